@@ -16,26 +16,37 @@ class Picture:
     """An SVG file, built from the back to the front."""
 
     def __init__(self, width, height, title):
-        self.parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
-                      'font-family="system-ui, sans-serif" font-size="13">',
-                      f"<title>{escape(title)}</title>", f'<rect width="{width}" height="{height}" fill="#ffffff"/>']
+        self.parts = [
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
+            'font-family="system-ui, sans-serif" font-size="13">',
+            f"<title>{escape(title)}</title>",
+            f'<rect width="{width}" height="{height}" fill="#ffffff"/>',
+        ]
 
     def line(self, points, colour=INK, width=1.5, dash="", opacity=1.0):
         path = " ".join(f"{number(x)},{number(y)}" for x, y in points)
-        extra = (f' stroke-dasharray="{dash}"' if dash else "") + (f' stroke-opacity="{opacity:g}"' if opacity != 1 else "")
-        self.parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="{width:g}" stroke-linejoin="round"{extra}/>')
+        extra = (f' stroke-dasharray="{dash}"' if dash else "") + (
+            f' stroke-opacity="{opacity:g}"' if opacity != 1 else ""
+        )
+        self.parts.append(
+            f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="{width:g}" stroke-linejoin="round"{extra}/>'
+        )
 
     def polygon(self, points, colour, opacity):
         path = " ".join(f"{number(x)},{number(y)}" for x, y in points)
         self.parts.append(f'<polygon points="{path}" fill="{colour}" fill-opacity="{opacity:g}"/>')
 
     def circle(self, x, y, radius, fill="none", stroke="none", width=1.5):
-        self.parts.append(f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(radius)}" fill="{fill}" stroke="{stroke}" stroke-width="{width:g}"/>')
+        self.parts.append(
+            f'<circle cx="{number(x)}" cy="{number(y)}" r="{number(radius)}" fill="{fill}" stroke="{stroke}" stroke-width="{width:g}"/>'
+        )
 
     def text(self, x, y, words, anchor="start", colour=INK, size=13, turn=0, weight=""):
         rotated = f' transform="rotate({turn} {number(x)} {number(y)})"' if turn else ""
         bold = f' font-weight="{weight}"' if weight else ""
-        self.parts.append(f'<text x="{number(x)}" y="{number(y)}" text-anchor="{anchor}" fill="{colour}" font-size="{size}"{bold}{rotated}>{escape(words)}</text>')
+        self.parts.append(
+            f'<text x="{number(x)}" y="{number(y)}" text-anchor="{anchor}" fill="{colour}" font-size="{size}"{bold}{rotated}>{escape(words)}</text>'
+        )
 
     def write(self, path):
         path.write_text("\n".join(self.parts) + "\n</svg>\n", encoding="utf-8")
@@ -44,8 +55,30 @@ class Picture:
 class Axes:
     """A rectangle of a picture with scales: x and y are (from, to), ticks are lists of values."""
 
-    def __init__(self, picture, left, top, width, height, x, y, x_ticks, y_ticks, x_name="", y_name="", form="{:g}"):
-        self.picture, self.left, self.top, self.width, self.height, self.x, self.y = picture, left, top, width, height, x, y
+    def __init__(
+        self,
+        picture,
+        left,
+        top,
+        width,
+        height,
+        x,
+        y,
+        x_ticks,
+        y_ticks,
+        x_name="",
+        y_name="",
+        form="{:g}",
+    ):
+        self.picture, self.left, self.top, self.width, self.height, self.x, self.y = (
+            picture,
+            left,
+            top,
+            width,
+            height,
+            x,
+            y,
+        )
         for tick in x_ticks:
             at = self.place(tick, y[0])[0]
             picture.line([(at, top), (at, top + height)], GRID, 1)
@@ -60,8 +93,10 @@ class Axes:
             picture.text(left - 44, top + height / 2, y_name, "middle", turn=-90)
 
     def place(self, x, y):
-        return (self.left + (x - self.x[0]) / (self.x[1] - self.x[0]) * self.width,
-                self.top + self.height - (y - self.y[0]) / (self.y[1] - self.y[0]) * self.height)
+        return (
+            self.left + (x - self.x[0]) / (self.x[1] - self.x[0]) * self.width,
+            self.top + self.height - (y - self.y[0]) / (self.y[1] - self.y[0]) * self.height,
+        )
 
     def curve(self, points, colour, width=2.0, dash="", opacity=1.0, dots=False):
         placed = [self.place(x, min(max(y, self.y[0]), self.y[1])) for x, y in points]
@@ -71,7 +106,12 @@ class Axes:
 
     def band(self, points, colour, opacity=0.12):
         """points: (x, lower, upper)."""
-        self.picture.polygon([self.place(x, low) for x, low, _ in points] + [self.place(x, high) for x, _, high in reversed(points)], colour, opacity)
+        self.picture.polygon(
+            [self.place(x, low) for x, low, _ in points]
+            + [self.place(x, high) for x, _, high in reversed(points)],
+            colour,
+            opacity,
+        )
 
 
 def floor(axes, path):
@@ -86,7 +126,9 @@ def floor(axes, path):
             axes.picture.line([axes.place(n[0], n[1]), axes.place(n[2], n[3])], INK, 2.5)
         elif words[0] == "box":
             corners = [axes.place(n[i], n[j]) for i, j in ((0, 1), (2, 1), (2, 3), (0, 3), (0, 1))]
-            outer = (n[2] - n[0]) * (n[3] - n[1]) > 0.5 * (axes.x[1] - axes.x[0]) * (axes.y[1] - axes.y[0])
+            outer = (n[2] - n[0]) * (n[3] - n[1]) > 0.5 * (axes.x[1] - axes.x[0]) * (
+                axes.y[1] - axes.y[0]
+            )
             if not outer:
                 axes.picture.polygon(corners, GREY, 0.35)
             axes.picture.line(corners, INK, 2.5 if outer else 1.2)
@@ -102,12 +144,24 @@ def simulate(hal, netlist, lines, pins, samples, every_s, ini=None):
     import sys
     import tempfile
     from pathlib import Path
-    script = [f"source {netlist}", *lines] + [f"advance {every_s:g}s", *(f"getp {pin}" for pin in pins)] * samples
+
+    script = [f"source {netlist}", *lines] + [
+        f"advance {every_s:g}s",
+        *(f"getp {pin}" for pin in pins),
+    ] * samples
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "run.hal")
         file.write_text("\n".join(script) + "\n", encoding="utf-8")
-        done = subprocess.run([hal, "sim", *(["-i", ini] if ini else []), file], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
-    words = [line for line in done.stdout.splitlines() if " " not in line]  # a line of words is what a component reports
+        done = subprocess.run(
+            [hal, "sim", *(["-i", ini] if ini else []), file],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    words = [
+        line for line in done.stdout.splitlines() if " " not in line
+    ]  # a line of words is what a component reports
     if done.returncode != 0:
         sys.exit(f"hal sim ended with status {done.returncode}:\n{done.stderr}")
-    return [words[i:i + len(pins)] for i in range(0, samples * len(pins), len(pins))]
+    return [words[i : i + len(pins)] for i in range(0, samples * len(pins), len(pins))]

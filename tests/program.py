@@ -21,6 +21,17 @@ def program(arguments=()):
 
 def environment(hal, folder):
     """No colours, no running instances, no home but `folder`."""
-    keep = {key: value for key, value in os.environ.items() if key in ("PATH", "HALCYON_PLUGIN_PATH", "QEMU_LD_PREFIX") or key.endswith("SAN_OPTIONS")}
-    return {**keep, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "TERM": "dumb", "HOME": folder, "XDG_RUNTIME_DIR": folder,
-            "PATH": f"{hal.parent}:{os.environ['PATH']}"}
+    keep = {
+        key: value
+        for key, value in os.environ.items()
+        if key in ("PATH", "HALCYON_PLUGIN_PATH", "QEMU_LD_PREFIX") or key.endswith("SAN_OPTIONS")
+    }
+    return {
+        **keep,
+        "LC_ALL": "C.UTF-8",
+        "NO_COLOR": "1",
+        "TERM": "dumb",
+        "HOME": folder,
+        "XDG_RUNTIME_DIR": folder,
+        "PATH": f"{hal.parent}:{os.environ['PATH']}",
+    }

@@ -11,9 +11,17 @@ for case in xml.parse(sys.argv[1]).iter("testcase"):
     said = (case.findtext("system-out") or "").strip()
     if case.find("skipped") is None:
         # A program of many tests: GoogleTest's short output has the reasons of those that it skipped.
-        reasons.update(found[1].strip() for found in re.finditer(r": Skipped\n(.*?)\n\n", said + "\n\n", re.S))
+        reasons.update(
+            found[1].strip() for found in re.finditer(r": Skipped\n(.*?)\n\n", said + "\n\n", re.S)
+        )
         continue
     googletest = re.search(r": Skipped\n(.*?)\n\[  SKIPPED ", said, re.S)
-    reasons[googletest[1].strip() if googletest else said.splitlines()[-1] if said else "no reason given"] += 1
+    reasons[
+        googletest[1].strip()
+        if googletest
+        else said.splitlines()[-1]
+        if said
+        else "no reason given"
+    ] += 1
 for reason, count in sorted(reasons.items()):
     print(f"    {count:>4}  {reason}")

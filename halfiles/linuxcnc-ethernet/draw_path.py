@@ -12,11 +12,24 @@ def read(path):
     with open(path, newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     time_key = next(key for key in rows[0] if key.startswith("time"))
-    rows = [row for row in rows if all(row[f"joint.{joint}.motor-pos-{end}"] for joint in range(len(AXES)) for end in ("cmd", "fb"))]
+    rows = [
+        row
+        for row in rows
+        if all(
+            row[f"joint.{joint}.motor-pos-{end}"]
+            for joint in range(len(AXES))
+            for end in ("cmd", "fb")
+        )
+    ]
     times = [float(row[time_key]) for row in rows]
     times = [time - times[0] for time in times]
-    pairs = {axis: [(float(row[f"joint.{joint}.motor-pos-cmd"]), float(row[f"joint.{joint}.motor-pos-fb"])) for row in rows]
-             for joint, axis in enumerate(AXES)}
+    pairs = {
+        axis: [
+            (float(row[f"joint.{joint}.motor-pos-cmd"]), float(row[f"joint.{joint}.motor-pos-fb"]))
+            for row in rows
+        ]
+        for joint, axis in enumerate(AXES)
+    }
     return times, pairs
 
 
@@ -25,22 +38,33 @@ def main():
     times, pairs = read(source)
     # the feedback of a cycle belongs to the command of two cycles before: it has crossed the segment twice
     late = 2
-    errors = {axis: [command - feedback for (command, _), (_, feedback) in zip(values, values[late:])] for axis, values in pairs.items()}
+    errors = {
+        axis: [command - feedback for (command, _), (_, feedback) in zip(values, values[late:])]
+        for axis, values in pairs.items()
+    }
     for axis, values in errors.items():
-        print(f"{axis}: following error {max(map(abs, values)):.3f} {'mm' if axis in 'XYZ' else 'degrees'} at most", flush=True)
+        print(
+            f"{axis}: following error {max(map(abs, values)):.3f} {'mm' if axis in 'XYZ' else 'degrees'} at most",
+            flush=True,
+        )
     try:
         import matplotlib
+
         matplotlib.use("agg")
         from matplotlib import collections, pyplot
     except ImportError:
         print("no picture: it needs matplotlib (sudo apt-get install python3-matplotlib)")
         return
-    figure, (path, over_time) = pyplot.subplots(1, 2, figsize=(12, 5.5), gridspec_kw={"width_ratios": [1, 1.2]})
+    figure, (path, over_time) = pyplot.subplots(
+        1, 2, figsize=(12, 5.5), gridspec_kw={"width_ratios": [1, 1.2]}
+    )
     points = [(x, y) for (_, x), (_, y) in zip(pairs["X"][late:], pairs["Y"][late:])]
     size = [(x * x + y * y) ** 0.5 for x, y in zip(errors["X"], errors["Y"])]
     step = max(1, len(points) // 4000)
     kept = points[::step]
-    lines = collections.LineCollection(list(zip(kept, kept[1:])), array=size[::step][1:], cmap="viridis", linewidths=1.6)
+    lines = collections.LineCollection(
+        list(zip(kept, kept[1:])), array=size[::step][1:], cmap="viridis", linewidths=1.6
+    )
     path.add_collection(lines)
     path.set_aspect("equal")
     path.autoscale()

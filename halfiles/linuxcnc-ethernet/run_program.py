@@ -31,12 +31,25 @@ def wait(what, condition, seconds=float("inf")):
         if condition():
             return
         time.sleep(0.01)
-    sys.exit(f"run_program: {what}: not within {seconds} s; " + ("; ".join(messages()) or "LinuxCNC gives no reason"))
+    sys.exit(
+        f"run_program: {what}: not within {seconds} s; "
+        + ("; ".join(messages()) or "LinuxCNC gives no reason")
+    )
 
 
 def counts():
     """Cycles of the servo thread so far, and how many of them it missed."""
-    return [int(subprocess.run(["hal", "shell", "getp", f"servo-thread.{pin}"], capture_output=True, text=True, check=True).stdout) for pin in ("threadbeat", "missed")]
+    return [
+        int(
+            subprocess.run(
+                ["hal", "shell", "getp", f"servo-thread.{pin}"],
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout
+        )
+        for pin in ("threadbeat", "missed")
+    ]
 
 
 def main():
@@ -59,8 +72,12 @@ def main():
     wait("homing", lambda: all(status.homed[: len(AXES)]), 10)
     print("homed; running " + program.name, flush=True)
 
-    values = [f"joint.{joint}.motor-pos-{end}" for joint in range(len(AXES)) for end in ("cmd", "fb")] + ["motion.in-position"]
-    record = subprocess.Popen(["hal", "record", OUT / "path.csv", *values], stdout=subprocess.DEVNULL)
+    values = [
+        f"joint.{joint}.motor-pos-{end}" for joint in range(len(AXES)) for end in ("cmd", "fb")
+    ] + ["motion.in-position"]
+    record = subprocess.Popen(
+        ["hal", "record", OUT / "path.csv", *values], stdout=subprocess.DEVNULL
+    )
     command.mode(linuxcnc.MODE_AUTO)
     command.wait_complete()
     command.program_open(str(program))
@@ -68,7 +85,11 @@ def main():
     begin = time.monotonic()
     command.auto(linuxcnc.AUTO_RUN, 0)
     wait("start of the program", lambda: status.interp_state != linuxcnc.INTERP_IDLE, 5)
-    wait("end of the program", lambda: status.interp_state == linuxcnc.INTERP_IDLE or status.task_state != linuxcnc.STATE_ON)
+    wait(
+        "end of the program",
+        lambda: status.interp_state == linuxcnc.INTERP_IDLE
+        or status.task_state != linuxcnc.STATE_ON,
+    )
     seconds = time.monotonic() - begin
     failed = messages()
     if status.task_state != linuxcnc.STATE_ON:
@@ -79,8 +100,13 @@ def main():
     if failed:
         sys.exit("run_program: " + "; ".join(failed))
     cycles, missed = (after - start for after, start in zip(counts(), before))
-    print(f"{program.name} took {seconds:.1f} s; of {cycles + missed} cycles of the servo thread {missed} were missed", flush=True)
-    subprocess.run([sys.executable, HERE / "draw_path.py", OUT / "path.csv", OUT / "path.png"], check=True)
+    print(
+        f"{program.name} took {seconds:.1f} s; of {cycles + missed} cycles of the servo thread {missed} were missed",
+        flush=True,
+    )
+    subprocess.run(
+        [sys.executable, HERE / "draw_path.py", OUT / "path.csv", OUT / "path.png"], check=True
+    )
 
 
 if __name__ == "__main__":

@@ -21,9 +21,17 @@ def wait_for_changes():
             confirmed_at = None
             panel["changed"] = False
         elif confirmed_at is None:
-            print(f"tool panel: insert tool {panel['number']}" + (" and press Enter" if sys.stdin.isatty() else ""), flush=True)
+            print(
+                f"tool panel: insert tool {panel['number']}"
+                + (" and press Enter" if sys.stdin.isatty() else ""),
+                flush=True,
+            )
             confirmed_at = time.monotonic() + 0.5
-        elif select.select([sys.stdin], [], [], 0)[0] and sys.stdin.readline() if sys.stdin.isatty() else time.monotonic() > confirmed_at:
+        elif (
+            select.select([sys.stdin], [], [], 0)[0] and sys.stdin.readline()
+            if sys.stdin.isatty()
+            else time.monotonic() > confirmed_at
+        ):
             panel["changed"] = True
         time.sleep(0.02)
 

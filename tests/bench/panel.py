@@ -18,8 +18,14 @@ from web import Browser, have_browser, request, start_panel  # noqa: E402
 
 SECONDS = float(sys.argv[2]) if len(sys.argv) > 2 else 10
 NAMES = [f"wave{i}" for i in range(16)]
-NETLIST = f"loadrt threads name1=servo period1=100000\nloadrt siggen names={','.join(NAMES)}\n" + "".join(
-    f"setp {name}.frequency {3 + i}\naddf {name}.update servo\nnet {name}-sine {name}.sine\n" for i, name in enumerate(NAMES)) + "start\n"
+NETLIST = (
+    f"loadrt threads name1=servo period1=100000\nloadrt siggen names={','.join(NAMES)}\n"
+    + "".join(
+        f"setp {name}.frequency {3 + i}\naddf {name}.update servo\nnet {name}-sine {name}.sine\n"
+        for i, name in enumerate(NAMES)
+    )
+    + "start\n"
+)
 FILE = r"""(?:href|src)="([\w.]+)"|(?:from |import\()'\./([\w.]+)'"""
 FIRST_PICTURE = """(() => {
     const look = () => {
@@ -55,7 +61,9 @@ def process_s(pid):
 
 
 def row(what, unit, figure, goal=""):
-    print(f"{what:62} {figure:9.4g} {unit:3} {f'target {goal}' if goal else ''}".rstrip(), flush=True)
+    print(
+        f"{what:62} {figure:9.4g} {unit:3} {f'target {goal}' if goal else ''}".rstrip(), flush=True
+    )
 
 
 def first_picture(browser, port):
@@ -78,7 +86,9 @@ def page_size(port):
         if path not in seen:
             body = request(port, path)[2]
             seen[path] = len(body)
-            waiting += ["/" + name for found in re.findall(FILE, body.decode()) for name in found if name]
+            waiting += [
+                "/" + name for found in re.findall(FILE, body.decode()) for name in found if name
+            ]
     row(f"page, {len(seen)} files", "kB", sum(seen.values()) / 1000, "<= 200")
 
 
@@ -86,39 +96,59 @@ def floor(browser):
     """What an empty canvas of the scope's size costs in this browser."""
     browser.open("about:blank")
     browser.wait("location.href === 'about:blank'")
-    browser.evaluate("""(() => {
+    browser.evaluate(
+        """(() => {
         const canvas = document.createElement('canvas'), draw = canvas.getContext('2d');
         document.body.append(canvas);
         [canvas.width, canvas.height] = [innerWidth - 16, innerHeight - 100];
         let x = 0;
         const look = () => { draw.clearRect(0, 0, canvas.width, canvas.height); draw.fillRect(x++ % 100, 9, 9, 9); requestAnimationFrame(look); };
         look();
-    })()""")
+    })()"""
+    )
     time.sleep(2)
     cpu, begun = ticks(browser.process.pid), time.monotonic()
     time.sleep(SECONDS)
-    row("CPU of the browser with an empty canvas, 60 frames/s", "%", 100 * (ticks(browser.process.pid) - cpu) / (time.monotonic() - begun))
+    row(
+        "CPU of the browser with an empty canvas, 60 frames/s",
+        "%",
+        100 * (ticks(browser.process.pid) - cpu) / (time.monotonic() - begun),
+    )
 
 
 def scope(browser, port, panel):
     channels = ",".join(f"{name}-sine:1:{3.5 - 7 * i / 15:.3g}" for i, name in enumerate(NAMES))
-    for mode, query in (("roll", "mode=roll"), ("triggered", f"mode=normal&trigger={NAMES[0]}-sine&edge=rising&level=0")):
+    for mode, query in (
+        ("roll", "mode=roll"),
+        ("triggered", f"mode=normal&trigger={NAMES[0]}-sine&edge=rising&level=0"),
+    ):
         browser.open("about:blank")
         browser.wait("location.href === 'about:blank'")
         browser.open(f"http://localhost:{port}/#/scope?ch={channels}&base=0.1&{query}")
         browser.wait("window.halcyonScope?.rows > 20000")
         time.sleep(5)  # a browser that has just started is busy with its own pages
-        before = browser.evaluate("({...halcyonScope, store: null, at: performance.now(), bytes: halcyon.stats.bytes})")
+        before = browser.evaluate(
+            "({...halcyonScope, store: null, at: performance.now(), bytes: halcyon.stats.bytes})"
+        )
         cpu, server = ticks(browser.process.pid), process_s(panel.pid)
         time.sleep(SECONDS)
-        after = browser.evaluate("({...halcyonScope, store: null, at: performance.now(), bytes: halcyon.stats.bytes})")
+        after = browser.evaluate(
+            "({...halcyonScope, store: null, at: performance.now(), bytes: halcyon.stats.bytes})"
+        )
         cpu, server = ticks(browser.process.pid) - cpu, process_s(panel.pid) - server
         passed = (after["at"] - before["at"]) / 1000
-        row(f"scope, 16 channels at 10 kHz, {mode}: frames per second", "", (after["frames"] - before["frames"]) / passed, ">= 60" if mode == "roll" else "")
+        row(
+            f"scope, 16 channels at 10 kHz, {mode}: frames per second",
+            "",
+            (after["frames"] - before["frames"]) / passed,
+            ">= 60" if mode == "roll" else "",
+        )
         row(f"rows per second in the page, {mode}", "", (after["rows"] - before["rows"]) / passed)
         row(f"lost rows, {mode}", "", after["lost"] - before["lost"], "<= 0")
         row(f"cycles that the machine missed itself, {mode}", "", after["gaps"] - before["gaps"])
-        row(f"CPU of the browser and hal-panel, {mode}", "%", 100 * (cpu + server) / passed, "<= 30")
+        row(
+            f"CPU of the browser and hal-panel, {mode}", "%", 100 * (cpu + server) / passed, "<= 30"
+        )
         row(f"of which hal-panel, {mode}", "%", 100 * server / passed)
 
 

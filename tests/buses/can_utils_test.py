@@ -29,14 +29,36 @@ wait $dump
 kill $candump
 for name in x ta tz tA colours none binary; do "$1" can dump replay:$name.log >$name.dump 2>&1 || true; done
 """
-SENT = ["123#1122AABB", "18FF0001#00", "321#R4", "123##1AABB", "181#0102", "18FF0002#03", "322#R2", "124##0CC", "000#0105"]
-MEANT = [("123", "11 22 AA BB"), ("18FF0001", "00"), ("321", "remote request, 4 bytes"), ("123", "AA BB"), ("181", "01 02"), ("18FF0002", "03"),
-         ("322", "remote request, 2 bytes"), ("124", "CC"), ("000", "01 05")]
+SENT = [
+    "123#1122AABB",
+    "18FF0001#00",
+    "321#R4",
+    "123##1AABB",
+    "181#0102",
+    "18FF0002#03",
+    "322#R2",
+    "124##0CC",
+    "000#0105",
+]
+MEANT = [
+    ("123", "11 22 AA BB"),
+    ("18FF0001", "00"),
+    ("321", "remote request, 4 bytes"),
+    ("123", "AA BB"),
+    ("181", "01 02"),
+    ("18FF0002", "03"),
+    ("322", "remote request, 2 bytes"),
+    ("124", "CC"),
+    ("000", "01 05"),
+]
 
 
 def seen(file):
     """The identifiers and bytes that hal can dump printed."""
-    lines = [re.match(r" *[\d.]+  rx +(\w+)  \[\d\](?: FD\+?)? (.*?)(?:  |$)", line) for line in file.read_text().splitlines()]
+    lines = [
+        re.match(r" *[\d.]+  rx +(\w+)  \[\d\](?: FD\+?)? (.*?)(?:  |$)", line)
+        for line in file.read_text().splitlines()
+    ]
     return [line.groups() for line in lines if line]
 
 
@@ -54,8 +76,12 @@ def main(hal):
         if status != 0:
             return status
         # candump of some versions has the mark of FD, 4, among the flags.
-        flags = lambda line: re.sub(r"##(\w)", lambda m: f"##{int(m[1], 16) & 3:X}", line.split()[2])
-        candump = [flags(line) for line in Path(folder, "heard-by-candump").read_text().splitlines()]
+        flags = lambda line: re.sub(
+            r"##(\w)", lambda m: f"##{int(m[1], 16) & 3:X}", line.split()[2]
+        )
+        candump = [
+            flags(line) for line in Path(folder, "heard-by-candump").read_text().splitlines()
+        ]
         ours = seen(Path(folder, "heard-by-hal"))
         for what, expected, got in (("candump", SENT, candump), ("hal can dump", MEANT, ours)):
             if expected != got:
@@ -67,7 +93,10 @@ def main(hal):
             if read != MEANT:
                 print(f"{name}.log of candump is read as {read}\n  instead of {MEANT}")
                 return 1
-        for name, reason in (("none", "terminal format of candump, without times"), ("binary", "terminal format of candump, not with plain hexadecimal bytes")):
+        for name, reason in (
+            ("none", "terminal format of candump, without times"),
+            ("binary", "terminal format of candump, not with plain hexadecimal bytes"),
+        ):
             text = Path(folder, name + ".dump").read_text()
             if reason not in text:
                 print(f"{name}.log of candump is not named: {text}")

@@ -27,7 +27,12 @@ until grep -q "ready to switch on" said-drive; do sleep 0.05; done
 kill -INT $pids
 wait $pids
 """
-EXPECTED = ["2 pre-operational 0x00020192", "4 pre-operational 0x00000000", "5 pre-operational 0x000F0191", "80 pre-operational 0x00040194"]
+EXPECTED = [
+    "2 pre-operational 0x00020192",
+    "4 pre-operational 0x00000000",
+    "5 pre-operational 0x000F0191",
+    "80 pre-operational 0x00040194",
+]
 
 
 def main(hal):
@@ -44,7 +49,11 @@ def main(hal):
         print(done.stdout)
         if done.returncode != 0:
             return done.returncode
-        rows = [" ".join(line.split()[:3]) for line in done.stdout.splitlines() if "pre-operational" in line]
+        rows = [
+            " ".join(line.split()[:3])
+            for line in done.stdout.splitlines()
+            if "pre-operational" in line
+        ]
         if rows != EXPECTED or "1.0" not in done.stdout or "1028" not in done.stdout:
             print(f"found {rows}\ninstead of {EXPECTED}, program 1.0 and product 1028 (0x404)")
             return 1

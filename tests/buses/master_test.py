@@ -64,7 +64,14 @@ SENTENCES = [  # of `show fault`, with # for what differs
     "x: run: drive lost: node no longer operational at cycle #; axis stopped; see: show pin x",
     "canopen.0: bus down: the interface is off or was removed at cycle #; the master retries; see: show pin canopen.0",
 ]
-EXPECTED = ["it moves", "getp canopen.0.x.fault TRUE", "getp canopen.0.bus-off TRUE", "getp canopen.0.bus-off FALSE", "machine ended", "drive ended"]
+EXPECTED = [
+    "it moves",
+    "getp canopen.0.x.fault TRUE",
+    "getp canopen.0.bus-off TRUE",
+    "getp canopen.0.bus-off FALSE",
+    "machine ended",
+    "drive ended",
+]
 
 
 def main(hal):
@@ -77,26 +84,63 @@ def main(hal):
     source = Path(__file__).resolve().parents[2] / "halfiles" / "canopen-axis"
     with tempfile.TemporaryDirectory() as folder:
         axis = (source / "axis.hal").read_text().replace("period1=1000000", "period1=10000000")
-        config = (source / "axis.canopen").read_text().replace("sim:axis", "can:vcan0").replace("period-value = 1", "period-value = 10")
-        config = config.replace("sync    = cycle", "sync    = cycle\nheartbeat = 400ms").replace("heartbeat = 50ms", "heartbeat = 400ms")
-        if "10000000" not in axis or "can:vcan0" not in config or "period-value = 10" not in config or config.count("400ms") != 2:
+        config = (
+            (source / "axis.canopen")
+            .read_text()
+            .replace("sim:axis", "can:vcan0")
+            .replace("period-value = 1", "period-value = 10")
+        )
+        config = config.replace("sync    = cycle", "sync    = cycle\nheartbeat = 400ms").replace(
+            "heartbeat = 50ms", "heartbeat = 400ms"
+        )
+        if (
+            "10000000" not in axis
+            or "can:vcan0" not in config
+            or "period-value = 10" not in config
+            or config.count("400ms") != 2
+        ):
             print("the halfile is not as this test knows it")
             return 1
-        for name, text in (("axis.hal", axis), ("axis.canopen", config), ("slow.hal", SLOW), ("script", SCRIPT)):
+        for name, text in (
+            ("axis.hal", axis),
+            ("axis.canopen", config),
+            ("slow.hal", SLOW),
+            ("script", SCRIPT),
+        ):
             Path(folder, name).write_text(text)
-        command = on_vcan0(["env", f"HOME={folder}", f"XDG_RUNTIME_DIR={folder}", "TERM=dumb", "sh", "script", str(hal)], 200)
+        command = on_vcan0(
+            [
+                "env",
+                f"HOME={folder}",
+                f"XDG_RUNTIME_DIR={folder}",
+                "TERM=dumb",
+                "sh",
+                "script",
+                str(hal),
+            ],
+            200,
+        )
         began = time.monotonic()
         done = subprocess.run(command, cwd=folder, check=False, stdout=subprocess.PIPE, text=True)
         print(done.stdout)
         print(f"{time.monotonic() - began:.1f} s")
         if done.returncode != 0:
             for output in ("machine.output", "drive.output"):
-                print(f"--- {output}\n{Path(folder, output).read_text() if Path(folder, output).exists() else 'nothing'}")
+                print(
+                    f"--- {output}\n{Path(folder, output).read_text() if Path(folder, output).exists() else 'nothing'}"
+                )
             return done.returncode
         lines = done.stdout.splitlines()
-        faults = {re.sub(r"(cycle|for) [\d.]+( \d{3})*", r"\1 #", re.split(r" ago(?: \(lasts\))?  ", line)[1])
-                  for line in lines if re.search(r" ago(?: \(lasts\))?  ", line)}
-        if missing := [line for line in EXPECTED if line not in lines] + [line for line in SENTENCES if line not in faults]:
+        faults = {
+            re.sub(
+                r"(cycle|for) [\d.]+( \d{3})*", r"\1 #", re.split(r" ago(?: \(lasts\))?  ", line)[1]
+            )
+            for line in lines
+            if re.search(r" ago(?: \(lasts\))?  ", line)
+        }
+        if missing := [line for line in EXPECTED if line not in lines] + [
+            line for line in SENTENCES if line not in faults
+        ]:
             print("missing:", *missing, sep="\n")
             return 1
     return 0

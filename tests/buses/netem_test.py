@@ -6,5 +6,13 @@ import sys
 from pathlib import Path
 
 tests = Path(sys.argv[1]).with_name("ethernet_tests")
-command = ["env", "HALCYON_MAY_SET_CLOCK=1", str(tests), "--gtest_filter=Raw.lost*:Raw.stamps*", "--gtest_brief=1"]
-sys.exit(subprocess.run([str(Path(__file__).parent / "uml" / "run"), "-t", "120", *command]).returncode)
+command = [
+    "env",
+    "HALCYON_MAY_SET_CLOCK=1",
+    str(tests),
+    "--gtest_filter=Raw.lost*:Raw.stamps*",
+    "--gtest_brief=1",
+]
+sys.exit(
+    subprocess.run([str(Path(__file__).parent / "uml" / "run"), "-t", "120", *command]).returncode
+)

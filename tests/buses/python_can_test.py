@@ -21,15 +21,26 @@ FRAMES = [
     dict(arbitration_id=0x701, is_extended_id=False, is_remote_frame=True, dlc=1),
 ]
 FD_FRAMES = [
-    dict(arbitration_id=0x321, is_extended_id=False, is_fd=True, data=[7] * 64, bitrate_switch=True),
+    dict(
+        arbitration_id=0x321, is_extended_id=False, is_fd=True, data=[7] * 64, bitrate_switch=True
+    ),
     dict(arbitration_id=0x12345, is_extended_id=True, is_fd=True, data=list(range(12))),
 ]
 
 
 def contents(frame):
     """What a bus carries of a frame: not when, where or by whom (Message.equals of older versions compares those, too)."""
-    return (frame.arbitration_id, frame.is_extended_id, frame.is_remote_frame, frame.is_error_frame, frame.is_fd, frame.bitrate_switch,
-            frame.error_state_indicator, frame.dlc, bytes(frame.data))
+    return (
+        frame.arbitration_id,
+        frame.is_extended_id,
+        frame.is_remote_frame,
+        frame.is_error_frame,
+        frame.is_fd,
+        frame.bitrate_switch,
+        frame.error_state_indicator,
+        frame.dlc,
+        bytes(frame.data),
+    )
 
 
 def exchange(bus, program, address, frames):
@@ -69,7 +80,9 @@ def serial_line(program):
         raise OSError("socat is missing; type: sudo apt install socat")
     with tempfile.TemporaryDirectory() as folder:
         ends = [f"{folder}/{side}" for side in "ab"]
-        relay = subprocess.Popen(["socat", f"pty,raw,echo=0,link={ends[0]}", f"pty,raw,echo=0,link={ends[1]}"])
+        relay = subprocess.Popen(
+            ["socat", f"pty,raw,echo=0,link={ends[0]}", f"pty,raw,echo=0,link={ends[1]}"]
+        )
         try:
             while not all(os.path.exists(e) for e in ends):
                 time.sleep(0.05)

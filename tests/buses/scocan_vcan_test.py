@@ -85,11 +85,33 @@ def main(hal):
         print("a sanitizer inside user-mode-linux is too slow")
         return 77
     with tempfile.TemporaryDirectory() as folder:
-        for name, text in (("slow.scocan", TABLE), ("script", SCRIPT),
-                           ("clock.hal", NETLIST.format(component="scocan_sync", node="clock", instance="scocan-sync.0", more=SPREAD)),
-                           ("motor.hal", NETLIST.format(component="scocan", node="motor", instance="scocan.0", more=""))):
+        for name, text in (
+            ("slow.scocan", TABLE),
+            ("script", SCRIPT),
+            (
+                "clock.hal",
+                NETLIST.format(
+                    component="scocan_sync", node="clock", instance="scocan-sync.0", more=SPREAD
+                ),
+            ),
+            (
+                "motor.hal",
+                NETLIST.format(component="scocan", node="motor", instance="scocan.0", more=""),
+            ),
+        ):
             Path(folder, name).write_text(text)
-        command = on_vcan0(["env", f"HOME={folder}", f"XDG_RUNTIME_DIR={folder}", "TERM=dumb", "sh", "script", str(hal)], 280)
+        command = on_vcan0(
+            [
+                "env",
+                f"HOME={folder}",
+                f"XDG_RUNTIME_DIR={folder}",
+                "TERM=dumb",
+                "sh",
+                "script",
+                str(hal),
+            ],
+            280,
+        )
         done = subprocess.run(command, cwd=folder, check=False, stdout=subprocess.PIPE, text=True)
         print(done.stdout)
         missing = [line for line in EXPECTED.splitlines() if line not in done.stdout.splitlines()]
@@ -97,7 +119,9 @@ def main(hal):
             return 0
         print("missing:", *missing, sep="\n")
         for output in ("clock.output", "motor.output"):
-            print(f"--- {output}\n{Path(folder, output).read_text() if Path(folder, output).exists() else 'nothing'}")
+            print(
+                f"--- {output}\n{Path(folder, output).read_text() if Path(folder, output).exists() else 'nothing'}"
+            )
         return done.returncode or 1
 
 

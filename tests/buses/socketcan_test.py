@@ -6,4 +6,8 @@ import sys
 
 from vcan import on_vcan0
 
-sys.exit(subprocess.run(on_vcan0([sys.argv[1], "--gtest_filter=Socketcan.*", "--gtest_brief=1"], 120)).returncode)
+sys.exit(
+    subprocess.run(
+        on_vcan0([sys.argv[1], "--gtest_filter=Socketcan.*", "--gtest_brief=1"], 120)
+    ).returncode
+)

@@ -18,12 +18,37 @@ def ip(*words):
 
 def datagram(identifier):
     """A frame as python-can packs it (msgpack, eleven keys)."""
+
     def key(name):
         return bytes([0xA0 | len(name)]) + name.encode()
-    return (b"\x8b" + key("timestamp") + b"\xcb" + bytes(8) + key("arbitration_id") + b"\xcd" + struct.pack(">H", identifier)
-            + key("is_extended_id") + b"\xc2" + key("is_remote_frame") + b"\xc2" + key("is_error_frame") + b"\xc2" + key("channel") + b"\xc0"
-            + key("dlc") + b"\x01" + key("data") + b"\xc4\x01\x07" + key("is_fd") + b"\xc2" + key("bitrate_switch") + b"\xc2"
-            + key("error_state_indicator") + b"\xc2")
+
+    return (
+        b"\x8b"
+        + key("timestamp")
+        + b"\xcb"
+        + bytes(8)
+        + key("arbitration_id")
+        + b"\xcd"
+        + struct.pack(">H", identifier)
+        + key("is_extended_id")
+        + b"\xc2"
+        + key("is_remote_frame")
+        + b"\xc2"
+        + key("is_error_frame")
+        + b"\xc2"
+        + key("channel")
+        + b"\xc0"
+        + key("dlc")
+        + b"\x01"
+        + key("data")
+        + b"\xc4\x01\x07"
+        + key("is_fd")
+        + b"\xc2"
+        + key("bitrate_switch")
+        + b"\xc2"
+        + key("error_state_indicator")
+        + b"\xc2"
+    )
 
 
 def peer():
@@ -32,7 +57,11 @@ def peer():
     end.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     end.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
     end.bind(("", PORT))
-    end.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(GROUP) + socket.inet_aton("10.9.0.1"))
+    end.setsockopt(
+        socket.IPPROTO_IP,
+        socket.IP_ADD_MEMBERSHIP,
+        socket.inet_aton(GROUP) + socket.inet_aton("10.9.0.1"),
+    )
     end.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("10.9.0.1"))
     end.settimeout(0.2)
     return end
@@ -68,13 +97,24 @@ def up():
 def inside(program):
     ip("link", "set", "lo", "up")
     plug()
-    ours = subprocess.Popen([program, "--echo", f"udp:{GROUP}:{PORT}"], stdout=subprocess.PIPE, text=True)
+    ours = subprocess.Popen(
+        [program, "--echo", f"udp:{GROUP}:{PORT}"], stdout=subprocess.PIPE, text=True
+    )
     try:
         line = ours.stdout.readline().strip()
         if line != "open":
             return print(line) or 1
-        steps = [("as it was opened", lambda: None), ("after it was down", lambda: (ip("link", "set", "bus0", "down"), time.sleep(0.1), up())),
-                 ("after it was taken away", lambda: (ip("link", "delete", "bus0"), time.sleep(0.1), plug()))]
+        steps = [
+            ("as it was opened", lambda: None),
+            (
+                "after it was down",
+                lambda: (ip("link", "set", "bus0", "down"), time.sleep(0.1), up()),
+            ),
+            (
+                "after it was taken away",
+                lambda: (ip("link", "delete", "bus0"), time.sleep(0.1), plug()),
+            ),
+        ]
         for number, (what, does) in enumerate(steps):
             does()
             if not answered(0x120 + 2 * number):
@@ -89,12 +129,20 @@ def inside(program):
 def main():
     if os.environ.get("HALCYON_NAMESPACE"):
         return inside(sys.argv[1])
-    can = subprocess.run(["unshare", "-rn", "ip", "link", "add", "bus0", "type", "veth", "peer", "name", "bus1"], check=False, capture_output=True, text=True)
+    can = subprocess.run(
+        ["unshare", "-rn", "ip", "link", "add", "bus0", "type", "veth", "peer", "name", "bus1"],
+        check=False,
+        capture_output=True,
+        text=True,
+    )
     if can.returncode != 0:
         print(f"no network namespace of our own: {can.stderr.strip()}")
         return 77
-    return subprocess.run(["unshare", "-rn", sys.executable, __file__, *sys.argv[1:]], env={**os.environ, "HALCYON_NAMESPACE": "1"},
-                          check=False).returncode
+    return subprocess.run(
+        ["unshare", "-rn", sys.executable, __file__, *sys.argv[1:]],
+        env={**os.environ, "HALCYON_NAMESPACE": "1"},
+        check=False,
+    ).returncode
 
 
 if __name__ == "__main__":

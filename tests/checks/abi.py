@@ -64,12 +64,16 @@ def describe(header, text):
             continue
         yield f'printf("    {kind} {name}, size %zu, alignment %zu\\n", sizeof({name}), _Alignof({name}));'
         for member, declaration in members(body):
-            yield (f'printf("        %zu, size %zu: {quoted(declaration)}\\n", offsetof({name}, {member}), '
-                   f'sizeof((({name} *)0)->{member}));')
+            yield (
+                f'printf("        %zu, size %zu: {quoted(declaration)}\\n", offsetof({name}, {member}), '
+                f"sizeof((({name} *)0)->{member}));"
+            )
     for body in UNNAMED.findall(text):
         for one in enumerators(body):
             yield f'printf("    constant {one} = %lld\\n", (long long){one});'
-    for declaration in re.findall(r"^(?:typedef [^{};]*\(\*\w+\)[^{};]*|extern [^{};\"]*);", text, re.MULTILINE):
+    for declaration in re.findall(
+        r"^(?:typedef [^{};]*\(\*\w+\)[^{};]*|extern [^{};\"]*);", text, re.MULTILINE
+    ):
         yield f'puts("    {quoted(one_line(declaration))}");'
 
 
@@ -87,8 +91,14 @@ def layout(root):
     statements = "\n".join(line for h in headers for line in describe(h.name, h.read_text()))
     with tempfile.TemporaryDirectory() as folder:
         source, program = Path(folder, "layout.c"), Path(folder, "layout")
-        source.write_text(f"{includes}#include <stdio.h>\nint main(void) {{\nif (sizeof(void *) != 8 || sizeof(long) != 8) return 77;\n{statements}\n}}\n")
-        made = subprocess.run([compiler, "-std=c11", f"-I{root}/runtime/abi", "-o", program, source], capture_output=True, text=True)
+        source.write_text(
+            f"{includes}#include <stdio.h>\nint main(void) {{\nif (sizeof(void *) != 8 || sizeof(long) != 8) return 77;\n{statements}\n}}\n"
+        )
+        made = subprocess.run(
+            [compiler, "-std=c11", f"-I{root}/runtime/abi", "-o", program, source],
+            capture_output=True,
+            text=True,
+        )
         if made.returncode != 0:
             sys.exit(made.stderr)
         ran = subprocess.run([program], capture_output=True, text=True)
@@ -102,7 +112,9 @@ def entries(lines):
         if not line.startswith(" "):
             header = owner = line
         elif not line.startswith("        "):
-            owner = line.strip().split(",")[0] if re.match(r" *(struct|union|enum) ", line) else header
+            owner = (
+                line.strip().split(",")[0] if re.match(r" *(struct|union|enum) ", line) else header
+            )
             if owner == header:
                 found.setdefault(header, {}).setdefault("", []).append(line.strip())
             else:
@@ -119,7 +131,9 @@ def differences(old, new):
         before, after = old.get(header, {}), new.get(header, {})
         for owner in [*before, *(o for o in after if o not in before)]:
             had, has = before.get(owner, []), after.get(owner, [])
-            grows = not owner.startswith(("struct", "union")) or bool(had and re.search(r": (uint32_t|size_t) size$", had[0]))
+            grows = not owner.startswith(("struct", "union")) or bool(
+                had and re.search(r": (uint32_t|size_t) size$", had[0])
+            )
             place = owner or "declarations"
             if owner and owner not in before:
                 yield header, True, f"{place}: new"
@@ -127,31 +141,49 @@ def differences(old, new):
             if owner and owner not in after:
                 yield header, False, f"{place}: removed"
                 continue
-            versions = {line for line in had + has if re.match(r"define HAL_ABI_(MAJOR|MINOR) ", line)}
+            versions = {
+                line for line in had + has if re.match(r"define HAL_ABI_(MAJOR|MINOR) ", line)
+            }
             for line in had:
                 if line not in has and line not in versions:
                     yield header, False, f"{place}: no longer as recorded: {line}"
-            at_end = has[:len(had)] == had
+            at_end = has[: len(had)] == had
             for line in has:
                 if line not in had and line not in versions:
-                    yield header, not owner.startswith(("struct", "union")) or (grows and at_end), f"{place}: new: {line}"
+                    yield header, not owner.startswith(("struct", "union")) or (
+                        grows and at_end
+                    ), f"{place}: new: {line}"
 
 
 def number(lines, name):
-    return next((int(line.split()[2]) for line in lines if line.strip().startswith(f"define {name} ")), 0)
+    return next(
+        (int(line.split()[2]) for line in lines if line.strip().startswith(f"define {name} ")), 0
+    )
 
 
 def demands(old, new):
     """What the difference still requires before it may be recorded: sentences."""
     found = list(differences(old, new))
-    major, minor = (number(new, name) - number(old, name) for name in ("HAL_ABI_MAJOR", "HAL_ABI_MINOR"))
+    major, minor = (
+        number(new, name) - number(old, name) for name in ("HAL_ABI_MAJOR", "HAL_ABI_MINOR")
+    )
     if major > 0:
         return []
     needed = []
     for header in sorted({header for header, compatible, _ in found if not compatible}):
-        ids = [{line.strip() for line in lines_of(lines, header) if re.search(r'define \w+ "hal\.\w+/\d+"', line)} for lines in (old, new)]
+        ids = [
+            {
+                line.strip()
+                for line in lines_of(lines, header)
+                if re.search(r'define \w+ "hal\.\w+/\d+"', line)
+            }
+            for lines in (old, new)
+        ]
         if not ids[0] or ids[0] == ids[1]:  # the extensions within abi.h belong to it
-            needed.append(f"{header}: an incompatible change: raise HAL_ABI_MAJOR" + (", or the number in the id of the extension" if ids[0] else ""))
+            needed.append(
+                f"{header}: an incompatible change: raise HAL_ABI_MAJOR"
+                + (", or the number in the id of the extension" if ids[0] else "")
+            )
     if found and not needed and minor <= 0 and any(header == "abi.h" for header, _, _ in found):
         needed.append("abi.h: an addition: raise HAL_ABI_MINOR")
     return needed
@@ -181,7 +213,10 @@ def main(root, option=""):
             return 1
         record.write_text("\n".join(new) + "\n")
         return 0
-    found = [f"{HEADERS}/{header}: {'added' if compatible else 'INCOMPATIBLE'}: {sentence}" for header, compatible, sentence in differences(old, new)]
+    found = [
+        f"{HEADERS}/{header}: {'added' if compatible else 'INCOMPATIBLE'}: {sentence}"
+        for header, compatible, sentence in differences(old, new)
+    ]
     if not found and old != new:
         found = [f"{RECORD}: versions or order of declarations differ from the headers"]
     if found:

@@ -28,7 +28,11 @@ def run(check, *arguments):
 def expect(what, got, status, *places):
     """`got` failed or passed as `status` says, with one line per place, each beginning with it."""
     lines = got[1] if got[0] else []
-    if got[0] != status or len(lines) != len(places) or not all(line.startswith(p) for line, p in zip(lines, places)):
+    if (
+        got[0] != status
+        or len(lines) != len(places)
+        or not all(line.startswith(p) for line, p in zip(lines, places))
+    ):
         failures.append(f"{what}: expected {status} {places}, got {got}")
 
 
@@ -46,7 +50,8 @@ GOOD = {
     "runtime/plan/plan.hpp": SPDX + '#include "hal/abi.h"\n',
     "runtime/model/model.hpp": SPDX + '#include "text/source.hpp"\n#include "plan/plan.hpp"\n',
     "runtime/execute/executor.hpp": SPDX + '#include "plan/plan.hpp"\n',
-    "runtime/machine/session.hpp": SPDX + '#include "execute/executor.hpp"\n#include "paths.hpp"\n#include <nlohmann/json.hpp>\n',
+    "runtime/machine/session.hpp": SPDX
+    + '#include "execute/executor.hpp"\n#include "paths.hpp"\n#include <nlohmann/json.hpp>\n',
     "drivers/link/link.hpp": SPDX,
     "components/logic/not.cpp": SPDX + '#include "hal/component.hpp"\n#include "own.hpp"\n',
     "components/logic/own.hpp": SPDX,
@@ -56,7 +61,8 @@ GOOD = {
 }
 BAD_INCLUDES = {
     "components/logic/or2.cpp": SPDX + '#include "link/link.hpp"\n',
-    "components/math/sum2.cpp": SPDX + '#include "../logic/own.hpp"\n#include "machine/session.hpp"\n#include <fmt/core.h>\n',
+    "components/math/sum2.cpp": SPDX
+    + '#include "../logic/own.hpp"\n#include "machine/session.hpp"\n#include <fmt/core.h>\n',
     "runtime/base/bad.hpp": SPDX + '#include "model/model.hpp"\n#include "nowhere.hpp"\n',
     "runtime/execute/bad.cpp": SPDX + '  #  include "../model/model.hpp"\n',
     "runtime/model/bad.cpp": SPDX + '\n#include "machine/session.hpp"\n',
@@ -66,7 +72,8 @@ BAD_INCLUDES = {
     "components/canopen/device/circle.hpp": SPDX + '#include "drive/bad.hpp"\n',
     "components/astrology/moon.cpp": SPDX,
     "components/ethercat/wire/frame.hpp": SPDX,
-    "components/ethercat/master/bad.cpp": SPDX + '#include "ethercat/esc/line.hpp"\n#include "ethercat/devices/servo.hpp"\n',
+    "components/ethercat/master/bad.cpp": SPDX
+    + '#include "ethercat/esc/line.hpp"\n#include "ethercat/devices/servo.hpp"\n',
     "components/ethercat/esc/line.hpp": SPDX,
     "components/ethercat/esc/bad.cpp": SPDX + '#include "ethercat/master/master.hpp"\n',
     "components/ethercat/devices/servo.hpp": SPDX,
@@ -81,39 +88,84 @@ def check_includes(root):
     expect("a tree that keeps the rules", run(includes, root), 0)
     write(root, BAD_INCLUDES)
     got = run(includes, root)
-    expect("forbidden includes", got, 1, "runtime/base/bad.hpp:2:", "runtime/base/bad.hpp:3:", "runtime/execute/bad.cpp:2:",
-           "runtime/model/bad.cpp:3:", "components/astrology/moon.cpp: components/astrology has no row",
-           "components/canopen/master/boot/bad.cpp:2:", "components/ethercat/devices/bad.cpp:2:", "components/ethercat/esc/bad.cpp:2:",
-           "components/ethercat/master/bad.cpp:2:", "components/ethercat/master/bad.cpp:3:", "components/logic/or2.cpp:2:", "components/math/sum2.cpp:2:",
-           "components/math/sum2.cpp:3:", "components/math/sum2.cpp:4:", "tools/bad.cpp:2: tests the prefix",
-           "folders that include each other: components/canopen/device, components/canopen/device/drive",
-           "    components/canopen/device/circle.hpp:2:", "    components/canopen/device/drive/bad.hpp:2:",
-           "folders that include each other: components/ethercat/devices, components/ethercat/esc, components/ethercat/master",
-           "    components/ethercat/devices/bad.cpp:2:", "    components/ethercat/esc/bad.cpp:2:", "    components/ethercat/master/bad.cpp:2:",
-           "    components/ethercat/master/bad.cpp:3:",
-           "folders that include each other: runtime/execute, runtime/machine, runtime/model",
-           "    runtime/execute/bad.cpp:2:", "    runtime/machine/session.hpp:2:", "    runtime/model/bad.cpp:3:")
+    expect(
+        "forbidden includes",
+        got,
+        1,
+        "runtime/base/bad.hpp:2:",
+        "runtime/base/bad.hpp:3:",
+        "runtime/execute/bad.cpp:2:",
+        "runtime/model/bad.cpp:3:",
+        "components/astrology/moon.cpp: components/astrology has no row",
+        "components/canopen/master/boot/bad.cpp:2:",
+        "components/ethercat/devices/bad.cpp:2:",
+        "components/ethercat/esc/bad.cpp:2:",
+        "components/ethercat/master/bad.cpp:2:",
+        "components/ethercat/master/bad.cpp:3:",
+        "components/logic/or2.cpp:2:",
+        "components/math/sum2.cpp:2:",
+        "components/math/sum2.cpp:3:",
+        "components/math/sum2.cpp:4:",
+        "tools/bad.cpp:2: tests the prefix",
+        "folders that include each other: components/canopen/device, components/canopen/device/drive",
+        "    components/canopen/device/circle.hpp:2:",
+        "    components/canopen/device/drive/bad.hpp:2:",
+        "folders that include each other: components/ethercat/devices, components/ethercat/esc, components/ethercat/master",
+        "    components/ethercat/devices/bad.cpp:2:",
+        "    components/ethercat/esc/bad.cpp:2:",
+        "    components/ethercat/master/bad.cpp:2:",
+        "    components/ethercat/master/bad.cpp:3:",
+        "folders that include each other: runtime/execute, runtime/machine, runtime/model",
+        "    runtime/execute/bad.cpp:2:",
+        "    runtime/machine/session.hpp:2:",
+        "    runtime/model/bad.cpp:3:",
+    )
     for words in includes.BANS.values():
         if not any(words in line for line in got[1]):
             failures.append(f"no line says: {words}")
 
 
 def check_files(root):
-    readmes = {f"{folder}/README.md": "x\n" for folder in ("runtime", "runtime/base")} | {"README.md": "x\n"}
+    readmes = {f"{folder}/README.md": "x\n" for folder in ("runtime", "runtime/base")} | {
+        "README.md": "x\n"
+    }
     write(root, readmes | {"runtime/base/a.cpp": SPDX * 400})
     expect("a tree with readmes", run(files, root), 0)
-    write(root, {"runtime/base/README.md": "read `a.cpp`, `runtime/base/a.cpp`, [up](../README.md), `gone.cpp`\n[lost](lost.md)\n"})
-    expect("pages that name missing files", run(files, root), 1, "runtime/base/README.md:1: mentions gone.cpp",
-           "runtime/base/README.md:2: mentions lost.md")
-    write(root, readmes | {"runtime/page.md": "write `lag.cpp`, read [it](base/README.md) and [that](gone.md#there)\n"})
+    write(
+        root,
+        {
+            "runtime/base/README.md": "read `a.cpp`, `runtime/base/a.cpp`, [up](../README.md), `gone.cpp`\n[lost](lost.md)\n"
+        },
+    )
+    expect(
+        "pages that name missing files",
+        run(files, root),
+        1,
+        "runtime/base/README.md:1: mentions gone.cpp",
+        "runtime/base/README.md:2: mentions lost.md",
+    )
+    write(
+        root,
+        readmes
+        | {
+            "runtime/page.md": "write `lag.cpp`, read [it](base/README.md) and [that](gone.md#there)\n"
+        },
+    )
     expect("a page with a dead link", run(files, root), 1, "runtime/page.md:1: mentions gone.md")
     (root / "runtime/page.md").unlink()
     write(root, readmes | {"runtime/base/z.py": "import sys\n", "tools/x.cpp": SPDX})
-    expect("unlicensed, undocumented", run(files, root), 1, "runtime/base/z.py:1:",
-           "tools: missing README.md")
+    expect(
+        "unlicensed, undocumented",
+        run(files, root),
+        1,
+        "runtime/base/z.py:1:",
+        "tools: missing README.md",
+    )
 
 
-ABI = SPDX.replace("//", "/*").replace("\n", " */\n") + """#include <stdint.h>
+ABI = (
+    SPDX.replace("//", "/*").replace("\n", " */\n")
+    + """#include <stdint.h>
 #define HAL_ABI_MAJOR 1
 #define HAL_ABI_MINOR 0
 typedef enum hal_dir { HAL_DIR_IN, HAL_DIR_OUT } hal_dir;
@@ -123,6 +175,7 @@ typedef struct hal_host {
     void (*fail)(const struct hal_host *, const char *reason);
 } hal_host;
 """
+)
 
 
 def check_abi(root):
@@ -138,21 +191,59 @@ def check_abi(root):
     expect("a layout as recorded", run(abi, root), 0)
     changed(("bytes", "in bytes"))
     expect("another comment", run(abi, root), 0)
-    place, end = "runtime/abi/hal/abi.h: ", ("on purpose? Then follow docs/versioning.md", "HAL_ABI_MAJOR, or")
+    place, end = "runtime/abi/hal/abi.h: ", (
+        "on purpose? Then follow docs/versioning.md",
+        "HAL_ABI_MAJOR, or",
+    )
     changed(("const char *reason", "int reason"))
-    expect("another parameter", run(abi, root), 1, f"{place}INCOMPATIBLE: struct hal_host: no longer as recorded: 8, size 8: void (*fail)",
-           f"{place}INCOMPATIBLE: struct hal_host: new: 8, size 8: void (*fail)", *end)
-    expect("an incompatible change within a major version", run(abi, root, "--record"), 1, "abi.h: an incompatible change: raise HAL_ABI_MAJOR")
+    expect(
+        "another parameter",
+        run(abi, root),
+        1,
+        f"{place}INCOMPATIBLE: struct hal_host: no longer as recorded: 8, size 8: void (*fail)",
+        f"{place}INCOMPATIBLE: struct hal_host: new: 8, size 8: void (*fail)",
+        *end,
+    )
+    expect(
+        "an incompatible change within a major version",
+        run(abi, root, "--record"),
+        1,
+        "abi.h: an incompatible change: raise HAL_ABI_MAJOR",
+    )
     changed(("HAL_DIR_IN, ", "HAL_DIR_NONE, HAL_DIR_IN, "))
-    expect("another value", run(abi, root), 1, *[f"{place}INCOMPATIBLE: enum hal_dir: no longer as recorded: HAL_DIR_"] * 2,
-           *[f"{place}added: enum hal_dir: new: HAL_DIR_"] * 3, *end)
+    expect(
+        "another value",
+        run(abi, root),
+        1,
+        *[f"{place}INCOMPATIBLE: enum hal_dir: no longer as recorded: HAL_DIR_"] * 2,
+        *[f"{place}added: enum hal_dir: new: HAL_DIR_"] * 3,
+        *end,
+    )
     changed(("uint32_t pad;", "uint32_t pad, more;"))
-    expect("a member in the middle", run(abi, root), 1, f"{place}INCOMPATIBLE: struct hal_host: no longer as recorded: 8, size 8: void (*fail)",
-           f"{place}INCOMPATIBLE: struct hal_host: new: 8, size 4: uint32_t more", f"{place}INCOMPATIBLE: struct hal_host: new: 16, size 8: void (*fail)", *end)
+    expect(
+        "a member in the middle",
+        run(abi, root),
+        1,
+        f"{place}INCOMPATIBLE: struct hal_host: no longer as recorded: 8, size 8: void (*fail)",
+        f"{place}INCOMPATIBLE: struct hal_host: new: 8, size 4: uint32_t more",
+        f"{place}INCOMPATIBLE: struct hal_host: new: 16, size 8: void (*fail)",
+        *end,
+    )
     growth = ("reason);", "reason);\n    void (*warn)(const struct hal_host *);")
     changed(growth)
-    expect("a member at the end", run(abi, root), 1, f"{place}added: struct hal_host: new: 16, size 8: void (*warn)", *end)
-    expect("an addition within a minor version", run(abi, root, "--record"), 1, "abi.h: an addition: raise HAL_ABI_MINOR")
+    expect(
+        "a member at the end",
+        run(abi, root),
+        1,
+        f"{place}added: struct hal_host: new: 16, size 8: void (*warn)",
+        *end,
+    )
+    expect(
+        "an addition within a minor version",
+        run(abi, root, "--record"),
+        1,
+        "abi.h: an addition: raise HAL_ABI_MINOR",
+    )
     changed(growth, ("MINOR 0", "MINOR 1"))
     expect("an addition in a new minor version", run(abi, root, "--record"), 0)
     expect("the record of an addition", run(abi, root), 0)
@@ -161,20 +252,65 @@ def check_abi(root):
 
 
 def check_language(root):
-    write(root, {"runtime/a.cpp": SPDX + 'int refused = 1;\nconst char* good = "rejected; connection refused";\n', "a.md": "The node is offline.\n"})
+    write(
+        root,
+        {
+            "runtime/a.cpp": SPDX
+            + 'int refused = 1;\nconst char* good = "rejected; connection refused";\n',
+            "a.md": "The node is offline.\n",
+        },
+    )
     expect("texts in the terms of the field", run(language, root), 0)
-    write(root, {"runtime/a.cpp": SPDX + '// it says so\nconst char* bad = "the value is refused";\n', "a.md": "The node is silent.\nPatience.\n",
-                 "b.py": "refused = 1  # mend it\nprint('it refused')\n", "c.hal": "# a pin that is none\n", "e.expected": "error: x lacks y\n"})
-    expect("paraphrases", run(language, root), 1, "a.md:1:", "a.md:2:", "b.py:1:", "b.py:2:", "c.hal:1:", "e.expected:1:", "runtime/a.cpp:2:", "runtime/a.cpp:3:")
+    write(
+        root,
+        {
+            "runtime/a.cpp": SPDX + '// it says so\nconst char* bad = "the value is refused";\n',
+            "a.md": "The node is silent.\nPatience.\n",
+            "b.py": "refused = 1  # mend it\nprint('it refused')\n",
+            "c.hal": "# a pin that is none\n",
+            "e.expected": "error: x lacks y\n",
+        },
+    )
+    expect(
+        "paraphrases",
+        run(language, root),
+        1,
+        "a.md:1:",
+        "a.md:2:",
+        "b.py:1:",
+        "b.py:2:",
+        "c.hal:1:",
+        "e.expected:1:",
+        "runtime/a.cpp:2:",
+        "runtime/a.cpp:3:",
+    )
 
 
 def check_symbols(root):
-    write(root, {"components/logic/good.cpp": "int hal_plugin;\n", "components/logic/leaky.cpp": "int hal_plugin; int other;\n",
-                 "components/logic/absent.cpp": "", "build/components/placeholder": ""})
+    write(
+        root,
+        {
+            "components/logic/good.cpp": "int hal_plugin;\n",
+            "components/logic/leaky.cpp": "int hal_plugin; int other;\n",
+            "components/logic/absent.cpp": "",
+            "build/components/placeholder": "",
+        },
+    )
     for name in ("good", "leaky"):
-        subprocess.run(["c++", "-shared", "-fPIC", "-o", root / f"build/components/{name}.so", root / f"components/logic/{name}.cpp"],
-                       check=True)
-    expect("plugins", run(symbols, root, root / "build"), 1, "absent.so: not built", "leaky.so exports")
+        subprocess.run(
+            [
+                "c++",
+                "-shared",
+                "-fPIC",
+                "-o",
+                root / f"build/components/{name}.so",
+                root / f"components/logic/{name}.cpp",
+            ],
+            check=True,
+        )
+    expect(
+        "plugins", run(symbols, root, root / "build"), 1, "absent.so: not built", "leaky.so exports"
+    )
 
 
 def check_clean_tree(root):
@@ -182,7 +318,9 @@ def check_clean_tree(root):
     git = ["git", "-c", "safe.directory=*", "-C", root]
 
     def clean(*arguments):
-        return subprocess.run(["sh", script, root, *arguments], capture_output=True, text=True, check=False)
+        return subprocess.run(
+            ["sh", script, root, *arguments], capture_output=True, text=True, check=False
+        )
 
     subprocess.run([*git, "init", "-q"], check=True)
     write(root, {"known.txt": "x"})
@@ -197,7 +335,14 @@ def check_clean_tree(root):
 
 
 def main():
-    for check in (check_includes, check_files, check_abi, check_language, check_symbols, check_clean_tree):
+    for check in (
+        check_includes,
+        check_files,
+        check_abi,
+        check_language,
+        check_symbols,
+        check_clean_tree,
+    ):
         with tempfile.TemporaryDirectory() as folder:
             check(Path(folder).resolve())
     print("\n".join(failures) or "every planted violation was found")

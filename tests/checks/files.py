@@ -12,10 +12,22 @@ MAX_README = 40  # a folder's README is read in a minute; the glossary and the r
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".py", ".sh", ".cmake"}
 LONGER_READMES = {"README.md", "runtime/README.md"}
 # Folders that the parent's README describes: data, one folder per case, and folders of folders.
-NO_README = ("runtime/abi/hal", "runtime/sdk/hal", "tests/netlists/", "tests/errors/", "tests/fuzz/", "tests/cli/", ".ci", "cmake", "docs/")
+NO_README = (
+    "runtime/abi/hal",
+    "runtime/sdk/hal",
+    "tests/netlists/",
+    "tests/errors/",
+    "tests/fuzz/",
+    "tests/cli/",
+    ".ci",
+    "cmake",
+    "docs/",
+)
 
 # References of a page: `file.ext` in backticks, and [links](to files).
-MENTIONED = re.compile(r"`([\w./-]+\.(?:cpp|hpp|h|py|sh|md|hal|ini|expected))`|\]\((?!https?:|#)([^)#]+)[^)]*\)")
+MENTIONED = re.compile(
+    r"`([\w./-]+\.(?:cpp|hpp|h|py|sh|md|hal|ini|expected))`|\]\((?!https?:|#)([^)#]+)[^)]*\)"
+)
 
 
 def absent(root, page, files):
@@ -27,14 +39,28 @@ def absent(root, page, files):
             if quoted and page.name != "README.md":
                 continue  # a tutorial names files that its reader creates
             name = quoted or link
-            exists = any((root / base / name).exists() for base in (page.parent, ".", "runtime/abi", "runtime/sdk"))
+            exists = any(
+                (root / base / name).exists()
+                for base in (page.parent, ".", "runtime/abi", "runtime/sdk")
+            )
             if not exists and not any(f.endswith("/" + name) for f in near if quoted):
                 yield number, name
 
 
 def tracked(root):
     """Returns the files of the repository, or of an unpacked archive all files outside build/."""
-    command = ["git", "-c", "safe.directory=*", "-C", str(root), "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    command = [
+        "git",
+        "-c",
+        "safe.directory=*",
+        "-C",
+        str(root),
+        "ls-files",
+        "-z",
+        "--cached",
+        "--others",
+        "--exclude-standard",
+    ]
     if (root / ".git").exists():
         names = subprocess.run(command, check=True, capture_output=True).stdout.decode().split("\0")
         return [Path(n) for n in names if n and (root / n).is_file()]
@@ -50,19 +76,29 @@ def main(root):
             continue
         lines = (root / path).read_text(errors="replace").splitlines()
         if not any("SPDX-License-Identifier: MIT" in line for line in lines[:2]):
-            errors.append(f"{path}:1: missing licence in the first line: SPDX-License-Identifier: MIT")
+            errors.append(
+                f"{path}:1: missing licence in the first line: SPDX-License-Identifier: MIT"
+            )
     for folder in sorted({parent for path in files for parent in path.parents}):
         name = folder.as_posix()
         if name != "." and name.startswith(NO_README) and name + "/" not in NO_README:
             continue
         readme = folder / "README.md"
         if readme not in files:
-            errors.append(f"{name}: missing README.md: purpose, what the folder must not do, where to start reading")
-        elif readme.as_posix() not in LONGER_READMES and len((root / readme).read_text().splitlines()) > MAX_README:
+            errors.append(
+                f"{name}: missing README.md: purpose, what the folder must not do, where to start reading"
+            )
+        elif (
+            readme.as_posix() not in LONGER_READMES
+            and len((root / readme).read_text().splitlines()) > MAX_README
+        ):
             errors.append(f"{readme}: longer than {MAX_README} lines")
     for page in files:
         if page.suffix == ".md":
-            errors += [f"{page}:{number}: mentions {name}, which does not exist" for number, name in absent(root, page, files)]
+            errors += [
+                f"{page}:{number}: mentions {name}, which does not exist"
+                for number, name in absent(root, page, files)
+            ]
     print("\n".join(errors) if errors else f"{len(files)} files checked")
     return 1 if errors else 0
 

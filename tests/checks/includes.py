@@ -23,7 +23,14 @@ ROWS = {
     "runtime/commands": ["runtime/machine"],
     "runtime/control": ["runtime/commands"],
     "runtime/cells": ["runtime/control", "components/dds/links"],
-    "tools": ["tools/inspect", "tools/linuxcnc", "tools/trace", "tools/comp", "tools/bus", "tools/panel"],  # the table of subcommands
+    "tools": [
+        "tools/inspect",
+        "tools/linuxcnc",
+        "tools/trace",
+        "tools/comp",
+        "tools/bus",
+        "tools/panel",
+    ],  # the table of subcommands
     "tools/cli": ["runtime/control"],
     "tools/run": ["tools/record", "tools/tcl", "runtime/cells"],
     "tools/record": ["tools/cli", "drivers/link", "components/recording/mcap"],
@@ -34,9 +41,17 @@ ROWS = {
     "tools/trace": ["tools/cli"],
     "tools/doc": ["tools/cli"],
     "tools/comp": ["tools/doc"],
-    "tools/bus": ["tools/cli", "components/canopen/master", "components/canopen/device",
-                  "components/fieldbus/tdma/rtcfg", "components/fieldbus/tdma/tunnel", "components/fieldbus/scocan/plan",
-                  "components/ethercat/master", "components/ethercat/devices", "components/ethercat/config"],  # hal can, ethercat, node, tdma
+    "tools/bus": [
+        "tools/cli",
+        "components/canopen/master",
+        "components/canopen/device",
+        "components/fieldbus/tdma/rtcfg",
+        "components/fieldbus/tdma/tunnel",
+        "components/fieldbus/scocan/plan",
+        "components/ethercat/master",
+        "components/ethercat/devices",
+        "components/ethercat/config",
+    ],  # hal can, ethercat, node, tdma
     "tools/panel": ["tools/cli"],
     "tools/python": ["runtime/control"],
     "drivers/link": [],
@@ -44,7 +59,13 @@ ROWS = {
     "drivers/capture": ["drivers/link"],
     "drivers/netlink": ["drivers/link"],
     "drivers/tap": ["drivers/link", "runtime/sdk"],
-    "drivers/can": ["drivers/discipline", "drivers/capture", "drivers/netlink", "runtime/sdk", "runtime/text"],
+    "drivers/can": [
+        "drivers/discipline",
+        "drivers/capture",
+        "drivers/netlink",
+        "runtime/sdk",
+        "runtime/text",
+    ],
     "drivers/ethernet": ["drivers/capture", "drivers/netlink", "runtime/sdk", "runtime/text"],
     "components/logic": ["components"],
     "components/math": ["components"],
@@ -62,44 +83,100 @@ ROWS = {
     "components/dds/links": [],  # what cells gives the components, as data
     "components": ["runtime/sdk", "runtime/text"],
     "components/cia402": ["runtime/sdk"],
-    "components/canopen/protocol": ["runtime/sdk", "runtime/text", "drivers/link", "components/cia402"],  # cia402: the error codes
+    "components/canopen/protocol": [
+        "runtime/sdk",
+        "runtime/text",
+        "drivers/link",
+        "components/cia402",
+    ],  # cia402: the error codes
     "components/canopen/eds": ["components/canopen/protocol"],
     "components/canopen/master": ["components/canopen/eds", "components/fieldbus/can_timing"],
-    "components/canopen/device": ["components/canopen/eds", "components/sim"],  # sim: the plants behind simulated devices
+    "components/canopen/device": [
+        "components/canopen/eds",
+        "components/sim",
+    ],  # sim: the plants behind simulated devices
     "components/ethercat/wire": ["runtime/text"],
     "components/ethercat/esi": ["components/ethercat/wire"],
     "components/ethercat/esc": ["components/ethercat/wire", "drivers/link"],
-    "components/ethercat/devices": ["components/ethercat/esc", "components/ethercat/esi", "components/sim", "components/cia402"],
+    "components/ethercat/devices": [
+        "components/ethercat/esc",
+        "components/ethercat/esi",
+        "components/sim",
+        "components/cia402",
+    ],
     "components/ethercat/master": ["components/ethercat/wire", "runtime/sdk", "drivers/link"],
-    "components/ethercat/config": ["components/ethercat/master", "components/ethercat/esi", "components/cia402"],
-    "components/ethercat/plugins": ["components/ethercat/config", "components/ethercat/devices", "drivers/tap"],
+    "components/ethercat/config": [
+        "components/ethercat/master",
+        "components/ethercat/esi",
+        "components/cia402",
+    ],
+    "components/ethercat/plugins": [
+        "components/ethercat/config",
+        "components/ethercat/devices",
+        "drivers/tap",
+    ],
     "components/canopen/plugins": ["components/canopen/master", "components/canopen/device"],
     "components/fieldbus/can_timing": ["drivers/link"],
     "components/fieldbus/segment": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/fieldbus/scocan/table": ["runtime/text", "drivers/link"],
     "components/fieldbus/scocan/wire": ["components/fieldbus/scocan/table"],
     "components/fieldbus/scocan/station": ["components/fieldbus/scocan/wire"],
-    "components/fieldbus/scocan/plan": ["components/fieldbus/scocan/table", "components/fieldbus/can_timing"],
-    "components/fieldbus/scocan/plugins": ["components/fieldbus/scocan/station", "components/fieldbus/messages", "runtime/sdk", "drivers/discipline"],
+    "components/fieldbus/scocan/plan": [
+        "components/fieldbus/scocan/table",
+        "components/fieldbus/can_timing",
+    ],
+    "components/fieldbus/scocan/plugins": [
+        "components/fieldbus/scocan/station",
+        "components/fieldbus/messages",
+        "runtime/sdk",
+        "drivers/discipline",
+    ],
     "components/fieldbus/messages": ["runtime/sdk", "drivers/link"],
     "components/fieldbus/tdma/wire": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/fieldbus/tdma/station": ["components/fieldbus/tdma/wire", "drivers/discipline"],
     "components/fieldbus/tdma/config": ["components/fieldbus/tdma/station"],
     "components/fieldbus/tdma/rtcfg": ["components/fieldbus/tdma/config"],
     "components/fieldbus/tdma/tunnel": ["components/fieldbus/tdma/config", "drivers/tap"],
-    "components/fieldbus/tdma/plugins": ["components/fieldbus/tdma/rtcfg", "components/fieldbus/tdma/tunnel"],
+    "components/fieldbus/tdma/plugins": [
+        "components/fieldbus/tdma/rtcfg",
+        "components/fieldbus/tdma/tunnel",
+    ],
 }
 
 # The bans that carry the design, in words.
 BANS = {
-    ("runtime/execute", "runtime/model"): "execute never includes model: real-time code cannot reach a name or a string",
-    ("components/ethercat/master", "components/ethercat/esc"): "master and emulated slaves share only wire/",
-    ("components/ethercat/master", "components/ethercat/devices"): "master and emulated slaves share only wire/",
-    ("components/ethercat/esc", "components/ethercat/master"): "master and emulated slaves share only wire/",
-    ("components/ethercat/devices", "components/ethercat/master"): "master and emulated slaves share only wire/",
-    ("components/canopen/master", "components/canopen/device"): "master and device never include each other",
-    ("components/canopen/device", "components/canopen/master"): "master and device never include each other",
-    ("components", None): "components include only the sdk and text (bus components also drivers/link)",
+    (
+        "runtime/execute",
+        "runtime/model",
+    ): "execute never includes model: real-time code cannot reach a name or a string",
+    (
+        "components/ethercat/master",
+        "components/ethercat/esc",
+    ): "master and emulated slaves share only wire/",
+    (
+        "components/ethercat/master",
+        "components/ethercat/devices",
+    ): "master and emulated slaves share only wire/",
+    (
+        "components/ethercat/esc",
+        "components/ethercat/master",
+    ): "master and emulated slaves share only wire/",
+    (
+        "components/ethercat/devices",
+        "components/ethercat/master",
+    ): "master and emulated slaves share only wire/",
+    (
+        "components/canopen/master",
+        "components/canopen/device",
+    ): "master and device never include each other",
+    (
+        "components/canopen/device",
+        "components/canopen/master",
+    ): "master and device never include each other",
+    (
+        "components",
+        None,
+    ): "components include only the sdk and text (bus components also drivers/link)",
     (None, "runtime/machine"): "only commands, control, cells, tools and tests include machine",
 }
 
@@ -116,17 +193,40 @@ LIBRARIES = {
     r"nlohmann/": ["runtime/machine", "runtime/commands", "runtime/control", "tools"],
 }
 
-INCLUDE_ROOTS = ["runtime", "runtime/abi", "runtime/sdk", "drivers", "components", "tools", "."]  # as the compiler searches
-SINGLE = {"paths.hpp": ["runtime/machine", "runtime/commands", "runtime/control", "tools", "tools/run", "tools/inspect", "tools/comp", "tools/panel"]}  # headers that belong to no folder
+INCLUDE_ROOTS = [
+    "runtime",
+    "runtime/abi",
+    "runtime/sdk",
+    "drivers",
+    "components",
+    "tools",
+    ".",
+]  # as the compiler searches
+SINGLE = {
+    "paths.hpp": [
+        "runtime/machine",
+        "runtime/commands",
+        "runtime/control",
+        "tools",
+        "tools/run",
+        "tools/inspect",
+        "tools/comp",
+        "tools/panel",
+    ]
+}  # headers that belong to no folder
 # Which transport an address names is the drivers' matter: others ask describe().
-ADDRESS_PREFIX = re.compile(r'(?:\b(?:starts_with|r?find|compare)\(\s*|[=!]=\s*|\b\w+ = )"(?:can|sim|udp|slcan|cane|replay|eth):"')
+ADDRESS_PREFIX = re.compile(
+    r'(?:\b(?:starts_with|r?find|compare)\(\s*|[=!]=\s*|\b\w+ = )"(?:can|sim|udp|slcan|cane|replay|eth):"'
+)
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
 
 
 def folder_of(path):
     """The longest row that holds `path` (relative to the root), or None. Only a file directly in components/ belongs to its row."""
     for parent in path.parents:
-        if parent.as_posix() in ROWS and (parent.as_posix() != "components" or path.parent == parent):
+        if parent.as_posix() in ROWS and (
+            parent.as_posix() != "components" or path.parent == parent
+        ):
             return parent.as_posix()
     return None
 
@@ -160,15 +260,23 @@ def problem(root, source, kind, name):
     """What is wrong with one include, or None."""
     folder = folder_of(source.relative_to(root))
     for pattern, users in LIBRARIES.items():
-        if re.match(pattern, name) and not any(folder == u or folder.startswith(u + "/") for u in users):
+        if re.match(pattern, name) and not any(
+            folder == u or folder.startswith(u + "/") for u in users
+        ):
             return f"includes <{name}>: only {', '.join(users)} may"
     if kind == "<":
         return None
     if name in SINGLE:
-        return None if folder in SINGLE[name] else f'includes "{name}": only {", ".join(SINGLE[name])} may'
+        return (
+            None
+            if folder in SINGLE[name]
+            else f'includes "{name}": only {", ".join(SINGLE[name])} may'
+        )
     found = resolve(root, source, name)
     if found is None:
-        return f'includes "{name}": there is no such file in the tree; a library is included with <>'
+        return (
+            f'includes "{name}": there is no such file in the tree; a library is included with <>'
+        )
     target = folder_of(found)
     if target in reach(folder):
         return None
@@ -177,6 +285,7 @@ def problem(root, source, kind, name):
 
 def circles(graph):
     """The sets of folders that reach each other, each as a sorted list."""
+
     def reached(start):
         found, new = set(), [start]
         while new:
@@ -187,7 +296,13 @@ def circles(graph):
         return found
 
     reaches = {folder: reached(folder) for folder in graph}
-    return sorted({tuple(sorted(o for o in seen if folder in reaches.get(o, ()))) for folder, seen in reaches.items() if folder in seen})
+    return sorted(
+        {
+            tuple(sorted(o for o in seen if folder in reaches.get(o, ())))
+            for folder, seen in reaches.items()
+            if folder in seen
+        }
+    )
 
 
 def main(root):
@@ -199,22 +314,33 @@ def main(root):
             path = source.relative_to(root)
             if folder_of(path) is None:
                 if path.parent.as_posix() not in ("runtime", "components"):
-                    errors.append(f"{path}: {path.parent} has no row in includes.py: what may it include?")
+                    errors.append(
+                        f"{path}: {path.parent} has no row in includes.py: what may it include?"
+                    )
                 continue
             count += 1
             for number, line in enumerate(source.read_text(errors="replace").splitlines(), 1):
                 if not path.as_posix().startswith("drivers/") and ADDRESS_PREFIX.search(line):
-                    errors.append(f"{path}:{number}: tests the prefix of an address; ask can::describe() or ethernet::describe() instead")
+                    errors.append(
+                        f"{path}:{number}: tests the prefix of an address; ask can::describe() or ethernet::describe() instead"
+                    )
                 match = INCLUDE.match(line)
                 wrong = match and problem(root, source, match[1], match[2])
                 if wrong:
                     errors.append(f"{path}:{number}: {wrong}")
                 target = match and match[1] == '"' and resolve(root, source, match[2])
                 if target and target.parent != path.parent:
-                    graph.setdefault(path.parent, {}).setdefault(target.parent, f'{path}:{number}: includes "{match[2]}"')
+                    graph.setdefault(path.parent, {}).setdefault(
+                        target.parent, f'{path}:{number}: includes "{match[2]}"'
+                    )
     for circle in circles(graph):
         errors.append(f"folders that include each other: {', '.join(f.as_posix() for f in circle)}")
-        errors += [f"    {where}" for folder in circle for other, where in graph[folder].items() if other in circle]
+        errors += [
+            f"    {where}"
+            for folder in circle
+            for other, where in graph[folder].items()
+            if other in circle
+        ]
     print("\n".join(errors) if errors else f"{count} files include only what they may")
     return 1 if errors else 0
 

@@ -13,23 +13,34 @@ sys.path.insert(0, str(Path(__file__).parent))
 from files import tracked
 
 RULES = [
-    (r"(?<!there )(?:is|are|was|were|be) no (?!longer|more than|doubt|less|worse|better|fewer|such|good|slower|faster|different)[a-z-]+",
-     "is not a valid X, invalid X, missing"),
-    (r"(?:that|which|it|this|one) (?:is|are) none|means nothing|there is no (?:option|argument|pin|command|component|thread|signal|function)s?\b(?! yet)",
-     "invalid X, unknown X, missing"),
+    (
+        r"(?<!there )(?:is|are|was|were|be) no (?!longer|more than|doubt|less|worse|better|fewer|such|good|slower|faster|different)[a-z-]+",
+        "is not a valid X, invalid X, missing",
+    ),
+    (
+        r"(?:that|which|it|this|one) (?:is|are) none|means nothing|there is no (?:option|argument|pin|command|component|thread|signal|function)s?\b(?! yet)",
+        "invalid X, unknown X, missing",
+    ),
     (r"(?:is|are|was|were) there twice|(?:is|are) twice (?:there|in)", "duplicate"),
     (r"(?:is|are|was|were) not there\b|\black(?:s|ed|ing)?\b(?! of)", "missing"),
     (r"(?:is|are|was|were) not known\b", "unknown, unsupported"),
-    (r"\brefus(?:e|es|ed|al|als|ing)\b(?<!connection refused)(?! (?:the |a |further )?connections?)",
-     "rejected (input), denied (permission); only a connection is refused"),
+    (
+        r"\brefus(?:e|es|ed|al|als|ing)\b(?<!connection refused)(?! (?:the |a |further )?connections?)",
+        "rejected (input), denied (permission); only a connection is refused",
+    ),
     (r"\b(?:says?|said|saying|tells?|told|telling)\b", "reports, prints, logs, warns, states"),
     (r"\bbeliev\w+\b", "valid, accepted"),
     (r"\bmend(?:s|ed|ing)?\b|\bheal(?:s|ed|ing)?\b", "fix, repair, recover"),
-    (r"\b(?:stands?|standing|stood) still\b", "stalls; the host is suspended; stops; at standstill"),
+    (
+        r"\b(?:stands?|standing|stood) still\b",
+        "stalls; the host is suspended; stops; at standstill",
+    ),
     (r"\b(?:goes|go|going|gone|went) away\b", "is lost, disconnects, is removed"),
     (r"\b(?:comes|come|coming|came) back\b", "reconnects, recovers, returns"),
-    (r"\b(?:is|are|was|were|be|been|being|falls?|fell|goes|went|stays?|stayed|remains?|keeps?) silent\b|\bsilent (?:for|since|node|station|drive|program|master)",
-     "offline, not responding, no frames"),
+    (
+        r"\b(?:is|are|was|were|be|been|being|falls?|fell|goes|went|stays?|stayed|remains?|keeps?) silent\b|\bsilent (?:for|since|node|station|drive|program|master)",
+        "offline, not responding, no frames",
+    ),
     (r"\bso long\b(?! as)|\bso long as\b", "duration, for at least N, as long as"),
     (r"\bpunctual\w*\b", "wake-up latency"),
     (r"\blate by\b", "latency, lateness"),
@@ -38,13 +49,19 @@ RULES = [
     (r"\bundone\b", "rolled back"),
     (r"\b(?:at|in) one cycle boundary\b", "at the same cycle boundary"),
     (r"\bwhat is left\b|\bwhat was left\b", "remaining"),
-    (r"\bno room\b|\broom (?:for|to|in)\b|\bhas room\b|\bmore room\b|\bis room\b", "capacity, space"),
+    (
+        r"\bno room\b|\broom (?:for|to|in)\b|\bhas room\b|\bmore room\b|\bis room\b",
+        "capacity, space",
+    ),
     (r"\bpatience\b|\bpatient(?:ly)?\b", "timeout"),
     (r"\bstrangers?\b", "unexpected response, unknown station, foreign"),
     (r"\bhas? the say\b", "takes precedence"),
     (r"\b(?:looks?|asks?|looking|asking) all the time\b", "polls, spins"),
     (r"\bthe way (?:to|from) the\b|\bthis way to\b", "path, path delay"),
-    (r"\bwords (?:a|the|an|it|its|each|every|what|faults|events|them)\b|\bworded\b", "formats the message"),
+    (
+        r"\bwords (?:a|the|an|it|its|each|every|what|faults|events|them)\b|\bworded\b",
+        "formats the message",
+    ),
     (r"\bkeeper\b|\bjudge[sd]?\b|\bworkshop\b|\baside\b", "name the job"),
     (r"\bstretch(?:es)?\b", "segment, batch, chunk"),
     (r"\bsomebody\b|\bwhoever\b|\bwherefrom\b|\bwhereto\b", "name the actor"),
@@ -58,14 +75,20 @@ OTHER = {".lua"}
 SKIP = {"LICENSE", "tests/checks/language.py", "tests/checks/catches.py"}
 
 C_TEXT = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\((.*?)\)\1"|"(?:[^"\\\n]|\\.)*"', re.DOTALL)
-PY_TEXT = re.compile(r'"""(?:.|\n)*?"""|\'\'\'(?:.|\n)*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\'|#[^\n]*')
+PY_TEXT = re.compile(
+    r'"""(?:.|\n)*?"""|\'\'\'(?:.|\n)*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'(?:[^\'\\\n]|\\.)*\'|#[^\n]*'
+)
 LUA_TEXT = re.compile(r'"(?:[^"\\\n]|\\.)*"|--[^\n]*')
 
 
 def texts(path, source):
     """(offset, text) of what a person reads in this file."""
     suffix = path.suffix
-    if suffix in PAGES or path.name in ("expected", "README", "CMakeLists.txt", "hal") or suffix in {".hal", ".ini", ".sh", ".cmake", ".awk", ".comp"}:
+    if (
+        suffix in PAGES
+        or path.name in ("expected", "README", "CMakeLists.txt", "hal")
+        or suffix in {".hal", ".ini", ".sh", ".cmake", ".awk", ".comp"}
+    ):
         if suffix in {".sh", ".cmake", ".awk"} or path.name in ("CMakeLists.txt", "hal"):
             pattern = re.compile(r'"(?:[^"\\\n]|\\.)*"|(?:^|(?<=\s))#[^\n]*', re.MULTILINE)
             yield from ((m.start(), m.group()) for m in pattern.finditer(source))
@@ -81,9 +104,9 @@ def texts(path, source):
 
 def is_identifier(text, match):
     """Returns whether the match is a name and not prose: in backticks, part of a hyphenated name, an attribute, or the only word of a string."""
-    before, after = text[:match.start()][-1:], text[match.end():][:1]
+    before, after = text[: match.start()][-1:], text[match.end() :][:1]
     alone = before == after and before in ("`", '"', "'") and " " not in match.group()
-    return alone or before == "-" or after == "-" or text[:match.start()].endswith("self.")
+    return alone or before == "-" or after == "-" or text[: match.start()].endswith("self.")
 
 
 def violations(root, only=()):
@@ -100,7 +123,9 @@ def violations(root, only=()):
             for pattern, term in COMPILED:
                 for match in pattern.finditer(text):
                     number = source.count("\n", 0, offset + match.start()) + 1
-                    if "language: quoted" not in lines[number - 1] and not is_identifier(text, match):
+                    if "language: quoted" not in lines[number - 1] and not is_identifier(
+                        text, match
+                    ):
                         yield name, number, " ".join(match.group().split()), term
 
 
@@ -111,5 +136,12 @@ def main(root, *only):
     return 1 if found else 0
 
 
-if __name__ == "__main__":  # the test run passes the build tree, too; a person may pass folders instead
-    sys.exit(main(Path(sys.argv[1]), *(folder for folder in sys.argv[2:] if not Path(folder).is_absolute())))
+if (
+    __name__ == "__main__"
+):  # the test run passes the build tree, too; a person may pass folders instead
+    sys.exit(
+        main(
+            Path(sys.argv[1]),
+            *(folder for folder in sys.argv[2:] if not Path(folder).is_absolute()),
+        )
+    )

@@ -21,11 +21,15 @@ struct Mine : hal::Component {
 };
 HAL_COMPONENT(Mine, "mine", "Doubles")
 """
-NETLIST = "loadrt threads name1=fast period1=1000000\nloadrt mine\naddf mine.0 fast\nsetp mine.0.in 21\n"
+NETLIST = (
+    "loadrt threads name1=fast period1=1000000\nloadrt mine\naddf mine.0 fast\nsetp mine.0.in 21\n"
+)
 
 
 def run(*command, **options):
-    result = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False, **options)
+    result = subprocess.run(
+        [str(c) for c in command], capture_output=True, text=True, check=False, **options
+    )
     if result.returncode != 0:
         sys.exit(f"{' '.join(map(str, command))}\n{result.stdout}{result.stderr}")
     return result.stdout
@@ -38,7 +42,16 @@ def main(build):
         source.mkdir()
         (source / "CMakeLists.txt").write_text(HEADER + PROJECT)
         (source / "mine.cpp").write_text(COMPONENT)
-        run("cmake", "-S", source, "-B", source / "build", "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={prefix}")
+        run(
+            "cmake",
+            "-S",
+            source,
+            "-B",
+            source / "build",
+            "-G",
+            "Ninja",
+            f"-DCMAKE_PREFIX_PATH={prefix}",
+        )
         run("cmake", "--build", source / "build")
         found = symbols.exported(source / "build" / "mine.so")
         if found != ["hal_plugin"]:
@@ -52,7 +65,13 @@ def main(build):
         # What `hal new component` makes passes its test at once.
         path = dict(environment, PATH=f"{prefix}/bin:{os.environ['PATH']}")
         run(hal, "new", "component", "fresh", env=path, cwd=folder)
-        run("bash", "-c", "cmake -B build && cmake --build build && ctest --test-dir build", env=path, cwd=Path(folder) / "fresh")
+        run(
+            "bash",
+            "-c",
+            "cmake -B build && cmake --build build && ctest --test-dir build",
+            env=path,
+            cwd=Path(folder) / "fresh",
+        )
         (source / "mine.hal").write_text(NETLIST + "loadrt not\n")
         run(hal, "check", source / "mine.hal", env=environment)
         for alias in ("halrun", "halcmd"):

@@ -7,18 +7,29 @@ from pathlib import Path
 
 
 def exported(plugin):
-    lines = subprocess.run(["nm", "-D", "--defined-only", "-j", str(plugin)], check=True, capture_output=True, text=True).stdout
+    lines = subprocess.run(
+        ["nm", "-D", "--defined-only", "-j", str(plugin)],
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout
     return lines.split()
 
 
 def main(root, build):
     plugins = {p.stem: p for p in (build / "components").glob("*.so")}
-    wanted = {p.stem for p in (root / "components").glob("*/*.cpp") if not (p.parent / "CMakeLists.txt").exists()}
+    wanted = {
+        p.stem
+        for p in (root / "components").glob("*/*.cpp")
+        if not (p.parent / "CMakeLists.txt").exists()
+    }
     errors = [f"{name}.so: not built" for name in sorted(wanted - plugins.keys())]
     for name, plugin in sorted(plugins.items()):
         symbols = exported(plugin)
         if symbols != ["hal_plugin"]:
-            errors.append(f"{name}.so exports {', '.join(symbols) or 'nothing'}; a plugin exports hal_plugin and nothing else")
+            errors.append(
+                f"{name}.so exports {', '.join(symbols) or 'nothing'}; a plugin exports hal_plugin and nothing else"
+            )
     if not plugins and wanted:
         errors.append("no plugin found")
     print("\n".join(errors) if errors else f"{len(plugins)} plugins export hal_plugin only")

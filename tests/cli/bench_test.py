@@ -28,7 +28,9 @@ class Bench(Case):
     def test_a_wrong_word_lists_the_sections(self):
         done = self.run_bench("dispach")
         self.assertEqual(2, done.returncode)
-        self.assertTrue(done.stderr.startswith("hal-bench: no section or option 'dispach'\n"), done.stderr)
+        self.assertTrue(
+            done.stderr.startswith("hal-bench: no section or option 'dispach'\n"), done.stderr
+        )
         self.assertRegex(done.stderr, r"(?m)^  dispatch +cost of a function")
 
 

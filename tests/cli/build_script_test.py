@@ -63,15 +63,27 @@ class Script(unittest.TestCase):
         self.tools.mkdir()
         shutil.copy(ROOT / "hal", self.tree)
         shutil.copy(ROOT / "cmake/needs.awk", self.tree / "cmake")
-        (self.tree / "cmake/optional").write_text(f"libsolving-dev {self.tools}/solving.h\nlibplain-dev {self.tools}/plain.h\n")
+        (self.tree / "cmake/optional").write_text(
+            f"libsolving-dev {self.tools}/solving.h\nlibplain-dev {self.tools}/plain.h\n"
+        )
         for name in ("CMakeLists.txt", "CMakePresets.json"):
             (self.tree / name).write_text("")
         for name in ("math/sum2", "math/scale", "math/pid", "solve/lqr"):
             (self.tree / f"components/{name}.cpp").write_text("")
-        for name, text in (("cmake", CMAKE), ("ninja", NINJA), ("apt-get", APT), ("sudo", "#!/bin/sh\nexec \"$@\"\n")):
+        for name, text in (
+            ("cmake", CMAKE),
+            ("ninja", NINJA),
+            ("apt-get", APT),
+            ("sudo", '#!/bin/sh\nexec "$@"\n'),
+        ):
             (self.tools / name).write_text(text)
             (self.tools / name).chmod(0o755)
-        self.environment = {"PATH": f"{self.tools}:{os.environ['PATH']}", "TOOLS": str(self.tools), "LC_ALL": "C.UTF-8", "HOME": str(self.folder)}
+        self.environment = {
+            "PATH": f"{self.tools}:{os.environ['PATH']}",
+            "TOOLS": str(self.tools),
+            "LC_ALL": "C.UTF-8",
+            "HOME": str(self.folder),
+        }
         self.write("a.hal", "loadrt sum2 names=a,b\nsource more.hal\nloadusr -W user-program\n")
         self.write("more.hal", "loadrt \\\n    pid\n# loadrt scale\n")
         self.write("b.hal", "loadrt scale\nloadrt of-the-user\n")
@@ -83,7 +95,15 @@ class Script(unittest.TestCase):
         """Runs the script; what it called and what it printed."""
         log = self.tools / "log"
         log.write_text("")
-        done = subprocess.run([self.tree / "hal", *words], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60)
+        done = subprocess.run(
+            [self.tree / "hal", *words],
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
         self.assertEqual(status, done.returncode, done.stderr)
         self.said, self.printed = done.stderr, done.stdout
         return [line.replace(str(self.tree), "TREE") for line in log.read_text().splitlines()]
@@ -95,7 +115,13 @@ class Script(unittest.TestCase):
     BUILD = "ninja -C TREE/build/release "
 
     def test_the_first_start_builds_the_program_and_what_the_netlist_needs(self):
-        self.assertEqual(["cmake --preset release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON", self.BUILD + "hal component_sum2 component_pid"], self.hal("run", "a.hal", "--for", "1s"))
+        self.assertEqual(
+            [
+                "cmake --preset release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON",
+                self.BUILD + "hal component_sum2 component_pid",
+            ],
+            self.hal("run", "a.hal", "--for", "1s"),
+        )
         self.assertEqual("hal: building the program and 2 components in build/release\n", self.said)
         self.assertIn("started: run a.hal --for 1s\n", self.printed)
 
@@ -107,14 +133,27 @@ class Script(unittest.TestCase):
 
         def start():
             (self.tools / "log").write_text("")
-            done = subprocess.run(["unshare", "-m", "sh", "-c", script, tree, self.folder], env=self.environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60)
+            done = subprocess.run(
+                ["unshare", "-m", "sh", "-c", script, tree, self.folder],
+                env=self.environment,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                timeout=60,
+            )
             self.assertEqual(0, done.returncode, done.stderr)
             return done, (self.tools / "log").read_text().splitlines()
+
         done, calls = start()
         builds = list((self.folder / ".cache/halcyon").glob("*/build"))
         self.assertEqual(1, len(builds))
-        self.assertEqual([f"cmake --preset release -B {builds[0]}/release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON",
-                          f"ninja -C {builds[0]}/release hal component_sum2 component_pid"], calls)
+        self.assertEqual(
+            [
+                f"cmake --preset release -B {builds[0]}/release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON",
+                f"ninja -C {builds[0]}/release hal component_sum2 component_pid",
+            ],
+            calls,
+        )
         self.assertIn(f"hal: {tree} is read-only: building in {builds[0]}\n", done.stderr)
         self.assertIn("started: run a.hal\n", done.stdout)
         done, calls = start()
@@ -131,9 +170,14 @@ class Script(unittest.TestCase):
         self.hal("run", "a.hal")
         self.assertIn(f"builds with {self.tree}/hal\n", self.printed)
 
-    def test_another_netlist_builds_what_it_adds_and_a_name_that_is_not_of_the_tree_is_left_to_the_program(self):
+    def test_another_netlist_builds_what_it_adds_and_a_name_that_is_not_of_the_tree_is_left_to_the_program(
+        self,
+    ):
         self.hal("run", "a.hal")
-        self.assertEqual([self.BUILD + "hal component_sum2 component_pid component_scale"], self.hal("run", "b.hal"))
+        self.assertEqual(
+            [self.BUILD + "hal component_sum2 component_pid component_scale"],
+            self.hal("run", "b.hal"),
+        )
         self.assertEqual([], self.hal("run", "b.hal"))
         self.assertEqual([], self.hal("run", "a.hal"))
 
@@ -150,24 +194,39 @@ class Script(unittest.TestCase):
         self.assertEqual(self.BUILD + "hal hal-bus", self.hal("can", "dump", "can:can0")[-1])
 
     def test_an_edit_typed_as_a_command_is_read_too(self):
-        self.assertEqual(self.BUILD + "hal component_scale", self.hal("shell", "loadrt", "scale")[-1])
+        self.assertEqual(
+            self.BUILD + "hal component_scale", self.hal("shell", "loadrt", "scale")[-1]
+        )
 
     def test_build_builds_everything(self):
         self.assertEqual(self.BUILD + "hal everything", self.hal("build")[-1])
-        self.assertIn("hal: left out: seeing (./hal build NAME installs the Debian packages that one needs)\n", self.said)
+        self.assertIn(
+            "hal: left out: seeing (./hal build NAME installs the Debian packages that one needs)\n",
+            self.said,
+        )
         self.assertEqual([], self.hal("run", "b.hal"))
 
     def test_build_of_a_component_that_does_not_exist_fails(self):
         self.hal("build", "sum3", status=1)
-        self.assertIn("hal: component 'sum3' does not exist; ./hal doc lists all components\n", self.said)
+        self.assertIn(
+            "hal: component 'sum3' does not exist; ./hal doc lists all components\n", self.said
+        )
 
     def test_only_the_packages_of_what_is_needed_are_installed(self):
         self.assertNotIn("apt-get", " ".join(self.hal("run", "a.hal")))
         self.write("c.hal", "loadrt lqr\n")
         calls = self.hal("run", "c.hal")
-        self.assertEqual(["apt-get -o DPkg::Lock::Timeout=300 -o Acquire::Retries=1 install --no-install-recommends -y libsolving-dev",
-                          self.BUILD + "hal component_sum2 component_pid component_lqr"], calls)
-        self.assertRegex(self.said, "^hal: installing Debian packages( through sudo)?: libsolving-dev \\(1,234 kB to download, 56.7 MB on disk\\)\nhal: new since the last build: libsolving-dev\n")
+        self.assertEqual(
+            [
+                "apt-get -o DPkg::Lock::Timeout=300 -o Acquire::Retries=1 install --no-install-recommends -y libsolving-dev",
+                self.BUILD + "hal component_sum2 component_pid component_lqr",
+            ],
+            calls,
+        )
+        self.assertRegex(
+            self.said,
+            "^hal: installing Debian packages( through sudo)?: libsolving-dev \\(1,234 kB to download, 56.7 MB on disk\\)\nhal: new since the last build: libsolving-dev\n",
+        )
 
     def test_a_package_that_cannot_be_installed_is_named(self):
         (self.tools / "offline").write_text("")
@@ -178,15 +237,27 @@ class Script(unittest.TestCase):
     def test_a_failed_build_shows_the_error_and_is_tried_again(self):
         (self.tools / "broken").write_text("")
         self.hal("run", "a.hal", status=1)
-        self.assertEqual("hal: building the program and 2 components in build/release\na.cpp:1: error: no\nhal: cannot build build/release\n", self.said)
+        self.assertEqual(
+            "hal: building the program and 2 components in build/release\na.cpp:1: error: no\nhal: cannot build build/release\n",
+            self.said,
+        )
         (self.tools / "broken").unlink()
-        self.assertEqual([self.BUILD + "hal component_sum2 component_pid"], self.hal("run", "a.hal"))
+        self.assertEqual(
+            [self.BUILD + "hal component_sum2 component_pid"], self.hal("run", "a.hal")
+        )
 
     def test_a_board_is_one_of_two_and_its_libraries_are_unpacked_once(self):
         for name in ("cmake/board.sh", "tests/board.sh"):
             (self.tree / name).parent.mkdir(exist_ok=True)
             shutil.copy(ROOT / name, self.tree / name)
-        self.assertEqual([], [line for line in self.hal("board", "mips", status=1) if not line.startswith("apt-get")])
+        self.assertEqual(
+            [],
+            [
+                line
+                for line in self.hal("board", "mips", status=1)
+                if not line.startswith("apt-get")
+            ],
+        )
         self.assertTrue(self.said.endswith("hal: usage: ./hal board armhf|arm64\n"), self.said)
         self.hal("package", "armhf", "arm64", status=1)
         self.assertTrue(self.said.endswith("hal: usage: ./hal package [armhf|arm64]\n"), self.said)
@@ -197,7 +268,10 @@ class Script(unittest.TestCase):
         unpacker.chmod(0o755)
         self.hal("package", "armhf", status=1)
         begun = "hal: unpacking Debian's libraries for armhf from http://deb.debian.org/debian in build/boards/armhf/sysroot\n"
-        self.assertEqual(f"{begun}E: no mirror\nhal: cannot make build/boards/armhf/sysroot (see {folder}/sysroot.log); HALCYON_MIRROR=URL names another mirror of Debian\n", self.said)
+        self.assertEqual(
+            f"{begun}E: no mirror\nhal: cannot make build/boards/armhf/sysroot (see {folder}/sysroot.log); HALCYON_MIRROR=URL names another mirror of Debian\n",
+            self.said,
+        )
         unpacker.write_text("#!/bin/sh\n")
         (self.tools / "broken").write_text("")
         failed = "hal: building everything for armhf in build/armhf\na.cpp:1: error: no\nhal: cannot build build/armhf\n"
@@ -207,31 +281,64 @@ class Script(unittest.TestCase):
 
     def test_sources_that_cannot_be_compiled_together_are_compiled_one_by_one(self):
         (self.tools / "together").write_text("")
-        self.assertEqual(["cmake --preset release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON", self.BUILD + "hal",
-                          "cmake --preset release -DHALCYON_QUICK=OFF", self.BUILD + "hal"], self.hal("version"))
-        self.assertIn("hal: compiling source by source, because some sources cannot be compiled together (see ", self.said)
+        self.assertEqual(
+            [
+                "cmake --preset release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON",
+                self.BUILD + "hal",
+                "cmake --preset release -DHALCYON_QUICK=OFF",
+                self.BUILD + "hal",
+            ],
+            self.hal("version"),
+        )
+        self.assertIn(
+            "hal: compiling source by source, because some sources cannot be compiled together (see ",
+            self.said,
+        )
         self.assertIn("started: version\n", self.printed)
 
     def test_a_long_build_prints_the_remaining_time_periodically(self):
-        (self.tools / "steps").write_text("".join(f"[{i}/100 {i * 2}.3] compile\n" for i in range(1, 101)))
+        (self.tools / "steps").write_text(
+            "".join(f"[{i}/100 {i * 2}.3] compile\n" for i in range(1, 101))
+        )
         self.hal("version")
-        self.assertEqual(["building the program in build/release"] + [f"{done} of 100 steps, about {left} left" for done, left in
-                         ((15, "3 min"), (30, "2 min"), (45, "2 min"), (60, "80 s"), (75, "50 s"), (90, "20 s"))],
-                         re.findall("(?m)^hal: (.*)$", self.said))
+        self.assertEqual(
+            ["building the program in build/release"]
+            + [
+                f"{done} of 100 steps, about {left} left"
+                for done, left in (
+                    (15, "3 min"),
+                    (30, "2 min"),
+                    (45, "2 min"),
+                    (60, "80 s"),
+                    (75, "50 s"),
+                    (90, "20 s"),
+                )
+            ],
+            re.findall("(?m)^hal: (.*)$", self.said),
+        )
 
     def test_a_moved_tree_is_built_from_the_start(self):
         self.hal("run", "a.hal")
         moved = self.folder / "moved"
         self.tree.rename(moved)
         self.tree = moved
-        self.assertEqual(["cmake --preset release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON", self.BUILD + "hal"], self.hal("version"))
+        self.assertEqual(
+            ["cmake --preset release -DHALCYON_TESTS=OFF -DHALCYON_QUICK=ON", self.BUILD + "hal"],
+            self.hal("version"),
+        )
 
 
 class Needs(unittest.TestCase):
     """The rough reader of cmake/needs.awk, against one that takes its time."""
 
     def needs(self, *words, cwd=ROOT):
-        done = subprocess.run(["awk", "-v", f"command={words[0]}", "-f", ROOT / "cmake/needs.awk", "--", *words], cwd=cwd, capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            ["awk", "-v", f"command={words[0]}", "-f", ROOT / "cmake/needs.awk", "--", *words],
+            cwd=cwd,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
         self.assertEqual("", done.stderr)
         return set(done.stdout.split())
 
@@ -250,29 +357,48 @@ class Needs(unittest.TestCase):
         return names
 
     def test_every_netlist_of_the_tree_gets_the_components_it_loads_and_no_other(self):
-        files = [path for folder in ("halfiles", "tests/netlists") for path in sorted((ROOT / folder).rglob("*.hal"))]
+        files = [
+            path
+            for folder in ("halfiles", "tests/netlists")
+            for path in sorted((ROOT / folder).rglob("*.hal"))
+        ]
         self.assertGreater(len(files), 50)
         for path in files:
             text = path.read_text(errors="replace")
-            if re.search(r"^\s*loadrt\s+\S*[\[$\"']|^\s*source\s+\S*[\[$\"']", text, re.M) or "\\\n" in text and "loadrt" not in text:
+            if (
+                re.search(r"^\s*loadrt\s+\S*[\[$\"']|^\s*source\s+\S*[\[$\"']", text, re.M)
+                or "\\\n" in text
+                and "loadrt" not in text
+            ):
                 continue
             with self.subTest(path.relative_to(ROOT)):
-                self.assertEqual(self.loaded(path, set()), self.needs("run", str(path)) - {"python", "bus"})
+                self.assertEqual(
+                    self.loaded(path, set()), self.needs("run", str(path)) - {"python", "bus"}
+                )
 
     def test_an_ini_file_names_its_netlists_and_the_values_of_variables(self):
         with tempfile.TemporaryDirectory() as folder:
-            Path(folder, "m.ini").write_text("[HAL]\nHALFILE = m.hal\nHALCMD = loadrt or2\n[KINS]\nKINEMATICS = trivial-kins coordinates=xyz\n")
+            Path(folder, "m.ini").write_text(
+                "[HAL]\nHALFILE = m.hal\nHALCMD = loadrt or2\n[KINS]\nKINEMATICS = trivial-kins coordinates=xyz\n"
+            )
             Path(folder, "m.hal").write_text("loadrt [KINS]KINEMATICS\nloadrt 'pid' count=3\n")
-            self.assertLessEqual({"or2", "pid", "trivial_kins"}, self.needs("run", f"{folder}/m.ini"))
+            self.assertLessEqual(
+                {"or2", "pid", "trivial_kins"}, self.needs("run", f"{folder}/m.ini")
+            )
 
     def test_programs_that_a_netlist_starts_are_read(self):
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "p.py").write_text("import time\nimport hal\n")
-            Path(folder, "m.hal").write_text("loadusr -W python3 p.py\nloadusr -W hal node io --link sim:a --id 3\n")
+            Path(folder, "m.hal").write_text(
+                "loadusr -W python3 p.py\nloadusr -W hal node io --link sim:a --id 3\n"
+            )
             self.assertEqual({"python", "bus"}, self.needs("run", f"{folder}/m.hal"))
 
     def test_a_node_of_several_exchanges_signals_with_the_others(self):
-        self.assertEqual({"node", "dds_publish", "dds_subscribe"}, self.needs("run", "nothing.hal", "--node", "cell"))
+        self.assertEqual(
+            {"node", "dds_publish", "dds_subscribe"},
+            self.needs("run", "nothing.hal", "--node", "cell"),
+        )
 
     def test_a_folder_with_the_name_of_an_argument_is_not_a_netlist(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -280,7 +406,9 @@ class Needs(unittest.TestCase):
             self.assertEqual({"pid"}, self.needs("build", "pid", cwd=folder))
 
     def test_pages_of_components_need_them(self):
-        self.assertEqual({"pid", "conv_s32_float"}, self.needs("doc", "pid", "conv-s32-float", "--markdown"))
+        self.assertEqual(
+            {"pid", "conv_s32_float"}, self.needs("doc", "pid", "conv-s32-float", "--markdown")
+        )
         self.assertEqual({"all"}, self.needs("doc", "--all", "--output", "pages"))
         self.assertEqual(set(), self.needs("doc"))
 
@@ -292,12 +420,21 @@ class Unbuilt(Case):
         super().setUp()
         (self.folder / "groups").write_text("later math Comes later, from its source\n")
         (self.folder / "file.hal").write_text("loadrt later\n")
-        (self.folder / "build").write_text(f"#!/bin/sh\necho \"built: $*\"\ncp {HAL.parent.parent}/components/sum2.so {self.folder}/later.so\n")
+        (self.folder / "build").write_text(
+            f'#!/bin/sh\necho "built: $*"\ncp {HAL.parent.parent}/components/sum2.so {self.folder}/later.so\n'
+        )
         (self.folder / "build").chmod(0o755)
         self.environment["HALCYON_PLUGIN_PATH"] = f"{self.folder}:{PLUGINS}"
 
     def run_hal(self, *words, **more):
-        return subprocess.run([HAL, *words], cwd=self.folder, env={**self.environment, **more}, capture_output=True, text=True, timeout=60)
+        return subprocess.run(
+            [HAL, *words],
+            cwd=self.folder,
+            env={**self.environment, **more},
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
 
     def test_check_names_the_command_that_builds_it(self):
         done = self.run_hal("check", "file.hal")
@@ -310,7 +447,9 @@ class Unbuilt(Case):
 
     def test_a_program_started_by_the_script_builds_it(self):
         done = self.run_hal("check", "file.hal", HALCYON_BUILD=str(self.folder / "build"))
-        self.assertEqual((0, "built: build later\nfile.hal: no errors\n"), (done.returncode, done.stderr))
+        self.assertEqual(
+            (0, "built: build later\nfile.hal: no errors\n"), (done.returncode, done.stderr)
+        )
         self.assertEqual("", done.stdout)
 
     def test_a_build_that_fails_leaves_the_error(self):
@@ -319,7 +458,15 @@ class Unbuilt(Case):
 
     def test_a_running_machine_builds_nothing(self):
         (self.folder / "file.hal").write_text("loadrt threads name1=t period1=1000000\n")
-        done = self.run_hal("sim", "file.hal", "--for", "1ms", "--execute", "loadrt later", HALCYON_BUILD=str(self.folder / "build"))
+        done = self.run_hal(
+            "sim",
+            "file.hal",
+            "--for",
+            "1ms",
+            "--execute",
+            "loadrt later",
+            HALCYON_BUILD=str(self.folder / "build"),
+        )
         self.assertIn("error: component 'later' is not built yet", done.stderr)
 
 

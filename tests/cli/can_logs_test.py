@@ -9,7 +9,15 @@ from can_test import Can
 from harness import TIMEOUT
 
 CONVERT = shutil.which("can_logconvert", path="/usr/bin") or shutil.which("can_logconvert")
-FRAMES = ["702#00", "602#4000100000000000", "582#4300100092010200", "123#", "18FF0001#AA", "00000123#1122334455667788", "7FF#0102030405060708"]
+FRAMES = [
+    "702#00",
+    "602#4000100000000000",
+    "582#4300100092010200",
+    "123#",
+    "18FF0001#AA",
+    "00000123#1122334455667788",
+    "7FF#0102030405060708",
+]
 REMOTE = ["701#R"]
 FD = ["123##1AABB", "18FF0002##0" + "0A" * 12]
 
@@ -23,10 +31,23 @@ class Logs(Can):
 
     def convert(self, source, target):
         """What can_logconvert prints, and so leaves out; skips the test where this python-can does not have the format."""
-        done = subprocess.run([CONVERT, source, target], cwd=self.folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                              text=True, timeout=2 * TIMEOUT)
-        if "no write support" in done.stdout or "No write support" in done.stdout or "Unknown file type" in done.stdout:
-            self.skipTest(f"this python-can does not write {target}: {done.stdout.strip().splitlines()[-1]}")
+        done = subprocess.run(
+            [CONVERT, source, target],
+            cwd=self.folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=2 * TIMEOUT,
+        )
+        if (
+            "no write support" in done.stdout
+            or "No write support" in done.stdout
+            or "Unknown file type" in done.stdout
+        ):
+            self.skipTest(
+                f"this python-can does not write {target}: {done.stdout.strip().splitlines()[-1]}"
+            )
         self.assertEqual(0, done.returncode, done.stdout)
         return done.stdout
 
@@ -34,7 +55,9 @@ class Logs(Can):
         """Without the time of the first, which ASC and TRC do not keep."""
         lines = self.run_program("can", "dump", "replay:" + file, "--json").stdout.splitlines()
         frames = [json.loads(line) for line in lines[:-1]]
-        return [{key: value for key, value in frame.items() if key != "direction"} for frame in frames]
+        return [
+            {key: value for key, value in frame.items() if key != "direction"} for frame in frames
+        ]
 
     def round_trip(self, ending, *frames):
         self.record(*frames)
@@ -53,7 +76,11 @@ class Logs(Can):
 
     def test_blf_keeps_all_frames_and_the_time_of_day(self):
         self.round_trip("blf", *FRAMES, *REMOTE, *FD)
-        first = [float(line[1:line.index(")")]) for file in ("seen.log", "back.log") for line in (self.folder / file).read_text().splitlines()[:1]]
+        first = [
+            float(line[1 : line.index(")")])
+            for file in ("seen.log", "back.log")
+            for line in (self.folder / file).read_text().splitlines()[:1]
+        ]
         self.assertAlmostEqual(first[0], first[1], delta=0.002)
 
     def test_trc_keeps_classic_data_frames(self):

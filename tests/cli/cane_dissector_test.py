@@ -52,14 +52,37 @@ class Dissector(Case):
 
     def run_netlist(self, text):
         self.write("wire.hal", text)
-        done = subprocess.run([HAL, "sim", "wire.hal"], cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=120)
+        done = subprocess.run(
+            [HAL, "sim", "wire.hal"],
+            cwd=self.folder,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
         self.assertEqual(0, done.returncode, done.stderr)
         return done.stdout.split()
 
     def tshark(self, *more):
-        read = subprocess.run(["tshark", "-n", "-X", f"lua_script:{ROOT}/tools/wireshark/halcyon.lua", *more, "-r", "seen.pcapng", "-T", "json",
-                               "--no-duplicate-keys"], cwd=self.folder, capture_output=True, text=True, timeout=120,
-                              env={**self.environment, "HOME": str(self.folder)})
+        read = subprocess.run(
+            [
+                "tshark",
+                "-n",
+                "-X",
+                f"lua_script:{ROOT}/tools/wireshark/halcyon.lua",
+                *more,
+                "-r",
+                "seen.pcapng",
+                "-T",
+                "json",
+                "--no-duplicate-keys",
+            ],
+            cwd=self.folder,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            env={**self.environment, "HOME": str(self.folder)},
+        )
         if "Lua: Error" in read.stderr or (read.returncode != 0 and "lua_script" in read.stderr):
             self.skipTest(read.stderr)
         self.assertEqual(0, read.returncode, read.stderr)
@@ -74,6 +97,7 @@ class Dissector(Case):
                         if "cane.id" in one:
                             yield one
                         yield from walk(one)
+
         return list(walk(frame["cane"]))
 
     def functions(self, frames):
@@ -83,20 +107,37 @@ class Dissector(Case):
         held = float(self.run_netlist(PINGS)[-1])
         frames = [packet["_source"]["layers"] for packet in json.loads(self.tshark())]
         pings = [frame["tdma_ping"] for frame in frames if "tdma_ping" in frame]
-        self.assertEqual([("0x0020", "7"), ("0x0021", "7"), ("0x0020", "70000"), ("0x0021", "70000")],
-                         [(p["tdma_ping.id"], p["tdma_ping.number"]) for p in pings])
+        self.assertEqual(
+            [("0x0020", "7"), ("0x0021", "7"), ("0x0020", "70000"), ("0x0021", "70000")],
+            [(p["tdma_ping.id"], p["tdma_ping.number"]) for p in pings],
+        )
         asked, answered = pings[:2]
         self.assertEqual(asked["tdma_ping.asked"], answered["tdma_ping.asked"])
         self.assertAlmostEqual(held, int(answered["tdma_ping.held"]) / 1000, places=1)
-        self.assertTrue(any("tdma.msg" in json.dumps(frame) or "rtmac" in frame for frame in frames), "Wireshark's own dissector has the others")
+        self.assertTrue(
+            any("tdma.msg" in json.dumps(frame) or "rtmac" in frame for frame in frames),
+            "Wireshark's own dissector has the others",
+        )
 
     def test_packed(self):
         frames, text = self.dissect("")
-        self.assertEqual({"good"}, {frame["cane"]["cane.crc.status"] for frame in frames}, "as the driver computes it")
-        self.assertGreaterEqual(self.functions(frames), {"NMT", "SYNC", "TPDO1", "RPDO1", "SDO request", "SDO answer", "heartbeat"})
+        self.assertEqual(
+            {"good"},
+            {frame["cane"]["cane.crc.status"] for frame in frames},
+            "as the driver computes it",
+        )
+        self.assertGreaterEqual(
+            self.functions(frames),
+            {"NMT", "SYNC", "TPDO1", "RPDO1", "SDO request", "SDO answer", "heartbeat"},
+        )
         for frame in frames:
             self.assertEqual(int(frame["cane"]["cane.messages"]), len(self.messages(frame)))
-        nodes = {m.get("cane.node") for frame in frames for m in self.messages(frame) if m.get("cane.function") == "TPDO1"}
+        nodes = {
+            m.get("cane.node")
+            for frame in frames
+            for m in self.messages(frame)
+            if m.get("cane.function") == "TPDO1"
+        }
         self.assertEqual({"2"}, nodes)
 
     def test_signed(self):
@@ -112,7 +153,10 @@ class Dissector(Case):
         for order, words in (("big", ()), ("little", ("-o", "cane.order:little endian"))):
             with self.subTest(order):
                 frames, text = self.dissect(f"?format=single&order={order}", *words)
-                self.assertGreaterEqual(self.functions(frames), {"NMT", "SYNC", "TPDO1", "RPDO1", "SDO request", "SDO answer", "heartbeat"})
+                self.assertGreaterEqual(
+                    self.functions(frames),
+                    {"NMT", "SYNC", "TPDO1", "RPDO1", "SDO request", "SDO answer", "heartbeat"},
+                )
 
 
 if __name__ == "__main__":

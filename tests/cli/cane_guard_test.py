@@ -79,7 +79,11 @@ def single(source, cob, data):
 
 
 def sync(source, cycle, stamp):
-    return b"\xff" * 6 + address(source) + struct.pack(">HHBBHHIQQ", 0x9021, 1, 2, 0, 0x0201, 0, cycle, stamp, stamp)
+    return (
+        b"\xff" * 6
+        + address(source)
+        + struct.pack(">HHBBHHIQQ", 0x9021, 1, 2, 0, 0x0201, 0, cycle, stamp, stamp)
+    )
 
 
 SEND = """
@@ -106,14 +110,40 @@ class Stranger(Segment):
         self.station("m", MASTER)
         log = self.logs.setdefault("x", self.folder / "x.log")
         with open(log, "a") as out:
-            process = subprocess.Popen(["ip", "netns", "exec", "x", HAL, "node", "io", "--link", "cane:wire0" + ("?" + format[1:] if format else ""),
-                                        "--id", "6", "--tdma", "cell.tdma", "--station", "x"],
-                                       cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL, stdout=out, stderr=out)
+            process = subprocess.Popen(
+                [
+                    "ip",
+                    "netns",
+                    "exec",
+                    "x",
+                    HAL,
+                    "node",
+                    "io",
+                    "--link",
+                    "cane:wire0" + ("?" + format[1:] if format else ""),
+                    "--id",
+                    "6",
+                    "--tdma",
+                    "cell.tdma",
+                    "--station",
+                    "x",
+                ],
+                cwd=self.folder,
+                env=self.environment,
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=out,
+            )
         self.addCleanup(self.stop, process)
-        wait_until(lambda: self.shell_value("m", "canopen.0.io.operational") == "TRUE", "the node is operational")
+        wait_until(
+            lambda: self.shell_value("m", "canopen.0.io.operational") == "TRUE",
+            "the node is operational",
+        )
 
     def shell_value(self, name, pin):
-        return self.at(name, HAL, "shell", "--name", f"test-{name}", "-s", "getp", pin, env=self.environment).stdout.strip()
+        return self.at(
+            name, HAL, "shell", "--name", f"test-{name}", "-s", "getp", pin, env=self.environment
+        ).stdout.strip()
 
     def send(self, frames, pause=0.001):
         text = "".join(f"{pause} {frame.hex()}\n" for frame in frames)
@@ -127,11 +157,18 @@ class Stranger(Segment):
 
     def test_forged_commands_in_packed_frames(self):
         self.begin()
-        self.send([packed(LOWEST, [(0x000, bytes([2, 0]))], n) for n in range(20)])       # NMT stop, all nodes
-        self.send([packed(LOWEST, [(0x080, b""), (0x206, b"\xff")], 100 + n) for n in range(20)])  # SYNC and a set-point
+        self.send(
+            [packed(LOWEST, [(0x000, bytes([2, 0]))], n) for n in range(20)]
+        )  # NMT stop, all nodes
+        self.send(
+            [packed(LOWEST, [(0x080, b""), (0x206, b"\xff")], 100 + n) for n in range(20)]
+        )  # SYNC and a set-point
         self.stays_operational()
-        self.assertRegex(self.said("x"), rf"rejected NMT command \(000h\) from {LOWEST}: not in a slot of that station|"
-                                         rf"rejected NMT command \(000h\) from {LOWEST}: not the master")
+        self.assertRegex(
+            self.said("x"),
+            rf"rejected NMT command \(000h\) from {LOWEST}: not in a slot of that station|"
+            rf"rejected NMT command \(000h\) from {LOWEST}: not the master",
+        )
         self.assertNotIn("stopped", self.said("x"))
 
     def test_status_shows_the_stations(self):
@@ -140,7 +177,9 @@ class Stranger(Segment):
         self.assertEqual(0, done.returncode, done.stdout)
         # Every request of the boot left in its slot: none had to be repeated after a timeout of half a second.
         self.assertLess(self.number("m", "frames-late"), 20)
-        self.assertRegex(done.stdout, r"tdma\.0: running as master, cycle \d+; own clock [-+.\d]+ ppm")
+        self.assertRegex(
+            done.stdout, r"tdma\.0: running as master, cycle \d+; own clock [-+.\d]+ ppm"
+        )
         self.assertRegex(done.stdout, r"(?m)^x +online +\d+\.\d s +[1-9]\d* ")
         print(done.stdout, file=sys.stderr)
         wrong = self.at("m", HAL, "tdma", "status", "--name", "nobody", env=self.environment)
@@ -157,33 +196,57 @@ class Stranger(Segment):
         self.begin()
         master = self.mac("m")
         self.send([packed(master, [(0x000, bytes([2, 0]))], n) for n in range(300)], 0.0037)
-        self.assertRegex(self.said("x"), rf"rejected NMT command \(000h\) from {master}: not in a slot of that station")
+        self.assertRegex(
+            self.said("x"),
+            rf"rejected NMT command \(000h\) from {master}: not in a slot of that station",
+        )
 
     def test_syncs_of_a_lower_address(self):
         self.begin()
         self.send([sync(LOWEST, n, 10**15 + n * 5_000_000) for n in range(999)], 0.004)
-        self.send([b"\xff" * 6 + address(LOWEST) + bytes.fromhex("9021") + bytes((n * k) % 256 for k in range(46)) for n in range(200)])
-        self.assertEqual(["TRUE", "3"], [self.shell_value("m", "tdma.0." + pin) for pin in ("leading", "state")])
+        self.send(
+            [
+                b"\xff" * 6
+                + address(LOWEST)
+                + bytes.fromhex("9021")
+                + bytes((n * k) % 256 for k in range(46))
+                for n in range(200)
+            ]
+        )
+        self.assertEqual(
+            ["TRUE", "3"], [self.shell_value("m", "tdma.0." + pin) for pin in ("leading", "state")]
+        )
         self.stays_operational()
         self.assertIn(f"second master on the segment: {LOWEST} ", self.said("m"))
         self.assertNotIn("stepped down", self.said("m"))
-        wait_until(lambda: f"the second master {LOWEST} is gone" in self.said("m"), "its end is reported")
+        wait_until(
+            lambda: f"the second master {LOWEST} is gone" in self.said("m"), "its end is reported"
+        )
 
     def test_an_event_timer_of_a_cycle_sends_in_every_cycle(self):
         self.begin()
-        program = ("import socket, time\ns = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(3))\ns.bind(('wire0', 3))\n"
-                   "end = time.time() + 4\ns.settimeout(0.5)\n"
-                   "while time.time() < end:\n    f = s.recv(2048)\n    print(f.hex(), flush=True)\n")
-        frames = [bytes.fromhex(line) for line in self.at("s", sys.executable, "-c", program).stdout.split()]
+        program = (
+            "import socket, time\ns = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(3))\ns.bind(('wire0', 3))\n"
+            "end = time.time() + 4\ns.settimeout(0.5)\n"
+            "while time.time() < end:\n    f = s.recv(2048)\n    print(f.hex(), flush=True)\n"
+        )
+        frames = [
+            bytes.fromhex(line)
+            for line in self.at("s", sys.executable, "-c", program).stdout.split()
+        ]
         has_it = []  # of each cycle
         for frame in frames:
-            if frame[12:14] != b"\x90\x23" or frame[6:12] != address(self.mac("m")) or frame[14] != 0xEC:
+            if (
+                frame[12:14] != b"\x90\x23"
+                or frame[6:12] != address(self.mac("m"))
+                or frame[14] != 0xEC
+            ):
                 continue
             body, cobs = frame[24:], []
             for _ in range(frame[16]):
                 first = struct.unpack("<H", body[:2])[0]
                 cobs.append(first & 0x7FF)
-                body = body[2 + (first >> 12):]
+                body = body[2 + (first >> 12) :]
             if 0x080 in cobs:
                 has_it.append(0x206 in cobs)
         print(f"{len(has_it)} SYNCs, {sum(has_it)} with the RPDO", file=sys.stderr)

@@ -51,50 +51,99 @@ class Check(Case):
         self.environment["HALLIB_DIR"] = str(self.folder / "library")
         self.write("machine.hal", MACHINE)
         self.write("library/library.hal", "net lib pid.x.error joint.0.f-error-lim\n")
-        self.write("more.hal", "net more joint.0.amp-enable-out => pid.x.enable\nsetp pid.x.Igain 1\nsetp pid.y.Dgain 2\n")
+        self.write(
+            "more.hal",
+            "net more joint.0.amp-enable-out => pid.x.enable\nsetp pid.x.Igain 1\nsetp pid.y.Dgain 2\n",
+        )
         self.write("after.hal", "net after axisui.notifications-clear => pyvcp.led\n")
         self.ini = self.write("machine.ini", INI)
 
     def errors(self, text):
-        return [line for line in text.splitlines() if ": error: " in line or line.startswith("error: ")]
+        return [
+            line for line in text.splitlines() if ": error: " in line or line.startswith("error: ")
+        ]
 
     def test_reports_one_error_per_cause(self):
         said = self.bad("check", "machine.ini")
-        self.assertEqual(["trivkins", "motmod", "hal_card"], [line.split("'")[1] for line in self.errors(said)], said)
-        self.assertIn("9 lines refer to names that no loaded component has; they were not checked", said)
-        self.assertIn("possibly from component 'trivkins', component 'motmod', component 'hal_card'", said)
-        self.assertIn("depends on program 'pyvcp', which is not started here; it was not checked", said)
+        self.assertEqual(
+            ["trivkins", "motmod", "hal_card"],
+            [line.split("'")[1] for line in self.errors(said)],
+            said,
+        )
+        self.assertIn(
+            "9 lines refer to names that no loaded component has; they were not checked", said
+        )
+        self.assertIn(
+            "possibly from component 'trivkins', component 'motmod', component 'hal_card'", said
+        )
+        self.assertIn(
+            "depends on program 'pyvcp', which is not started here; it was not checked", said
+        )
         self.assertIn("depends on program 'io', which is not started here", said)
 
     def test_a_single_missing_component_has_all_lines(self):
-        self.write("a.hal", "loadrt motmod\nloadrt pid names=pid.x\nnet c joint.0.pos-cmd => pid.x.command\naddf pid.x.do-pid-calcs servo-thread\n")
+        self.write(
+            "a.hal",
+            "loadrt motmod\nloadrt pid names=pid.x\nnet c joint.0.pos-cmd => pid.x.command\naddf pid.x.do-pid-calcs servo-thread\n",
+        )
         self.write("b.hal", "net d joint.0.pos-fb pid.x.feedback\nsetp pid.x.Pgain 1\n")
         said = self.bad("check", "a.hal", "b.hal")
-        self.assertEqual(["a.hal:1:8: error: unknown component 'motmod' [no-such-component]"], self.errors(said), said)
+        self.assertEqual(
+            ["a.hal:1:8: error: unknown component 'motmod' [no-such-component]"],
+            self.errors(said),
+            said,
+        )
         self.assertIn("= help: 2 lines depend on it; they were not checked", said)
-        self.assertIn("b.hal:1:1: warning: 1 line depends on component 'motmod', which is missing; it was not checked [unchecked-lines]", said)
+        self.assertIn(
+            "b.hal:1:1: warning: 1 line depends on component 'motmod', which is missing; it was not checked [unchecked-lines]",
+            said,
+        )
 
     def test_real_errors_are_still_errors(self):
-        self.write("b.hal", "net d pdi.x.command joint.0.x\nsetp pid.x.Nogain 3\nsetp pid.x.Pgain no\naddf pid.z.do-pid-calcs servo-thread\nsets nothing 3\n")
+        self.write(
+            "b.hal",
+            "net d pdi.x.command joint.0.x\nsetp pid.x.Nogain 3\nsetp pid.x.Pgain no\naddf pid.z.do-pid-calcs servo-thread\nsets nothing 3\n",
+        )
         said = self.bad("check", "machine.ini", "b.hal")
-        self.assertEqual([f"b.hal:{line}" for line in (1, 2, 3, 4, 5)],
-                         [":".join(line.split(":")[:2]) for line in self.errors(said) if line.startswith("b.hal")], said)
+        self.assertEqual(
+            [f"b.hal:{line}" for line in (1, 2, 3, 4, 5)],
+            [
+                ":".join(line.split(":")[:2])
+                for line in self.errors(said)
+                if line.startswith("b.hal")
+            ],
+            said,
+        )
         for name in ("pdi.x.command", "pid.x.Nogain", "pid.z.do-pid-calcs", "'nothing'"):
             self.assertIn(name, "\n".join(self.errors(said)))
 
     def test_assume(self):
-        said = self.run_program("check", "--assume", "trivkins", "--assume", "motmod", "--assume", "hal_card", "machine.ini")
+        said = self.run_program(
+            "check",
+            "--assume",
+            "trivkins",
+            "--assume",
+            "motmod",
+            "--assume",
+            "hal_card",
+            "machine.ini",
+        )
         self.assertEqual((0, []), (said.returncode, self.errors(said.stderr)), said.stderr)
         self.assertIn("9 lines refer to names that no loaded component has", said.stderr)
         self.write("c.hal", "loadrt and2 names=a\nnet s far.out => a.in0\n")
         self.assertIn("far.out", self.bad("check", "c.hal"))
         said = self.run_program("check", "--assume", "far", "c.hal")
         self.assertEqual(0, said.returncode, said.stderr)
-        self.assertIn("1 line depends on 'far', which is assumed to exist; it was not checked [unchecked-lines]", said.stderr)
+        self.assertIn(
+            "1 line depends on 'far', which is assumed to exist; it was not checked [unchecked-lines]",
+            said.stderr,
+        )
 
     def test_files_of_the_library(self):
         self.write("x.ini", "[HAL]\nHALFILE = LIB:nowhere.hal\n")
-        self.assertIn("'LIB:nowhere.hal' cannot be read: it is not in HALLIB_DIR", self.bad("check", "x.ini"))
+        self.assertIn(
+            "'LIB:nowhere.hal' cannot be read: it is not in HALLIB_DIR", self.bad("check", "x.ini")
+        )
         del self.environment["HALLIB_DIR"]
         self.assertIn("HALLIB_DIR is not set", self.bad("check", "x.ini"))
         self.write("library/s.hal", "loadrt and2 names=q\nprint found\n")
@@ -123,15 +172,37 @@ class SpecialFiles(Case):
         (self.folder / "fifo.dds").symlink_to("fifo.hal")
 
     def test_every_command_that_reads_a_file(self):
-        for name, why in (("fifo.hal", "FIFO"), ("folder.hal", "directory"), ("zero.hal", "device")):
+        for name, why in (
+            ("fifo.hal", "FIFO"),
+            ("folder.hal", "directory"),
+            ("zero.hal", "device"),
+        ):
             self.write("source.hal", f"source {name}\n")
             self.write("named.ini", f"[HAL]\nHALFILE = {name}\n")
-            for words in (["check", name], ["run", name], ["sim", name], ["fmt", name], ["graph", name], ["check", "source.hal"], ["run", "source.hal"],
-                          ["sim", "source.hal"], ["check", "named.ini"], ["run", "named.ini"], ["sim", "--ini", name, "source.hal"]):
+            for words in (
+                ["check", name],
+                ["run", name],
+                ["sim", name],
+                ["fmt", name],
+                ["graph", name],
+                ["check", "source.hal"],
+                ["run", "source.hal"],
+                ["sim", "source.hal"],
+                ["check", "named.ini"],
+                ["run", "named.ini"],
+                ["sim", "--ini", name, "source.hal"],
+            ):
                 with self.subTest(words=words):
                     self.assertIn(why, self.bad(*words))
-        for words in (["check", "fifo.ini"], ["sim", "fifo.ini"], ["compile", "fifo.cpp"], ["compile", "fifo.c"], ["compile", "fifo.comp"],
-                      ["canopen", "check", "fifo.canopen"], ["can", "eds", "check", "fifo.eds"]):
+        for words in (
+            ["check", "fifo.ini"],
+            ["sim", "fifo.ini"],
+            ["compile", "fifo.cpp"],
+            ["compile", "fifo.c"],
+            ["compile", "fifo.comp"],
+            ["canopen", "check", "fifo.canopen"],
+            ["can", "eds", "check", "fifo.eds"],
+        ):
             with self.subTest(words=words):
                 self.assertRegex(self.bad(*words), "FIFO|regular file")
         self.write("included.ini", "#INCLUDE fifo.ini\n")
@@ -144,13 +215,21 @@ class SpecialFiles(Case):
         self.assertIn("FIFO", self.run_program("-f", "fifo.hal", name="halcmd").stderr)
 
     def test_a_descriptor_of_the_shell_is_read(self):
-        done = subprocess.run(["bash", "-c", f"exec '{self.hal()}' sim <(echo print hello)"], cwd=self.folder, env=self.environment,
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=60)
+        done = subprocess.run(
+            ["bash", "-c", f"exec '{self.hal()}' sim <(echo print hello)"],
+            cwd=self.folder,
+            env=self.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+        )
         self.assertIn("HALCMD MSG: hello", done.stderr)
 
     @staticmethod
     def hal():
         from harness import HAL
+
         return HAL
 
 

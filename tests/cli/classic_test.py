@@ -26,24 +26,63 @@ class Halcmd(Case):
         def run(*words):
             done = self.run_program(*words[1:], name=words[0])
             return done.returncode, done.stdout + done.stderr
+
         self.assertEqual(0, run("halmeter", "-s", "-g", "10", "20", "pin", "adder.in0")[0])
         self.assertIn("2", run("halmeter", "pin", "adder.in0")[1])
-        self.assertEqual((1, "halmeter: which value? Type: halmeter pin NAME; hal shell show pin lists the pins\n"), run("halmeter"))
-        self.assertEqual((1, "halmeter: unexpected argument 'b'; usage: halmeter [pin|sig|param] NAME\n"), run("halmeter", "pin", "a", "b"))
-        self.assertEqual(run("hal", "scope", "adder.in0"), run("halscope", "adder.in0"))  # which needs a terminal or a file
-        self.assertEqual((1, "halscope: option '-i' is not supported; type: hal scope NAME…, or hal panel\n"), run("halscope", "-i", "x"))
-        self.assertEqual((1, "halshow: unexpected argument 'x.halshow'; type: hal panel, or hal watch NAME…\n"), run("halshow", "x.halshow"))
-        found = self.run_program("loadusr", "-w", "sh", "-c", "command -v halmeter; command -v halcmd", name="halcmd").stdout
-        self.assertRegex(found, r"\A.*/halcyon/linuxcnc/bin/halmeter\n.*/halcyon/linuxcnc/bin/halcmd\n\Z")
+        self.assertEqual(
+            (
+                1,
+                "halmeter: which value? Type: halmeter pin NAME; hal shell show pin lists the pins\n",
+            ),
+            run("halmeter"),
+        )
+        self.assertEqual(
+            (1, "halmeter: unexpected argument 'b'; usage: halmeter [pin|sig|param] NAME\n"),
+            run("halmeter", "pin", "a", "b"),
+        )
+        self.assertEqual(
+            run("hal", "scope", "adder.in0"), run("halscope", "adder.in0")
+        )  # which needs a terminal or a file
+        self.assertEqual(
+            (1, "halscope: option '-i' is not supported; type: hal scope NAME…, or hal panel\n"),
+            run("halscope", "-i", "x"),
+        )
+        self.assertEqual(
+            (1, "halshow: unexpected argument 'x.halshow'; type: hal panel, or hal watch NAME…\n"),
+            run("halshow", "x.halshow"),
+        )
+        found = self.run_program(
+            "loadusr", "-w", "sh", "-c", "command -v halmeter; command -v halcmd", name="halcmd"
+        ).stdout
+        self.assertRegex(
+            found, r"\A.*/halcyon/linuxcnc/bin/halmeter\n.*/halcyon/linuxcnc/bin/halcmd\n\Z"
+        )
 
     def test_arguments_keep_their_boundaries(self):
         failed = self.halcmd("loadusr", "-w", "sh", "-c", "exit 7")
         self.assertEqual(1, failed.returncode)
         self.assertIn("exit status 7", failed.stderr)
-        given = ["a  b", '"q"', "it's", "[A]B", "$HOME", "#x", "{x,y}", "[0..2]", "", "a=b c", "tab\there", "two\nlines", "=>", "\\"]
+        given = [
+            "a  b",
+            '"q"',
+            "it's",
+            "[A]B",
+            "$HOME",
+            "#x",
+            "{x,y}",
+            "[0..2]",
+            "",
+            "a=b c",
+            "tab\there",
+            "two\nlines",
+            "=>",
+            "\\",
+        ]
         script = "import sys; print(sys.argv[1:])"
         for name, first in (("halcmd", ()), ("hal", ("shell",))):
-            done = self.run_program(*first, "loadusr", "-w", "python3", "-c", script, *given, name=name)
+            done = self.run_program(
+                *first, "loadusr", "-w", "python3", "-c", script, *given, name=name
+            )
             self.assertEqual((f"{given!r}\n", "", 0), (done.stdout, done.stderr, done.returncode))
         for name in ("two words.hal", "[A]B.hal", '"quoted".hal', "#.hal", "$HOME.hal"):
             self.assertEqual("", self.halcmd("save", "comp", name).stderr)
@@ -51,12 +90,16 @@ class Halcmd(Case):
         for name in ("my file.hal", '"q".hal', "#x"):
             self.write(name, "print hello\n")
             self.assertIn("HALCMD MSG: hello", self.halcmd("source", name).stderr)
-        self.assertEqual("2\n", self.halcmd("getp adder.in0").stdout)  # one word with blanks: a line
+        self.assertEqual(
+            "2\n", self.halcmd("getp adder.in0").stdout
+        )  # one word with blanks: a line
         self.assertIn("'' is not a", self.halcmd("setp", "adder.in0", "").stderr)
 
     def test_names_of_files_have_quotes_in_a_netlist(self):
         self.write("my file.hal", "print hello\n")
-        path = self.write("a.hal", "source \"my file.hal\"\nsource 'my file.hal'\nsave comp \"two words.hal\"\n")
+        path = self.write(
+            "a.hal", 'source "my file.hal"\nsource \'my file.hal\'\nsave comp "two words.hal"\n'
+        )
         done = self.halcmd("-f", path)
         self.assertEqual((0, 2), (done.returncode, done.stderr.count("HALCMD MSG: hello")))
         self.assertIn("loadrt sum2", (self.folder / "two words.hal").read_text())
@@ -65,7 +108,9 @@ class Halcmd(Case):
         self.assertEqual(0, self.halcmd("loadrt", "sum2", "names=x y").returncode)
         saved = self.halcmd("save", "comp").stdout
         self.assertIn('loadrt sum2 names="x y"\n', saved)
-        self.assertEqual("0\n", self.good("sim", self.write("again.hal", saved + "getp adder.in0\n")))
+        self.assertEqual(
+            "0\n", self.good("sim", self.write("again.hal", saved + "getp adder.in0\n"))
+        )
 
     def test_continues_after_an_unset_ini_key(self):
         ini = self.write("x.ini", "[A]\nB = 1\nC = # not a comment\n")
@@ -83,7 +128,8 @@ class Halcmd(Case):
     def test_the_value_of_an_ini_key_is_shown_with_its_place(self):
         ini = self.write("x.ini", "[J]\nMAX = 2.5 # end of travel\n")
         done = self.halcmd("-i", ini, "-f", given="setp adder.in0 [J]MAX\n")
-        self.assertEqual(f"""<stdin>:1:16: error: setp takes 2 arguments, not 6 [wrong-arguments]
+        self.assertEqual(
+            f"""<stdin>:1:16: error: setp takes 2 arguments, not 6 [wrong-arguments]
     1 | setp adder.in0 [J]MAX
       |                ^^^^^^
       = note: [J]MAX is '2.5 # end of travel' in {ini}:2
@@ -91,7 +137,9 @@ class Halcmd(Case):
       = help: in an INI file a comment has a line of its own: behind a value it is part of the value
 
 1 error; nothing was changed
-""", done.stderr)
+""",
+            done.stderr,
+        )
 
     def test_letters_may_be_joined(self):
         path = self.write("s.hal", "getp nothing\ngetp adder.in1\n")
@@ -104,7 +152,10 @@ class Halcmd(Case):
         self.assertEqual("3\n", self.halcmd("-f", path, "getp", "adder.in0").stdout)
 
     def test_script_output(self):
-        self.assertRegex(self.halcmd("-s", "show", "pin", "adder.out").stdout, r"^sum2 float OUT +5 adder\.out ==> total\n$")
+        self.assertRegex(
+            self.halcmd("-s", "show", "pin", "adder.out").stdout,
+            r"^sum2 float OUT +5 adder\.out ==> total\n$",
+        )
 
     def test_echo(self):
         done = self.halcmd("-e", "-f", self.write("s.hal", "\ngetp adder.in1\n"))
@@ -116,7 +167,9 @@ class Halcmd(Case):
         self.assertEqual(255, self.halcmd("-i", "x.ini", "show").returncode)
 
     def test_release_has_no_effect(self):
-        self.assertEqual((0, "", ""), (lambda d: (d.returncode, d.stdout, d.stderr))(self.halcmd("-R")))
+        self.assertEqual(
+            (0, "", ""), (lambda d: (d.returncode, d.stdout, d.stderr))(self.halcmd("-R"))
+        )
 
     def test_help(self):
         self.assertIn("usage: halcmd", self.halcmd().stdout)
@@ -162,14 +215,21 @@ class Halrun(Case):
 
     def test_programs_started_by_it(self):
         self.write("inner.sh", "halcmd getp adder.in0\nhalcmd setp adder.in0 9\n")
-        done = self.halrun("-f", self.write("a.hal", SERVO + "loadusr -w sh inner.sh\ngetp adder.in0\n"))
+        done = self.halrun(
+            "-f", self.write("a.hal", SERVO + "loadusr -w sh inner.sh\ngetp adder.in0\n")
+        )
         self.assertEqual((0, "2\n9\n", ""), (done.returncode, done.stdout, done.stderr))
 
     def test_sampler_in_the_background(self):
-        self.write("a.hal", "loadrt threads name1=servo period1=1000000\nloadrt sampler cfg=f depth=100\nloadrt sum2 names=adder\nsetp adder.in0 1\n"
-                            "addf adder servo\naddf sampler.0 servo\nnet x adder.out => sampler.0.pin.0\n"
-                            "loadusr -Wn log halsampler -N log -n 5\nstart\nwaitusr log\n")
-        self.assertEqual((0, "1.000000 \n" * 5), (lambda d: (d.returncode, d.stdout))(self.halrun("-f", "a.hal")))
+        self.write(
+            "a.hal",
+            "loadrt threads name1=servo period1=1000000\nloadrt sampler cfg=f depth=100\nloadrt sum2 names=adder\nsetp adder.in0 1\n"
+            "addf adder servo\naddf sampler.0 servo\nnet x adder.out => sampler.0.pin.0\n"
+            "loadusr -Wn log halsampler -N log -n 5\nstart\nwaitusr log\n",
+        )
+        self.assertEqual(
+            (0, "1.000000 \n" * 5), (lambda d: (d.returncode, d.stdout))(self.halrun("-f", "a.hal"))
+        )
 
     def test_ini_file(self):
         self.write("a.hal", SERVO + "setp adder.in0 [A]B\ngetp adder.in0\n")
@@ -181,7 +241,9 @@ class Halrun(Case):
         self.assertEqual((0, "0\n"), (done.returncode, done.stdout))
 
     def test_rejects_a_second_instance_and_u_ends_the_first(self):
-        first = self.start("-I", self.write("a.hal", SERVO + "start\n"), name="halrun", stdin=subprocess.PIPE)
+        first = self.start(
+            "-I", self.write("a.hal", SERVO + "start\n"), name="halrun", stdin=subprocess.PIPE
+        )
         error = self.halrun(self.write("b.hal", ""))
         self.assertEqual(1, error.returncode)
         self.assertIn("default", error.stderr)
@@ -210,26 +272,48 @@ puts [getp a.in0]
     def test_a_netlist_in_tcl(self):
         self.write("a.ini", "[A]\nNAME = a\n")
         path = self.write("a.tcl", self.TCL)
-        expected = "6 6 <> a.ini\n" + self.halrun("-f", self.write("show.hal", "show sig\n")).stdout + "1 <>\n2\n"
+        expected = (
+            "6 6 <> a.ini\n"
+            + self.halrun("-f", self.write("show.hal", "show sig\n")).stdout
+            + "1 <>\n2\n"
+        )
         done = self.halrun("-i", "a.ini", path)
         self.assertEqual((0, expected, ""), (done.returncode, done.stdout, done.stderr))
         done = self.halrun("-i", "a.ini", "-f", path)
         self.assertEqual((0, expected, ""), (done.returncode, done.stdout, done.stderr))
         self.write("b.ini", "[HAL]\nHALFILE = a.tcl\n[A]\nNAME = a\n")
-        self.assertEqual((0, expected.replace("a.ini", "b.ini")), (lambda d: (d.returncode, d.stdout))(self.halrun("b.ini")))
-        self.assertEqual(expected.replace("<>", "<x y>", 1), self.good("sim", "--quiet", "-i", "a.ini", path, "--", "x", "y"))
+        self.assertEqual(
+            (0, expected.replace("a.ini", "b.ini")),
+            (lambda d: (d.returncode, d.stdout))(self.halrun("b.ini")),
+        )
+        self.assertEqual(
+            expected.replace("<>", "<x y>", 1),
+            self.good("sim", "--quiet", "-i", "a.ini", path, "--", "x", "y"),
+        )
 
     @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
     def test_an_error_in_tcl_is_its_status(self):
         done = self.halrun(self.write("a.tcl", "loadrt sum2 names=a\nsetp a.in7 1\n"))
         self.assertEqual((1, ""), (done.returncode, done.stdout))
         self.assertIn("<a.tcl>:1:6: error: unknown pin 'a.in7' [no-such-pin]", done.stderr)
-        self.assertTrue(done.stderr.endswith(f"\n    (file \"{self.folder}/a.tcl\" line 2)\nhalrun: '{self.folder}/a.tcl' ended with exit status 1\n"), done.stderr)
+        self.assertTrue(
+            done.stderr.endswith(
+                f"\n    (file \"{self.folder}/a.tcl\" line 2)\nhalrun: '{self.folder}/a.tcl' ended with exit status 1\n"
+            ),
+            done.stderr,
+        )
 
     @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
     def test_lines_of_tcl_after_a_file(self):
-        done = self.halrun("-T", self.write("a.hal", SERVO), given="foreach n {0 1} {\n puts [getp adder.in$n]\n}\nsetp adder.in0 5+1\ngetp adder.in0\nnonsense\n")
-        self.assertEqual((0, "2\n3\n6\n", 'invalid command name "nonsense"\n'), (done.returncode, done.stdout, done.stderr))
+        done = self.halrun(
+            "-T",
+            self.write("a.hal", SERVO),
+            given="foreach n {0 1} {\n puts [getp adder.in$n]\n}\nsetp adder.in0 5+1\ngetp adder.in0\nnonsense\n",
+        )
+        self.assertEqual(
+            (0, "2\n3\n6\n", 'invalid command name "nonsense"\n'),
+            (done.returncode, done.stdout, done.stderr),
+        )
 
     def test_wrong_files(self):
         self.assertIn("must end with .hal, .tcl or .ini", self.halrun("x.txt").stderr)

@@ -45,39 +45,68 @@ class Compile(harness.Case):
         self.write("lag.cpp", LAG.replace("BODY", "out = in;"))
         done = self.compile("lag.cpp")
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertRegex(done.stdout, r"^lag: 2 pins, 1 function; installed as .*halcyon/components/lag\.so\nnext: hal doc lag, or in a netlist: loadrt lag, then addf lag\.0 THREAD\n$")
+        self.assertRegex(
+            done.stdout,
+            r"^lag: 2 pins, 1 function; installed as .*halcyon/components/lag\.so\nnext: hal doc lag, or in a netlist: loadrt lag, then addf lag\.0 THREAD\n$",
+        )
         self.assertIn("First-order lag", self.run_program("doc", "lag").stdout)
 
     def test_a_compiler_error_names_the_users_line_and_column(self):
-        self.write("lag.cpp", LAG.replace("BODY", "in = 1;").replace(" noexcept", "").replace("    using Component::Component;", ""))
+        self.write(
+            "lag.cpp",
+            LAG.replace("BODY", "in = 1;")
+            .replace(" noexcept", "")
+            .replace("    using Component::Component;", ""),
+        )
         done = self.compile("lag.cpp")
         self.assertEqual(done.returncode, 1)
-        self.assertRegex(done.stderr, r"lag\.cpp:8:\d+: error: (?s:.*)// must be: void NAME\(hal::Cycle\) noexcept")
-        self.assertRegex(done.stderr, r"lag\.cpp:9:3\d: error: (?s:.*)// an input is only read; hal::Out and hal::Io can be written")
+        self.assertRegex(
+            done.stderr,
+            r"lag\.cpp:8:\d+: error: (?s:.*)// must be: void NAME\(hal::Cycle\) noexcept",
+        )
+        self.assertRegex(
+            done.stderr,
+            r"lag\.cpp:9:3\d: error: (?s:.*)// an input is only read; hal::Out and hal::Io can be written",
+        )
         self.assertIn("missing line in the component: using Component::Component;", done.stderr)
-        self.assertTrue(done.stderr.endswith("hal compile: 'lag.cpp' does not compile; nothing was installed\n"), done.stderr)
+        self.assertTrue(
+            done.stderr.endswith(
+                "hal compile: 'lag.cpp' does not compile; nothing was installed\n"
+            ),
+            done.stderr,
+        )
 
     def test_rejects_a_file_that_is_not_a_component(self):
         self.write("none.cpp", "int x;\n")
         done = self.compile("none.cpp")
-        self.assertEqual(done.stderr, "hal compile: 'none.cpp' compiles, but is not a component: it exports no symbol hal_plugin, "
-                                      "which HAL_COMPONENT(Type, \"name\", \"summary\") makes; nothing was installed\n")
+        self.assertEqual(
+            done.stderr,
+            "hal compile: 'none.cpp' compiles, but is not a component: it exports no symbol hal_plugin, "
+            'which HAL_COMPONENT(Type, "name", "summary") makes; nothing was installed\n',
+        )
 
     def test_reports_a_missing_compiler_in_one_sentence(self):
         self.write("lag.cpp", LAG)
         done = self.compile("lag.cpp", PATH="/nowhere")
-        self.assertEqual(done.stderr, "hal compile: no C++ compiler found; install one: sudo apt install g++\n")
+        self.assertEqual(
+            done.stderr, "hal compile: no C++ compiler found; install one: sudo apt install g++\n"
+        )
 
     def test_check_rt_names_the_call(self):
         self.write("lag.cpp", LAG.replace("BODY", "row.push_back(in); out = row.back();"))
         done = self.compile("lag.cpp", "--check-rt")
         self.assertEqual(done.returncode, 1)
-        self.assertEqual(done.stderr, "hal compile: lag: function 'lag' calls malloc in a cycle\nhal compile: 'lag.cpp' was not installed\n")
+        self.assertEqual(
+            done.stderr,
+            "hal compile: lag: function 'lag' calls malloc in a cycle\nhal compile: 'lag.cpp' was not installed\n",
+        )
         self.assertEqual(done.stdout, "")
 
     def test_check_rt_calls_an_exception_an_exception(self):
         def said(constructor="", body="", start="", stop=""):
-            self.write("bad.cpp", f"""#include <stdexcept>
+            self.write(
+                "bad.cpp",
+                f"""#include <stdexcept>
 #include "hal/component.hpp"
 struct Bad : hal::Component {{
     explicit Bad(const hal_host* host) : Component(host) {{ {constructor} }}
@@ -88,17 +117,31 @@ struct Bad : hal::Component {{
     void go(hal::Cycle) noexcept {{ {body} }}
 }};
 HAL_COMPONENT(Bad, "bad", "Throws")
-""")
+""",
+            )
             done = self.compile("bad.cpp", "--check-rt")
             self.assertEqual(1, done.returncode, done.stdout)
             return done.stderr
+
         throw = 'throw std::runtime_error("no board");'
-        self.assertIn("bad: function 'bad' throws std::runtime_error in a cycle\n", said(body=throw))
-        self.assertIn("bad: function 'bad' throws int in a cycle\n", said(body="try { throw 3; } catch (int) {}"))
+        self.assertIn(
+            "bad: function 'bad' throws std::runtime_error in a cycle\n", said(body=throw)
+        )
+        self.assertIn(
+            "bad: function 'bad' throws int in a cycle\n",
+            said(body="try { throw 3; } catch (int) {}"),
+        )
         self.assertIn("bad: function 'bad' aborts in a cycle\n", said(body="__builtin_abort();"))
-        self.assertIn("bad: function 'bad' crashes in a cycle\n", said(body="*static_cast<volatile int*>(nullptr) = 1;"))
-        self.assertIn("bad: start() failed, so its functions were not checked: no board\n", said(start=throw))
-        self.assertIn("bad: its stop() throws std::runtime_error, which nothing catches\n", said(stop=throw))
+        self.assertIn(
+            "bad: function 'bad' crashes in a cycle\n",
+            said(body="*static_cast<volatile int*>(nullptr) = 1;"),
+        )
+        self.assertIn(
+            "bad: start() failed, so its functions were not checked: no board\n", said(start=throw)
+        )
+        self.assertIn(
+            "bad: its stop() throws std::runtime_error, which nothing catches\n", said(stop=throw)
+        )
 
     def test_check_rt_of_a_good_one(self):
         done = self.compile(str(EDGES), "--check-rt", "--", "num_chan=2")
@@ -116,7 +159,10 @@ HAL_COMPONENT(Bad, "bad", "Throws")
         self.compile("--output", "plugins", str(EDGES))
         self.write("many.hal", "loadrt edges num_chan=5\n")
         done = self.run_program("sim", "many.hal", environment={"HALCYON_PLUGIN_PATH": "plugins"})
-        self.assertIn("component 'edges' cannot make 'edges': edges: 5 channels are too many (rtapi_app_main: Invalid argument) [construct-failed]", done.stderr)
+        self.assertIn(
+            "component 'edges' cannot make 'edges': edges: 5 channels are too many (rtapi_app_main: Invalid argument) [construct-failed]",
+            done.stderr,
+        )
 
 
 if __name__ == "__main__":

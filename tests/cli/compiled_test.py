@@ -7,7 +7,7 @@ from pathlib import Path
 from harness import PLUGINS, Case, wait_until
 
 GAUGE = Path(__file__).parent / "sources/gauge.c"
-SCALE = '''component scale2 "In times a factor";
+SCALE = """component scale2 "In times a factor";
 pin in float in; pin out float out; pin io s32 cycles;
 param rw float gain = 1.0; param r u32 runs "how often it ran"; param r float peak;
 function update; function tally;
@@ -15,7 +15,7 @@ license "MIT";
 ;;
 FUNCTION(update) { out = in * gain * FACTOR; if (out > peak) peak = out; runs++; }
 FUNCTION(tally) { cycles++; }
-'''
+"""
 NETLIST = """newthread servo 1000000
 newthread slow 2000000
 loadrt NAME
@@ -40,13 +40,30 @@ class Compiled(Case):
 
     def version(self, kind, factor):
         text = GAUGE.read_text() if kind == "c" else SCALE
-        file = self.write("gauge.c" if kind == "c" else "scale2.comp", text.replace("FACTOR", str(factor)) if kind != "c" else f"#define FACTOR {factor}\n" + text)
+        file = self.write(
+            "gauge.c" if kind == "c" else "scale2.comp",
+            text.replace("FACTOR", str(factor))
+            if kind != "c"
+            else f"#define FACTOR {factor}\n" + text,
+        )
         self.good("compile", "--output", self.plugins, file)
 
     def machine(self, kind, counts="slow"):
         self.version(kind, 10)
         name, prefix = ("gauge", "gauge") if kind == "c" else ("scale2", "scale2.0")
-        return self.start("run", self.write("m.hal", NETLIST.replace("NAME", name).replace("PREFIX", prefix).replace("COUNTS", counts))), name, prefix
+        return (
+            self.start(
+                "run",
+                self.write(
+                    "m.hal",
+                    NETLIST.replace("NAME", name)
+                    .replace("PREFIX", prefix)
+                    .replace("COUNTS", counts),
+                ),
+            ),
+            name,
+            prefix,
+        )
 
     def life(self, kind):
         machine, name, prefix = self.machine(kind)
@@ -61,7 +78,11 @@ class Compiled(Case):
         self.say("setp", f"{prefix}.gain", "1")
         self.comes("adder.out", "400")
         runs, cycles = int(self.value(f"{prefix}.runs"), 0), int(self.value(f"{prefix}.cycles"))
-        wait_until(lambda: int(self.value(f"{prefix}.runs"), 0) > runs + 10 and int(self.value(f"{prefix}.cycles")) > cycles + 10, "both functions run")
+        wait_until(
+            lambda: int(self.value(f"{prefix}.runs"), 0) > runs + 10
+            and int(self.value(f"{prefix}.cycles")) > cycles + 10,
+            "both functions run",
+        )
         for factor in (2, 3, 4):
             self.version(kind, factor)
             self.say("reload", name)
@@ -88,12 +109,22 @@ class Compiled(Case):
     def read_only(self, kind):
         machine, name, prefix = self.machine(kind, "servo")
         self.comes(f"{prefix}.peak", "60")
-        rows = {line.split()[-1]: line.split() for line in self.say("show", "param", prefix).splitlines() if prefix in line}
+        rows = {
+            line.split()[-1]: line.split()
+            for line in self.say("show", "param", prefix).splitlines()
+            if prefix in line
+        }
         dirs = {full: "RO" if "RO" in row else "RW" for full, row in rows.items()}
-        self.assertEqual({f"{prefix}.gain": "RW", f"{prefix}.runs": "RO", f"{prefix}.peak": "RO"}, {k: v for k, v in dirs.items() if "tmax" not in k}, rows)
+        self.assertEqual(
+            {f"{prefix}.gain": "RW", f"{prefix}.runs": "RO", f"{prefix}.peak": "RO"},
+            {k: v for k, v in dirs.items() if "tmax" not in k},
+            rows,
+        )
         done = self.shell("setp", f"{prefix}.peak", "5")
         self.assertEqual(1, done.returncode)
-        self.assertIn(f"parameter '{prefix}.peak' is read-only: only its component sets it", done.stderr)
+        self.assertIn(
+            f"parameter '{prefix}.peak' is read-only: only its component sets it", done.stderr
+        )
         self.assertEqual("60", self.value(f"{prefix}.peak"))
         saved = self.say("save", "param")
         self.assertIn(f"setp {prefix}.gain", saved)

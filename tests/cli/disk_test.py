@@ -19,7 +19,10 @@ def own_mounts():
     if os.environ.get(VARIABLE) == "1":
         return True
     words = ["unshare", "--mount", *([] if os.geteuid() == 0 else ["--map-root-user"])]
-    if not shutil.which("unshare") or subprocess.run([*words, "true"], capture_output=True).returncode != 0:
+    if (
+        not shutil.which("unshare")
+        or subprocess.run([*words, "true"], capture_output=True).returncode != 0
+    ):
         return False
     os.environ[VARIABLE] = "1"
     os.execvp("unshare", [*words, sys.executable, *sys.argv])
@@ -34,7 +37,9 @@ class Full(Case):
         super().setUp()
         self.disk = self.folder / "disk"
         self.disk.mkdir()
-        subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(self.disk)], check=True)
+        subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(self.disk)], check=True
+        )
         self.addCleanup(subprocess.run, ["umount", "-l", str(self.disk)])
 
     def old(self, name, text="the old content\n", mode=0o640):
@@ -52,7 +57,14 @@ class Full(Case):
                 pass
 
     def hal(self, *words):
-        return subprocess.run([str(HAL), *map(str, words)], cwd=self.folder, env=self.environment, capture_output=True, text=True, timeout=120)
+        return subprocess.run(
+            [str(HAL), *map(str, words)],
+            cwd=self.folder,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
 
     def keeps(self, path, *words, content="the old content\n"):
         """The command fails with the reason, and the file is unchanged; no temporary file remains."""
@@ -68,7 +80,9 @@ class Full(Case):
         a = self.write("a.hal", NETLIST)
         saved, drawn = self.old("saved.hal"), self.old("drawn.dot")
         page = self.old("and2.md")
-        ugly = "loadrt   and2 count=1\n" + "".join(f"setp   and2.0.in0    {i % 2}\n" for i in range(500))
+        ugly = "loadrt   and2 count=1\n" + "".join(
+            f"setp   and2.0.in0    {i % 2}\n" for i in range(500)
+        )
         formatted = self.old("ugly.hal", ugly)
         self.fill()
         self.keeps(saved, "sim", a, self.write("save.hal", f"save all {saved}\n"))
@@ -87,7 +101,9 @@ class Full(Case):
     def test_a_replaced_file_keeps_mode_and_link_and_a_new_one_has_the_umask(self):
         saved = self.old("saved.hal", mode=0o604)
         (self.disk / "link.hal").symlink_to("saved.hal")
-        script = self.write("save.hal", f"{NETLIST}save all {self.disk}/link.hal\nsave all {self.disk}/new.hal\n")
+        script = self.write(
+            "save.hal", f"{NETLIST}save all {self.disk}/link.hal\nsave all {self.disk}/new.hal\n"
+        )
         done = self.hal("sim", script)
         self.assertEqual(0, done.returncode, done.stderr)
         self.assertTrue((self.disk / "link.hal").is_symlink())
@@ -96,28 +112,61 @@ class Full(Case):
         mask = os.umask(0o22)
         os.umask(mask)
         self.assertEqual(0o666 & ~mask, stat.S_IMODE((self.disk / "new.hal").stat().st_mode))
-        self.assertEqual(["link.hal", "new.hal", "saved.hal"], sorted(p.name for p in self.disk.iterdir()))
-        self.assertEqual(0, self.hal("sim", self.write("device.hal", NETLIST + "save all /dev/null\n")).returncode)
+        self.assertEqual(
+            ["link.hal", "new.hal", "saved.hal"], sorted(p.name for p in self.disk.iterdir())
+        )
+        self.assertEqual(
+            0,
+            self.hal("sim", self.write("device.hal", NETLIST + "save all /dev/null\n")).returncode,
+        )
 
     def test_lost_output_is_an_error(self):
-        a = self.write("a.hal", "loadrt threads name1=t period1=1000000\nloadrt and2 count=1\naddf and2.0 t\ngetp and2.0.in0\n")
-        for words in (["sim", a], ["run", a, "--for", "10ms"], ["run", "--for", "10ms", a, "--name", "other"]):
+        a = self.write(
+            "a.hal",
+            "loadrt threads name1=t period1=1000000\nloadrt and2 count=1\naddf and2.0 t\ngetp and2.0.in0\n",
+        )
+        for words in (
+            ["sim", a],
+            ["run", a, "--for", "10ms"],
+            ["run", "--for", "10ms", a, "--name", "other"],
+        ):
             with open("/dev/full", "w") as full:
-                done = subprocess.run([str(HAL), *words], cwd=self.folder, env=self.environment, stdout=full, stderr=subprocess.PIPE, text=True, timeout=120)
+                done = subprocess.run(
+                    [str(HAL), *words],
+                    cwd=self.folder,
+                    env=self.environment,
+                    stdout=full,
+                    stderr=subprocess.PIPE,
+                    text=True,
+                    timeout=120,
+                )
             self.assertEqual(1, done.returncode, done.stderr)
-            self.assertEqual(1, done.stderr.count("hal: cannot write to standard output: No space left on device\n"), done.stderr)
+            self.assertEqual(
+                1,
+                done.stderr.count(
+                    "hal: cannot write to standard output: No space left on device\n"
+                ),
+                done.stderr,
+            )
 
     def test_a_recording_ends_with_a_whole_line(self):
         for form in ([], ["--csv"]):
             record = f"loadusr -w hal record {' '.join(form)} -n 20000 {self.disk}/seen.txt\n"
-            netlist = self.write("rec.hal", "loadrt threads name1=t period1=1000000\nloadrt sampler cfg=uf depth=30000\nloadrt sum2 names=s\naddf s t\naddf sampler.0 t\n"
-                                            "net cycles t.threadbeat => sampler.0.pin.0\nnet sum s.out => sampler.0.pin.1\nsetp s.in0 0.5\nstart\nadvance 20000 cycles\n" + record)
+            netlist = self.write(
+                "rec.hal",
+                "loadrt threads name1=t period1=1000000\nloadrt sampler cfg=uf depth=30000\nloadrt sum2 names=s\naddf s t\naddf sampler.0 t\n"
+                "net cycles t.threadbeat => sampler.0.pin.0\nnet sum s.out => sampler.0.pin.1\nsetp s.in0 0.5\nstart\nadvance 20000 cycles\n"
+                + record,
+            )
             done = self.hal("sim", netlist)
             self.assertNotEqual(0, done.returncode)
-            self.assertIn("No space left on device; what was written ends with a whole line, after", done.stderr)
+            self.assertIn(
+                "No space left on device; what was written ends with a whole line, after",
+                done.stderr,
+            )
             lines = (self.disk / "seen.txt").read_text()
             self.assertTrue(lines.endswith("\n"))
-            rows = lines.splitlines()[len(form):]
+            rows = lines.splitlines()[len(form) :]
             self.assertGreater(len(rows), 1000)
             self.assertIn(f"after {len(rows)} records", done.stderr)
             width = {len(row.replace(",", " ").split()) for row in rows}
@@ -125,11 +174,33 @@ class Full(Case):
             (self.disk / "seen.txt").unlink()
 
     def test_a_flight_recorder_goes_on_and_writes_late_when_there_is_space(self):
-        self.start("run", self.write("a.hal", "loadrt threads name1=servo period1=1000000\nloadrt siggen names=wave\naddf wave.update servo\n"
-                                              "net sine wave.sine\nnewsig crash bit\nstart\n"))
+        self.start(
+            "run",
+            self.write(
+                "a.hal",
+                "loadrt threads name1=servo period1=1000000\nloadrt siggen names=wave\naddf wave.update servo\n"
+                "net sine wave.sine\nnewsig crash bit\nstart\n",
+            ),
+        )
         out, err = self.folder / "out", self.folder / "err"
-        recorder = subprocess.Popen([str(HAL), "record", self.disk / "box.csv", "sine", "--last", "300ms", "--after", "50ms", "--trigger", "crash"],
-                                    cwd=self.folder, env=self.environment, stdout=out.open("w"), stderr=err.open("w"))
+        recorder = subprocess.Popen(
+            [
+                str(HAL),
+                "record",
+                self.disk / "box.csv",
+                "sine",
+                "--last",
+                "300ms",
+                "--after",
+                "50ms",
+                "--trigger",
+                "crash",
+            ],
+            cwd=self.folder,
+            env=self.environment,
+            stdout=out.open("w"),
+            stderr=err.open("w"),
+        )
         self.addCleanup(self.end, recorder)
 
         def cycles(count):
@@ -144,12 +215,18 @@ class Full(Case):
         self.say("sets", "crash", "TRUE")
         cycles(400)
         self.assertIsNone(recorder.poll())
-        self.assertRegex(err.read_text(), r"^hal record: cannot write '\S+/box-\w+-crash-001\.csv': No space left on device[^\n]*; the recorder goes on, "
-                                          r"and writes events from memory when there is space\n$")
+        self.assertRegex(
+            err.read_text(),
+            r"^hal record: cannot write '\S+/box-\w+-crash-001\.csv': No space left on device[^\n]*; the recorder goes on, "
+            r"and writes events from memory when there is space\n$",
+        )
         (self.disk / "ballast").unlink()
         wait_until(lambda: "writing again" in out.read_text(), "the events are written")
-        self.assertRegex(out.read_text(), r"(?s)box-\w+-crash-001\.csv: \d+ rows.*box-\w+-crash-002\.csv: \d+ rows.*"
-                                          r"writing again: 2 events written late, 0 lost\n$")
+        self.assertRegex(
+            out.read_text(),
+            r"(?s)box-\w+-crash-001\.csv: \d+ rows.*box-\w+-crash-002\.csv: \d+ rows.*"
+            r"writing again: 2 events written late, 0 lost\n$",
+        )
         for number in ("001", "002"):
             rows = next(self.disk.glob(f"box-*-crash-{number}.csv")).read_text().splitlines()
             self.assertGreater(len(rows), 200)
@@ -158,10 +235,16 @@ class Full(Case):
         self.say("sets", "crash", "FALSE")
         cycles(100)
         self.say("sets", "crash", "TRUE")
-        wait_until(lambda: err.read_text().count("the recorder goes on") == 2, "the failure is reported again")
+        wait_until(
+            lambda: err.read_text().count("the recorder goes on") == 2,
+            "the failure is reported again",
+        )
         recorder.send_signal(signal.SIGINT)
         self.assertEqual(1, recorder.wait(60))
-        self.assertRegex(err.read_text(), r"\nhal record: 1 event not written: cannot write '\S+-crash-003\.csv': No space left on device")
+        self.assertRegex(
+            err.read_text(),
+            r"\nhal record: 1 event not written: cannot write '\S+-crash-003\.csv': No space left on device",
+        )
 
 
 if __name__ == "__main__":

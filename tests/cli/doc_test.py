@@ -41,7 +41,11 @@ class Reference(Case):
         self.assertEqual("", self.good("doc", "--all", "--output", "pages"))
         folder = self.folder / "pages"
         index = Links((folder / "index.html").read_text())
-        self.assertEqual(sorted(os.listdir(folder)), sorted([*index.links, "index.html"]), "the index has every page once")
+        self.assertEqual(
+            sorted(os.listdir(folder)),
+            sorted([*index.links, "index.html"]),
+            "the index has every page once",
+        )
         self.assertIn("search", index.ids)
         for name in os.listdir(folder):
             text = (folder / name).read_text()
@@ -64,10 +68,18 @@ class Reference(Case):
         self.assertEqual("", self.good("doc", "--all", "--man", "--output", "man9"))
         pages = sorted(os.listdir(self.folder / "man9"))
         self.assertEqual(len(self.names()), len(pages))
-        self.assertTrue(all(page.startswith("hal-") and page.endswith(".9") for page in pages), pages)
+        self.assertTrue(
+            all(page.startswith("hal-") and page.endswith(".9") for page in pages), pages
+        )
         # as man does it, but one process for all
-        done = subprocess.run(["groff", "-Kutf8", "-Tutf8", "-P-cbou", "-t", "-man", "-ww", "-rLL=200n", *pages], cwd=self.folder / "man9", stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True)
+        done = subprocess.run(
+            ["groff", "-Kutf8", "-Tutf8", "-P-cbou", "-t", "-man", "-ww", "-rLL=200n", *pages],
+            cwd=self.folder / "man9",
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            stdin=subprocess.DEVNULL,
+            text=True,
+        )
         self.assertEqual((0, ""), (done.returncode, done.stderr))
         self.assertEqual(len(pages), done.stdout.count("SYNOPSIS"))
 
@@ -75,11 +87,17 @@ class Reference(Case):
         self.good("doc", "sum2", "--markdown", "-o", "some")
         self.assertEqual(["sum2.md"], os.listdir(self.folder / "some"))
         self.assertTrue(self.good("doc", "sum2", "--html").startswith("<!DOCTYPE html>"))
-        self.assertEqual("hal doc: --all needs a folder; type: hal doc --all --output DIR\n", self.bad("doc", "--all"))
+        self.assertEqual(
+            "hal doc: --all needs a folder; type: hal doc --all --output DIR\n",
+            self.bad("doc", "--all"),
+        )
         self.assertIn("leave one out", self.bad("doc", "--all", "sum2", "-o", "x"))
         self.assertIn("exclude each other", self.bad("doc", "sum2", "--html", "--man"))
         self.write("file", "")
-        self.assertEqual("hal doc: cannot create 'file/x': Not a directory\n", self.bad("doc", "--all", "-o", "file/x"))
+        self.assertEqual(
+            "hal doc: cannot create 'file/x': Not a directory\n",
+            self.bad("doc", "--all", "-o", "file/x"),
+        )
 
 
 if __name__ == "__main__":

@@ -15,9 +15,16 @@ class Drive(Case):
 
     def node(self, *words):
         """Starts a drive and waits until it is on the bus."""
-        process = subprocess.Popen(["hal", "node", "drive", "--link", self.bus, "--id", "2", *map(str, words)], executable=str(HAL),
-                                   cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                   stderr=subprocess.STDOUT, text=True)
+        process = subprocess.Popen(
+            ["hal", "node", "drive", "--link", self.bus, "--id", "2", *map(str, words)],
+            executable=str(HAL),
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
         self.addCleanup(self.end, process)
         for line in process.stdout:
             if ", profile position" in line and "not ready" not in line:
@@ -29,9 +36,16 @@ class Drive(Case):
 
     def begin(self, *words, **how):
         """Starts hal can drive in the background."""
-        process = subprocess.Popen(["hal", "can", "drive", self.bus, "--node", "2", *map(str, words)], executable=str(HAL), cwd=self.folder,
-                                   env=self.environment, stdin=how.get("stdin", subprocess.DEVNULL), stdout=subprocess.PIPE,
-                                   stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            ["hal", "can", "drive", self.bus, "--node", "2", *map(str, words)],
+            executable=str(HAL),
+            cwd=self.folder,
+            env=self.environment,
+            stdin=how.get("stdin", subprocess.DEVNULL),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         self.addCleanup(self.end, process)
         return process
 
@@ -39,8 +53,10 @@ class Drive(Case):
         """A command that succeeds and leaves the axis moving prints a warning."""
         done = self.run_program("can", "drive", self.bus, "--node", 2, *words)
         self.assertEqual(0, done.returncode, done.stderr)
-        self.assertEqual(f"hal can drive: A: still moving, no longer supervised; to stop it: hal can drive {self.bus} --node 2 A stop\n",
-                         done.stderr)
+        self.assertEqual(
+            f"hal can drive: A: still moving, no longer supervised; to stop it: hal can drive {self.bus} --node 2 A stop\n",
+            done.stderr,
+        )
         return done.stdout
 
     def position(self):
@@ -56,4 +72,4 @@ class Drive(Case):
     def refused(self, *words, **how):
         text = self.bad("can", "drive", self.bus, "--node", 2, *words, **how)
         self.assertTrue(text.startswith("hal can drive: "), text)
-        return text[len("hal can drive: "):]
+        return text[len("hal can drive: ") :]

@@ -12,7 +12,13 @@ class LetterWords(Drive):
 
     def test_a_session(self):
         self.node("--axes", 2, "--motor", "endless:1")
-        done = self.run_program("can", "drive", self.bus, "--node", 2, given="""ONA:
+        done = self.run_program(
+            "can",
+            "drive",
+            self.bus,
+            "--node",
+            2,
+            given="""ONA:
 ONB:
 MSA:40000
 MSA?
@@ -37,18 +43,24 @@ APB ?
 OFFA:
 OFFB:
 HELP
-""")
+""",
+        )
         self.assertEqual("", done.stderr)
         lines = done.stdout.splitlines()
         self.assertEqual(["MSA=40000", "MAA=300000", "PFA=1,1", "PFA=2,1", "AFA=3,2"], lines[:5])
-        self.assertRegex("\n".join(lines[5:9]), r"^A: at (99\d|100\d)\nAPA=(99\d|100\d)\nA: at -(49\d|50\d)\nAPB=-?\d+$")
+        self.assertRegex(
+            "\n".join(lines[5:9]),
+            r"^A: at (99\d|100\d)\nAPA=(99\d|100\d)\nA: at -(49\d|50\d)\nAPB=-?\d+$",
+        )
         self.assertIn("  ONA:             switch the axis on", lines)
         self.assertIn("  MSA:n   MSA?     maximum speed of moves", lines)
 
     def test_one_shot_and_prompt(self):
         self.node()
         self.assertEqual("", self.drive("ONA:"))
-        done = self.run_program("can", "drive", self.bus, "--node", 2, "GA:", 100)  # done when accepted, so it may still be on its way
+        done = self.run_program(
+            "can", "drive", self.bus, "--node", 2, "GA:", 100
+        )  # done when accepted, so it may still be on its way
         self.assertEqual((0, ""), (done.returncode, done.stdout), done.stderr)
         self.assertRegex(self.drive("APA?"), r"^APA=\d+\n$")
         terminal = Terminal(self, "can", "drive", self.bus, "--node", 2)
@@ -60,7 +72,14 @@ HELP
 
     def test_wrong_lines(self):
         self.node()
-        done = self.run_program("can", "drive", self.bus, "--node", 2, "-k", given="""GA:1000
+        done = self.run_program(
+            "can",
+            "drive",
+            self.bus,
+            "--node",
+            2,
+            "-k",
+            given="""GA:1000
 ON:
 ONI:
 ONA?
@@ -77,9 +96,11 @@ PFA:1,
 SPA:100
 XYZA:
 GB:5
-""")
+""",
+        )
         self.assertEqual(1, done.returncode)
-        self.assertEqual("""A: not enabled (drive is in "switch on disabled"); type: A on
+        self.assertEqual(
+            """A: not enabled (drive is in "switch on disabled"); type: A on
 missing axis in 'ON:'; write ONA: to ONH:
 'I' is not an axis; write ONA: to ONH:
 ONA cannot be queried; type: ONA:
@@ -96,13 +117,22 @@ PFA: takes two integers from 1 to 4294967295; type: PFA:4096,360
 unknown command 'SPA'; did you mean 'APA' or 'SPDA'?
 unknown command 'XYZA'; type: HELP
 B: node 2 has no such axis: object 6841 is missing
-""", done.stderr.replace("hal can drive: ", ""))
+""",
+            done.stderr.replace("hal can drive: ", ""),
+        )
 
 
 class WrongWords(Drive):
     def test_each_says_what_to_type(self):
         self.node()
-        done = self.run_program("can", "drive", self.bus, "--node", 2, "-k", given="""A foo
+        done = self.run_program(
+            "can",
+            "drive",
+            self.bus,
+            "--node",
+            2,
+            "-k",
+            given="""A foo
 A st
 A go x
 A go 1e12
@@ -119,9 +149,11 @@ A home 1.5
 A on now
 I on
 A
-""")
+""",
+        )
         self.assertEqual(1, done.returncode)
-        self.assertEqual("""unknown command 'foo'; type: help
+        self.assertEqual(
+            """unknown command 'foo'; type: help
 unknown command 'st'; did you mean 'set'?
 invalid number 'x'; type: A go POSITION [relative] [nowait]
 A: position 1e+12 is 1e+12 counts, out of the range -2147483648..2147483647 of the drive
@@ -138,19 +170,32 @@ invalid homing method '1.5'; write 1..37, or a negative one of the drive's manua
 unexpected argument 'now'; type: A on
 invalid axis 'I'; write A to H
 missing command for axis A; type: help
-""", done.stderr.replace("hal can drive: ", ""))
+""",
+            done.stderr.replace("hal can drive: ", ""),
+        )
 
     def test_what_has_no_effect(self):
         self.node()
         for words, expected in (
-            (["PFA:2,1"], "PFA:2,1: a factor is valid for the commands after it, and there are none; "),
-            (["VFA:", "2,1"], "VFA:2,1: a factor is valid for the commands after it, and there are none; "),
-            (["A", "set", "position-factor", "4096/360"],
-             "A set position-factor 4096/360: a factor is valid for the commands after it, and there are none; "),
+            (
+                ["PFA:2,1"],
+                "PFA:2,1: a factor is valid for the commands after it, and there are none; ",
+            ),
+            (
+                ["VFA:", "2,1"],
+                "VFA:2,1: a factor is valid for the commands after it, and there are none; ",
+            ),
+            (
+                ["A", "set", "position-factor", "4096/360"],
+                "A set position-factor 4096/360: a factor is valid for the commands after it, and there are none; ",
+            ),
             (["quit"], "quit ends a session, and there is none; "),
             (["-k", "A", "on"], "--keep-going is for commands from a file or pipe; "),
             (["--axis", "B", "A", "status"], "--axis has no effect on a command with a letter; "),
-            (["--supervise", "off", "--heartbeat-id", 112, "A", "on"], "--heartbeat-id has no effect with --supervise off; "),
+            (
+                ["--supervise", "off", "--heartbeat-id", 112, "A", "on"],
+                "--heartbeat-id has no effect with --supervise off; ",
+            ),
         ):
             done = self.run_program("can", "drive", self.bus, "--node", 2, *words)
             self.assertEqual((1, ""), (done.returncode, done.stdout), words)
@@ -160,13 +205,30 @@ missing command for axis A; type: help
     def test_command_line(self):
         def bad(*words):
             return self.bad("can", "drive", *words)
-        self.assertEqual("hal can drive: missing address; type: hal can drive can:can0 --node 2 A on\n", bad())
-        self.assertEqual(f"hal can drive: missing --node; type: hal can drive {self.bus} --node 2\n", bad(self.bus))
-        self.assertEqual("hal can drive: invalid node '200'; write 1..127\n", bad(self.bus, "--node", 200))
-        self.assertEqual("hal can drive: invalid axis 'Z'; write A to H\n", bad(self.bus, "--node", 2, "--axis", "Z", "on"))
-        self.assertEqual("hal can drive: unknown option '--nod'; see: hal help can drive\n", bad(self.bus, "--nod", 2))
+
+        self.assertEqual(
+            "hal can drive: missing address; type: hal can drive can:can0 --node 2 A on\n", bad()
+        )
+        self.assertEqual(
+            f"hal can drive: missing --node; type: hal can drive {self.bus} --node 2\n",
+            bad(self.bus),
+        )
+        self.assertEqual(
+            "hal can drive: invalid node '200'; write 1..127\n", bad(self.bus, "--node", 200)
+        )
+        self.assertEqual(
+            "hal can drive: invalid axis 'Z'; write A to H\n",
+            bad(self.bus, "--node", 2, "--axis", "Z", "on"),
+        )
+        self.assertEqual(
+            "hal can drive: unknown option '--nod'; see: hal help can drive\n",
+            bad(self.bus, "--nod", 2),
+        )
         self.assertEqual("hal can drive: missing value of --node\n", bad(self.bus, "--node"))
-        self.assertEqual("hal can drive: invalid duration 'soon'; use 200ms or 1s\n", bad(self.bus, "--node", 2, "--timeout", "soon"))
+        self.assertEqual(
+            "hal can drive: invalid duration 'soon'; use 200ms or 1s\n",
+            bad(self.bus, "--node", 2, "--timeout", "soon"),
+        )
         self.assertIn("--node N", self.good("help", "can", "drive"))
         self.assertIn("hal can drive: 'bus:0'", bad("bus:0", "--node", 2, "A", "on"))
 

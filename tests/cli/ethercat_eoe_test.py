@@ -53,12 +53,21 @@ def ping(address, size, count=1, timeout=20.0):
         while answered < count and time.monotonic() < deadline:
             data = bytes((answered + n) % 256 for n in range(size))
             head = struct.pack("!BBHHH", 8, 0, 0, os.getpid() & 0xFFFF, answered)
-            raw.sendto(struct.pack("!BBHHH", 8, 0, checksum(head + data), os.getpid() & 0xFFFF, answered) + data, (address, 0))
+            raw.sendto(
+                struct.pack("!BBHHH", 8, 0, checksum(head + data), os.getpid() & 0xFFFF, answered)
+                + data,
+                (address, 0),
+            )
             try:
                 while True:
                     packet, sender = raw.recvfrom(65536)
                     icmp = packet[20:]
-                    if sender[0] == address and icmp[0] == 0 and icmp[4:] == head[4:] + data and checksum(icmp) == 0:
+                    if (
+                        sender[0] == address
+                        and icmp[0] == 0
+                        and icmp[4:] == head[4:] + data
+                        and checksum(icmp) == 0
+                    ):
                         answered += 1
                         break
             except OSError:
@@ -81,8 +90,15 @@ class Eoe(Case):
     def run_machine(self, *before):
         log = self.folder / "log.txt"
         with open(log, "w", encoding="utf-8") as out:
-            machine = subprocess.Popen([*before, HAL, "run", "--name", "eoe", "--no-picture", "machine.hal"], cwd=self.folder, env=self.environment,
-                                       stdin=subprocess.DEVNULL, stdout=out, stderr=out, text=True)
+            machine = subprocess.Popen(
+                [*before, HAL, "run", "--name", "eoe", "--no-picture", "machine.hal"],
+                cwd=self.folder,
+                env=self.environment,
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=out,
+                text=True,
+            )
         self.addCleanup(lambda: (machine.terminate(), machine.wait(60)))
         return machine
 
@@ -91,7 +107,10 @@ class Eoe(Case):
 
     def begin(self):
         machine = self.run_machine()
-        wait_until(lambda: self.said().count("is operational") == 2 or machine.poll() is not None, "both slaves are operational")
+        wait_until(
+            lambda: self.said().count("is operational") == 2 or machine.poll() is not None,
+            "both slaves are operational",
+        )
         self.assertIsNone(machine.poll(), self.said())
         return machine
 
@@ -103,18 +122,28 @@ class Eoe(Case):
         return subprocess.run(["ip", "addr", "show", name], capture_output=True, text=True).stdout
 
     def test_ping_passes_beside_the_process_data(self):
-        self.configure("192.168.2.10/24 host 192.168.2.1 gateway 192.168.2.1 interface eoe0", "192.168.3.10/24 host 192.168.3.1 mac 02:00:00:00:00:77")
+        self.configure(
+            "192.168.2.10/24 host 192.168.2.1 gateway 192.168.2.1 interface eoe0",
+            "192.168.3.10/24 host 192.168.3.1 mac 02:00:00:00:00:77",
+        )
         machine = self.begin()
         lost, incomplete = self.pin("machine.frames-lost"), self.pin("machine.cycles-incomplete")
         self.assertIn("inet 192.168.2.1/24", self.shown("eoe0"))
-        wait_until(lambda: "LOWER_UP" in self.shown("eoe0") and "LOWER_UP" in self.shown("eoe-b"), "the interfaces have a carrier")
+        wait_until(
+            lambda: "LOWER_UP" in self.shown("eoe0") and "LOWER_UP" in self.shown("eoe-b"),
+            "the interfaces have a carrier",
+        )
         self.assertEqual(20, ping("192.168.2.10", 56, 20))
         self.assertEqual(3, ping("192.168.2.10", 1472, 3), "in fragments of the mailbox")
         self.assertEqual(3, ping("192.168.3.10", 56, 3))
         neighbours = subprocess.run(["ip", "neigh"], capture_output=True, text=True).stdout
         self.assertRegex(neighbours, r"192\.168\.2\.10 dev eoe0 lladdr 02:ec:a7:[0-9a-f]{2}:00:00 ")
         self.assertIn("192.168.3.10 dev eoe-b lladdr 02:00:00:00:00:77 ", neighbours)
-        self.assertEqual((lost, incomplete), (self.pin("machine.frames-lost"), self.pin("machine.cycles-incomplete")), "cycles without process data")
+        self.assertEqual(
+            (lost, incomplete),
+            (self.pin("machine.frames-lost"), self.pin("machine.cycles-incomplete")),
+            "cycles without process data",
+        )
         machine.terminate()
         machine.wait(60)
         self.assertEqual("", self.shown("eoe0"), "the interface ends with the machine")
@@ -130,9 +159,13 @@ class Eoe(Case):
         self.configure("192.168.2.10/24 host 192.168.2.1")
         self.begin()
         self.assertEqual(1, ping("192.168.2.10", 56))
-        self.run_program("shell", "--name", "eoe", "-s", "setp", "ethercat-segment.0.slave-0.power", "FALSE")
+        self.run_program(
+            "shell", "--name", "eoe", "-s", "setp", "ethercat-segment.0.slave-0.power", "FALSE"
+        )
         wait_until(lambda: "NO-CARRIER" in self.shown("eoe-a"), "no carrier")
-        self.run_program("shell", "--name", "eoe", "-s", "setp", "ethercat-segment.0.slave-0.power", "TRUE")
+        self.run_program(
+            "shell", "--name", "eoe", "-s", "setp", "ethercat-segment.0.slave-0.power", "TRUE"
+        )
         self.assertEqual(2, ping("192.168.2.10", 56, 2, 60), "its address was written again")
 
     def test_a_missing_privilege_names_what_to_type(self):
@@ -142,20 +175,33 @@ class Eoe(Case):
         machine = self.run_machine(*WITHOUT_ADMIN)
         self.assertEqual(1, machine.wait(60), self.said())
         found = re.findall(r"cannot start: (eoe: .*) \[start-failed\]", self.said())
-        self.assertEqual(["eoe: interface eoe-a needs the capability CAP_NET_ADMIN; grant it with: sudo setcap "
-                          f"cap_sys_nice,cap_ipc_lock,cap_net_raw,cap_net_admin=ep {HAL.resolve()}; or create it once: sudo ip tuntap add dev eoe-a mode tap user "
-                          "$USER; sudo ip link set eoe-a up; sudo ip addr add 192.168.2.1/24 dev eoe-a"], found, self.said())
+        self.assertEqual(
+            [
+                "eoe: interface eoe-a needs the capability CAP_NET_ADMIN; grant it with: sudo setcap "
+                f"cap_sys_nice,cap_ipc_lock,cap_net_raw,cap_net_admin=ep {HAL.resolve()}; or create it once: sudo ip tuntap add dev eoe-a mode tap user "
+                "$USER; sudo ip link set eoe-a up; sudo ip addr add 192.168.2.1/24 dev eoe-a"
+            ],
+            found,
+            self.said(),
+        )
 
     def test_an_interface_of_an_administrator_needs_no_privilege(self):
         if not shutil.which("setpriv"):
             self.skipTest("no setpriv here")
-        for words in ("tuntap add dev eoe-a mode tap user root", "link set eoe-a up", "addr add 192.168.2.1/24 dev eoe-a"):
+        for words in (
+            "tuntap add dev eoe-a mode tap user root",
+            "link set eoe-a up",
+            "addr add 192.168.2.1/24 dev eoe-a",
+        ):
             if subprocess.run(["ip", *words.split()], capture_output=True).returncode != 0:
                 self.skipTest("no TAP interface can be created here")
         self.addCleanup(subprocess.run, ["ip", "link", "delete", "eoe-a"])
         self.configure("192.168.2.10/24 host 192.168.2.1")
         machine = self.run_machine(*WITHOUT_ADMIN)
-        wait_until(lambda: self.said().count("is operational") == 2 or machine.poll() is not None, "both slaves are operational")
+        wait_until(
+            lambda: self.said().count("is operational") == 2 or machine.poll() is not None,
+            "both slaves are operational",
+        )
         self.assertIsNone(machine.poll(), self.said())
         self.assertEqual(2, ping("192.168.2.10", 56, 2))
 

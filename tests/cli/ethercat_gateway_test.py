@@ -24,7 +24,11 @@ def upload(station, index, sub):
 
 class Gateway(Case):
     def begin(self, gateway):
-        text = (MACHINE / "servo.ethercat").read_text().replace("cycle = 1ms", f"cycle = 1ms\ngateway = {gateway}")
+        text = (
+            (MACHINE / "servo.ethercat")
+            .read_text()
+            .replace("cycle = 1ms", f"cycle = 1ms\ngateway = {gateway}")
+        )
         self.write("servo.ethercat", text)
         self.write("servo.hal", (MACHINE / "servo.hal").read_text())
         self.start("run", "servo.hal", loaded=False)
@@ -37,17 +41,33 @@ class Gateway(Case):
 
     def test_objects_of_a_running_machine(self):
         self.begin(f"127.0.0.1:{self.port}")
-        self.assertEqual("Halcyon servo\n", self.good("ethercat", "upload", self.address, "-p", "1", "0x1008", "0"))
-        self.assertEqual("", self.good("ethercat", "download", self.address, "-p", "0", "0x6083", "0", "12345"))
-        self.assertEqual(12345, json.loads(self.good("ethercat", "upload", self.address, "-p", "0", "0x6083", "0", "--json"))["value"])
+        self.assertEqual(
+            "Halcyon servo\n",
+            self.good("ethercat", "upload", self.address, "-p", "1", "0x1008", "0"),
+        )
+        self.assertEqual(
+            "", self.good("ethercat", "download", self.address, "-p", "0", "0x6083", "0", "12345")
+        )
+        self.assertEqual(
+            12345,
+            json.loads(
+                self.good("ethercat", "upload", self.address, "-p", "0", "0x6083", "0", "--json")
+            )["value"],
+        )
         self.assertIn("0x6041 ", self.good("ethercat", "sdos", self.address, "-p", "0"))
-        self.assertEqual("hal ethercat upload: slave 0: 0x6999:0: SDO transfer aborted with code 0x06020000: object does not exist\n",
-                         self.bad("ethercat", "upload", self.address, "-p", "0", "0x6999", "0"))
-        self.assertEqual("hal ethercat upload: no slave at position 7; the bus has 2, the last one at position 1\n",
-                         self.bad("ethercat", "upload", self.address, "-p", "7", "0x6083", "0"))
+        self.assertEqual(
+            "hal ethercat upload: slave 0: 0x6999:0: SDO transfer aborted with code 0x06020000: object does not exist\n",
+            self.bad("ethercat", "upload", self.address, "-p", "0", "0x6999", "0"),
+        )
+        self.assertEqual(
+            "hal ethercat upload: no slave at position 7; the bus has 2, the last one at position 1\n",
+            self.bad("ethercat", "upload", self.address, "-p", "7", "0x6083", "0"),
+        )
         for command, words in (("scan", ()), ("foe-read", ("-p", "0", "x"))):
-            self.assertEqual(f"hal ethercat {command}: this command needs the bus itself; through a gateway there are upload, download and sdos\n",
-                             self.bad("ethercat", command, self.address, *words))
+            self.assertEqual(
+                f"hal ethercat {command}: this command needs the bus itself; through a gateway there are upload, download and sdos\n",
+                self.bad("ethercat", command, self.address, *words),
+            )
         self.assertEqual("TRUE", self.value("ethercat.0.all-op"))
 
     def test_frames_by_hand(self):
@@ -56,10 +76,12 @@ class Gateway(Case):
         self.addCleanup(udp.close)
         udp.settimeout(20)
         udp.connect(("127.0.0.1", self.port))
-        udp.send(upload(0, 0xf020, 1))  # the station of the first slave, from the dictionary of the master
+        udp.send(
+            upload(0, 0xF020, 1)
+        )  # the station of the first slave, from the dictionary of the master
         answer = udp.recv(1500)
-        self.assertEqual((0x4b, 0xf020, 1), struct.unpack_from("<BHB", answer, 10))
-        station, = struct.unpack_from("<H", answer, 14)
+        self.assertEqual((0x4B, 0xF020, 1), struct.unpack_from("<BHB", answer, 10))
+        (station,) = struct.unpack_from("<H", answer, 14)
         tcp = socket.create_connection(("127.0.0.1", self.port), timeout=20)
         self.addCleanup(tcp.close)
         request = upload(station, 0x1000, 0)
@@ -76,17 +98,31 @@ class Gateway(Case):
 
     def test_without_gateway(self):
         said = self.bad("ethercat", "upload", self.address, "-p", "0", "0x1000", "0")
-        self.assertEqual(f"hal ethercat upload: no mailbox gateway at 127.0.0.1:{self.port}: Connection refused; write gateway = 127.0.0.1 in [bus] "
-                         "of the configuration, and start the machine\n", said)
-        self.assertEqual("hal ethercat upload: invalid address 'gateway:here'; write gateway:127.0.0.1 or gateway:127.0.0.1:34980\n",
-                         self.bad("ethercat", "upload", "gateway:here", "-p", "0", "0x1000", "0"))
+        self.assertEqual(
+            f"hal ethercat upload: no mailbox gateway at 127.0.0.1:{self.port}: Connection refused; write gateway = 127.0.0.1 in [bus] "
+            "of the configuration, and start the machine\n",
+            said,
+        )
+        self.assertEqual(
+            "hal ethercat upload: invalid address 'gateway:here'; write gateway:127.0.0.1 or gateway:127.0.0.1:34980\n",
+            self.bad("ethercat", "upload", "gateway:here", "-p", "0", "0x1000", "0"),
+        )
 
     def test_wrong_settings(self):
-        self.write("bus.ethercat", "[bus]\ngateway = localhost\n[slave 0 x]\nvendor = 1\noutputs = none\ninputs = none\n")
+        self.write(
+            "bus.ethercat",
+            "[bus]\ngateway = localhost\n[slave 0 x]\nvendor = 1\noutputs = none\ninputs = none\n",
+        )
         self.assertIn("bus.ethercat:2:11: error: ", self.bad("ethercat", "check", "bus.ethercat"))
-        self.write("bus.ethercat", "[bus]\ngateway = 0.0.0.0\n[slave 0 x]\nvendor = 1\noutputs = none\ninputs = none\n")
+        self.write(
+            "bus.ethercat",
+            "[bus]\ngateway = 0.0.0.0\n[slave 0 x]\nvendor = 1\noutputs = none\ninputs = none\n",
+        )
         said = self.run_program("ethercat", "check", "bus.ethercat").stderr
-        self.assertIn("warning: programs on other computers can read and write the objects of the slaves through the gateway", said)
+        self.assertIn(
+            "warning: programs on other computers can read and write the objects of the slaves through the gateway",
+            said,
+        )
 
 
 if __name__ == "__main__":

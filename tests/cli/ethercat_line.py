@@ -13,12 +13,20 @@ MISSING = "no network namespaces here; run it as root, or where user namespaces 
 
 
 def up(interface):
-    return ",LOWER_UP" in subprocess.run(["ip", "link", "show", interface], capture_output=True, text=True).stdout
+    return (
+        ",LOWER_UP"
+        in subprocess.run(["ip", "link", "show", interface], capture_output=True, text=True).stdout
+    )
 
 
 def veth():
     """Makes m0 and s0 and waits until both have a link. False where there are no veth pairs."""
-    if subprocess.run(["ip", "link", "add", "m0", "type", "veth", "peer", "name", "s0"], capture_output=True).returncode != 0:
+    if (
+        subprocess.run(
+            ["ip", "link", "add", "m0", "type", "veth", "peer", "name", "s0"], capture_output=True
+        ).returncode
+        != 0
+    ):
         return False
     for interface in ("m0", "s0"):
         subprocess.run(["ip", "link", "set", interface, "up"], check=True)
@@ -51,9 +59,16 @@ class Line:
         (folder / "devices.line").write_text(devices)
         self.log = folder / "line.txt"
         with open(self.log, "w", encoding="utf-8") as out:
-            self.process = subprocess.Popen([hal, "node", "ethercat", folder / "devices.line", "--link", "eth:s0", *words],
-                                            stdin=subprocess.DEVNULL, stdout=out, stderr=out)
-        if not wait_for(lambda: "press Ctrl-C" in self.said() or self.process.poll() is not None) or self.process.poll() is not None:
+            self.process = subprocess.Popen(
+                [hal, "node", "ethercat", folder / "devices.line", "--link", "eth:s0", *words],
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=out,
+            )
+        if (
+            not wait_for(lambda: "press Ctrl-C" in self.said() or self.process.poll() is not None)
+            or self.process.poll() is not None
+        ):
             self.process.kill()
             raise AssertionError("the line does not start: " + self.said())
 

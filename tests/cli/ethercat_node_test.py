@@ -18,23 +18,42 @@ class Line(Case):
     def setUp(self):
         super().setUp()
         if os.environ.get(VARIABLE) != "1":
-            self.skipTest("no network namespaces here; run it as root, or where user namespaces are allowed")
+            self.skipTest(
+                "no network namespaces here; run it as root, or where user namespaces are allowed"
+            )
         if SANITIZED:
             self.skipTest("a master under a sanitizer misses its cycles")
         if not ethercat_line.veth():
             self.skipTest("no veth pairs here")
         self.addCleanup(subprocess.run, ["ip", "link", "delete", "m0"])
         self.write("servo.line", (MACHINE / "servo.line").read_text())
-        self.write("servo.ethercat", (MACHINE / "servo.ethercat").read_text().replace("sim:servo", "eth:m0"))
-        self.write("servo.hal", "".join(line for line in (MACHINE / "servo.hal").read_text().splitlines(True)
-                                        if "ethercat_segment" not in line and "ethercat-segment" not in line))
+        self.write(
+            "servo.ethercat",
+            (MACHINE / "servo.ethercat").read_text().replace("sim:servo", "eth:m0"),
+        )
+        self.write(
+            "servo.hal",
+            "".join(
+                line
+                for line in (MACHINE / "servo.hal").read_text().splitlines(True)
+                if "ethercat_segment" not in line and "ethercat-segment" not in line
+            ),
+        )
         self.logs = {}
 
     def start(self, *words):
         log = self.folder / f"{len(self.logs)}.txt"
         with open(log, "w", encoding="utf-8") as out:
-            process = subprocess.Popen(["hal", *map(str, words)], executable=str(HAL), cwd=self.folder, env=self.environment,
-                                       stdin=subprocess.DEVNULL, stdout=out, stderr=out, text=True)
+            process = subprocess.Popen(
+                ["hal", *map(str, words)],
+                executable=str(HAL),
+                cwd=self.folder,
+                env=self.environment,
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=out,
+                text=True,
+            )
         self.addCleanup(self.end, process)
         self.logs[process] = log
         return process
@@ -49,8 +68,14 @@ class Line(Case):
         return self.logs[process].read_text()
 
     def expect(self, process, pattern, times=1):
-        wait_until(lambda: len(re.findall(pattern, self.said(process))) >= times or process.poll() is not None, f"{pattern} in {self.said(process)}")
-        self.assertGreaterEqual(len(re.findall(pattern, self.said(process))), times, self.said(process))
+        wait_until(
+            lambda: len(re.findall(pattern, self.said(process))) >= times
+            or process.poll() is not None,
+            f"{pattern} in {self.said(process)}",
+        )
+        self.assertGreaterEqual(
+            len(re.findall(pattern, self.said(process))), times, self.said(process)
+        )
 
     def node(self, *words):
         node = self.start("node", "ethercat", "servo.line", "--link", "eth:s0", *words)
@@ -64,23 +89,42 @@ class Line(Case):
         return self.run_program("shell", "--name", "servo", "-s", "getp", name).stdout.strip()
 
     def both(self, pin, value):
-        wait_until(lambda: all(self.pin(pin.replace("*", axis)) == value for axis in ("left", "right")), f"{pin} is {value}")
+        wait_until(
+            lambda: all(self.pin(pin.replace("*", axis)) == value for axis in ("left", "right")),
+            f"{pin} is {value}",
+        )
 
     def test_dump_shows_what_a_command_does(self):
         self.node()
         dump = self.start("ethercat", "dump", "eth:m0")
         filtered = self.start("ethercat", "dump", "eth:m0", "--filter", "nothing has this")
-        wait_until(lambda: self.good("ethercat", "upload", "eth:m0", "-p", "1", "0x1018", "1") and " CoE SDO uploaded 0x1018:1" in self.said(dump), "dump shows it")
+        wait_until(
+            lambda: self.good("ethercat", "upload", "eth:m0", "-p", "1", "0x1018", "1")
+            and " CoE SDO uploaded 0x1018:1" in self.said(dump),
+            "dump shows it",
+        )
         self.bad("ethercat", "upload", "eth:m0", "-p", "1", "0x2fff", "0")
-        self.expect(dump, r"  <-  FPRD station 0x1002 1100  \[256\] 0A 00 .* WKC 1  CoE SDO abort 0x2FFF:0: 0x06020000, object does not exist\n")
-        self.expect(dump, r"  <-  BWR  all slaves 0120  \[2\] 11 00  WKC 2  AL control: INIT, acknowledge\n")
-        self.expect(dump, r"  <-  FPWR station 0x1002 0120  \[2\] 02 00  WKC 1  AL control: PRE-OP\n")
+        self.expect(
+            dump,
+            r"  <-  FPRD station 0x1002 1100  \[256\] 0A 00 .* WKC 1  CoE SDO abort 0x2FFF:0: 0x06020000, object does not exist\n",
+        )
+        self.expect(
+            dump, r"  <-  BWR  all slaves 0120  \[2\] 11 00  WKC 2  AL control: INIT, acknowledge\n"
+        )
+        self.expect(
+            dump, r"  <-  FPWR station 0x1002 0120  \[2\] 02 00  WKC 1  AL control: PRE-OP\n"
+        )
         self.assertEqual((0, 0, ""), (self.end(dump), self.end(filtered), self.said(filtered)))
 
     def test_commands_by_position_leave_a_running_master_alone(self):
         machine = None
         try:
-            self.write("servo.ethercat", (self.folder / "servo.ethercat").read_text().replace("cycle = 1ms", "cycle = 1ms\nsync-window = 1ms"))
+            self.write(
+                "servo.ethercat",
+                (self.folder / "servo.ethercat")
+                .read_text()
+                .replace("cycle = 1ms", "cycle = 1ms\nsync-window = 1ms"),
+            )
             self.node()
             machine = self.machine()
             self.look_beside(machine)
@@ -94,33 +138,62 @@ class Line(Case):
         self.both("ethercat.0.*.operational", "TRUE")
         self.both("*.active", "TRUE")
         self.assertEqual("0    OP\n1    OP\n", self.good("ethercat", "states", "eth:m0"))
-        self.assertRegex(self.good("ethercat", "slaves", "eth:m0"), r"^0 +0:0 +OP +\+ Halcyon servo\n1 +0:1 +OP +\+ Halcyon servo\n$")
-        self.assertRegex(self.good("ethercat", "scan", "eth:m0"), r"^0  OP  Halcyon servo  .*\n  1  OP  Halcyon servo  at port 1 of slave 0  delay [1-9]\d* ns\n$")
-        self.assertEqual("0x08 0x00\n", self.good("ethercat", "reg-read", "eth:m0", "-p", "1", "0x130"))
+        self.assertRegex(
+            self.good("ethercat", "slaves", "eth:m0"),
+            r"^0 +0:0 +OP +\+ Halcyon servo\n1 +0:1 +OP +\+ Halcyon servo\n$",
+        )
+        self.assertRegex(
+            self.good("ethercat", "scan", "eth:m0"),
+            r"^0  OP  Halcyon servo  .*\n  1  OP  Halcyon servo  at port 1 of slave 0  delay [1-9]\d* ns\n$",
+        )
+        self.assertEqual(
+            "0x08 0x00\n", self.good("ethercat", "reg-read", "eth:m0", "-p", "1", "0x130")
+        )
         self.assertIn("6040:0 UINT, 16 bit", self.good("ethercat", "pdos", "eth:m0"))
-        image = json.loads(self.good("ethercat", "sii-read", "eth:m0", "-p", "1", "--json"))["bytes"].split()
+        image = json.loads(self.good("ethercat", "sii-read", "eth:m0", "-p", "1", "--json"))[
+            "bytes"
+        ].split()
         self.assertEqual(["0xff", "0xff", "0xff", "0x00"], image[16:20], "the vendor, at word 8")
-        self.assertIn("no port has counted errors of its own\n", self.good("ethercat", "crc", "eth:m0"))
+        self.assertIn(
+            "no port has counted errors of its own\n", self.good("ethercat", "crc", "eth:m0")
+        )
         rows = json.loads(self.good("ethercat", "dc", "eth:m0", "--json"))
         self.assertEqual([(0, True), (1, True)], [(row["position"], row["sync"]) for row in rows])
         self.assertEqual(0, rows[0]["delay_ns"])
         self.assertGreater(rows[1]["delay_ns"], 0)
         self.assertTrue(all(abs(row["deviation_ns"]) < 1_000_000 for row in rows), rows)
-        for command, words in (("upload", ("-p", "1", "0x1000", "0")), ("states", ("PREOP",)), ("foe-read", ("-p", "1", "x"))):
-            self.assertIn("another EtherCAT master is active on eth:m0, and this command changes states; stop it, or, for objects, use its mailbox gateway: "
-                          "gateway:127.0.0.1 instead of eth:m0\n", self.bad("ethercat", command, "eth:m0", *words))
+        for command, words in (
+            ("upload", ("-p", "1", "0x1000", "0")),
+            ("states", ("PREOP",)),
+            ("foe-read", ("-p", "1", "x")),
+        ):
+            self.assertIn(
+                "another EtherCAT master is active on eth:m0, and this command changes states; stop it, or, for objects, use its mailbox gateway: "
+                "gateway:127.0.0.1 instead of eth:m0\n",
+                self.bad("ethercat", command, "eth:m0", *words),
+            )
         self.both("ethercat.0.*.operational", "TRUE")
-        self.assertEqual(["TRUE"] * 2, [self.pin("left.active"), self.pin("right.active")], self.said(machine))
+        self.assertEqual(
+            ["TRUE"] * 2, [self.pin("left.active"), self.pin("right.active")], self.said(machine)
+        )
         self.assertNotIn("another EtherCAT master", self.said(machine))
 
     def test_dc_shows_clocks_that_run_apart(self):
-        self.write("servo.ethercat", (self.folder / "servo.ethercat").read_text().replace("dc      = sync0\n", ""))
+        self.write(
+            "servo.ethercat",
+            (self.folder / "servo.ethercat").read_text().replace("dc      = sync0\n", ""),
+        )
         self.node("--fault", "1:drift=500")
         self.machine()
         self.both("ethercat.0.*.operational", "TRUE")
         rows = json.loads(self.good("ethercat", "dc", "eth:m0", "--json"))
-        self.assertEqual([False, False], [row["sync"] for row in rows], "no SYNC without dc in the configuration")
-        self.assertRegex(self.good("ethercat", "dc", "eth:m0"), r"^0  deviation -?\d+ ns  delay \d+ ns  SYNC off  Halcyon servo\n1  deviation ")
+        self.assertEqual(
+            [False, False], [row["sync"] for row in rows], "no SYNC without dc in the configuration"
+        )
+        self.assertRegex(
+            self.good("ethercat", "dc", "eth:m0"),
+            r"^0  deviation -?\d+ ns  delay \d+ ns  SYNC off  Halcyon servo\n1  deviation ",
+        )
 
     def test_crc_names_the_cable_with_errors(self):
         self.write("servo.line", "coupler\nservo\nservo\n")
@@ -131,25 +204,56 @@ class Line(Case):
         self.assertRegex(report, r"(?m)^ +2 +0 +[1-9]\d* +0 +0 +0$")
         self.assertIn("      check the cable between slave 2 port 0 and slave 1 port 1\n", report)
         self.assertEqual(1, report.count("check the cable"), report)
-        self.assertEqual(["check the cable between slave 2 port 0 and slave 1 port 1"], json.loads(self.good("ethercat", "crc", "eth:m0", "--json"))["cables"])
+        self.assertEqual(
+            ["check the cable between slave 2 port 0 and slave 1 port 1"],
+            json.loads(self.good("ethercat", "crc", "eth:m0", "--json"))["cables"],
+        )
 
     def test_firmware_is_written_in_BOOT(self):
         self.write("servo.line", "servo\nmailbox_device\n")
         self.node()
         (self.folder / "new").write_bytes(bytes(range(256)) * 20)
         write = ["ethercat", "foe-write", "eth:m0", "-p", "1", "new", "firmware"]
-        self.assertIn("slave 1: file 'firmware': the slave ends the transfer with FoE error 0x8008 (allowed in BOOT only)", self.bad(*write, "--password", "0x1234"))
-        self.assertIn("slave 1: file 'firmware': the slave ends the transfer with FoE error 0x800A (no rights (wrong password))", self.bad(*write, "--boot"))
-        self.assertEqual("slave 1: 'firmware' written, 5120 bytes\n", self.good(*write, "--boot", "--password", "0x1234"))
+        self.assertIn(
+            "slave 1: file 'firmware': the slave ends the transfer with FoE error 0x8008 (allowed in BOOT only)",
+            self.bad(*write, "--password", "0x1234"),
+        )
+        self.assertIn(
+            "slave 1: file 'firmware': the slave ends the transfer with FoE error 0x800A (no rights (wrong password))",
+            self.bad(*write, "--boot"),
+        )
+        self.assertEqual(
+            "slave 1: 'firmware' written, 5120 bytes\n",
+            self.good(*write, "--boot", "--password", "0x1234"),
+        )
         self.assertRegex(self.good("ethercat", "states", "eth:m0"), r"(?m)^1 +PRE-OP$")
-        read = json.loads(self.good("ethercat", "foe-read", "eth:m0", "-p", "1", "firmware", "--boot", "--password", "0x1234", "--json"))
+        read = json.loads(
+            self.good(
+                "ethercat",
+                "foe-read",
+                "eth:m0",
+                "-p",
+                "1",
+                "firmware",
+                "--boot",
+                "--password",
+                "0x1234",
+                "--json",
+            )
+        )
         self.assertEqual(bytes(range(256)) * 20, bytes(int(b, 16) for b in read["bytes"].split()))
-        self.assertEqual("hal ethercat foe-write: slave 0: its EEPROM has no mailbox for BOOT; it takes its firmware in PRE-OP (without --boot), or by a tool of its "
-                         "maker\n", self.bad("ethercat", "foe-write", "eth:m0", "-p", "0", "new", "firmware", "--boot"))
+        self.assertEqual(
+            "hal ethercat foe-write: slave 0: its EEPROM has no mailbox for BOOT; it takes its firmware in PRE-OP (without --boot), or by a tool of its "
+            "maker\n",
+            self.bad("ethercat", "foe-write", "eth:m0", "-p", "0", "new", "firmware", "--boot"),
+        )
 
     def test_watchdogs_turn_outputs_off_when_the_master_is_killed_and_a_new_one_reaches_OP(self):
         node = self.node()
-        self.assertRegex(self.said(node), r"^EtherCAT line of 2 slaves on eth:s0 \(raw Ethernet\); press Ctrl-C to end\n   0  servo\n   1  servo\n")
+        self.assertRegex(
+            self.said(node),
+            r"^EtherCAT line of 2 slaves on eth:s0 \(raw Ethernet\); press Ctrl-C to end\n   0  servo\n   1  servo\n",
+        )
         machine = self.machine()
         self.both("*.active", "TRUE")
         for slave in "01":
@@ -163,7 +267,9 @@ class Line(Case):
         self.expect(node, r"slave 0 \(servo\): OP\n", operational + 1)
         self.both("*.active", "TRUE")
         self.assertEqual(0, self.end(node, signal.SIGINT))
-        self.assertRegex(self.said(node), r"\n\d+\.\d s: [1-9]\d* frames passed, [1-9]\d* sent, \d+ lost here\n$")
+        self.assertRegex(
+            self.said(node), r"\n\d+\.\d s: [1-9]\d* frames passed, [1-9]\d* sent, \d+ lost here\n$"
+        )
 
     def test_machine_reports_a_killed_line_and_starts_it_again(self):
         node, machine = self.node(), self.machine()
@@ -176,20 +282,37 @@ class Line(Case):
             self.expect(machine, rf"slave \d \({axis}\)")
         self.node()
         self.both("ethercat.0.*.operational", "TRUE")
-        self.assertEqual(["FALSE"] * 2, [self.pin("left.active"), self.pin("right.active")], "an axis stays off until it is switched on again")
+        self.assertEqual(
+            ["FALSE"] * 2,
+            [self.pin("left.active"), self.pin("right.active")],
+            "an axis stays off until it is switched on again",
+        )
 
     def test_ends_by_itself_and_on_SIGTERM(self):
-        self.assertRegex(self.good("node", "ethercat", "servo.line", "--link", "eth:s0", "--for", "50ms"), r"\n0\.\d s: 0 frames passed, 0 sent, 0 lost here\n$")
+        self.assertRegex(
+            self.good("node", "ethercat", "servo.line", "--link", "eth:s0", "--for", "50ms"),
+            r"\n0\.\d s: 0 frames passed, 0 sent, 0 lost here\n$",
+        )
         self.assertEqual(0, self.end(self.node(), signal.SIGTERM))
 
     def test_an_interface_that_is_missing(self):
-        self.assertIn("nothere", self.bad("node", "ethercat", "servo.line", "--link", "eth:nothere"))
+        self.assertIn(
+            "nothere", self.bad("node", "ethercat", "servo.line", "--link", "eth:nothere")
+        )
 
 
 class BringUp(Case):
     def run_script(self, *words):
-        done = subprocess.run([MACHINE / "bring-up", *words], cwd=self.folder, env={**self.environment, "HAL": str(HAL), "TMPDIR": str(self.folder)},
-                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=120)
+        done = subprocess.run(
+            [MACHINE / "bring-up", *words],
+            cwd=self.folder,
+            env={**self.environment, "HAL": str(HAL), "TMPDIR": str(self.folder)},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=120,
+        )
         if done.returncode == 77 or "not to be had" in done.stdout:
             self.skipTest("no network namespaces here: " + done.stdout.strip())
         return done
@@ -198,14 +321,24 @@ class BringUp(Case):
         if SANITIZED:
             self.skipTest("a master under a sanitizer misses its cycles")
         done = self.run_script("1")
-        self.assertRegex(done.stdout, r"bring-up: after \d+ s: left drive on: TRUE, right drive on: TRUE\n")
+        self.assertRegex(
+            done.stdout, r"bring-up: after \d+ s: left drive on: TRUE, right drive on: TRUE\n"
+        )
         if done.returncode != 0:  # possible on a busy machine, with the reason
-            return self.assertIn("a drive is off: it was lost, or missed the frames of ten cycles", done.stdout)
-        self.assertRegex(done.stdout, r"at the end: drives on: TRUE; velocity -?\d+ and -?\d+ counts/s; clocks within \d+ ns; frames sent [1-9]\d*, lost \d+; ")
+            return self.assertIn(
+                "a drive is off: it was lost, or missed the frames of ten cycles", done.stdout
+            )
+        self.assertRegex(
+            done.stdout,
+            r"at the end: drives on: TRUE; velocity -?\d+ and -?\d+ counts/s; clocks within \d+ ns; frames sent [1-9]\d*, lost \d+; ",
+        )
 
     def test_an_unexpected_word(self):
         done = self.run_script("fast")
-        self.assertEqual((1, "bring-up: invalid argument 'fast'; write bring-up [SECONDS]\n"), (done.returncode, done.stdout))
+        self.assertEqual(
+            (1, "bring-up: invalid argument 'fast'; write bring-up [SECONDS]\n"),
+            (done.returncode, done.stdout),
+        )
 
 
 class WrongWords(Case):
@@ -214,22 +347,56 @@ class WrongWords(Case):
         self.write("bad.line", "coupler\nservoo axes=2\nservo axes=9\n")
         self.write("empty.line", "# nothing\n")
         say = "hal node ethercat: "
-        self.assertEqual(say + "missing --link; add --link eth:enp3s0, the interface towards the master, or --link udp:127.0.0.1 for one on this machine\n", self.bad("node", "ethercat", "good.line"))
-        self.assertEqual(say + "cannot read 'none.line': No such file or directory\n", self.bad("node", "ethercat", "none.line", "--link", "eth:m0"))
+        self.assertEqual(
+            say
+            + "missing --link; add --link eth:enp3s0, the interface towards the master, or --link udp:127.0.0.1 for one on this machine\n",
+            self.bad("node", "ethercat", "good.line"),
+        )
+        self.assertEqual(
+            say + "cannot read 'none.line': No such file or directory\n",
+            self.bad("node", "ethercat", "none.line", "--link", "eth:m0"),
+        )
         first, second = self.bad("node", "ethercat", "bad.line", "--link", "eth:m0").splitlines()
-        self.assertRegex(first, r"^hal node ethercat: bad\.line:2:1: unknown device 'servoo'; use one of: coupler, digital_in, ")
-        self.assertRegex(second, r"^hal node ethercat: bad\.line:3:7: invalid value '9' of axes; use 1\.\.8; options of servo: ")
-        self.assertEqual(say + "empty.line: the line has no device; write one device per line\n", self.bad("node", "ethercat", "empty.line", "--link", "eth:m0"))
-        fault = lambda text: self.bad("node", "ethercat", "good.line", "--link", "eth:m0", "--fault", text)
-        self.assertEqual(say + "invalid --fault 'corrupt'; write --fault 1:corrupt-every=9\n", fault("corrupt"))
-        self.assertEqual(say + "--fault 1:drift=1: no slave 1; the last one of 1 is 0\n", fault("1:drift=1"))
-        self.assertEqual(say + "--fault 0:drift=x: invalid drift 'x'; write -1000..1000 ppm\n", fault("0:drift=x"))
-        self.assertEqual(say + "--fault 0:lose-every=0: invalid number '0'; write 1..1000000000\n", fault("0:lose-every=0"))
-        self.assertEqual(say + "--fault 0:loose-every=2: unknown fault 'loose-every'; write one of: lose-every, corrupt-every, double-every, noise-every, drift\n",
-                         fault("0:loose-every=2"))
-        self.assertEqual(say + "'sim:line' is a segment in memory, which other programs cannot open; write --link eth:enp3s0, or emulate the line in the "
-                               "netlist of the master: loadrt ethercat_segment link=sim:line\n",
-                         self.bad("node", "ethercat", "good.line", "--link", "sim:line"))
+        self.assertRegex(
+            first,
+            r"^hal node ethercat: bad\.line:2:1: unknown device 'servoo'; use one of: coupler, digital_in, ",
+        )
+        self.assertRegex(
+            second,
+            r"^hal node ethercat: bad\.line:3:7: invalid value '9' of axes; use 1\.\.8; options of servo: ",
+        )
+        self.assertEqual(
+            say + "empty.line: the line has no device; write one device per line\n",
+            self.bad("node", "ethercat", "empty.line", "--link", "eth:m0"),
+        )
+        fault = lambda text: self.bad(
+            "node", "ethercat", "good.line", "--link", "eth:m0", "--fault", text
+        )
+        self.assertEqual(
+            say + "invalid --fault 'corrupt'; write --fault 1:corrupt-every=9\n", fault("corrupt")
+        )
+        self.assertEqual(
+            say + "--fault 1:drift=1: no slave 1; the last one of 1 is 0\n", fault("1:drift=1")
+        )
+        self.assertEqual(
+            say + "--fault 0:drift=x: invalid drift 'x'; write -1000..1000 ppm\n",
+            fault("0:drift=x"),
+        )
+        self.assertEqual(
+            say + "--fault 0:lose-every=0: invalid number '0'; write 1..1000000000\n",
+            fault("0:lose-every=0"),
+        )
+        self.assertEqual(
+            say
+            + "--fault 0:loose-every=2: unknown fault 'loose-every'; write one of: lose-every, corrupt-every, double-every, noise-every, drift\n",
+            fault("0:loose-every=2"),
+        )
+        self.assertEqual(
+            say
+            + "'sim:line' is a segment in memory, which other programs cannot open; write --link eth:enp3s0, or emulate the line in the "
+            "netlist of the master: loadrt ethercat_segment link=sim:line\n",
+            self.bad("node", "ethercat", "good.line", "--link", "sim:line"),
+        )
 
 
 if __name__ == "__main__":

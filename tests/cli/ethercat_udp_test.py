@@ -28,17 +28,33 @@ class Udp(Case):
             self.skipTest("a master under a sanitizer misses its cycles")
         self.link = f"udp:127.0.0.1:{free_port()}"
         self.write("servo.line", (MACHINE / "servo.line").read_text())
-        self.write("servo.ethercat", (MACHINE / "servo.ethercat").read_text().replace("sim:servo", self.link))
-        self.write("servo.hal", "".join(line for line in (MACHINE / "servo.hal").read_text().splitlines(True)
-                                        if "ethercat_segment" not in line and "ethercat-segment" not in line))
+        self.write(
+            "servo.ethercat",
+            (MACHINE / "servo.ethercat").read_text().replace("sim:servo", self.link),
+        )
+        self.write(
+            "servo.hal",
+            "".join(
+                line
+                for line in (MACHINE / "servo.hal").read_text().splitlines(True)
+                if "ethercat_segment" not in line and "ethercat-segment" not in line
+            ),
+        )
         self.logs = {}
 
     def begin(self, *words):
         log = self.folder / f"{len(self.logs)}.txt"
         before = UNPRIVILEGED if shutil.which("setpriv") and os.geteuid() == 0 else ()
         with open(log, "w", encoding="utf-8") as out:
-            process = subprocess.Popen([*before, str(HAL), *words], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
-                                       stdout=out, stderr=out, text=True)
+            process = subprocess.Popen(
+                [*before, str(HAL), *words],
+                cwd=self.folder,
+                env=self.environment,
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=out,
+                text=True,
+            )
         self.addCleanup(self.finish, process)
         self.logs[process] = log
         return process
@@ -53,8 +69,14 @@ class Udp(Case):
         return self.logs[process].read_text()
 
     def expect(self, process, pattern, times=1):
-        wait_until(lambda: len(re.findall(pattern, self.said(process))) >= times or process.poll() is not None, f"{pattern} in {self.said(process)}")
-        self.assertGreaterEqual(len(re.findall(pattern, self.said(process))), times, self.said(process))
+        wait_until(
+            lambda: len(re.findall(pattern, self.said(process))) >= times
+            or process.poll() is not None,
+            f"{pattern} in {self.said(process)}",
+        )
+        self.assertGreaterEqual(
+            len(re.findall(pattern, self.said(process))), times, self.said(process)
+        )
 
     def node(self):
         node = self.begin("node", "ethercat", "servo.line", "--link", self.link)
@@ -68,53 +90,82 @@ class Udp(Case):
         return self.run_program("shell", "--name", "servo", "-s", "getp", name).stdout.strip()
 
     def both(self, pin, value):
-        wait_until(lambda: all(self.pin(pin.replace("*", axis)) == value for axis in ("left", "right")), f"{pin} is {value}")
+        wait_until(
+            lambda: all(self.pin(pin.replace("*", axis)) == value for axis in ("left", "right")),
+            f"{pin} is {value}",
+        )
 
     def test_drives_are_operated_by_another_process_and_again_after_it_was_killed(self):
         node, machine = self.node(), self.machine()
-        self.assertRegex(self.said(node), rf"^EtherCAT line of 2 slaves on {self.link} \(frames in UDP datagrams\); press Ctrl-C to end\n")
+        self.assertRegex(
+            self.said(node),
+            rf"^EtherCAT line of 2 slaves on {self.link} \(frames in UDP datagrams\); press Ctrl-C to end\n",
+        )
         self.both("*.active", "TRUE")
         for slave in "01":
             self.expect(node, rf"slave {slave} \(servo\): OP\n")
         scan = json.loads(self.good("ethercat", "slaves", self.link, "--json"))
         self.assertEqual(2, len(scan))
         dump = self.begin("ethercat", "dump", self.link, "--count", "3")
-        self.assertEqual(0, self.finish(dump, 0) if dump.poll() is None else dump.returncode, self.said(dump))
+        self.assertEqual(
+            0, self.finish(dump, 0) if dump.poll() is None else dump.returncode, self.said(dump)
+        )
         self.assertEqual(3, len(re.findall(r"  <-  ", self.said(dump))), self.said(dump))
 
         node.kill()
         node.wait()
-        self.expect(machine, rf"{self.link} has no link: no program listens there; emulate a line, as in: hal node ethercat FILE --link {self.link}\n")
+        self.expect(
+            machine,
+            rf"{self.link} has no link: no program listens there; emulate a line, as in: hal node ethercat FILE --link {self.link}\n",
+        )
         self.both("ethercat.0.*.operational", "FALSE")
         node = self.node()
         self.expect(machine, rf"{self.link} has a link again\n")
         self.both("ethercat.0.*.operational", "TRUE")
         self.assertEqual(0, self.finish(node, signal.SIGINT))
-        self.assertRegex(self.said(node), r"\n\d+\.\d s: [1-9]\d* frames passed, [1-9]\d* sent, \d+ lost here\n$")
+        self.assertRegex(
+            self.said(node), r"\n\d+\.\d s: [1-9]\d* frames passed, [1-9]\d* sent, \d+ lost here\n$"
+        )
 
     def test_commands_work_without_a_machine(self):
         self.write("servo.line", "servo alias=5\nmailbox_device\n")
         self.node()
-        self.assertEqual("0        5:0   INIT     + Halcyon servo\n1        5:1   INIT     + Halcyon mailbox_device\n", self.good("ethercat", "slaves", self.link))
-        self.assertRegex(self.good("ethercat", "upload", self.link, "-p", "0", "0x1018", "1"), "^0x00ffffff ")
+        self.assertEqual(
+            "0        5:0   INIT     + Halcyon servo\n1        5:1   INIT     + Halcyon mailbox_device\n",
+            self.good("ethercat", "slaves", self.link),
+        )
+        self.assertRegex(
+            self.good("ethercat", "upload", self.link, "-p", "0", "0x1018", "1"), "^0x00ffffff "
+        )
         self.assertIn("PRE-OP", self.good("ethercat", "states", self.link))
 
     def test_a_second_master_is_named(self):
         self.node()
         self.machine()
         self.both("*.active", "TRUE")
-        self.assertEqual(f"hal ethercat upload: another EtherCAT master is active on {self.link}, and this command changes states; stop it, or, for objects, use its "
-                         f"mailbox gateway: gateway:127.0.0.1 instead of {self.link}\n", self.bad("ethercat", "upload", self.link, "-p", "0", "0x1018", "1"))
+        self.assertEqual(
+            f"hal ethercat upload: another EtherCAT master is active on {self.link}, and this command changes states; stop it, or, for objects, use its "
+            f"mailbox gateway: gateway:127.0.0.1 instead of {self.link}\n",
+            self.bad("ethercat", "upload", self.link, "-p", "0", "0x1018", "1"),
+        )
 
     def test_errors_name_what_to_type(self):
         say = "hal node ethercat: "
-        self.assertEqual(f"hal ethercat slaves: {self.link} has no link: no program listens there; emulate a line, as in: hal node ethercat FILE --link {self.link}\n",
-                         self.bad("ethercat", "slaves", self.link))
-        self.assertEqual(say + "udp:192.0.2.1: 192.0.2.1 is not an address of this machine; to listen on all of them, write udp:0.0.0.0\n",
-                         self.bad("node", "ethercat", "servo.line", "--link", "udp:192.0.2.1"))
+        self.assertEqual(
+            f"hal ethercat slaves: {self.link} has no link: no program listens there; emulate a line, as in: hal node ethercat FILE --link {self.link}\n",
+            self.bad("ethercat", "slaves", self.link),
+        )
+        self.assertEqual(
+            say
+            + "udp:192.0.2.1: 192.0.2.1 is not an address of this machine; to listen on all of them, write udp:0.0.0.0\n",
+            self.bad("node", "ethercat", "servo.line", "--link", "udp:192.0.2.1"),
+        )
         self.node()
-        self.assertEqual(say + f"{self.link}: cannot listen on {self.link[4:]}: Address already in use; to find the program that does: ss -ulpn\n",
-                         self.bad("node", "ethercat", "servo.line", "--link", self.link))
+        self.assertEqual(
+            say
+            + f"{self.link}: cannot listen on {self.link[4:]}: Address already in use; to find the program that does: ss -ulpn\n",
+            self.bad("node", "ethercat", "servo.line", "--link", self.link),
+        )
 
 
 class Capture(Case):
@@ -122,29 +173,49 @@ class Capture(Case):
 
     def setUp(self):
         super().setUp()
-        self.write("record.hal", "loadrt threads name1=bus period1=1000000\nloadrt ethercat_segment devices=servo link=sim:line\n"
-                   "loadrt ethercat config=one.ethercat\nloadrt segment_record link=sim:line file=seen.pcapng\n"
-                   "addf ethercat.0.receive bus\naddf ethercat.0.transmit bus\naddf ethercat-segment.0.update bus\naddf segment-record.0.update bus\n"
-                   "start\nadvance 200ms\n")
-        self.write("one.ethercat", "[bus]\nlink = sim:line\ncycle = 1ms\n[slave 0 x]\nvendor = 0x00ffffff\ndevice = cia402\noutputs = 6040 607A\ninputs = 6041 6064\n")
+        self.write(
+            "record.hal",
+            "loadrt threads name1=bus period1=1000000\nloadrt ethercat_segment devices=servo link=sim:line\n"
+            "loadrt ethercat config=one.ethercat\nloadrt segment_record link=sim:line file=seen.pcapng\n"
+            "addf ethercat.0.receive bus\naddf ethercat.0.transmit bus\naddf ethercat-segment.0.update bus\naddf segment-record.0.update bus\n"
+            "start\nadvance 200ms\n",
+        )
+        self.write(
+            "one.ethercat",
+            "[bus]\nlink = sim:line\ncycle = 1ms\n[slave 0 x]\nvendor = 0x00ffffff\ndevice = cia402\noutputs = 6040 607A\ninputs = 6041 6064\n",
+        )
         self.run_program("sim", "record.hal")
         self.assertTrue((self.folder / "seen.pcapng").stat().st_size > 1000)
 
     def test_dump_lists_it_at_once_or_at_its_times(self):
         at_once = self.good("ethercat", "dump", "seen.pcapng", "--count", "20")
         self.assertEqual(20, len(at_once.splitlines()))
-        self.assertEqual([line.split("  ", 2)[-1] for line in at_once.splitlines()],
-                         [line.split("  ", 2)[-1] for line in self.good("ethercat", "dump", "replay:seen.pcapng", "--count", "20").splitlines()])
+        self.assertEqual(
+            [line.split("  ", 2)[-1] for line in at_once.splitlines()],
+            [
+                line.split("  ", 2)[-1]
+                for line in self.good(
+                    "ethercat", "dump", "replay:seen.pcapng", "--count", "20"
+                ).splitlines()
+            ],
+        )
 
     def test_a_master_and_a_line_need_somebody_at_the_other_end(self):
-        self.write("again.hal", "loadrt threads name1=bus period1=1000000\nloadrt ethercat config=one.ethercat link=replay:seen.pcapng\n"
-                   "addf ethercat.0.receive bus\naddf ethercat.0.transmit bus\nstart\nadvance 10ms\n")
+        self.write(
+            "again.hal",
+            "loadrt threads name1=bus period1=1000000\nloadrt ethercat config=one.ethercat link=replay:seen.pcapng\n"
+            "addf ethercat.0.receive bus\naddf ethercat.0.transmit bus\nstart\nadvance 10ms\n",
+        )
         words = "replay:seen.pcapng is a capture, whose slaves do not answer; to see what is in it: hal ethercat dump FILE"
         self.assertIn(words, self.bad("sim", "again.hal"))
-        self.assertEqual(f"hal ethercat scan: {words}\n", self.bad("ethercat", "scan", "replay:seen.pcapng"))
+        self.assertEqual(
+            f"hal ethercat scan: {words}\n", self.bad("ethercat", "scan", "replay:seen.pcapng")
+        )
         self.write("a.line", "servo\n")
-        self.assertEqual("hal node ethercat: 'replay:seen.pcapng' is a capture, which no master can reach; write --link eth:enp3s0 or --link udp:127.0.0.1\n",
-                         self.bad("node", "ethercat", "a.line", "--link", "replay:seen.pcapng"))
+        self.assertEqual(
+            "hal node ethercat: 'replay:seen.pcapng' is a capture, which no master can reach; write --link eth:enp3s0 or --link udp:127.0.0.1\n",
+            self.bad("node", "ethercat", "a.line", "--link", "replay:seen.pcapng"),
+        )
 
 
 if __name__ == "__main__":

@@ -18,8 +18,16 @@ class Segment(Case):
         if SANITIZED:
             self.skipTest("eight processes under a sanitizer miss their cycles on any machine")
         script = ROOT / "halfiles" / machine / "bring-up"
-        done = subprocess.run([script, *words], cwd=self.folder, env={**self.environment, "HAL": str(HAL), "TMPDIR": str(self.folder)},
-                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=240)
+        done = subprocess.run(
+            [script, *words],
+            cwd=self.folder,
+            env={**self.environment, "HAL": str(HAL), "TMPDIR": str(self.folder)},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=240,
+        )
         if done.returncode == 77 or "not to be had" in done.stdout:
             self.skipTest("no network namespaces here: " + done.stdout.strip())
         print(done.stdout, file=sys.stderr)
@@ -31,7 +39,9 @@ class Segment(Case):
         """Fails when the machine is off at the end, with the reason in its last lines: possible on a busy machine."""
         self.assertEqual(0 if re.search(on, done.stdout) else 1, done.returncode, done.stdout)
         if done.returncode != 0:
-            self.assertRegex(done.stdout, r"the (motor|machine) is off at the end: the control missed \d+ cycles")
+            self.assertRegex(
+                done.stdout, r"the (motor|machine) is off at the end: the control missed \d+ cycles"
+            )
 
     def stations(self, logs, names):
         """Each station was synchronous, and measured its skew as exactly as a busy machine permits."""
@@ -40,7 +50,9 @@ class Segment(Case):
             self.assertIsNotNone(line, f"{name}: {logs[name]}")
             print(f"{name}: {line[1]}", file=sys.stderr)
             self.assertGreater(int(re.search(r"syncs (\d+) received", line[1])[1]), 0, line[1])
-            self.assertLess(abs(float(re.search(r"clock ([-+.\d]+) ppm", line[1])[1]) + ppm), 150, line[1])
+            self.assertLess(
+                abs(float(re.search(r"clock ([-+.\d]+) ppm", line[1])[1]) + ppm), 150, line[1]
+            )
 
     def test_the_rig_hangs_at_the_other_end(self):
         done, logs = self.bring_up("ethernet-furuta", SECONDS)
@@ -51,55 +63,115 @@ class Segment(Case):
         done, logs = self.bring_up("ethernet-cnc", "--lose-clock", SECONDS)
         self.status_is_true(done, "at the end: nodes operational: \\d of 6; machine on: TRUE")
         self.stations(logs, {"x": 200, "y": -150, "z": 80, "a": -200, "c": 35, "io": -60})
-        self.assertRegex(done.stdout, r"at the end: .* the control sends the syncs: TRUE", "the backup master took over")
+        self.assertRegex(
+            done.stdout,
+            r"at the end: .* the control sends the syncs: TRUE",
+            "the backup master took over",
+        )
         self.assertRegex(done.stdout, r"axis c: enabled (TRUE|FALSE), following error [-\d.]+ mm")
-        self.assertIn("x-pwm: canopen.0.x.pwm-set-point => node 1 (x)  0 cycles on the wire, 260 us at worst\n", done.stdout)
-        self.assertIn("x-count: node 1 (x) => canopen.0.x.encoder-count  1 cycle on the wire, 1.74 ms at worst; there and back 2 cycles\n",
-                      done.stdout)
+        self.assertIn(
+            "x-pwm: canopen.0.x.pwm-set-point => node 1 (x)  0 cycles on the wire, 260 us at worst\n",
+            done.stdout,
+        )
+        self.assertIn(
+            "x-count: node 1 (x) => canopen.0.x.encoder-count  1 cycle on the wire, 1.74 ms at worst; there and back 2 cycles\n",
+            done.stdout,
+        )
         left = subprocess.run(["ip", "netns", "list"], stdout=subprocess.PIPE, text=True).stdout
         self.assertNotIn("hal-cnc-", left)
 
     def test_names_a_folder_that_cannot_be_created(self):
-        done = subprocess.run([ROOT / "halfiles/ethernet-furuta/bring-up"], env={**self.environment, "HAL": str(HAL), "TMPDIR": "/nowhere"},
-                              text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        done = subprocess.run(
+            [ROOT / "halfiles/ethernet-furuta/bring-up"],
+            env={**self.environment, "HAL": str(HAL), "TMPDIR": "/nowhere"},
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
         if done.returncode == 77:
             self.skipTest("no network namespaces here")
         self.assertEqual(1, done.returncode)
-        self.assertIn("cannot create a folder for the output of the processes in '/nowhere'; set TMPDIR=FOLDER\n", done.stdout)
+        self.assertIn(
+            "cannot create a folder for the output of the processes in '/nowhere'; set TMPDIR=FOLDER\n",
+            done.stdout,
+        )
 
     def test_names_unexpected_words(self):
         for machine, option in (("cnc", "--lose-clock"), ("furuta", "--swing-up")):
-            done = subprocess.run([ROOT / f"halfiles/ethernet-{machine}/bring-up", "fast"], env={**self.environment, "HAL": str(HAL)}, text=True,
-                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+            done = subprocess.run(
+                [ROOT / f"halfiles/ethernet-{machine}/bring-up", "fast"],
+                env={**self.environment, "HAL": str(HAL)},
+                text=True,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+            )
             if done.returncode == 77:
                 self.skipTest("no network namespaces here")
-            self.assertEqual((1, True), (done.returncode, f"invalid argument 'fast'; write bring-up [{option}] [SECONDS]" in done.stdout), done.stdout)
+            self.assertEqual(
+                (1, True),
+                (
+                    done.returncode,
+                    f"invalid argument 'fast'; write bring-up [{option}] [SECONDS]" in done.stdout,
+                ),
+                done.stdout,
+            )
 
     def test_a_station_prints_what_to_type(self):
         tdma = self.folder / "one.tdma"
-        tdma.write_text("master:\nname control\ncycle 1000\nslot 0 250 1/1 300\n\nslave:\nname x\nphase 330\nslot 0 450 1/1 250\n")
-        node = lambda *words: subprocess.run(["hal", "node", "axis-io", "--id", "1", *words], executable=str(HAL), env=self.environment, text=True,
-                                             stdout=subprocess.PIPE, stderr=subprocess.PIPE).stderr
-        self.assertIn("--tdma needs an Ethernet link; write --link cane:eth0, or remove --tdma", node("--link", "udp:239.74.163.2:43113", "--tdma", str(tdma)))
-        self.assertIn("--skew needs a TDMA schedule; add --tdma FILE\n", node("--link", "cane:lo", "--skew", "200ppm"))
-        self.assertIn("unknown option 'slots'; options are bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, receivequeue, "
-                      "and for cane: format, order, slot, priority, learn, to, master, also, key, mac, speed, policy, spin, promiscuous, forward, noise, node5\n",
-                      node("--link", "cane:lo?slots=3"))
+        tdma.write_text(
+            "master:\nname control\ncycle 1000\nslot 0 250 1/1 300\n\nslave:\nname x\nphase 330\nslot 0 450 1/1 250\n"
+        )
+        node = lambda *words: subprocess.run(
+            ["hal", "node", "axis-io", "--id", "1", *words],
+            executable=str(HAL),
+            env=self.environment,
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        ).stderr
+        self.assertIn(
+            "--tdma needs an Ethernet link; write --link cane:eth0, or remove --tdma",
+            node("--link", "udp:239.74.163.2:43113", "--tdma", str(tdma)),
+        )
+        self.assertIn(
+            "--skew needs a TDMA schedule; add --tdma FILE\n",
+            node("--link", "cane:lo", "--skew", "200ppm"),
+        )
+        self.assertIn(
+            "unknown option 'slots'; options are bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, receivequeue, "
+            "and for cane: format, order, slot, priority, learn, to, master, also, key, mac, speed, policy, spin, promiscuous, forward, noise, node5\n",
+            node("--link", "cane:lo?slots=3"),
+        )
         with_mac = self.folder / "mac.tdma"
         with_mac.write_text(tdma.read_text().replace("name x\n", "name x\nmac 02:00:00:00:00:07\n"))
         refusal = node("--link", "cane:lo", "--tdma", str(with_mac), "--station", "x")
         if "CAP_NET_RAW" not in refusal:
-            self.assertEqual(f"hal node axis-io: eth:lo has the address 00:00:00:00:00:00, but {with_mac} gives x 02:00:00:00:00:07; correct the line 'mac' "
-                             "of its block\n", refusal)
-        self.assertIn("write --skew 200ppm", node("--link", "cane:lo", "--tdma", str(tdma), "--skew", "fast"))
+            self.assertEqual(
+                f"hal node axis-io: eth:lo has the address 00:00:00:00:00:00, but {with_mac} gives x 02:00:00:00:00:07; correct the line 'mac' "
+                "of its block\n",
+                refusal,
+            )
+        self.assertIn(
+            "write --skew 200ppm", node("--link", "cane:lo", "--tdma", str(tdma), "--skew", "fast")
+        )
         self.assertIn("write one of: axis, furuta", node("--link", "cane:lo", "--plant", "robot"))
         self.assertIn("cannot read 'none.tdma'", node("--link", "cane:lo", "--tdma", "none.tdma"))
 
     def test_the_description_beside_the_machines_is_the_devices(self):
-        eds = subprocess.run(["hal", "node", "axis-io", "--eds"], executable=str(HAL), env=self.environment, text=True, stdout=subprocess.PIPE).stdout
+        eds = subprocess.run(
+            ["hal", "node", "axis-io", "--eds"],
+            executable=str(HAL),
+            env=self.environment,
+            text=True,
+            stdout=subprocess.PIPE,
+        ).stdout
         dates = re.compile(r"^(Creation|Modification)(Date|Time)=.*\n|^(Description)=.*\n", re.M)
         for machine in ("ethernet-furuta", "ethernet-cnc"):
-            self.assertEqual(dates.sub("", eds), dates.sub("", (ROOT / "halfiles" / machine / "axis-io.eds").read_text()), machine)
+            self.assertEqual(
+                dates.sub("", eds),
+                dates.sub("", (ROOT / "halfiles" / machine / "axis-io.eds").read_text()),
+                machine,
+            )
 
 
 if __name__ == "__main__":

@@ -38,7 +38,9 @@ class Check(Case):
         self.assertIn("bad.hal:1", self.bad("check", good, bad))
 
     def test_later_files_see_earlier_ones(self):
-        first, second = self.write("first.hal", SERVO), self.write("second.hal", "setp adder.in1 4\n")
+        first, second = self.write("first.hal", SERVO), self.write(
+            "second.hal", "setp adder.in1 4\n"
+        )
         done = self.run_program("check", first, second)
         self.assertEqual(0, done.returncode, done.stderr)
 
@@ -58,7 +60,9 @@ class Check(Case):
         self.assertIn("binary.hal:1", self.bad("check", path))
 
     def test_ini_values(self):
-        ini, path = self.write("a.ini", "[LIMITS]\nMAX = 7\n"), self.write("a.hal", SERVO + "setp adder.in0 [LIMITS]MAX\n")
+        ini, path = self.write("a.ini", "[LIMITS]\nMAX = 7\n"), self.write(
+            "a.hal", SERVO + "setp adder.in0 [LIMITS]MAX\n"
+        )
         self.assertEqual(0, self.run_program("check", "--ini", ini, path).returncode)
         self.assertIn("[LIMITS]MAX", self.bad("check", path))
 
@@ -77,14 +81,19 @@ class Format(Case):
 
     def test_check_changes_nothing(self):
         path = self.write("ugly.hal", self.UGLY)
-        self.assertEqual(f"hal fmt: '{path}' is not formatted; type: hal fmt {path}\n", self.bad("fmt", "--check", path))
+        self.assertEqual(
+            f"hal fmt: '{path}' is not formatted; type: hal fmt {path}\n",
+            self.bad("fmt", "--check", path),
+        )
         self.assertEqual(self.UGLY, (self.folder / "ugly.hal").read_text())
         self.good("fmt", path)
         self.good("fmt", "--check", path)
 
     def test_standard_input(self):
         self.good("fmt", self.write("ugly.hal", self.UGLY))
-        self.assertEqual((self.folder / "ugly.hal").read_text(), self.good("fmt", "-", given=self.UGLY))
+        self.assertEqual(
+            (self.folder / "ugly.hal").read_text(), self.good("fmt", "-", given=self.UGLY)
+        )
 
     def test_keeps_mode_and_link(self):
         path = self.write("ugly.hal", self.UGLY)
@@ -104,7 +113,10 @@ class Format(Case):
         self.assertEqual([path], [str(p) for p in self.folder.glob("bad.hal*")])
 
     def test_missing_file(self):
-        self.assertEqual("hal fmt: cannot read 'nowhere.hal': No such file or directory\n", self.bad("fmt", "nowhere.hal"))
+        self.assertEqual(
+            "hal fmt: cannot read 'nowhere.hal': No such file or directory\n",
+            self.bad("fmt", "nowhere.hal"),
+        )
 
 
 class Doc(Case):
@@ -115,15 +127,25 @@ class Doc(Case):
 
     def test_page_is_made_from_the_declarations(self):
         page = self.good("doc", "and2")
-        for line in (r"    and2: ", r"    loadrt and2 \[count=N \| names=NAME,…\]", r"    and2\.N\.in0 +bit +in ", r"    and2\.N\.out +bit +out ", r"FUNCTIONS\n    and2\.N "):
+        for line in (
+            r"    and2: ",
+            r"    loadrt and2 \[count=N \| names=NAME,…\]",
+            r"    and2\.N\.in0 +bit +in ",
+            r"    and2\.N\.out +bit +out ",
+            r"FUNCTIONS\n    and2\.N ",
+        ):
             self.assertRegex(page, line)
 
     def test_every_component_has_a_page_in_every_form(self):
         """All in one process for each form: a process per component takes minutes under a sanitizer."""
-        names = sorted(entry["name"].replace("_", "-") for entry in json.loads(self.good("doc", "--json")))
+        names = sorted(
+            entry["name"].replace("_", "-") for entry in json.loads(self.good("doc", "--json"))
+        )
         for form in ("json", "markdown", "man"):
             self.good("doc", "--all", f"--{form}", "--output", form)
-        pages = {path.stem: json.loads(path.read_text()) for path in (self.folder / "json").iterdir()}
+        pages = {
+            path.stem: json.loads(path.read_text()) for path in (self.folder / "json").iterdir()
+        }
         self.assertEqual(names, sorted(pages))
         for name, page in pages.items():
             self.assertEqual(name, page["name"])
@@ -131,8 +153,12 @@ class Doc(Case):
             for pin in page["pins"]:
                 self.assertTrue(pin["doc"], f"{name}.{pin['name']}")
         for name in names:
-            self.assertTrue((self.folder / "markdown" / f"{name}.md").read_text().startswith("# "), name)
-            self.assertRegex((self.folder / "man" / f"hal-{name}.9").read_text(), r"\A('\\\" t\n)?\.TH ", name)
+            self.assertTrue(
+                (self.folder / "markdown" / f"{name}.md").read_text().startswith("# "), name
+            )
+            self.assertRegex(
+                (self.folder / "man" / f"hal-{name}.9").read_text(), r"\A('\\\" t\n)?\.TH ", name
+            )
         self.assertEqual(pages["and2"], json.loads(self.good("doc", "and2", "--json")))
 
     def test_unknown_component_gets_a_suggestion(self):
@@ -143,7 +169,9 @@ class Doc(Case):
     def test_broken_plugin_is_a_sentence(self):
         (self.folder / "plugins").mkdir()
         self.write("plugins/broken.so", "not a shared object")
-        error = self.bad("doc", "broken", environment={"HALCYON_PLUGIN_PATH": str(self.folder / "plugins")})
+        error = self.bad(
+            "doc", "broken", environment={"HALCYON_PLUGIN_PATH": str(self.folder / "plugins")}
+        )
         self.assertIn("is not a usable component", error)
 
 

@@ -41,7 +41,9 @@ class Halcompile(Case):
         self.quiet("half.comp")
         self.assertIn("halcyon", (self.folder / "half.c").read_text().lower())
         self.quiet("--preprocess", "-o", "other.c", "half.comp")
-        self.assertEqual((self.folder / "half.c").read_text(), (self.folder / "other.c").read_text())
+        self.assertEqual(
+            (self.folder / "half.c").read_text(), (self.folder / "other.c").read_text()
+        )
         self.write("other.comp", HALF)
         self.assertIn("name the file half.comp", self.halcompile("other.comp").stderr)
 
@@ -52,7 +54,9 @@ class Halcompile(Case):
     def test_adoc_is_the_page_in_asciidoc(self):
         self.quiet("--adoc", "half.comp")
         text = (self.folder / "half.adoc").read_text()
-        self.assertTrue(text.startswith("= half(9)\n:doctype: manpage\n\n== NAME\n\nhalf - Halves\n"), text)
+        self.assertTrue(
+            text.startswith("= half(9)\n:doctype: manpage\n\n== NAME\n\nhalf - Halves\n"), text
+        )
         self.assertIn("\n== PINS\n\n`+half.N.in+` float in::\n", text)
         self.quiet("--adoc", "-o", "other.adoc", "half.comp")
         self.assertEqual(text, (self.folder / "other.adoc").read_text())
@@ -70,21 +74,38 @@ class Halcompile(Case):
         self.write("flags.c", "#include HEADER\nint main(void) { return (int)cos(0) - 1; }\n")
         self.assertEqual(1, self.halcompile("--userspace", "--compile", "flags.c").returncode)
         self.assertFalse((self.folder / "flags").exists())
-        self.quiet("--userspace", "--compile", "--extra-compile-args=-DHEADER=<math.h> -O1", "--extra-link-args=-lm", "flags.c")
+        self.quiet(
+            "--userspace",
+            "--compile",
+            "--extra-compile-args=-DHEADER=<math.h> -O1",
+            "--extra-link-args=-lm",
+            "flags.c",
+        )
         self.assertTrue((self.folder / "flags").is_file())
 
     def test_wrong_words(self):
         self.assertEqual(1, self.halcompile().returncode)
         self.assertEqual(1, self.halcompile("--nothing", "half.comp").returncode)
-        self.assertIn("write a number from 1", self.halcompile("--personalities=0", "half.comp").stderr)
+        self.assertIn(
+            "write a number from 1", self.halcompile("--personalities=0", "half.comp").stderr
+        )
         self.assertEqual(0, self.halcompile("--personalities=4", "half.comp").returncode)
         self.assertIn("usage: halcompile", self.halcompile("--help").stdout)
 
     def test_name_that_ends_in_an_underscore_and_variables_after_EXTRA_SETUP(self):
         self.write("trail_.comp", TRAIL)
         self.quiet("--install", "trail_.comp")
-        self.assertEqual("0\n3\n", self.good("sim", self.write("a.hal", "loadrt threads name1=t period1=1000000\nloadrt trail_\naddf trail.0 t\nstart\n"
-                                                                "advance 1 cycles\ngetp trail.0.early\ngetp trail.0.late\n")))
+        self.assertEqual(
+            "0\n3\n",
+            self.good(
+                "sim",
+                self.write(
+                    "a.hal",
+                    "loadrt threads name1=t period1=1000000\nloadrt trail_\naddf trail.0 t\nstart\n"
+                    "advance 1 cycles\ngetp trail.0.early\ngetp trail.0.late\n",
+                ),
+            ),
+        )
 
 
 if __name__ == "__main__":

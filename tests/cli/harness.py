@@ -26,7 +26,9 @@ TIMEOUT = float(os.environ.get("HALCYON_TEST_TIMEOUT", "30"))  # for what should
 HAL = program()
 PLUGINS = os.environ.get("HALCYON_PLUGIN_PATH") or str(HAL.parent.parent / "tests" / "components")
 
-SANITIZED = any(name in HAL.read_bytes() for name in (b"__asan_init", b"__tsan_init"))  # then the sanitizer takes crash signals
+SANITIZED = any(
+    name in HAL.read_bytes() for name in (b"__asan_init", b"__tsan_init")
+)  # then the sanitizer takes crash signals
 
 SERVO = """loadrt threads name1=servo period1=1000000
 loadrt sum2 names=adder
@@ -39,7 +41,9 @@ net total adder.out
 
 def undisturbed(error):
     """Standard error without the overruns of a busy host, which a test does not cause."""
-    return error and re.sub(r"(?m)^fault: .* \[overrun\].*\n", "", error)  # None: it went to standard output
+    return error and re.sub(
+        r"(?m)^fault: .* \[overrun\].*\n", "", error
+    )  # None: it went to standard output
 
 
 def wait_until(predicate, what):
@@ -61,9 +65,21 @@ class Case(unittest.TestCase):
     def setUp(self):
         self.folder = Path(tempfile.mkdtemp(prefix="hal-"))
         self.addCleanup(shutil.rmtree, self.folder, True)
-        keep = {key: value for key, value in os.environ.items() if key == "PATH" or key.endswith("SAN_OPTIONS")}
-        self.environment = {**keep, "LC_ALL": "C.UTF-8", "TERM": "xterm", "HOME": str(self.folder), "XDG_RUNTIME_DIR": str(self.folder),
-                            "XDG_STATE_HOME": str(self.folder / "state"), "HALCYON_PLUGIN_PATH": PLUGINS, "HAL_RTMOD_DIR": "/nowhere"}  # LinuxCNC may be installed
+        keep = {
+            key: value
+            for key, value in os.environ.items()
+            if key == "PATH" or key.endswith("SAN_OPTIONS")
+        }
+        self.environment = {
+            **keep,
+            "LC_ALL": "C.UTF-8",
+            "TERM": "xterm",
+            "HOME": str(self.folder),
+            "XDG_RUNTIME_DIR": str(self.folder),
+            "XDG_STATE_HOME": str(self.folder / "state"),
+            "HALCYON_PLUGIN_PATH": PLUGINS,
+            "HAL_RTMOD_DIR": "/nowhere",
+        }  # LinuxCNC may be installed
 
     def write(self, name, text):
         path = self.folder / name
@@ -72,9 +88,18 @@ class Case(unittest.TestCase):
 
     def run_program(self, *words, name="hal", given=None, environment=None):
         """Runs hal (or an alias) to its end; standard output and error as text."""
-        done = subprocess.run([name, *map(str, words)], executable=str(HAL), cwd=self.folder, env={**self.environment, **(environment or {})},
-                              input=given, stdin=subprocess.DEVNULL if given is None else None, stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, text=True, timeout=2 * TIMEOUT)
+        done = subprocess.run(
+            [name, *map(str, words)],
+            executable=str(HAL),
+            cwd=self.folder,
+            env={**self.environment, **(environment or {})},
+            input=given,
+            stdin=subprocess.DEVNULL if given is None else None,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=2 * TIMEOUT,
+        )
         done.stderr = undisturbed(done.stderr)
         return done
 
@@ -92,14 +117,27 @@ class Case(unittest.TestCase):
 
     def start(self, *words, name="hal", instance="default", loaded=True, **how):
         """Starts `hal run …` in the background and waits until its files are loaded and its threads run."""
-        machine = subprocess.Popen([name, *map(str, words)], executable=str(HAL), cwd=self.folder, env=self.environment,
-                                   stdin=how.pop("stdin", subprocess.DEVNULL), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **how)
+        machine = subprocess.Popen(
+            [name, *map(str, words)],
+            executable=str(HAL),
+            cwd=self.folder,
+            env=self.environment,
+            stdin=how.pop("stdin", subprocess.DEVNULL),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            **how,
+        )
         self.addCleanup(self.end, machine)
         if loaded:
+
             def ready():
                 if machine.poll() is not None:
                     raise AssertionError("it ended: " + "".join(machine.communicate()))
-                return self.shell("getp", "servo.threadbeat", instance=instance).stdout.strip() not in ("", "0")
+                return self.shell(
+                    "getp", "servo.threadbeat", instance=instance
+                ).stdout.strip() not in ("", "0")
+
             wait_until(ready, "the machine runs")
         return machine
 
@@ -141,7 +179,9 @@ class Terminal:
         self.process, self.descriptor = pty.fork()
         if self.process == 0:
             os.chdir(case.folder)
-            os.execve(str(HAL), [name, *map(str, words)], {**case.environment, **(environment or {})})
+            os.execve(
+                str(HAL), [name, *map(str, words)], {**case.environment, **(environment or {})}
+            )
         fcntl.ioctl(self.descriptor, termios.TIOCSWINSZ, struct.pack("HHHH", 30, 100, 0, 0))
         self.seen = ""
         self.status = None

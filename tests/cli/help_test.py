@@ -13,7 +13,18 @@ class Help(Case):
     def test_without_words_lists_the_commands(self):
         for words in ((), ("help",), ("--help",)):
             text = self.good(*words)
-            for name in ("run", "sim", "shell", "check", "fmt", "graph", "doc", "explain", "record", "doctor"):
+            for name in (
+                "run",
+                "sim",
+                "shell",
+                "check",
+                "fmt",
+                "graph",
+                "doc",
+                "explain",
+                "record",
+                "doctor",
+            ):
                 self.assertRegex(text, rf"(?m)^  {name} ")
 
     def test_of_a_command_names_its_options(self):
@@ -28,17 +39,28 @@ class Help(Case):
                 self.assertIn("usage: hal " + line.split()[0], self.good("help", line.split()[0]))
 
     def test_version(self):
-        self.assertRegex(self.good("--version"), r"^hal \d+\.\d+\.\d+ \(commit ([0-9a-f]{10}|unknown)\)\n$")
+        self.assertRegex(
+            self.good("--version"), r"^hal \d+\.\d+\.\d+ \(commit ([0-9a-f]{10}|unknown)\)\n$"
+        )
 
 
 class BusProgram(Case):
     def test_reports_a_missing_program(self):
         alone = self.folder / "hal"
         shutil.copy(HAL, alone)
-        done = subprocess.run([alone, "can", "dump", "can:can0"], capture_output=True, text=True,
-                              env=dict(os.environ, LD_LIBRARY_PATH=str(HAL.parent.parent / "lib")))
-        self.assertEqual((1, f"hal: cannot start {self.folder}/hal-bus: No such file or directory; it must be in the folder of hal: type ./hal build bus in the source tree, or reinstall Halcyon\n"),
-                         (done.returncode, done.stderr))
+        done = subprocess.run(
+            [alone, "can", "dump", "can:can0"],
+            capture_output=True,
+            text=True,
+            env=dict(os.environ, LD_LIBRARY_PATH=str(HAL.parent.parent / "lib")),
+        )
+        self.assertEqual(
+            (
+                1,
+                f"hal: cannot start {self.folder}/hal-bus: No such file or directory; it must be in the folder of hal: type ./hal build bus in the source tree, or reinstall Halcyon\n",
+            ),
+            (done.returncode, done.stderr),
+        )
 
 
 class WrongWords(Case):
@@ -46,28 +68,47 @@ class WrongWords(Case):
         self.assertEqual("hal: unknown command 'shel'; did you mean 'shell'?\n", self.bad("shel"))
 
     def test_commands_with_a_common_beginning(self):
-        self.assertEqual("usage: hal can eds COMMAND …\n\n  can eds check    check a device description and summarise it\n\n"
-                         "For details: hal help can eds COMMAND.\n", self.good("help", "can", "eds"))
-        for words, last in ((("can", "sdo"), "can sdo write"), (("can", "pdo"), "can pdo watch"), (("can", "dcf"), "can dcf write")):
+        self.assertEqual(
+            "usage: hal can eds COMMAND …\n\n  can eds check    check a device description and summarise it\n\n"
+            "For details: hal help can eds COMMAND.\n",
+            self.good("help", "can", "eds"),
+        )
+        for words, last in (
+            (("can", "sdo"), "can sdo write"),
+            (("can", "pdo"), "can pdo watch"),
+            (("can", "dcf"), "can dcf write"),
+        ):
             self.assertIn(last, self.good("help", *words))
 
     def test_unknown_command_without_likeness_points_to_help(self):
         self.assertEqual("hal: unknown command 'qqqqqqqq'; type: hal help\n", self.bad("qqqqqqqq"))
-        self.assertEqual("hal: 'getp' is a command of the shell; to run it in a running machine type: hal shell getp and2.0.out\n",
-                         self.bad("getp", "and2.0.out"))
+        self.assertEqual(
+            "hal: 'getp' is a command of the shell; to run it in a running machine type: hal shell getp and2.0.out\n",
+            self.bad("getp", "and2.0.out"),
+        )
 
     def test_a_netlist_as_command_suggests_hal_run(self):
-        self.assertEqual("hal: 'x.hal' is not a command; to run it type: hal run x.hal\n", self.bad("x.hal"))
+        self.assertEqual(
+            "hal: 'x.hal' is not a command; to run it type: hal run x.hal\n", self.bad("x.hal")
+        )
 
     def test_unknown_option_gets_a_suggestion(self):
-        self.assertEqual("hal sim: unknown option '--cycle'; did you mean '--cycles'?\n", self.bad("sim", "x.hal", "--cycle", "3"))
+        self.assertEqual(
+            "hal sim: unknown option '--cycle'; did you mean '--cycles'?\n",
+            self.bad("sim", "x.hal", "--cycle", "3"),
+        )
 
     def test_unknown_shell_option(self):
-        self.assertIn("unknown option '--jsn'; did you mean '--json'?", self.bad("shell", "--jsn", "show"))
+        self.assertIn(
+            "unknown option '--jsn'; did you mean '--json'?", self.bad("shell", "--jsn", "show")
+        )
 
     def test_bad_duration(self):
         for text in ("soon", "10x", "-3s"):
-            self.assertIn(f"invalid duration '{text}'; use 10s, 250ms or 2min", self.bad("sim", "x.hal", "--for=" + text))
+            self.assertIn(
+                f"invalid duration '{text}'; use 10s, 250ms or 2min",
+                self.bad("sim", "x.hal", "--for=" + text),
+            )
 
     def test_bad_number(self):
         error = self.bad("sim", "x.hal", "--cycles", "many")
@@ -96,17 +137,30 @@ class Explain(Case):
             self.assertIn("sum2", page)
 
     def test_unknown_code_gets_a_suggestion(self):
-        self.assertEqual("hal explain: unknown code 'two-writer'; did you mean 'two-writers'?\n", self.bad("explain", "two-writer"))
+        self.assertEqual(
+            "hal explain: unknown code 'two-writer'; did you mean 'two-writers'?\n",
+            self.bad("explain", "two-writer"),
+        )
 
 
 class CompletionScript(Case):
     def complete(self, line):
         script = self.good("completion", "bash")
         words = line.split(" ")
-        code = script + f"\nCOMP_WORDS=({' '.join(repr(w) for w in words)}); COMP_CWORD={len(words) - 1}; _hal; printf '%s\\n' \"${{COMPREPLY[@]}}\""
+        code = (
+            script
+            + f"\nCOMP_WORDS=({' '.join(repr(w) for w in words)}); COMP_CWORD={len(words) - 1}; _hal; printf '%s\\n' \"${{COMPREPLY[@]}}\""
+        )
         path = f"{HAL.parent}:{self.environment['PATH']}"
-        return subprocess.run(["bash", "-c", code], env={**self.environment, "PATH": path}, cwd=self.folder, stdout=subprocess.PIPE, text=True,
-                              check=True, timeout=30).stdout.split()
+        return subprocess.run(
+            ["bash", "-c", code],
+            env={**self.environment, "PATH": path},
+            cwd=self.folder,
+            stdout=subprocess.PIPE,
+            text=True,
+            check=True,
+            timeout=30,
+        ).stdout.split()
 
     def test_subcommands(self):
         self.assertEqual(["record"], self.complete("hal rec"))
@@ -127,8 +181,18 @@ class CompletionScript(Case):
 class Doctor(Case):
     def test_gives_verdicts_and_measures(self):
         text = self.good("doctor", "--seconds", "0.05")
-        for subject in ("kernel", "SCHED_FIFO", "memory locking", "capabilities", "raw Ethernet", "throttling", "frequency", "isolated cpus",
-                        "clock source", "idle states"):
+        for subject in (
+            "kernel",
+            "SCHED_FIFO",
+            "memory locking",
+            "capabilities",
+            "raw Ethernet",
+            "throttling",
+            "frequency",
+            "isolated cpus",
+            "clock source",
+            "idle states",
+        ):
             self.assertRegex(text, rf"(?m)^(good|fair|poor)  {subject} ")
         self.assertRegex(text, r"(?m)^wake-up latency at 1 kHz, SCHED_\w+")
         self.assertRegex(text, r"(?m)^  sleeping, then spinning the last 200 us .*s$")

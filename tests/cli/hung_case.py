@@ -33,7 +33,10 @@ class HungCase(Case):
         if ms:
             self.good("shell", "setp", "s.ms", ms)
         self.good("shell", "setp", "s.mode", mode)
-        return wait_until(lambda: "hung-thread" in self.shell("--json", "show", "fault").stdout and self.faults(), "the fault is known")
+        return wait_until(
+            lambda: "hung-thread" in self.shell("--json", "show", "fault").stdout and self.faults(),
+            "the fault is known",
+        )
 
     def rejected(self, *words):
         done = self.shell(*words)
@@ -44,11 +47,17 @@ class HungCase(Case):
             self.assertIn("function 's' (stall) does not return", done.stderr)
 
     def check_hung(self, machine, fault, why):
-        self.assertRegex(fault, r"servo: function 's' \(stall\) has not returned, no cycle ended for [\d.]+ ms, it " + why +
-                         r".* \(limit 100 ms\) at cycle [\d ]+; the thread's functions are stopped and its outputs were set to their safe values")
+        self.assertRegex(
+            fault,
+            r"servo: function 's' \(stall\) has not returned, no cycle ended for [\d.]+ ms, it "
+            + why
+            + r".* \(limit 100 ms\) at cycle [\d ]+; the thread's functions are stopped and its outputs were set to their safe values",
+        )
         self.assertIn("safe", self.events())
         self.assertEqual("-1", self.value("s.out"))
-        wait_until(lambda: self.shell("gets", "level").stdout == "-1\n", "the signal has its safe value")
+        wait_until(
+            lambda: self.shell("gets", "level").stdout == "-1\n", "the signal has its safe value"
+        )
         wait_until(lambda: self.value("other.out") == "-1", "another thread sees the safe value")
         beat = self.value("slow.threadbeat")
         wait_until(lambda: self.value("slow.threadbeat") != beat, "the other thread goes on")
@@ -56,7 +65,14 @@ class HungCase(Case):
         wait_until(lambda: int(self.value("servo.missed")) > missed + 10, "missed periods count on")
         timing = self.shell("show", "timing").stdout
         self.assertRegex(timing, r"(?m)^servo .* hangs in 's' for ")
-        for words in (["setp", "adder.in0", "7"], ["stop"], ["start"], ["delthread", "servo"], ["unload", "s"], ["net", "x", "adder.out"]):
+        for words in (
+            ["setp", "adder.in0", "7"],
+            ["stop"],
+            ["start"],
+            ["delthread", "servo"],
+            ["unload", "s"],
+            ["net", "x", "adder.out"],
+        ):
             self.rejected(*words)
         self.assertEqual("2", self.value("adder.in0"))
         self.assertEqual(0, self.shell("setp", "other.in1", "3").returncode)

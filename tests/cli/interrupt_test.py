@@ -25,7 +25,9 @@ start
 def takes(process, number):
     """Whether the command waits for the signal itself; before, the signal would end it in any case."""
     status = Path(f"/proc/{process.pid}/status").read_text()
-    blocked = int(next(line for line in status.splitlines() if line.startswith("SigBlk:")).split()[1], 16)
+    blocked = int(
+        next(line for line in status.splitlines() if line.startswith("SigBlk:")).split()[1], 16
+    )
     return blocked >> (number - 1) & 1
 
 
@@ -37,11 +39,23 @@ class Interrupt(Case):
                 continue
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
                 with self.subTest(command=command, signal=number.name):
-                    process = subprocess.Popen([HAL, command, *words], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
-                                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+                    process = subprocess.Popen(
+                        [HAL, command, *words],
+                        cwd=self.folder,
+                        env=self.environment,
+                        stdin=subprocess.DEVNULL,
+                        stdout=subprocess.PIPE,
+                        stderr=subprocess.STDOUT,
+                        text=True,
+                    )
                     try:
-                        wait_until(lambda: process.poll() is not None or takes(process, number), "the command waits")
-                        self.assertIsNone(process.poll(), process.poll() is not None and process.stdout.read())
+                        wait_until(
+                            lambda: process.poll() is not None or takes(process, number),
+                            "the command waits",
+                        )
+                        self.assertIsNone(
+                            process.poll(), process.poll() is not None and process.stdout.read()
+                        )
                         process.send_signal(number)
                         process.communicate(timeout=TIMEOUT)
                     finally:
@@ -51,12 +65,24 @@ class Interrupt(Case):
                     self.assertGreaterEqual(process.returncode, 0)
 
     def test_an_interrupted_replay_reports_how_much_was_replayed(self):
-        self.write("abs.hal", "loadrt threads name1=servo period1=1000000\nloadrt abs\naddf abs.0 servo\nnet a => abs.0.in\nnet b abs.0.out\n")
+        self.write(
+            "abs.hal",
+            "loadrt threads name1=servo period1=1000000\nloadrt abs\naddf abs.0 servo\nnet a => abs.0.in\nnet b abs.0.out\n",
+        )
         self.write("run.csv", "time_s,a,b\n0,0,0\n1e9,0,0\n")
-        process = subprocess.Popen([HAL, "replay", "run.csv", "abs.hal", "--tolerance", "1"], cwd=self.folder, env=self.environment,
-                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            [HAL, "replay", "run.csv", "abs.hal", "--tolerance", "1"],
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
         try:
-            wait_until(lambda: process.poll() is not None or takes(process, signal.SIGTERM), "the replay runs")
+            wait_until(
+                lambda: process.poll() is not None or takes(process, signal.SIGTERM),
+                "the replay runs",
+            )
             process.send_signal(signal.SIGTERM)
             out, _ = process.communicate(timeout=TIMEOUT)
         finally:
@@ -64,7 +90,10 @@ class Interrupt(Case):
                 process.kill()
                 process.communicate()
         self.assertEqual(1, process.returncode)
-        self.assertRegex(out, r"(?m)^interrupted after \S+ s of 1e\+09 s of recording: 1 input driven, 1 value compared")
+        self.assertRegex(
+            out,
+            r"(?m)^interrupted after \S+ s of 1e\+09 s of recording: 1 input driven, 1 value compared",
+        )
 
 
 if __name__ == "__main__":

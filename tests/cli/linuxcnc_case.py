@@ -43,7 +43,9 @@ PLAIN = "[HAL]\nHALFILE = machine.hal\n"
 
 def prompt(err):
     """Standard error without what a busy host causes: that loadusr waits, and gaps without CPU."""
-    return re.sub(r"(?m)^(loadusr: waiting for|hal linuxcnc: [\w-]+: no CPU time for) .*\n", "", err)
+    return re.sub(
+        r"(?m)^(loadusr: waiting for|hal linuxcnc: [\w-]+: no CPU time for) .*\n", "", err
+    )
 
 
 @unittest.skipUnless(list(MODULE.glob("hal/_core*.so")), "Python's module hal is not built")
@@ -55,7 +57,11 @@ class LinuxcncCase(Case):
         for name in PROGRAMS:
             self.install(name)
         self.log = self.folder / "log"
-        self.environment |= {"LINUXCNC_HOME": str(self.home), "STANDIN_LOG": str(self.log), "TMPDIR": str(self.folder)}
+        self.environment |= {
+            "LINUXCNC_HOME": str(self.home),
+            "STANDIN_LOG": str(self.log),
+            "TMPDIR": str(self.folder),
+        }
         self.write("machine.hal", HALFILE)
         self.display("exit 0")
 
@@ -67,15 +73,20 @@ class LinuxcncCase(Case):
             names = []
             for process in Path("/proc").glob("[0-9]*"):
                 try:
-                    if mark in (process / "environ").read_bytes().split(b"\0") and process.name != str(os.getpid()):
+                    if mark in (process / "environ").read_bytes().split(
+                        b"\0"
+                    ) and process.name != str(os.getpid()):
                         names.append((process / "comm").read_text().strip())
                 except OSError:
                     pass  # it has ended
             return names
+
         remaining = left()
         self.assertEqual([], remaining)
         self.assertFalse((self.folder / "linuxcnc.lock").exists())
-        self.assertEqual([], list(self.folder.glob("*.expanded")) + list(self.folder.glob("halcyon/*.sock")))
+        self.assertEqual(
+            [], list(self.folder.glob("*.expanded")) + list(self.folder.glob("halcyon/*.sock"))
+        )
 
     def install(self, name):
         path = self.home / "bin" / name
@@ -93,7 +104,9 @@ class LinuxcncCase(Case):
         """Runs a machine to its end; standard output and error without the name of the folder."""
         done = self.run_program("linuxcnc", *words, **how)
         self.assertEqual(status, done.returncode, done.stdout + done.stderr)
-        return done.stdout.replace(str(self.folder), "CONFIG"), prompt(done.stderr).replace(str(self.folder), "CONFIG")
+        return done.stdout.replace(str(self.folder), "CONFIG"), prompt(done.stderr).replace(
+            str(self.folder), "CONFIG"
+        )
 
     def end(self, machine, number=signal.SIGTERM):
         out, err = super().end(machine, number)
@@ -102,7 +115,10 @@ class LinuxcncCase(Case):
     def runs(self, *words):
         """Starts a machine and waits until its display runs."""
         machine = self.start("linuxcnc", *words, loaded=False)
-        wait_until(lambda: machine.poll() is not None or (self.folder / "shown").exists(), "the display runs")
+        wait_until(
+            lambda: machine.poll() is not None or (self.folder / "shown").exists(),
+            "the display runs",
+        )
         self.assertIsNone(machine.poll())
         return machine
 

@@ -30,7 +30,9 @@ PAIRS = [
 
 
 def resident_kb(machine):
-    return int(re.search(r"Rss:\s*(\d+) kB", Path(f"/proc/{machine.pid}/smaps_rollup").read_text())[1])
+    return int(
+        re.search(r"Rss:\s*(\d+) kB", Path(f"/proc/{machine.pid}/smaps_rollup").read_text())[1]
+    )
 
 
 class Client:
@@ -53,13 +55,21 @@ class Client:
 class Memory(Case):
     def test_the_furuta_machine_is_small(self):
         machine = self.start("run", "--no-picture", HANG, loaded=False)
-        self.assertTrue(any("running" in line for line in iter(machine.stdout.readline, "")), "it does not run")
-        resident = int(re.search(r"VmRSS:\s*(\d+) kB", Path(f"/proc/{machine.pid}/status").read_text())[1])
+        self.assertTrue(
+            any("running" in line for line in iter(machine.stdout.readline, "")), "it does not run"
+        )
+        resident = int(
+            re.search(r"VmRSS:\s*(\d+) kB", Path(f"/proc/{machine.pid}/status").read_text())[1]
+        )
         print(f"{resident} kB resident")
         self.assertLess(resident, MOST_KB)
 
     def test_reverted_edits_leave_nothing(self):
-        machine = self.start("run", "--no-picture", self.write("m.hal", SERVO.replace("net total adder.out\n", "newsig total float\n")))
+        machine = self.start(
+            "run",
+            "--no-picture",
+            self.write("m.hal", SERVO.replace("net total adder.out\n", "newsig total float\n")),
+        )
         client = Client(self)
         number = 0
 
@@ -85,13 +95,20 @@ class Memory(Case):
         machine = self.start("run", "--no-picture", self.write("m.hal", SERVO))
         client = Client(self)
         comment = "# " + "x" * 98 + "\n"
-        large = self.write("large.hal", 9000 * comment + "newsig large float\nsetp adder.in0 1\ndelsig large\n")
+        large = self.write(
+            "large.hal", 9000 * comment + "newsig large float\nsetp adder.in0 1\ndelsig large\n"
+        )
 
         def read(count):
             for number in range(count):
                 name = f"f{number}.hal"
-                self.write(name, 100 * comment + f"newsig s{number} float\nnet s{number} => adder.in1\n")
-                self.assertEqual([0, 0, 0], client.run([f"source {name}", f"delsig s{number}", "setp adder.in1 3"]))
+                self.write(
+                    name, 100 * comment + f"newsig s{number} float\nnet s{number} => adder.in1\n"
+                )
+                self.assertEqual(
+                    [0, 0, 0],
+                    client.run([f"source {name}", f"delsig s{number}", "setp adder.in1 3"]),
+                )
             for _ in range(50):
                 self.assertEqual([0], client.run([f"source {large}"]))
 
@@ -109,10 +126,28 @@ class Memory(Case):
         def use(first, count):
             for number in range(first, first + count):
                 other = Client(self)
-                other.socket.sendall(json.dumps({"component": f"panel{number}", "pins": [{"name": "value", "type": "float", "dir": "out",
-                                                 "doc": f"a text that no other pin has, {number} " + "y" * 200}], "ready": True}).encode() + b"\n")
+                other.socket.sendall(
+                    json.dumps(
+                        {
+                            "component": f"panel{number}",
+                            "pins": [
+                                {
+                                    "name": "value",
+                                    "type": "float",
+                                    "dir": "out",
+                                    "doc": f"a text that no other pin has, {number} " + "y" * 200,
+                                }
+                            ],
+                            "ready": True,
+                        }
+                    ).encode()
+                    + b"\n"
+                )
                 self.assertTrue(json.loads(other.lines.readline())["ok"])
-                other.socket.sendall(b'{"subscribe":["adder.out"]}\n{"probe":["adder.out"]}\n{"exit":"panel%d"}\n' % number)
+                other.socket.sendall(
+                    b'{"subscribe":["adder.out"]}\n{"probe":["adder.out"]}\n{"exit":"panel%d"}\n'
+                    % number
+                )
                 other.lines.readline()
                 other.lines.close()
                 other.socket.close()

@@ -26,7 +26,9 @@ class Meter(Case):
 
     def live(self, *words, columns=100, rows=30):
         terminal = Terminal(self, "meter", *words)
-        fcntl.ioctl(terminal.descriptor, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+        fcntl.ioctl(
+            terminal.descriptor, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0)
+        )
         return terminal
 
     def test_a_script_gets_one_line(self):
@@ -40,10 +42,19 @@ class Meter(Case):
         self.assertEqual({"12.5"}, set(lines))
 
     def test_one_value_at_a_time(self):
-        self.assertRegex(self.bad("meter", "adder.*"), r"^hal meter: one value at a time, not \d+; several: hal watch adder\.\*\n$")
-        self.assertEqual("hal meter: no pin, parameter or signal matches 'zz*'; to list them: hal shell show pin\n", self.bad("meter", "zz*"))
+        self.assertRegex(
+            self.bad("meter", "adder.*"),
+            r"^hal meter: one value at a time, not \d+; several: hal watch adder\.\*\n$",
+        )
+        self.assertEqual(
+            "hal meter: no pin, parameter or signal matches 'zz*'; to list them: hal shell show pin\n",
+            self.bad("meter", "zz*"),
+        )
         self.assertIn("did you mean 'total'?", self.bad("meter", "totla"))
-        self.assertEqual("hal meter: one value at a time, not 2; several: hal watch total gate.out\n", self.bad("meter", "total", "gate.out"))
+        self.assertEqual(
+            "hal meter: one value at a time, not 2; several: hal watch total gate.out\n",
+            self.bad("meter", "total", "gate.out"),
+        )
 
     def test_large_in_a_terminal_until_q(self):
         terminal = self.live("total")
@@ -77,7 +88,11 @@ class ShellWatch(Case):
         self.machine = self.start("run", self.write("a.hal", MACHINE))
 
     def test_a_command_prints_the_table(self):
-        for words in (("watch", "total", "gate.*"), ("-e", "watch total gate.*"), ("watch total gate.*",)):
+        for words in (
+            ("watch", "total", "gate.*"),
+            ("-e", "watch total gate.*"),
+            ("watch total gate.*",),
+        ):
             out = self.good("shell", *words)
             self.assertRegex(out, r"(?m)^NAME +VALUE UNIT +MIN +MAX +RATE$")
             self.assertRegex(out, r"(?m)^total +12\.5 ")

@@ -20,7 +20,18 @@ class ModuleCase(harness.Case):
 
     def build(self, *names, source=None):
         for name in names:
-            subprocess.run([CC, "-shared", "-fPIC", "-O1", "-o", str(self.modules / f"{name}.so"), str(SOURCES / f"{source or name}.c")], check=True)
+            subprocess.run(
+                [
+                    CC,
+                    "-shared",
+                    "-fPIC",
+                    "-O1",
+                    "-o",
+                    str(self.modules / f"{name}.so"),
+                    str(SOURCES / f"{source or name}.c"),
+                ],
+                check=True,
+            )
 
     def sim(self, text, *words, **how):
         return self.run_program("sim", "--quiet", self.write("m.hal", text), *words, **how)

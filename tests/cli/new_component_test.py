@@ -19,8 +19,16 @@ class NewComponent(Case):
 
     def shell_line(self, line, folder, status=0, path=None):
         environment = {**self.environment, "PATH": path or self.environment["PATH"]}
-        done = subprocess.run(["bash", "-c", line], cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                              text=True, timeout=4 * TIMEOUT)
+        done = subprocess.run(
+            ["bash", "-c", line],
+            cwd=folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=4 * TIMEOUT,
+        )
         self.assertEqual(status, done.returncode, done.stdout)
         return done.stdout
 
@@ -35,7 +43,10 @@ class NewComponent(Case):
     @unittest.skipUnless(PACKAGE.exists(), "no package beside the program")
     def test_what_is_printed_works_straight_from_the_build_tree(self):
         folder = self.follow_the_hint("my-ramp")
-        self.assertEqual({"my-ramp.cpp", "CMakeLists.txt", "test.hal", "expected", "build"}, set(os.listdir(folder)))
+        self.assertEqual(
+            {"my-ramp.cpp", "CMakeLists.txt", "test.hal", "expected", "build"},
+            set(os.listdir(folder)),
+        )
         self.assertIn(f'HINTS "{BUILD}"', (folder / "CMakeLists.txt").read_text())
         # a failing test prints the output and the expectation
         (folder / "expected").write_text("7\n")
@@ -61,27 +72,46 @@ class NewComponent(Case):
         (self.folder / "there").mkdir()
         (self.folder / "there" / "file").touch()
         for words, why in {
-            ("my part",): "invalid component name 'my part': use a letter, then letters, digits, - and _; try: hal new component my-part",
-            ("my", "part"): "expected one name, not 2; a name contains no blanks: hal new component my-part",
+            (
+                "my part",
+            ): "invalid component name 'my part': use a letter, then letters, digits, - and _; try: hal new component my-part",
+            (
+                "my",
+                "part",
+            ): "expected one name, not 2; a name contains no blanks: hal new component my-part",
             ("9x",): "invalid component name '9x'",
             ("../x",): "invalid component name '../x'",
             ("class",): "'class' is a C++ keyword; try: hal new component my-class",
             ("not_eq",): "'not_eq' is a C++ keyword",
-            ("threads",): "component 'threads' already exists (see: hal doc threads); choose another name",
+            (
+                "threads",
+            ): "component 'threads' already exists (see: hal doc threads); choose another name",
             ("n" * 41,): "the name has 41 characters; the limit is 40",
-            ("there",): "'there' exists already; give the new component another folder: hal new component there --folder DIR",
+            (
+                "there",
+            ): "'there' exists already; give the new component another folder: hal new component there --folder DIR",
             ("ok", "--folder", "there"): "'there' exists already",
             ("ok", "--folder", "there/file/x"): "cannot create 'there/file/x': Not a directory",
             (): "missing name; type: hal new component NAME",
         }.items():
             with self.subTest(words):
                 self.assertIn(why, self.bad("new", "component", *words))
-        self.assertEqual("hal new: missing kind: only components can be created; type: hal new component thing\n", self.bad("new", "thing"))
+        self.assertEqual(
+            "hal new: missing kind: only components can be created; type: hal new component thing\n",
+            self.bad("new", "thing"),
+        )
         self.assertEqual({"there"}, set(os.listdir(self.folder)) - {".ccache"})
 
     def test_a_folder_of_another_name(self):
-        self.assertTrue(self.good("new", "component", "part", "--folder", "a b/c").startswith("'a b/c': part.cpp, CMakeLists.txt"))
-        self.assertEqual({"part.cpp", "CMakeLists.txt", "test.hal", "expected"}, set(os.listdir(self.folder / "a b" / "c")))
+        self.assertTrue(
+            self.good("new", "component", "part", "--folder", "a b/c").startswith(
+                "'a b/c': part.cpp, CMakeLists.txt"
+            )
+        )
+        self.assertEqual(
+            {"part.cpp", "CMakeLists.txt", "test.hal", "expected"},
+            set(os.listdir(self.folder / "a b" / "c")),
+        )
 
 
 if __name__ == "__main__":

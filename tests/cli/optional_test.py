@@ -41,22 +41,46 @@ class Optional(unittest.TestCase):
         (folder / "see.hal").write_text("loadrt vision_line\n")
         (folder / "apt-get").write_text(APT)
         (folder / "apt-get").chmod(0o755)
-        environment = {"PATH": f"{folder}:{os.environ['PATH']}", "FOLDER": str(folder), "HOME": os.environ.get("HOME", str(folder)), "XDG_RUNTIME_DIR": str(folder), "LC_ALL": "C.UTF-8"}
-        done = subprocess.run(["unshare", "-m", "sh", "-c", SCRIPT, "sh", str(folder)], env=environment, stdin=subprocess.DEVNULL,
-                              capture_output=True, text=True, timeout=8 * TIMEOUT)
+        environment = {
+            "PATH": f"{folder}:{os.environ['PATH']}",
+            "FOLDER": str(folder),
+            "HOME": os.environ.get("HOME", str(folder)),
+            "XDG_RUNTIME_DIR": str(folder),
+            "LC_ALL": "C.UTF-8",
+        }
+        done = subprocess.run(
+            ["unshare", "-m", "sh", "-c", SCRIPT, "sh", str(folder)],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=8 * TIMEOUT,
+        )
         if done.returncode == 77:
             self.skipTest("no overlay file systems here")
-        _, offline, online, same = (part.split("\n", 1)[-1] for part in ("\n" + done.stderr).split("=="))
+        _, offline, online, same = (
+            part.split("\n", 1)[-1] for part in ("\n" + done.stderr).split("==")
+        )
         self.assertEqual("status 1\nstatus 0\nstatus 0\nstatus 0\n", done.stdout, done.stderr)
-        self.assertTrue(offline.startswith("hal: installing Debian packages: libopencv-contrib-dev\n"
-                                           "hal: cannot install these Debian packages: libopencv-contrib-dev (see "), offline)
+        self.assertTrue(
+            offline.startswith(
+                "hal: installing Debian packages: libopencv-contrib-dev\n"
+                "hal: cannot install these Debian packages: libopencv-contrib-dev (see "
+            ),
+            offline,
+        )
         self.assertIn("hal: installing Debian packages: libopencv-contrib-dev\n", online)
         self.assertIn("see.hal: no errors\n", online)
         self.assertEqual("see.hal: no errors\n", same)  # built: nothing is configured or built
 
 
 if __name__ == "__main__":
-    if os.geteuid() != 0 or SANITIZED or HAL != BUILD / "release/bin/hal" or not list((BUILD / "release/components").glob("vision_line.so")):
+    if (
+        os.geteuid() != 0
+        or SANITIZED
+        or HAL != BUILD / "release/bin/hal"
+        or not list((BUILD / "release/components").glob("vision_line.so"))
+    ):
         print("needs root, a build with OpenCV in build/release, and a program without sanitizers")
         sys.exit(77)
     unittest.main()

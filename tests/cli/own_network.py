@@ -20,11 +20,18 @@ def own_network():
     prepare = "ip link set lo up && mount -t tmpfs tmpfs /dev/shm && mount -t tmpfs tmpfs /run"
     if not shutil.which("unshare") or not shutil.which("ip"):
         return False
-    if subprocess.run([*words, "sh", "-c", prepare], stdin=subprocess.DEVNULL, capture_output=True).returncode != 0:
+    if (
+        subprocess.run(
+            [*words, "sh", "-c", prepare], stdin=subprocess.DEVNULL, capture_output=True
+        ).returncode
+        != 0
+    ):
         return False
     os.environ[VARIABLE] = "1"
     sys.stdout.flush()
-    os.execvp("unshare", [*words, "sh", "-c", prepare + ' && exec "$@"', "sh", sys.executable, *sys.argv])
+    os.execvp(
+        "unshare", [*words, "sh", "-c", prepare + ' && exec "$@"', "sh", sys.executable, *sys.argv]
+    )
 
 
 def dds_domain():
@@ -34,7 +41,11 @@ def dds_domain():
         return 7
     for number in range(1, 101):
         try:
-            file = os.open(Path(tempfile.gettempdir()) / f"halcyon-dds-domain-{number}", os.O_RDWR | os.O_CREAT, 0o666)  # stays open
+            file = os.open(
+                Path(tempfile.gettempdir()) / f"halcyon-dds-domain-{number}",
+                os.O_RDWR | os.O_CREAT,
+                0o666,
+            )  # stays open
         except OSError:
             continue
         try:

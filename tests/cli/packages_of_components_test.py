@@ -41,8 +41,13 @@ def headers_of_objects():
 
 def packages_of_files(paths):
     """The Debian package of each file."""
-    done = subprocess.run(["dpkg", "-S", *sorted(paths)], capture_output=True, text=True, check=False)
-    return {path: package.split(":")[0] for package, path in re.findall(r"(?m)^(\S+): (/.*)$", done.stdout)}
+    done = subprocess.run(
+        ["dpkg", "-S", *sorted(paths)], capture_output=True, text=True, check=False
+    )
+    return {
+        path: package.split(":")[0]
+        for package, path in re.findall(r"(?m)^(\S+): (/.*)$", done.stdout)
+    }
 
 
 def with_dependencies(packages):
@@ -51,7 +56,12 @@ def with_dependencies(packages):
     while waiting:
         one = waiting.pop()
         found.add(one)
-        listed = subprocess.run(["dpkg-query", "-W", "-f", "${Depends}", one], capture_output=True, text=True, check=False).stdout
+        listed = subprocess.run(
+            ["dpkg-query", "-W", "-f", "${Depends}", one],
+            capture_output=True,
+            text=True,
+            check=False,
+        ).stdout
         waiting |= set(re.findall(r"(?:^|, )([a-z0-9.+-]+)", listed)) - found
     return found
 
@@ -71,11 +81,15 @@ class Packages(unittest.TestCase):
         """The optional packages whose headers a component or a library in it was compiled with."""
         inputs = run("ninja", "-t", "inputs", f"component_{component}").split("\n")
         headers = set().union(*(self.headers.get(one, set()) for one in inputs))
-        return {self.package_of[header] for header in headers if header in self.package_of} & self.optional
+        return {
+            self.package_of[header] for header in headers if header in self.package_of
+        } & self.optional
 
     def needed_by(self, netlist):
         words = ["awk", "-v", "command=run", "-f", ROOT / "cmake/needs.awk", "--", "run", netlist]
-        return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+        return subprocess.run(
+            words, cwd=ROOT, capture_output=True, text=True, check=True
+        ).stdout.split()
 
     def test_each_component_is_compiled_with_the_packages_that_are_installed_for_it(self):
         absent = table(BUILD / "components/absent")
@@ -83,18 +97,28 @@ class Packages(unittest.TestCase):
             if component in absent:
                 continue
             with self.subTest(component):
-                stated, used = self.installed_for.get(component, set()), self.compiled_with(component)
-                self.assertLessEqual(used, with_dependencies(stated), "a package that is used is installed")
+                stated, used = self.installed_for.get(component, set()), self.compiled_with(
+                    component
+                )
+                self.assertLessEqual(
+                    used, with_dependencies(stated), "a package that is used is installed"
+                )
                 self.assertLessEqual(stated, used, "a package that is installed is used")
 
     def test_every_machine_of_halfiles_installs_what_its_components_use_and_no_more(self):
-        machines = [path for path in sorted((ROOT / "halfiles").rglob("*")) if path.suffix in (".hal", ".ini")]
+        machines = [
+            path
+            for path in sorted((ROOT / "halfiles").rglob("*"))
+            if path.suffix in (".hal", ".ini")
+        ]
         self.assertGreater(len(machines), 30)
         known = set(table(BUILD / "components/groups"))
         for machine in machines:
             with self.subTest(machine.relative_to(ROOT)):
                 names = self.needed_by(machine)
-                installed = set().union(*(self.installed_for.get(name, set()) for name in names if name in known))
+                installed = set().union(
+                    *(self.installed_for.get(name, set()) for name in names if name in known)
+                )
                 used = set().union(*(self.compiled_with(name) for name in names if name in known))
                 self.assertLessEqual(used, with_dependencies(installed))
                 self.assertLessEqual(installed, used)
@@ -105,11 +129,18 @@ class Packages(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    if not shutil.which("ninja") or not shutil.which("dpkg") or not (BUILD / ".ninja_deps").exists():
+    if (
+        not shutil.which("ninja")
+        or not shutil.which("dpkg")
+        or not (BUILD / ".ninja_deps").exists()
+    ):
         print("needs ninja, dpkg and the build tree of the program")
         sys.exit(77)
     absent_packages = (BUILD / "components/absent").read_text()
     if absent_packages:
-        print("needs a build with all optional packages; left out: " + " ".join(absent_packages.split()[::2]))
+        print(
+            "needs a build with all optional packages; left out: "
+            + " ".join(absent_packages.split()[::2])
+        )
         sys.exit(77)
     unittest.main()

@@ -8,20 +8,32 @@ from panel_page import WAVE, Page, main
 class Views(Page):
     def test_overview_shows_the_threads_and_a_killed_machine(self):
         self.begin()
-        self.browser.wait("Number(document.querySelector('[data-thread=servo] .figures dd:nth-of-type(2)')?.textContent) > 10")
+        self.browser.wait(
+            "Number(document.querySelector('[data-thread=servo] .figures dd:nth-of-type(2)')?.textContent) > 10"
+        )
         self.assertIn("No faults", self.browser.evaluate("document.body.innerText"))
         self.end(self.machine, 9)
-        self.browser.wait("document.body.classList.contains('stale') && /not running/.test(document.getElementById('banner').textContent)")
+        self.browser.wait(
+            "document.body.classList.contains('stale') && /not running/.test(document.getElementById('banner').textContent)"
+        )
         self.machine = self.start("run", self.write("m.hal", WAVE))
-        self.browser.wait("!document.body.classList.contains('stale') && document.getElementById('banner').hidden")
-        before = self.browser.evaluate("Number(document.querySelector('[data-thread=servo] .figures dd:nth-of-type(2)').textContent)")
-        self.browser.wait(f"Number(document.querySelector('[data-thread=servo] .figures dd:nth-of-type(2)').textContent) != {before}")
+        self.browser.wait(
+            "!document.body.classList.contains('stale') && document.getElementById('banner').hidden"
+        )
+        before = self.browser.evaluate(
+            "Number(document.querySelector('[data-thread=servo] .figures dd:nth-of-type(2)').textContent)"
+        )
+        self.browser.wait(
+            f"Number(document.querySelector('[data-thread=servo] .figures dd:nth-of-type(2)').textContent) != {before}"
+        )
 
     def test_a_stopped_machine_is_shown_as_not_responding(self):
         self.begin()
         self.machine.send_signal(19)
         try:
-            self.browser.wait("/does not respond/.test(document.getElementById('banner').textContent)")
+            self.browser.wait(
+                "/does not respond/.test(document.getElementById('banner').textContent)"
+            )
         finally:
             self.machine.send_signal(18)
         self.browser.wait("document.getElementById('banner').hidden")
@@ -30,47 +42,79 @@ class Views(Page):
         self.begin("--write", view="watch?names=total,adder.in0", token=False)
         self.browser.wait("document.querySelector('[data-value=total]')?.textContent === '5'")
         self.assertTrue(self.browser.evaluate("document.querySelector('button.set').disabled"))
-        self.assertEqual("read-only: no token", self.browser.evaluate("document.getElementById('role').textContent"))
+        self.assertEqual(
+            "read-only: no token",
+            self.browser.evaluate("document.getElementById('role').textContent"),
+        )
         self.open("watch?names=total,adder.in0")
-        self.browser.wait("document.querySelector('button.set') && !document.querySelector('button.set').disabled")
+        self.browser.wait(
+            "document.querySelector('button.set') && !document.querySelector('button.set').disabled"
+        )
         self.assertNotIn(self.token, self.browser.evaluate("location.href"))
-        self.browser.evaluate("document.querySelector('input.set').value = '40'; document.querySelector('button.set').click()")
+        self.browser.evaluate(
+            "document.querySelector('input.set').value = '40'; document.querySelector('button.set').click()"
+        )
         self.browser.wait("document.querySelector('[data-value=total]').textContent === '43'")
         self.assertEqual("40", self.value("adder.in0"))
 
     def test_a_view_is_restored_from_its_address(self):
         self.begin(view="watch?names=total", token=False)
         self.browser.wait("document.querySelector('[data-value=total]')?.textContent === '5'")
-        self.browser.evaluate("[...document.querySelectorAll('.tree summary')].forEach(s => s.parentNode.open = true)")
-        self.browser.evaluate("const f = document.querySelector('input[type=search]'); f.value = 'wave.sine'; f.dispatchEvent(new Event('input'))")
+        self.browser.evaluate(
+            "[...document.querySelectorAll('.tree summary')].forEach(s => s.parentNode.open = true)"
+        )
+        self.browser.evaluate(
+            "const f = document.querySelector('input[type=search]'); f.value = 'wave.sine'; f.dispatchEvent(new Event('input'))"
+        )
         self.browser.wait("document.querySelectorAll('.tree button.leaf').length === 1")
         self.browser.evaluate("document.querySelector('.tree button.leaf').click()")
         address = self.browser.evaluate("location.href")
         self.assertIn("names=total%2Cwave.sine", address)
         self.browser.open("about:blank")
         self.browser.open(address)
-        self.browser.wait("document.querySelector('[data-value=\"wave.sine\"]')?.textContent.length > 1")
+        self.browser.wait(
+            "document.querySelector('[data-value=\"wave.sine\"]')?.textContent.length > 1"
+        )
 
     def test_the_graph_shows_boxes_values_and_the_latency_of_a_reader(self):
-        self.begin(netlist=WAVE + "loadrt sum2 names=next\naddf next servo\nnet total next.in0\n", view="graph?pin=total")
-        self.browser.wait("Number(document.querySelector('canvas')?.dataset.boxes) === 3 && Number(document.querySelector('canvas')?.dataset.values) >= 1")
-        self.browser.wait("/next\\.in0[^]*0 cycles/.test(document.querySelector('.floating').innerText)")
-        self.assertIn("written by adder.out", self.browser.evaluate("document.querySelector('.floating').innerText"))
+        self.begin(
+            netlist=WAVE + "loadrt sum2 names=next\naddf next servo\nnet total next.in0\n",
+            view="graph?pin=total",
+        )
+        self.browser.wait(
+            "Number(document.querySelector('canvas')?.dataset.boxes) === 3 && Number(document.querySelector('canvas')?.dataset.values) >= 1"
+        )
+        self.browser.wait(
+            "/next\\.in0[^]*0 cycles/.test(document.querySelector('.floating').innerText)"
+        )
+        self.assertIn(
+            "written by adder.out",
+            self.browser.evaluate("document.querySelector('.floating').innerText"),
+        )
 
     def test_the_scope_triggers_on_the_right_sample(self):
-        self.begin(view="scope?ch=sine:0.5:0&mode=normal&trigger=sine&edge=rising&level=0.5&base=0.1")
-        self.browser.wait("window.halcyonScope?.shownAt && halcyonScope.rows > 50 && halcyonScope.lost === 0")
+        self.begin(
+            view="scope?ch=sine:0.5:0&mode=normal&trigger=sine&edge=rising&level=0.5&base=0.1"
+        )
+        self.browser.wait(
+            "window.halcyonScope?.shownAt && halcyonScope.rows > 50 && halcyonScope.lost === 0"
+        )
         # The samples on both sides of the trigger, which is at 20 % of the record.
-        before, after = self.browser.evaluate("""(() => { const s = halcyonScope, at = s.shownAt - s.pre * 4, [g, c] = s.store.place.get('sine'), row = g.row(at);
-            return [g.value(c, row - 1), g.value(c, row)]; })()""")
+        before, after = self.browser.evaluate(
+            """(() => { const s = halcyonScope, at = s.shownAt - s.pre * 4, [g, c] = s.store.place.get('sine'), row = g.row(at);
+            return [g.value(c, row - 1), g.value(c, row)]; })()"""
+        )
         self.assertLess(before, 0.5 + 1e-9)
         self.assertGreaterEqual(after, 0.5 - 1e-9)
-        frequency = self.browser.wait("parseFloat(document.querySelector('[data-channel=sine]').children[6].textContent)")
+        frequency = self.browser.wait(
+            "parseFloat(document.querySelector('[data-channel=sine]').children[6].textContent)"
+        )
         self.assertAlmostEqual(5, frequency, delta=1)
 
     def test_a_batch_of_a_probe_is_read_to_the_last_bit(self):
         self.begin()
-        result = self.browser.evaluate("""(async () => {
+        result = self.browser.evaluate(
+            """(async () => {
             const {Store, Trigger, measure} = await import('./scope_data.js'), store = new Store(), rows = 1000, view = new DataView(new ArrayBuffer(rows * 32));
             store.layout([{columns: [0, 1]}], ['x', 'n']);
             for (let i = 0; i < rows; i++) {
@@ -82,10 +126,19 @@ class Views(Page):
             store.samples({parts: [{group: 0, rows, lost: 3}], until_ns: 1000000000000 + rows * 100000}, view.buffer, {columns: [{type: 'float'}, {type: 's32'}]});
             const edges = new Trigger('x', 'rising', 0).scan(store), seen = measure(store, 'x', 0, 1);
             return {rows: store.rows, lost: store.lost, gaps: store.gaps, least: measure(store, 'n', 0, 1).min, edges: edges.map(t => Math.round(t * 1e6)), rms: seen.rms, frequency: seen.frequency};
-        })()""")
-        self.assertEqual({"rows": 1000, "lost": 3, "gaps": 1, "least": -999, "edges": [20000, 40000, 60000, 80000]},
-                         {key: result[key] for key in ("rows", "lost", "gaps", "least", "edges")})
-        self.assertAlmostEqual(0.5 ** 0.5, result["rms"], places=4)
+        })()"""
+        )
+        self.assertEqual(
+            {
+                "rows": 1000,
+                "lost": 3,
+                "gaps": 1,
+                "least": -999,
+                "edges": [20000, 40000, 60000, 80000],
+            },
+            {key: result[key] for key in ("rows", "lost", "gaps", "least", "edges")},
+        )
+        self.assertAlmostEqual(0.5**0.5, result["rms"], places=4)
         self.assertAlmostEqual(50, result["frequency"], places=4)
 
     def test_names_of_the_machine_are_text(self):
@@ -94,8 +147,12 @@ class Views(Page):
         self.assertEqual(0, self.browser.evaluate("document.querySelectorAll('main img').length"))
 
     def test_networks_show_stations_and_emergencies_in_words(self):
-        self.write("bus.canopen", "[bus]\nlink = sim:panel\nbitrate = 1M\nsync = cycle\n[node 3 io]\ndevice = cia401\nheartbeat = 20ms\n[node 80 force]\ndevice = jr3\nheartbeat = 20ms\n")
-        self.begin(netlist="""loadrt threads name1=servo period1=1000000
+        self.write(
+            "bus.canopen",
+            "[bus]\nlink = sim:panel\nbitrate = 1M\nsync = cycle\n[node 3 io]\ndevice = cia401\nheartbeat = 20ms\n[node 80 force]\ndevice = jr3\nheartbeat = 20ms\n",
+        )
+        self.begin(
+            netlist="""loadrt threads name1=servo period1=1000000
 loadrt canopen config=bus.canopen
 loadrt canopen_io link=sim:panel id=3 inputs=8 outputs=8
 loadrt canopen_jr3 link=sim:panel id=0x50
@@ -104,7 +161,10 @@ addf canopen.0.transmit servo
 addf canopen-io.0.update servo
 addf canopen-jr3.0.update servo
 start
-""", view="networks", token=False)
+""",
+            view="networks",
+            token=False,
+        )
         cell = "[...document.querySelectorAll('[data-node={}] td')][[...document.querySelectorAll('#bus-canopen\\\\.0 thead th')].findIndex(th => th.dataset.what === '{}')]?.textContent"
         self.browser.wait(cell.format("io", "operational") + " === 'yes'")
         self.browser.wait("document.querySelectorAll('.station.operational').length === 2")
@@ -113,21 +173,34 @@ start
         self.browser.wait(cell.format("force", "emcy") + " === 'FF01h device specific'")
         self.browser.wait("document.querySelectorAll('.station.faulty').length === 1")
         self.good("shell", "setp", "canopen-io.0.power", "FALSE")
-        self.browser.wait(cell.format("io", "online") + " === 'no' && document.querySelectorAll('.station:not(.online):not(.master)').length === 1")
+        self.browser.wait(
+            cell.format("io", "online")
+            + " === 'no' && document.querySelectorAll('.station:not(.online):not(.master)').length === 1"
+        )
 
     def test_the_log_has_writes_edits_and_faults_and_filters_them(self):
         self.begin("--write", view="watch?names=adder.in0")
         self.browser.wait("!document.querySelector('button.set').disabled")
-        self.browser.evaluate("document.querySelector('input.set').value = '40'; document.querySelector('button.set').click()")
+        self.browser.evaluate(
+            "document.querySelector('input.set').value = '40'; document.querySelector('button.set').click()"
+        )
         self.browser.wait("halcyon.log.some(entry => /adder\\.in0: 2 -> 40/.test(entry.text))")
         self.browser.evaluate("location.hash = '#/log'")
-        self.browser.wait("/write\\s+client \\d+: adder\\.in0: 2 -> 40/.test(document.getElementById('log').innerText)")
+        self.browser.wait(
+            "/write\\s+client \\d+: adder\\.in0: 2 -> 40/.test(document.getElementById('log').innerText)"
+        )
         self.good("shell", "loadrt", "sum2", "names=later")
-        self.browser.wait("/loadrt sum2 names=later/.test(document.getElementById('log').innerText)")
-        self.browser.evaluate("[...document.querySelectorAll('button')].find(b => b.textContent === 'write').click()")
+        self.browser.wait(
+            "/loadrt sum2 names=later/.test(document.getElementById('log').innerText)"
+        )
+        self.browser.evaluate(
+            "[...document.querySelectorAll('button')].find(b => b.textContent === 'write').click()"
+        )
         self.browser.wait("!/write\\s+client/.test(document.getElementById('log').innerText)")
         self.assertIn("hide=write", self.browser.evaluate("location.hash"))
-        self.browser.evaluate("const f = document.querySelector('input[type=search]'); f.value = 'later'; f.dispatchEvent(new Event('input'))")
+        self.browser.evaluate(
+            "const f = document.querySelector('input[type=search]'); f.value = 'later'; f.dispatchEvent(new Event('input'))"
+        )
         self.browser.wait("document.querySelectorAll('#log li').length === 1")
 
 

@@ -17,7 +17,10 @@ class PanelComponent(Case):
         start_panel(self, "jog.panel", "--write")
         errors = self.folder / "panel.err"
         wait_until(lambda: errors.read_text().endswith("\n"), "the second one is rejected")
-        self.assertRegex(errors.read_text(), r"^hal panel: the machine rejects the panel's component: the name 'jog' is in use by process \d+ \(ready\)\n$")
+        self.assertRegex(
+            errors.read_text(),
+            r"^hal panel: the machine rejects the panel's component: the name 'jog' is in use by process \d+ \(ready\)\n$",
+        )
 
 
 if __name__ == "__main__":

@@ -6,11 +6,14 @@ import unittest
 from harness import SERVO, Case
 from web import PANEL, Browser, have_browser, start_panel
 
-WAVE = SERVO + """loadrt siggen names=wave
+WAVE = (
+    SERVO
+    + """loadrt siggen names=wave
 addf wave.update servo
 setp wave.frequency 5
 net sine wave.sine
 """
+)
 
 
 class Page(Case):
@@ -29,7 +32,9 @@ class Page(Case):
             self.browser.evaluate(f"location.hash = '#/{view}'")
         else:
             self.browser.open(f"http://localhost:{self.port}/#/{view}")
-        self.browser.wait("window.halcyon?.machine && document.getElementById('main').children.length > 0")
+        self.browser.wait(
+            "window.halcyon?.machine && document.getElementById('main').children.length > 0"
+        )
 
     def tearDown(self):
         if hasattr(self, "browser"):

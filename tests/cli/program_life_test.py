@@ -73,7 +73,14 @@ class LifeCase(Case):
         return done.stderr
 
     def row(self, name):
-        return next((line.split(None, 4) for line in self.shell("show", "comp", name).stdout.splitlines() if f" {name} " in line), None)
+        return next(
+            (
+                line.split(None, 4)
+                for line in self.shell("show", "comp", name).stdout.splitlines()
+                if f" {name} " in line
+            ),
+            None,
+        )
 
     def state(self, name):
         row = self.row(name)
@@ -83,8 +90,15 @@ class LifeCase(Case):
         return int(self.row(name)[3])
 
     def background(self, *words, **more):
-        program = subprocess.Popen(words, cwd=self.folder, env={**self.environment, **more}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                   stderr=subprocess.PIPE, text=True)
+        program = subprocess.Popen(
+            words,
+            cwd=self.folder,
+            env={**self.environment, **more},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         self.addCleanup(self.end, program, signal.SIGKILL)
         return program
 
@@ -98,23 +112,37 @@ class Names(LifeCase):
         self.machine()
         self.say("loadusr", "-Wn", "uc", *self.slow("uc", after="0.3"))
         for turn in range(2, 8):
-            self.say("net", "level", "uc.out", "adder.in1") if turn == 2 else self.say("net", "level", "uc.out")
+            self.say("net", "level", "uc.out", "adder.in1") if turn == 2 else self.say(
+                "net", "level", "uc.out"
+            )
             self.say("unload", "uc")
             self.say("loadusr", "-Wn", "uc", *self.slow("uc", "0.1", str(turn), "0.3"))
             self.assertEqual("ready", self.state("uc"))
             self.say("net", "level", "uc.out")
-            wait_until(lambda: self.value("adder.in1") == str(turn), "the new program's value arrives")
+            wait_until(
+                lambda: self.value("adder.in1") == str(turn), "the new program's value arrives"
+            )
             self.assertEqual(["uc", "sum2", "threads"], self.say("list", "comp").split())
 
     @unittest.skipIf(os.geteuid() != 0, "starting programs of two users needs root")
     def test_a_program_of_another_user_is_neither_ended_nor_forgotten(self):
         os.chown(self.folder, 65534, 65534)
-        self.start("run", "--no-picture", self.write("machine.hal", SERVO + "start\n"), user=65534, group=65534, extra_groups=[])
+        self.start(
+            "run",
+            "--no-picture",
+            self.write("machine.hal", SERVO + "start\n"),
+            user=65534,
+            group=65534,
+            extra_groups=[],
+        )
         program = self.background(*self.slow("uc"))
         wait_until(lambda: self.state("uc") == "ready", "the program is ready")
         for command in (("unloadusr", "uc"), ("unload", "uc"), ("unload", "all")):
             said = self.refused(*command)
-            self.assertIn(f"'uc' (process {program.pid}) belongs to another user and cannot be ended from here [not-permitted]\n", said)
+            self.assertIn(
+                f"'uc' (process {program.pid}) belongs to another user and cannot be ended from here [not-permitted]\n",
+                said,
+            )
             self.assertIn("help: end it as that user, or as root\n", said)
         self.assertEqual(("ready", "1"), (self.state("uc"), self.value("uc.out")))
         program.kill()
@@ -123,7 +151,14 @@ class Names(LifeCase):
     def test_it_is_restarted_under_load(self):
         self.machine()
         self.say("loadusr", "-Wn", "uc", *self.slow("uc"))
-        hammers = [self.background("sh", "-c", f"while :; do {HAL} shell show comp >/dev/null; {HAL} shell getp adder.out >/dev/null; done") for _ in range(2)]
+        hammers = [
+            self.background(
+                "sh",
+                "-c",
+                f"while :; do {HAL} shell show comp >/dev/null; {HAL} shell getp adder.out >/dev/null; done",
+            )
+            for _ in range(2)
+        ]
         for turn in range(5):
             self.say("unload", "uc")
             self.say("loadusr", "-Wn", "uc", *self.slow("uc", value=str(turn)))
@@ -144,21 +179,34 @@ class Names(LifeCase):
         self.assertIn("the name 'sum2' is in use (a component in the machine) [name-taken]", said)
         said = self.refused("loadusr", "-W", *self.slow("uc"))
         self.assertIn("[program-ended]", said)
-        self.assertIn(f"it could not register: the name 'uc' is in use by process {first} (ready)", said)
+        self.assertIn(
+            f"it could not register: the name 'uc' is in use by process {first} (ready)", said
+        )
         self.assertEqual(["uc", "sum2", "threads"], self.say("list", "comp").split())
         self.assertEqual(first, self.pid("uc"))
 
     def test_one_that_ends_while_it_initializes_leaves_nothing(self):
         self.machine()
-        said = self.refused("loadusr", "-Wn", "uc", sys.executable, self.write("dies.py", """import os, socket
+        said = self.refused(
+            "loadusr",
+            "-Wn",
+            "uc",
+            sys.executable,
+            self.write(
+                "dies.py",
+                """import os, socket
 s = socket.socket(socket.AF_UNIX)
 s.connect(os.environ["XDG_RUNTIME_DIR"] + "/halcyon/default.sock")
 s.sendall(b'{"component":"uc","ready":false,"pins":[{"name":"out","type":"float","dir":"out"}]}\\n')
 while b'"ok":true' not in s.recv(4096): pass
 os._exit(3)
-"""))
+""",
+            ),
+        )
         self.assertIn("[program-ended]", said)
-        self.assertIn("= help: it registered the component and ended while it was initializing\n", said)
+        self.assertIn(
+            "= help: it registered the component and ended while it was initializing\n", said
+        )
         self.assertEqual(["sum2", "threads"], self.say("list", "comp").split())
         self.assertEqual(0, self.shell("loadusr", "-Wn", "uc", *self.slow("uc")).returncode)
         self.assertEqual("ready", self.state("uc"))
@@ -167,37 +215,68 @@ os._exit(3)
         self.machine()
         waiter = self.background(str(HAL), "shell", "loadusr", "-Wn", "wrong", *self.slow("right"))
         line = waiter.stderr.readline()
-        self.assertRegex(line, r"^loadusr: waiting for component 'wrong': '.*python3?[0-9.]*' \(process \d+\) has registered 'right' instead \(\d+ s\)\n$")
+        self.assertRegex(
+            line,
+            r"^loadusr: waiting for component 'wrong': '.*python3?[0-9.]*' \(process \d+\) has registered 'right' instead \(\d+ s\)\n$",
+        )
         self.assertIn("name-taken", self.refused("loadusr", "-Wn", "wrong", "sleep", "1000"))
         os.kill(self.pid("right"), signal.SIGKILL)
         self.assertIn("[program-ended]", waiter.communicate(timeout=60)[1])
         self.assertEqual(1, waiter.returncode)
         said = self.refused("loadusr", "-t", "500ms", "-Wn", "other", "sleep", "1000")
         self.assertIn("component 'other' was not ready within 500 ms [program-timeout]", said)
-        wait_until(lambda: "other" not in self.say("list", "comp") and "sleep" not in self.say("list", "comp"), "nothing is left")
+        wait_until(
+            lambda: "other" not in self.say("list", "comp")
+            and "sleep" not in self.say("list", "comp"),
+            "nothing is left",
+        )
 
     def test_waitusr_has_a_time_out(self):
         self.machine()
         self.say("loadusr", "-Wn", "uc", *self.slow("uc"))
         said = self.refused("waitusr", "-t", "50ms", "uc")
-        self.assertIn(f"'uc' (process {self.pid('uc')}, ready) did not end within 50 ms [program-timeout]", said)
+        self.assertIn(
+            f"'uc' (process {self.pid('uc')}, ready) did not end within 50 ms [program-timeout]",
+            said,
+        )
         self.say("unload", "uc")
         self.say("waitusr", "-t", "60s", "uc")
-        self.assertIn("-t requires a duration of 1ms..24h, such as -t 10s", self.refused("waitusr", "-t", "soon", "uc"))
-        self.assertIn("-t requires -W, -Wn or -w, whose wait it limits", self.refused("loadusr", "-t", "1s", "true"))
-        self.assertIn("'sleep' did not end within 50 ms [program-timeout]", self.refused("loadusr", "-t", "50ms", "-w", "sleep", "1000"))
+        self.assertIn(
+            "-t requires a duration of 1ms..24h, such as -t 10s",
+            self.refused("waitusr", "-t", "soon", "uc"),
+        )
+        self.assertIn(
+            "-t requires -W, -Wn or -w, whose wait it limits",
+            self.refused("loadusr", "-t", "1s", "true"),
+        )
+        self.assertIn(
+            "'sleep' did not end within 50 ms [program-timeout]",
+            self.refused("loadusr", "-t", "50ms", "-w", "sleep", "1000"),
+        )
 
     def test_a_program_that_does_not_end_keeps_its_name_and_is_named(self):
         self.machine()
-        self.write("deaf.py", SLOW.replace("c = hal", "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN)\nc = hal"))
+        self.write(
+            "deaf.py",
+            SLOW.replace(
+                "c = hal", "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN)\nc = hal"
+            ),
+        )
         self.say("loadusr", "-Wn", "uc", sys.executable, "deaf.py", "uc", "0", "1", "0")
         deaf = self.pid("uc")
         self.say("unload", "uc")
         self.assertEqual("ready, stopping", self.state("uc"))
-        self.assertIn(f"the previous 'uc' (process {deaf}) did not end within 100 ms [program-timeout]",
-                      self.refused("loadusr", "-t", "100ms", "-Wn", "uc", *self.slow("uc")))
-        waiter = self.background(str(HAL), "shell", "loadusr", "-Wn", "uc", *self.slow("uc", value="5"))
-        self.assertIn(f"waiting for the previous 'uc' to end: process {deaf} received SIGTERM but is still running", waiter.stderr.readline())
+        self.assertIn(
+            f"the previous 'uc' (process {deaf}) did not end within 100 ms [program-timeout]",
+            self.refused("loadusr", "-t", "100ms", "-Wn", "uc", *self.slow("uc")),
+        )
+        waiter = self.background(
+            str(HAL), "shell", "loadusr", "-Wn", "uc", *self.slow("uc", value="5")
+        )
+        self.assertIn(
+            f"waiting for the previous 'uc' to end: process {deaf} received SIGTERM but is still running",
+            waiter.stderr.readline(),
+        )
         os.kill(deaf, signal.SIGKILL)
         waiter.communicate(timeout=60)
         self.assertEqual(0, waiter.returncode)
@@ -216,7 +295,13 @@ os._exit(3)
 
     def test_one_that_ends_by_the_signal_it_was_sent_leaves_nothing(self):
         self.machine()
-        self.write("plain.py", SLOW.replace("c.ready()", "import signal; signal.signal(signal.SIGTERM, signal.SIG_DFL)\nc.ready()"))
+        self.write(
+            "plain.py",
+            SLOW.replace(
+                "c.ready()",
+                "import signal; signal.signal(signal.SIGTERM, signal.SIG_DFL)\nc.ready()",
+            ),
+        )
         self.say("loadusr", "-Wn", "uc", sys.executable, "plain.py", "uc", "0", "1", "0")
         os.kill(self.pid("uc"), signal.SIGSTOP)  # it is not deaf to unload even so
         self.say("unload", "uc")
@@ -234,19 +319,34 @@ class KilledMachine(LifeCase):
         wait_until(lambda: not any(lives(pid) for pid in pids), "the programs have ended")
 
     def test_programs_of_loadusr_end(self):
-        self.write("idle.py", ECHO.replace("while True:\n", "while True: time.sleep(1000)\nwhile True:\n").replace('"echo"', '"idle"'))
-        machine = self.machine(SERVO + f"loadusr -Wn echo {sys.executable} echo.py\nloadusr -Wn idle {sys.executable} idle.py\n"
-                               "loadusr sleep 1000\nstart\n")
+        self.write(
+            "idle.py",
+            ECHO.replace("while True:\n", "while True: time.sleep(1000)\nwhile True:\n").replace(
+                '"echo"', '"idle"'
+            ),
+        )
+        machine = self.machine(
+            SERVO
+            + f"loadusr -Wn echo {sys.executable} echo.py\nloadusr -Wn idle {sys.executable} idle.py\n"
+            "loadusr sleep 1000\nstart\n"
+        )
         self.say("loadusr", "sleep", "1000")  # by a thread of the server that ends with the command
         waiter = self.background(str(HAL), "shell", "loadusr", "-w", "sleep", "1000")
         children = lambda: Path(f"/proc/{machine.pid}/task").glob("*/children")
-        pids = wait_until(lambda: (lambda all: all if len(all) >= 5 else None)([int(pid) for file in children() for pid in file.read_text().split()]), "all run")
+        pids = wait_until(
+            lambda: (lambda all: all if len(all) >= 5 else None)(
+                [int(pid) for file in children() for pid in file.read_text().split()]
+            ),
+            "all run",
+        )
         wait_until(lambda: self.state("echo") == "ready", "it is ready")
         for pid in pids:
             self.assertTrue(lives(pid))
         self.kill(machine)
         self.gone(*pids)
-        self.assertIn("the connection to instance 'default' is lost", waiter.communicate(timeout=60)[1])
+        self.assertIn(
+            "the connection to instance 'default' is lost", waiter.communicate(timeout=60)[1]
+        )
 
     def test_a_program_behind_a_shell_ends(self):
         self.write("wrapper.sh", f"{sys.executable} echo.py\ntrue\n")
@@ -257,18 +357,29 @@ class KilledMachine(LifeCase):
 
     def test_programs_without_their_death_signal_end(self):
         """The kernel takes it from a program with file capabilities: the library notices the end of the connection, hal asks for it again."""
-        self.write("forget.py", "import ctypes, os, sys\nctypes.CDLL(None).prctl(1, 0)\nos.execvp(sys.argv[1], sys.argv[1:])\n")
+        self.write(
+            "forget.py",
+            "import ctypes, os, sys\nctypes.CDLL(None).prctl(1, 0)\nos.execvp(sys.argv[1], sys.argv[1:])\n",
+        )
         self.write("other.hal", SERVO)
-        machine = self.machine(SERVO + f"loadusr -Wn echo {sys.executable} forget.py {sys.executable} echo.py\n"
-                               f"loadusr {sys.executable} forget.py {HAL} run --no-picture --name other other.hal\nstart\n")
-        pids = [self.pid("echo"), wait_until(lambda: self.other_pid(machine), "the other machine runs")]
+        machine = self.machine(
+            SERVO + f"loadusr -Wn echo {sys.executable} forget.py {sys.executable} echo.py\n"
+            f"loadusr {sys.executable} forget.py {HAL} run --no-picture --name other other.hal\nstart\n"
+        )
+        pids = [
+            self.pid("echo"),
+            wait_until(lambda: self.other_pid(machine), "the other machine runs"),
+        ]
         self.kill(machine)
         self.gone(*pids)
 
     def other_pid(self, machine):
         for file in Path(f"/proc/{machine.pid}/task").glob("*/children"):
             for pid in file.read_text().split():
-                if b"other.hal" in Path(f"/proc/{pid}/cmdline").read_bytes() and self.shell("getp", "servo.threadbeat", instance="other").returncode == 0:
+                if (
+                    b"other.hal" in Path(f"/proc/{pid}/cmdline").read_bytes()
+                    and self.shell("getp", "servo.threadbeat", instance="other").returncode == 0
+                ):
                     return int(pid)
         return None
 
@@ -276,24 +387,33 @@ class KilledMachine(LifeCase):
         def find():
             for folder in Path("/proc").glob("[0-9]*"):
                 try:
-                    if (folder / "cmdline").read_bytes().split(b"\0")[1:2] == [b"echo.py"] and os.readlink(folder / "cwd") == str(self.folder.resolve()):
+                    if (folder / "cmdline").read_bytes().split(b"\0")[1:2] == [
+                        b"echo.py"
+                    ] and os.readlink(folder / "cwd") == str(self.folder.resolve()):
                         return folder.name
                 except OSError:
                     pass
             return None
+
         return wait_until(find, "the program runs")
 
     def test_a_program_started_by_hand_takes_safe_values_and_reconnects(self):
         machine = self.machine()
-        self.write("watch.py", "import hal, time\nc = hal.component('watch')\nc.newpin('go', hal.HAL_BIT, hal.HAL_IN, safe=False)\n"
-                   "c.newpin('other', hal.HAL_BIT, hal.HAL_IN)\nc.ready()\nwhile True:\n print(c['go'], c['other'], flush=True)\n time.sleep(0.05)\n")
+        self.write(
+            "watch.py",
+            "import hal, time\nc = hal.component('watch')\nc.newpin('go', hal.HAL_BIT, hal.HAL_IN, safe=False)\n"
+            "c.newpin('other', hal.HAL_BIT, hal.HAL_IN)\nc.ready()\nwhile True:\n print(c['go'], c['other'], flush=True)\n time.sleep(0.05)\n",
+        )
         program = self.background(sys.executable, "watch.py")
         wait_until(lambda: self.state("watch") == "ready", "it is ready")
         self.say("setp", "watch.go", "1")
         self.say("setp", "watch.other", "1")
         wait_until(lambda: program.stdout.readline() == "True True\n", "it sees its inputs")
         self.kill(machine)
-        wait_until(lambda: program.stdout.readline() == "False True\n", "what has a declared value takes it")
+        wait_until(
+            lambda: program.stdout.readline() == "False True\n",
+            "what has a declared value takes it",
+        )
         self.assertIn("watch: the machine 'default' (process ", program.stderr.readline())
         self.machine()
         wait_until(lambda: self.state("watch") == "ready", "it is there again")
@@ -303,7 +423,10 @@ class KilledMachine(LifeCase):
         program = self.background(sys.executable, "echo.py", HALCYON_LOST="end")
         wait_until(lambda: self.state("echo") == "ready", "it is ready")
         self.kill(machine)
-        self.assertRegex(program.communicate(timeout=60)[1], r"^echo: the machine 'default' \(process \d+\) has ended; ending\n")
+        self.assertRegex(
+            program.communicate(timeout=60)[1],
+            r"^echo: the machine 'default' \(process \d+\) has ended; ending\n",
+        )
 
     def test_programs_in_c(self):
         if SANITIZED:
@@ -349,10 +472,23 @@ class Hanging(LifeCase):
 
     def test_one_that_is_to_be_restarted_is(self):
         self.machine()
-        self.say("loadusr", "-Wn", "echo", "--restart=on-failure", "--restart-delay=10ms", sys.executable, "echo.py")
+        self.say(
+            "loadusr",
+            "-Wn",
+            "echo",
+            "--restart=on-failure",
+            "--restart-delay=10ms",
+            sys.executable,
+            "echo.py",
+        )
         first = self.pid("echo")
         os.kill(first, signal.SIGSTOP)
-        wait_until(lambda: self.row("echo") and self.pid("echo") != first and self.state("echo") == "ready", "it is started again")
+        wait_until(
+            lambda: self.row("echo")
+            and self.pid("echo") != first
+            and self.state("echo") == "ready",
+            "it is started again",
+        )
 
     def test_a_program_in_c(self):
         if SANITIZED:
@@ -364,12 +500,19 @@ class Hanging(LifeCase):
         self.say("net", "level", "hang.out", "adder.in1")
         wait_until(lambda: self.value("adder.in1") == "5", "it works")
         os.kill(self.pid("hang"), signal.SIGSTOP)
-        wait_until(lambda: self.state("hang").startswith("not responding since "), "SIGSTOP is noticed")
+        wait_until(
+            lambda: self.state("hang").startswith("not responding since "), "SIGSTOP is noticed"
+        )
         wait_until(lambda: self.value("adder.in1") == "-2", "its output takes the declared value")
         os.kill(self.pid("hang"), signal.SIGCONT)
-        wait_until(lambda: self.state("hang") == "ready" and self.value("adder.in1") == "5", "it recovers")
+        wait_until(
+            lambda: self.state("hang") == "ready" and self.value("adder.in1") == "5", "it recovers"
+        )
         self.say("setp", "hang.loop", "1")
-        wait_until(lambda: self.state("hang").startswith("not responding since "), "an endless loop is noticed, though its values are exchanged")
+        wait_until(
+            lambda: self.state("hang").startswith("not responding since "),
+            "an endless loop is noticed, though its values are exchanged",
+        )
         wait_until(lambda: self.value("adder.in1") == "-2", "its output takes the declared value")
         self.say("unload", "hang")
 
@@ -379,7 +522,9 @@ class Operator(LifeCase):
         machine = self.machine()
         waiting = []
         for _ in range(300):
-            client = socket.socket(socket.AF_UNIX)  # without a timeout: then connect() waits for a place in the queue
+            client = socket.socket(
+                socket.AF_UNIX
+            )  # without a timeout: then connect() waits for a place in the queue
             client.connect(str(self.folder / "halcyon/default.sock"))
             waiting.append(client)
             self.addCleanup(client.close)
@@ -390,7 +535,9 @@ class Operator(LifeCase):
         text = b""
         while part := first.recv(4096):
             text += part
-        self.assertIn("more than 256 clients are connected, and this one sent no request for", text.decode())
+        self.assertIn(
+            "more than 256 clients are connected, and this one sent no request for", text.decode()
+        )
         self.say("stop")
         self.say("unloadusr", "all")
         self.assertIsNone(machine.poll())

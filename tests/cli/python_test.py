@@ -40,27 +40,56 @@ class PythonTest(Case):
 
     def python(self, text):
         """Runs a program to its end; what it prints."""
-        done = subprocess.run([sys.executable, "-c", text], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, text=True, timeout=60)
+        done = subprocess.run(
+            [sys.executable, "-c", text],
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+        )
         self.assertEqual(0, done.returncode, done.stderr)
         return done.stdout
 
     def background(self, text):
-        program = subprocess.Popen([sys.executable, "-c", text], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                                   stderr=subprocess.PIPE, text=True)
+        program = subprocess.Popen(
+            [sys.executable, "-c", text],
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         self.addCleanup(self.end, program)
         return program
 
     def state(self, name="echo"):
-        line = next((line for line in self.shell("show", "comp", name).stdout.splitlines() if f" {name} " in line), "")
+        line = next(
+            (
+                line
+                for line in self.shell("show", "comp", name).stdout.splitlines()
+                if f" {name} " in line
+            ),
+            "",
+        )
         return line.split(None, 4)[-1] if line else ""
 
     def pid(self, name="echo"):
-        return int(next(line for line in self.shell("show", "comp", name).stdout.splitlines() if f" {name} " in line).split()[3])
+        return int(
+            next(
+                line
+                for line in self.shell("show", "comp", name).stdout.splitlines()
+                if f" {name} " in line
+            ).split()[3]
+        )
 
     def test_a_probe_gives_arrays_of_every_cycle(self):
         self.machine("loadrt siggen names=wave\n" + SERVO + "addf wave.update servo\nstart\n")
-        out = self.python("""import hal
+        out = self.python(
+            """import hal
 with hal.probe(["wave.sine", "adder.out", "wave.frequency", "servo.threadbeat"]) as samples:
     cycles, counts = [], []
     for rows in samples:
@@ -75,13 +104,23 @@ try:
     hal.probe("adder.uot")
 except hal.error as problem:
     print(problem)
-""")
-        self.assertEqual("True 0 Hz\nunknown pin, parameter or signal 'adder.uot'; did you mean 'adder.out'?\n", out)
+"""
+        )
+        self.assertEqual(
+            "True 0 Hz\nunknown pin, parameter or signal 'adder.uot'; did you mean 'adder.out'?\n",
+            out,
+        )
 
     def test_a_component_from_loadusr_is_linked_like_any_other(self):
         self.write("echo.py", ECHO)
-        self.machine(f"loadusr -W {sys.executable} echo.py\n{SERVO}setp echo.gain 2\nnet doubled echo.out => adder.in1\n".replace("setp adder.in1 3\n", "")
-                     .replace("net total adder.out", "net total adder.out => echo.in") + "setp adder.gain1 0.25\nstart\n")
+        self.machine(
+            f"loadusr -W {sys.executable} echo.py\n{SERVO}setp echo.gain 2\nnet doubled echo.out => adder.in1\n".replace(
+                "setp adder.in1 3\n", ""
+            ).replace(
+                "net total adder.out", "net total adder.out => echo.in"
+            )
+            + "setp adder.gain1 0.25\nstart\n"
+        )
         # total = 2 + 0.25 * 2 * total has its rest at 4
         wait_until(lambda: self.value("adder.out") == "4", "the loop settles")
         self.assertEqual("ready", self.state())
@@ -106,29 +145,46 @@ except hal.error as problem:
         wait_until(lambda: self.value("adder.in1") == "-1", "the declared value")
         self.assertEqual("7", self.value("echo.kept"))
         second = self.background(ECHO)
-        wait_until(lambda: self.state() == "ready" and self.value("adder.in1") == "6", "another takes its pins over, links and parameters")
+        wait_until(
+            lambda: self.state() == "ready" and self.value("adder.in1") == "6",
+            "another takes its pins over, links and parameters",
+        )
         second.send_signal(signal.SIGTERM)
         wait_until(lambda: self.state() == "", "SIGTERM is an end in good order")
 
     def test_an_exception_is_a_death_and_exit_is_not(self):
         self.machine()
         text = "import hal\nc = hal.component('echo')\nc.newpin('out', hal.HAL_BIT, hal.HAL_OUT)\nc.ready()\n"
-        crashed = subprocess.run([sys.executable, "-c", text + "c['nothing']"], env=self.environment, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        self.assertIn("AttributeError: component 'echo' has no pin or parameter 'nothing'", crashed.stderr)
+        crashed = subprocess.run(
+            [sys.executable, "-c", text + "c['nothing']"],
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.assertIn(
+            "AttributeError: component 'echo' has no pin or parameter 'nothing'", crashed.stderr
+        )
         wait_until(lambda: self.state().startswith("dead since "), "its death is seen")
         self.python(text)
         wait_until(lambda: self.state() == "", "it leaves at its end")
 
     def test_restart_on_failure(self):
         self.write("echo.py", ECHO)
-        self.machine(SERVO + f"start\nloadusr -W --restart=on-failure --restart-delay=50ms {sys.executable} echo.py\n")
+        self.machine(
+            SERVO
+            + f"start\nloadusr -W --restart=on-failure --restart-delay=50ms {sys.executable} echo.py\n"
+        )
         wait_until(lambda: self.state() == "ready", "it is ready")
         first = self.pid()
         os.kill(first, signal.SIGKILL)
         wait_until(lambda: self.state() == "ready" and self.pid() != first, "it is started again")
         self.assertEqual(0, self.shell("unloadusr", "echo").returncode)
         wait_until(lambda: self.state() == "", "unloadusr ends it for good")
-        self.assertIn("--restart must be no, on-failure or always", self.shell("loadusr", "--restart=sometimes", "true").stderr)
+        self.assertIn(
+            "--restart must be no, on-failure or always",
+            self.shell("loadusr", "--restart=sometimes", "true").stderr,
+        )
 
     def test_a_program_that_always_fails_is_given_up(self):
         self.machine(SERVO + "start\nloadusr --restart=on-failure --restart-delay=10ms false\n")
@@ -148,73 +204,104 @@ except hal.error as problem:
 
     def test_values_keep_their_range(self):
         self.machine()
-        self.assertEqual("-1 4294967295 inf True OverflowError\n", self.python(
-            "import hal\nc = hal.component('x')\n"
-            "for name, kind in (('s', hal.HAL_S32), ('u', hal.HAL_U32), ('f', hal.HAL_FLOAT), ('b', hal.HAL_BIT)): c.newpin(name, kind, hal.HAL_OUT)\n"
-            "c.ready()\nc['s'] = -1; c['u'] = 0xffffffff; c['f'] = float('inf'); c.b = 1\n"
-            "try: c['u'] = -1\nexcept OverflowError as e: print(c['s'], c['u'], c['f'], c.b, type(e).__name__)\n"))
+        self.assertEqual(
+            "-1 4294967295 inf True OverflowError\n",
+            self.python(
+                "import hal\nc = hal.component('x')\n"
+                "for name, kind in (('s', hal.HAL_S32), ('u', hal.HAL_U32), ('f', hal.HAL_FLOAT), ('b', hal.HAL_BIT)): c.newpin(name, kind, hal.HAL_OUT)\n"
+                "c.ready()\nc['s'] = -1; c['u'] = 0xffffffff; c['f'] = float('inf'); c.b = 1\n"
+                "try: c['u'] = -1\nexcept OverflowError as e: print(c['s'], c['u'], c['f'], c.b, type(e).__name__)\n"
+            ),
+        )
 
     def test_functions_of_the_module(self):
         self.machine()
-        self.assertEqual("True False True\n2.0 2.0\nTrue False\nerror 9.0\n", self.python(
-            "import hal\nprint(hal.component_exists('sum2'), hal.component_exists('nobody'), hal.component_is_ready('sum2'))\n"
-            "hal.new_sig('level', hal.HAL_FLOAT); hal.set_s('level', 5.5);\n"
-            "hal.connect('adder.in0', 'level')\nprint(hal.get_value('level'), hal.get_value('adder.in0'))\n"
-            "print(hal.pin_has_writer('adder.out'), hal.pin_has_writer('adder.in0'))\n"
-            "try: hal.set_p('adder.nothing', 1)\nexcept hal.error: hal.set_p('adder.in1', 9); print('error', hal.get_value('adder.in1'))\n"))
+        self.assertEqual(
+            "True False True\n2.0 2.0\nTrue False\nerror 9.0\n",
+            self.python(
+                "import hal\nprint(hal.component_exists('sum2'), hal.component_exists('nobody'), hal.component_is_ready('sum2'))\n"
+                "hal.new_sig('level', hal.HAL_FLOAT); hal.set_s('level', 5.5);\n"
+                "hal.connect('adder.in0', 'level')\nprint(hal.get_value('level'), hal.get_value('adder.in0'))\n"
+                "print(hal.pin_has_writer('adder.out'), hal.pin_has_writer('adder.in0'))\n"
+                "try: hal.set_p('adder.nothing', 1)\nexcept hal.error: hal.set_p('adder.in1', 9); print('error', hal.get_value('adder.in1'))\n"
+            ),
+        )
 
     def test_what_the_functions_return_and_raise_is_linuxcncs(self):
         self.machine()
-        self.assertEqual("False True False True False False False\nerror\nerror True\nerror True\nAttributeError True\nNameError True\nFalse\nmade\nb'bf' True\n", self.python(
-            "import hal, os, sys\nsys.stderr = open(os.devnull, 'w')\nc = hal.component('x')\n"
-            "print(hal.new_sig('level', hal.HAL_FLOAT), hal.new_sig('level', hal.HAL_FLOAT), hal.connect('adder.in0', 'level'), hal.connect('nothing', 'level'),\n"
-            "      hal.set_s('level', 1), hal.disconnect('adder.in0'), hal.set_p('adder.in0', '2'))\n"
-            "def fails(call, *kinds):\n try: call()\n except kinds[0] as e: return all(isinstance(e, kind) for kind in kinds)\n"
-            "try: hal.set_p('adder.out', 1)\nexcept RuntimeError as e: print(type(e).__name__)\n"
-            "print('error', fails(lambda: c.newpin('a', hal.HAL_BIT, hal.HAL_RO), hal.error, ValueError))\n"
-            "print('error', fails(lambda: c.newpin('a', 99, hal.HAL_IN), hal.error, ValueError))\n"
-            "c.newpin('a', hal.HAL_BIT, hal.HAL_IN)\nprint('AttributeError', fails(lambda: c.getparam('a'), AttributeError, hal.error))\n"
-            "print('NameError', fails(lambda: hal.pin_has_writer('nothing'), NameError, hal.error))\n"
-            "c.ready()\n"
-            "try: c.newpin('b', hal.HAL_BIT, hal.HAL_IN); print('made too late')\nexcept hal.error as e: print(not str(e).startswith('Invalid argument: '))\n"
-            "c.unready(); c.newpin('b', hal.HAL_BIT, hal.HAL_IN); c.ready(); print('made')\n"
-            "s = hal.stream(c, hal.streamer_base + 6, 3, 'bf')\nprint(s.element_types, fails(lambda: hal.stream(c, hal.streamer_base + 7), OSError, hal.error))\n"))
+        self.assertEqual(
+            "False True False True False False False\nerror\nerror True\nerror True\nAttributeError True\nNameError True\nFalse\nmade\nb'bf' True\n",
+            self.python(
+                "import hal, os, sys\nsys.stderr = open(os.devnull, 'w')\nc = hal.component('x')\n"
+                "print(hal.new_sig('level', hal.HAL_FLOAT), hal.new_sig('level', hal.HAL_FLOAT), hal.connect('adder.in0', 'level'), hal.connect('nothing', 'level'),\n"
+                "      hal.set_s('level', 1), hal.disconnect('adder.in0'), hal.set_p('adder.in0', '2'))\n"
+                "def fails(call, *kinds):\n try: call()\n except kinds[0] as e: return all(isinstance(e, kind) for kind in kinds)\n"
+                "try: hal.set_p('adder.out', 1)\nexcept RuntimeError as e: print(type(e).__name__)\n"
+                "print('error', fails(lambda: c.newpin('a', hal.HAL_BIT, hal.HAL_RO), hal.error, ValueError))\n"
+                "print('error', fails(lambda: c.newpin('a', 99, hal.HAL_IN), hal.error, ValueError))\n"
+                "c.newpin('a', hal.HAL_BIT, hal.HAL_IN)\nprint('AttributeError', fails(lambda: c.getparam('a'), AttributeError, hal.error))\n"
+                "print('NameError', fails(lambda: hal.pin_has_writer('nothing'), NameError, hal.error))\n"
+                "c.ready()\n"
+                "try: c.newpin('b', hal.HAL_BIT, hal.HAL_IN); print('made too late')\nexcept hal.error as e: print(not str(e).startswith('Invalid argument: '))\n"
+                "c.unready(); c.newpin('b', hal.HAL_BIT, hal.HAL_IN); c.ready(); print('made')\n"
+                "s = hal.stream(c, hal.streamer_base + 6, 3, 'bf')\nprint(s.element_types, fails(lambda: hal.stream(c, hal.streamer_base + 7), OSError, hal.error))\n"
+            ),
+        )
 
     def test_the_writes_of_two_components_arrive_in_their_order(self):
-        machine = self.machine(SERVO + "loadrt sum2\nloadrt minmax\naddf sum2.0 servo\naddf minmax.0 servo\nsetp sum2.0.gain1 -1\n"
-                                       "net difference sum2.0.out => minmax.0.in\nstart\n")
-        self.python("import hal, subprocess\n"
-                    "a, b = hal.component('a'), hal.component('b')\n"
-                    "b.newpin('in', hal.HAL_BIT, hal.HAL_IN)\n"
-                    "for c in a, b: c.newpin('x', hal.HAL_FLOAT, hal.HAL_OUT), c.ready()\n"
-                    "for words in (['late', 'b.x', 'sum2.0.in0'], ['early', 'a.x', 'sum2.0.in1']): subprocess.run(['halcmd', 'net'] + words, check=True)\n"
-                    "for i in range(1, 1001): a['x'] = i; b['x'] = i; b['in']\n")  # what is read is fetched, after what was written
+        machine = self.machine(
+            SERVO
+            + "loadrt sum2\nloadrt minmax\naddf sum2.0 servo\naddf minmax.0 servo\nsetp sum2.0.gain1 -1\n"
+            "net difference sum2.0.out => minmax.0.in\nstart\n"
+        )
+        self.python(
+            "import hal, subprocess\n"
+            "a, b = hal.component('a'), hal.component('b')\n"
+            "b.newpin('in', hal.HAL_BIT, hal.HAL_IN)\n"
+            "for c in a, b: c.newpin('x', hal.HAL_FLOAT, hal.HAL_OUT), c.ready()\n"
+            "for words in (['late', 'b.x', 'sum2.0.in0'], ['early', 'a.x', 'sum2.0.in1']): subprocess.run(['halcmd', 'net'] + words, check=True)\n"
+            "for i in range(1, 1001): a['x'] = i; b['x'] = i; b['in']\n"
+        )  # what is read is fetched, after what was written
         self.assertEqual("0", self.value("minmax.0.max"))  # the second is never ahead of the first
         self.end(machine)
 
     def test_several_processes_talk_through_signals(self):
         self.machine()
-        self.background("import hal, time\nc = hal.component('there')\nc.newpin('in', hal.HAL_S32, hal.HAL_IN)\nc.newpin('out', hal.HAL_S32, hal.HAL_OUT)\nc.ready()\n"
-                        "while True:\n c['out'] = c['in'] + 1\n time.sleep(0.001)\n")
-        self.assertEqual("done\n", self.python(
-            "import hal, time\nc = hal.component('here')\nc.newpin('in', hal.HAL_S32, hal.HAL_IN)\nc.newpin('out', hal.HAL_S32, hal.HAL_OUT)\nc.ready()\n"
-            "while not hal.component_exists('there') or not hal.component_is_ready('there'): time.sleep(0.01)\n"
-            "for name, pins in (('go', ('here.out', 'there.in')), ('come', ('there.out', 'here.in'))):\n"
-            " hal.new_sig(name, hal.HAL_S32)\n for pin in pins: hal.connect(pin, name)\n"
-            "while c['in'] < 100:\n c['out'] = c['in']\n time.sleep(0.001)\nprint('done')\n"))
+        self.background(
+            "import hal, time\nc = hal.component('there')\nc.newpin('in', hal.HAL_S32, hal.HAL_IN)\nc.newpin('out', hal.HAL_S32, hal.HAL_OUT)\nc.ready()\n"
+            "while True:\n c['out'] = c['in'] + 1\n time.sleep(0.001)\n"
+        )
+        self.assertEqual(
+            "done\n",
+            self.python(
+                "import hal, time\nc = hal.component('here')\nc.newpin('in', hal.HAL_S32, hal.HAL_IN)\nc.newpin('out', hal.HAL_S32, hal.HAL_OUT)\nc.ready()\n"
+                "while not hal.component_exists('there') or not hal.component_is_ready('there'): time.sleep(0.01)\n"
+                "for name, pins in (('go', ('here.out', 'there.in')), ('come', ('there.out', 'here.in'))):\n"
+                " hal.new_sig(name, hal.HAL_S32)\n for pin in pins: hal.connect(pin, name)\n"
+                "while c['in'] < 100:\n c['out'] = c['in']\n time.sleep(0.001)\nprint('done')\n"
+            ),
+        )
 
     def test_a_stream_between_programs(self):
         self.machine()
-        self.assertEqual("(True, 1.5, -3, 7) 1 None 1\nerror\n", self.python(
-            "import hal\nc = hal.component('s')\nw = hal.stream(c, hal.streamer_base + 5, 3, 'bfsu')\nr = hal.stream(c, hal.streamer_base + 5, 'bfsu')\nc.ready()\n"
-            "w.write((1, 1.5, -3, 7))\nprint(r.read(), r.sampleno, r.read(), r.num_underruns)\nw.write((0,0,0,0)); w.write((0,0,0,0)); assert not w.writable\n"
-            "try: w.write((0,0,0,0))\nexcept hal.error: print('error')\n"))
+        self.assertEqual(
+            "(True, 1.5, -3, 7) 1 None 1\nerror\n",
+            self.python(
+                "import hal\nc = hal.component('s')\nw = hal.stream(c, hal.streamer_base + 5, 3, 'bfsu')\nr = hal.stream(c, hal.streamer_base + 5, 'bfsu')\nc.ready()\n"
+                "w.write((1, 1.5, -3, 7))\nprint(r.read(), r.sampleno, r.read(), r.num_underruns)\nw.write((0,0,0,0)); w.write((0,0,0,0)); assert not w.writable\n"
+                "try: w.write((0,0,0,0))\nexcept hal.error: print('error')\n"
+            ),
+        )
 
     def test_a_child_process_does_not_use_its_parents_component(self):
         self.machine()
-        self.assertEqual("rejected\n", self.python(
-            "import hal, os\nc = hal.component('x')\nc.newpin('a', hal.HAL_BIT, hal.HAL_OUT)\nc.ready()\n"
-            "if os.fork() == 0:\n try: c['a'] = 1\n except hal.error: print('rejected', flush=True)\n os._exit(0)\nos.wait()\nassert c['a'] is False\n"))
+        self.assertEqual(
+            "rejected\n",
+            self.python(
+                "import hal, os\nc = hal.component('x')\nc.newpin('a', hal.HAL_BIT, hal.HAL_OUT)\nc.ready()\n"
+                "if os.fork() == 0:\n try: c['a'] = 1\n except hal.error: print('rejected', flush=True)\n os._exit(0)\nos.wait()\nassert c['a'] is False\n"
+            ),
+        )
 
 
 if __name__ == "__main__":

@@ -61,11 +61,18 @@ class Simulated(Case):
     def test_the_same_netlist_gives_the_same_file(self):
         self.sim(NETLIST, "--for", "3s", "--record", "b.mcap", "--name", "x")
         self.sim(NETLIST, "--for", "3s", "--record", "c.mcap", "--name", "x")
-        self.assertEqual((self.folder / "b.mcap").read_bytes(), (self.folder / "c.mcap").read_bytes())
+        self.assertEqual(
+            (self.folder / "b.mcap").read_bytes(), (self.folder / "c.mcap").read_bytes()
+        )
 
     def test_messages_of_a_bus_are_in_the_recording(self):
-        self.write("a.canopen", "[bus]\nlink = sim:bus\nbitrate = 1M\nsync = 10ms\n[node 3 io]\ndevice = cia401\nheartbeat = 20ms\n")
-        netlist = self.write("a.hal", """loadrt threads name1=bus period1=1000000
+        self.write(
+            "a.canopen",
+            "[bus]\nlink = sim:bus\nbitrate = 1M\nsync = 10ms\n[node 3 io]\ndevice = cia401\nheartbeat = 20ms\n",
+        )
+        netlist = self.write(
+            "a.hal",
+            """loadrt threads name1=bus period1=1000000
 loadrt canopen config=a.canopen
 loadrt canopen_io names=io link=sim:bus id=3 faults=emcy-storm
 addf canopen.0.receive bus
@@ -73,23 +80,49 @@ addf canopen.0.transmit bus
 addf io.update bus
 setp io.fault-emcy-storm-ms 500
 setp io.fault-emcy-storm 1
-""")
-        done = self.run_program("sim", netlist, "-q", "--for", "2s", "--record", "run.mcap", "--values", "canopen.0.operational")
+""",
+        )
+        done = self.run_program(
+            "sim",
+            netlist,
+            "-q",
+            "--for",
+            "2s",
+            "--record",
+            "run.mcap",
+            "--values",
+            "canopen.0.operational",
+        )
         self.assertEqual(0, done.returncode, done.stderr)
         self.good("plot", "run.mcap", "canopen.0.operational")
         titles = re.findall("<title>(.*?)</title>", (self.folder / "run.svg").read_text())
-        self.assertIn("message: canopen.0: node 3 (io): emergency 0xFF00 (device specific), error register 0x81", titles)
+        self.assertIn(
+            "message: canopen.0: node 3 (io): emergency 0xFF00 (device specific), error register 0x81",
+            titles,
+        )
 
     def test_words(self):
         self.write("a.hal", NETLIST)
         self.assertIn("--record needs --for TIME", self.bad("sim", "a.hal", "--record", "x.mcap"))
-        self.assertIn("name the file .mcap or .csv", self.bad("sim", "a.hal", "--for", "1s", "--record", "x.bag"))
-        self.assertIn("No such file", self.bad("sim", "a.hal", "--for", "1s", "--record", "nowhere/x.mcap"))
+        self.assertIn(
+            "name the file .mcap or .csv",
+            self.bad("sim", "a.hal", "--for", "1s", "--record", "x.bag"),
+        )
+        self.assertIn(
+            "No such file", self.bad("sim", "a.hal", "--for", "1s", "--record", "nowhere/x.mcap")
+        )
         (self.folder / "folder.mcap").mkdir()
-        self.assertEqual("hal sim: cannot write 'folder.mcap': it is a folder; name a file in it\n", self.bad("sim", "a.hal", "--for", "1s", "--record", "folder.mcap"))
+        self.assertEqual(
+            "hal sim: cannot write 'folder.mcap': it is a folder; name a file in it\n",
+            self.bad("sim", "a.hal", "--for", "1s", "--record", "folder.mcap"),
+        )
         for name in ("sine,sin", "sin"):
-            self.assertEqual("hal sim: --values: no pin, parameter or signal matches 'sin'; did you mean 'sine'?\n",
-                             self.bad("sim", "a.hal", "-q", "--for", "1s", "--record", "x.mcap", "--values", name))
+            self.assertEqual(
+                "hal sim: --values: no pin, parameter or signal matches 'sin'; did you mean 'sine'?\n",
+                self.bad(
+                    "sim", "a.hal", "-q", "--for", "1s", "--record", "x.mcap", "--values", name
+                ),
+            )
         self.assertFalse((self.folder / "x.mcap").exists())
         self.assertIn("cannot read 'x.mcap': No such file", self.bad("plot", "x.mcap"))
         self.assertIn("missing netlist", self.bad("replay", "x.mcap"))
@@ -103,46 +136,104 @@ setp io.fault-emcy-storm 1
         self.assertNotIn("shifted", svg)
         self.assertLess(len(svg), 200_000)
         self.assertIn("did you mean 'sine'?", self.bad("plot", "run.mcap", "sin"))
-        self.assertIn("--from is after the end", self.bad("plot", "run.mcap", "sine", "--from", "5s"))
-        self.assertIn("<svg", self.good("plot", "run.mcap", "sine", "-o", "-", "--from", "200ms", "--for", "100ms"))
+        self.assertIn(
+            "--from is after the end", self.bad("plot", "run.mcap", "sine", "--from", "5s")
+        )
+        self.assertIn(
+            "<svg",
+            self.good("plot", "run.mcap", "sine", "-o", "-", "--from", "200ms", "--for", "100ms"),
+        )
 
     def test_a_replay_of_the_same_control_is_equal(self):
         whole = "loadrt threads name1=servo period1=1000000\n" + PLANT + CONTROL
         self.write("whole.hal", whole + "setp loop.command 1\n")
-        self.write("control.hal", "loadrt threads name1=servo period1=1000000\n" + CONTROL + "setp loop.command 1\n")
-        self.good("sim", "whole.hal", "-q", "--for", "500ms", "--record", "run.mcap", "--values", "effort,feedback", "--", "GAIN=1")
+        self.write(
+            "control.hal",
+            "loadrt threads name1=servo period1=1000000\n" + CONTROL + "setp loop.command 1\n",
+        )
+        self.good(
+            "sim",
+            "whole.hal",
+            "-q",
+            "--for",
+            "500ms",
+            "--record",
+            "run.mcap",
+            "--values",
+            "effort,feedback",
+            "--",
+            "GAIN=1",
+        )
         out = self.good("replay", "run.mcap", "control.hal", "--tolerance", "1e-9", "--", "GAIN=1")
-        self.assertRegex(out, r"effort  equal in 500 rows\n0\.499 s of recording: 1 input driven, 1 value compared, none differs\n")
-        out = self.bad_output("replay", "run.mcap", "control.hal", "--tolerance", "1e-9", "--", "GAIN=2")
+        self.assertRegex(
+            out,
+            r"effort  equal in 500 rows\n0\.499 s of recording: 1 input driven, 1 value compared, none differs\n",
+        )
+        out = self.bad_output(
+            "replay", "run.mcap", "control.hal", "--tolerance", "1e-9", "--", "GAIN=2"
+        )
         self.assertRegex(out, r"effort  differs by up to 1: 2 instead of 1 at 0\.\d+ s\n")
         self.assertIn("1 differs by more than 1e-09", out)
-        self.assertIn("nothing of the recording is an input", self.bad("replay", "run.mcap", "whole.hal", "--", "GAIN=1"))
+        self.assertIn(
+            "nothing of the recording is an input",
+            self.bad("replay", "run.mcap", "whole.hal", "--", "GAIN=1"),
+        )
 
     def test_a_replay_of_a_table_has_the_types_of_the_netlist(self):
         logic = "loadrt threads name1=servo period1=1000000\nloadrt and2 names=both\nloadrt conv_s32_float names=to\naddf both servo\naddf to servo\nnet a => both.in0\nnet b => both.in1\nnet y both.out\nnet n => to.in\nnet x to.out\n"
         self.write("logic.hal", logic)
-        self.write("run.csv", "time_s,a,b,y,n,x\n" + "".join(f"{0.001 * i:.3f},{i & 1},{i >> 1 & 1},{int(i & 3 == 3)},{-i},{-i}\n" for i in range(1, 101)))
+        self.write(
+            "run.csv",
+            "time_s,a,b,y,n,x\n"
+            + "".join(
+                f"{0.001 * i:.3f},{i & 1},{i >> 1 & 1},{int(i & 3 == 3)},{-i},{-i}\n"
+                for i in range(1, 101)
+            ),
+        )
         out = self.good("replay", "run.csv", "logic.hal", "--tolerance", "0")
-        self.assertRegex(out, r"^y  equal in 100 rows\nx  equal in 100 rows\n0\.099 s of recording: 3 inputs driven, 2 values compared, none differs\n$")
+        self.assertRegex(
+            out,
+            r"^y  equal in 100 rows\nx  equal in 100 rows\n0\.099 s of recording: 3 inputs driven, 2 values compared, none differs\n$",
+        )
         self.write("bad.csv", "time_s,a,b\n0.001,0,0\n0.002,0.5,0\n")
-        self.assertEqual("hal replay: 'bad.csv', line 3: '0.5' of 'a' is not a value of type bit\n", self.bad("replay", "bad.csv", "logic.hal"))
+        self.assertEqual(
+            "hal replay: 'bad.csv', line 3: '0.5' of 'a' is not a value of type bit\n",
+            self.bad("replay", "bad.csv", "logic.hal"),
+        )
 
     def test_a_test_that_tests_nothing_fails(self):
-        self.write("control.hal", "loadrt threads name1=servo period1=1000000\nsetp loop.command 1\n".replace("setp", CONTROL + "setp"))
+        self.write(
+            "control.hal",
+            "loadrt threads name1=servo period1=1000000\nsetp loop.command 1\n".replace(
+                "setp", CONTROL + "setp"
+            ),
+        )
         self.write("run.csv", "time_s,feedback,effort\n0.001,0,nan\n0.002,0,1\n0.003,0,1\n")
         words = ("replay", "run.csv", "control.hal")
-        self.assertIn("--tolerance: nan is not a number; use 0 or more", self.bad(*words, "--tolerance", "nan", "--", "GAIN=1"))
-        self.assertEqual("0.002 s of recording: 1 input driven, 0 values compared: nothing was tested; record values that the netlist computes too\n",
-                         self.bad_output(*words, "--tolerance", "1", "--names", "feedback", "--", "GAIN=1"))
-        self.assertEqual("hal replay: --names: the recording has no value 'efort'; did you mean 'effort'?\n",
-                         self.bad(*words, "--names", "feedback,efort", "--", "GAIN=1"))
-        self.assertIn("effort  differs by up to inf: 1 instead of nan at 0.000000 s\n", self.bad_output(*words, "--tolerance", "1", "--", "GAIN=1"))
+        self.assertIn(
+            "--tolerance: nan is not a number; use 0 or more",
+            self.bad(*words, "--tolerance", "nan", "--", "GAIN=1"),
+        )
+        self.assertEqual(
+            "0.002 s of recording: 1 input driven, 0 values compared: nothing was tested; record values that the netlist computes too\n",
+            self.bad_output(*words, "--tolerance", "1", "--names", "feedback", "--", "GAIN=1"),
+        )
+        self.assertEqual(
+            "hal replay: --names: the recording has no value 'efort'; did you mean 'effort'?\n",
+            self.bad(*words, "--names", "feedback,efort", "--", "GAIN=1"),
+        )
+        self.assertIn(
+            "effort  differs by up to inf: 1 instead of nan at 0.000000 s\n",
+            self.bad_output(*words, "--tolerance", "1", "--", "GAIN=1"),
+        )
 
     def test_a_plot_of_what_the_scope_wrote_and_of_the_largest_values(self):
         self.write("scope.csv", "time_s,a\n-0.002,1\n-0.001,-1\n0.000,1\n")
         self.good("plot", "scope.csv")
         self.assertIn(">-1</text>", (self.folder / "scope.svg").read_text())
-        self.write("large.csv", "time_s,a,b\n0,-1e308,1e17\n1,1.7e308,100000000000000016\n2,0,1e17\n")
+        self.write(
+            "large.csv", "time_s,a,b\n0,-1e308,1e17\n1,1.7e308,100000000000000016\n2,0,1e17\n"
+        )
         self.good("plot", "large.csv")
         svg = (self.folder / "large.svg").read_text()
         self.assertNotRegex(svg, "nan|inf")
@@ -150,24 +241,40 @@ setp io.fault-emcy-storm 1
         self.assertEqual(2, svg.count('fill="none" stroke="#999"'), "each has a strip of its own")
 
     def test_values_of_other_sizes_have_a_scale_of_their_own(self):
-        self.write("run.csv", "time_s,a,b,small,zero\n" + "".join(f"{i},{i % 7},{i % 5 - 2},{(i % 3) * 0.01},0\n" for i in range(20)))
+        self.write(
+            "run.csv",
+            "time_s,a,b,small,zero\n"
+            + "".join(f"{i},{i % 7},{i % 5 - 2},{(i % 3) * 0.01},0\n" for i in range(20)),
+        )
         self.good("plot", "run.csv")
         svg = (self.folder / "run.svg").read_text()
         self.assertEqual(2, svg.count('fill="none" stroke="#999"'))
-        y = {name: re.search(rf'y="([\d.]+)"[^>]*>{name}</text>', svg)[1] for name in ("a", "b", "small", "zero")}
+        y = {
+            name: re.search(rf'y="([\d.]+)"[^>]*>{name}</text>', svg)[1]
+            for name in ("a", "b", "small", "zero")
+        }
         self.assertEqual(y["a"], y["b"])
         self.assertEqual(y["a"], y["zero"])
         self.assertNotEqual(y["a"], y["small"])
 
     def test_a_plot_of_too_many_values_asks_for_names(self):
         names = [f"v{i}" for i in range(25)]
-        self.write("run.csv", f"time_s,{','.join(names)}\n" + "".join(f"{i}{',1' * 25}\n" for i in range(2)))
-        self.assertEqual("hal plot: 25 values are too many for one picture (limit 24); name some: hal plot FILE NAME…\n", self.bad("plot", "run.csv"))
+        self.write(
+            "run.csv",
+            f"time_s,{','.join(names)}\n" + "".join(f"{i}{',1' * 25}\n" for i in range(2)),
+        )
+        self.assertEqual(
+            "hal plot: 25 values are too many for one picture (limit 24); name some: hal plot FILE NAME…\n",
+            self.bad("plot", "run.csv"),
+        )
         self.good("plot", "run.csv", "v1*")
 
     def test_the_ending_of_a_plot(self):
         self.write("run.csv", "time_s,a\n0,1\n1,2\n")
-        self.assertEqual("hal plot: unknown format of 'x.jpg'; name the file .svg or .png\n", self.bad("plot", "run.csv", "-o", "x.jpg"))
+        self.assertEqual(
+            "hal plot: unknown format of 'x.jpg'; name the file .svg or .png\n",
+            self.bad("plot", "run.csv", "-o", "x.jpg"),
+        )
         if shutil.which("rsvg-convert"):
             self.good("plot", "run.csv", "-o", "x.png")
             self.assertEqual(b"\x89PNG", (self.folder / "x.png").read_bytes()[:4])
@@ -188,7 +295,14 @@ class Live(Case):
         self.machine = self.start("run", self.write("a.hal", NETLIST + "start\n"))
 
     def recorder(self, *words):
-        process = subprocess.Popen([str(HAL), "record", *words], env=self.environment, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            [str(HAL), "record", *words],
+            env=self.environment,
+            cwd=self.folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         self.addCleanup(self.end, process)
         return process
 
@@ -201,19 +315,35 @@ class Live(Case):
             self.good("record", "group.csv", *words, "--for", "20ms")
             with open(self.folder / "group.csv", newline="") as file:
                 return next(csv.reader(file))[1:]
-        self.assertEqual(["above.equal", "above.in0", "sine", "high", "above.hyst"], [name for name in columns("--group", "above") if "time" not in name])
+
+        self.assertEqual(
+            ["above.equal", "above.in0", "sine", "high", "above.hyst"],
+            [name for name in columns("--group", "above") if "time" not in name],
+        )
         self.assertIn("offset.in1", columns("--group", "sum2"))
         self.assertNotIn("offset.in1", columns("--group", "above"))
-        self.assertTrue({"offset.in1", "shifted", "above.hyst"} <= set(columns("--group", "offset", "--group", "above")))
+        self.assertTrue(
+            {"offset.in1", "shifted", "above.hyst"}
+            <= set(columns("--group", "offset", "--group", "above"))
+        )
         for group in ("servo", "a.hal", str(self.folder / "a.hal")):
-            self.assertTrue({"offset.in1", "shifted", "sine", "high"} <= set(columns("--group", group)), group)
-        self.assertEqual("hal record: --group: 'abov' is not a component, an instance, a thread or a netlist file with values; hal shell show all lists them\n",
-                         self.bad("record", "group.csv", "--group", "abov"))
-        self.assertEqual("hal record: --all has every --group; leave one out\n", self.bad("record", "group.csv", "--all", "--group", "above"))
+            self.assertTrue(
+                {"offset.in1", "shifted", "sine", "high"} <= set(columns("--group", group)), group
+            )
+        self.assertEqual(
+            "hal record: --group: 'abov' is not a component, an instance, a thread or a netlist file with values; hal shell show all lists them\n",
+            self.bad("record", "group.csv", "--group", "abov"),
+        )
+        self.assertEqual(
+            "hal record: --all has every --group; leave one out\n",
+            self.bad("record", "group.csv", "--all", "--group", "above"),
+        )
 
     def test_a_running_machine_is_recorded_without_a_sampler(self):
         out = self.good("record", "run.csv", "sine", "wave.*", "servo.missed", "--for", "300ms")
-        self.assertRegex(out, r"^run\.csv: \d+ rows of \d+ values, \d+\.\d kB(, \d+ rows? lost)?\n$")
+        self.assertRegex(
+            out, r"^run\.csv: \d+ rows of \d+ values, \d+\.\d kB(, \d+ rows? lost)?\n$"
+        )
         with open(self.folder / "run.csv", newline="") as file:
             rows = list(csv.DictReader(file))
         self.assertEqual(len(rows), int(out.split()[1]))
@@ -226,13 +356,19 @@ class Live(Case):
         self.assertIn(gaps - (missed[-1] - missed[0]), range(lost + 1))
         self.assertLessEqual(len(rows) + gaps, 300)
         if len(rows) + gaps < 300 and lost == 0:
-            self.assertGreater(int(self.value("servo.missed")), missed[-1], "the last periods were missed")
+            self.assertGreater(
+                int(self.value("servo.missed")), missed[-1], "the last periods were missed"
+            )
 
     def test_a_file_is_complete_after_ctrl_c(self):
         process = self.recorder("run.mcap", "--all")
         wait_until((self.folder / "run.mcap.part").exists, "the file is begun")
         self.shell("setp", "wave.amplitude", "2")
-        wait_until(lambda: (self.folder / "run.mcap.part").stat().st_size > 1000 or process.poll() is not None, "something is written")
+        wait_until(
+            lambda: (self.folder / "run.mcap.part").stat().st_size > 1000
+            or process.poll() is not None,
+            "something is written",
+        )
         out, err = self.end(process, signal.SIGINT)
         self.assertEqual((0, ""), (process.returncode, err))
         self.assertRegex(out, r"^run\.mcap: ")
@@ -244,25 +380,45 @@ class Live(Case):
         return (self.folder / name.replace(".mcap", ".svg")).read_bytes()
 
     def test_every_nth_cycle_and_rotation(self):
-        out = self.good("record", "run.csv", "sine", "--every", "10", "--for", "900ms", "--rotate", "300ms", "--keep", "2")
+        out = self.good(
+            "record",
+            "run.csv",
+            "sine",
+            "--every",
+            "10",
+            "--for",
+            "900ms",
+            "--rotate",
+            "300ms",
+            "--keep",
+            "2",
+        )
         self.assertGreaterEqual(len(out.splitlines()), 3)
         kept = sorted(path.name for path in self.folder.glob("run-*.csv"))
         self.assertEqual(2, len(kept), kept)
         times = self.times(kept[-1])
         # A row comes later when the machine misses its cycle; the others stay on the grid.
-        on_grid = collections.Counter(round(time * 1000) % 10 for time in times).most_common(1)[0][1]
+        on_grid = collections.Counter(round(time * 1000) % 10 for time in times).most_common(1)[0][
+            1
+        ]
         self.assertLessEqual(len(times) - on_grid, int(self.value("servo.missed")), times)
 
     def test_size_limit(self):
-        self.assertRegex(self.good("record", "run.csv", "sine", "--limit", "0.02"), r"^run\.csv: \d+ rows")
+        self.assertRegex(
+            self.good("record", "run.csv", "sine", "--limit", "0.02"), r"^run\.csv: \d+ rows"
+        )
 
     def test_a_flight_recorder_writes_at_a_trigger(self):
         self.shell("newsig", "crash", "bit")
-        process = self.recorder("box.csv", "sine", "--last", "200ms", "--after", "100ms", "--trigger", "crash")
+        process = self.recorder(
+            "box.csv", "sine", "--last", "200ms", "--after", "100ms", "--trigger", "crash"
+        )
         self.good("record", "wait.csv", "sine", "--for", "400ms")
         self.assertEqual([], list(self.folder.glob("box-*")))
         self.shell("sets", "crash", "TRUE")
-        name = wait_until(lambda: [path.name for path in self.folder.glob("box-*.csv")], "the trigger has written")[0]
+        name = wait_until(
+            lambda: [path.name for path in self.folder.glob("box-*.csv")], "the trigger has written"
+        )[0]
         self.assertRegex(name, r"^box-\d{8}T\d{6}Z-crash-001\.csv$")
         self.end(process, signal.SIGINT)
         times = self.times(name)
@@ -280,15 +436,31 @@ class Live(Case):
         def small():
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, resource.RLIM_INFINITY))
-        done = subprocess.run([str(HAL), "record", "run.mcap", "sine", "shifted"], env=self.environment, cwd=self.folder, preexec_fn=small, capture_output=True, text=True, timeout=60)
+
+        done = subprocess.run(
+            [str(HAL), "record", "run.mcap", "sine", "shifted"],
+            env=self.environment,
+            cwd=self.folder,
+            preexec_fn=small,
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
         self.assertEqual(1, done.returncode)
-        self.assertRegex(done.stderr, r"^hal record: cannot write 'run\.mcap': File too large; the file is complete up to there\n$")
+        self.assertRegex(
+            done.stderr,
+            r"^hal record: cannot write 'run\.mcap': File too large; the file is complete up to there\n$",
+        )
         self.good("plot", "run.mcap", "sine")
 
     def test_thousands_of_values_are_recorded_up_to_a_limit(self):
         def machine(name, count):
-            large = f"loadrt threads name1=servo period1=1000000\nloadrt siggen count={count}\n" + "".join(f"addf siggen.{i}.update servo\n" for i in range(count))
+            large = (
+                f"loadrt threads name1=servo period1=1000000\nloadrt siggen count={count}\n"
+                + "".join(f"addf siggen.{i}.update servo\n" for i in range(count))
+            )
             self.start("run", self.write(f"{name}.hal", large), "--name", name, instance=name)
+
         machine("big", 250)
         out = self.good("record", "big.csv", "--name", "big", "--all", "--for", "100ms")
         rows, values = int(out.split()[1]), int(out.split()[4])
@@ -296,15 +468,22 @@ class Live(Case):
         lost = int(out.split()[-3]) if "lost" in out else 0
         self.assertGreaterEqual(rows + lost, 80)
         machine("huge", 400)
-        self.assertRegex(self.bad("record", "huge.csv", "--name", "huge", "--all", "--for", "100ms"),
-                         r"^hal record: \d{4} values are more than 4096; name fewer, or type --group NAME\n$")
+        self.assertRegex(
+            self.bad("record", "huge.csv", "--name", "huge", "--all", "--for", "100ms"),
+            r"^hal record: \d{4} values are more than 4096; name fewer, or type --group NAME\n$",
+        )
 
     def test_two_recorders_do_not_share_a_file(self):
         for name in ("run.mcap", "run.csv"):
             first = self.recorder(name, "sine")
-            wait_until(lambda: any(path.stat().st_size > 0 for path in self.folder.glob(f"{name}*")), "the file is begun")
-            self.assertEqual(f"hal record: cannot write '{name}': another recorder is writing it; end that one, or name another file\n",
-                             self.bad("record", name, "sine", "--for", "100ms"))
+            wait_until(
+                lambda: any(path.stat().st_size > 0 for path in self.folder.glob(f"{name}*")),
+                "the file is begun",
+            )
+            self.assertEqual(
+                f"hal record: cannot write '{name}': another recorder is writing it; end that one, or name another file\n",
+                self.bad("record", name, "sine", "--for", "100ms"),
+            )
             out, err = self.end(first, signal.SIGINT)
             self.assertEqual((0, ""), (first.returncode, err))
             self.assertRegex(out, rf"^{re.escape(name)}: \d+ rows of 1 value")
@@ -312,14 +491,25 @@ class Live(Case):
 
     def test_what_a_killed_recorder_left_is_kept(self):
         left = self.recorder("run.mcap", "sine")
-        wait_until(lambda: (self.folder / "run.mcap.part").exists() and (self.folder / "run.mcap.part").stat().st_size > 3000, "a chunk is written")
+        wait_until(
+            lambda: (self.folder / "run.mcap.part").exists()
+            and (self.folder / "run.mcap.part").stat().st_size > 3000,
+            "a chunk is written",
+        )
         left.kill()
         left.communicate()
         before = (self.folder / "run.mcap.part").read_bytes()
         out = self.good("record", "run.mcap", "sine", "--for", "100ms")
-        self.assertTrue(out.startswith("'run.mcap.part' was left by a recorder that was killed; it is now 'run-unfinished-001.mcap'\n"), out)
+        self.assertTrue(
+            out.startswith(
+                "'run.mcap.part' was left by a recorder that was killed; it is now 'run-unfinished-001.mcap'\n"
+            ),
+            out,
+        )
         self.assertEqual(before, (self.folder / "run-unfinished-001.mcap").read_bytes())
-        self.assertIn("ends without a summary", self.run_program("plot", "run-unfinished-001.mcap").stderr)
+        self.assertIn(
+            "ends without a summary", self.run_program("plot", "run-unfinished-001.mcap").stderr
+        )
         self.assertIn("<svg", (self.folder / "run-unfinished-001.svg").read_text())
         self.assertFalse((self.folder / "run.mcap.part").exists())
 
@@ -327,9 +517,18 @@ class Live(Case):
         (self.folder / "folder.mcap").mkdir()
         os.mkfifo(self.folder / "pipe.mcap")
         for last in ([], ["--last", "10s"]):
-            self.assertEqual("hal record: cannot write 'nowhere/x.mcap': No such file or directory\n", self.bad("record", "nowhere/x.mcap", "sine", *last))
-            self.assertEqual("hal record: cannot write 'folder.mcap': it is a folder; name a file in it\n", self.bad("record", "folder.mcap", "sine", *last))
-            self.assertEqual("hal record: cannot write 'pipe.mcap': it is a pipe or a device; name a file\n", self.bad("record", "pipe.mcap", "sine", *last))
+            self.assertEqual(
+                "hal record: cannot write 'nowhere/x.mcap': No such file or directory\n",
+                self.bad("record", "nowhere/x.mcap", "sine", *last),
+            )
+            self.assertEqual(
+                "hal record: cannot write 'folder.mcap': it is a folder; name a file in it\n",
+                self.bad("record", "folder.mcap", "sine", *last),
+            )
+            self.assertEqual(
+                "hal record: cannot write 'pipe.mcap': it is a pipe or a device; name a file\n",
+                self.bad("record", "pipe.mcap", "sine", *last),
+            )
         self.assertTrue((self.folder / "pipe.mcap").is_fifo())
 
     def test_a_link_is_followed(self):
@@ -339,43 +538,84 @@ class Live(Case):
             self.good("record", name, "sine", "--for", "100ms")
             self.assertTrue((self.folder / name).is_symlink())
             self.assertGreater((self.folder / "big" / name).stat().st_size, 1000)
-        self.assertEqual(["run.csv", "run.mcap"], sorted(path.name for path in (self.folder / "big").iterdir()))
+        self.assertEqual(
+            ["run.csv", "run.mcap"], sorted(path.name for path in (self.folder / "big").iterdir())
+        )
 
     def test_the_machine_is_killed(self):
         process = self.recorder("run.mcap", "sine")
         wait_until((self.folder / "run.mcap.part").exists, "the file is begun")
         self.machine.kill()
         out, err = process.communicate(timeout=60)
-        self.assertEqual((1, "hal record: instance 'default' was killed; the file is complete up to there\n"), (process.returncode, err))
+        self.assertEqual(
+            (1, "hal record: instance 'default' was killed; the file is complete up to there\n"),
+            (process.returncode, err),
+        )
         self.assertRegex(out, r"^run\.mcap: \d+ rows? of 1 value")
 
     def test_a_trigger_that_never_fires_is_told(self):
         self.shell("newsig", "crash", "bit")
-        self.assertEqual("nothing was written: there was no fault, and 'crash' did not become TRUE or non-zero\n",
-                         self.good("record", "box.mcap", "sine", "--last", "1s", "--trigger", "crash", "--for", "200ms"))
+        self.assertEqual(
+            "nothing was written: there was no fault, and 'crash' did not become TRUE or non-zero\n",
+            self.good(
+                "record", "box.mcap", "sine", "--last", "1s", "--trigger", "crash", "--for", "200ms"
+            ),
+        )
         self.shell("sets", "crash", "TRUE")
-        self.assertEqual("nothing was written: there was no fault, and 'crash' was TRUE or non-zero all the time\n",
-                         self.good("record", "box.mcap", "sine", "--last", "1s", "--trigger", "crash", "--for", "200ms"))
-        self.assertEqual("nothing was written: there was no fault\n", self.good("record", "box.mcap", "sine", "--last", "1s", "--for", "200ms"))
+        self.assertEqual(
+            "nothing was written: there was no fault, and 'crash' was TRUE or non-zero all the time\n",
+            self.good(
+                "record", "box.mcap", "sine", "--last", "1s", "--trigger", "crash", "--for", "200ms"
+            ),
+        )
+        self.assertEqual(
+            "nothing was written: there was no fault\n",
+            self.good("record", "box.mcap", "sine", "--last", "1s", "--for", "200ms"),
+        )
 
     def test_a_disk_without_room_leaves_no_empty_file(self):
         def none():
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (20, resource.RLIM_INFINITY))
+
         for name, left in (("run.mcap", ""), ("run.csv", "; no row was written")):
-            done = subprocess.run([str(HAL), "record", name, "sine", "--for", "1s"], env=self.environment, cwd=self.folder, preexec_fn=none, capture_output=True, text=True, timeout=60)
-            self.assertEqual((1, "", f"hal record: cannot write '{name}': File too large{left}\n"), (done.returncode, done.stdout, done.stderr))
+            done = subprocess.run(
+                [str(HAL), "record", name, "sine", "--for", "1s"],
+                env=self.environment,
+                cwd=self.folder,
+                preexec_fn=none,
+                capture_output=True,
+                text=True,
+                timeout=60,
+            )
+            self.assertEqual(
+                (1, "", f"hal record: cannot write '{name}': File too large{left}\n"),
+                (done.returncode, done.stdout, done.stderr),
+            )
         self.assertEqual([], list(self.folder.glob("run.mcap*")))
 
     def test_words(self):
         self.assertIn("did you mean 'sine'?", self.bad("record", "run.mcap", "sin"))
         self.assertIn("matches 'zz*'", self.bad("record", "run.mcap", "zz*"))
         self.assertIn("missing names", self.bad("record", "run.mcap"))
-        self.assertIn("--trigger needs --last", self.bad("record", "run.mcap", "sine", "--trigger", "high"))
-        self.assertIn("--after needs --last TIME", self.bad("record", "run.mcap", "sine", "--after", "1s"))
-        self.assertIn("--keep needs --rotate TIME or --last TIME", self.bad("record", "run.mcap", "sine", "--keep", "2"))
-        self.assertIn("unknown format of 'run.txt'; name the file .mcap or .csv", self.bad("record", "run.txt", "sine"))
-        self.assertIn("--limit: -1 is negative; use 0 or more", self.bad("record", "run.mcap", "sine", "--limit", "-1"))
+        self.assertIn(
+            "--trigger needs --last", self.bad("record", "run.mcap", "sine", "--trigger", "high")
+        )
+        self.assertIn(
+            "--after needs --last TIME", self.bad("record", "run.mcap", "sine", "--after", "1s")
+        )
+        self.assertIn(
+            "--keep needs --rotate TIME or --last TIME",
+            self.bad("record", "run.mcap", "sine", "--keep", "2"),
+        )
+        self.assertIn(
+            "unknown format of 'run.txt'; name the file .mcap or .csv",
+            self.bad("record", "run.txt", "sine"),
+        )
+        self.assertIn(
+            "--limit: -1 is negative; use 0 or more",
+            self.bad("record", "run.mcap", "sine", "--limit", "-1"),
+        )
         self.assertIn("for a sampler", self.bad("record", "run.mcap", "sine", "--tag"))
         self.assertIn("No such file or directory", self.bad("record", "nowhere/run.mcap", "sine"))
 

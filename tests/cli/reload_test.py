@@ -94,13 +94,33 @@ def compiled(folder, name, text, language="c++"):
     source.write_text(text)
     library = folder / f"{name}.so"
     standard = ["-x", "c", "-std=c11"] if language == "c" else ["-std=c++20"]
-    subprocess.run([COMPILER, *standard, "-O1", "-fPIC", "-shared", "-fvisibility=hidden", *([] if "clang" in COMPILER else ["-fno-gnu-unique"]), f"-I{ROOT}/runtime/abi", f"-I{ROOT}/runtime/sdk",
-                    f"-Wl,--version-script={ROOT}/cmake/plugin.map", str(source), "-o", str(library)], check=True)
+    subprocess.run(
+        [
+            COMPILER,
+            *standard,
+            "-O1",
+            "-fPIC",
+            "-shared",
+            "-fvisibility=hidden",
+            *([] if "clang" in COMPILER else ["-fno-gnu-unique"]),
+            f"-I{ROOT}/runtime/abi",
+            f"-I{ROOT}/runtime/sdk",
+            f"-Wl,--version-script={ROOT}/cmake/plugin.map",
+            str(source),
+            "-o",
+            str(library),
+        ],
+        check=True,
+    )
     return library
 
 
 def counter(formula="in * gain", members="", function="", **replace):
-    text = COUNTER.replace("FORMULA", formula).replace("MEMBERS", members).replace("FUNCTION", function)
+    text = (
+        COUNTER.replace("FORMULA", formula)
+        .replace("MEMBERS", members)
+        .replace("FUNCTION", function)
+    )
     for old, new in replace.values():
         text = text.replace(old, new)
     return text
@@ -115,14 +135,32 @@ class Reload(Case):
         cls.addClassCleanup(shutil.rmtree, cls.built, True)
         texts = {
             "first": counter(members='hal::Param<double> old{*this, "old", "goes"};'),
-            "second": counter("in * gain * 10 + offset", 'hal::In<double> extra{*this, "extra", "new", {.initial = 7.0}};'),
-            "retyped": counter("in", t=("hal::Out<double> out", "hal::Out<std::int32_t> out"), f=("out = in", "out = 1")),
-            "turned": counter("in", t=("hal::Out<double> out{*this, \"out\", \"the output\", {.safe = -1.0}}", "hal::In<double> out{*this, \"out\", \"the output\"}"), f=("out = in;", "")),
+            "second": counter(
+                "in * gain * 10 + offset",
+                'hal::In<double> extra{*this, "extra", "new", {.initial = 7.0}};',
+            ),
+            "retyped": counter(
+                "in",
+                t=("hal::Out<double> out", "hal::Out<std::int32_t> out"),
+                f=("out = in", "out = 1"),
+            ),
+            "turned": counter(
+                "in",
+                t=(
+                    'hal::Out<double> out{*this, "out", "the output", {.safe = -1.0}}',
+                    'hal::In<double> out{*this, "out", "the output"}',
+                ),
+                f=("out = in;", ""),
+            ),
             "renamed": counter(function="step"),
-            "stubborn": counter(members='int no = [] { throw std::runtime_error("not today"); return 0; }();'),
+            "stubborn": counter(
+                members='int no = [] { throw std::runtime_error("not today"); return 0; }();'
+            ),
             "unasked": counter(t=('hal::Argument offset{*this, "offset", 0, "added"};', "")),
             "state1": STATE.replace("STEP", "1").replace("OTHER", "double").replace("ZERO", "0.5"),
-            "state2": STATE.replace("STEP", "1000").replace("OTHER", "std::int32_t").replace("ZERO", "7"),
+            "state2": STATE.replace("STEP", "1000")
+            .replace("OTHER", "std::int32_t")
+            .replace("ZERO", "7"),
             "owner1": OWNER.replace("VERSION", "1").replace("FAILS", "false"),
             "owner2": OWNER.replace("VERSION", "2").replace("FAILS", "false"),
             "failing": OWNER.replace("VERSION", "3").replace("FAILS", "true"),
@@ -172,10 +210,17 @@ class Reload(Case):
         first = self.mapped(machine)
         self.assertEqual(1, len(first))
         self.install("second")
-        self.assertEqual("6", self.value("p.out"), "a file that was written over changes nothing by itself")
+        self.assertEqual(
+            "6", self.value("p.out"), "a file that was written over changes nothing by itself"
+        )
         self.say("reload", "part")
-        wait_until(lambda: self.value("adder.out") == "65", "the new version runs, with its load argument, in its old place")
-        self.assertEqual(["3", "2", "7"], [self.value(name) for name in ("p.gain", "p.in", "p.extra")])
+        wait_until(
+            lambda: self.value("adder.out") == "65",
+            "the new version runs, with its load argument, in its old place",
+        )
+        self.assertEqual(
+            ["3", "2", "7"], [self.value(name) for name in ("p.gain", "p.in", "p.extra")]
+        )
         self.assertEqual(re.sub("setp p.old .*\n", "", saved), self.saved("all"))
         second = self.mapped(machine)
         self.assertEqual(1, len(second), "the old version is unloaded")
@@ -186,8 +231,11 @@ class Reload(Case):
         self.assertEqual("7", self.value("p.extra"))
 
     def test_no_cycle_is_lost_or_repeated(self):
-        self.machine("first", "newthread servo 1000000\nloadrt part names=p\nloadrt sampler cfg=s depth=100000\naddf p servo\naddf sampler.0 servo\n"
-                              "net c p.count => sampler.0.pin.0\nstart\n")
+        self.machine(
+            "first",
+            "newthread servo 1000000\nloadrt part names=p\nloadrt sampler cfg=s depth=100000\naddf p servo\naddf sampler.0 servo\n"
+            "net c p.count => sampler.0.pin.0\nstart\n",
+        )
         for i in range(20):
             self.install("second" if i % 2 == 0 else "first")
             self.say("reload", "part")
@@ -199,19 +247,23 @@ class Reload(Case):
 
     def test_what_is_linked_or_in_a_thread_must_stay(self):
         self.machine()
-        for version, words in {"retyped": "pin 'p.out' has type s32 in the new version, but is linked to signal 'result'",
-                               "turned": "pin 'p.out' has direction IN in the new version, not OUT",
-                               "renamed": "function 'p' is missing in the new version, but is in thread 'servo'",
-                               "stubborn": "cannot make 'p': not today",
-                               "unasked": "component 'part' has no argument 'offset'",
-                               "other": "it was built for version 2 of the component interface, this runtime has 1"}.items():
+        for version, words in {
+            "retyped": "pin 'p.out' has type s32 in the new version, but is linked to signal 'result'",
+            "turned": "pin 'p.out' has direction IN in the new version, not OUT",
+            "renamed": "function 'p' is missing in the new version, but is in thread 'servo'",
+            "stubborn": "cannot make 'p': not today",
+            "unasked": "component 'part' has no argument 'offset'",
+            "other": "it was built for version 2 of the component interface, this runtime has 1",
+        }.items():
             with self.subTest(version):
                 self.install(version)
                 self.assertIn(words, self.refused("reload", "part"))
         wait_until(lambda: self.value("p.out") == "6", "the first version runs on")
         self.install("retyped")
         self.say("-e", "begin", "-e", "unlinkp p.out", "-e", "reload part", "-e", "commit")
-        wait_until(lambda: self.value("p.out") == "1", "with the pin off its signal it can be replaced")
+        wait_until(
+            lambda: self.value("p.out") == "1", "with the pin off its signal it can be replaced"
+        )
 
     def test_a_value_that_is_lost_is_named(self):
         self.machine()
@@ -219,35 +271,60 @@ class Reload(Case):
         self.install("second")
         done = self.shell("reload", "part")
         self.assertEqual(0, done.returncode)
-        self.assertIn("warning: parameter 'p.old' is missing in the new version: its value is lost [reload-dropped]", done.stderr)
+        self.assertIn(
+            "warning: parameter 'p.old' is missing in the new version: its value is lost [reload-dropped]",
+            done.stderr,
+        )
 
     def test_who_owns_something_gives_it_back_first(self):
         owned = self.folder / "owned"
-        self.machine("owner1", f"newthread servo 1000000\nloadrt part names=p file={owned}\naddf p servo\nloadrt sum2\naddf sum2.0 servo\nstart\n")
+        self.machine(
+            "owner1",
+            f"newthread servo 1000000\nloadrt part names=p file={owned}\naddf p servo\nloadrt sum2\naddf sum2.0 servo\nstart\n",
+        )
         wait_until(lambda: self.value("p.version") == "1", "it runs")
         self.install("owner2")
         self.say("reload", "part")
         wait_until(lambda: self.value("p.version") == "2", "the second has it")
         self.install("failing")
-        self.assertIn("'p' (part) cannot start in its new version: it does not like it", self.refused("reload", "part"))
+        self.assertIn(
+            "'p' (part) cannot start in its new version: it does not like it",
+            self.refused("reload", "part"),
+        )
         self.assertTrue(owned.exists())
         wait_until(lambda: self.value("p.version") == "2", "the second runs again")
 
     def test_names_that_are_not_components(self):
         self.machine()
-        self.assertIn("an instance; a component is reloaded with all its instances", self.refused("reload", "p"))
-        self.assertIn("component 'prat' is not loaded; did you mean 'part'?".split(";")[0], self.refused("reload", "prat"))
-        self.assertIn("belongs to the runtime" if "threads" in self.say("list", "comp") else "is not loaded", self.refused("reload", "threads"))
+        self.assertIn(
+            "an instance; a component is reloaded with all its instances",
+            self.refused("reload", "p"),
+        )
+        self.assertIn(
+            "component 'prat' is not loaded; did you mean 'part'?".split(";")[0],
+            self.refused("reload", "prat"),
+        )
+        self.assertIn(
+            "belongs to the runtime" if "threads" in self.say("list", "comp") else "is not loaded",
+            self.refused("reload", "threads"),
+        )
 
     def test_completion_knows_what_can_be_reloaded_and_which_arguments_there_are(self):
         self.machine()
-        complete = lambda line: self.good("-C", name="halcmd", environment={"COMP_LINE": "halcmd " + line, "COMP_POINT": ""}).split()
+        complete = lambda line: self.good(
+            "-C", name="halcmd", environment={"COMP_LINE": "halcmd " + line, "COMP_POINT": ""}
+        ).split()
         self.assertEqual(["part", "sum2"], complete("reload "))
-        self.assertEqual(["count=", "names=", "num_chan=", "offset=", "personality="], complete("loadrt part "))
+        self.assertEqual(
+            ["count=", "names=", "num_chan=", "offset=", "personality="], complete("loadrt part ")
+        )
 
     def test_streams_and_statistics_survive(self):
         self.install("first")
-        self.machine("first", "newthread servo 1000000\nloadrt part names=p\nloadrt sampler cfg=s depth=4000\naddf p servo\naddf sampler.0 servo\nnet c p.count => sampler.0.pin.0\nstart\n")
+        self.machine(
+            "first",
+            "newthread servo 1000000\nloadrt part names=p\nloadrt sampler cfg=s depth=4000\naddf p servo\naddf sampler.0 servo\nnet c p.count => sampler.0.pin.0\nstart\n",
+        )
         wait_until(lambda: int(self.value("p.count")) > 10, "it counts")
         self.install("second")
         self.say("reload", "part")
@@ -258,15 +335,27 @@ class Reload(Case):
 
     def test_declared_state_is_carried_over_where_name_and_type_match(self):
         self.install("state1")
-        path = self.write("m.hal", "loadrt threads name1=servo period1=1000000\nloadrt part names=p\naddf p servo\nstart\nadvance 10 cycles\n"
-                          f"getp p.sum\ngetp p.other\nloadusr -w cp {self.versions['state2']} {self.plugins}/part.so\n"
-                          "reload part\nadvance 3 cycles\ngetp p.sum\ngetp p.other\ngetp p.cycles\n")
+        path = self.write(
+            "m.hal",
+            "loadrt threads name1=servo period1=1000000\nloadrt part names=p\naddf p servo\nstart\nadvance 10 cycles\n"
+            f"getp p.sum\ngetp p.other\nloadusr -w cp {self.versions['state2']} {self.plugins}/part.so\n"
+            "reload part\nadvance 3 cycles\ngetp p.sum\ngetp p.other\ngetp p.cycles\n",
+        )
         self.assertEqual("10\n10.5\n3010\n10\n13\n", self.good("sim", path))
-        self.assertIn("is read-only: only its component sets it", self.bad("sim", "-q", self.write("w.hal", "loadrt part names=p\nsetp p.sum 1\n")))
+        self.assertIn(
+            "is read-only: only its component sets it",
+            self.bad("sim", "-q", self.write("w.hal", "loadrt part names=p\nsetp p.sum 1\n")),
+        )
 
     def test_no_cycle_of_declared_state_is_lost_in_a_running_machine(self):
         self.install("state1")
-        self.start("run", self.write("m.hal", "newthread servo 1000000\nloadrt part names=p\naddf p servo\nnet c p.cycles\nstart\n"))
+        self.start(
+            "run",
+            self.write(
+                "m.hal",
+                "newthread servo 1000000\nloadrt part names=p\naddf p servo\nnet c p.cycles\nstart\n",
+            ),
+        )
         for _ in range(20):
             before = int(self.value("p.cycles"))
             self.install("state1")
@@ -277,8 +366,12 @@ class Reload(Case):
 
     def test_a_machine_that_reloads_itself_under_the_virtual_clock(self):
         self.install("first")
-        path = self.write("m.hal", NETLIST + f"advance 10 cycles\ngetp p.out\nloadusr -w cp {self.versions['second']} {self.plugins}/part.so\n"
-                          "reload part\ngetp p.out\nadvance 1 cycles\ngetp p.out\ngetp p.count\n")
+        path = self.write(
+            "m.hal",
+            NETLIST
+            + f"advance 10 cycles\ngetp p.out\nloadusr -w cp {self.versions['second']} {self.plugins}/part.so\n"
+            "reload part\ngetp p.out\nadvance 1 cycles\ngetp p.out\ngetp p.count\n",
+        )
         self.assertEqual("6\n6\n65\n11\n", self.good("sim", path))
 
 

@@ -47,7 +47,10 @@ class Run(Case):
     def test_ini_file_lists_netlists(self):
         self.write("one.hal", SERVO)
         self.write("two.hal", "setp adder.in0 [VALUES]IN0\n")
-        ini = self.write("machine.ini", "[HAL]\nHALFILE = one.hal\nHALFILE = two.hal\nHALCMD = setp adder.in1 1\n[VALUES]\nIN0 = 20\n")
+        ini = self.write(
+            "machine.ini",
+            "[HAL]\nHALFILE = one.hal\nHALFILE = two.hal\nHALCMD = setp adder.in1 1\n[VALUES]\nIN0 = 20\n",
+        )
         self.start("run", ini)
         wait_until(lambda: self.shell("gets", "total").stdout == "21\n", "the sum is there")
 
@@ -69,7 +72,9 @@ class End(Case):
         text = (self.folder / "end.txt").read_text()
         self.assertIn("emergency\n", text)
         self.assertTrue(text.endswith("stop out=-1\n"), text)
-        self.assertEqual([], [p.name for p in (self.folder / "halcyon").iterdir() if p.suffix == ".sock"])
+        self.assertEqual(
+            [], [p.name for p in (self.folder / "halcyon").iterdir() if p.suffix == ".sock"]
+        )
 
     def test_interrupt_leaves_outputs_safe(self):
         self.ended_by(lambda machine: machine.send_signal(signal.SIGINT))
@@ -84,6 +89,7 @@ class End(Case):
         def twice(machine):
             machine.send_signal(signal.SIGINT)
             machine.send_signal(signal.SIGINT)
+
         self.ended_by(twice)
 
     def test_halrun_u_ends_it(self):
@@ -153,19 +159,25 @@ class Picture(Case):
         self.assertNotIn("\033[?25l", terminal.seen)
 
     def test_axis_is_drawn(self):
-        terminal = Terminal(self, "run", self.write("a.hal", FURUTA_SIGNALS.replace("arm-angle", "axis-position")))
+        terminal = Terminal(
+            self, "run", self.write("a.hal", FURUTA_SIGNALS.replace("arm-angle", "axis-position"))
+        )
         terminal.expect("position ")
         os.kill(terminal.process, signal.SIGTERM)
         self.assertEqual(0, terminal.wait())
 
     def test_not_without_unicode(self):
-        terminal = Terminal(self, "run", self.write("a.hal", FURUTA_SIGNALS), environment={"LC_ALL": "C"})
+        terminal = Terminal(
+            self, "run", self.write("a.hal", FURUTA_SIGNALS), environment={"LC_ALL": "C"}
+        )
         frame = terminal.expect("missed")
         self.assertIn("arm, from above", frame)
         self.assertNotIn("⠀", frame)
 
     def test_disabled_by_option(self):
-        terminal = Terminal(self, "run", "--no-picture", "--for", "100ms", self.write("a.hal", FURUTA_SIGNALS))
+        terminal = Terminal(
+            self, "run", "--no-picture", "--for", "100ms", self.write("a.hal", FURUTA_SIGNALS)
+        )
         self.assertEqual(0, terminal.wait())
         self.assertNotIn("from above", terminal.seen)
 

@@ -22,8 +22,15 @@ RUNS = 3
 class Scaling(Case):
     def cost(self, *words):
         """Processor time of a run of hal, in seconds."""
-        process = subprocess.Popen(["hal", *map(str, words)], executable=str(HAL), cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
-                                   stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        process = subprocess.Popen(
+            ["hal", *map(str, words)],
+            executable=str(HAL),
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+        )
         error = process.stderr.read()
         process.stderr.close()
         _, status, usage = os.wait4(process.pid, 0)
@@ -35,27 +42,54 @@ class Scaling(Case):
         """`measure(n)` gives seconds of processor time."""
         base, small, large = (min(measure(n) for _ in range(RUNS)) for n in (1, most // 4, most))
         ratio = (large - base) / max(small - base, 0.05)  # the clock's ticks are 0.01 s
-        print(f"{what}: {most // 4} {small - base:.2f} s, {most} {large - base:.2f} s, ratio {ratio:.1f}", flush=True)
+        print(
+            f"{what}: {most // 4} {small - base:.2f} s, {most} {large - base:.2f} s, ratio {ratio:.1f}",
+            flush=True,
+        )
         self.assertLess(ratio, LIMIT, what)
 
     def test_check_of_many_instances(self):
         def measure(n):
-            return self.cost("check", self.write("a.hal", f"loadrt threads name1=servo period1=1000000\nloadrt and2 count={n}\n"
-                                                          + "".join(f"addf and2.{i} servo\n" for i in range(n))))
+            return self.cost(
+                "check",
+                self.write(
+                    "a.hal",
+                    f"loadrt threads name1=servo period1=1000000\nloadrt and2 count={n}\n"
+                    + "".join(f"addf and2.{i} servo\n" for i in range(n)),
+                ),
+            )
+
         self.compare("check", measure)
 
     def test_instances_in_a_chain_of_nets(self):
         def measure(n):
-            return self.cost("check", self.write("a.hal", f"loadrt threads name1=servo period1=1000000\nloadrt not count={n}\n"
-                                                          + "".join(f"addf not.{i} servo\n" for i in range(n))
-                                                          + "".join(f"net s{i} not.{i}.out => not.{i + 1}.in\n" for i in range(n - 1))))
+            return self.cost(
+                "check",
+                self.write(
+                    "a.hal",
+                    f"loadrt threads name1=servo period1=1000000\nloadrt not count={n}\n"
+                    + "".join(f"addf not.{i} servo\n" for i in range(n))
+                    + "".join(f"net s{i} not.{i}.out => not.{i + 1}.in\n" for i in range(n - 1)),
+                ),
+            )
+
         self.compare("nets", measure)
 
     def test_addf_auto_of_many_functions(self):
         def measure(n):
-            return self.cost("sim", "-q", self.write("a.hal", f"loadrt threads name1=servo period1=1000000\nloadrt not count={n}\n"
-                                                              + "".join(f"net s{i} not.{i}.out => not.{i + 1}.in\n" for i in range(n - 2, -1, -1))
-                                                              + "addf --auto servo\n"))
+            return self.cost(
+                "sim",
+                "-q",
+                self.write(
+                    "a.hal",
+                    f"loadrt threads name1=servo period1=1000000\nloadrt not count={n}\n"
+                    + "".join(
+                        f"net s{i} not.{i}.out => not.{i + 1}.in\n" for i in range(n - 2, -1, -1)
+                    )
+                    + "addf --auto servo\n",
+                ),
+            )
+
         self.compare("addf --auto", measure)
 
     def test_one_request_with_many_pins(self):
@@ -64,7 +98,11 @@ class Scaling(Case):
             stat = Path(f"/proc/{machine.pid}/task")
 
             def used():  # in nanoseconds
-                return {task: int((task / "schedstat").read_text().split()[0]) for task in stat.iterdir()}
+                return {
+                    task: int((task / "schedstat").read_text().split()[0])
+                    for task in stat.iterdir()
+                }
+
             client = socket.socket(socket.AF_UNIX)
             client.settimeout(120)
             client.connect(str(self.folder / "halcyon/default.sock"))
@@ -81,6 +119,7 @@ class Scaling(Case):
             client.close()
             self.end(machine)
             return cost
+
         self.compare("pins of a request", measure)
 
 

@@ -52,21 +52,36 @@ class Plan(Case):
     def test_plan(self):
         self.write("robot.scocan", ROBOT)
         text = self.good("scocan", "plan", "robot.scocan")
-        self.assertIn("cycle 10 ms, 20 slots of 500 us at 1000000 bit/s; guard 4 us, idle 16 us; CRC ", text)
+        self.assertIn(
+            "cycle 10 ms, 20 slots of 500 us at 1000000 bit/s; guard 4 us, idle 16 us; CRC ", text
+        )
         self.assertIn("|.b.................\n| SYNC, . shared, b motor\n", text)
-        self.assertIn("frames of 8 bytes in a shared slot: 3; in an idle private slot: 3 by nodes of type A, 2 by type B\n", text)
-        self.assertIn("0x10A position: 10.000 to the next turn of its slot + 0.004 guard + 0.135 frame = 10.139 ms\n", text)
+        self.assertIn(
+            "frames of 8 bytes in a shared slot: 3; in an idle private slot: 3 by nodes of type A, 2 by type B\n",
+            text,
+        )
+        self.assertIn(
+            "0x10A position: 10.000 to the next turn of its slot + 0.004 guard + 0.135 frame = 10.139 ms\n",
+            text,
+        )
         plan = json.loads(self.good("scocan", "plan", "robot.scocan", "--json"))
         self.assertTrue(plan["fits"])
         position = next(m for m in plan["messages"] if m["name"] == "position")
-        self.assertEqual((True, 10139000, 4000), (position["private"], position["worst_ns"], position["jitter_ns"]))
+        self.assertEqual(
+            (True, 10139000, 4000),
+            (position["private"], position["worst_ns"], position["jitter_ns"]),
+        )
         self.assertGreater(position["plain_jitter_ns"], 100_000)
         for m in plan["messages"]:
             self.assertIn(f"= {m['worst_ns'] / 1e6:.3f} ms\n", text)
         fast = json.loads(self.good("scocan", "plan", "robot.scocan", "--json", "--mode", "fast"))
-        self.assertEqual(5139000, next(m for m in fast["messages"] if m["name"] == "position")["worst_ns"])
-        self.assertEqual("hal scocan plan: unknown mode 'slow'; modes of robot.scocan: 0 (run), 1 (fast)\n",
-                         self.bad("scocan", "plan", "robot.scocan", "--mode", "slow"))
+        self.assertEqual(
+            5139000, next(m for m in fast["messages"] if m["name"] == "position")["worst_ns"]
+        )
+        self.assertEqual(
+            "hal scocan plan: unknown mode 'slow'; modes of robot.scocan: 0 (run), 1 (fast)\n",
+            self.bad("scocan", "plan", "robot.scocan", "--mode", "slow"),
+        )
 
     def test_picture(self):
         self.write("robot.scocan", ROBOT)
@@ -75,13 +90,18 @@ class Plan(Case):
         xml.etree.ElementTree.fromstring(picture)
         self.assertIn("0x10A position", picture)
         self.assertEqual(picture, self.good("scocan", "plan", "robot.scocan", "--svg", "-"))
-        self.assertEqual("hal scocan plan: --json and --svg exclude each other\n",
-                         self.bad("scocan", "plan", "robot.scocan", "--json", "--svg", "robot.svg"))
+        self.assertEqual(
+            "hal scocan plan: --json and --svg exclude each other\n",
+            self.bad("scocan", "plan", "robot.scocan", "--json", "--svg", "robot.svg"),
+        )
 
     def test_what_cannot_work(self):
         self.write("robot.scocan", ROBOT.replace("1M", "250k"))
-        self.assertIn("robot.scocan:7:1: error: slot 2 is too short for 0x10A: 8 bytes take 135 bits + 20 bits for an error at 250000 bit/s, with the guard of "
-                      "13 us 633 us; the slot has 500 us [scocan-", self.bad("scocan", "plan", "robot.scocan"))
+        self.assertIn(
+            "robot.scocan:7:1: error: slot 2 is too short for 0x10A: 8 bytes take 135 bits + 20 bits for an error at 250000 bit/s, with the guard of "
+            "13 us 633 us; the slot has 500 us [scocan-",
+            self.bad("scocan", "plan", "robot.scocan"),
+        )
         self.write("robot.scocan", ROBOT + "message flood 0x311 node sonar event 200us\n")
         done = self.run_program("scocan", "plan", "robot.scocan")
         self.assertEqual(1, done.returncode)
@@ -91,17 +111,30 @@ class Plan(Case):
         self.write("robot.scocan", ROBOT.replace("period 10ms fields", "period 3ms fields"))
         done = self.run_program("scocan", "plan", "robot.scocan")
         self.assertEqual(1, done.returncode)
-        self.assertEqual("robot.scocan:13: 0x10A position: 10.000 to the next turn of its slot + 0.004 guard + 0.135 frame = 10.139 ms, "
-                         "period 3.000 ms is shorter than 10.000 ms between two turns\n"
-                         "  = help: give it more private slots, a shorter cycle, or a longer period and deadline\n", done.stderr)
-        self.write("robot.scocan", ROBOT.replace("period 10ms fields", "period 10ms deadline 8ms fields"))
-        self.assertEqual("robot.scocan:13: 0x10A position: 10.000 to the next turn of its slot + 0.004 guard + 0.135 frame = 10.139 ms, "
-                         "deadline 8.000 ms\n"
-                         "  = help: give it more private slots, a shorter cycle, or a longer period and deadline\n",
-                         self.run_program("scocan", "plan", "robot.scocan").stderr)
+        self.assertEqual(
+            "robot.scocan:13: 0x10A position: 10.000 to the next turn of its slot + 0.004 guard + 0.135 frame = 10.139 ms, "
+            "period 3.000 ms is shorter than 10.000 ms between two turns\n"
+            "  = help: give it more private slots, a shorter cycle, or a longer period and deadline\n",
+            done.stderr,
+        )
+        self.write(
+            "robot.scocan", ROBOT.replace("period 10ms fields", "period 10ms deadline 8ms fields")
+        )
+        self.assertEqual(
+            "robot.scocan:13: 0x10A position: 10.000 to the next turn of its slot + 0.004 guard + 0.135 frame = 10.139 ms, "
+            "deadline 8.000 ms\n"
+            "  = help: give it more private slots, a shorter cycle, or a longer period and deadline\n",
+            self.run_program("scocan", "plan", "robot.scocan").stderr,
+        )
         self.write("robot.scocan", ROBOT.replace("fields a:s32", "fields send:s32"))
-        self.assertIn("robot.scocan:13:43: error: reserved field name 'send' [scocan-", self.bad("scocan", "plan", "robot.scocan"))
-        self.assertEqual("hal scocan plan: cannot read 'none.scocan': No such file or directory\n", self.bad("scocan", "plan", "none.scocan"))
+        self.assertIn(
+            "robot.scocan:13:43: error: reserved field name 'send' [scocan-",
+            self.bad("scocan", "plan", "robot.scocan"),
+        )
+        self.assertEqual(
+            "hal scocan plan: cannot read 'none.scocan': No such file or directory\n",
+            self.bad("scocan", "plan", "none.scocan"),
+        )
 
 
 class Processes(Case):
@@ -109,13 +142,26 @@ class Processes(Case):
         place = random.Random(os.urandom(8))
         bus = f"udp:239.{place.randrange(1, 255)}.{place.randrange(256)}.{place.randrange(1, 255)}%lo:{place.randrange(20000, 60000)}"
         self.write("slow.scocan", SLOW)
-        for name, component, instance in (("clock", "scocan_sync", "scocan-sync.0"), ("motor", "scocan", "scocan.0")):
-            self.write(f"{name}.hal", NETLIST.format(component=component, bus=bus, node=name, instance=instance))
+        for name, component, instance in (
+            ("clock", "scocan_sync", "scocan-sync.0"),
+            ("motor", "scocan", "scocan.0"),
+        ):
+            self.write(
+                f"{name}.hal",
+                NETLIST.format(component=component, bus=bus, node=name, instance=instance),
+            )
             self.start("run", f"{name}.hal", "--name", name, instance=name)
-        wait_until(lambda: self.value("scocan.0.running", "motor") == "TRUE", "the node follows the SYNC")
+        wait_until(
+            lambda: self.value("scocan.0.running", "motor") == "TRUE", "the node follows the SYNC"
+        )
         self.shell("setp", "scocan.0.position.a", "-42", instance="motor")
-        wait_until(lambda: self.value("scocan-sync.0.position.a", "clock") == "-42", "the message arrives")
-        wait_until(lambda: int(self.value("scocan.0.lamp.received", "motor")) > 2, "the shared message arrives")
+        wait_until(
+            lambda: self.value("scocan-sync.0.position.a", "clock") == "-42", "the message arrives"
+        )
+        wait_until(
+            lambda: int(self.value("scocan.0.lamp.received", "motor")) > 2,
+            "the shared message arrives",
+        )
         self.assertEqual("TRUE", self.value("scocan-sync.0.leading", "clock"))
 
 

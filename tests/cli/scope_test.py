@@ -42,19 +42,27 @@ class Files(Case):
         return rows[0], [[float(value) if value else None for value in row] for row in rows[1:]]
 
     def test_a_record_lies_around_the_rising_edge(self):
-        names, rows = self.table("square", "sine", "--trigger", "square > 0", "--pre", "5ms", "--post", "10ms")
+        names, rows = self.table(
+            "square", "sine", "--trigger", "square > 0", "--pre", "5ms", "--post", "10ms"
+        )
         self.assertEqual(["time_s", "square", "sine"], names)
         self.assertEqual(15, len(rows))
         before = [row[1] for row in rows if row[0] < 0]
         self.assertEqual([-2] * 5, before)
         self.assertEqual(2, next(row[1] for row in rows if row[0] > 0))
         times = [row[0] for row in rows]
-        self.assertTrue(all(abs(b - a - 0.001) < 1e-9 for a, b in zip(times, times[1:])), "no sample is missing")
+        self.assertTrue(
+            all(abs(b - a - 0.001) < 1e-9 for a, b in zip(times, times[1:])), "no sample is missing"
+        )
 
     def test_falling_magnitude_bit_and_level_triggers(self):
-        for trigger, check in (("square < 0", lambda before, after: before > 0 > after), ("|sine| > 1.5", lambda before, after: abs(before) < 1.5 <= abs(after)),
-                               ("high", lambda before, after: (before, after) == (0, 1)), ("!high", lambda before, after: (before, after) == (1, 0)),
-                               ("level sine > 1", lambda before, after: after >= 1)):
+        for trigger, check in (
+            ("square < 0", lambda before, after: before > 0 > after),
+            ("|sine| > 1.5", lambda before, after: abs(before) < 1.5 <= abs(after)),
+            ("high", lambda before, after: (before, after) == (0, 1)),
+            ("!high", lambda before, after: (before, after) == (1, 0)),
+            ("level sine > 1", lambda before, after: after >= 1),
+        ):
             source = re.search(r"square|sine|high", trigger)[0]
             _, rows = self.table(source, "--trigger", trigger, "--pre", "5ms", "--post", "5ms")
             before = [row[1] for row in rows if row[0] < 0][-1]
@@ -70,13 +78,30 @@ class Files(Case):
         self.assertEqual(5, len(rows))
 
     def test_measurements_and_picture(self):
-        out = self.good("scope", "square", "sine", "--trigger", "sine > 0", "--pre", "50ms", "--post", "150ms", "--svg", "wave.svg")
+        out = self.good(
+            "scope",
+            "square",
+            "sine",
+            "--trigger",
+            "sine > 0",
+            "--pre",
+            "50ms",
+            "--post",
+            "150ms",
+            "--svg",
+            "wave.svg",
+        )
         row = next(line.split() for line in out.splitlines()[1:] if line.startswith("sine"))
         self.assertEqual("sine > 0", out.splitlines()[0])
         self.assertAlmostEqual(50, float(row[6]), delta=2.5)  # Hz; a busy host takes cycles from it
-        self.assertAlmostEqual(2 ** 0.5, float(row[5]), delta=0.02)  # rms
+        self.assertAlmostEqual(2**0.5, float(row[5]), delta=0.02)  # rms
         picture = (self.folder / "wave.svg").read_text()
-        for text in (">sine > 0<".replace("> 0", "&gt; 0"), ">square<", "time [ms], 0: trigger", "frequency"):
+        for text in (
+            ">sine > 0<".replace("> 0", "&gt; 0"),
+            ">square<",
+            "time [ms], 0: trigger",
+            "frequency",
+        ):
             self.assertIn(text, picture)
 
     @unittest.skipUnless(shutil.which("rsvg-convert"), "librsvg2-bin is not installed")
@@ -85,9 +110,14 @@ class Files(Case):
         self.assertEqual(b"\x89PNG\r\n\x1a\n", (self.folder / "wave.png").read_bytes()[:8])
 
     def test_png_without_rsvg_names_the_package(self):
-        error = self.bad("scope", "sine", "--png", "wave.png", environment={"PATH": str(self.folder)})
-        self.assertEqual("hal scope: cannot draw 'wave.png': cannot find the program rsvg-convert; type: sudo apt install librsvg2-bin "
-                         "(or write a .svg file: --svg FILE)\n", error)
+        error = self.bad(
+            "scope", "sine", "--png", "wave.png", environment={"PATH": str(self.folder)}
+        )
+        self.assertEqual(
+            "hal scope: cannot draw 'wave.png': cannot find the program rsvg-convert; type: sudo apt install librsvg2-bin "
+            "(or write a .svg file: --svg FILE)\n",
+            error,
+        )
 
     def test_without_a_file_the_picture_is_printed(self):
         out = self.good("scope", "sine", "--trigger", "sine > 0", "--post", "30ms")
@@ -96,17 +126,32 @@ class Files(Case):
         self.assertGreater(sum(out.count(chr(0x2800 + i)) for i in range(1, 256)), 100)
 
     def test_no_trigger_names_the_range_of_the_source(self):
-        error = self.bad("scope", "sine", "--trigger", "sine > 5", "--timeout", "300ms", "--csv", "x.csv")
-        self.assertRegex(error, r"^hal scope: no trigger 'sine > 5' in 300 ms: sine was between -2 and 2; type another level, or a longer --timeout\n$")
+        error = self.bad(
+            "scope", "sine", "--trigger", "sine > 5", "--timeout", "300ms", "--csv", "x.csv"
+        )
+        self.assertRegex(
+            error,
+            r"^hal scope: no trigger 'sine > 5' in 300 ms: sine was between -2 and 2; type another level, or a longer --timeout\n$",
+        )
         self.assertFalse((self.folder / "x.csv").exists())
 
     def test_errors(self):
         self.assertIn("'nothing'", self.bad("scope", "nothing"))
-        self.assertIn("'much' is not a number", self.bad("scope", "sine", "--trigger", "sine > much"))
-        self.assertEqual("hal scope: 'sine' is not a bit: the trigger needs a level; type: --trigger 'sine > 0'\n", self.bad("scope", "sine", "--trigger", "sine"))
-        self.assertEqual("hal scope: invalid --mode 'some'; type: --mode auto, normal, single or roll\n", self.bad("scope", "sine", "--mode", "some"))
-        self.assertEqual("hal scope: --mode is for the terminal: a file gets the first record; leave --mode out\n",
-                         self.bad("scope", "sine", "--mode", "roll", "--csv", "-"))
+        self.assertIn(
+            "'much' is not a number", self.bad("scope", "sine", "--trigger", "sine > much")
+        )
+        self.assertEqual(
+            "hal scope: 'sine' is not a bit: the trigger needs a level; type: --trigger 'sine > 0'\n",
+            self.bad("scope", "sine", "--trigger", "sine"),
+        )
+        self.assertEqual(
+            "hal scope: invalid --mode 'some'; type: --mode auto, normal, single or roll\n",
+            self.bad("scope", "sine", "--mode", "some"),
+        )
+        self.assertEqual(
+            "hal scope: --mode is for the terminal: a file gets the first record; leave --mode out\n",
+            self.bad("scope", "sine", "--mode", "roll", "--csv", "-"),
+        )
 
     def test_nothing_running_is_reported(self):
         self.shell("stop")

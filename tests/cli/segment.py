@@ -17,9 +17,21 @@ def enter():
         return
     for flags in (["--net", "--mount"], ["--user", "--map-root-user", "--net", "--mount"]):
         probe = "mount -t tmpfs tmpfs /run && ip netns add probe && ip -n probe link add a0 type veth peer name a1"
-        if subprocess.run(["unshare", *flags, "sh", "-c", probe], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0:
-            os.execvpe("unshare", ["unshare", *flags, sys.executable, *sys.argv], {**os.environ, MARK: "1"})
-    print("skipped: no network namespaces, `ip` or veth here; run it as root, or where user namespaces are allowed", file=sys.stderr)
+        if (
+            subprocess.run(
+                ["unshare", *flags, "sh", "-c", probe],
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            ).returncode
+            == 0
+        ):
+            os.execvpe(
+                "unshare", ["unshare", *flags, sys.executable, *sys.argv], {**os.environ, MARK: "1"}
+            )
+    print(
+        "skipped: no network namespaces, `ip` or veth here; run it as root, or where user namespaces are allowed",
+        file=sys.stderr,
+    )
     sys.exit(77)
 
 
@@ -40,25 +52,74 @@ class Segment(Case):
         for name in ("switch", *self.names):
             self.addCleanup(subprocess.run, ["ip", "netns", "delete", name])
             ip("netns", "add", name)
-            subprocess.run(["ip", "netns", "exec", name, "sysctl", "-qw", "net.ipv6.conf.all.disable_ipv6=1",
-                            "net.ipv6.conf.default.disable_ipv6=1"], stderr=subprocess.DEVNULL)
-        ip("-n", "switch", "link", "add", "bridge0", "type", "bridge", "stp_state", "0", "forward_delay", "0", "mcast_snooping", "0")
+            subprocess.run(
+                [
+                    "ip",
+                    "netns",
+                    "exec",
+                    name,
+                    "sysctl",
+                    "-qw",
+                    "net.ipv6.conf.all.disable_ipv6=1",
+                    "net.ipv6.conf.default.disable_ipv6=1",
+                ],
+                stderr=subprocess.DEVNULL,
+            )
+        ip(
+            "-n",
+            "switch",
+            "link",
+            "add",
+            "bridge0",
+            "type",
+            "bridge",
+            "stp_state",
+            "0",
+            "forward_delay",
+            "0",
+            "mcast_snooping",
+            "0",
+        )
         ip("-n", "switch", "link", "set", "bridge0", "up")
         for name in self.names:
-            ip("-n", "switch", "link", "add", f"to-{name}", "type", "veth", "peer", "name", "wire0", "netns", name)
+            ip(
+                "-n",
+                "switch",
+                "link",
+                "add",
+                f"to-{name}",
+                "type",
+                "veth",
+                "peer",
+                "name",
+                "wire0",
+                "netns",
+                name,
+            )
             ip("-n", "switch", "link", "set", f"to-{name}", "master", "bridge0", "up")
             ip("-n", name, "link", "set", "wire0", "up")
             ip("-n", name, "link", "set", "lo", "up")
         for name in self.names:
-            wait_until(lambda: ",LOWER_UP" in self.at(name, "ip", "link", "show", "wire0").stdout, f"the line of {name} is there")
+            wait_until(
+                lambda: ",LOWER_UP" in self.at(name, "ip", "link", "show", "wire0").stdout,
+                f"the line of {name} is there",
+            )
 
     def at(self, name, *words, **how):
         """A command in the station's namespace, to its end."""
-        return subprocess.run(["ip", "netns", "exec", name, *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                              cwd=self.folder, **{"timeout": 240, **how})
+        return subprocess.run(
+            ["ip", "netns", "exec", name, *map(str, words)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            cwd=self.folder,
+            **{"timeout": 240, **how},
+        )
 
     def mac(self, name):
-        return re.search(r"link/ether (\S+)", self.at(name, "ip", "link", "show", "wire0").stdout)[1]
+        return re.search(r"link/ether (\S+)", self.at(name, "ip", "link", "show", "wire0").stdout)[
+            1
+        ]
 
     def cable(self, name, plugged):
         """Pulls the station's cable out at the switch, or puts it in: its own interface stays up, without a carrier."""
@@ -69,8 +130,25 @@ class Segment(Case):
         self.write(f"{name}.hal", text)
         log = self.logs.setdefault(name, self.folder / f"{name}.log")
         with open(log, "a") as out:
-            process = subprocess.Popen(["ip", "netns", "exec", name, HAL, "run", "--name", f"test-{name}", "--no-picture", f"{name}.hal"],
-                                       cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL, stdout=out, stderr=out)
+            process = subprocess.Popen(
+                [
+                    "ip",
+                    "netns",
+                    "exec",
+                    name,
+                    HAL,
+                    "run",
+                    "--name",
+                    f"test-{name}",
+                    "--no-picture",
+                    f"{name}.hal",
+                ],
+                cwd=self.folder,
+                env=self.environment,
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=out,
+            )
         self.addCleanup(self.stop, process)
         return process
 

@@ -30,7 +30,9 @@ class Service(Case):
 
     def listen(self, address):
         self.socket.bind(address)
-        reader = threading.Thread(target=self.read)  # as systemd, it reads at once: a socket holds few messages
+        reader = threading.Thread(
+            target=self.read
+        )  # as systemd, it reads at once: a socket holds few messages
         reader.start()
         self.addCleanup(reader.join)
         self.addCleanup(setattr, self, "ending", True)
@@ -59,7 +61,10 @@ class Service(Case):
         netlist = self.write("a.hal", "loadusr -w sh show.sh\n" + SERVO)
         self.write("show.sh", 'echo "socket: $NOTIFY_SOCKET"\n')
         machine = self.start("run", netlist)
-        self.assertEqual("READY=1\nSTATUS=machine 'default' runs; to control it: hal shell --name default", self.receive())
+        self.assertEqual(
+            "READY=1\nSTATUS=machine 'default' runs; to control it: hal shell --name default",
+            self.receive(),
+        )
         self.assertIsNone(self.receive(0.3), "without WatchdogSec= nothing else is sent")
         out, err = self.end(machine)
         self.assertEqual("STOPPING=1", self.receive())
@@ -92,10 +97,24 @@ class Service(Case):
 
     def test_a_watchdog_without_a_thread_is_an_error(self):
         self.listen(str(self.folder / "notify"))
-        said = self.bad("run", self.write("a.hal", "newsig a bit\n"), environment={"WATCHDOG_USEC": "400000"})
-        self.assertEqual("hal run: WatchdogSec= of the service needs a thread whose progress feeds the watchdog; the netlist has none\n", said)
-        said = self.bad("run", self.write("b.hal", SERVO), "--watchdog", "/dev/null", environment={"WATCHDOG_USEC": "400000"})
-        self.assertEqual("hal run: --watchdog and WatchdogSec= of the service exclude each other; leave one out\n", said)
+        said = self.bad(
+            "run", self.write("a.hal", "newsig a bit\n"), environment={"WATCHDOG_USEC": "400000"}
+        )
+        self.assertEqual(
+            "hal run: WatchdogSec= of the service needs a thread whose progress feeds the watchdog; the netlist has none\n",
+            said,
+        )
+        said = self.bad(
+            "run",
+            self.write("b.hal", SERVO),
+            "--watchdog",
+            "/dev/null",
+            environment={"WATCHDOG_USEC": "400000"},
+        )
+        self.assertEqual(
+            "hal run: --watchdog and WatchdogSec= of the service exclude each other; leave one out\n",
+            said,
+        )
 
     def test_a_service_manager_that_does_not_read_does_not_stop_the_end(self):
         address = str(self.folder / "deaf")
@@ -103,7 +122,9 @@ class Service(Case):
         self.environment.update(NOTIFY_SOCKET=address, WATCHDOG_USEC="4000")
         machine = self.start("run", self.write("a.hal", SERVO))
         self.socket.setblocking(False)
-        with self.assertRaises(BlockingIOError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as other:
+        with self.assertRaises(BlockingIOError), socket.socket(
+            socket.AF_UNIX, socket.SOCK_DGRAM
+        ) as other:
             other.setblocking(False)
             while True:  # until it holds no more
                 other.sendto(b"full", address)
@@ -136,7 +157,9 @@ class Fix(Case):
         return path.read_text().splitlines() if path.exists() else []
 
     def commands(self, out):
-        return [line.strip() for line in out.partition("\n\n")[2].splitlines() if line.startswith("  ")]
+        return [
+            line.strip() for line in out.partition("\n\n")[2].splitlines() if line.startswith("  ")
+        ]
 
     def test_asks_before_each_command_and_runs_only_what_was_agreed_to(self):
         out = self.good("doctor", "--fix", given="n\n" * 20)
@@ -148,7 +171,9 @@ class Fix(Case):
         self.assertEqual(len(commands), out.count("left as it is\n"))
         self.assertEqual(len(commands), len(set(commands)), "a command is offered once")
         out = self.good("doctor", "--fix", given="y\n" + "n\n" * 20)
-        self.assertEqual((1, len(commands) - 1), (out.count("done\n"), out.count("left as it is\n")), out)
+        self.assertEqual(
+            (1, len(commands) - 1), (out.count("done\n"), out.count("left as it is\n")), out
+        )
         self.assertTrue(self.calls())
         if os.geteuid() == 0:
             self.assertFalse(any("sudo" in command for command in commands), commands)
@@ -161,7 +186,10 @@ class Fix(Case):
             self.skipTest("nothing is missing on this machine")
         commands = self.commands(done.stdout)
         self.assertEqual(1, done.returncode)
-        self.assertEqual([f"hal doctor: failed with status 3: {command}" for command in commands], done.stderr.splitlines())
+        self.assertEqual(
+            [f"hal doctor: failed with status 3: {command}" for command in commands],
+            done.stderr.splitlines(),
+        )
         self.assertEqual(len(commands), len(self.calls()))
 
     @unittest.skipUnless(os.geteuid() == 0 and shutil.which("setpriv"), "needs root and setpriv")
@@ -172,21 +200,65 @@ class Fix(Case):
         sockets = self.folder / "sockets"
         sockets.mkdir(0o700)
         os.chown(sockets, 65534, 65534)
-        done = subprocess.run(["setpriv", withheld, "--inh-caps=-all", "--reuid=65534", "--regid=65534", "--clear-groups", str(HAL), "run", netlist, "--for", "50ms"],
-                              capture_output=True, text=True, stdin=subprocess.DEVNULL, env=self.environment | {"XDG_RUNTIME_DIR": str(sockets)}, timeout=TIMEOUT)
+        done = subprocess.run(
+            [
+                "setpriv",
+                withheld,
+                "--inh-caps=-all",
+                "--reuid=65534",
+                "--regid=65534",
+                "--clear-groups",
+                str(HAL),
+                "run",
+                netlist,
+                "--for",
+                "50ms",
+            ],
+            capture_output=True,
+            text=True,
+            stdin=subprocess.DEVNULL,
+            env=self.environment | {"XDG_RUNTIME_DIR": str(sockets)},
+            timeout=TIMEOUT,
+        )
         notices = [line for line in (done.stdout + done.stderr).splitlines() if " here: " in line]
-        self.assertEqual(["no real-time scheduling and memory locking here: threads are late under load, and a page fault can delay a cycle; grant it with: "
-                          "--cap-add=SYS_NICE --cap-add=IPC_LOCK --cap-add=NET_RAW in the command that starts this container, which withholds them "
-                          "(or by limits of a group: hal doctor)"], notices, done.stdout + done.stderr)
-        done = subprocess.run(["setpriv", withheld, "--inh-caps=-all", str(HAL), "doctor", "--seconds", "0"], capture_output=True, text=True, timeout=TIMEOUT)
+        self.assertEqual(
+            [
+                "no real-time scheduling and memory locking here: threads are late under load, and a page fault can delay a cycle; grant it with: "
+                "--cap-add=SYS_NICE --cap-add=IPC_LOCK --cap-add=NET_RAW in the command that starts this container, which withholds them "
+                "(or by limits of a group: hal doctor)"
+            ],
+            notices,
+            done.stdout + done.stderr,
+        )
+        done = subprocess.run(
+            ["setpriv", withheld, "--inh-caps=-all", str(HAL), "doctor", "--seconds", "0"],
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT,
+        )
         self.assertNotIn("setcap", done.stdout)
 
     @unittest.skipUnless(os.geteuid() == 0, "needs root")
     def test_without_sudo_an_ordinary_user_reads_what_root_types(self):
         os.chmod(self.folder, 0o755)
         path = str(self.folder / "empty")
-        done = subprocess.run(["/usr/sbin/runuser", "-u", "nobody", "--", "env", f"PATH={path}", f"HOME={self.folder}", str(HAL), "doctor", "--fix"],
-                              capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        done = subprocess.run(
+            [
+                "/usr/sbin/runuser",
+                "-u",
+                "nobody",
+                "--",
+                "env",
+                f"PATH={path}",
+                f"HOME={self.folder}",
+                str(HAL),
+                "doctor",
+                "--fix",
+            ],
+            capture_output=True,
+            text=True,
+            stdin=subprocess.DEVNULL,
+        )
         if "nothing to fix" in done.stdout:
             self.skipTest("nothing is missing on this machine")
         self.assertEqual((1, "hal doctor: the fixes need root\n"), (done.returncode, done.stderr))

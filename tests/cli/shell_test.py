@@ -47,7 +47,10 @@ class WhichInstance(Case):
         for name in ("left", "right"):
             self.start("run", path, "--name", name, instance=name)
         self.shell("setp", "adder.in1", "9", instance="right")
-        self.assertEqual("9\n", self.good("shell", "getp", "adder.in1", environment={"HALCYON_INSTANCE": "right"}))
+        self.assertEqual(
+            "9\n",
+            self.good("shell", "getp", "adder.in1", environment={"HALCYON_INSTANCE": "right"}),
+        )
 
 
 class OneShot(Case):
@@ -76,7 +79,9 @@ class OneShot(Case):
         self.assertEqual("2\n", self.good("shell", "getp", "first"))
 
     def test_several_commands(self):
-        self.assertEqual("2\n3\n", self.good("shell", "-e", "getp adder.in0", "-e", "getp adder.in1"))
+        self.assertEqual(
+            "2\n3\n", self.good("shell", "-e", "getp adder.in0", "-e", "getp adder.in1")
+        )
         done = self.run_program("shell", "-e", "getp nothing", "-e", "getp adder.in1")
         self.assertEqual((1, ""), (done.returncode, done.stdout))
         done = self.run_program("shell", "-k", "-e", "getp nothing", "-e", "getp adder.in1")
@@ -90,17 +95,35 @@ class OneShot(Case):
         self.assertEqual(2, json.loads(self.good("shell", "--json", "getp", "adder.in0"))["value"])
 
     def test_script_output(self):
-        self.assertRegex(self.good("shell", "-s", "show", "pin", "adder.in0"), r"^sum2 float IN +2 adder\.in0 *\n$")
+        self.assertRegex(
+            self.good("shell", "-s", "show", "pin", "adder.in0"),
+            r"^sum2 float IN +2 adder\.in0 *\n$",
+        )
 
     def test_output_that_cannot_be_written(self):
         with open("/dev/full", "w") as full:
-            done = subprocess.run([str(HAL), "shell", "show"], env=self.environment, cwd=self.folder, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+            done = subprocess.run(
+                [str(HAL), "shell", "show"],
+                env=self.environment,
+                cwd=self.folder,
+                stdout=full,
+                stderr=subprocess.PIPE,
+                text=True,
+                timeout=60,
+            )
         self.assertEqual(1, done.returncode)
         self.assertIn("No space left", done.stderr)
 
     def test_instance_that_ends_during_a_command(self):
-        client = subprocess.Popen([str(HAL), "shell", "-e", "setp adder.in0 77", "-e", "loadusr -w sleep 1000"], env=self.environment, cwd=self.folder,
-                                  stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        client = subprocess.Popen(
+            [str(HAL), "shell", "-e", "setp adder.in0 77", "-e", "loadusr -w sleep 1000"],
+            env=self.environment,
+            cwd=self.folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         self.addCleanup(self.end, client)
         wait_until(lambda: self.value("adder.in0") == "77", "the first command has run")
         self.end(self.machine)
@@ -133,7 +156,10 @@ class Scripts(Case):
         self.assertIn("(1)<echo>: getp adder.in0", done.stderr)
 
     def test_missing_file(self):
-        self.assertEqual("hal shell: cannot read 'nowhere.hal': No such file or directory\n", self.bad("shell", "-f", "nowhere.hal"))
+        self.assertEqual(
+            "hal shell: cannot read 'nowhere.hal': No such file or directory\n",
+            self.bad("shell", "-f", "nowhere.hal"),
+        )
 
     def test_standard_input(self):
         text = "# a comment\nsetp adder.in0 10\ngetp adder.in0\nquit\ngetp adder.in1\n"
@@ -146,31 +172,79 @@ class Scripts(Case):
         self.assertIn("<stdin>", done.stderr)
 
     def test_a_pipes_lines_are_numbered(self):
-        pipe = subprocess.run([str(HAL), "shell"], env=self.environment, input="setp adder.in0 \\\n 10\n\ngetp nothing\n", text=True, capture_output=True)
+        pipe = subprocess.run(
+            [str(HAL), "shell"],
+            env=self.environment,
+            input="setp adder.in0 \\\n 10\n\ngetp nothing\n",
+            text=True,
+            capture_output=True,
+        )
         self.assertTrue(pipe.stderr.startswith("<stdin>:4:6: error: "), pipe.stderr)
-        self.assertTrue(pipe.stderr.endswith("hal shell: a pipe is read line by line: lines 1 to 3 were carried out before the error in line 4\n"), pipe.stderr)
+        self.assertTrue(
+            pipe.stderr.endswith(
+                "hal shell: a pipe is read line by line: lines 1 to 3 were carried out before the error in line 4\n"
+            ),
+            pipe.stderr,
+        )
         self.assertEqual("10", self.value("adder.in0"))
 
     def test_a_pipe_reports_an_open_begin(self):
         before = self.value("adder.in0")
-        for text, said in (("begin\nsetp adder.in0 7\n", "hal shell: 'begin' in line 1 without 'commit': the collected edits had no effect\n"),
-                           ("\nbegin\nsetp adder.in0 7\nquit\n", "hal shell: 'begin' in line 2 without 'commit': the collected edits had no effect\n"),
-                           ("begin\nsetp adder.in0 7\nsetp nothing 1\ncommit\n",
-                            "hal shell: a pipe is read line by line: the edits collected from line 1 on had no effect\n"),
-                           ("getp adder.in0\nbegin\nsetp adder.in0 7\nfrobnicate\ncommit\n",
-                            "hal shell: a pipe is read line by line: line 1 was carried out before the error in line 4; "
-                            "the edits collected from line 2 on had no effect\n")):
-            pipe = subprocess.run([str(HAL), "shell"], env=self.environment, input=text, text=True, capture_output=True)
+        for text, said in (
+            (
+                "begin\nsetp adder.in0 7\n",
+                "hal shell: 'begin' in line 1 without 'commit': the collected edits had no effect\n",
+            ),
+            (
+                "\nbegin\nsetp adder.in0 7\nquit\n",
+                "hal shell: 'begin' in line 2 without 'commit': the collected edits had no effect\n",
+            ),
+            (
+                "begin\nsetp adder.in0 7\nsetp nothing 1\ncommit\n",
+                "hal shell: a pipe is read line by line: the edits collected from line 1 on had no effect\n",
+            ),
+            (
+                "getp adder.in0\nbegin\nsetp adder.in0 7\nfrobnicate\ncommit\n",
+                "hal shell: a pipe is read line by line: line 1 was carried out before the error in line 4; "
+                "the edits collected from line 2 on had no effect\n",
+            ),
+        ):
+            pipe = subprocess.run(
+                [str(HAL), "shell"],
+                env=self.environment,
+                input=text,
+                text=True,
+                capture_output=True,
+            )
             self.assertEqual(1, pipe.returncode, text)
             self.assertTrue(pipe.stderr.endswith(said), pipe.stderr)
             self.assertEqual(before, self.value("adder.in0"))
-        self.assertEqual("hal shell: 'begin' without 'commit' had no effect; write the transaction to a file, or type: hal shell\n", self.bad("shell", "begin"))
-        pipe = subprocess.run([str(HAL), "shell"], env=self.environment, input="begin\nsetp adder.in0 7\ncommit\nsetp nothing 1\n", text=True, capture_output=True)
-        self.assertTrue(pipe.stderr.endswith("lines 1 to 3 were carried out before the error in line 4\n"), pipe.stderr)
+        self.assertEqual(
+            "hal shell: 'begin' without 'commit' had no effect; write the transaction to a file, or type: hal shell\n",
+            self.bad("shell", "begin"),
+        )
+        pipe = subprocess.run(
+            [str(HAL), "shell"],
+            env=self.environment,
+            input="begin\nsetp adder.in0 7\ncommit\nsetp nothing 1\n",
+            text=True,
+            capture_output=True,
+        )
+        self.assertTrue(
+            pipe.stderr.endswith("lines 1 to 3 were carried out before the error in line 4\n"),
+            pipe.stderr,
+        )
         self.assertEqual("7", self.value("adder.in0"))
 
     def test_pipe_answers_each_line_at_once(self):
-        client = subprocess.Popen([str(HAL), "shell"], env=self.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
+        client = subprocess.Popen(
+            [str(HAL), "shell"],
+            env=self.environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            bufsize=1,
+        )
         self.addCleanup(client.wait)
         for value in ("1", "2.5", "-3"):
             client.stdin.write(f"setp adder.in0 {value}\ngetp adder.in0\n")

@@ -7,10 +7,27 @@ import unittest
 
 from harness import HAL, SANITIZED, SERVO, Case, Terminal, wait_until
 
-ENDING = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGXCPU, signal.SIGPWR]
-CRASHES = [signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT, signal.SIGSYS, signal.SIGTRAP]
+ENDING = [
+    signal.SIGINT,
+    signal.SIGTERM,
+    signal.SIGHUP,
+    signal.SIGQUIT,
+    signal.SIGXCPU,
+    signal.SIGPWR,
+]
+CRASHES = [
+    signal.SIGSEGV,
+    signal.SIGBUS,
+    signal.SIGFPE,
+    signal.SIGILL,
+    signal.SIGABRT,
+    signal.SIGSYS,
+    signal.SIGTRAP,
+]
 NOT_TO_CATCH = [signal.SIGKILL, signal.SIGSTOP]
-IGNORED = [number for number in signal.valid_signals() if number not in (*ENDING, *CRASHES, *NOT_TO_CATCH)]
+IGNORED = [
+    number for number in signal.valid_signals() if number not in (*ENDING, *CRASHES, *NOT_TO_CATCH)
+]
 
 WITNESS = "loadrt threads name1=servo period1=1000000\nloadrt witness file=end.txt\naddf witness.0 servo\n"
 
@@ -27,7 +44,10 @@ class Machine(Case):
             machine.send_signal(number)
             beat = self.value("servo.threadbeat")
             self.assertIsNone(machine.poll(), f"signal {number} ended it")
-            wait_until(lambda: self.value("servo.threadbeat") != beat, f"the thread goes on after signal {number}")
+            wait_until(
+                lambda: self.value("servo.threadbeat") != beat,
+                f"the thread goes on after signal {number}",
+            )
         self.assertEqual("5", self.value("witness.0.out"))
         self.end(machine)
         self.assertEqual(0, machine.returncode)
@@ -56,11 +76,17 @@ class Machine(Case):
             self.assertIn("emergency\n", (self.folder / "end.txt").read_text())
 
     def test_closed_standard_streams_are_not_taken_by_other_files(self):
-        hal = subprocess.Popen(["sh", "-c", f"exec {HAL} run {self.write('a.hal', WITNESS)} <&- >&- 2>&-"], cwd=self.folder, env=self.environment)
+        hal = subprocess.Popen(
+            ["sh", "-c", f"exec {HAL} run {self.write('a.hal', WITNESS)} <&- >&- 2>&-"],
+            cwd=self.folder,
+            env=self.environment,
+        )
         self.addCleanup(hal.wait)
         self.addCleanup(hal.kill)
         wait_until(lambda: self.value("witness.0.out") == "5", "the output is 5")
-        self.assertEqual(["/dev/null"] * 3, [os.readlink(f"/proc/{hal.pid}/fd/{number}") for number in range(3)])
+        self.assertEqual(
+            ["/dev/null"] * 3, [os.readlink(f"/proc/{hal.pid}/fd/{number}") for number in range(3)]
+        )
         hal.terminate()
         self.assertEqual(0, hal.wait(60))
 
@@ -98,8 +124,16 @@ class Others(Case):
             self.assertEqual(status, program.returncode, f"{number.name}: {out}{err}")
 
     def program(self, *words):
-        program = subprocess.Popen(["hal", *map(str, words)], executable=str(HAL), cwd=self.folder, env=self.environment,
-                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        program = subprocess.Popen(
+            ["hal", *map(str, words)],
+            executable=str(HAL),
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         self.addCleanup(self.end, program)
         return program
 
@@ -114,11 +148,20 @@ class Others(Case):
         self.assertNotEqual("", program.stdout.readline())
 
     def test_record(self):
-        self.start("run", self.write("a.hal", SERVO + "loadrt sampler cfg=f depth=100\nnet total => sampler.0.pin.0\naddf sampler.0 servo\n"))
+        self.start(
+            "run",
+            self.write(
+                "a.hal",
+                SERVO
+                + "loadrt sampler cfg=f depth=100\nnet total => sampler.0.pin.0\naddf sampler.0 servo\n",
+            ),
+        )
         self.check("record", wait=self.first_line)
 
     def test_node(self):
-        self.check("node", "io", "--link", "udp:239.74.163.2:43113", "--id", "5", wait=self.first_line)
+        self.check(
+            "node", "io", "--link", "udp:239.74.163.2:43113", "--id", "5", wait=self.first_line
+        )
 
 
 if __name__ == "__main__":

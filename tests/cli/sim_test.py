@@ -12,7 +12,9 @@ class Sim(Case):
         self.assertEqual("5\n", self.good("sim", path))
 
     def test_for_advances_the_clock(self):
-        counter = self.write("a.hal", "loadrt threads name1=servo period1=1000000\nloadrt time\naddf time.0 servo\n")
+        counter = self.write(
+            "a.hal", "loadrt threads name1=servo period1=1000000\nloadrt time\naddf time.0 servo\n"
+        )
         self.assertEqual("", self.good("sim", "--quiet", counter, "--for", "2s"))
         report = self.run_program("sim", counter, "--for", "2s", "--report")
         self.assertEqual("", report.stdout)
@@ -22,9 +24,17 @@ class Sim(Case):
         path = self.write("a.hal", SERVO)
         done = self.run_program("sim", path, "--for", "2s")
         self.assertEqual((0, ""), (done.returncode, done.stdout))
-        self.assertRegex(done.stderr, r"^simulated 2 s in [\d.]+ \ws, [\d.e+]+ times as fast as real time; servo 2000 cycles; no faults\n$")
-        self.assertEqual("no time simulated: add --for 10s, or advance in the netlist; servo 0 cycles; no faults\n", self.run_program("sim", path).stderr)
-        self.assertEqual("5\n", self.good("sim", path, "--for", "2s", "-e", "gets total"))  # its own output is enough
+        self.assertRegex(
+            done.stderr,
+            r"^simulated 2 s in [\d.]+ \ws, [\d.e+]+ times as fast as real time; servo 2000 cycles; no faults\n$",
+        )
+        self.assertEqual(
+            "no time simulated: add --for 10s, or advance in the netlist; servo 0 cycles; no faults\n",
+            self.run_program("sim", path).stderr,
+        )
+        self.assertEqual(
+            "5\n", self.good("sim", path, "--for", "2s", "-e", "gets total")
+        )  # its own output is enough
         terminal = Terminal(self, "sim", path, "--for", "2s", "-e", "gets total")
         terminal.expect("5\r\nsimulated 2 s in ")
         self.assertEqual(0, terminal.wait())
@@ -32,30 +42,55 @@ class Sim(Case):
         self.assertEqual((0, "5\r\n"), (terminal.wait(), terminal.seen))
 
     def test_a_summary_names_the_faults(self):
-        path = self.write("a.hal", "loadrt threads name1=servo period1=1000000\nloadrt test_faulty\naddf test-faulty.0.run servo\n"
-                          "setp test-faulty.0.throws TRUE\n")
-        done = self.run_program("sim", path, "--for", "2s", environment={"HALCYON_PLUGIN_PATH": str(HAL.parent.parent / "tests/plugins")})
+        path = self.write(
+            "a.hal",
+            "loadrt threads name1=servo period1=1000000\nloadrt test_faulty\naddf test-faulty.0.run servo\n"
+            "setp test-faulty.0.throws TRUE\n",
+        )
+        done = self.run_program(
+            "sim",
+            path,
+            "--for",
+            "2s",
+            environment={"HALCYON_PLUGIN_PATH": str(HAL.parent.parent / "tests/plugins")},
+        )
         self.assertEqual(1, done.returncode)
-        self.assertRegex(done.stderr, r"(?m)^simulated 2 s in .*; servo 2000 cycles, stopped by a fault; 1 fault:\n"
-                                      r"  servo: function 'test-faulty.0.run' \(test-faulty\) threw an exception at cycle 0")
+        self.assertRegex(
+            done.stderr,
+            r"(?m)^simulated 2 s in .*; servo 2000 cycles, stopped by a fault; 1 fault:\n"
+            r"  servo: function 'test-faulty.0.run' \(test-faulty\) threw an exception at cycle 0",
+        )
 
     def test_show_prints_values_at_the_end(self):
         path = self.write("a.hal", SERVO)
-        self.assertEqual("total      5\nadder.in0  2\nadder.in1  3\n", self.good("sim", path, "--for", "1s", "--show", "total,adder.in?"))
-        self.assertEqual("hal sim: --show: unknown pin, parameter or signal 'totl'; did you mean 'total'?\n",
-                         self.bad("sim", "-q", path, "--for", "1s", "--show", "totl"))
+        self.assertEqual(
+            "total      5\nadder.in0  2\nadder.in1  3\n",
+            self.good("sim", path, "--for", "1s", "--show", "total,adder.in?"),
+        )
+        self.assertEqual(
+            "hal sim: --show: unknown pin, parameter or signal 'totl'; did you mean 'total'?\n",
+            self.bad("sim", "-q", path, "--for", "1s", "--show", "totl"),
+        )
 
     def test_cycles_advance_the_clock(self):
         path = self.write("a.hal", SERVO)
-        self.assertRegex(self.run_program("sim", path, "--cycles", "1234", "--report").stderr, r"(?m)^servo +1 ms +1234 +0 ")
+        self.assertRegex(
+            self.run_program("sim", path, "--cycles", "1234", "--report").stderr,
+            r"(?m)^servo +1 ms +1234 +0 ",
+        )
 
     def test_for_and_cycles_exclude_each_other(self):
-        self.assertIn("exclude each other", self.bad("sim", "x.hal", "--for", "1s", "--cycles", "1"))
+        self.assertIn(
+            "exclude each other", self.bad("sim", "x.hal", "--for", "1s", "--cycles", "1")
+        )
 
     def test_twice_the_same(self):
-        path = self.write("a.hal", "loadrt threads name1=base period1=50000 name2=servo period2=1000000\nloadrt siggen\nloadrt sampler cfg=ff\n"
-                          "addf siggen.0.update base\naddf sampler.0 servo\nnet s siggen.0.sine => sampler.0.pin.0\nstart\nadvance 5000 cycles\n"
-                          "gets s\nshow thread\nshow pin siggen\nsave\n")
+        path = self.write(
+            "a.hal",
+            "loadrt threads name1=base period1=50000 name2=servo period2=1000000\nloadrt siggen\nloadrt sampler cfg=ff\n"
+            "addf siggen.0.update base\naddf sampler.0 servo\nnet s siggen.0.sine => sampler.0.pin.0\nstart\nadvance 5000 cycles\n"
+            "gets s\nshow thread\nshow pin siggen\nsave\n",
+        )
         self.assertEqual(self.good("sim", path), self.good("sim", path))
 
     def test_error_ends_it_before_the_clock(self):
@@ -66,17 +101,29 @@ class Sim(Case):
         self.assertNotIn("cycles", done.stderr)
 
     def test_arguments_are_variables(self):
-        path = self.write("a.hal", SERVO + "setp adder.in0 $1\nsetp adder.in1 $OFFSET\nstart\nadvance 2 cycles\ngets total\n")
+        path = self.write(
+            "a.hal",
+            SERVO
+            + "setp adder.in0 $1\nsetp adder.in1 $OFFSET\nstart\nadvance 2 cycles\ngets total\n",
+        )
         self.assertEqual("42\n", self.good("sim", path, "--", "40", "OFFSET=2"))
 
     def test_programs_it_starts_reach_it(self):
-        path = self.write("a.hal", SERVO + "start\nadvance 2 cycles\nloadusr -w halcmd setp adder.in0 10\nadvance 2 cycles\ngets total\n")
+        path = self.write(
+            "a.hal",
+            SERVO
+            + "start\nadvance 2 cycles\nloadusr -w halcmd setp adder.in0 10\nadvance 2 cycles\ngets total\n",
+        )
         self.assertEqual("13\n", self.good("sim", path))
 
     def test_can_be_interrupted(self):
         path = self.write("a.hal", SERVO)
         machine = self.start("sim", path, "--for", "100000000s", "--name", "long", loaded=False)
-        wait_until(lambda: self.shell("getp", "servo.threadbeat", instance="long").stdout.strip() not in ("", "0"), "it runs")
+        wait_until(
+            lambda: self.shell("getp", "servo.threadbeat", instance="long").stdout.strip()
+            not in ("", "0"),
+            "it runs",
+        )
         out, err = self.end(machine, signal.SIGINT)
         self.assertEqual((1, ""), (machine.returncode, out))
         self.assertRegex(err, r"^simulated [\d.]+ m?s in .*; no faults\n$")

@@ -111,7 +111,10 @@ class StopUnderLoad(Case):
     def test_checking_such_a_file_takes_no_longer_than_loading_it(self):
         self.wrong()
         self.write("right.hal", NET + f"loadrt pid num_chan={INSTANCES}\n")
-        self.write("check.hal", (self.folder / "right.hal").read_text() + (self.folder / "wrong.hal").read_text())
+        self.write(
+            "check.hal",
+            (self.folder / "right.hal").read_text() + (self.folder / "wrong.hal").read_text(),
+        )
 
         def check(name):
             begin = time.monotonic()
@@ -137,7 +140,9 @@ class StopUnderLoad(Case):
         self.assertLess(self.ends("60 x describe all", machine), NOTICED)
 
     def test_clients_that_save_a_large_machine(self):
-        machine = self.machine("".join(f"newsig s{i} float\n" for i in range(5000 if SANITIZED else 100_000)))
+        machine = self.machine(
+            "".join(f"newsig s{i} float\n" for i in range(5000 if SANITIZED else 100_000))
+        )
         calm = Wire(self)
         self.busy(4, run=["save"])
         took = max(self.stops("save of 100 000", calm) for _ in range(3))
@@ -145,7 +150,9 @@ class StopUnderLoad(Case):
         self.assertLess(self.ends("save of 100 000", machine), NOTICED)
 
     def test_all_descriptors_are_taken(self):
-        machine = self.machine(preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (40, 40)))
+        machine = self.machine(
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (40, 40))
+        )
         taken = []
         for _ in range(60):
             one = socket.socket(socket.AF_UNIX)
@@ -159,7 +166,9 @@ class StopUnderLoad(Case):
         for turn in range(3):
             begin = time.monotonic()
             done = self.shell("stop")
-            print(f"40 descriptors: hal shell stop after {1000 * (time.monotonic() - begin):.1f} ms")
+            print(
+                f"40 descriptors: hal shell stop after {1000 * (time.monotonic() - begin):.1f} ms"
+            )
             self.assertEqual((0, ""), (done.returncode, done.stderr))
         self.assertLess(self.ends("40 descriptors", machine), NOTICED)
 

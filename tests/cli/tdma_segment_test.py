@@ -51,15 +51,28 @@ class Tdma(Segment):
         super().tearDown()
 
     def master_was_not_disturbed(self):
-        self.assertEqual(("TRUE", "TRUE", "FALSE", "0"), tuple(self.pin("m", pin) for pin in ("running", "leading", "fault", "losses")))
+        self.assertEqual(
+            ("TRUE", "TRUE", "FALSE", "0"),
+            tuple(self.pin("m", pin) for pin in ("running", "leading", "fault", "losses")),
+        )
         self.assertEqual(1, self.said("m").count(RUNS), self.said("m"))
 
     def test_comes_up(self):
-        self.assertEqual(["TRUE"] * 4, [self.pin("x", pin) for pin in ("synchronous", "calibrated", "master-active", "link-up")])
+        self.assertEqual(
+            ["TRUE"] * 4,
+            [
+                self.pin("x", pin)
+                for pin in ("synchronous", "calibrated", "master-active", "link-up")
+            ],
+        )
         self.assertEqual(("TRUE", "FALSE"), (self.pin("m", "leading"), self.pin("x", "leading")))
         said = self.said("x")
-        self.assertEqual([1, 1, 0], [said.count(words) for words in (self.followed, RUNS, self.lost)], said)
-        self.assertRegex(said, rf"tdma.0: calibrated: frames take [\d.]+ us from or to {self.mac('m')}\n")
+        self.assertEqual(
+            [1, 1, 0], [said.count(words) for words in (self.followed, RUNS, self.lost)], said
+        )
+        self.assertRegex(
+            said, rf"tdma.0: calibrated: frames take [\d.]+ us from or to {self.mac('m')}\n"
+        )
         at_m, at_x = self.number("m", "cycle"), self.number("x", "cycle")
         self.assertLessEqual(at_m, at_x, "both count the same cycles")
         self.master_was_not_disturbed()
@@ -76,7 +89,10 @@ class Tdma(Segment):
     def test_the_master_dies_and_returns(self):
         Segment.stop(self.processes["m"], signal.SIGKILL)
         self.wait_for_words("x", self.lost)
-        self.assertEqual(["FALSE", "FALSE", "TRUE"], [self.pin("x", pin) for pin in ("synchronous", "running", "fault")])
+        self.assertEqual(
+            ["FALSE", "FALSE", "TRUE"],
+            [self.pin("x", pin) for pin in ("synchronous", "running", "fault")],
+        )
         self.station("m", NETLIST.format("m"))
         self.wait_for_words("x", RUNS, 2)
         self.wait_for("x", "running", "TRUE")
@@ -88,14 +104,21 @@ class Tdma(Segment):
         self.cable("x", plugged=False)
         self.wait_for_words("x", NO_CARRIER)
         self.wait_for_words("x", self.lost)
-        self.assertEqual(["FALSE", "FALSE", "TRUE"], [self.pin("x", pin) for pin in ("link-up", "running", "fault")])
+        self.assertEqual(
+            ["FALSE", "FALSE", "TRUE"],
+            [self.pin("x", pin) for pin in ("link-up", "running", "fault")],
+        )
         self.cable("x", plugged=True)
         self.wait_for_words("x", CARRIER)
         self.wait_for_words("x", RUNS, 2)
         self.wait_for("x", "running", "TRUE")
         self.wait_for("x", "fault", "FALSE")
         said = self.said("x")
-        self.assertEqual([1, 1, 1, 2], [said.count(words) for words in (NO_CARRIER, CARRIER, self.lost, RUNS)], said)
+        self.assertEqual(
+            [1, 1, 1, 2],
+            [said.count(words) for words in (NO_CARRIER, CARRIER, self.lost, RUNS)],
+            said,
+        )
         self.master_was_not_disturbed()
 
     def test_the_masters_cable_is_pulled(self):
@@ -109,7 +132,10 @@ class Tdma(Segment):
         self.wait_for("m", "fault", "FALSE")
         self.wait_for_words("x", RUNS, 2)
         self.wait_for("x", "running", "TRUE")
-        self.assertEqual([1, 1], [self.said(name).count(words) for name, words in (("m", NO_CARRIER), ("x", self.lost))])
+        self.assertEqual(
+            [1, 1],
+            [self.said(name).count(words) for name, words in (("m", NO_CARRIER), ("x", self.lost))],
+        )
 
     def test_a_stalled_process_reports_no_hung_thread(self):
         """What its ring holds then is of many cycles: a process that begins late finds the same."""
@@ -119,10 +145,16 @@ class Tdma(Segment):
         wait_until(lambda: self.number("m", "cycle") > before + 300, "the master goes on")
         x.send_signal(signal.SIGCONT)
         # a process without CPU time for longer than its threads' limit runs its functions again after `start`
-        wait_until(lambda: "got no CPU time" in self.shell("show", "fault", instance="test-x").stdout, "the fault of the threads is known")
+        wait_until(
+            lambda: "got no CPU time" in self.shell("show", "fault", instance="test-x").stdout,
+            "the fault of the threads is known",
+        )
         self.good("shell", "--name", "test-x", "start")
         at = self.number("m", "cycle")
-        wait_until(lambda: self.pin("x", "running") == "TRUE" and self.number("x", "cycle") >= at, "the station is there again")
+        wait_until(
+            lambda: self.pin("x", "running") == "TRUE" and self.number("x", "cycle") >= at,
+            "the station is there again",
+        )
         self.master_was_not_disturbed()
 
 

@@ -26,7 +26,13 @@ class Shell(Case):
 
     def setUp(self):
         super().setUp()
-        self.machine = self.start("run", self.write("a.hal", SERVO + "loadrt and2 names=gate\nloadrt or2 names=either\nnewsig flag bit\n"))
+        self.machine = self.start(
+            "run",
+            self.write(
+                "a.hal",
+                SERVO + "loadrt and2 names=gate\nloadrt or2 names=either\nnewsig flag bit\n",
+            ),
+        )
         self.terminal = self.open()
 
     def open(self):
@@ -42,7 +48,10 @@ class Shell(Case):
     def test_commands_and_quit(self):
         self.assertIn("\n2\r\n", self.type("getp adder.in0"))
         self.type("setp adder.in0 8")
-        wait_until(lambda: self.value("adder.in0") == "8", "the line editor may draw its prompt twice, before and after the command")
+        wait_until(
+            lambda: self.value("adder.in0") == "8",
+            "the line editor may draw its prompt twice, before and after the command",
+        )
         self.terminal.send("quit\r")
         self.assertEqual(0, self.terminal.wait())
 
@@ -96,7 +105,10 @@ class Shell(Case):
         self.terminal = self.open()
         self.terminal.send("\x1b[A\x1b[A\r")  # quit is the newest
         self.terminal.expect(self.prompt)
-        self.assertEqual("getp adder.in0\ngetp adder.in1\ngetp adder.in0\nquit\ngetp adder.in0\n", (self.folder / "state/halcyon/history").read_text())
+        self.assertEqual(
+            "getp adder.in0\ngetp adder.in1\ngetp adder.in0\nquit\ngetp adder.in0\n",
+            (self.folder / "state/halcyon/history").read_text(),
+        )
 
     def test_interrupt_drops_the_line_only(self):
         self.terminal.send("setp adder.in0 99\x03")
@@ -120,7 +132,10 @@ class Shell(Case):
         self.assertEqual("40", self.value("adder.in0"))
 
     def test_colours_only_when_wanted(self):
-        self.assertIn("\033[", self.type("getp adder.ot").split("getp", 1)[1].split("\n", 1)[1].rsplit("\r\n", 1)[0])
+        self.assertIn(
+            "\033[",
+            self.type("getp adder.ot").split("getp", 1)[1].split("\n", 1)[1].rsplit("\r\n", 1)[0],
+        )
         plain = Terminal(self, *self.words, environment={"NO_COLOR": "1"})
         plain.expect(self.prompt)
         plain.send("getp adder.ot\r")
@@ -165,7 +180,9 @@ class RunInteractively(Case):
 
     def test_interrupt_ends_a_command_that_waits(self):
         self.terminal.send("loadusr -w sleep 1000\r")
-        wait_until(lambda: b"sleep" in b"".join(children(self.terminal.process)), "the program runs")
+        wait_until(
+            lambda: b"sleep" in b"".join(children(self.terminal.process)), "the program runs"
+        )
         self.terminal.send("\x03")
         self.terminal.expect("hal> ")
         self.terminal.send("getp adder.in0\r")

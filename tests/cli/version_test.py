@@ -27,7 +27,13 @@ IDENTITY = ["-c", "user.name=A", "-c", "user.email=a@example.org"]
 
 class Version(Case):
     def run_in(self, folder, *words):
-        done = subprocess.run([str(word) for word in words], cwd=folder, capture_output=True, text=True, env={**os.environ, "GIT_CEILING_DIRECTORIES": str(self.folder)})
+        done = subprocess.run(
+            [str(word) for word in words],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            env={**os.environ, "GIT_CEILING_DIRECTORIES": str(self.folder)},
+        )
         self.assertEqual(0, done.returncode, done.stdout + done.stderr)
         return done.stdout
 
@@ -50,9 +56,14 @@ class Version(Case):
         return self.run_in(folder, "git", "rev-parse", "HEAD")[:10]
 
     def test_names_the_version_and_a_commit(self):
-        version = re.search(r"project\(Halcyon VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text()).group(1)
+        version = re.search(
+            r"project\(Halcyon VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text()
+        ).group(1)
         for words in (("--version",), ("version",)):
-            self.assertRegex(self.good(*words), rf"\Ahal {re.escape(version)} \(commit ([0-9a-f]{{10}}|unknown)\)\n\Z")
+            self.assertRegex(
+                self.good(*words),
+                rf"\Ahal {re.escape(version)} \(commit ([0-9a-f]{{10}}|unknown)\)\n\Z",
+            )
 
     def test_follows_the_checkout_and_is_not_built_without_a_change(self):
         folder = self.project()

@@ -29,7 +29,9 @@ class Watch(Case):
 
     def test_extremes_hold_every_cycle_and_rates_are_per_second(self):
         out = self.good("watch", "sine", "clock", "--for", "1500ms")
-        self.assertEqual(["NAME", "VALUE", "UNIT", "MIN", "MAX", "RATE"], out.splitlines()[0].split())
+        self.assertEqual(
+            ["NAME", "VALUE", "UNIT", "MIN", "MAX", "RATE"], out.splitlines()[0].split()
+        )
         rows = self.rows(out)
         value, least, most = rows["sine"][:3]
         self.assertAlmostEqual(-2, float(least), delta=0.01)

@@ -28,7 +28,12 @@ def complete(data):
 def request(port, path="/", host=None, method="GET", headers=(), body=b""):
     """One HTTP request; status line, headers as a dict, body. An empty status: closed without an answer."""
     with socket.create_connection(("127.0.0.1", port), timeout=TIMEOUT) as connection:
-        lines = [f"{method} {path} HTTP/1.1", f"Host: {host or f'localhost:{port}'}", "Connection: close", *headers]
+        lines = [
+            f"{method} {path} HTTP/1.1",
+            f"Host: {host or f'localhost:{port}'}",
+            "Connection: close",
+            *headers,
+        ]
         connection.sendall("\r\n".join(lines).encode() + b"\r\n\r\n" + body)
         data = b""
         try:
@@ -38,17 +43,29 @@ def request(port, path="/", host=None, method="GET", headers=(), body=b""):
             pass
     head, _, rest = data.partition(b"\r\n\r\n")
     status, _, fields = head.decode(errors="replace").partition("\r\n")
-    return status, dict(line.lower().split(": ", 1) for line in fields.split("\r\n") if ": " in line), rest
+    return (
+        status,
+        dict(line.lower().split(": ", 1) for line in fields.split("\r\n") if ": " in line),
+        rest,
+    )
 
 
 class WebSocket:
     """A client of RFC 6455: text and binary messages in one piece."""
 
-    def __init__(self, port, origin=None, host=None, subprotocol=SUBPROTOCOL, path="/", address="127.0.0.1"):
+    def __init__(
+        self, port, origin=None, host=None, subprotocol=SUBPROTOCOL, path="/", address="127.0.0.1"
+    ):
         self.socket = socket.create_connection((address, port), timeout=TIMEOUT)
         self.data, self.closed = b"", None
-        lines = [f"GET {path} HTTP/1.1", f"Host: {host or f'localhost:{port}'}", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
-                 "Sec-WebSocket-Key: " + base64.b64encode(os.urandom(16)).decode()]
+        lines = [
+            f"GET {path} HTTP/1.1",
+            f"Host: {host or f'localhost:{port}'}",
+            "Upgrade: websocket",
+            "Connection: Upgrade",
+            "Sec-WebSocket-Version: 13",
+            "Sec-WebSocket-Key: " + base64.b64encode(os.urandom(16)).decode(),
+        ]
         lines += [f"Sec-WebSocket-Protocol: {subprotocol}"] if subprotocol else []
         lines += [f"Origin: {origin}"] if origin else []
         self.socket.sendall("\r\n".join(lines).encode() + b"\r\n\r\n")
@@ -66,10 +83,25 @@ class WebSocket:
             self.socket.close()
 
     def send(self, message, kind=None):
-        text = message if isinstance(message, bytes) else (message if isinstance(message, str) else json.dumps(message)).encode()
+        text = (
+            message
+            if isinstance(message, bytes)
+            else (message if isinstance(message, str) else json.dumps(message)).encode()
+        )
         mask = os.urandom(4)
-        size = struct.pack("!B", 0x80 | len(text)) if len(text) < 126 else struct.pack("!BH", 0xFE, len(text)) if len(text) < 65536 else struct.pack("!BQ", 0xFF, len(text))
-        self.socket.sendall(bytes([kind or (0x82 if isinstance(message, bytes) else 0x81)]) + size + mask + bytes(b ^ mask[i % 4] for i, b in enumerate(text)))
+        size = (
+            struct.pack("!B", 0x80 | len(text))
+            if len(text) < 126
+            else struct.pack("!BH", 0xFE, len(text))
+            if len(text) < 65536
+            else struct.pack("!BQ", 0xFF, len(text))
+        )
+        self.socket.sendall(
+            bytes([kind or (0x82 if isinstance(message, bytes) else 0x81)])
+            + size
+            + mask
+            + bytes(b ^ mask[i % 4] for i, b in enumerate(text))
+        )
 
     def more(self):
         try:
@@ -87,9 +119,17 @@ class WebSocket:
                 length, head = self.data[1] & 127, 2
                 if length >= 126:
                     head = 4 if length == 126 else 10
-                    length = int.from_bytes(self.data[2:head], "big") if len(self.data) >= head else 1 << 60
+                    length = (
+                        int.from_bytes(self.data[2:head], "big")
+                        if len(self.data) >= head
+                        else 1 << 60
+                    )
                 if len(self.data) >= head + length:
-                    kind, body, self.data = self.data[0], self.data[head:head + length], self.data[head + length:]
+                    kind, body, self.data = (
+                        self.data[0],
+                        self.data[head : head + length],
+                        self.data[head + length :],
+                    )
                     return kind, body
             if not self.more():
                 return 0x88, b""
@@ -100,12 +140,18 @@ class WebSocket:
         while True:
             kind, body = self.frame()
             if kind & 15 == 8:
-                self.closed = (int.from_bytes(body[:2], "big"), body[2:].decode()) if body else self.closed or (1006, "")
+                self.closed = (
+                    (int.from_bytes(body[:2], "big"), body[2:].decode())
+                    if body
+                    else self.closed or (1006, "")
+                )
                 return None
             if kind & 15 == 9:  # answered as any client does
                 self.send(body, 0x8A)
                 continue
-            first = kind & 15 if kind & 15 else first  # noqa: F821 a continuation follows its first frame
+            first = (
+                kind & 15 if kind & 15 else first
+            )  # noqa: F821 a continuation follows its first frame
             whole += body
             if kind & 0x80:
                 return json.loads(whole) if first == 1 else whole
@@ -130,14 +176,47 @@ class Browser:
     def __init__(self, case, width=1280, height=800, folder="browser"):
         folder = case.folder / folder
         self.process = subprocess.Popen(
-            ["chromium", "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--remote-debugging-port=0", f"--window-size={width},{height}",
-             "--hide-scrollbars", "--force-prefers-reduced-motion", f"--user-data-dir={folder}", "about:blank"],
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True, env={**os.environ, "HOME": str(case.folder)})
+            [
+                "chromium",
+                "--headless=new",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--disable-dev-shm-usage",
+                "--remote-debugging-port=0",
+                f"--window-size={width},{height}",
+                "--hide-scrollbars",
+                "--force-prefers-reduced-motion",
+                f"--user-data-dir={folder}",
+                "about:blank",
+            ],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+            env={**os.environ, "HOME": str(case.folder)},
+        )
         case.addCleanup(self.end)
         port_file = folder / "DevToolsActivePort"
-        port = int(wait_until(lambda: port_file.exists() and port_file.read_text().split("\n")[0], "the browser starts"))
-        pages = wait_until(lambda: [p for p in json.loads(request(port, "/json", host=f"127.0.0.1:{port}")[2] or b"[]") if p["type"] == "page"], "the browser has a page")
-        self.socket = WebSocket(port, host=f"127.0.0.1:{port}", subprotocol=None, path=urlparse(pages[0]["webSocketDebuggerUrl"]).path)
+        port = int(
+            wait_until(
+                lambda: port_file.exists() and port_file.read_text().split("\n")[0],
+                "the browser starts",
+            )
+        )
+        pages = wait_until(
+            lambda: [
+                p
+                for p in json.loads(request(port, "/json", host=f"127.0.0.1:{port}")[2] or b"[]")
+                if p["type"] == "page"
+            ],
+            "the browser has a page",
+        )
+        self.socket = WebSocket(
+            port,
+            host=f"127.0.0.1:{port}",
+            subprotocol=None,
+            path=urlparse(pages[0]["webSocketDebuggerUrl"]).path,
+        )
         self.number, self.errors = 0, []
         self.call("Page.enable")
         self.call("Runtime.enable")
@@ -150,8 +229,15 @@ class Browser:
             if message.get("id") == self.number:
                 return message.get("result", {})
             if message.get("method") == "Runtime.exceptionThrown":
-                self.errors.append(message["params"]["exceptionDetails"].get("exception", {}).get("description", str(message["params"])))
-            if message.get("method") == "Log.entryAdded" and message["params"]["entry"]["level"] == "error":
+                self.errors.append(
+                    message["params"]["exceptionDetails"]
+                    .get("exception", {})
+                    .get("description", str(message["params"]))
+                )
+            if (
+                message.get("method") == "Log.entryAdded"
+                and message["params"]["entry"]["level"] == "error"
+            ):
                 entry = message["params"]["entry"]
                 self.errors.append(f"{entry['text']} {entry.get('url', '')}")
         raise AssertionError("the browser has ended")
@@ -160,21 +246,41 @@ class Browser:
         self.call("Page.navigate", url=url)
 
     def evaluate(self, expression):
-        result = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        result = self.call(
+            "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
+        )
         if "exceptionDetails" in result:
-            raise AssertionError(result["exceptionDetails"].get("exception", {}).get("description", str(result)))
+            raise AssertionError(
+                result["exceptionDetails"].get("exception", {}).get("description", str(result))
+            )
         return result.get("result", {}).get("value")
 
     def wait(self, expression):
         # What the expression reads may not exist yet.
-        return wait_until(lambda: self.evaluate(f"(() => {{ try {{ return {expression}; }} catch {{ return false; }} }})()"), expression)
+        return wait_until(
+            lambda: self.evaluate(
+                f"(() => {{ try {{ return {expression}; }} catch {{ return false; }} }})()"
+            ),
+            expression,
+        )
 
     def screenshot(self, path):
-        path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))
+        path.write_bytes(
+            base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
+        )
 
     def size(self, width, height, dark=False):
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
-        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}])
+        self.call(
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=width < 600,
+        )
+        self.call(
+            "Emulation.setEmulatedMedia",
+            features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}],
+        )
 
     def end(self):
         """Ends the browser with the processes it has started."""
@@ -192,8 +298,15 @@ def have_browser():
 def start_panel(case, *words):
     """Starts `hal panel` on a free port; (process, port, token or None)."""
     with open(case.folder / "panel.err", "w") as errors:
-        process = subprocess.Popen([str(HAL), "panel", "--port", "0", *map(str, words)], cwd=case.folder, env=case.environment, stdin=subprocess.DEVNULL,
-                                   stdout=subprocess.PIPE, stderr=errors, text=True)
+        process = subprocess.Popen(
+            [str(HAL), "panel", "--port", "0", *map(str, words)],
+            cwd=case.folder,
+            env=case.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
+        )
     case.addCleanup(lambda: (process.poll() is None and process.kill(), process.communicate()))
     for line in process.stdout:
         if found := re.match(r"http://[^/]*?:(\d+)/(?:#t=(\w+))?", line):

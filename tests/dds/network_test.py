@@ -21,7 +21,11 @@ def ip(*words):
 
 
 def sent_packets(interface):
-    found = json.loads(subprocess.run(["ip", "-json", "-stats", "link", "show", interface], check=True, capture_output=True).stdout)
+    found = json.loads(
+        subprocess.run(
+            ["ip", "-json", "-stats", "link", "show", interface], check=True, capture_output=True
+        ).stdout
+    )
     return found[0]["stats64"]["tx"]["packets"]
 
 
@@ -49,22 +53,36 @@ class Network(DdsCase):
         publisher.send_signal(signal.SIGSTOP)
         self.addCleanup(publisher.send_signal, signal.SIGCONT)
         self.becomes("sub.matched", "0")  # dropped after 5 s
-        wait_until(lambda: float(self.value("sub.age-ms", "subscriber")) > 7000, "it is suspended for longer than its lease")
+        wait_until(
+            lambda: float(self.value("sub.age-ms", "subscriber")) > 7000,
+            "it is suspended for longer than its lease",
+        )
         self.assertEqual("FALSE", self.value("sub.valid", "subscriber"))
         publisher.send_signal(signal.SIGCONT)
         # a process without CPU time for longer than its threads' limit runs its functions again after `start`
-        wait_until(lambda: "got no CPU time" in self.shell("show", "fault", instance="publisher").stdout, "the thread has reported its fault")
+        wait_until(
+            lambda: "got no CPU time" in self.shell("show", "fault", instance="publisher").stdout,
+            "the thread has reported its fault",
+        )
         self.good("shell", "--name", "publisher", "start")
         self.becomes("sub.valid", "TRUE")
         self.shows("1.5")
         self.becomes("pub.matched", "1", "publisher")
-        self.assertRegex(self.words("publisher"), r"dds: this process was suspended for \d+\.\d s and may have been dropped by others; announcing it again\n")
+        self.assertRegex(
+            self.words("publisher"),
+            r"dds: this process was suspended for \d+\.\d s and may have been dropped by others; announcing it again\n",
+        )
 
     def test_nothing_leaves_the_machine_without_interfaces(self):
         ip("link", "add", "out0", "type", "veth", "peer", "name", "out1")
         self.addCleanup(ip, "link", "del", "out0")
-        for command in (["link", "set", "out0", "address", "02:00:00:00:00:01"], ["addr", "add", "10.77.0.1/24", "dev", "out0"],
-                        ["link", "set", "out0", "up"], ["link", "set", "out1", "up"], ["route", "add", "default", "via", "10.77.0.2"]):
+        for command in (
+            ["link", "set", "out0", "address", "02:00:00:00:00:01"],
+            ["addr", "add", "10.77.0.1/24", "dev", "out0"],
+            ["link", "set", "out0", "up"],
+            ["link", "set", "out1", "up"],
+            ["route", "add", "default", "via", "10.77.0.2"],
+        ):
             ip(*command)
         with open("/proc/sys/net/ipv6/conf/out0/disable_ipv6", "w") as file:
             file.write("1")  # its neighbour discovery is not ours
@@ -75,13 +93,20 @@ class Network(DdsCase):
         self.assertEqual(before, sent_packets("out0"))
         self.end_quietly(publisher)
         self.publisher(more="interfaces=out0")
-        wait_until(lambda: sent_packets("out0") > before, "it announces itself on the given interface")
+        wait_until(
+            lambda: sent_packets("out0") > before, "it announces itself on the given interface"
+        )
 
     def test_a_discovery_server_connects_them(self):
         if not shutil.which("fast-discovery-server"):
             self.skipTest("fast-discovery-server is not installed (fastdds-tools)")
-        server = subprocess.Popen(["fast-discovery-server", "-i", "0", "-l", "127.0.0.1", "-p", "11811"], stdin=subprocess.DEVNULL,
-                                  stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=self.folder)
+        server = subprocess.Popen(
+            ["fast-discovery-server", "-i", "0", "-l", "127.0.0.1", "-p", "11811"],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            cwd=self.folder,
+        )
         self.addCleanup(server.wait)
         self.addCleanup(server.kill)
         self.publisher(3.5, more="server=127.0.0.1:11811")

@@ -30,8 +30,12 @@ class DdsCase(Case):
     def setUp(self):
         super().setUp()
         # Fast DDS 2.9 never frees the keys of a handshake that is rejected or aborted.
-        self.environment["LSAN_OPTIONS"] = "print_suppressions=0:suppressions=" + self.write("known-leaks", "leak:libcrypto\n")
-        self.environment["ASAN_OPTIONS"] = ":".join(filter(None, [os.environ.get("ASAN_OPTIONS"), "new_delete_type_mismatch=0"]))
+        self.environment["LSAN_OPTIONS"] = "print_suppressions=0:suppressions=" + self.write(
+            "known-leaks", "leak:libcrypto\n"
+        )
+        self.environment["ASAN_OPTIONS"] = ":".join(
+            filter(None, [os.environ.get("ASAN_OPTIONS"), "new_delete_type_mismatch=0"])
+        )
         if os.environ.get("HALCYON_PLUGIN_PATH"):
             self.environment["HALCYON_PLUGIN_PATH"] = os.environ["HALCYON_PLUGIN_PATH"]
 
@@ -40,13 +44,21 @@ class DdsCase(Case):
         self.write(instance + ".hal", netlist)
         log = open(self.folder / (instance + ".log"), "a")
         self.addCleanup(log.close)
-        process = subprocess.Popen(["hal", "run", "--name", instance, instance + ".hal"], executable=str(HAL), cwd=self.folder, env=self.environment,
-                                   stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=log)
+        process = subprocess.Popen(
+            ["hal", "run", "--name", instance, instance + ".hal"],
+            executable=str(HAL),
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=log,
+        )
         self.addCleanup(self.end_quietly, process)
 
         def runs():
             self.assertIsNone(process.poll(), "it ended: " + self.words(instance))
             return self.value("servo.threadbeat", instance) not in ("", "0")
+
         wait_until(runs, "the machine runs")
         return process
 
@@ -59,10 +71,14 @@ class DdsCase(Case):
         return (self.folder / (instance + ".log")).read_text()
 
     def publisher(self, angle=1.5, more=""):
-        return self.machine("publisher", PUBLISH.format(angle=angle, more=f"domain={DOMAIN} {more}"))
+        return self.machine(
+            "publisher", PUBLISH.format(angle=angle, more=f"domain={DOMAIN} {more}")
+        )
 
     def subscriber(self, fields=FIELDS, more="timeout_ms=1000"):
-        return self.machine("subscriber", SUBSCRIBE.format(fields=fields, more=f"domain={DOMAIN} {more}"))
+        return self.machine(
+            "subscriber", SUBSCRIBE.format(fields=fields, more=f"domain={DOMAIN} {more}")
+        )
 
     def becomes(self, pin, value, instance="subscriber"):
         wait_until(lambda: self.value(pin, instance) == value, f"{instance}: {pin} is {value}")
@@ -75,10 +91,19 @@ class DdsCase(Case):
     def prints(self, text, instance="subscriber"):
         wait_until(lambda: text in self.words(instance), f"{instance} prints '{text}'")
 
-    def rogue(self, *words, fields="angle:float,ready:bit,count:s32*2", topic="arm/state", domain=DOMAIN):
+    def rogue(
+        self, *words, fields="angle:float,ready:bit,count:s32*2", topic="arm/state", domain=DOMAIN
+    ):
         """Starts a program on the topic that runs until its input ends."""
-        process = subprocess.Popen([str(ROGUE), topic, fields, f"domain={domain}", *words], cwd=self.folder, env=self.environment,
-                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            [str(ROGUE), topic, fields, f"domain={domain}", *words],
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         self.addCleanup(self.end_rogue, process)
         return process
 

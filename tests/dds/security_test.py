@@ -39,24 +39,74 @@ PERMISSIONS = """<?xml version="1.0" encoding="UTF-8"?>
 
 class Security(DdsCase):
     def openssl(self, *words):
-        done = subprocess.run(["openssl", *map(str, words)], cwd=self.folder, capture_output=True, text=True)
+        done = subprocess.run(
+            ["openssl", *map(str, words)], cwd=self.folder, capture_output=True, text=True
+        )
         self.assertEqual(0, done.returncode, done.stderr)
 
     def authority(self, name):
         self.openssl("ecparam", "-name", "prime256v1", "-genkey", "-noout", "-out", f"{name}.key")
-        self.openssl("req", "-x509", "-new", "-key", f"{name}.key", "-days", 3650, "-subj", f"/O=Halcyon/CN={name}", "-out", f"{name}.pem")
+        self.openssl(
+            "req",
+            "-x509",
+            "-new",
+            "-key",
+            f"{name}.key",
+            "-days",
+            3650,
+            "-subj",
+            f"/O=Halcyon/CN={name}",
+            "-out",
+            f"{name}.pem",
+        )
 
     def sign(self, authority, text, to):
         self.write("plain.xml", text)
-        self.openssl("smime", "-sign", "-in", "plain.xml", "-text", "-out", to, "-signer", f"{authority}.pem", "-inkey", f"{authority}.key")
+        self.openssl(
+            "smime",
+            "-sign",
+            "-in",
+            "plain.xml",
+            "-text",
+            "-out",
+            to,
+            "-signer",
+            f"{authority}.pem",
+            "-inkey",
+            f"{authority}.key",
+        )
 
     def enclave(self, name, authority="authority", topic="arm/state"):
         """Creates the folder of one machine, in the layout of a ROS 2 enclave."""
         (self.folder / name).mkdir()
-        self.openssl("ecparam", "-name", "prime256v1", "-genkey", "-noout", "-out", f"{name}/key.pem")
-        self.openssl("req", "-new", "-key", f"{name}/key.pem", "-subj", f"/O=Halcyon/CN={name}", "-out", f"{name}/request")
-        self.openssl("x509", "-req", "-in", f"{name}/request", "-CA", f"{authority}.pem", "-CAkey", f"{authority}.key", "-CAcreateserial", "-days", 3650,
-                     "-out", f"{name}/cert.pem")
+        self.openssl(
+            "ecparam", "-name", "prime256v1", "-genkey", "-noout", "-out", f"{name}/key.pem"
+        )
+        self.openssl(
+            "req",
+            "-new",
+            "-key",
+            f"{name}/key.pem",
+            "-subj",
+            f"/O=Halcyon/CN={name}",
+            "-out",
+            f"{name}/request",
+        )
+        self.openssl(
+            "x509",
+            "-req",
+            "-in",
+            f"{name}/request",
+            "-CA",
+            f"{authority}.pem",
+            "-CAkey",
+            f"{authority}.key",
+            "-CAcreateserial",
+            "-days",
+            3650,
+            "-out",
+            f"{name}/cert.pem",
+        )
         for file in ("identity_ca.cert.pem", "permissions_ca.cert.pem"):
             shutil.copy(self.folder / f"{authority}.pem", self.folder / name / file)
         self.sign(authority, GOVERNANCE, f"{name}/governance.p7s")
@@ -85,14 +135,23 @@ class Security(DdsCase):
         self.authority("authority")
         self.publisher(more=self.enclave("arm", topic="*"))
         domain, tool = f"domain={DOMAIN}", self.enclave("tool", topic="*")
-        elsewhere = {"XDG_RUNTIME_DIR": str(self.folder / "tool")}  # so that it has the network only
-        wait_until(lambda: '"publisher"' in self.good("top", "--json", "--dds", f"{domain} {tool}", environment=elsewhere), "hal top sees it")
+        elsewhere = {
+            "XDG_RUNTIME_DIR": str(self.folder / "tool")
+        }  # so that it has the network only
+        wait_until(
+            lambda: '"publisher"'
+            in self.good("top", "--json", "--dds", f"{domain} {tool}", environment=elsewhere),
+            "hal top sees it",
+        )
         self.assertEqual("[]\n", self.good("top", "--json", "--dds", domain, environment=elsewhere))
 
     def test_a_topic_without_permission_is_denied_by_name(self):
         self.authority("authority")
-        self.write("bad.hal", "loadrt threads name1=servo period1=1000000\nloadrt dds_publish names=pub topic=arm/state fields=a:float "
-                              f"domain={DOMAIN} {self.enclave('guest', topic='other/topic')}\n")
+        self.write(
+            "bad.hal",
+            "loadrt threads name1=servo period1=1000000\nloadrt dds_publish names=pub topic=arm/state fields=a:float "
+            f"domain={DOMAIN} {self.enclave('guest', topic='other/topic')}\n",
+        )
         done = self.run_program("run", "--for", "10ms", "bad.hal")
         self.assertNotEqual(0, done.returncode)
         self.assertIn("arm/state", done.stderr)
@@ -102,9 +161,15 @@ class Security(DdsCase):
         self.authority("authority")
         words = self.enclave("arm")
         (self.folder / "arm" / "key.pem").unlink()
-        self.write("bad.hal", "loadrt threads name1=servo period1=1000000\nloadrt dds_publish names=pub topic=arm/state fields=a:float "
-                              f"domain={DOMAIN} {words}\n")
-        self.assertIn("arm/key.pem; the folder needs identity_ca.cert.pem, cert.pem, key.pem, ", self.run_program("run", "--for", "10ms", "bad.hal").stderr)
+        self.write(
+            "bad.hal",
+            "loadrt threads name1=servo period1=1000000\nloadrt dds_publish names=pub topic=arm/state fields=a:float "
+            f"domain={DOMAIN} {words}\n",
+        )
+        self.assertIn(
+            "arm/key.pem; the folder needs identity_ca.cert.pem, cert.pem, key.pem, ",
+            self.run_program("run", "--for", "10ms", "bad.hal").stderr,
+        )
 
 
 if __name__ == "__main__":

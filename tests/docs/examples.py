@@ -18,8 +18,28 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests/cli"))
 from own_network import own_network  # noqa: E402
 
-COMMANDS = ("loadrt", "addf", "initf", "net", "setp", "sets", "newsig", "newthread", "linkps", "linksp", "linkpp", "alias", "unlinkp", "start")
-PERIODS = {"base": 50_000, "fast": 100_000, "servo": 1_000_000, "slow": 10_000_000}  # by how the name begins; else as servo
+COMMANDS = (
+    "loadrt",
+    "addf",
+    "initf",
+    "net",
+    "setp",
+    "sets",
+    "newsig",
+    "newthread",
+    "linkps",
+    "linksp",
+    "linkpp",
+    "alias",
+    "unlinkp",
+    "start",
+)
+PERIODS = {
+    "base": 50_000,
+    "fast": 100_000,
+    "servo": 1_000_000,
+    "slow": 10_000_000,
+}  # by how the name begins; else as servo
 
 
 def program(arguments):
@@ -29,17 +49,32 @@ def program(arguments):
 
 
 def run(hal, *words, folder=None):
-    environment = {**os.environ, "NO_COLOR": "1", "HOME": str(folder or "/nonexistent"), "XDG_RUNTIME_DIR": str(folder or "/nonexistent")}
+    environment = {
+        **os.environ,
+        "NO_COLOR": "1",
+        "HOME": str(folder or "/nonexistent"),
+        "XDG_RUNTIME_DIR": str(folder or "/nonexistent"),
+    }
     environment.pop("XDG_DATA_HOME", None)
-    return subprocess.run([str(hal), *map(str, words)], env=environment, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                          timeout=float(os.environ.get("HALCYON_TEST_TIMEOUT", "60")))
+    return subprocess.run(
+        [str(hal), *map(str, words)],
+        env=environment,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=float(os.environ.get("HALCYON_TEST_TIMEOUT", "60")),
+    )
 
 
 def example_of(text):
     """The commands among the indented lines, continued ones too."""
     lines, goes_on = [], False
     for line in text.splitlines():
-        if line.startswith("    ") and (goes_on or line.split()[:1] and line.split()[0] in COMMANDS):
+        if line.startswith("    ") and (
+            goes_on or line.split()[:1] and line.split()[0] in COMMANDS
+        ):
             lines.append(line.strip())
             goes_on = line.rstrip().endswith("\\")
         else:
@@ -54,11 +89,19 @@ def files_of(text):
 
 
 def period_of(thread):
-    return next((period for name, period in PERIODS.items() if thread.startswith(name)), PERIODS["servo"])
+    return next(
+        (period for name, period in PERIODS.items() if thread.startswith(name)), PERIODS["servo"]
+    )
 
 
 def netlist(lines):
-    made = {word.split("=")[1] for line in lines if line.startswith("loadrt threads") for word in line.split() if word.startswith("name")}
+    made = {
+        word.split("=")[1]
+        for line in lines
+        if line.startswith("loadrt threads")
+        for word in line.split()
+        if word.startswith("name")
+    }
     made |= {line.split()[1] for line in lines if line.startswith("newthread")}
     used = []
     for line in lines:
@@ -70,7 +113,9 @@ def netlist(lines):
     threads = [f"newthread {name} {period_of(name)}" for name in sorted(used, key=period_of)]
     if not threads and not made:
         threads = ["newthread servo 1000000"]
-    return "\n".join([*threads, *(line for line in lines if line != "start"), "start", "advance 20 cycles", ""])
+    return "\n".join(
+        [*threads, *(line for line in lines if line != "start"), "start", "advance 20 cycles", ""]
+    )
 
 
 def check(hal, name):
@@ -84,28 +129,44 @@ def check(hal, name):
         return "it has no example"
     loaded = [line.split()[1].replace("-", "_") for line in lines if line.startswith("loadrt")]
     family = name.replace("-", "_").split("_")[0]  # conv_bit_float and its kind share a text
-    if not any(one == name.replace("-", "_") or family == "conv" and one.startswith("conv_") for one in loaded):
+    if not any(
+        one == name.replace("-", "_") or family == "conv" and one.startswith("conv_")
+        for one in loaded
+    ):
         return "its example does not load it"
     with tempfile.TemporaryDirectory() as folder:
         for other, content in files_of(text).items():
             (Path(folder) / other).write_text(content)
         (Path(folder) / "example.hal").write_text(netlist(lines))
         done = run(hal, "sim", "example.hal", folder=folder)
-        return None if done.returncode == 0 else f"exit status {done.returncode}\n{netlist(lines)}\n{done.stderr.strip()}"
+        return (
+            None
+            if done.returncode == 0
+            else f"exit status {done.returncode}\n{netlist(lines)}\n{done.stderr.strip()}"
+        )
 
 
 def main():
-    if own_network():  # the examples of DDS and of buses over UDP meet nobody else's; where it cannot be made they are on this machine's loopback
+    if (
+        own_network()
+    ):  # the examples of DDS and of buses over UDP meet nobody else's; where it cannot be made they are on this machine's loopback
         subprocess.run(["ip", "route", "add", "224.0.0.0/4", "dev", "lo"], check=True)
     arguments = sys.argv[1:]
     hal = program(arguments)
-    names = arguments or [line.split()[0] for line in run(hal, "doc").stdout.splitlines() if line.split()[0] != "threads"]
+    names = arguments or [
+        line.split()[0]
+        for line in run(hal, "doc").stdout.splitlines()
+        if line.split()[0] != "threads"
+    ]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         results = dict(zip(names, pool.map(lambda name: check(hal, name), names)))
     failed = {name: why for name, why in results.items() if why}
     for name, why in failed.items():
         print(f"FAILED {name}: {why}\n")
-    print(f"{len(names) - len(failed)} of {len(names)} examples run" + (f"; not: {' '.join(failed)}" if failed else ""))
+    print(
+        f"{len(names) - len(failed)} of {len(names)} examples run"
+        + (f"; not: {' '.join(failed)}" if failed else "")
+    )
     return 1 if failed or not names else 0
 
 

@@ -33,16 +33,22 @@ NOT_RUN = ("./hal test", "./hal bench", "./hal build")
 FENCE = re.compile(r"^```(\w+)([^\n]*)\n(.*?)^```", re.M | re.S)
 
 
-NUMBER = re.compile(r"(?<=cycle )\d+(?: \d{3})*|\b(?=\w*[a-f])(?=\w*\d)[0-9a-f]{8,}\b|"  # cycle 1 104; a token
-                    r"(?<![A-Za-z_])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?: ?(?:ns|us|ms|s|min)\b)?")
+NUMBER = re.compile(
+    r"(?<=cycle )\d+(?: \d{3})*|\b(?=\w*[a-f])(?=\w*\d)[0-9a-f]{8,}\b|"  # cycle 1 104; a token
+    r"(?<![A-Za-z_])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?: ?(?:ns|us|ms|s|min)\b)?"
+)
 
 
 def matches(expected, actual, figures=False):
     """True when the lines agree; with `figures`, any number stands for any number."""
+
     def plain(line):
         if not figures:
             return line.rstrip()
-        return re.sub(r"(of it #) in \S+", r"\1", " ".join(NUMBER.sub("#", line).replace("-#", "#").split()))
+        return re.sub(
+            r"(of it #) in \S+", r"\1", " ".join(NUMBER.sub("#", line).replace("-#", "#").split())
+        )
+
     return [plain(line) for line in expected] == [plain(line) for line in actual]
 
 
@@ -53,12 +59,21 @@ def run(command, folder, environment):
         status = int(code)
     command = command.strip()
     if command.startswith("./hal "):
-        command, folder = str(HAL) + command[len("./hal"):], ROOT
+        command, folder = str(HAL) + command[len("./hal") :], ROOT
     if command.startswith("cmake --install build/release"):
         command, folder = command.replace("build/release", str(HAL.parents[1])), ROOT
     try:
-        done = subprocess.run(["bash", "-c", command], cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                              stderr=subprocess.STDOUT, timeout=120, text=True, errors="replace")
+        done = subprocess.run(
+            ["bash", "-c", command],
+            cwd=folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            timeout=120,
+            text=True,
+            errors="replace",
+        )
     except subprocess.TimeoutExpired:
         return False, "none: it still ran after 120 s", []
     return done.returncode == status, done.returncode, done.stdout.splitlines()
@@ -79,9 +94,16 @@ def check_console(text, where, folder, environment, figures):
             while lines and not lines[-1].strip():
                 lines.pop()
         if not good:
-            problems.append(f"{where}: `{command}` ended with status {status}:\n" + "\n".join(actual))
+            problems.append(
+                f"{where}: `{command}` ended with status {status}:\n" + "\n".join(actual)
+            )
         elif expected and not matches(expected, actual, figures):
-            problems.append(f"{where}: `{command}` printed\n" + "\n".join(actual) + "\n  where the document has\n" + "\n".join(expected))
+            problems.append(
+                f"{where}: `{command}` printed\n"
+                + "\n".join(actual)
+                + "\n  where the document has\n"
+                + "\n".join(expected)
+            )
     return len(commands), problems
 
 
@@ -101,8 +123,16 @@ def check_document(path):
     ran, problems = 0, []
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         home = pathlib.Path(folder, ".home")
-        environment = dict(os.environ, PATH=f"{HAL.parent}:{os.environ['PATH']}", NO_COLOR="1", HOME=str(home), XDG_RUNTIME_DIR=str(home),
-                           XDG_DATA_HOME=str(home), XDG_STATE_HOME=str(home), TERM="dumb")
+        environment = dict(
+            os.environ,
+            PATH=f"{HAL.parent}:{os.environ['PATH']}",
+            NO_COLOR="1",
+            HOME=str(home),
+            XDG_RUNTIME_DIR=str(home),
+            XDG_DATA_HOME=str(home),
+            XDG_STATE_HOME=str(home),
+            TERM="dumb",
+        )
         home.mkdir(mode=0o700)
         for block in FENCE.finditer(text):
             language, options, body = block.groups()
@@ -119,7 +149,9 @@ def check_document(path):
                 if not good:
                     problems.append(f"{where}: hal check prints\n" + "\n".join(actual))
             elif language == "console":
-                count, found = check_console(body, where, folder, environment, "figures" in options.split())
+                count, found = check_console(
+                    body, where, folder, environment, "figures" in options.split()
+                )
                 ran += count
                 problems += found
         end_what_was_left(home)
@@ -127,8 +159,13 @@ def check_document(path):
 
 
 def main():
-    chosen = [pathlib.Path(a).resolve() for a in sys.argv[1:]] or [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-    if any("loadrt dds_" in path.read_text() or "HALCYON_DDS" in path.read_text() for path in chosen):
+    chosen = [pathlib.Path(a).resolve() for a in sys.argv[1:]] or [
+        ROOT / "README.md",
+        *sorted((ROOT / "docs").rglob("*.md")),
+    ]
+    if any(
+        "loadrt dds_" in path.read_text() or "HALCYON_DDS" in path.read_text() for path in chosen
+    ):
         own_network()  # the pages' domains may be in use here
     total, failed = 0, 0
     for path in chosen:

@@ -32,8 +32,15 @@ def run(hal, command):
         # a file that is not a plugin, and the components made for tests
         plugins = {"HALCYON_PLUGIN_PATH": f"plugins:{hal.parent.parent / 'tests' / 'plugins'}"}
         try:
-            done = subprocess.run(["/usr/bin/env", *command], cwd=HERE, env=environment(hal, folder) | plugins, stdin=subprocess.DEVNULL,
-                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=TIMEOUT)
+            done = subprocess.run(
+                ["/usr/bin/env", *command],
+                cwd=HERE,
+                env=environment(hal, folder) | plugins,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                timeout=TIMEOUT,
+            )
         except subprocess.TimeoutExpired as late:
             return late.stderr or b"", f"still running after {TIMEOUT:g} s"
     return done.stderr, done.returncode
@@ -41,7 +48,9 @@ def run(hal, command):
 
 def codes(hal):
     """All diagnostic codes."""
-    listed = subprocess.run([str(hal), "explain"], stdout=subprocess.PIPE, check=True, timeout=TIMEOUT).stdout.decode()
+    listed = subprocess.run(
+        [str(hal), "explain"], stdout=subprocess.PIPE, check=True, timeout=TIMEOUT
+    ).stdout.decode()
     return {line.split()[0] for line in listed.splitlines() if line and not line.startswith(" ")}
 
 
@@ -74,7 +83,9 @@ def check(hal, test, known):
         problems.append(f"'{test}.expected' does not mention [{code}]")
     if got != wanted:
         text = lambda data: data.decode(errors="backslashreplace").splitlines()
-        problems += list(difflib.unified_diff(text(wanted), text(got), "expected", "stderr", lineterm="", n=2)) or ["the same lines, but other line ends"]
+        problems += list(
+            difflib.unified_diff(text(wanted), text(got), "expected", "stderr", lineterm="", n=2)
+        ) or ["the same lines, but other line ends"]
     return problems
 
 
@@ -84,7 +95,9 @@ def main():
     coverage_only = "--every-code" in arguments
     names = [Path(a).stem for a in arguments if a != "--every-code"]
     known = codes(hal)
-    everything = sorted({path.stem for pattern in ("*.hal", "*.cmd", "*.sh") for path in HERE.glob(pattern)})
+    everything = sorted(
+        {path.stem for pattern in ("*.hal", "*.cmd", "*.sh") for path in HERE.glob(pattern)}
+    )
     tests = [] if coverage_only else [t for t in everything if not names or t in names]
     failed = 0
     for test in tests:
@@ -101,7 +114,11 @@ def main():
             if not code_of(path.stem, known) or path.stem not in everything:
                 failed += 1
                 print(f"FAILED {path.name}: no code has this name, or there is no {path.stem}.hal")
-    print(f"{len(tests)} error tests run, {failed} failed" if not coverage_only else f"{len(known)} codes, {failed} without test")
+    print(
+        f"{len(tests)} error tests run, {failed} failed"
+        if not coverage_only
+        else f"{len(known)} codes, {failed} without test"
+    )
     return 0 if (tests or coverage_only) and not failed else 1
 
 

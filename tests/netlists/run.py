@@ -30,18 +30,29 @@ def run(hal, test):
         command = shlex.split((test / "command").read_text())
     with tempfile.TemporaryDirectory() as folder:
         try:
-            done = subprocess.run(["/usr/bin/env", *command], cwd=test, env=environment(hal, folder), stdin=subprocess.DEVNULL,
-                                  stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=TIMEOUT)
+            done = subprocess.run(
+                ["/usr/bin/env", *command],
+                cwd=test,
+                env=environment(hal, folder),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                timeout=TIMEOUT,
+            )
         except subprocess.TimeoutExpired as late:
             return late.stdout or b"", late.stderr or b"", f"still running after {TIMEOUT:g} s"
     # the warning of a busy host, or an emulator, about a slow constructor is not the netlist's
-    err = re.sub(rb"(?m)^hal: '.*' \(.*\) has not returned from its constructor for .*\n", b"", done.stderr)
+    err = re.sub(
+        rb"(?m)^hal: '.*' \(.*\) has not returned from its constructor for .*\n", b"", done.stderr
+    )
     return done.stdout, err, done.returncode
 
 
 def differences(wanted, got, what):
     text = lambda data: data.decode(errors="backslashreplace").splitlines()
-    lines = list(difflib.unified_diff(text(wanted), text(got), f"expected {what}", what, lineterm="", n=2))
+    lines = list(
+        difflib.unified_diff(text(wanted), text(got), f"expected {what}", what, lineterm="", n=2)
+    )
     return lines or [f"{what}: the same lines, but other line ends"]
 
 
@@ -54,13 +65,19 @@ def check(hal, test):
     problems = []
     wanted_status = int((test / "status").read_text()) if (test / "status").exists() else 0
     if status != wanted_status:
-        problems += [f"exit status {status}, not {wanted_status}; standard error:"] + err.decode(errors="backslashreplace").splitlines()
+        problems += [f"exit status {status}, not {wanted_status}; standard error:"] + err.decode(
+            errors="backslashreplace"
+        ).splitlines()
     if out != (wanted := (test / "expected").read_bytes()):
         problems += differences(wanted, out, "stdout")
-    if (test / "expected.stderr").exists() and err != (wanted := (test / "expected.stderr").read_bytes()):
+    if (test / "expected.stderr").exists() and err != (
+        wanted := (test / "expected.stderr").read_bytes()
+    ):
         problems += differences(wanted, err, "stderr")
     if first[0] != second[0] or first[2] != second[2]:
-        problems += ["a second run differs from the first:"] + differences(first[0], second[0], "stdout")
+        problems += ["a second run differs from the first:"] + differences(
+            first[0], second[0], "stdout"
+        )
     return problems
 
 
@@ -69,8 +86,19 @@ def main():
     hal = program(arguments)
     tests = sorted(path.parent for path in HERE.rglob("test.hal"))
     if arguments:
-        wanted = [Path(a).resolve().parent if a.endswith(".hal") else Path(a).resolve() if Path(a).is_dir() else a for a in arguments]
-        tests = [t for t in tests if any(t == w or (isinstance(w, str) and w in str(t.relative_to(HERE))) for w in wanted)]
+        wanted = [
+            Path(a).resolve().parent
+            if a.endswith(".hal")
+            else Path(a).resolve()
+            if Path(a).is_dir()
+            else a
+            for a in arguments
+        ]
+        tests = [
+            t
+            for t in tests
+            if any(t == w or (isinstance(w, str) and w in str(t.relative_to(HERE))) for w in wanted)
+        ]
     failed = 0
     for test in tests:
         if problems := check(hal, test):

@@ -19,7 +19,10 @@ checks = []
 
 def check(name, holds, *seen):
     checks.append(bool(holds))
-    print(f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}", flush=True)
+    print(
+        f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}",
+        flush=True,
+    )
 
 
 def pattern(size, seed):
@@ -58,7 +61,11 @@ def dictionary():
         for sub in range(size + 1):
             variable = canopen.objectdictionary.ODVariable(f"sub {sub}", base, sub)
             if base >= 0x1800 and base < 0x1A00 or base < 0x1600:
-                variable.data_type = {1: types.UNSIGNED32, 3: types.UNSIGNED16, 5: types.UNSIGNED16}.get(sub, types.UNSIGNED8)
+                variable.data_type = {
+                    1: types.UNSIGNED32,
+                    3: types.UNSIGNED16,
+                    5: types.UNSIGNED16,
+                }.get(sub, types.UNSIGNED8)
             else:
                 variable.data_type = types.UNSIGNED32 if sub else types.UNSIGNED8
             record.add_member(variable)
@@ -91,7 +98,10 @@ def our_device(program, network):
         check("segmented text", node.sdo.upload(0x2005, 0) == b"hello world")
         check("abort no object", abort_code(lambda: node.sdo.upload(0x2FFF, 0)) == 0x06020000)
         check("abort no sub-index", abort_code(lambda: node.sdo.upload(0x1018, 9)) == 0x06090011)
-        check("abort read only", abort_code(lambda: node.sdo.download(0x1000, 0, b"1234")) == 0x06010002)
+        check(
+            "abort read only",
+            abort_code(lambda: node.sdo.download(0x1000, 0, b"1234")) == 0x06010002,
+        )
         for size in SIZES:
             data = pattern(size, 1)
             node.sdo.download(0x2006, 0, data, force_segment=size > 4)
@@ -118,12 +128,19 @@ def our_device(program, network):
             network.sync.transmit()
             wait_for(lambda: len(arrived) > n)
         check("TPDO after SYNC, 10 of 10", len(arrived) == 10, len(arrived))
-        check("values of the TPDO", (node.tpdo[1][0x2001].raw, node.tpdo[1][0x2000].raw) == (-5, 0xCAFE))
+        check(
+            "values of the TPDO",
+            (node.tpdo[1][0x2001].raw, node.tpdo[1][0x2000].raw) == (-5, 0xCAFE),
+        )
         node.rpdo[1][0x2000].raw = 0xE
         node.rpdo[1].transmit()
         check("EMCY", wait_for(lambda: [e.code for e in node.emcy.log] == [0x5030]), node.emcy.log)
         node.sdo.download(0x2000, 0, bytes(4))
-        check("EMCY is over", wait_for(lambda: len(node.emcy.log) == 2 and not node.emcy.active), node.emcy.log)
+        check(
+            "EMCY is over",
+            wait_for(lambda: len(node.emcy.log) == 2 and not node.emcy.active),
+            node.emcy.log,
+        )
         node.nmt.state = "STOPPED"
         check("stopped", wait_for(lambda: beats[-1] == 4))
         seen_boot.clear()
@@ -140,7 +157,9 @@ def our_client(program, network):
     node.nmt.send_command(0)
     node.sdo[0x1000].raw = 0x1234
     node.sdo[0x2000].raw = 77
-    ours = subprocess.Popen([program, "client", ADDRESS, "9"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    ours = subprocess.Popen(
+        [program, "client", ADDRESS, "9"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
 
     def ask(line):
         print(line, file=ours.stdin, flush=True)
@@ -149,13 +168,27 @@ def our_client(program, network):
     try:
         check("client opens the bus", ours.stdout.readline().strip() == "open")
         check("client reads", (got := ask("read 1000 0 segmented")) == "ok 34120000", got)
-        check("client writes", ask("write 2000 0 segmented 0d000000") == "ok" and node.sdo[0x2000].raw == 13)
-        check("client gets the abort", (got := ask("read 2fff 0 segmented")).startswith("abort 06020000"), got)
+        check(
+            "client writes",
+            ask("write 2000 0 segmented 0d000000") == "ok" and node.sdo[0x2000].raw == 13,
+        )
+        check(
+            "client gets the abort",
+            (got := ask("read 2fff 0 segmented")).startswith("abort 06020000"),
+            got,
+        )
         for size in SIZES:
-            for mode in ("segmented", "block"):  # the package has no block server: our client falls back to segments
+            for mode in (
+                "segmented",
+                "block",
+            ):  # the package has no block server: our client falls back to segments
                 data = pattern(size, 3)
                 wrote = ask(f"write 2006 0 {mode} {data.hex()}")
-                check(f"client {mode} {size}", wrote == "ok" and ask(f"read 2006 0 {mode}") == f"ok {data.hex()}", wrote)
+                check(
+                    f"client {mode} {size}",
+                    wrote == "ok" and ask(f"read 2006 0 {mode}") == f"ok {data.hex()}",
+                    wrote,
+                )
         ask("nmt 1")
         check("client starts the node", wait_for(lambda: node.nmt.state == "OPERATIONAL"))
     finally:
@@ -170,23 +203,47 @@ def our_master(program, network):
     node.sdo[0x2001].raw = -5
     ours = subprocess.Popen([program, "master", ADDRESS, "10"], stdout=subprocess.PIPE, text=True)
     lines = []
-    threading.Thread(target=lambda: lines.extend(iter(ours.stdout.readline, "")), daemon=True).start()
+    threading.Thread(
+        target=lambda: lines.extend(iter(ours.stdout.readline, "")), daemon=True
+    ).start()
 
     def steps():
         return [line.strip() for line in lines[-12:]]
 
     try:
-        check("master boots a node of the package", wait_for(lambda: steps()[-1:] == ["running"], 20), steps())
-        check("its objects are configured", (node.sdo[0x2000].raw, node.sdo[0x2005].raw) == (4711, "a long text"))
-        check("its PDO is mapped", [node.sdo[0x1A00][n].raw for n in range(3)] == [2, 0x20010010, 0x20000020], steps())
-        check("its PDO is on", (node.sdo[0x1800][1].raw & 0xBFFFFFFF, node.sdo[0x1800][2].raw) == (0x18A, 1))
+        check(
+            "master boots a node of the package",
+            wait_for(lambda: steps()[-1:] == ["running"], 20),
+            steps(),
+        )
+        check(
+            "its objects are configured",
+            (node.sdo[0x2000].raw, node.sdo[0x2005].raw) == (4711, "a long text"),
+        )
+        check(
+            "its PDO is mapped",
+            [node.sdo[0x1A00][n].raw for n in range(3)] == [2, 0x20010010, 0x20000020],
+            steps(),
+        )
+        check(
+            "its PDO is on",
+            (node.sdo[0x1800][1].raw & 0xBFFFFFFF, node.sdo[0x1800][2].raw) == (0x18A, 1),
+        )
         check("its heartbeat is set", node.sdo[0x1017].raw == 100)
         check("it is operational", node.nmt.state == "OPERATIONAL")
         node.nmt.stop_heartbeat()
-        check("its silence is noticed", wait_for(lambda: any(" sent no heartbeat within " in s for s in steps())), steps())
+        check(
+            "its silence is noticed",
+            wait_for(lambda: any(" sent no heartbeat within " in s for s in steps())),
+            steps(),
+        )
         check("it is booted again", wait_for(lambda: steps()[-1:] == ["running"], 20), steps())
         node.nmt.state = "PRE-OPERATIONAL"
-        check("that it left operational is noticed", wait_for(lambda: any(" left the operational state " in s for s in steps())), steps())
+        check(
+            "that it left operational is noticed",
+            wait_for(lambda: any(" left the operational state " in s for s in steps())),
+            steps(),
+        )
         check("it is brought back", wait_for(lambda: steps()[-1:] == ["running"], 20), steps())
     finally:
         ours.kill()

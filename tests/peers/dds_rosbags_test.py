@@ -13,7 +13,9 @@ package("rosbags")
 from rosbags.typesys import Stores, get_typestore  # noqa: E402
 
 store = get_typestore(Stores.ROS2_HUMBLE)
-lines = subprocess.run([sys.argv[1]], stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()
+lines = subprocess.run(
+    [sys.argv[1]], stdout=subprocess.PIPE, text=True, check=True
+).stdout.splitlines()
 failed = len(lines) < 8
 for line in lines:
     ros, digits = line.split()
@@ -22,5 +24,8 @@ for line in lines:
     theirs = bytes(store.serialize_cdr(message, name))
     same = theirs == ours
     failed |= not same
-    print(f"{ros}: {len(ours)} bytes " + ("are the same" if same else f"differ:\n  ours   {ours.hex()}\n  theirs {theirs.hex()}"))
+    print(
+        f"{ros}: {len(ours)} bytes "
+        + ("are the same" if same else f"differ:\n  ours   {ours.hex()}\n  theirs {theirs.hex()}")
+    )
 sys.exit(failed)

@@ -25,8 +25,13 @@ SUMMARY = re.compile(r"(\d+) objects?, (\d+) entr(?:y|ies), .*; (\d+) warnings?,
 def ours(hal, path):
     """(objects, entries, warnings, notes, milliseconds), or the reason of its rejection, or how the program ended."""
     start = time.monotonic()
-    done = subprocess.run([hal, "can", "eds", "check", path], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                          stderr=subprocess.PIPE, timeout=60)
+    done = subprocess.run(
+        [hal, "can", "eds", "check", path],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        timeout=60,
+    )
     took = 1000 * (time.monotonic() - start)
     lines = done.stderr.decode().splitlines()
     found = SUMMARY.search(lines[-1]) if lines else None
@@ -44,7 +49,9 @@ def theirs(path):
     except ImportError:
         return None
     try:
-        return sum(index >= 0x1000 for index in canopen.import_od(str(path), node_id=1))  # it counts dummies as objects, too
+        return sum(
+            index >= 0x1000 for index in canopen.import_od(str(path), node_id=1)
+        )  # it counts dummies as objects, too
     except Exception as reason:  # whatever it is
         return f"{type(reason).__name__}: {reason}"
 
@@ -59,14 +66,22 @@ def main():
         sys.exit(f"eds_corpus.py: no device description below {arguments[0]}")
     table = "--table" in sys.argv
     if table:
-        print("| file | objects | entries | warnings | notes | canopen |\n| --- | --- | --- | --- | --- | --- |")
+        print(
+            "| file | objects | entries | warnings | notes | canopen |\n| --- | --- | --- | --- | --- | --- |"
+        )
     read = rejected = crashed = clean = warnings = theirs_read = theirs_there = entries = 0
     slowest = (0.0, "")
     for path in files:
         mine, other = ours(hal, path), theirs(path)
         theirs_there += other is not None
         theirs_read += isinstance(other, int)
-        word = "-" if other is None else other if isinstance(other, int) else str(other)[:60].replace("|", "/")
+        word = (
+            "-"
+            if other is None
+            else other
+            if isinstance(other, int)
+            else str(other)[:60].replace("|", "/")
+        )
         if isinstance(mine, tuple):
             read += 1
             entries += mine[1]
@@ -84,9 +99,11 @@ def main():
             print(row)
         elif isinstance(other, int) and other != mine[0]:
             print(f"{path.name}: {mine[0]} objects here, {other} in canopen")
-    print(f"{len(files)} files: {read} read ({clean} without a warning), {rejected} rejected, {crashed} crashed; "
-          f"{entries} entries, {warnings} warnings; "
-          f"slowest {slowest[0]:.0f} ms ({slowest[1]})")
+    print(
+        f"{len(files)} files: {read} read ({clean} without a warning), {rejected} rejected, {crashed} crashed; "
+        f"{entries} entries, {warnings} warnings; "
+        f"slowest {slowest[0]:.0f} ms ({slowest[1]})"
+    )
     if theirs_there:
         print(f"Python package canopen: {theirs_read} read, {theirs_there - theirs_read} not")
     return 1 if crashed else 0

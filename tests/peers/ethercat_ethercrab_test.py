@@ -25,19 +25,48 @@ if "HALCYON_ETHERCRAB" not in os.environ:  # before the namespace, which has no 
     cargo = shutil.which("cargo") or shutil.which("cargo", path=str(Path.home() / ".cargo" / "bin"))
     if not cargo:
         skip("cargo is missing; type: apt-get install cargo, or install Rust with rustup")
-    build = subprocess.run([cargo, "build", "--release", "--locked", "--quiet", "--manifest-path", HERE / "ethercrab" / "Cargo.toml", "--target-dir", TARGET],
-                           capture_output=True, text=True)
+    build = subprocess.run(
+        [
+            cargo,
+            "build",
+            "--release",
+            "--locked",
+            "--quiet",
+            "--manifest-path",
+            HERE / "ethercrab" / "Cargo.toml",
+            "--target-dir",
+            TARGET,
+        ],
+        capture_output=True,
+        text=True,
+    )
     if build.returncode != 0:
-        skip(f"ethercrab cannot be built here: {(build.stderr.strip().splitlines() or ['no reason given'])[-1]}")
+        skip(
+            f"ethercrab cannot be built here: {(build.stderr.strip().splitlines() or ['no reason given'])[-1]}"
+        )
     os.environ["HALCYON_ETHERCRAB"] = str(TARGET / "release" / "ethercrab_master")
 ethercat_line.network()
 with ethercat_line.line(HAL, "servo\ndigital_out bits=8\ndigital_in bits=8\n") as node:
-    master = subprocess.run([os.environ["HALCYON_ETHERCRAB"], "m0"], capture_output=True, text=True, timeout=60)
+    master = subprocess.run(
+        [os.environ["HALCYON_ETHERCRAB"], "m0"], capture_output=True, text=True, timeout=60
+    )
     log = node.said()
 print(master.stdout + master.stderr, end="")
 checks = master.stdout.splitlines()
-checks.append("ok   outputs arrive" if "slave 1 (digital_out): outputs 10100101\n" in log else f"FAIL outputs arrive {log}")
-checks.append("ok   the line prints the state" if "slave 0 (servo): OP" in log else f"FAIL the line prints the state {log}")
+checks.append(
+    "ok   outputs arrive"
+    if "slave 1 (digital_out): outputs 10100101\n" in log
+    else f"FAIL outputs arrive {log}"
+)
+checks.append(
+    "ok   the line prints the state"
+    if "slave 0 (servo): OP" in log
+    else f"FAIL the line prints the state {log}"
+)
 print("\n".join(checks[-2:]))
 print(f"{sum(c.startswith('ok ') for c in checks)} of {len(checks)} checks hold")
-sys.exit(0 if master.returncode == 0 and len(checks) == 13 and all(c.startswith("ok ") for c in checks) else 1)
+sys.exit(
+    0
+    if master.returncode == 0 and len(checks) == 13 and all(c.startswith("ok ") for c in checks)
+    else 1
+)

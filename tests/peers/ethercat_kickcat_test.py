@@ -18,7 +18,10 @@ checks = []
 
 def check(name, holds, *seen):
     checks.append(bool(holds))
-    print(f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}", flush=True)
+    print(
+        f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}",
+        flush=True,
+    )
 
 
 def initialise(bus, attempts=5):
@@ -39,7 +42,9 @@ def run(log):
     slaves = bus.slaves()
     check("three slaves", len(slaves) == 3, len(slaves))
     servo, outputs, inputs = slaves
-    read = lambda index, sub, size: int.from_bytes(bus.read_sdo(servo, index, sub, kickcat.Access.PARTIAL, size, 2.0)[:size], "little")
+    read = lambda index, sub, size: int.from_bytes(
+        bus.read_sdo(servo, index, sub, kickcat.Access.PARTIAL, size, 2.0)[:size], "little"
+    )
     check("vendor of 1018h", read(0x1018, 1, 4) == 0xFFFFFF, hex(read(0x1018, 1, 4)))
     check("supported modes", read(0x6502, 0, 4) == 0x3A5, hex(read(0x6502, 0, 4)))
     try:
@@ -48,7 +53,11 @@ def run(log):
     except Exception as problem:  # its own type is not exported
         check("an object that does not exist is an error", True, problem)
     bus.create_mapping()
-    check("sizes of the process data", [(s.input_size, s.output_size) for s in slaves] == [(13, 13), (0, 1), (1, 0)], [(s.input_size, s.output_size) for s in slaves])
+    check(
+        "sizes of the process data",
+        [(s.input_size, s.output_size) for s in slaves] == [(13, 13), (0, 1), (1, 0)],
+        [(s.input_size, s.output_size) for s in slaves],
+    )
     bus.request_state(kickcat.State.SAFE_OP)
     bus.wait_for_state(kickcat.State.SAFE_OP, 10.0)
     check("SAFE-OP", all(bus.get_state(s) == kickcat.State.SAFE_OP for s in slaves))
@@ -64,18 +73,39 @@ def run(log):
         time.sleep(0.001)
         return True
 
-    check("outputs arrive", wait_for(lambda: cycle() and "slave 1 (digital_out): outputs 10100101\n" in log.read_text()), log.read_text())
+    check(
+        "outputs arrive",
+        wait_for(
+            lambda: cycle() and "slave 1 (digital_out): outputs 10100101\n" in log.read_text()
+        ),
+        log.read_text(),
+    )
 
     def statusword_is(control, bits):
-        servo.set_output_bytes(control.to_bytes(2, "little") + b"\x09" + bytes(4) + (20_000).to_bytes(4, "little") + bytes(2))
+        servo.set_output_bytes(
+            control.to_bytes(2, "little")
+            + b"\x09"
+            + bytes(4)
+            + (20_000).to_bytes(4, "little")
+            + bytes(2)
+        )
         cycle()
         return int.from_bytes(servo.input_data[:2], "little") & 0x6F == bits
 
-    for name, control, status in (("ready to switch on", 6, 0x21), ("switched on", 7, 0x23), ("operation enabled", 15, 0x27)):
+    for name, control, status in (
+        ("ready to switch on", 6, 0x21),
+        ("switched on", 7, 0x23),
+        ("operation enabled", 15, 0x27),
+    ):
         check(name, wait_for(lambda: statusword_is(control, status)), servo.input_data.hex())
     position = lambda: int.from_bytes(servo.input_data[3:7], "little", signed=True)
     began = position()
-    check("the drive turns", wait_for(lambda: cycle() and position() - began > 1000), began, position())
+    check(
+        "the drive turns",
+        wait_for(lambda: cycle() and position() - began > 1000),
+        began,
+        position(),
+    )
     check("the line prints the state", "slave 0 (servo): OP" in log.read_text(), log.read_text())
 
 

@@ -16,7 +16,9 @@ from web import PANEL, start_panel  # noqa: E402
 
 FILES = ("package.json", "package-lock.json", "client.mjs")
 TARGET = HERE.parents[1] / "build" / "peers" / "foxglove"
-NETLIST = SERVO + """loadrt siggen names=wave
+NETLIST = (
+    SERVO
+    + """loadrt siggen names=wave
 loadrt comp names=above
 addf wave.update servo
 addf above servo
@@ -25,6 +27,7 @@ net sine wave.sine => above.in1
 net high above.out
 start
 """
+)
 CHECKS = 14
 
 
@@ -41,9 +44,16 @@ def install():
     for name in FILES:
         shutil.copy(HERE / "foxglove" / name, TARGET / name)
     if not stamp.exists() or stamp.read_text() != wanted:
-        done = subprocess.run(["npm", "ci", "--no-fund", "--no-audit", "--ignore-scripts"], cwd=TARGET, capture_output=True, text=True)
+        done = subprocess.run(
+            ["npm", "ci", "--no-fund", "--no-audit", "--ignore-scripts"],
+            cwd=TARGET,
+            capture_output=True,
+            text=True,
+        )
         if done.returncode != 0:
-            skip(f"@foxglove/ws-protocol cannot be installed here: {(done.stderr.strip().splitlines() or ['no reason given'])[-1]}")
+            skip(
+                f"@foxglove/ws-protocol cannot be installed here: {(done.stderr.strip().splitlines() or ['no reason given'])[-1]}"
+            )
         stamp.write_text(wanted)
 
 
@@ -64,7 +74,12 @@ try:
     case.start("run", case.write("m.hal", NETLIST))
     _, port, token = start_panel(case, "--write")
     for name in ("foxglove.sdk.v1", "foxglove.websocket.v1"):
-        client = subprocess.run(["node", TARGET / "client.mjs", f"ws://localhost:{port}/?t={token}", name], capture_output=True, text=True, timeout=120)
+        client = subprocess.run(
+            ["node", TARGET / "client.mjs", f"ws://localhost:{port}/?t={token}", name],
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
         print(f"{name}:\n{client.stdout}{client.stderr}", end="")
         checks += client.stdout.splitlines()
 finally:

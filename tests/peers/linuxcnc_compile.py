@@ -20,8 +20,11 @@ import tempfile
 import linuxcnc_tests as tests
 
 HAL = tests.BIN / "hal"
-ELSEWHERE = re.compile(r'^\s*#?include\s+[<"](kinematics\.h|hostmot2[\w-]*\.h|.*mesa-hostmot2/.*|emcmotcfg\.h|motion\.h|tp\.h|posemath\.h|rtapi_pci\.h|'
-                       r'rtapi_io\.h|sys/io\.h|rtapi_parport\.h|gtk/.*|libusb.*|linux/.*|.*homing\.h|.*mot_priv\.h)[>"]', re.M)
+ELSEWHERE = re.compile(
+    r'^\s*#?include\s+[<"](kinematics\.h|hostmot2[\w-]*\.h|.*mesa-hostmot2/.*|emcmotcfg\.h|motion\.h|tp\.h|posemath\.h|rtapi_pci\.h|'
+    r'rtapi_io\.h|sys/io\.h|rtapi_parport\.h|gtk/.*|libusb.*|linux/.*|.*homing\.h|.*mot_priv\.h)[>"]',
+    re.M,
+)
 INCLUDES = ""  # LinuxCNC's source, where components find headers of their own, and a config.h as its configure makes one
 OPTIONS = re.compile(r"^\s*option\s+(homemod|tpmod)\b", re.M)
 
@@ -48,14 +51,32 @@ name=$(basename "${file%.*}")
 
 def hal(*words, folder=None, plugins=None):
     """Standard error and exit status of our program."""
-    environment = dict(tests.CLEAN, HOME=str(folder), HALCYON_PLUGIN_PATH=str(plugins or ""), NO_COLOR="1", CPATH=INCLUDES)
-    done = subprocess.run([str(HAL), *words], env=environment, cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                          stderr=subprocess.PIPE, text=True, errors="replace", timeout=300)
+    environment = dict(
+        tests.CLEAN,
+        HOME=str(folder),
+        HALCYON_PLUGIN_PATH=str(plugins or ""),
+        NO_COLOR="1",
+        CPATH=INCLUDES,
+    )
+    done = subprocess.run(
+        [str(HAL), *words],
+        env=environment,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+        timeout=300,
+    )
     return done.stderr.strip(), done.returncode
 
 
 def first_error(text):
-    return next((line for line in text.splitlines() if "error" in line), text.splitlines()[-1] if text else "")
+    return next(
+        (line for line in text.splitlines() if "error" in line),
+        text.splitlines()[-1] if text else "",
+    )
 
 
 def compile_all(sources, folder):
@@ -80,29 +101,63 @@ def compile_all(sources, folder):
         (folder / "load.hal").write_text(f"loadrt {source.stem}\n")
         output, status = hal("check", "load.hal", folder=folder, plugins=plugins)
         good.append(source.stem)
-        print(f"compiled {source.name}" + (f" (loads with arguments only: {first_error(output)})" if status else ""), flush=True)
+        print(
+            f"compiled {source.name}"
+            + (f" (loads with arguments only: {first_error(output)})" if status else ""),
+            flush=True,
+        )
     return good, bad
 
 
 def run_tests(top, compiled, folder):
     """Tests that load a compiled component or compile one themselves."""
-    shim, installed, scratch, home = folder / "bin", folder / "installed", folder / "scratch", folder / "emc2"
+    shim, installed, scratch, home = (
+        folder / "bin",
+        folder / "installed",
+        folder / "scratch",
+        folder / "emc2",
+    )
     for made in (shim, installed, scratch, home, home / "bin"):
         made.mkdir()
     (shim / "halcompile").write_text(HALCOMPILE)
     (shim / "halcompile").chmod(0o755)
     tests.UTILITIES.add("halcompile")
-    tests.CLEAN.update(EMC2_HOME=str(home), PATH=f"{shim}:{home}/bin:{tests.CLEAN['PATH']}", HALCYON_PLUGIN_PATH=f"{installed}:{folder / 'plugins'}",
-                       HALCOMPILE_INSTALL=str(installed), HALCOMPILE_SCRATCH=str(scratch), RTLIB_DIR=str(installed))
-    listed = subprocess.run([str(HAL), "doc"], env=tests.CLEAN, stdout=subprocess.PIPE, text=True, check=True).stdout
-    known = {line.split()[0].replace("-", "_") for line in listed.splitlines() if line.strip()} | {"threads"}
+    tests.CLEAN.update(
+        EMC2_HOME=str(home),
+        PATH=f"{shim}:{home}/bin:{tests.CLEAN['PATH']}",
+        HALCYON_PLUGIN_PATH=f"{installed}:{folder / 'plugins'}",
+        HALCOMPILE_INSTALL=str(installed),
+        HALCOMPILE_SCRATCH=str(scratch),
+        RTLIB_DIR=str(installed),
+    )
+    listed = subprocess.run(
+        [str(HAL), "doc"], env=tests.CLEAN, stdout=subprocess.PIPE, text=True, check=True
+    ).stdout
+    known = {line.split()[0].replace("-", "_") for line in listed.splitlines() if line.strip()} | {
+        "threads"
+    }
     passed = failed = other = 0
-    found = {file.parent: file.name for name in reversed(tests.SCRIPTS) for file in top.rglob(name) if file.is_file()}
+    found = {
+        file.parent: file.name
+        for name in reversed(tests.SCRIPTS)
+        for file in top.rglob(name)
+        if file.is_file()
+    }
     for test, script in sorted(found.items()):
-        name, own = str(test.relative_to(top)), {file.stem for file in test.glob("*.comp")} | {file.stem for file in test.glob("*.c")}
-        loads = {word for file in test.iterdir() if file.suffix in (".hal", ".sh") or file.name == "test"
-                 for word in re.findall(r"loadrt\s+(\w+)", file.read_text(errors="replace"))}
-        if not (loads & set(compiled) or own and "halcompile" in (test / script).read_text(errors="replace")):
+        name, own = str(test.relative_to(top)), {file.stem for file in test.glob("*.comp")} | {
+            file.stem for file in test.glob("*.c")
+        }
+        loads = {
+            word
+            for file in test.iterdir()
+            if file.suffix in (".hal", ".sh") or file.name == "test"
+            for word in re.findall(r"loadrt\s+(\w+)", file.read_text(errors="replace"))
+        }
+        if not (
+            loads & set(compiled)
+            or own
+            and "halcompile" in (test / script).read_text(errors="replace")
+        ):
             continue
         if parts := tests.missing_parts(test, known | own):
             other += 1
@@ -115,13 +170,19 @@ def run_tests(top, compiled, folder):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("source", type=pathlib.Path)
     parser.add_argument("tests", type=pathlib.Path, nargs="?")
     parser.add_argument("--only", choices=["comp", "c"])
     given = parser.parse_args()
     kinds = [given.only] if given.only else ["comp", "c"]
-    sources = sorted(file for kind in kinds for file in (given.source.resolve() / "hal" / "components").glob(f"*.{kind}"))
+    sources = sorted(
+        file
+        for kind in kinds
+        for file in (given.source.resolve() / "hal" / "components").glob(f"*.{kind}")
+    )
     global INCLUDES
     with tempfile.TemporaryDirectory() as where:
         folder = pathlib.Path(where)
@@ -129,7 +190,9 @@ def main():
         (folder / "config" / "config.h").touch()
         INCLUDES = f"{given.source.resolve()}:{folder / 'config'}"
         good, bad = compile_all(sources, folder)
-        print(f"{len(good)} compiled, {bad} failed, {len(sources) - len(good) - bad} need unsupported parts")
+        print(
+            f"{len(good)} compiled, {bad} failed, {len(sources) - len(good) - bad} need unsupported parts"
+        )
         if given.tests:
             passed, failed, other = run_tests(given.tests.resolve(), good, folder)
             print(f"tests: {passed} passed, {failed} failed, {other} need unsupported parts")

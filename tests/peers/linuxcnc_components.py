@@ -18,7 +18,16 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from linuxcnc_components import comparison, documentation, entries, expected, halrun, inventory, netlists, stimulus
+from linuxcnc_components import (
+    comparison,
+    documentation,
+    entries,
+    expected,
+    halrun,
+    inventory,
+    netlists,
+    stimulus,
+)
 from linuxcnc_components.runners import RunError, SimRunner
 from linuxcnc_components.variants import variants
 from linuxcnc_components.view import View
@@ -28,34 +37,59 @@ ROOT = HERE.parents[1]
 FACTS = HERE / "linuxcnc_components" / "inventory.json"
 MODULES = Path("/usr/lib/linuxcnc/modules")
 FOLDERS = ("logic", "math", "control", "motion", "io", "safety", "sim")
-ORDER = ("make-pulses", "update-counters", "capture-position", "update-freq")  # of functions in the thread; the others follow by name
+ORDER = (
+    "make-pulses",
+    "update-counters",
+    "capture-position",
+    "update-freq",
+)  # of functions in the thread; the others follow by name
 WITNESS_CYCLES = 400
 CRASHED = "LinuxCNC's module crashed or hung"
 
 
 def our_components():
-    return {path.stem for folder in FOLDERS for path in (ROOT / "components" / folder).glob("*.cpp")}
+    return {
+        path.stem for folder in FOLDERS for path in (ROOT / "components" / folder).glob("*.cpp")
+    }
 
 
 def common(ours, theirs):
     """The part of an inventory that both sides have in the same way."""
-    items = {name: item for name, item in theirs.items.items()
-             if name in ours.items and (ours.items[name].kind, ours.items[name].type, ours.items[name].direction) == (item.kind, item.type, item.direction)}
+    items = {
+        name: item
+        for name, item in theirs.items.items()
+        if name in ours.items
+        and (ours.items[name].kind, ours.items[name].type, ours.items[name].direction)
+        == (item.kind, item.type, item.direction)
+    }
     return inventory.Inventory(items, [name for name in theirs.functions if name in ours.functions])
 
 
 def format_value(value):
-    return f"{value:.9g}" if isinstance(value, float) else str(int(value)) if isinstance(value, bool) else str(value)
+    return (
+        f"{value:.9g}"
+        if isinstance(value, float)
+        else str(int(value))
+        if isinstance(value, bool)
+        else str(value)
+    )
 
 
 def inputs_at(given, cycle, cycles):
     """The inputs of the cycle before and of the cycle, then the settings."""
-    streams = {name: values[max(0, cycle - 1):cycle + 1] for name, values in given.streams.items()}
+    streams = {
+        name: values[max(0, cycle - 1) : cycle + 1] for name, values in given.streams.items()
+    }
     settings = {}
-    for changes in given.settings[:cycle * len(given.settings) // cycles + 1]:
+    for changes in given.settings[: cycle * len(given.settings) // cycles + 1]:
         settings.update(changes)
-    text = " ".join(f"{name.split('.', 1)[-1]}={'->'.join(map(format_value, values))}" for name, values in streams.items())
-    return text + "".join(f" {name.split('.', 1)[-1]}:={format_value(value)}" for name, value in settings.items())
+    text = " ".join(
+        f"{name.split('.', 1)[-1]}={'->'.join(map(format_value, values))}"
+        for name, values in streams.items()
+    )
+    return text + "".join(
+        f" {name.split('.', 1)[-1]}:={format_value(value)}" for name, value in settings.items()
+    )
 
 
 class Comparison:
@@ -65,7 +99,11 @@ class Comparison:
         self.options = options
         self.native = SimRunner(options.hal, "native", order=ORDER)
         self.older = SimRunner(options.hal, "linuxcnc", order=ORDER)
-        self.newer = SimRunner(options.hal, "native", plugins=options.newer, order=ORDER) if options.newer else None
+        self.newer = (
+            SimRunner(options.hal, "native", plugins=options.newer, order=ORDER)
+            if options.newer
+            else None
+        )
         self.real = halrun.HalrunRunner(ORDER) if options.halrun else None
         self.used = set()
 
@@ -73,7 +111,11 @@ class Comparison:
         """(runner, version) of LinuxCNC's side."""
         if self.real:
             return self.real, "2.9"
-        if self.newer and (component in expected.NEWER or self.options.all_newer) and (self.options.newer / f"{component}.so").exists():
+        if (
+            self.newer
+            and (component in expected.NEWER or self.options.all_newer)
+            and (self.options.newer / f"{component}.so").exists()
+        ):
             return self.newer, "2.10"
         return self.older, "2.9"
 
@@ -85,7 +127,14 @@ class Comparison:
     def inventory_lines(self, variant, ours, theirs, version):
         lines = []
         for name, a, b in inventory.differences(ours, theirs):
-            entry = next((e for e in expected.INVENTORY if version in e.versions and e.concerns(variant.component, name)), None)
+            entry = next(
+                (
+                    e
+                    for e in expected.INVENTORY
+                    if version in e.versions and e.concerns(variant.component, name)
+                ),
+                None,
+            )
             self.used.add(id(entry))
             if entry is None:
                 lines.append(f"{variant} | inventory | {name} | LinuxCNC {b} | ours {a}")
@@ -101,7 +150,10 @@ class Comparison:
                 results.append(side.run(variant, both, inputs, cycles))
             except RunError as error:
                 if who != "ours" and any(word in str(error) for word in ("crashed", "hangs")):
-                    print(f"{variant} | {inputs.seed} | LinuxCNC's own: {str(error)[:150]}", flush=True)
+                    print(
+                        f"{variant} | {inputs.seed} | LinuxCNC's own: {str(error)[:150]}",
+                        flush=True,
+                    )
                     return [], {CRASHED}
                 return [f"{variant} | {inputs.seed} | {who}: {error}"], set()
         ours, theirs = results
@@ -109,7 +161,11 @@ class Comparison:
         for found in comparison.differences(ours, theirs, absolute):
             left = found
             for entry in expected.BEHAVIOURS:
-                if left is None or version not in entry.versions or not entry.concerns(variant.component, found.name):
+                if (
+                    left is None
+                    or version not in entry.versions
+                    or not entry.concerns(variant.component, found.name)
+                ):
                     continue
                 before = len(left.cycles)
                 left = entry.remaining(view, left)
@@ -117,7 +173,9 @@ class Comparison:
                     seen.add(id(entry))
             if left:
                 i = left.first
-                lines.append(f"{variant} | {inputs.seed} | {left.name} @{i} ({len(left.cycles)}) | LinuxCNC {left.theirs[i]} | ours {left.ours[i]} | {inputs_at(inputs, i, cycles)[:900]}")
+                lines.append(
+                    f"{variant} | {inputs.seed} | {left.name} @{i} ({len(left.cycles)}) | LinuxCNC {left.theirs[i]} | ours {left.ours[i]} | {inputs_at(inputs, i, cycles)[:900]}"
+                )
         return lines, seen
 
     def variant(self, variant):
@@ -131,7 +189,14 @@ class Comparison:
         both = common(ours, theirs)
         for kind in options.classes:
             for number in range(options.rounds):
-                inputs = stimulus.random_stimulus(both, variant, kind, f"{options.seed}.{number}", options.cycles, segments=1 if options.halrun else stimulus.SEGMENTS)
+                inputs = stimulus.random_stimulus(
+                    both,
+                    variant,
+                    kind,
+                    f"{options.seed}.{number}",
+                    options.cycles,
+                    segments=1 if options.halrun else stimulus.SEGMENTS,
+                )
                 found, seen = self.run(variant, both, inputs, options.cycles)
                 lines += found
                 self.used |= seen
@@ -142,11 +207,16 @@ class Comparison:
         variant, *rest = entry.witness
         if len(rest) == 1:
             for number in range(10):
-                yield stimulus.random_stimulus(both, variant, rest[0], f"witness.{number}", 1000), 1000
+                yield stimulus.random_stimulus(
+                    both, variant, rest[0], f"witness.{number}", 1000
+                ), 1000
             return
         streams, settings = rest
         inputs = stimulus.Stimulus("witness", f"witness of {entry.component} {entry.pins}")
-        inputs.streams = {name: (values + [values[-1]] * WITNESS_CYCLES)[:WITNESS_CYCLES] for name, values in streams.items()}
+        inputs.streams = {
+            name: (values + [values[-1]] * WITNESS_CYCLES)[:WITNESS_CYCLES]
+            for name, values in streams.items()
+        }
         inputs.settings = settings if isinstance(settings, list) else [settings]
         yield inputs, WITNESS_CYCLES
 
@@ -163,7 +233,10 @@ class Comparison:
             lines += found
             if id(entry) in seen or CRASHED in seen:
                 return lines
-        return [*lines, f"{entry.component} | {entry.pins} | {entry.condition}: no difference; remove the entry"]
+        return [
+            *lines,
+            f"{entry.component} | {entry.pins} | {entry.condition}: no difference; remove the entry",
+        ]
 
 
 def check_facts(options):
@@ -177,7 +250,9 @@ def check_facts(options):
         variant = next((one for one in variants(component) if str(one) == text), None)
         if variant is None:
             continue
-        lines += checker.inventory_lines(variant, native.inventory(variant), theirs, expected.NEWER_FACTS.get(component, "2.9"))
+        lines += checker.inventory_lines(
+            variant, native.inventory(variant), theirs, expected.NEWER_FACTS.get(component, "2.9")
+        )
     return lines
 
 
@@ -187,7 +262,9 @@ def write_facts(names):
         for variant in variants(name):
             found[str(variant)] = runner.inventory(variant)
     inventory.save_facts(FACTS, found)
-    print(f"{FACTS.name}: {len(found)} variants, {sum(len(one.items) for one in found.values())} pins and parameters")
+    print(
+        f"{FACTS.name}: {len(found)} variants, {sum(len(one.items) for one in found.values())} pins and parameters"
+    )
 
 
 def compare_components(options, names):
@@ -221,16 +298,28 @@ def compare_netlists(options):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("hal", type=lambda path: Path(path).resolve())
     parser.add_argument("--seed", default=str(int(time.time())))
     parser.add_argument("--cycles", type=int, default=2000)
-    parser.add_argument("--rounds", type=int, default=2, help="stimuli of each class for each variant")
-    parser.add_argument("--classes", type=lambda text: text.split(","), default=list(stimulus.CLASSES))
+    parser.add_argument(
+        "--rounds", type=int, default=2, help="stimuli of each class for each variant"
+    )
+    parser.add_argument(
+        "--classes", type=lambda text: text.split(","), default=list(stimulus.CLASSES)
+    )
     parser.add_argument("--only", type=lambda text: text.split(","), default=None)
     parser.add_argument("--newer", type=lambda path: Path(path).resolve())
-    parser.add_argument("--all-newer", action="store_true", help="compare all with 2.10, not only those that differ from 2.9")
-    parser.add_argument("--halrun", action="store_true", help="LinuxCNC's side under its own halrun")
+    parser.add_argument(
+        "--all-newer",
+        action="store_true",
+        help="compare all with 2.10, not only those that differ from 2.9",
+    )
+    parser.add_argument(
+        "--halrun", action="store_true", help="LinuxCNC's side under its own halrun"
+    )
     parser.add_argument("--netlists", type=int, default=0, metavar="N")
     parser.add_argument("--no-witnesses", action="store_true")
     parser.add_argument("--write-docs", action="store_true")

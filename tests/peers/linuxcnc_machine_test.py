@@ -29,23 +29,37 @@ class Machine(Case):
         self.environment["HAL_RTMOD_DIR"] = "/usr/lib/linuxcnc/modules"
 
     def launch(self, *words, ini="cnc.ini"):
-        return subprocess.Popen([HAL, "linuxcnc", MACHINE / ini, *words], cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
-                                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        return subprocess.Popen(
+            [HAL, "linuxcnc", MACHINE / ini, *words],
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
 
     def test_g_code_moves_five_axes_over_ethernet(self):
         printed = self.moves(self.launch)
         page = (MACHINE.parents[1] / "docs/tutorials/cnc-machine.md").read_text()
-        shown = re.search(r"It prints:\n\n```text\n(.*?)```", page, re.S)[1].replace("program.ngc", "short.ngc").replace("/home/you/halcyon/halfiles/linuxcnc-ethernet/driven", str(self.folder))
+        shown = (
+            re.search(r"It prints:\n\n```text\n(.*?)```", page, re.S)[1]
+            .replace("program.ngc", "short.ngc")
+            .replace("/home/you/halcyon/halfiles/linuxcnc-ethernet/driven", str(self.folder))
+        )
 
         def lines(text):
             return {re.sub(r"(?<!tool )\b\d+(\.\d+)?", "N", line) for line in text.splitlines()}
+
         missing = lines(shown) - lines(printed)
         if importlib.util.find_spec("matplotlib"):
             self.assertEqual(set(), missing, printed)
             self.assertTrue((self.folder / "path.png").exists())
             return
         self.assertEqual({f"the path is drawn in {self.folder}/path.png"}, missing, printed)
-        self.assertIn("no picture: it needs matplotlib (sudo apt-get install python3-matplotlib)\n", printed)
+        self.assertIn(
+            "no picture: it needs matplotlib (sudo apt-get install python3-matplotlib)\n", printed
+        )
         print("the picture of the path is left out: it needs python3-matplotlib")
 
     def test_g_code_moves_five_axes_over_ethercat(self):
@@ -55,9 +69,18 @@ class Machine(Case):
         if SANITIZED:
             self.skipTest("nine processes with a sanitizer are too slow for a wire")
         if os.geteuid() != 0:
-            self.skipTest("time slots need real-time priority, which a user namespace withholds; run this as root")
-        machine = subprocess.run([MACHINE / "bring-up", self.write("empty.ngc", "M2\n")], cwd=self.folder, env={**self.environment, "HAL": str(HAL)}, stdin=subprocess.DEVNULL,
-                                 capture_output=True, text=True, timeout=150)
+            self.skipTest(
+                "time slots need real-time priority, which a user namespace withholds; run this as root"
+            )
+        machine = subprocess.run(
+            [MACHINE / "bring-up", self.write("empty.ngc", "M2\n")],
+            cwd=self.folder,
+            env={**self.environment, "HAL": str(HAL)},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=150,
+        )
         if machine.returncode == 77:
             self.skipTest(machine.stdout.strip())
         self.assertIn("homed; running empty.ngc\n", machine.stdout, machine.stderr)
@@ -65,17 +88,27 @@ class Machine(Case):
 
     def moves(self, launch):
         short = self.folder / "short.ngc"
-        short.write_text("G21 G90\nT1 M6\nG0 X10 Y-5 A20\nT2 M6\nG1 F3000 X0 C30\nG2 X10 Y5 I5 J5\nG0 X0 Y0 Z-4\nM2\n")
+        short.write_text(
+            "G21 G90\nT1 M6\nG0 X10 Y-5 A20\nT2 M6\nG1 F3000 X0 C30\nG2 X10 Y5 I5 J5\nG0 X0 Y0 Z-4\nM2\n"
+        )
         machine = launch("--", str(short))
         self.addCleanup(machine.kill)
         out, error = machine.communicate(timeout=120)
         self.assertEqual(0, machine.returncode, out + error)
         self.assertIn("homed; running short.ngc\n", out)
         self.assertIn("tool panel: insert tool 1\n", out)
-        self.assertRegex(out, r"short.ngc took \d+\.\d s; of \d{4,} cycles of the servo thread \d+ were missed\n")
+        self.assertRegex(
+            out, r"short.ngc took \d+\.\d s; of \d{4,} cycles of the servo thread \d+ were missed\n"
+        )
         with open(self.folder / "path.csv", newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
-        at = {end: [[float(row[f"joint.{joint}.motor-pos-{end}"] or "nan") for row in rows] for joint in range(5)] for end in ("cmd", "fb")}
+        at = {
+            end: [
+                [float(row[f"joint.{joint}.motor-pos-{end}"] or "nan") for row in rows]
+                for joint in range(5)
+            ]
+            for end in ("cmd", "fb")
+        }
         for joint, reached in enumerate((10, 7, -4, 20, 30)):
             extreme = min if reached < 0 else max
             self.assertAlmostEqual(reached, extreme(at["cmd"][joint]), delta=0.5)
@@ -83,7 +116,12 @@ class Machine(Case):
             errors = [abs(a - b) for a, b in zip(at["cmd"][joint], at["fb"][joint][2:])]
             self.assertLess(max(errors), 2.0)  # FERROR
             self.assertGreater(max(at["fb"][joint]) - min(at["fb"][joint]), 3.5)
-        self.assertEqual("", subprocess.run(["pgrep", "-x", "milltask|io|halui|linuxcncsvr"], capture_output=True, text=True).stdout)
+        self.assertEqual(
+            "",
+            subprocess.run(
+                ["pgrep", "-x", "milltask|io|halui|linuxcncsvr"], capture_output=True, text=True
+            ).stdout,
+        )
         return out + error
 
     def test_the_e_stop_ends_the_motion(self):
@@ -91,7 +129,11 @@ class Machine(Case):
         long.write_text("G21 G90\nG1 F600 X90\nM2\n")
         machine = self.launch("--", str(long))
         self.addCleanup(machine.kill)
-        wait_until(lambda: self.value("x.active") == "TRUE" and float(self.value("x.position-fb") or 0) > 3, "the axis moves")
+        wait_until(
+            lambda: self.value("x.active") == "TRUE"
+            and float(self.value("x.position-fb") or 0) > 3,
+            "the axis moves",
+        )
         self.shell("setp", "io-node.in-00", "FALSE")
         out, error = machine.communicate(timeout=60)
         self.assertEqual(1, machine.returncode, out + error)
@@ -102,11 +144,18 @@ class Machine(Case):
         machine = self.launch("--", str(MACHINE / "program.ngc"))
         self.addCleanup(machine.kill)
         wait_until(lambda: self.value("x.active") == "TRUE", "the machine is on")
-        pid = next(line.split()[3] for line in self.shell("show", "comp").stdout.splitlines() if re.search(r" inihal +\d", line))
+        pid = next(
+            line.split()[3]
+            for line in self.shell("show", "comp").stdout.splitlines()
+            if re.search(r" inihal +\d", line)
+        )
         os.kill(int(pid), signal.SIGKILL)
         out, error = machine.communicate(timeout=60)
         self.assertEqual(1, machine.returncode, out + error)
-        self.assertRegex(error, r"hal linuxcnc: 'milltask' \(component inihal\) died at [\d:]+ \(SIGKILL\); the outputs have their safe values, the machine ends\n")
+        self.assertRegex(
+            error,
+            r"hal linuxcnc: 'milltask' \(component inihal\) died at [\d:]+ \(SIGKILL\); the outputs have their safe values, the machine ends\n",
+        )
 
 
 if __name__ == "__main__":

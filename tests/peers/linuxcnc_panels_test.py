@@ -13,7 +13,11 @@ sys.path.insert(0, str(HERE.parent / "cli"))
 from harness import SERVO, Case, wait_until  # noqa: E402
 from web import PANEL, Browser, have_browser, start_panel  # noqa: E402
 
-PLACES = sys.argv[2:] or ["/usr/share/linuxcnc", "/usr/share/doc/linuxcnc", "/usr/share/doc/linuxcnc-doc-en"]
+PLACES = sys.argv[2:] or [
+    "/usr/share/linuxcnc",
+    "/usr/share/doc/linuxcnc",
+    "/usr/share/doc/linuxcnc-doc-en",
+]
 # Widgets of the layout that the server sends, and those that the page has made of them.
 COUNT = """(() => {
     const count = node => node.widget === 'tablerow' ? 0 : 1 + (node.children ?? []).reduce((sum, child) => sum + count(child), 0);
@@ -40,7 +44,9 @@ class Peer(Case):
     def expected_pins(self, path):
         """Name, type and direction of the pins that LinuxCNC's test lists, as `show pin` prints them; the component comes first."""
         lines = [line.split() for line in (path.parent / "expected").read_text().splitlines()]
-        return lines[0][0], sorted((name.partition(".")[2], kind, direction) for _, kind, direction, _, name in lines)
+        return lines[0][0], sorted(
+            (name.partition(".")[2], kind, direction) for _, kind, direction, _, name in lines
+        )
 
     def shows(self, path, browser):
         """A sentence about what is wrong, or an empty text."""
@@ -50,18 +56,30 @@ class Peer(Case):
         try:
             browser.errors.clear()
             browser.open(f"http://localhost:{port}/#t={token}")
-            browser.wait("halcyon.panel && halcyon.held && document.querySelector('.w-root') !== null")
+            browser.wait(
+                "halcyon.panel && halcyon.held && document.querySelector('.w-root') !== null"
+            )
             wanted, drawn = browser.evaluate(COUNT)
-            browser.wait("[...document.querySelectorAll('.w-root [data-output]')].every(one => !one.disabled)")
+            browser.wait(
+                "[...document.querySelectorAll('.w-root [data-output]')].every(one => !one.disabled)"
+            )
             if browser.errors:
                 return browser.errors[0]
             if wanted != drawn:
                 return f"{drawn} of {wanted} widgets drawn"
             if pins is None:
                 return ""
-            wait_until(lambda: f"{component}." in self.shell("list", "pin").stdout, "the pins exist")
-            rows = [line.split() for line in self.shell("show", "pin", component).stdout.splitlines()]
-            found = sorted((row[4].partition(".")[2], row[1], row[2]) for row in rows if len(row) > 4 and row[4].startswith(component + "."))
+            wait_until(
+                lambda: f"{component}." in self.shell("list", "pin").stdout, "the pins exist"
+            )
+            rows = [
+                line.split() for line in self.shell("show", "pin", component).stdout.splitlines()
+            ]
+            found = sorted(
+                (row[4].partition(".")[2], row[1], row[2])
+                for row in rows
+                if len(row) > 4 and row[4].startswith(component + ".")
+            )
             return "" if found == pins else f"pins differ: {sorted(set(found) ^ set(pins))}"
         finally:
             browser.open("about:blank")
@@ -75,7 +93,9 @@ if not have_browser():
     skip("no browser: install the Debian package chromium")
 files = list(panels())
 if not files:
-    skip("no panels of LinuxCNC here: install the Debian package linuxcnc-uspace, or name the folder of a source tree")
+    skip(
+        "no panels of LinuxCNC here: install the Debian package linuxcnc-uspace, or name the folder of a source tree"
+    )
 case = Peer()
 case.setUp()
 failed = 0

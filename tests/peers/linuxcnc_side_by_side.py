@@ -21,8 +21,14 @@ def memory():
     total = 0
     for process in Path("/proc").glob("[0-9]*"):
         try:
-            if (process / "comm").read_text().strip() in PROGRAMS or b"rtapi_app" in (process / "cmdline").read_bytes():
-                total += sum(int(line.split()[1]) for line in (process / "smaps_rollup").read_text().splitlines() if line.startswith("Pss:"))
+            if (process / "comm").read_text().strip() in PROGRAMS or b"rtapi_app" in (
+                process / "cmdline"
+            ).read_bytes():
+                total += sum(
+                    int(line.split()[1])
+                    for line in (process / "smaps_rollup").read_text().splitlines()
+                    if line.startswith("Pss:")
+                )
         except OSError:
             pass  # it has ended
     return total / 1024
@@ -37,8 +43,17 @@ def run(words, user, environment):
             for path in (Path(name), folder, *folder.iterdir()):
                 os.chown(path, user.pw_uid, user.pw_gid)
         begin = time.time()
-        machine = subprocess.Popen([*words, "machine.ini"], cwd=folder, env=environment, user=user and user.pw_uid, group=user and user.pw_gid,
-                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        machine = subprocess.Popen(
+            [*words, "machine.ini"],
+            cwd=folder,
+            env=environment,
+            user=user and user.pw_uid,
+            group=user and user.pw_gid,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
         used = 0.0
         while machine.poll() is None:
             if (folder / "started.txt").exists():
@@ -61,8 +76,10 @@ def regularity(periods):
     """How far periods are from the middle one, which is taken for a millisecond."""
     middle = sorted(periods)[len(periods) // 2]
     away = sorted(abs(period / middle - 1) * 1000 for period in periods)
-    return (f"half of {len(away)} within {away[len(away) // 2]:.1f} us, 99 % within {away[len(away) * 99 // 100]:.0f} us, all within {away[-1]:.0f} us; "
-            f"{sum(period > 1.5 * middle for period in periods)} longer than 1.5 ms")
+    return (
+        f"half of {len(away)} within {away[len(away) // 2]:.1f} us, 99 % within {away[len(away) * 99 // 100]:.0f} us, all within {away[-1]:.0f} us; "
+        f"{sum(period > 1.5 * middle for period in periods)} longer than 1.5 ms"
+    )
 
 
 def main():
@@ -76,19 +93,28 @@ def main():
         print("LinuxCNC rejects root; name a user who runs it")
         sys.exit(77)
     plain = {**os.environ, "HOME": user.pw_dir if user else os.environ["HOME"]}
-    load = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(os.cpu_count() if "--load" in sys.argv else 0)]
+    load = [
+        subprocess.Popen([sys.executable, "-c", "while True: pass"])
+        for _ in range(os.cpu_count() if "--load" in sys.argv else 0)
+    ]
     try:
         theirs, their_start, their_memory, their_periods = run(["linuxcnc", "-r"], user, plain)
-        ours, our_start, our_memory, our_periods = run([str(hal), "linuxcnc"], user, {**plain, "PATH": f"{hal.parent}:{plain['PATH']}"})
+        ours, our_start, our_memory, our_periods = run(
+            [str(hal), "linuxcnc"], user, {**plain, "PATH": f"{hal.parent}:{plain['PATH']}"}
+        )
     finally:
         for process in load:
             process.kill()
     differ = sum(a != b for a, b in zip(theirs, ours)) + abs(len(theirs) - len(ours))
-    print(f"cycles with motion: LinuxCNC {len(theirs)}, Halcyon {len(ours)}; {differ} differ (6 decimals)")
+    print(
+        f"cycles with motion: LinuxCNC {len(theirs)}, Halcyon {len(ours)}; {differ} differ (6 decimals)"
+    )
     print(f"periods, LinuxCNC: {regularity(their_periods)}")
     print(f"periods, Halcyon:  {regularity(our_periods)}")
     print(f"until the display runs: LinuxCNC {their_start:.2f} s, Halcyon {our_start:.2f} s")
-    print(f"memory of the machine's programs: LinuxCNC {their_memory:.0f} MB, Halcyon {our_memory:.0f} MB")
+    print(
+        f"memory of the machine's programs: LinuxCNC {their_memory:.0f} MB, Halcyon {our_memory:.0f} MB"
+    )
     sys.exit(0 if differ == 0 and theirs else 1)
 
 

@@ -23,9 +23,19 @@ import linuxcnc_upstream
 
 HERE = pathlib.Path(__file__).resolve().parent / "sim_sweep"
 STEPS = ("started", "homed", "moved", "program")
-OF_DISPLAY = re.compile(r"\s*(POSTGUI_HALFILE|POSTGUI_HALCMD|PYVCP|GLADEVCP|EMBED_TAB_\w+|INTRO_GRAPHIC|APP|USER_COMMAND_FILE)\s*=", re.I)
-MACHINE = re.compile(r"^\s*DISPLAY\s*=|^#INCLUDE\s", re.M)  # the display may be in an included file; other INI files are settings of programs
-NO_WINDOW = ("sim_pin", "halshow", "halscope", "halmeter")  # loaded by netlists without a pin of their own
+OF_DISPLAY = re.compile(
+    r"\s*(POSTGUI_HALFILE|POSTGUI_HALCMD|PYVCP|GLADEVCP|EMBED_TAB_\w+|INTRO_GRAPHIC|APP|USER_COMMAND_FILE)\s*=",
+    re.I,
+)
+MACHINE = re.compile(
+    r"^\s*DISPLAY\s*=|^#INCLUDE\s", re.M
+)  # the display may be in an included file; other INI files are settings of programs
+NO_WINDOW = (
+    "sim_pin",
+    "halshow",
+    "halscope",
+    "halmeter",
+)  # loaded by netlists without a pin of their own
 
 
 def without_windows(text):
@@ -64,7 +74,12 @@ def copy_of(top, folder):
 def first_error(output):
     """The line that names the problem, of all that was printed."""
     lines = [line.strip() for line in output.splitlines() if line.strip()]
-    for pattern in (r"(fault: .*hung-thread.*)", r"^sweep: not (.*)", r".*(\berror:.*)", r"(.*\b(?:error|cannot|failed|Traceback|No such|not found|[Mm]issing)\b.*)"):
+    for pattern in (
+        r"(fault: .*hung-thread.*)",
+        r"^sweep: not (.*)",
+        r".*(\berror:.*)",
+        r"(.*\b(?:error|cannot|failed|Traceback|No such|not found|[Mm]issing)\b.*)",
+    ):
         for line in lines:
             if (found := re.match(pattern, line)) and "Can not find -sec" not in line:
                 return found.group(1)[:220]
@@ -75,16 +90,30 @@ def run(ini, command, environment):
     """(the steps that succeeded, an error or an empty text)"""
     output = ini.with_suffix(".sweep-output")
     with open(output, "wb") as out:
-        machine = subprocess.Popen([*command, str(ini)], cwd=ini.parent, env=environment, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT,
-                                   start_new_session=True)
+        machine = subprocess.Popen(
+            [*command, str(ini)],
+            cwd=ini.parent,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
         try:
             status = machine.wait(linuxcnc_upstream.LIMIT)
         except subprocess.TimeoutExpired:
             os.killpg(machine.pid, signal.SIGKILL)
             machine.wait()
             status = None
-    left = [pathlib.Path(f"/proc/{process}/comm").read_text().strip() for process in linuxcnc_upstream.processes_of_test()
-            if pathlib.Path(f"/proc/{process}/comm").exists()] if status is not None else []
+    left = (
+        [
+            pathlib.Path(f"/proc/{process}/comm").read_text().strip()
+            for process in linuxcnc_upstream.processes_of_test()
+            if pathlib.Path(f"/proc/{process}/comm").exists()
+        ]
+        if status is not None
+        else []
+    )
     linuxcnc_upstream.clean_up()
     text = output.read_text(errors="replace")
     steps = [step for step in STEPS if f"sweep: {step}\n" in text]
@@ -101,7 +130,7 @@ def main():
     part, parts = 0, 1
     if "--part" in words:
         part, parts = (int(number) for number in words[words.index("--part") + 1].split("/"))
-        del words[words.index("--part"):words.index("--part") + 2]
+        del words[words.index("--part") : words.index("--part") + 2]
     if not words or words[0].startswith("-"):
         sys.exit(__doc__)
     if not shutil.which("milltask", path=f"{source}/bin" if source else "/usr/bin"):
@@ -115,22 +144,39 @@ def main():
         configs = copy_of(pathlib.Path(words[0]).resolve(), pathlib.Path(folder))
         common = linuxcnc_upstream.environment_of(theirs, pathlib.Path(folder, ".tools"), source)
         common["PYTHONPATH"] = f"{HERE}:{common.get('PYTHONPATH', '')}".rstrip(":")
-        command = [f"{source}/scripts/linuxcnc" if source else "/usr/bin/linuxcnc", "-r"] if theirs else ["/usr/bin/env", "hal", "linuxcnc"]
-        files = sorted(file for file in (configs / "sim").rglob("*.ini") if MACHINE.search(file.read_text(errors="replace")))
+        command = (
+            [f"{source}/scripts/linuxcnc" if source else "/usr/bin/linuxcnc", "-r"]
+            if theirs
+            else ["/usr/bin/env", "hal", "linuxcnc"]
+        )
+        files = sorted(
+            file
+            for file in (configs / "sim").rglob("*.ini")
+            if MACHINE.search(file.read_text(errors="replace"))
+        )
         for at, file in enumerate(files):
             name = str(file.relative_to(configs / "sim"))
-            if len(words) > 1 and not any(wanted in name for wanted in words[1:]) or at % parts != part % parts:
+            if (
+                len(words) > 1
+                and not any(wanted in name for wanted in words[1:])
+                or at % parts != part % parts
+            ):
                 continue
             home = pathlib.Path(folder, ".home")
             shutil.rmtree(home, ignore_errors=True)
             home.mkdir()
             begin = time.monotonic()
-            steps, problem = run(file, command, common | {"HOME": str(home), "XDG_RUNTIME_DIR": str(home)})
+            steps, problem = run(
+                file, command, common | {"HOME": str(home), "XDG_RUNTIME_DIR": str(home)}
+            )
             number += 1
             for step in steps:
                 count[step] += 1
-            print(f"{'FAILED' if problem else 'passed'} {name} ({time.monotonic() - begin:.1f} s): {problem or ', '.join(steps)}"
-                  + (f" (after: {', '.join(steps)})" if problem and steps else ""), flush=True)
+            print(
+                f"{'FAILED' if problem else 'passed'} {name} ({time.monotonic() - begin:.1f} s): {problem or ', '.join(steps)}"
+                + (f" (after: {', '.join(steps)})" if problem and steps else ""),
+                flush=True,
+            )
     print(f"{number} configurations; " + ", ".join(f"{step} {of}" for step, of in count.items()))
     return 0 if count["ended"] == number else 1
 

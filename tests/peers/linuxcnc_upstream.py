@@ -26,7 +26,18 @@ BIN = linuxcnc_tests.BIN
 LIMIT = float(os.environ.get("LIMIT", "150"))
 CLASSES = ("whole machine", "HAL", "interpreter", "compiler", "other")
 OVERRUNS = 10  # a netlist whose sampler has lost records is run again, as upstream's runner does
-PROGRAMS = {"rtapi_app", "rtapi:0", "hal", "io", "iov2", "milltask", "linuxcncsvr", "halui", "motion-logger", "linuxcncrsh"}
+PROGRAMS = {
+    "rtapi_app",
+    "rtapi:0",
+    "hal",
+    "io",
+    "iov2",
+    "milltask",
+    "linuxcncsvr",
+    "halui",
+    "motion-logger",
+    "linuxcncrsh",
+}
 MARK = f"LINUXCNC_UPSTREAM={os.getpid()}"
 LAUNCHER = """#!/bin/sh
 [ "$1" != -r ] || shift
@@ -42,13 +53,19 @@ def class_of(file):
     programs = {pathlib.Path(name).name for name in linuxcnc_tests.shell_programs(text)}
     if "python" in text.split("\n", 1)[0]:
         programs = set(re.findall(r"[\w-]+", text))
-    if "linuxcnc" in programs or re.search(r"^\s*(?:if |exec )?linuxcnc\s+(?:-r\s+)?\S+\.ini", text, re.M):
+    if "linuxcnc" in programs or re.search(
+        r"^\s*(?:if |exec )?linuxcnc\s+(?:-r\s+)?\S+\.ini", text, re.M
+    ):
         return "whole machine"
     if programs & {"halcompile", "gcc", "g++", "gxx"}:
         return "compiler"
     if "rs274" in programs:
         return "interpreter"
-    return "HAL" if linuxcnc_tests.OF_HAL.search(text) or programs & {"hal", "haltcl", "mb2hal"} else "other"
+    return (
+        "HAL"
+        if linuxcnc_tests.OF_HAL.search(text) or programs & {"hal", "haltcl", "mb2hal"}
+        else "other"
+    )
 
 
 def processes_of_test():
@@ -56,7 +73,13 @@ def processes_of_test():
     found = []
     for folder in pathlib.Path("/proc").glob("[0-9]*"):
         try:
-            if int(folder.name) == os.getpid() or str(os.getuid()) not in re.search(r"^Uid:(.*)", (folder / "status").read_text(), re.M).group(1).split():
+            if (
+                int(folder.name) == os.getpid()
+                or str(os.getuid())
+                not in re.search(r"^Uid:(.*)", (folder / "status").read_text(), re.M)
+                .group(1)
+                .split()
+            ):
                 continue
             state = (folder / "stat").read_text().rpartition(")")[2].split()[0]
             try:
@@ -91,25 +114,49 @@ def clean_up():
 def environment_of(theirs, tools, home):
     name, value = MARK.split("=")
     libraries = sysconfig.get_config_vars()
-    common = {name: value, "LC_ALL": "C", "LANGUAGES": "", "EMC2_HOME": "/usr", "SYSTEM_BUILD": "1", "HEADERS": "/usr/include/linuxcnc",
-              "LIBDIR": "/usr/lib", "LINUXCNC_EMCSH": "wish", "PYTHON_CPPFLAGS": f"-I{libraries['INCLUDEPY']}", "USER": os.environ.get("USER", "user"),
-              "PYTHON_LIBS": f"-lpython{libraries['py_version_short']}", "RUNTESTS": str(pathlib.Path(__file__).resolve())}
+    common = {
+        name: value,
+        "LC_ALL": "C",
+        "LANGUAGES": "",
+        "EMC2_HOME": "/usr",
+        "SYSTEM_BUILD": "1",
+        "HEADERS": "/usr/include/linuxcnc",
+        "LIBDIR": "/usr/lib",
+        "LINUXCNC_EMCSH": "wish",
+        "PYTHON_CPPFLAGS": f"-I{libraries['INCLUDEPY']}",
+        "USER": os.environ.get("USER", "user"),
+        "PYTHON_LIBS": f"-lpython{libraries['py_version_short']}",
+        "RUNTESTS": str(pathlib.Path(__file__).resolve()),
+    }
     common["PYTHON_EXTRA_LIBS"] = common["PYTHON_LIBS"]
     if home:
         common |= in_place(home)
     if theirs and home:
-        return common | {"PATH": f"{home}/bin:{home}/scripts:{home}/tcl:/usr/bin:/bin:/usr/sbin", "REALTIME": "realtime"}
+        return common | {
+            "PATH": f"{home}/bin:{home}/scripts:{home}/tcl:/usr/bin:/bin:/usr/sbin",
+            "REALTIME": "realtime",
+        }
     if theirs:
-        return common | {"PATH": "/usr/bin:/bin:/usr/sbin", "REALTIME": "/usr/lib/linuxcnc/realtime"}
+        return common | {
+            "PATH": "/usr/bin:/bin:/usr/sbin",
+            "REALTIME": "/usr/lib/linuxcnc/realtime",
+        }
     tools.mkdir()
     for program, text in (("linuxcnc", LAUNCHER), ("realtime", linuxcnc_tests.REALTIME)):
         (tools / program).write_text(text)
         (tools / program).chmod(0o755)
-    ours = common | {"PATH": f"{tools}:{BIN}:/usr/bin:/bin:/usr/sbin", "REALTIME": str(tools / "realtime"), "HALCYON_MODULES": "linuxcnc",
-                     "HAL_RTMOD_DIR": "/usr/lib/linuxcnc/modules", "PYTHONPATH": f"{linuxcnc_tests.MODULE}:/usr/lib/python3/dist-packages",
-                     "LD_LIBRARY_PATH": str(BIN.parent / "lib/halcyon/linuxcnc")}
+    ours = common | {
+        "PATH": f"{tools}:{BIN}:/usr/bin:/bin:/usr/sbin",
+        "REALTIME": str(tools / "realtime"),
+        "HALCYON_MODULES": "linuxcnc",
+        "HAL_RTMOD_DIR": "/usr/lib/linuxcnc/modules",
+        "PYTHONPATH": f"{linuxcnc_tests.MODULE}:/usr/lib/python3/dist-packages",
+        "LD_LIBRARY_PATH": str(BIN.parent / "lib/halcyon/linuxcnc"),
+    }
     if home:
-        ours["PATH"] = f"{tools}:{BIN.parent}/lib/halcyon/linuxcnc/bin:{BIN}:{home}/bin:{home}/scripts:{home}/tcl:/usr/bin:/bin:/usr/sbin"
+        ours[
+            "PATH"
+        ] = f"{tools}:{BIN.parent}/lib/halcyon/linuxcnc/bin:{BIN}:{home}/bin:{home}/scripts:{home}/tcl:/usr/bin:/bin:/usr/sbin"
         ours |= {"HAL_RTMOD_DIR": f"{home}/rtlib", "LINUXCNC_HOME": str(home)}
         for name in ("PYTHONPATH", "LD_LIBRARY_PATH"):
             ours[name] = ours[name].split(":")[0] + ":" + common[name]
@@ -118,8 +165,17 @@ def environment_of(theirs, tools, home):
 
 def in_place(home):
     """What `. scripts/rip-environment` of a source tree sets."""
-    return {"EMC2_HOME": str(home), "SYSTEM_BUILD": "", "HEADERS": f"{home}/include", "LIBDIR": f"{home}/lib", "LINUXCNC_RIP_FLAG": "True",
-            "LINUXCNC_NCFILES_DIR": f"{home}/nc_files", "TCLLIBPATH": f"{home}/tcl", "LD_LIBRARY_PATH": f"{home}/lib", "PYTHONPATH": f"{home}/lib/python"}
+    return {
+        "EMC2_HOME": str(home),
+        "SYSTEM_BUILD": "",
+        "HEADERS": f"{home}/include",
+        "LIBDIR": f"{home}/lib",
+        "LINUXCNC_RIP_FLAG": "True",
+        "LINUXCNC_NCFILES_DIR": f"{home}/nc_files",
+        "TCLLIBPATH": f"{home}/tcl",
+        "LD_LIBRARY_PATH": f"{home}/lib",
+        "PYTHONPATH": f"{home}/lib/python",
+    }
 
 
 def skipped(here, environment):
@@ -129,17 +185,42 @@ def skipped(here, environment):
         return ""
     if not os.access(skip, os.X_OK):
         return "disabled by its folder"
-    asked = subprocess.run([str(skip)], cwd=here, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60, check=False)
-    return "" if asked.returncode == 0 else (asked.stderr + asked.stdout).strip().split("\n")[-1] or f"skip exited with {asked.returncode}"
+    asked = subprocess.run(
+        [str(skip)],
+        cwd=here,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    return (
+        ""
+        if asked.returncode == 0
+        else (asked.stderr + asked.stdout).strip().split("\n")[-1]
+        or f"skip exited with {asked.returncode}"
+    )
 
 
 def start(here, script, environment):
     """The exit status, or None when the time was over."""
-    command = {"test.hal": ["halrun", "-f", "test.hal"], "test.sh": ["bash", "-x", "test.sh"], "test": ["./test"]}[script]
+    command = {
+        "test.hal": ["halrun", "-f", "test.hal"],
+        "test.sh": ["bash", "-x", "test.sh"],
+        "test": ["./test"],
+    }[script]
     with open(here / "result", "wb") as out, open(here / "stderr", "wb") as err:
         # Not the folder of the first word in our own PATH: that of the test.
-        process = subprocess.Popen(["/usr/bin/env", *command], cwd=here, env=environment, stdin=subprocess.DEVNULL, stdout=out, stderr=err,
-                                   start_new_session=True)
+        process = subprocess.Popen(
+            ["/usr/bin/env", *command],
+            cwd=here,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=err,
+            start_new_session=True,
+        )
         try:
             return process.wait(LIMIT)
         except subprocess.TimeoutExpired:
@@ -153,12 +234,18 @@ def run(here, script, environment):
     for _ in range(OVERRUNS):
         status = start(here, script, environment)
         clean_up()
-        if script != "test.hal" or not re.search(r"^overrun$", (here / "result").read_text(errors="replace"), re.M):
+        if script != "test.hal" or not re.search(
+            r"^overrun$", (here / "result").read_text(errors="replace"), re.M
+        ):
             break
     if status is None:
         return f"still running after {LIMIT:.0f} s"
     if status != 0:
-        lines = [line for line in (here / "stderr").read_text(errors="replace").splitlines() if line.strip() and not line.startswith("+")]
+        lines = [
+            line
+            for line in (here / "stderr").read_text(errors="replace").splitlines()
+            if line.strip() and not line.startswith("+")
+        ]
         errors = [line for line in lines if re.search(r"\b(error|cannot)\b", line)] or lines[-1:]
         return f"exit status {status}: {errors[0].strip()[:200] if errors else 'no message'}"
     return linuxcnc_tests.judge(here, environment)
@@ -179,7 +266,7 @@ def take_home(words):
         return None
     at = words.index("--home")
     home = pathlib.Path(words[at + 1]).resolve()
-    del words[at:at + 2]
+    del words[at : at + 2]
     return home
 
 
@@ -189,15 +276,19 @@ def missing_prerequisite(here, home):
     if not home or not wanted.exists():
         return ""
     has = (home / "src/config.h").read_text()
-    missing = [name for name in wanted.read_text().split() if not re.search(rf"^#define HAVE_{name}", has, re.M)]
+    missing = [
+        name
+        for name in wanted.read_text().split()
+        if not re.search(rf"^#define HAVE_{name}", has, re.M)
+    ]
     return f"LinuxCNC was built without {', '.join(missing)}" if missing else ""
 
 
 def take_with(words):
     """Removes `--with linuxcnc` from the words; True if it was there."""
-    theirs = "--with" in words and words[words.index("--with") + 1:][:1] == ["linuxcnc"]
+    theirs = "--with" in words and words[words.index("--with") + 1 :][:1] == ["linuxcnc"]
     if theirs:
-        del words[words.index("--with"):words.index("--with") + 2]
+        del words[words.index("--with") : words.index("--with") + 2]
     return theirs
 
 
@@ -215,17 +306,29 @@ def main():
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         top = copy_of(pathlib.Path(words[0]).resolve(), pathlib.Path(folder))
         common = environment_of(theirs, pathlib.Path(folder, ".tools"), home)
-        own = pathlib.Path(folder, ".home")  # one for all, as upstream: a display may read task's tools before task has made the file
+        own = pathlib.Path(
+            folder, ".home"
+        )  # one for all, as upstream: a display may read task's tools before task has made the file
         own.mkdir()
-        files = sorted(file for name in linuxcnc_tests.SCRIPTS for file in top.rglob(name) if file.is_file())
+        files = sorted(
+            file for name in linuxcnc_tests.SCRIPTS for file in top.rglob(name) if file.is_file()
+        )
         for file in files:
             here, name = file.parent, str(file.parent.relative_to(top))
             if len(words) > 1 and not any(part in name for part in words[1:]):
                 continue
-            environment = common | {"HOME": str(own), "XDG_RUNTIME_DIR": str(own), "TEST_DIR": str(here), "USER_MODULE_DIR": str(here),
-                                    "TOPDIR": str(top.parent), "PATH": f"{here}:{common['PATH']}"}
+            environment = common | {
+                "HOME": str(own),
+                "XDG_RUNTIME_DIR": str(own),
+                "TEST_DIR": str(here),
+                "USER_MODULE_DIR": str(here),
+                "TOPDIR": str(top.parent),
+                "PATH": f"{here}:{common['PATH']}",
+            }
             if theirs and home:
-                del environment["USER_MODULE_DIR"]  # upstream's runner sets it for an installed package only
+                del environment[
+                    "USER_MODULE_DIR"
+                ]  # upstream's runner sets it for an installed package only
             kind, begin = class_of(file), time.monotonic()
             reason = missing_prerequisite(here, home) or skipped(here, environment)
             verdict = "skipped" if reason else run(here, file.name, environment)
@@ -235,10 +338,15 @@ def main():
             elif word == "FAILED":
                 reason = verdict
             count[kind][word] += 1
-            print(f"{word} {name} ({kind}, {time.monotonic() - begin:.1f} s){': ' * bool(reason)}{reason}", flush=True)
+            print(
+                f"{word} {name} ({kind}, {time.monotonic() - begin:.1f} s){': ' * bool(reason)}{reason}",
+                flush=True,
+            )
     for kind, row in count.items():
         print(f"{kind}: {row['passed']} passed, {row['FAILED']} failed, {row['skipped']} skipped")
-    total = {word: sum(row[word] for row in count.values()) for word in ("passed", "FAILED", "skipped")}
+    total = {
+        word: sum(row[word] for row in count.values()) for word in ("passed", "FAILED", "skipped")
+    }
     print(f"all: {total['passed']} passed, {total['FAILED']} failed, {total['skipped']} skipped")
     return 1 if total["FAILED"] else 0
 

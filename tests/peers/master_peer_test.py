@@ -17,7 +17,13 @@ types = canopen.objectdictionary.datatypes
 
 HAL = sys.argv[1]
 FOLDER = Path(tempfile.mkdtemp(prefix="hal-master-"))
-ENVIRONMENT = {**os.environ, "HOME": str(FOLDER), "XDG_RUNTIME_DIR": str(FOLDER), "LC_ALL": "C.UTF-8", "TERM": "dumb"}
+ENVIRONMENT = {
+    **os.environ,
+    "HOME": str(FOLDER),
+    "XDG_RUNTIME_DIR": str(FOLDER),
+    "LC_ALL": "C.UTF-8",
+    "TERM": "dumb",
+}
 checks = []
 
 CONFIGURATION = """[bus]
@@ -47,12 +53,22 @@ start
 
 def check(name, holds, *seen):
     checks.append(bool(holds))
-    print(f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}", flush=True)
+    print(
+        f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}",
+        flush=True,
+    )
 
 
 def shell(*words):
-    done = subprocess.run([HAL, "shell", *words], env=ENVIRONMENT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                          text=True, check=False)
+    done = subprocess.run(
+        [HAL, "shell", *words],
+        env=ENVIRONMENT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
     return done.stdout.strip()
 
 
@@ -68,9 +84,14 @@ def dictionary():
         it.data_type, it.default, it.access_type = data_type, value, "rw"
         return it
 
-    for row in ((0x1000, types.UNSIGNED32, "Device type", 0x1234), (0x1017, types.UNSIGNED16, "Producer heartbeat time", 0),
-                (0x2000, types.UNSIGNED32, "Count", 0), (0x2001, types.INTEGER16, "Small", 0), (0x2002, types.UNSIGNED32, "Wish", 0),
-                (0x2003, types.UNSIGNED32, "Setting", 0)):
+    for row in (
+        (0x1000, types.UNSIGNED32, "Device type", 0x1234),
+        (0x1017, types.UNSIGNED16, "Producer heartbeat time", 0),
+        (0x2000, types.UNSIGNED32, "Count", 0),
+        (0x2001, types.INTEGER16, "Small", 0),
+        (0x2002, types.UNSIGNED32, "Wish", 0),
+        (0x2003, types.UNSIGNED32, "Setting", 0),
+    ):
         od.add_object(variable(*row))
 
     def record(index, name, *rows):
@@ -110,7 +131,10 @@ class Device:
         self.node.sdo[0x2000].raw, self.node.sdo[0x2001].raw = self.syncs, -self.id
         cob = self.node.sdo[0x1800][1].raw
         mapping = [self.node.sdo[0x1A00][n].raw for n in range(1, self.node.sdo[0x1A00][0].raw + 1)]
-        data = b"".join(self.node.get_data(entry >> 16, entry >> 8 & 0xFF)[:(entry & 0xFF) // 8] for entry in mapping)
+        data = b"".join(
+            self.node.get_data(entry >> 16, entry >> 8 & 0xFF)[: (entry & 0xFF) // 8]
+            for entry in mapping
+        )
         self.network.send_message(cob & 0x7FF, data)
 
 
@@ -127,39 +151,79 @@ def run(what, network, link):
     (FOLDER / "net.canopen").write_text(CONFIGURATION.format(link=link))
     (FOLDER / "net.hal").write_text(NETLIST)
     devices = [Device(network, 10), Device(network, 11)]
-    machine = subprocess.Popen([HAL, "run", "net.hal"], cwd=FOLDER, env=ENVIRONMENT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                               stderr=subprocess.STDOUT, text=True)
+    machine = subprocess.Popen(
+        [HAL, "run", "net.hal"],
+        cwd=FOLDER,
+        env=ENVIRONMENT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
     try:
         up = wait_for(lambda: pin("nodes-operational") == "2", 60)
         check(f"{what}: both devices are operational", up, shell("show", "pin", "canopen.0"))
         if not up:
             return
         first, second = devices
-        check(f"{what}: as they know it", [d.node.nmt.state for d in devices] == ["OPERATIONAL"] * 2)
-        check(f"{what}: objects were written", [d.node.sdo[0x2003].raw for d in devices] == [4711] * 2)
-        check(f"{what}: PDOs were mapped", [first.node.sdo[0x1A00][n].raw for n in range(3)] == [2, 0x20010010, 0x20000020])
+        check(
+            f"{what}: as they know it", [d.node.nmt.state for d in devices] == ["OPERATIONAL"] * 2
+        )
+        check(
+            f"{what}: objects were written", [d.node.sdo[0x2003].raw for d in devices] == [4711] * 2
+        )
+        check(
+            f"{what}: PDOs were mapped",
+            [first.node.sdo[0x1A00][n].raw for n in range(3)] == [2, 0x20010010, 0x20000020],
+        )
         for d in devices:
             d.live = True
-        check(f"{what}: what they send are pins", wait_for(lambda: pin("first.0x2001") == "-10" and int(pin("second.0x2000"), 0) > 3),
-              pin("first.0x2001"), pin("second.0x2000"))
+        check(
+            f"{what}: what they send are pins",
+            wait_for(lambda: pin("first.0x2001") == "-10" and int(pin("second.0x2000"), 0) > 3),
+            pin("first.0x2001"),
+            pin("second.0x2000"),
+        )
         shell("setp", "canopen.0.first.0x2002", "77")
-        check(f"{what}: a pin is sent to the device", wait_for(lambda: first.wish == 77), first.wish)
+        check(
+            f"{what}: a pin is sent to the device", wait_for(lambda: first.wish == 77), first.wish
+        )
         first.node.emcy.send(0x5030, 0x81)
-        check(f"{what}: emergency", wait_for(lambda: int(pin("first.emcy"), 0) == 0x5030 and int(pin("first.error-register"), 0) == 0x81))
+        check(
+            f"{what}: emergency",
+            wait_for(
+                lambda: int(pin("first.emcy"), 0) == 0x5030
+                and int(pin("first.error-register"), 0) == 0x81
+            ),
+        )
         first.node.emcy.reset()
         check(f"{what}: the error is gone", wait_for(lambda: int(pin("first.emcy"), 0) == 0))
         second.node.nmt.stop_heartbeat()
         check(f"{what}: silence is a fault", wait_for(lambda: int(pin("second.retries"), 0) > 0))
-        check(f"{what}: the fault is reported", "node 11 (second): no heartbeat for" in (text := shell("show", "fault")), text)
-        check(f"{what}: and the device is brought back", wait_for(lambda: pin("second.operational") == "TRUE"))
+        check(
+            f"{what}: the fault is reported",
+            "node 11 (second): no heartbeat for" in (text := shell("show", "fault")),
+            text,
+        )
+        check(
+            f"{what}: and the device is brought back",
+            wait_for(lambda: pin("second.operational") == "TRUE"),
+        )
         first.node.nmt.state = "PRE-OPERATIONAL"
-        check(f"{what}: who leaves operational is brought back",
-              wait_for(lambda: int(pin("first.retries"), 0) > 0 and pin("first.operational") == "TRUE"))
+        check(
+            f"{what}: who leaves operational is brought back",
+            wait_for(
+                lambda: int(pin("first.retries"), 0) > 0 and pin("first.operational") == "TRUE"
+            ),
+        )
     finally:
         machine.terminate()
         check(f"{what}: the machine ends in order", machine.wait(60) == 0, machine.stdout.read())
-    check(f"{what}: its nodes are pre-operational", wait_for(lambda: [d.node.nmt.state for d in devices] == ["PRE-OPERATIONAL"] * 2, 5),
-          [d.node.nmt.state for d in devices])
+    check(
+        f"{what}: its nodes are pre-operational",
+        wait_for(lambda: [d.node.nmt.state for d in devices] == ["PRE-OPERATIONAL"] * 2, 5),
+        [d.node.nmt.state for d in devices],
+    )
 
 
 def udp():
@@ -178,7 +242,9 @@ def slcan():
     if shutil.which("socat") is None:
         return print("slcan: left out, socat is missing; type: apt install socat")
     ends = [str(FOLDER / side) for side in "ab"]
-    relay = subprocess.Popen(["socat", f"pty,raw,echo=0,link={ends[0]}", f"pty,raw,echo=0,link={ends[1]}"])
+    relay = subprocess.Popen(
+        ["socat", f"pty,raw,echo=0,link={ends[0]}", f"pty,raw,echo=0,link={ends[1]}"]
+    )
     network = canopen.Network()
     try:
         if not wait_for(lambda: all(map(os.path.exists, ends))):

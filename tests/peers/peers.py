@@ -16,7 +16,9 @@ def package(*names):
         if PEERS.exists() and Path(sys.prefix) != PEERS.parents[1]:
             sys.stdout.flush()
             os.execv(PEERS, [str(PEERS), *sys.argv])
-        print(f"{missing}; type: python3 -m pip install -r {Path(__file__).with_name('requirements.txt')}; ./hal test does it by itself")
+        print(
+            f"{missing}; type: python3 -m pip install -r {Path(__file__).with_name('requirements.txt')}; ./hal test does it by itself"
+        )
         sys.exit(77)
 
 

@@ -42,10 +42,19 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         capture, fields = Path(folder) / "tdma.pcapng", Path(folder) / "fields"
         subprocess.run([sys.argv[1], capture, fields], check=True)
-        decoded = subprocess.run(["tshark", "-n", "-r", capture, "-T", "json", "--no-duplicate-keys"], check=True, capture_output=True,
-                                 env={"HOME": folder, "PATH": "/usr/bin:/bin:/usr/local/bin", "LC_ALL": "C.UTF-8"})
-        wanted = [dict(pair.split("=", 1) for pair in line.split()) for line in fields.read_text().splitlines()]
-        frames = [fields_of(packet["_source"]["layers"], {}) for packet in json.loads(decoded.stdout)]
+        decoded = subprocess.run(
+            ["tshark", "-n", "-r", capture, "-T", "json", "--no-duplicate-keys"],
+            check=True,
+            capture_output=True,
+            env={"HOME": folder, "PATH": "/usr/bin:/bin:/usr/local/bin", "LC_ALL": "C.UTF-8"},
+        )
+        wanted = [
+            dict(pair.split("=", 1) for pair in line.split())
+            for line in fields.read_text().splitlines()
+        ]
+        frames = [
+            fields_of(packet["_source"]["layers"], {}) for packet in json.loads(decoded.stdout)
+        ]
     wrong, compared = [], 0
     if len(frames) != len(wanted):
         wrong.append(f"{len(wanted)} frames were written, tshark reads {len(frames)}")
@@ -53,10 +62,15 @@ def main():
         for name, value in want.items():
             compared += 1
             if not any(same(value, one) for one in got.get(name, [])):
-                wrong.append(f"frame {index}: {name} is {value}, tshark reads {got.get(name, 'no such field')}")
+                wrong.append(
+                    f"frame {index}: {name} is {value}, tshark reads {got.get(name, 'no such field')}"
+                )
         if any(name.startswith(("_ws.malformed", "_ws.expert")) for name in got):
             wrong.append(f"frame {index}: tshark finds it malformed")
-    print("\n".join(wrong) or f"{compared} fields of {len(frames)} frames: tshark reads what was written")
+    print(
+        "\n".join(wrong)
+        or f"{compared} fields of {len(frames)} frames: tshark reads what was written"
+    )
     return 1 if wrong or compared < 100 else 0
 
 

@@ -65,28 +65,41 @@ class Replay:
         names, open_slices, cleared = {}, {}, False
         for packet in trace.packet:
             if packet.HasField("clock_snapshot"):
-                self.clocks = {clock.clock_id: clock.timestamp for clock in packet.clock_snapshot.clocks}
+                self.clocks = {
+                    clock.clock_id: clock.timestamp for clock in packet.clock_snapshot.clocks
+                }
             if packet.sequence_flags & CLEARED:
                 cleared, names = packet.trace_packet_defaults.timestamp_clock_id == MONOTONIC, {}
             if packet.HasField("track_descriptor"):
                 described = packet.track_descriptor
-                self.tracks[described.uuid] = described.thread.thread_name or described.name or described.process.process_name
+                self.tracks[described.uuid] = (
+                    described.thread.thread_name or described.name or described.process.process_name
+                )
                 if described.HasField("process"):
                     self.processes.add(described.process.pid)
                 if described.HasField("thread"):
-                    self.threads[described.thread.thread_name] = (described.thread.pid, described.thread.tid)
+                    self.threads[described.thread.thread_name] = (
+                        described.thread.pid,
+                        described.thread.tid,
+                    )
                 if described.parent_uuid and described.parent_uuid not in self.tracks:
                     self.problems.append(f"{described.uuid} has an unknown parent")
             if not packet.HasField("track_event"):
                 continue
-            if not cleared or not packet.sequence_flags & NEEDED or not packet.trusted_packet_sequence_id:
+            if (
+                not cleared
+                or not packet.sequence_flags & NEEDED
+                or not packet.trusted_packet_sequence_id
+            ):
                 self.problems.append("an event outside of a sequence")
             names.update((name.iid, name.name) for name in packet.interned_data.event_names)
             event = packet.track_event
             if event.track_uuid not in self.tracks:
                 self.problems.append(f"an event on the unknown track {event.track_uuid}")
             track, name = self.tracks.get(event.track_uuid), names.get(event.name_iid)
-            notes = {one.name: one.uint_value or one.string_value for one in event.debug_annotations}
+            notes = {
+                one.name: one.uint_value or one.string_value for one in event.debug_annotations
+            }
             if event.type in (TrackEvent.TYPE_SLICE_BEGIN, TrackEvent.TYPE_INSTANT) and not name:
                 self.problems.append("an event without a name")
             if event.type == TrackEvent.TYPE_SLICE_BEGIN:
@@ -96,29 +109,52 @@ class Replay:
                 outer = open_slices[track][-1][1] if open_slices[track] else 0
                 if not outer <= begin <= packet.timestamp:
                     self.problems.append(f"{name} begins at {begin} and ends at {packet.timestamp}")
-                self.slices.append((track, name, begin, packet.timestamp, notes, len(open_slices[track])))
+                self.slices.append(
+                    (track, name, begin, packet.timestamp, notes, len(open_slices[track]))
+                )
             elif event.type == TrackEvent.TYPE_INSTANT:
                 self.instants.append((track, name, packet.timestamp, notes))
             elif event.type == TrackEvent.TYPE_COUNTER:
                 self.counters.append((track, packet.timestamp, event.counter_value))
-        self.problems += [f"{track}: {left} does not end" for track, left in open_slices.items() if left]
+        self.problems += [
+            f"{track}: {left} does not end" for track, left in open_slices.items() if left
+        ]
 
 
 with tempfile.TemporaryDirectory() as folder:
     environment = dict(os.environ, XDG_RUNTIME_DIR=folder, HOME=folder)
 
     def hal(*words):
-        return subprocess.run([sys.argv[1], *words], cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        return subprocess.run(
+            [sys.argv[1], *words],
+            cwd=folder,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
 
     Path(folder, "a.hal").write_text(MACHINE)
     Path(folder, "a.canopen").write_text(CANOPEN)
-    machine = subprocess.Popen([sys.argv[1], "run", "a.hal"], cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    machine = subprocess.Popen(
+        [sys.argv[1], "run", "a.hal"],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     try:
         for _ in range(1000):
             if hal("shell", "getp", "canopen.0.io.operational").stdout.strip() == "TRUE":
                 break
             time.sleep(0.02)
-        tracer = subprocess.Popen([sys.argv[1], "trace", "t.pftrace", "--for", "800ms"], cwd=folder, env=environment, stdout=subprocess.PIPE, text=True)
+        tracer = subprocess.Popen(
+            [sys.argv[1], "trace", "t.pftrace", "--for", "800ms"],
+            cwd=folder,
+            env=environment,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
         time.sleep(0.3)
         hal("shell", "net", "late", "gate.out")
         out = tracer.communicate()[0]
@@ -132,23 +168,64 @@ trace = Trace()
 trace.ParseFromString(data)
 check("the schema knows every field", unknown(trace) == 0, unknown(trace))
 replay = Replay(trace)
-check("slices nest, tracks and names are described before their use", not replay.problems, replay.problems[:5])
-check("clocks of the machine, of the day and since the boot", set(replay.clocks) >= {1, 3, 6}, replay.clocks)
+check(
+    "slices nest, tracks and names are described before their use",
+    not replay.problems,
+    replay.problems[:5],
+)
+check(
+    "clocks of the machine, of the day and since the boot",
+    set(replay.clocks) >= {1, 3, 6},
+    replay.clocks,
+)
 check("one process", replay.processes == {machine.pid}, replay.processes)
-check("a track for each thread, with the number of the system's thread",
-      set(replay.threads) == {"fast", "servo"} and all(pid == machine.pid and tid > 0 for pid, tid in replay.threads.values()), replay.threads)
+check(
+    "a track for each thread, with the number of the system's thread",
+    set(replay.threads) == {"fast", "servo"}
+    and all(pid == machine.pid and tid > 0 for pid, tid in replay.threads.values()),
+    replay.threads,
+)
 cycles = [one for one in replay.slices if one[:2] == ("fast", "cycle")]
 numbers = [one[4]["cycle"] for one in cycles]
-check("each cycle once, in order", len(cycles) > 100 and numbers == sorted(set(numbers)), numbers[:20])
+check(
+    "each cycle once, in order", len(cycles) > 100 and numbers == sorted(set(numbers)), numbers[:20]
+)
 inner = {one[1] for one in replay.slices if one[0] == "fast" and one[5] == 1}
-check("the functions of the thread within its cycles", {"canopen.0.receive", "gate", "canopen.0.transmit", "io.update"} <= inner, inner)
-check("the edit", any(one[1] == "take new plan" for one in replay.slices) and
-      any(name == "edit" and notes["text"] == "net late gate.out" for _, name, _, notes in replay.instants), replay.instants[-3:])
+check(
+    "the functions of the thread within its cycles",
+    {"canopen.0.receive", "gate", "canopen.0.transmit", "io.update"} <= inner,
+    inner,
+)
+check(
+    "the edit",
+    any(one[1] == "take new plan" for one in replay.slices)
+    and any(
+        name == "edit" and notes["text"] == "net late gate.out"
+        for _, name, _, notes in replay.instants
+    ),
+    replay.instants[-3:],
+)
 frames = [one for one in replay.instants if " CAN " in one[1]]
 transmit = [one for one in replay.slices if one[1] == "canopen.0.transmit"]
-syncs = [one for one in frames if one[1] == "send CAN 080h" and any(begin <= one[2] <= end for _, _, begin, end, _, _ in transmit)]
-check("the SYNC frames within the function that sends them", len(syncs) > 100, (len(syncs), {one[1] for one in frames}))
-check("the device receives them", sum(one[1] == "receive CAN 080h" for one in frames) > 100, len(frames))
-check("counters of latency and execution", {"fast wake-up latency", "fast execution time"} <= {one[0] for one in replay.counters})
+syncs = [
+    one
+    for one in frames
+    if one[1] == "send CAN 080h"
+    and any(begin <= one[2] <= end for _, _, begin, end, _, _ in transmit)
+]
+check(
+    "the SYNC frames within the function that sends them",
+    len(syncs) > 100,
+    (len(syncs), {one[1] for one in frames}),
+)
+check(
+    "the device receives them",
+    sum(one[1] == "receive CAN 080h" for one in frames) > 100,
+    len(frames),
+)
+check(
+    "counters of latency and execution",
+    {"fast wake-up latency", "fast execution time"} <= {one[0] for one in replay.counters},
+)
 print(f"{failed} failed")
 sys.exit(1 if failed else 0)

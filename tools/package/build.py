@@ -37,18 +37,32 @@ def is_elf(path):
 
 class Packages:
     def __init__(self, root, build, output, architecture="", sysroot=""):
-        self.root, self.build, self.output = (Path(path).resolve() for path in (root, build, output))
+        self.root, self.build, self.output = (
+            Path(path).resolve() for path in (root, build, output)
+        )
         self.sysroot = Path(sysroot).resolve() if sysroot else None
-        self.version = re.search(r"project\(Halcyon VERSION (\S+)", (self.root / "CMakeLists.txt").read_text())[1]
+        self.version = re.search(
+            r"project\(Halcyon VERSION (\S+)", (self.root / "CMakeLists.txt").read_text()
+        )[1]
         self.architecture = architecture or run("dpkg", "--print-architecture").strip()
-        self.triplet = run("dpkg-architecture", "-a", self.architecture, "-q", "DEB_HOST_MULTIARCH").strip()
+        self.triplet = run(
+            "dpkg-architecture", "-a", self.architecture, "-q", "DEB_HOST_MULTIARCH"
+        ).strip()
         self.date = self.source_date()
         self.scratch = Path(tempfile.mkdtemp(prefix="halcyon-package-"))
 
     def source_date(self):
         """Seconds of the checked-out commit, so that the same sources give the same packages."""
-        done = subprocess.run(["git", "-c", "safe.directory=*", "-C", self.root, "log", "-1", "--format=%ct"], capture_output=True, text=True)
-        return int(os.environ.get("SOURCE_DATE_EPOCH") or done.stdout.strip() or (self.root / "CHANGELOG.md").stat().st_mtime)
+        done = subprocess.run(
+            ["git", "-c", "safe.directory=*", "-C", self.root, "log", "-1", "--format=%ct"],
+            capture_output=True,
+            text=True,
+        )
+        return int(
+            os.environ.get("SOURCE_DATE_EPOCH")
+            or done.stdout.strip()
+            or (self.root / "CHANGELOG.md").stat().st_mtime
+        )
 
     def tree(self, name):
         return self.scratch / name
@@ -57,8 +71,20 @@ class Packages:
 
     def install(self):
         stage = self.scratch / "stage"
-        run("cmake", "--install", self.build, "--prefix", "/usr", env={**os.environ, "DESTDIR": str(stage)})
-        group_of = {name: group for name, group, *_ in (line.split() for line in (self.build / "components/groups").read_text().splitlines())}
+        run(
+            "cmake",
+            "--install",
+            self.build,
+            "--prefix",
+            "/usr",
+            env={**os.environ, "DESTDIR": str(stage)},
+        )
+        group_of = {
+            name: group
+            for name, group, *_ in (
+                line.split() for line in (self.build / "components/groups").read_text().splitlines()
+            )
+        }
         for path in sorted(p for p in stage.rglob("*") if p.is_symlink() or not p.is_dir()):
             name = path.relative_to(stage).as_posix()
             package, target = self.place(name, group_of)
@@ -107,22 +133,35 @@ class Packages:
         if elf := [path for path in sorted(tree.rglob("*")) if is_elf(path)]:
             run(self.strip, "--strip-unneeded", "--remove-section=.comment", *elf)
             # The system's libraries are in the system's folders.
-            run("cmake", "-P", self.script("\n".join(f'file(RPATH_REMOVE FILE "{path}")' for path in elf)))
+            run(
+                "cmake",
+                "-P",
+                self.script("\n".join(f'file(RPATH_REMOVE FILE "{path}")' for path in elf)),
+            )
         if archives := list(tree.glob("usr/lib/*.a")):
             run(self.strip, "--strip-debug", *archives)
         for path in tree.glob("usr/share/man/*/*.[1-9]"):
-            (path.parent / f"{path.name}.gz").write_bytes(gzip.compress(path.read_bytes(), 9, mtime=0))
+            (path.parent / f"{path.name}.gz").write_bytes(
+                gzip.compress(path.read_bytes(), 9, mtime=0)
+            )
             path.unlink()
         doc = tree / f"usr/share/doc/{package}"
         doc.mkdir(parents=True, exist_ok=True)
         changes = f"halcyon ({self.version}) unstable; urgency=medium\n\n  * Built from its sources; see CHANGELOG.md there.\n\n -- {MAINTAINER}  {formatdate(self.date)}\n"
         (doc / "changelog.gz").write_bytes(gzip.compress(changes.encode(), 9, mtime=0))
-        (doc / "copyright").write_text("Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/\nUpstream-Name: Halcyon\n\nFiles: *\n"
-                                       + self.copyright())
+        (doc / "copyright").write_text(
+            "Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/\nUpstream-Name: Halcyon\n\nFiles: *\n"
+            + self.copyright()
+        )
         for path in [tree, *tree.rglob("*")]:
             if path.is_symlink():
                 continue
-            executable = path.is_dir() or path.stat().st_mode & stat.S_IXUSR and not path.suffix == ".so" and ".so." not in path.name
+            executable = (
+                path.is_dir()
+                or path.stat().st_mode & stat.S_IXUSR
+                and not path.suffix == ".so"
+                and ".so." not in path.name
+            )
             path.chmod(0o755 if executable else 0o644)
 
     @property
@@ -137,7 +176,7 @@ class Packages:
     def copyright(self):
         lines = (self.root / "LICENSE").read_text().strip().splitlines()
         owner = next(line for line in lines if line.startswith("Copyright"))
-        body = lines[lines.index(owner) + 1:]
+        body = lines[lines.index(owner) + 1 :]
         text = "\n".join(f" {line}" if line.strip() else " ." for line in body).removeprefix(" .\n")
         return f"Copyright: {owner.removeprefix('Copyright').removeprefix(' (c)').strip()}\nLicense: MIT\n{text}\n"
 
@@ -150,15 +189,32 @@ class Packages:
             return ""
         folder = self.scratch / "shlibs"
         (folder / "debian").mkdir(parents=True, exist_ok=True)
-        (folder / "debian/control").write_text(f"Source: halcyon\nMaintainer: {MAINTAINER}\n\nPackage: {package}\nArchitecture: any\n")
-        own = "\n".join(f"{re.match('(lib.*).so', p.name)[1]} {p.name.partition('.so.')[2]} {name} (= {self.version})"
-                        for name in PACKAGES for p in self.tree(name).glob("usr/lib/*.so.*") if not p.is_symlink())
+        (folder / "debian/control").write_text(
+            f"Source: halcyon\nMaintainer: {MAINTAINER}\n\nPackage: {package}\nArchitecture: any\n"
+        )
+        own = "\n".join(
+            f"{re.match('(lib.*).so', p.name)[1]} {p.name.partition('.so.')[2]} {name} (= {self.version})"
+            for name in PACKAGES
+            for p in self.tree(name).glob("usr/lib/*.so.*")
+            if not p.is_symlink()
+        )
         (folder / "debian/shlibs.local").write_text(own + "\n")
         paths = [f"-l{self.tree(name)}/usr/lib" for name in PACKAGES]
         if self.sysroot:
-            paths += [f"--admindir={self.database()}", f"-l{self.sysroot}/lib/{self.triplet}", f"-l{self.sysroot}/usr/lib/{self.triplet}"]
-        out = run("dpkg-shlibdeps", "-O", "--warnings=0", *paths, *[f"-e{p}" for p in elf], cwd=folder,
-                  env={**os.environ, "DEB_HOST_ARCH": self.architecture})
+            paths += [
+                f"--admindir={self.database()}",
+                f"-l{self.sysroot}/lib/{self.triplet}",
+                f"-l{self.sysroot}/usr/lib/{self.triplet}",
+            ]
+        out = run(
+            "dpkg-shlibdeps",
+            "-O",
+            "--warnings=0",
+            *paths,
+            *[f"-e{p}" for p in elf],
+            cwd=folder,
+            env={**os.environ, "DEB_HOST_ARCH": self.architecture},
+        )
         found = out.strip().removeprefix("shlibs:Depends=").split(", ")
         return ", ".join(d for d in found if d and not d.startswith(f"{package} "))
 
@@ -170,7 +226,9 @@ class Packages:
         info = database / "info"
         info.mkdir(parents=True)
         (info / "format").write_text("1\n")
-        (database / "arch").write_text(f"{run('dpkg', '--print-architecture').strip()}\n{self.architecture}\n")
+        (database / "arch").write_text(
+            f"{run('dpkg', '--print-architecture').strip()}\n{self.architecture}\n"
+        )
         status = []
         for archive in sorted((self.sysroot / "var/cache/apt/archives").glob("*.deb")):
             control = self.scratch / "control"
@@ -181,8 +239,17 @@ class Packages:
             for kind in ("symbols", "shlibs"):
                 if (control / kind).exists():
                     shutil.copyfile(control / kind, info / f"{stem}.{kind}")
-            packed = (self.sysroot / line.split(None, 5)[5].split(" -> ")[0] for line in run("dpkg-deb", "--contents", archive).splitlines())
-            (info / f"{stem}.list").write_text("".join(f"{path}\n" for file in packed for path in sorted({os.path.normpath(file), os.path.realpath(file)})))
+            packed = (
+                self.sysroot / line.split(None, 5)[5].split(" -> ")[0]
+                for line in run("dpkg-deb", "--contents", archive).splitlines()
+            )
+            (info / f"{stem}.list").write_text(
+                "".join(
+                    f"{path}\n"
+                    for file in packed
+                    for path in sorted({os.path.normpath(file), os.path.realpath(file)})
+                )
+            )
             status.append(fields.strip() + "\nStatus: install ok installed\n")
             shutil.rmtree(control)
         (database / "status").write_text("\n".join(status))
@@ -190,18 +257,36 @@ class Packages:
 
     def control(self, package, about):
         tree = self.tree(package)
-        size = sum((p.lstat().st_size + 1023) // 1024 if not p.is_dir() else 1 for p in tree.rglob("*"))
+        size = sum(
+            (p.lstat().st_size + 1023) // 1024 if not p.is_dir() else 1 for p in tree.rglob("*")
+        )
         extra = dict(about.get("fields", {}))
         architecture = extra.pop("Architecture", self.architecture)
         depends = []
-        for one in f"{about['depends']}, {self.libraries(package)}".format(version=self.version).split(", "):
+        for one in f"{about['depends']}, {self.libraries(package)}".format(
+            version=self.version
+        ).split(", "):
             if one.strip() and one not in depends:
                 depends.append(one)
-        fields = {"Package": package, "Source": "halcyon" if package != "halcyon" else None, "Version": self.version, "Architecture": architecture,
-                  "Maintainer": MAINTAINER, "Installed-Size": size, "Depends": ", ".join(depends), "Section": extra.pop("Section", "electronics"),
-                  "Priority": "optional", "Homepage": extra.pop("Homepage", None), **extra}
+        fields = {
+            "Package": package,
+            "Source": "halcyon" if package != "halcyon" else None,
+            "Version": self.version,
+            "Architecture": architecture,
+            "Maintainer": MAINTAINER,
+            "Installed-Size": size,
+            "Depends": ", ".join(depends),
+            "Section": extra.pop("Section", "electronics"),
+            "Priority": "optional",
+            "Homepage": extra.pop("Homepage", None),
+            **extra,
+        }
         text = "".join(f"{key}: {value}\n" for key, value in fields.items() if value)
-        return text + f"Description: {about['summary']}\n" + "".join(f" {line}\n" for line in about["text"].splitlines())
+        return (
+            text
+            + f"Description: {about['summary']}\n"
+            + "".join(f" {line}\n" for line in about["text"].splitlines())
+        )
 
     def pack(self, package, about):
         tree = self.tree(package)
@@ -213,13 +298,22 @@ class Packages:
         control = tree / "DEBIAN"
         control.mkdir()
         (control / "control").write_text(self.control(package, about))
-        sums = [f"{hashlib.md5(p.read_bytes()).hexdigest()}  {p.relative_to(tree)}" for p in sorted(tree.rglob("*"))
-                if p.is_file() and not p.is_symlink() and "DEBIAN" not in p.relative_to(tree).parts]
+        sums = [
+            f"{hashlib.md5(p.read_bytes()).hexdigest()}  {p.relative_to(tree)}"
+            for p in sorted(tree.rglob("*"))
+            if p.is_file() and not p.is_symlink() and "DEBIAN" not in p.relative_to(tree).parts
+        ]
         (control / "md5sums").write_text("\n".join(sums) + "\n")
-        if configured := [f"/{p.relative_to(tree)}" for p in sorted((tree / "etc").rglob("*")) if p.is_file()]:
+        if configured := [
+            f"/{p.relative_to(tree)}" for p in sorted((tree / "etc").rglob("*")) if p.is_file()
+        ]:
             (control / "conffiles").write_text("\n".join(configured) + "\n")
         if any(p for p in tree.glob("usr/lib/*.so.*")):
-            shlibs = "".join(f"{re.match('(lib.*).so', p.name)[1]} {p.name.partition('.so.')[2]} {package} (= {self.version})\n" for p in sorted(tree.glob("usr/lib/*.so.*")) if not p.is_symlink())
+            shlibs = "".join(
+                f"{re.match('(lib.*).so', p.name)[1]} {p.name.partition('.so.')[2]} {package} (= {self.version})\n"
+                for p in sorted(tree.glob("usr/lib/*.so.*"))
+                if not p.is_symlink()
+            )
             (control / "shlibs").write_text(shlibs)
             (control / "triggers").write_text("activate-noawait ldconfig\n")
         for name in ("postinst", "prerm", "postrm"):
@@ -227,9 +321,19 @@ class Packages:
             if source.exists():
                 shutil.copyfile(source, control / name)
                 (control / name).chmod(0o755)
-        architecture = re.search(r"^Architecture: (.*)$", (control / "control").read_text(), re.MULTILINE)[1]
+        architecture = re.search(
+            r"^Architecture: (.*)$", (control / "control").read_text(), re.MULTILINE
+        )[1]
         path = self.output / f"{package}_{self.version}_{architecture}.deb"
-        run("dpkg-deb", "--root-owner-group", "-Zxz", "--build", tree, path, env={**os.environ, "SOURCE_DATE_EPOCH": str(self.date)})
+        run(
+            "dpkg-deb",
+            "--root-owner-group",
+            "-Zxz",
+            "--build",
+            tree,
+            path,
+            env={**os.environ, "SOURCE_DATE_EPOCH": str(self.date)},
+        )
         print(f"{path.name}  {path.stat().st_size / 1e6:.1f} MB")
 
     def make(self):

@@ -10,11 +10,17 @@ PLUGINS = "library-not-linked-against-libc [usr/lib/halcyon/components/*]"
 PACKAGES = {
     "halcyon": {
         "depends": "adduser, libcap2-bin, iproute2",
-        "lintian": [PLUGINS, "python3-script-but-no-python3-dep * [usr/share/halcyon/halfiles/*]"],  # pictures of examples
-        "fields": {"Recommends": "libpam-modules, python3", "Suggests": "halcyon-dev, halcyon-doc, can-utils"},
+        "lintian": [
+            PLUGINS,
+            "python3-script-but-no-python3-dep * [usr/share/halcyon/halfiles/*]",
+        ],  # pictures of examples
+        "fields": {
+            "Recommends": "libpam-modules, python3",
+            "Suggests": "halcyon-dev, halcyon-doc, can-utils",
+        },
         "summary": "real-time dataflow runtime in the manner of LinuxCNC's HAL",
         "text": "Control components are wired together by netlist files and run in real-time\nthreads; a shell inspects and rewires the running machine. CANopen, EtherCAT\n"
-                "and TDMA on Ethernet are components like any other.\n.\nContains the program hal, the core components, the buses and the machines to\nstart from.",
+        "and TDMA on Ethernet are components like any other.\n.\nContains the program hal, the core components, the buses and the machines to\nstart from.",
     },
     "halcyon-linuxcnc": {
         "depends": OWN,
@@ -22,10 +28,29 @@ PACKAGES = {
         "summary": "LinuxCNC's command names for Halcyon",
         "text": "halrun, halcmd, halcompile, halmeter, halsampler, halscope, halshow, halstreamer,\nhaltcl and lcec_conf as names of the program hal. Programs that a machine starts\nfind them without this package.",
     },
-    "halcyon-vision": {"depends": OWN, "lintian": [PLUGINS], "summary": "cameras and markers for Halcyon", "text": "The components that use OpenCV."},
-    "halcyon-dds": {"depends": OWN, "lintian": [PLUGINS], "summary": "distribution over DDS for Halcyon", "text": "The components that use Fast DDS: signals as topics, also for ROS 2, and\nmachines of several computers."},
-    "halcyon-estimation": {"depends": OWN, "lintian": [PLUGINS], "summary": "estimation and state control for Halcyon", "text": "Kalman filters, state feedback, observers, force and torque."},
-    "halcyon-panel": {"depends": OWN, "summary": "web panel of running Halcyon machines", "text": "The command hal panel: values, graph, scope and user panels in a browser."},
+    "halcyon-vision": {
+        "depends": OWN,
+        "lintian": [PLUGINS],
+        "summary": "cameras and markers for Halcyon",
+        "text": "The components that use OpenCV.",
+    },
+    "halcyon-dds": {
+        "depends": OWN,
+        "lintian": [PLUGINS],
+        "summary": "distribution over DDS for Halcyon",
+        "text": "The components that use Fast DDS: signals as topics, also for ROS 2, and\nmachines of several computers.",
+    },
+    "halcyon-estimation": {
+        "depends": OWN,
+        "lintian": [PLUGINS],
+        "summary": "estimation and state control for Halcyon",
+        "text": "Kalman filters, state feedback, observers, force and torque.",
+    },
+    "halcyon-panel": {
+        "depends": OWN,
+        "summary": "web panel of running Halcyon machines",
+        "text": "The command hal panel: values, graph, scope and user panels in a browser.",
+    },
     "python3-halcyon": {
         "depends": OWN + ", python3 (>= 3.11), python3 (<< 3.12)",
         "fields": {"Section": "python"},
@@ -34,16 +59,26 @@ PACKAGES = {
     },
     "halcyon-dev": {
         "depends": OWN + ", g++",
-        "fields": {"Recommends": "cmake, ninja-build, libpugixml-dev", "Section": "libdevel", "Conflicts": "linuxcnc-uspace-dev, linuxcnc-dev"},
+        "fields": {
+            "Recommends": "cmake, ninja-build, libpugixml-dev",
+            "Section": "libdevel",
+            "Conflicts": "linuxcnc-uspace-dev, linuxcnc-dev",
+        },
         "summary": "headers and CMake package of Halcyon",
         "text": "What hal compile, hal new component and find_package(Halcyon) need.",
     },
-    "halcyon-doc": {"depends": "", "fields": {"Section": "doc", "Architecture": "all"}, "summary": "pages and component reference of Halcyon",
-                    "text": "Tutorials, guides and manual pages; as one searchable site in\n/usr/share/doc/halcyon/html."},
+    "halcyon-doc": {
+        "depends": "",
+        "fields": {"Section": "doc", "Architecture": "all"},
+        "summary": "pages and component reference of Halcyon",
+        "text": "Tutorials, guides and manual pages; as one searchable site in\n/usr/share/doc/halcyon/html.",
+    },
 }
 
 DOC = "usr/share/doc/Halcyon/"
-ALIASES = "(halrun|halcmd|halcompile|halmeter|halsampler|halscope|halshow|halstreamer|haltcl|lcec_conf)"
+ALIASES = (
+    "(halrun|halcmd|halcompile|halmeter|halsampler|halscope|halshow|halstreamer|haltcl|lcec_conf)"
+)
 GROUPS = ("vision", "dds", "estimation")  # components that are packages of their own
 
 # (pattern of a path in the installation, package, new path or None for the same); the first match counts. Package None: left out.

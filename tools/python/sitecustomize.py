@@ -13,14 +13,23 @@ class _Finder:
     def find_spec(name, path=None, target=None):
         if name not in ("hal", "_hal") or path is not None:
             return None
-        theirs = [os.path.realpath(home + "/lib/python") for home in (os.environ.get("LINUXCNC_HOME"), os.environ.get("EMC2_HOME")) if home]
+        theirs = [
+            os.path.realpath(home + "/lib/python")
+            for home in (os.environ.get("LINUXCNC_HOME"), os.environ.get("EMC2_HOME"))
+            if home
+        ]
         for folder in sys.path:
-            if any(os.path.exists(os.path.join(folder, name + end)) for end in (".py", ".so", "/__init__.py")):
+            if any(
+                os.path.exists(os.path.join(folder, name + end))
+                for end in (".py", ".so", "/__init__.py")
+            ):
                 if os.path.realpath(folder) not in theirs:
                     return None
                 if name == "_hal":
                     return importlib.util.spec_from_file_location("_hal", _HERE + "/_hal.py")
-                return importlib.util.spec_from_file_location("hal", _HERE + "/hal/__init__.py", submodule_search_locations=[_HERE + "/hal"])
+                return importlib.util.spec_from_file_location(
+                    "hal", _HERE + "/hal/__init__.py", submodule_search_locations=[_HERE + "/hal"]
+                )
         return None
 
 
@@ -31,5 +40,8 @@ for _folder in sys.path:
     _other = os.path.join(_folder, "sitecustomize.py")
     if os.path.abspath(_other) != os.path.abspath(__file__) and os.path.isfile(_other):
         with open(_other) as _file:
-            exec(compile(_file.read(), _other, "exec"), {"__name__": "sitecustomize", "__file__": _other})
+            exec(
+                compile(_file.read(), _other, "exec"),
+                {"__name__": "sitecustomize", "__file__": _other},
+            )
         break

@@ -20,11 +20,29 @@ from markdown import Markdown, plain  # noqa: E402
 
 PICTURES = {".svg", ".png", ".csv"}
 NAVIGATION = (  # title, pages: a path, or a pattern of paths
-    ("Start", ("README.md", "docs/glossary.md", "docs/tutorials/write-a-netlist.md", "docs/tutorials/*.md")),
+    (
+        "Start",
+        (
+            "README.md",
+            "docs/glossary.md",
+            "docs/tutorials/write-a-netlist.md",
+            "docs/tutorials/*.md",
+        ),
+    ),
     ("Guides", ("docs/[!dvgi]*.md", "docs/device-descriptions.md")),
     ("Reference", ("reference/index.html", "commands.html", "errors.html")),
     ("Machines", ("halfiles/README.md", "halfiles/*/README.md")),
-    ("Project", ("CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "docs/versioning.md", "docs/design.md", "docs/decisions/README.md")),
+    (
+        "Project",
+        (
+            "CONTRIBUTING.md",
+            "CHANGELOG.md",
+            "SECURITY.md",
+            "docs/versioning.md",
+            "docs/design.md",
+            "docs/decisions/README.md",
+        ),
+    ),
     ("Folders", ("[!hir]*/README.md", "runtime/README.md")),
 )
 
@@ -38,7 +56,9 @@ def address(path):
     """Where a file of the tree is in the site."""
     path = PurePosixPath(path)
     if path.suffix == ".md":
-        return str(path.with_name("index.html") if path.name == "README.md" else path.with_suffix(".html"))
+        return str(
+            path.with_name("index.html") if path.name == "README.md" else path.with_suffix(".html")
+        )
     return str(path) if path.suffix in {*PICTURES, ".html"} else f"{path}.html"
 
 
@@ -54,11 +74,27 @@ class Site:
     # --- pages
 
     def tracked(self):
-        git = ["git", "-c", "safe.directory=*", "-C", str(self.root), "ls-files", "-z", "--cached", "--others", "--exclude-standard", "*.md"]
+        git = [
+            "git",
+            "-c",
+            "safe.directory=*",
+            "-C",
+            str(self.root),
+            "ls-files",
+            "-z",
+            "--cached",
+            "--others",
+            "--exclude-standard",
+            "*.md",
+        ]
         if (self.root / ".git").exists():
             names = subprocess.run(git, check=True, capture_output=True).stdout.decode().split("\0")
         else:
-            names = [p.relative_to(self.root).as_posix() for p in self.root.rglob("*.md") if p.relative_to(self.root).parts[0] != "build"]
+            names = [
+                p.relative_to(self.root).as_posix()
+                for p in self.root.rglob("*.md")
+                if p.relative_to(self.root).parts[0] != "build"
+            ]
         return sorted(name for name in names if name and (self.root / name).is_file())
 
     def resolve(self, page, link):
@@ -81,7 +117,11 @@ class Site:
 
     def add_markdown(self, name):
         text = self.markdown.html((self.root / name).read_text(encoding="utf-8"))
-        text = re.sub(r'(<a href|<img src)="([^"]*)"', lambda m: f'{m[1]}="{html.escape(self.resolve(name, html.unescape(m[2])))}"', text)
+        text = re.sub(
+            r'(<a href|<img src)="([^"]*)"',
+            lambda m: f'{m[1]}="{html.escape(self.resolve(name, html.unescape(m[2])))}"',
+            text,
+        )
         title = re.search(r"<h1[^>]*>(.*?)<a class", text)
         self.pages[address(name)] = (plain(title[1]) if title else name, text)
 
@@ -90,20 +130,35 @@ class Site:
         for name in sorted(self.wanted):
             path = self.root / name
             if path.is_dir():
-                entries = "".join(f"<li>{html.escape(p.name)}</li>" for p in sorted(path.iterdir()) if not p.name.startswith("."))
-                self.pages[f"{name}/index.html"] = (name, f"<h1>{html.escape(name)}</h1><ul>{entries}</ul>")
+                entries = "".join(
+                    f"<li>{html.escape(p.name)}</li>"
+                    for p in sorted(path.iterdir())
+                    if not p.name.startswith(".")
+                )
+                self.pages[f"{name}/index.html"] = (
+                    name,
+                    f"<h1>{html.escape(name)}</h1><ul>{entries}</ul>",
+                )
             elif path.suffix in PICTURES:
                 (self.output / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(path, self.output / name)
             else:
                 source = html.escape(path.read_text(encoding="utf-8", errors="replace"))
-                self.pages[address(name)] = (name, f"<h1>{html.escape(name)}</h1><pre><code>{source}</code></pre>")
+                self.pages[address(name)] = (
+                    name,
+                    f"<h1>{html.escape(name)}</h1><pre><code>{source}</code></pre>",
+                )
 
     def add_reference(self):
         for path in sorted(Path(self.options.reference).glob("*.html")):
             text = path.read_text(encoding="utf-8")
             body = re.search(r"<body>\n(.*)</body>", text, re.DOTALL)[1]
-            body = re.sub(r"<script>.*?</script>|<nav>.*?</nav>|<p><input id=\"search\".*?</p>", "", body, flags=re.DOTALL)
+            body = re.sub(
+                r"<script>.*?</script>|<nav>.*?</nav>|<p><input id=\"search\".*?</p>",
+                "",
+                body,
+                flags=re.DOTALL,
+            )
             for table in set(re.findall(r"<table>.*?</table>", body, re.DOTALL)):
                 kind = "wide pins" if 'class="type"' in table else "wide"
                 body = body.replace(table, f'<div class="{kind}">{table}</div>')
@@ -111,7 +166,13 @@ class Site:
             self.pages[f"reference/{path.name}"] = (html.unescape(title), body)
 
     def printed(self, *words):
-        return subprocess.run([self.options.hal, *words], check=True, capture_output=True, text=True, env={**os.environ, "NO_COLOR": "1"}).stdout
+        return subprocess.run(
+            [self.options.hal, *words],
+            check=True,
+            capture_output=True,
+            text=True,
+            env={**os.environ, "NO_COLOR": "1"},
+        ).stdout
 
     def add_printed(self, name, title, introduction, entries):
         """A page of what the program prints about each of `entries`: (heading, words of the command)."""
@@ -125,7 +186,15 @@ class Site:
         for line in self.printed("help").splitlines():
             if found := re.match(r"  ([\w-]+) +\S", line):
                 shown = self.printed("help", found[1])
-                grouped = re.findall(rf"^  ({found[1]} [\w -]*\w)  +\S|^  ({found[1]} [\w -]*\w) \S", shown, re.MULTILINE) if "COMMAND …" in shown else []
+                grouped = (
+                    re.findall(
+                        rf"^  ({found[1]} [\w -]*\w)  +\S|^  ({found[1]} [\w -]*\w) \S",
+                        shown,
+                        re.MULTILINE,
+                    )
+                    if "COMMAND …" in shown
+                    else []
+                )
                 if not grouped:
                     yield found[1], ("help", found[1])
                 for first, second in grouped:
@@ -137,7 +206,9 @@ class Site:
         """The longest beginning of `words` that is a command."""
         parts = words.split()
         for count in range(len(parts), 1, -1):
-            shown = subprocess.run([self.options.hal, "help", *parts[:count]], capture_output=True, text=True)
+            shown = subprocess.run(
+                [self.options.hal, "help", *parts[:count]], capture_output=True, text=True
+            )
             if shown.returncode == 0 and shown.stdout.startswith(f"hal {' '.join(parts[:count])}:"):
                 return " ".join(parts[:count])
         return None
@@ -146,14 +217,31 @@ class Site:
         """At the end of a folder's page: the pages below it that it does not link to."""
         below = {}
         for where in sorted(self.pages):
-            folders = PurePosixPath(where).parents if not where.endswith("/index.html") else PurePosixPath(where).parent.parents
-            page = next((p for p in (f"{folder}/index.html" for folder in folders if folder.name) if p in self.pages), None)
+            folders = (
+                PurePosixPath(where).parents
+                if not where.endswith("/index.html")
+                else PurePosixPath(where).parent.parents
+            )
+            page = next(
+                (
+                    p
+                    for p in (f"{folder}/index.html" for folder in folders if folder.name)
+                    if p in self.pages
+                ),
+                None,
+            )
             if page and f'href="{html.escape(parent_of(page, where))}' not in self.pages[page][1]:
                 below.setdefault(page, []).append(where)
         for page, found in below.items():
-            items = "".join(f'<li><a href="{html.escape(parent_of(page, where))}">{html.escape(self.pages[where][0])}</a></li>' for where in found)
+            items = "".join(
+                f'<li><a href="{html.escape(parent_of(page, where))}">{html.escape(self.pages[where][0])}</a></li>'
+                for where in found
+            )
             title, body = self.pages[page]
-            self.pages[page] = (title, f'{body}\n<h2 id="in-this-folder">In this folder</h2>\n<ul>{items}</ul>')
+            self.pages[page] = (
+                title,
+                f'{body}\n<h2 id="in-this-folder">In this folder</h2>\n<ul>{items}</ul>',
+            )
 
     # --- the site
 
@@ -163,7 +251,13 @@ class Site:
         for title, patterns in NAVIGATION:
             items = []
             for pattern in map(address, patterns):
-                where = [w for w in sorted(self.pages) if w.count("/") == pattern.count("/") and fnmatch.fnmatchcase(w, pattern) and w not in listed]
+                where = [
+                    w
+                    for w in sorted(self.pages)
+                    if w.count("/") == pattern.count("/")
+                    and fnmatch.fnmatchcase(w, pattern)
+                    and w not in listed
+                ]
                 listed.update(where)
                 items += [(w, "Halcyon" if w == "index.html" else self.pages[w][0]) for w in where]
             yield title, items
@@ -173,26 +267,41 @@ class Site:
         def item(where, title):
             current = ' aria-current="page"' if where == here else ""
             return f'<li><a href="{html.escape(parent_of(here, where))}"{current}>{html.escape(title)}</a></li>'
-        return "\n".join(f"<h2>{title}</h2>\n<ul>{''.join(item(*one) for one in items)}</ul>" for title, items in sections)
+
+        return "\n".join(
+            f"<h2>{title}</h2>\n<ul>{''.join(item(*one) for one in items)}</ul>"
+            for title, items in sections
+        )
 
     def write(self):
         sections = list(self.navigation())
         for where, (title, body) in self.pages.items():
-            top = parent_of(where, "index.html")[:-len("index.html")]
-            page = TEMPLATE.format(title=html.escape(title), top=top, navigation=self.navigation_of(sections, where), body=body)
+            top = parent_of(where, "index.html")[: -len("index.html")]
+            page = TEMPLATE.format(
+                title=html.escape(title),
+                top=top,
+                navigation=self.navigation_of(sections, where),
+                body=body,
+            )
             path = self.output / where
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(page, encoding="utf-8")
         for name in ("style.css", "search.js"):
             shutil.copyfile(HERE / name, self.output / name)
         index = json.dumps(list(self.index()), ensure_ascii=False, separators=(",", ":"))
-        (self.output / "search-index.js").write_text(f"window.halcyonIndex={index};\n", encoding="utf-8")
+        (self.output / "search-index.js").write_text(
+            f"window.halcyonIndex={index};\n", encoding="utf-8"
+        )
 
     def index(self):
         """An entry per section: page, heading, address, text."""
         for where, (title, body) in sorted(self.pages.items()):
             parts = re.split(r'<h[1-3] id="([^"]*)">(.*?)(?:<a class="anchor".*?)?</h[1-3]>', body)
-            for text, anchor, heading in zip([parts[0] if parts[0].strip() else "", *parts[3::3]], ["", *parts[1::3]], ["", *parts[2::3]]):
+            for text, anchor, heading in zip(
+                [parts[0] if parts[0].strip() else "", *parts[3::3]],
+                ["", *parts[1::3]],
+                ["", *parts[2::3]],
+            ):
                 words = " ".join(plain(text.replace("<", " <")).split())
                 if words or heading:
                     yield [title, plain(heading), where + (f"#{anchor}" if anchor else ""), words]
@@ -205,10 +314,23 @@ class Site:
             self.add_markdown(name)
         self.add_linked()
         self.add_reference()
-        self.add_printed("commands", "Commands", "What <code>hal help COMMAND</code> prints.", list(self.commands()))
-        codes = [line.split()[0] for line in self.printed("explain").splitlines() if re.match(r"\s*[a-z][a-z0-9-]+  ", line)]
-        self.add_printed("errors", "Diagnostics", "What <code>hal explain CODE</code> prints; the code is in [brackets] at the end of a message.",
-                         [(code, ("explain", code)) for code in codes])
+        self.add_printed(
+            "commands",
+            "Commands",
+            "What <code>hal help COMMAND</code> prints.",
+            list(self.commands()),
+        )
+        codes = [
+            line.split()[0]
+            for line in self.printed("explain").splitlines()
+            if re.match(r"\s*[a-z][a-z0-9-]+  ", line)
+        ]
+        self.add_printed(
+            "errors",
+            "Diagnostics",
+            "What <code>hal explain CODE</code> prints; the code is in [brackets] at the end of a message.",
+            [(code, ("explain", code)) for code in codes],
+        )
         self.add_below()
         self.write()
         print(f"{len(self.pages)} pages in {self.output}/index.html")

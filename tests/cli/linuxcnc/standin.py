@@ -40,6 +40,7 @@ def serve():
 
 def component():
     import hal
+
     signal.signal(signal.SIGTERM, ends)
     it = hal.component(COMPONENTS[NAME])
     it.newpin("speed", hal.HAL_FLOAT, hal.HAL_OUT)

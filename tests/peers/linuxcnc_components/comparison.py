@@ -10,9 +10,10 @@ ABSOLUTE = 1e-12
 @dataclass
 class Difference:
     """An output or parameter that differs. A parameter is read at the last cycle of each segment."""
+
     name: str
     cycles: list
-    ours: dict     # of each of the cycles
+    ours: dict  # of each of the cycles
     theirs: dict
 
     @property
@@ -55,10 +56,16 @@ def differences(ours, theirs, absolute=ABSOLUTE):
     for name, texts in ours.parameters.items():
         if name not in theirs.parameters:
             continue  # LinuxCNC's halrun
-        a, b = [as_number(text) for text in texts], [as_number(text) for text in theirs.parameters[name]]
+        a, b = [as_number(text) for text in texts], [
+            as_number(text) for text in theirs.parameters[name]
+        ]
         ends = [ours.cycles * (i + 1) // len(texts) - 1 for i in range(len(texts))]
         # getp prints seven digits
-        cycles = [end for end, x, y in zip(ends, a, b) if not equal(x, y) and not abs(x - y) <= 1e-6 * max(abs(x), abs(y))]
+        cycles = [
+            end
+            for end, x, y in zip(ends, a, b)
+            if not equal(x, y) and not abs(x - y) <= 1e-6 * max(abs(x), abs(y))
+        ]
         if cycles:
             found.append(Difference(name, cycles, dict(zip(ends, a)), dict(zip(ends, b))))
     return found

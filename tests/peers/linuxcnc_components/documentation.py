@@ -17,11 +17,38 @@ def table(head, rows):
 
 
 def text():
-    lines = table(("component", "pins", "when", "Halcyon", "LinuxCNC", "why"),
-                  sorted({(e.component, names(e.pins), e.condition, e.ours, e.linuxcnc + ("" if len(e.versions) == 2 else f" ({e.versions[0]} only)"), e.why) for e in expected.BEHAVIOURS}))
+    lines = table(
+        ("component", "pins", "when", "Halcyon", "LinuxCNC", "why"),
+        sorted(
+            {
+                (
+                    e.component,
+                    names(e.pins),
+                    e.condition,
+                    e.ours,
+                    e.linuxcnc + ("" if len(e.versions) == 2 else f" ({e.versions[0]} only)"),
+                    e.why,
+                )
+                for e in expected.BEHAVIOURS
+            }
+        ),
+    )
     lines += ["", "Pins and parameters:", ""]
-    lines += table(("component", "name", "Halcyon", "LinuxCNC", "why"),
-                   sorted({(e.component, names(e.names), e.ours, e.linuxcnc + ("" if len(e.versions) == 2 else f" ({e.versions[0]} only)"), e.why) for e in expected.INVENTORY}))
+    lines += table(
+        ("component", "name", "Halcyon", "LinuxCNC", "why"),
+        sorted(
+            {
+                (
+                    e.component,
+                    names(e.names),
+                    e.ours,
+                    e.linuxcnc + ("" if len(e.versions) == 2 else f" ({e.versions[0]} only)"),
+                    e.why,
+                )
+                for e in expected.INVENTORY
+            }
+        ),
+    )
     lines += ["", "Compared by their pins only:", ""]
     lines += table(("component", "why"), sorted(expected.INVENTORY_ONLY.items()))
     lines += ["", "Compared by their pins only, because they follow another law on purpose:", ""]
@@ -36,7 +63,9 @@ def check(page):
     content = page.read_text()
     if f"{BEGIN}\n\n{text()}\n\n{END}" in content:
         return []
-    return [f"{page.name}: its tables of differences are out of date; type: tests/peers/linuxcnc_components.py HAL --write-docs"]
+    return [
+        f"{page.name}: its tables of differences are out of date; type: tests/peers/linuxcnc_components.py HAL --write-docs"
+    ]
 
 
 def write(page):

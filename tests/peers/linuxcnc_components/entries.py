@@ -4,147 +4,957 @@ from .expected import behaviour, inventory
 
 LINKABLE = "as a read-only parameter it could not be linked; `getp` reads both"
 
-for component, names in {"axistest": "elapsed", "steptest": "elapsed", "carousel": "homing|motor-dir|state|timer", "edge": "last-in|time-left-ns", "mux16": "elapsed|selected",
-                         "mux_generic": "elapsed|selected", "stepgen": "frequency|rawcounts"}.items():
+for component, names in {
+    "axistest": "elapsed",
+    "steptest": "elapsed",
+    "carousel": "homing|motor-dir|state|timer",
+    "edge": "last-in|time-left-ns",
+    "mux16": "elapsed|selected",
+    "mux_generic": "elapsed|selected",
+    "stepgen": "frequency|rawcounts",
+}.items():
     inventory(component, names, "output pin", "read-only parameter", LINKABLE)
-inventory("lowpass", "gain", "input pin", "writable parameter", "as a parameter it could not be linked; `setp` sets both")
-inventory("watchdog", "tripped-by", "the number of the input that timed out", "missing", "an addition")
+inventory(
+    "lowpass",
+    "gain",
+    "input pin",
+    "writable parameter",
+    "as a parameter it could not be linked; `setp` sets both",
+)
+inventory(
+    "watchdog", "tripped-by", "the number of the input that timed out", "missing", "an addition"
+)
 
-behaviour("wcomp", "out", lambda v: v.invalid("in", "min", "max"), "an input is NaN", "FALSE", "TRUE", "a value that is not a number is not inside a window",
-          ("wcomp", {"wcomp.0.in": [float("nan")], "wcomp.0.min": [-1.0], "wcomp.0.max": [1.0]}, {}))
-behaviour("watchdog", "ok-out", lambda v: not v["enable-in"] or v.cycle == 0 or min(v.all("timeout-0", "timeout-1")) <= 0 or v.invalid("timeout-0", "timeout-1"),
-          "`enable-in` is FALSE; a timeout is 0 or less; the first cycle, before `set-timeouts`", "FALSE",
-          "continues after `enable-in`; TRUE for a cycle", "a watchdog that is off or not configured must not report OK", lasts=True,
-          witness=("watchdog num_inputs=2", {"watchdog.enable-in": [True] * 20 + [False], "watchdog.input-0": [False, True] * 200, "watchdog.input-1": [False, True] * 200},
-                   {"watchdog.timeout-0": 0.01, "watchdog.timeout-1": 0.01}))
-behaviour("updown", "count", lambda v: (v["clamp"] or v["wrap"]) and v["max"] == 2147483647, "counting up at a `max` of 2147483647", "continues at `min`, or stays", "overflows",
-          "an overflow that the limits should prevent", lasts=True,
-          witness=("updown", {"updown.0.countdown": [False, True], "updown.0.countup": [False, False, False, True]}, {"updown.0.wrap": True}))
-behaviour("threadtest", "count", lambda v: True, "`reset` runs after `increment`", "the reset takes effect in the next run of `increment`", "in the same cycle",
-          "each function writes its own memory, so that both may be in different threads", ("threadtest", {}, {}))
+behaviour(
+    "wcomp",
+    "out",
+    lambda v: v.invalid("in", "min", "max"),
+    "an input is NaN",
+    "FALSE",
+    "TRUE",
+    "a value that is not a number is not inside a window",
+    ("wcomp", {"wcomp.0.in": [float("nan")], "wcomp.0.min": [-1.0], "wcomp.0.max": [1.0]}, {}),
+)
+behaviour(
+    "watchdog",
+    "ok-out",
+    lambda v: not v["enable-in"]
+    or v.cycle == 0
+    or min(v.all("timeout-0", "timeout-1")) <= 0
+    or v.invalid("timeout-0", "timeout-1"),
+    "`enable-in` is FALSE; a timeout is 0 or less; the first cycle, before `set-timeouts`",
+    "FALSE",
+    "continues after `enable-in`; TRUE for a cycle",
+    "a watchdog that is off or not configured must not report OK",
+    lasts=True,
+    witness=(
+        "watchdog num_inputs=2",
+        {
+            "watchdog.enable-in": [True] * 20 + [False],
+            "watchdog.input-0": [False, True] * 200,
+            "watchdog.input-1": [False, True] * 200,
+        },
+        {"watchdog.timeout-0": 0.01, "watchdog.timeout-1": 0.01},
+    ),
+)
+behaviour(
+    "updown",
+    "count",
+    lambda v: (v["clamp"] or v["wrap"]) and v["max"] == 2147483647,
+    "counting up at a `max` of 2147483647",
+    "continues at `min`, or stays",
+    "overflows",
+    "an overflow that the limits should prevent",
+    lasts=True,
+    witness=(
+        "updown",
+        {"updown.0.countdown": [False, True], "updown.0.countup": [False, False, False, True]},
+        {"updown.0.wrap": True},
+    ),
+)
+behaviour(
+    "threadtest",
+    "count",
+    lambda v: True,
+    "`reset` runs after `increment`",
+    "the reset takes effect in the next run of `increment`",
+    "in the same cycle",
+    "each function writes its own memory, so that both may be in different threads",
+    ("threadtest", {}, {}),
+)
 for component in ("steptest", "axistest"):
-    behaviour(component, "run-target", lambda v: True, "always", "the commanded position", "0", "the pin is documented in LinuxCNC, and never written",
-              (component, {f"{component}.0.run": [True], f"{component}.0.amplitude": [1.0]}, {}))
-behaviour("simple_tp", "active|current-pos|current-vel", lambda v: not (v["maxvel"] >= 0 and v["maxaccel"] >= 0) or v.beyond(1e12), "`maxvel` or `maxaccel` is negative or NaN",
-          "counts as 0", "NaN in `current-pos`, or motion away from the target", "a position must not become NaN", lasts=True,
-          witness=("simple_tp", {"simple-tp.0.enable": [True], "simple-tp.0.target-pos": [1.0], "simple-tp.0.maxvel": [1.0], "simple-tp.0.maxaccel": [-1.0]}, {}))
-behaviour("sim_spindle", "position-fb|index-enable", lambda v: v.invalid() or v.beyond(1e18), "the speed is NaN or infinite", "the position is held", "the position becomes NaN", "a position must not become NaN",
-          ("sim_spindle", {"sim-spindle.0.velocity-cmd": [1.0, float("nan"), 1.0]}, {}), lasts=True)
-behaviour("spindle_monitor", "spindle-underspeed", lambda v: v["spindle-command"] < 0 or v.invalid(), "a negative command; a NaN", "compared in the direction of the command; a NaN is an underspeed",
-          "-110 is an underspeed of -100, and -80 is not", "LinuxCNC's does not detect an underspeed in reverse", lasts=True,
-          witness=("spindle_monitor", {"spindle-monitor.0.spindle-is-on": [True], "spindle-monitor.0.spindle-command": [-100.0], "spindle-monitor.0.spindle-feedback": [-100.0] * 5 + [-80.0]},
-                   {"spindle-monitor.0.threshold": 5.0}))
-behaviour("sim_axis_hardware", "A(maxsw|minsw|bothsw)-homesw-out", lambda v: True, "always", "work", "FALSE", "LinuxCNC's does not write them",
-          ("sim_axis_hardware", {"sim-axis-hardware.0.Acurrent-pos": [1.0]}, {}))
-behaviour("sphereprobe", "probe-out", lambda v: v.beyond(1e9), "coordinates beyond ±1e9 counts", "exact", "differences overflow", "a contact must not depend on an overflow",
-          ("sphereprobe", {"sphereprobe.0.px": [2147483647], "sphereprobe.0.cx": [-2147483648], "sphereprobe.0.r": [5]}, {}))
-behaviour("ohmic", "ohmic-on|ohmic-volts|thcad-volts|arc-on", lambda v: v["thcad-max-volt-freq"] == v["thcad-0-volt-freq"] or v["thcad-divide"] == 0 or v["thcad-fullscale"] == 0 or v.beyond(1e12),
-          "the two frequencies are equal, as before they are set; a divisor is 0; a NaN", "voltages are 0", "infinite or NaN", "a voltage must not become NaN", lasts=True,
-          witness=("ohmic", {"ohmic.0.velocity-in": [100.0]}, {}))
-behaviour("ohmic", "ohmic-on", lambda v: v["is-probing"], "probing", "compares with `ohmic-threshold`", "compares with 1", "2.10's; its documentation is the same", lasts=True, versions=("2.9",),
-          witness=("ohmic", {"ohmic.0.is-probing": [True], "ohmic.0.velocity-in": [300.0], "ohmic.0.thcad-max-volt-freq": [900.0], "ohmic.0.thcad-divide": [1.0]}, {}))
-behaviour("multiclick", ".*-click|.*-click-only", lambda v: v["output-hold-ns"] == 0, "`output-hold-ns` is 0", "a pulse of one cycle", "the output remains TRUE", "a pulse has an end", lasts=True,
-          witness=("multiclick", {"multiclick.0.in": [False, True, True, False]}, {"multiclick.0.output-hold-ns": 0}))
-behaviour("limit2", "out", lambda v: not v["maxv"] >= 0 or v.beyond(1e18, "in", "max", "min", "maxv"), "`maxv` is negative; an input is NaN or infinite", "the output is held",
-          "moves away from the input; NaN", "a limit must hold", lasts=True, witness=("limit2", {"limit2.0.in": [1.0], "limit2.0.maxv": [-10.0]}, {}))
-behaviour("lincurve", "out|out-io", lambda v: v.invalid() or any(b < a for a, b in zip(v.all("x-val-00", "x-val-01", "x-val-02"), v.all("x-val-01", "x-val-02", "x-val-03"))),
-          "`in` is NaN; the points are not in ascending order", "the output is held; each pair of points is a segment", "NaN; depends on earlier inputs, and reads beyond the points", "an output must not become NaN; no access outside of the points", lasts=True,
-          witness=("lincurve personality=4", {"lincurve.0.in": [float("nan")]}, {"lincurve.0.x-val-03": 1.0, "lincurve.0.y-val-00": 2.0}))
-behaviour("modmath", "up|down|on-target", lambda v: v.beyond(1e9) or v["max-num"] < v["min-num"], "positions beyond ±1e9; `max-num` is below `min-num`", "computed in 64 bits", "overflows; divides by 0", "a division by 0 ends the process", lasts=True,
-          witness=("modmath mod_dir=1", {"mod-dir.0.actual": [1], "mod-dir.0.desired": [-1]}, {"mod-dir.0.max-num": 2147483647, "mod-dir.0.min-num": -100}))
-behaviour("histobins", "mean|variance", lambda v: True, "always", "include the first value", "divide by its number, and leave it out of the sum", "a wrong mean",
-          ("histobins", {"histobins.0.input": [2.0]}, {}))
-behaviour("histobins", ".*", lambda v: not v["binsize"] > 0 or v.invalid(), "`binsize` is not above 0; a value is NaN or infinite", "`input-error`, and the outputs are held", "writes outside of its memory", "a setting must not damage memory",
-          lasts=True, witness=("histobins", {"histobins.0.binsize": [-1.0], "histobins.0.input": [2.0]}, {}))
-behaviour("lowpass", "out", lambda v: v.invalid(), "an input is NaN or infinite", "the cycle is skipped", "the output is NaN for ever", "the filter recovers", lasts=True,
-          witness=("lowpass", {"lowpass.0.in": [1.0, float("nan"), 1.0]}, {"lowpass.0.gain": 0.5}))
-behaviour("ilowpass", "out", lambda v: v.invalid() or v.beyond(1e100), "`gain` or `scale` is NaN or infinite", "the cycle is skipped", "0 for ever", "the filter recovers", lasts=True,
-          witness=("ilowpass", {"ilowpass.0.in": [5]}, [{}, {"ilowpass.0.gain": float("nan")}]))
+    behaviour(
+        component,
+        "run-target",
+        lambda v: True,
+        "always",
+        "the commanded position",
+        "0",
+        "the pin is documented in LinuxCNC, and never written",
+        (component, {f"{component}.0.run": [True], f"{component}.0.amplitude": [1.0]}, {}),
+    )
+behaviour(
+    "simple_tp",
+    "active|current-pos|current-vel",
+    lambda v: not (v["maxvel"] >= 0 and v["maxaccel"] >= 0) or v.beyond(1e12),
+    "`maxvel` or `maxaccel` is negative or NaN",
+    "counts as 0",
+    "NaN in `current-pos`, or motion away from the target",
+    "a position must not become NaN",
+    lasts=True,
+    witness=(
+        "simple_tp",
+        {
+            "simple-tp.0.enable": [True],
+            "simple-tp.0.target-pos": [1.0],
+            "simple-tp.0.maxvel": [1.0],
+            "simple-tp.0.maxaccel": [-1.0],
+        },
+        {},
+    ),
+)
+behaviour(
+    "sim_spindle",
+    "position-fb|index-enable",
+    lambda v: v.invalid() or v.beyond(1e18),
+    "the speed is NaN or infinite",
+    "the position is held",
+    "the position becomes NaN",
+    "a position must not become NaN",
+    ("sim_spindle", {"sim-spindle.0.velocity-cmd": [1.0, float("nan"), 1.0]}, {}),
+    lasts=True,
+)
+behaviour(
+    "spindle_monitor",
+    "spindle-underspeed",
+    lambda v: v["spindle-command"] < 0 or v.invalid(),
+    "a negative command; a NaN",
+    "compared in the direction of the command; a NaN is an underspeed",
+    "-110 is an underspeed of -100, and -80 is not",
+    "LinuxCNC's does not detect an underspeed in reverse",
+    lasts=True,
+    witness=(
+        "spindle_monitor",
+        {
+            "spindle-monitor.0.spindle-is-on": [True],
+            "spindle-monitor.0.spindle-command": [-100.0],
+            "spindle-monitor.0.spindle-feedback": [-100.0] * 5 + [-80.0],
+        },
+        {"spindle-monitor.0.threshold": 5.0},
+    ),
+)
+behaviour(
+    "sim_axis_hardware",
+    "A(maxsw|minsw|bothsw)-homesw-out",
+    lambda v: True,
+    "always",
+    "work",
+    "FALSE",
+    "LinuxCNC's does not write them",
+    ("sim_axis_hardware", {"sim-axis-hardware.0.Acurrent-pos": [1.0]}, {}),
+)
+behaviour(
+    "sphereprobe",
+    "probe-out",
+    lambda v: v.beyond(1e9),
+    "coordinates beyond ±1e9 counts",
+    "exact",
+    "differences overflow",
+    "a contact must not depend on an overflow",
+    (
+        "sphereprobe",
+        {
+            "sphereprobe.0.px": [2147483647],
+            "sphereprobe.0.cx": [-2147483648],
+            "sphereprobe.0.r": [5],
+        },
+        {},
+    ),
+)
+behaviour(
+    "ohmic",
+    "ohmic-on|ohmic-volts|thcad-volts|arc-on",
+    lambda v: v["thcad-max-volt-freq"] == v["thcad-0-volt-freq"]
+    or v["thcad-divide"] == 0
+    or v["thcad-fullscale"] == 0
+    or v.beyond(1e12),
+    "the two frequencies are equal, as before they are set; a divisor is 0; a NaN",
+    "voltages are 0",
+    "infinite or NaN",
+    "a voltage must not become NaN",
+    lasts=True,
+    witness=("ohmic", {"ohmic.0.velocity-in": [100.0]}, {}),
+)
+behaviour(
+    "ohmic",
+    "ohmic-on",
+    lambda v: v["is-probing"],
+    "probing",
+    "compares with `ohmic-threshold`",
+    "compares with 1",
+    "2.10's; its documentation is the same",
+    lasts=True,
+    versions=("2.9",),
+    witness=(
+        "ohmic",
+        {
+            "ohmic.0.is-probing": [True],
+            "ohmic.0.velocity-in": [300.0],
+            "ohmic.0.thcad-max-volt-freq": [900.0],
+            "ohmic.0.thcad-divide": [1.0],
+        },
+        {},
+    ),
+)
+behaviour(
+    "multiclick",
+    ".*-click|.*-click-only",
+    lambda v: v["output-hold-ns"] == 0,
+    "`output-hold-ns` is 0",
+    "a pulse of one cycle",
+    "the output remains TRUE",
+    "a pulse has an end",
+    lasts=True,
+    witness=(
+        "multiclick",
+        {"multiclick.0.in": [False, True, True, False]},
+        {"multiclick.0.output-hold-ns": 0},
+    ),
+)
+behaviour(
+    "limit2",
+    "out",
+    lambda v: not v["maxv"] >= 0 or v.beyond(1e18, "in", "max", "min", "maxv"),
+    "`maxv` is negative; an input is NaN or infinite",
+    "the output is held",
+    "moves away from the input; NaN",
+    "a limit must hold",
+    lasts=True,
+    witness=("limit2", {"limit2.0.in": [1.0], "limit2.0.maxv": [-10.0]}, {}),
+)
+behaviour(
+    "lincurve",
+    "out|out-io",
+    lambda v: v.invalid()
+    or any(
+        b < a
+        for a, b in zip(
+            v.all("x-val-00", "x-val-01", "x-val-02"), v.all("x-val-01", "x-val-02", "x-val-03")
+        )
+    ),
+    "`in` is NaN; the points are not in ascending order",
+    "the output is held; each pair of points is a segment",
+    "NaN; depends on earlier inputs, and reads beyond the points",
+    "an output must not become NaN; no access outside of the points",
+    lasts=True,
+    witness=(
+        "lincurve personality=4",
+        {"lincurve.0.in": [float("nan")]},
+        {"lincurve.0.x-val-03": 1.0, "lincurve.0.y-val-00": 2.0},
+    ),
+)
+behaviour(
+    "modmath",
+    "up|down|on-target",
+    lambda v: v.beyond(1e9) or v["max-num"] < v["min-num"],
+    "positions beyond ±1e9; `max-num` is below `min-num`",
+    "computed in 64 bits",
+    "overflows; divides by 0",
+    "a division by 0 ends the process",
+    lasts=True,
+    witness=(
+        "modmath mod_dir=1",
+        {"mod-dir.0.actual": [1], "mod-dir.0.desired": [-1]},
+        {"mod-dir.0.max-num": 2147483647, "mod-dir.0.min-num": -100},
+    ),
+)
+behaviour(
+    "histobins",
+    "mean|variance",
+    lambda v: True,
+    "always",
+    "include the first value",
+    "divide by its number, and leave it out of the sum",
+    "a wrong mean",
+    ("histobins", {"histobins.0.input": [2.0]}, {}),
+)
+behaviour(
+    "histobins",
+    ".*",
+    lambda v: not v["binsize"] > 0 or v.invalid(),
+    "`binsize` is not above 0; a value is NaN or infinite",
+    "`input-error`, and the outputs are held",
+    "writes outside of its memory",
+    "a setting must not damage memory",
+    lasts=True,
+    witness=("histobins", {"histobins.0.binsize": [-1.0], "histobins.0.input": [2.0]}, {}),
+)
+behaviour(
+    "lowpass",
+    "out",
+    lambda v: v.invalid(),
+    "an input is NaN or infinite",
+    "the cycle is skipped",
+    "the output is NaN for ever",
+    "the filter recovers",
+    lasts=True,
+    witness=("lowpass", {"lowpass.0.in": [1.0, float("nan"), 1.0]}, {"lowpass.0.gain": 0.5}),
+)
+behaviour(
+    "ilowpass",
+    "out",
+    lambda v: v.invalid() or v.beyond(1e100),
+    "`gain` or `scale` is NaN or infinite",
+    "the cycle is skipped",
+    "0 for ever",
+    "the filter recovers",
+    lasts=True,
+    witness=("ilowpass", {"ilowpass.0.in": [5]}, [{}, {"ilowpass.0.gain": float("nan")}]),
+)
 
 SATURATED = "a conversion keeps the sign of the value and its order"
 HELD = "an output must not become NaN"
 
-for component, pins in {"siggen": "sine|cosine", "spindle": "output|spindle-rpm|spindle-rpm-abs"}.items():
-    behaviour(component, pins, lambda v: True, "always", "double precision", "differs from the eighth digit on", "constants and speeds have all digits", (component + (" num_chan=1" if component == "siggen" else ""), "wild"),
-              within={"siggen": 1e-4, "spindle": 1e-2}.get(component, 1e-5), lasts=True)
-behaviour("comp", "equal|out", lambda v: v.invalid(), "an input is NaN", "FALSE", "`equal` is TRUE", "a NaN is not equal to a number", ("comp", "wild"), lasts=True)
+for component, pins in {
+    "siggen": "sine|cosine",
+    "spindle": "output|spindle-rpm|spindle-rpm-abs",
+}.items():
+    behaviour(
+        component,
+        pins,
+        lambda v: True,
+        "always",
+        "double precision",
+        "differs from the eighth digit on",
+        "constants and speeds have all digits",
+        (component + (" num_chan=1" if component == "siggen" else ""), "wild"),
+        within={"siggen": 1e-4, "spindle": 1e-2}.get(component, 1e-5),
+        lasts=True,
+    )
+behaviour(
+    "comp",
+    "equal|out",
+    lambda v: v.invalid(),
+    "an input is NaN",
+    "FALSE",
+    "`equal` is TRUE",
+    "a NaN is not equal to a number",
+    ("comp", "wild"),
+    lasts=True,
+)
 for component, pins in {"scaled_s32_sums": "out-s", "mux16": "out-s"}.items():
-    behaviour(component, pins, lambda v: v.beyond(1e6), "the value is beyond the range of s32, or NaN", "limited to the range; 0 for NaN", "-2147483648", SATURATED, (component, "wild"), lasts=True)
-behaviour("hypot", "out", lambda v: v.beyond(1e150), "an input is beyond 1e150", "exact", "infinite", "no overflow within", ("hypot", "wild"))
-behaviour("minmax", "max|min", lambda v: v.invalid(), "`in` is NaN during `reset`", "the cycle is skipped", "NaN until the next reset", HELD, ("minmax", "wild"), lasts=True)
-behaviour("orient", "command|poserr|is-oriented", lambda v: v.invalid() or v.beyond(1e9), "an input is NaN or infinite", "`command` is held", "`command` is NaN or infinite", HELD, ("orient", "wild"), lasts=True)
-behaviour("ddt", "out", lambda v: v.invalid(), "`in` is NaN or infinite", "0", "NaN", HELD, ("ddt", "wild"), lasts=True)
-behaviour("lcd", "out", lambda v: True, "always", "the same text", "control characters in another order", "the display shows the same", ("lcd fmt_strings=%d", "plain"))
-inventory("toggle2nist", "debounce|max-pulse-length", "input pins of 2.10", "missing", "newer", versions=("2.9",))
-behaviour("thcud", "vel-status", lambda v: not v["enable"], "`enable` is FALSE", "FALSE", "keeps its value", "the pin reports a state of the control, which is off", ("thcud", "plain"), lasts=True)
-behaviour("thc", "vel-status", lambda v: not v["enable"], "`enable` is FALSE", "FALSE", "keeps its value", "the pin reports a state of the control, which is off", ("thc", "plain"), lasts=True)
+    behaviour(
+        component,
+        pins,
+        lambda v: v.beyond(1e6),
+        "the value is beyond the range of s32, or NaN",
+        "limited to the range; 0 for NaN",
+        "-2147483648",
+        SATURATED,
+        (component, "wild"),
+        lasts=True,
+    )
+behaviour(
+    "hypot",
+    "out",
+    lambda v: v.beyond(1e150),
+    "an input is beyond 1e150",
+    "exact",
+    "infinite",
+    "no overflow within",
+    ("hypot", "wild"),
+)
+behaviour(
+    "minmax",
+    "max|min",
+    lambda v: v.invalid(),
+    "`in` is NaN during `reset`",
+    "the cycle is skipped",
+    "NaN until the next reset",
+    HELD,
+    ("minmax", "wild"),
+    lasts=True,
+)
+behaviour(
+    "orient",
+    "command|poserr|is-oriented",
+    lambda v: v.invalid() or v.beyond(1e9),
+    "an input is NaN or infinite",
+    "`command` is held",
+    "`command` is NaN or infinite",
+    HELD,
+    ("orient", "wild"),
+    lasts=True,
+)
+behaviour(
+    "ddt",
+    "out",
+    lambda v: v.invalid(),
+    "`in` is NaN or infinite",
+    "0",
+    "NaN",
+    HELD,
+    ("ddt", "wild"),
+    lasts=True,
+)
+behaviour(
+    "lcd",
+    "out",
+    lambda v: True,
+    "always",
+    "the same text",
+    "control characters in another order",
+    "the display shows the same",
+    ("lcd fmt_strings=%d", "plain"),
+)
+inventory(
+    "toggle2nist",
+    "debounce|max-pulse-length",
+    "input pins of 2.10",
+    "missing",
+    "newer",
+    versions=("2.9",),
+)
+behaviour(
+    "thcud",
+    "vel-status",
+    lambda v: not v["enable"],
+    "`enable` is FALSE",
+    "FALSE",
+    "keeps its value",
+    "the pin reports a state of the control, which is off",
+    ("thcud", "plain"),
+    lasts=True,
+)
+behaviour(
+    "thc",
+    "vel-status",
+    lambda v: not v["enable"],
+    "`enable` is FALSE",
+    "FALSE",
+    "keeps its value",
+    "the pin reports a state of the control, which is off",
+    ("thc", "plain"),
+    lasts=True,
+)
 
-behaviour("biquad", ".*", lambda v: not v["f0"] > 0 or not v["Q"] > 0 or v.invalid() or v.beyond(1e12), "`f0` is 0 or below; a NaN", "`valid` is FALSE, `out` recovers", "the filter diverges",
-          HELD, ("biquad", "edges"), lasts=True)
-behaviour("siggen", "clock|square|sawtooth|triangle|sine|cosine", lambda v: v["frequency"] < 0 or v.invalid() or v.beyond(1e12), "a negative frequency; a NaN", "the waves run backwards; the phase is held",
-          "`sawtooth` and `triangle` leave their range; NaN for ever", "the waves stay within `amplitude`", ("siggen num_chan=1", "plain"), lasts=True)
+behaviour(
+    "biquad",
+    ".*",
+    lambda v: not v["f0"] > 0 or not v["Q"] > 0 or v.invalid() or v.beyond(1e12),
+    "`f0` is 0 or below; a NaN",
+    "`valid` is FALSE, `out` recovers",
+    "the filter diverges",
+    HELD,
+    ("biquad", "edges"),
+    lasts=True,
+)
+behaviour(
+    "siggen",
+    "clock|square|sawtooth|triangle|sine|cosine",
+    lambda v: v["frequency"] < 0 or v.invalid() or v.beyond(1e12),
+    "a negative frequency; a NaN",
+    "the waves run backwards; the phase is held",
+    "`sawtooth` and `triangle` leave their range; NaN for ever",
+    "the waves stay within `amplitude`",
+    ("siggen num_chan=1", "plain"),
+    lasts=True,
+)
 inventory("sim_encoder", "rawcounts", "output pin", "input pin", "the component writes it")
-behaviour("feedcomp", "out", lambda v: v["feed"] == 0 or v.invalid() or v.beyond(1e100), "`feed` is 0", "`in`", "infinite or NaN", HELD, ("feedcomp", "plain"))
-behaviour("integ", "out", lambda v: v.invalid() or v.beyond(1e18, "in", "gain"), "an input is NaN or infinite", "the cycle is skipped", "NaN for ever", HELD, ("integ", "wild"), lasts=True)
-behaviour("demux", "out-31", lambda v: v["bargraph"] or v.beyond(2147480000, "sel-u32"), "a bar of all outputs", "all TRUE", "the last output is FALSE", "a bar could not be full", ("demux", "edges"))
-behaviour("demux", "out-.*", lambda v: v.beyond(2147480000, "sel-u32"), "`sel-u32` beyond 2147483647", "the last output", "none, the sum is negative", "as for every selection above the last output", ("demux", "wild"))
-behaviour("filter_kalman", "xk-out", lambda v: v["Rk"] < 0 or v["Qk"] < 0 or v.invalid() or v.beyond(1e12), "`Rk` or `Qk` is negative; a NaN", "counts as 0; is ignored", "the estimate diverges", "a variance is not negative", ("filter_kalman", "edges"),
-          lasts=True)
-behaviour("timedelay", "out|elapsed", lambda v: v.invalid(), "a delay is NaN", "counts as 0", "`out` never changes", "a relay must not stick", ("timedelay", "wild"), lasts=True)
-behaviour("knob2float", "out", lambda v: v.beyond(1e9) or v.invalid(), "counts that wrap around; a NaN", "the difference in 32 bits", "overflows", "counts wrap around", ("knob2float", "wild"), lasts=True)
+behaviour(
+    "feedcomp",
+    "out",
+    lambda v: v["feed"] == 0 or v.invalid() or v.beyond(1e100),
+    "`feed` is 0",
+    "`in`",
+    "infinite or NaN",
+    HELD,
+    ("feedcomp", "plain"),
+)
+behaviour(
+    "integ",
+    "out",
+    lambda v: v.invalid() or v.beyond(1e18, "in", "gain"),
+    "an input is NaN or infinite",
+    "the cycle is skipped",
+    "NaN for ever",
+    HELD,
+    ("integ", "wild"),
+    lasts=True,
+)
+behaviour(
+    "demux",
+    "out-31",
+    lambda v: v["bargraph"] or v.beyond(2147480000, "sel-u32"),
+    "a bar of all outputs",
+    "all TRUE",
+    "the last output is FALSE",
+    "a bar could not be full",
+    ("demux", "edges"),
+)
+behaviour(
+    "demux",
+    "out-.*",
+    lambda v: v.beyond(2147480000, "sel-u32"),
+    "`sel-u32` beyond 2147483647",
+    "the last output",
+    "none, the sum is negative",
+    "as for every selection above the last output",
+    ("demux", "wild"),
+)
+behaviour(
+    "filter_kalman",
+    "xk-out",
+    lambda v: v["Rk"] < 0 or v["Qk"] < 0 or v.invalid() or v.beyond(1e12),
+    "`Rk` or `Qk` is negative; a NaN",
+    "counts as 0; is ignored",
+    "the estimate diverges",
+    "a variance is not negative",
+    ("filter_kalman", "edges"),
+    lasts=True,
+)
+behaviour(
+    "timedelay",
+    "out|elapsed",
+    lambda v: v.invalid(),
+    "a delay is NaN",
+    "counts as 0",
+    "`out` never changes",
+    "a relay must not stick",
+    ("timedelay", "wild"),
+    lasts=True,
+)
+behaviour(
+    "knob2float",
+    "out",
+    lambda v: v.beyond(1e9) or v.invalid(),
+    "counts that wrap around; a NaN",
+    "the difference in 32 bits",
+    "overflows",
+    "counts wrap around",
+    ("knob2float", "wild"),
+    lasts=True,
+)
 inventory("carousel", "debounce", "writable", "read-only", "a time that is set by the user")
-behaviour("sim_encoder", "scale", lambda v: v["scale"] == 0, "`scale` is 0", "1", "-0 remains", "a division by 0", ("sim_encoder num_chan=1", {}, {"sim-encoder.0.scale": -0.0}))
-behaviour("clarkeinv", "a|b|c", lambda v: True, "always", "whole turns of `theta` are removed first, and the constants are exact", "2 pi has ten digits", "an angle keeps its digits over many turns", ("clarkeinv", "plain"), within=1e-3)
-behaviour("clarkeinv", "a|b|c", lambda v: v.beyond(1e5), "inputs beyond 1e5; a NaN", "as above", "the angle has no digits left", "an angle keeps its digits over many turns", ("clarkeinv", "wild"))
+behaviour(
+    "sim_encoder",
+    "scale",
+    lambda v: v["scale"] == 0,
+    "`scale` is 0",
+    "1",
+    "-0 remains",
+    "a division by 0",
+    ("sim_encoder num_chan=1", {}, {"sim-encoder.0.scale": -0.0}),
+)
+behaviour(
+    "clarkeinv",
+    "a|b|c",
+    lambda v: True,
+    "always",
+    "whole turns of `theta` are removed first, and the constants are exact",
+    "2 pi has ten digits",
+    "an angle keeps its digits over many turns",
+    ("clarkeinv", "plain"),
+    within=1e-3,
+)
+behaviour(
+    "clarkeinv",
+    "a|b|c",
+    lambda v: v.beyond(1e5),
+    "inputs beyond 1e5; a NaN",
+    "as above",
+    "the angle has no digits left",
+    "an angle keeps its digits over many turns",
+    ("clarkeinv", "wild"),
+)
 for component, third in (("clarke2", {}), ("clarke3", {"clarke3.0.c": [-2147483648.0]})):
-    behaviour(component, "x|y|h", lambda v: v.beyond(1e6), "inputs beyond 1e6 that cancel each other; a NaN", "exact to the last digit", "another order of the sum", "the order of a sum is not specified",
-              (component, {f"{component}.0.a": [4294967296.0 if component == "clarke2" else 0.00863335458], f"{component}.0.b": [-2147483648.0 if component == "clarke2" else 2147483648.0], **third}, {}))
-behaviour("abs", "sign", lambda v: v.invalid(), "`in` is NaN", "FALSE", "TRUE", "a NaN has no sign", ("abs", "wild"))
-behaviour("abs_s32", "out", lambda v: v["in"] == -2147483648, "-2147483648", "2147483647", "-2147483648", "an absolute value is not negative", ("abs_s32", "wild"))
-behaviour("conv_float_s32", "out|out-of-range", lambda v: v.beyond(2147483647), "beyond the range of s32; a NaN", "wraps around, as documented; 0 for NaN", "-2147483648", SATURATED, ("conv_float_s32", "wild"), lasts=True)
-behaviour("conv_float_u32", "out|out-of-range", lambda v: v.beyond(2147483647) or v["in"] < 0, "beyond 2147483647; a NaN; negative", "wraps around, or with `clamp` is limited to the range", "0, or 2147483647 with `clamp`", SATURATED,
-          ("conv_float_u32", "wild"), lasts=True)
-behaviour("conv_s32_u32", "out-of-range", lambda v: v["in"] < 0, "a negative value", "TRUE", "FALSE", "a value that wraps around is out of range", ("conv_s32_u32", "edges"), lasts=True)
-behaviour("conv_u32_s32", "out-of-range", lambda v: v["in"] > 2147483647, "beyond 2147483647", "TRUE", "FALSE", "a value that wraps around is out of range", ("conv_u32_s32", "wild"), lasts=True)
-behaviour("joyhandle", "out", lambda v: v["inverse"] and v["in"] < 0 or v.invalid() or v.beyond(1e6), "`inverse`, and `in` is negative; a NaN; `power` beyond 1e3", "the curve has the same shape on both sides", "another shape: minus three times `offset`",
-          "a handle is symmetrical", ("joyhandle", "wild"))
-behaviour("multiswitch", "bit-.*|position", lambda v: v["top-position"] > 2147483647 or v["position"] == -2147483648, "`top-position` beyond 2147483647, `position` -2147483648", "0 is the first position", "-1 is a position", "a position is not negative", ("multiswitch personality=3", "wild"), lasts=True)
-behaviour("mux_generic", "out-.*", lambda v: v.beyond(2147483647), "`sel-int` beyond the number of inputs; a value beyond the range", "the last input; limited", "reads beyond its inputs, or crashes", "a selection must not read other memory", ("mux_generic config=su4", {"mux-gen.00.sel-int": [4294967295], "mux-gen.00.in-s32-03": [5]}, {}), lasts=True)
+    behaviour(
+        component,
+        "x|y|h",
+        lambda v: v.beyond(1e6),
+        "inputs beyond 1e6 that cancel each other; a NaN",
+        "exact to the last digit",
+        "another order of the sum",
+        "the order of a sum is not specified",
+        (
+            component,
+            {
+                f"{component}.0.a": [4294967296.0 if component == "clarke2" else 0.00863335458],
+                f"{component}.0.b": [-2147483648.0 if component == "clarke2" else 2147483648.0],
+                **third,
+            },
+            {},
+        ),
+    )
+behaviour(
+    "abs",
+    "sign",
+    lambda v: v.invalid(),
+    "`in` is NaN",
+    "FALSE",
+    "TRUE",
+    "a NaN has no sign",
+    ("abs", "wild"),
+)
+behaviour(
+    "abs_s32",
+    "out",
+    lambda v: v["in"] == -2147483648,
+    "-2147483648",
+    "2147483647",
+    "-2147483648",
+    "an absolute value is not negative",
+    ("abs_s32", "wild"),
+)
+behaviour(
+    "conv_float_s32",
+    "out|out-of-range",
+    lambda v: v.beyond(2147483647),
+    "beyond the range of s32; a NaN",
+    "wraps around, as documented; 0 for NaN",
+    "-2147483648",
+    SATURATED,
+    ("conv_float_s32", "wild"),
+    lasts=True,
+)
+behaviour(
+    "conv_float_u32",
+    "out|out-of-range",
+    lambda v: v.beyond(2147483647) or v["in"] < 0,
+    "beyond 2147483647; a NaN; negative",
+    "wraps around, or with `clamp` is limited to the range",
+    "0, or 2147483647 with `clamp`",
+    SATURATED,
+    ("conv_float_u32", "wild"),
+    lasts=True,
+)
+behaviour(
+    "conv_s32_u32",
+    "out-of-range",
+    lambda v: v["in"] < 0,
+    "a negative value",
+    "TRUE",
+    "FALSE",
+    "a value that wraps around is out of range",
+    ("conv_s32_u32", "edges"),
+    lasts=True,
+)
+behaviour(
+    "conv_u32_s32",
+    "out-of-range",
+    lambda v: v["in"] > 2147483647,
+    "beyond 2147483647",
+    "TRUE",
+    "FALSE",
+    "a value that wraps around is out of range",
+    ("conv_u32_s32", "wild"),
+    lasts=True,
+)
+behaviour(
+    "joyhandle",
+    "out",
+    lambda v: v["inverse"] and v["in"] < 0 or v.invalid() or v.beyond(1e6),
+    "`inverse`, and `in` is negative; a NaN; `power` beyond 1e3",
+    "the curve has the same shape on both sides",
+    "another shape: minus three times `offset`",
+    "a handle is symmetrical",
+    ("joyhandle", "wild"),
+)
+behaviour(
+    "multiswitch",
+    "bit-.*|position",
+    lambda v: v["top-position"] > 2147483647 or v["position"] == -2147483648,
+    "`top-position` beyond 2147483647, `position` -2147483648",
+    "0 is the first position",
+    "-1 is a position",
+    "a position is not negative",
+    ("multiswitch personality=3", "wild"),
+    lasts=True,
+)
+behaviour(
+    "mux_generic",
+    "out-.*",
+    lambda v: v.beyond(2147483647),
+    "`sel-int` beyond the number of inputs; a value beyond the range",
+    "the last input; limited",
+    "reads beyond its inputs, or crashes",
+    "a selection must not read other memory",
+    (
+        "mux_generic config=su4",
+        {"mux-gen.00.sel-int": [4294967295], "mux-gen.00.in-s32-03": [5]},
+        {},
+    ),
+    lasts=True,
+)
 for names in ("in-type|out-type|offset-measured",):
     inventory("bldc", names, "output pin", "read-only parameter", LINKABLE)
 inventory("thcud", "correction-vel", "input pin", "parameter", "2.10's", versions=("2.9",))
-behaviour("spindle", "brake", lambda v: True, "always", "as documented", "FALSE", "its manual page documents it", ("spindle", "plain"))
-behaviour("spindle", "reverse", lambda v: not v["enable"] or v.changed("commanded-speed", "enable"), "a spindle that turns backwards decelerates", "TRUE until it stops", "becomes FALSE at once", "the spindle must not coast",
-          ("spindle", "plain"), lasts=True)
-behaviour("spindle", ".*", lambda v: v["select-gear"] > 0 or v.invalid() or v.beyond(1e9), "`select-gear` beyond the last gear; a NaN", "the last gear; counts as 0", "reads pins that do not exist; NaN for ever", "a selection must not read other memory", ("spindle", "wild"), lasts=True)
-behaviour("thc", "offset-value|z-pos-out|z-fb-out", lambda v: not v["enable"] or not v["torch-on"] or v.invalid(), "`enable` or `torch-on` is FALSE", "the correction is removed as documented", "removed in one cycle, or returned at once",
-          "the torch must not jump", ("thc", "edges"), lasts=True)
-behaviour("thcud", "cur-offset|z-pos-out|z-fb-out|removing-offset", lambda v: not v["enable"] or not v["torch-on"] or v.invalid(), "`enable` or `torch-on` is FALSE", "the correction is removed as documented", "removed in one cycle",
-          "the torch must not jump", ("thcud", "plain"), lasts=True, versions=("2.10",))
-behaviour("eoffset_per_angle", ".*", lambda v: v["angle"] < 0 or not v["is-on"] or v.invalid() or v.beyond(1e9), "a negative angle; the machine is switched off; a NaN", "the same shape; `clear` becomes FALSE", "another shape; `clear` remains", "a polygon repeats in both directions",
-          ("eoffset_per_angle", "plain"), lasts=True)
-behaviour("gantry", "home|position-fb|joint.*", lambda v: v.has("joint.02.home"), "more than two joints", "`home` waits for all joints", "not for the last ones", "a gantry is at home when all its joints are", ("gantry personality=3", "edges"), lasts=True)
-behaviour("gantry", ".*", lambda v: v.invalid() or v.beyond(1e9), "a NaN or infinite input", "is ignored", "NaN for ever", "a position must not become NaN", ("gantry personality=2", "wild"), lasts=True)
-behaviour("sim_encoder", "phase-.", lambda v: v["scale"] == 0 or not abs(v["speed"] / v["scale"]) * v["ppr"] * 0.004 < 1 or v.invalid() or v.changed("ppr"), "a count per cycle or more; `ppr` changes", "turns forward", "turns backwards", "a spindle does not reverse at its highest speed", ("sim_encoder num_chan=1", "edges"), lasts=True)
-behaviour("counter", "rawcounts|counts|position|velocity", lambda v: v.cycle == 0 and v["phase-A"] or v["reset"], "`phase-A` is TRUE in the first cycle; `reset`", "counting starts there; `rawcounts` is this cycle's", "an edge; that of the cycle before",
-          "the first state is not an edge", ("counter num_chan=1", "plain"), lasts=True)
-behaviour("encoder_ratio", "error", lambda v: v.changed("ppr", "teeth") or 0 in v.all("ppr", "teeth") or v.beyond(20000, "ppr", "teeth"), "`ppr` or teeth change, are 0 or beyond 20000", "apply to all counts since the start; 0 disables that axis",
-          "apply to later counts; the error is held", "the gear ratio is that of the settings", ("encoder_ratio num_chan=1", "plain"), lasts=True)
-behaviour("toggle2nist", "on|off", lambda v: True, "a request that `is-on` does not follow at once", "lasts `max-pulse-length` cycles", "ends at any time: its time runs while there is no request", "a request of one cycle may be missed",
-          ("toggle2nist", "plain"), versions=("2.10",))
-behaviour("toggle2nist", "on|off", lambda v: True, "always", "those of 2.10", "both edges request the other state", "2.10's", ("toggle2nist", "plain"), lasts=True, versions=("2.9",))
-behaviour("gantry", ".*", lambda v: v.cycle == 0 and v["position-cmd"] != 0, "`position-cmd` is not 0 in the first cycle", "the first command is not a motion", "a motion from 0", "a machine must not jump", ("gantry personality=2", "plain"), lasts=True)
-behaviour("counter", "position-scale|position|velocity", lambda v: v.invalid() or v.beyond(1e12) or v["position-scale"] == 0, "`position-scale` is NaN, infinite or 0", "1", "is used", "a division by 0", ("counter num_chan=1", "wild"), lasts=True)
+behaviour(
+    "spindle",
+    "brake",
+    lambda v: True,
+    "always",
+    "as documented",
+    "FALSE",
+    "its manual page documents it",
+    ("spindle", "plain"),
+)
+behaviour(
+    "spindle",
+    "reverse",
+    lambda v: not v["enable"] or v.changed("commanded-speed", "enable"),
+    "a spindle that turns backwards decelerates",
+    "TRUE until it stops",
+    "becomes FALSE at once",
+    "the spindle must not coast",
+    ("spindle", "plain"),
+    lasts=True,
+)
+behaviour(
+    "spindle",
+    ".*",
+    lambda v: v["select-gear"] > 0 or v.invalid() or v.beyond(1e9),
+    "`select-gear` beyond the last gear; a NaN",
+    "the last gear; counts as 0",
+    "reads pins that do not exist; NaN for ever",
+    "a selection must not read other memory",
+    ("spindle", "wild"),
+    lasts=True,
+)
+behaviour(
+    "thc",
+    "offset-value|z-pos-out|z-fb-out",
+    lambda v: not v["enable"] or not v["torch-on"] or v.invalid(),
+    "`enable` or `torch-on` is FALSE",
+    "the correction is removed as documented",
+    "removed in one cycle, or returned at once",
+    "the torch must not jump",
+    ("thc", "edges"),
+    lasts=True,
+)
+behaviour(
+    "thcud",
+    "cur-offset|z-pos-out|z-fb-out|removing-offset",
+    lambda v: not v["enable"] or not v["torch-on"] or v.invalid(),
+    "`enable` or `torch-on` is FALSE",
+    "the correction is removed as documented",
+    "removed in one cycle",
+    "the torch must not jump",
+    ("thcud", "plain"),
+    lasts=True,
+    versions=("2.10",),
+)
+behaviour(
+    "eoffset_per_angle",
+    ".*",
+    lambda v: v["angle"] < 0 or not v["is-on"] or v.invalid() or v.beyond(1e9),
+    "a negative angle; the machine is switched off; a NaN",
+    "the same shape; `clear` becomes FALSE",
+    "another shape; `clear` remains",
+    "a polygon repeats in both directions",
+    ("eoffset_per_angle", "plain"),
+    lasts=True,
+)
+behaviour(
+    "gantry",
+    "home|position-fb|joint.*",
+    lambda v: v.has("joint.02.home"),
+    "more than two joints",
+    "`home` waits for all joints",
+    "not for the last ones",
+    "a gantry is at home when all its joints are",
+    ("gantry personality=3", "edges"),
+    lasts=True,
+)
+behaviour(
+    "gantry",
+    ".*",
+    lambda v: v.invalid() or v.beyond(1e9),
+    "a NaN or infinite input",
+    "is ignored",
+    "NaN for ever",
+    "a position must not become NaN",
+    ("gantry personality=2", "wild"),
+    lasts=True,
+)
+behaviour(
+    "sim_encoder",
+    "phase-.",
+    lambda v: v["scale"] == 0
+    or not abs(v["speed"] / v["scale"]) * v["ppr"] * 0.004 < 1
+    or v.invalid()
+    or v.changed("ppr"),
+    "a count per cycle or more; `ppr` changes",
+    "turns forward",
+    "turns backwards",
+    "a spindle does not reverse at its highest speed",
+    ("sim_encoder num_chan=1", "edges"),
+    lasts=True,
+)
+behaviour(
+    "counter",
+    "rawcounts|counts|position|velocity",
+    lambda v: v.cycle == 0 and v["phase-A"] or v["reset"],
+    "`phase-A` is TRUE in the first cycle; `reset`",
+    "counting starts there; `rawcounts` is this cycle's",
+    "an edge; that of the cycle before",
+    "the first state is not an edge",
+    ("counter num_chan=1", "plain"),
+    lasts=True,
+)
+behaviour(
+    "encoder_ratio",
+    "error",
+    lambda v: v.changed("ppr", "teeth")
+    or 0 in v.all("ppr", "teeth")
+    or v.beyond(20000, "ppr", "teeth"),
+    "`ppr` or teeth change, are 0 or beyond 20000",
+    "apply to all counts since the start; 0 disables that axis",
+    "apply to later counts; the error is held",
+    "the gear ratio is that of the settings",
+    ("encoder_ratio num_chan=1", "plain"),
+    lasts=True,
+)
+behaviour(
+    "toggle2nist",
+    "on|off",
+    lambda v: True,
+    "a request that `is-on` does not follow at once",
+    "lasts `max-pulse-length` cycles",
+    "ends at any time: its time runs while there is no request",
+    "a request of one cycle may be missed",
+    ("toggle2nist", "plain"),
+    versions=("2.10",),
+)
+behaviour(
+    "toggle2nist",
+    "on|off",
+    lambda v: True,
+    "always",
+    "those of 2.10",
+    "both edges request the other state",
+    "2.10's",
+    ("toggle2nist", "plain"),
+    lasts=True,
+    versions=("2.9",),
+)
+behaviour(
+    "gantry",
+    ".*",
+    lambda v: v.cycle == 0 and v["position-cmd"] != 0,
+    "`position-cmd` is not 0 in the first cycle",
+    "the first command is not a motion",
+    "a motion from 0",
+    "a machine must not jump",
+    ("gantry personality=2", "plain"),
+    lasts=True,
+)
+behaviour(
+    "counter",
+    "position-scale|position|velocity",
+    lambda v: v.invalid() or v.beyond(1e12) or v["position-scale"] == 0,
+    "`position-scale` is NaN, infinite or 0",
+    "1",
+    "is used",
+    "a division by 0",
+    ("counter num_chan=1", "wild"),
+    lasts=True,
+)
 inventory("encoder", "quad-errors", "counts invalid transitions", "missing", "an addition")
-inventory("pid", "feedbackD", "the derivative of the feedback, with `debug=1`", "missing", "an addition")
-behaviour("spindle", "zero-speed|at-speed|limited|forward|reverse|brake", lambda v: True, "a speed within the last digits of a tolerance", "double precision", "single precision: some cycles earlier or later", "speeds have all digits", ("spindle", "edges"),
-          most_cycles=60)
-behaviour("counter", "velocity", lambda v: v["phase-A"], "after the first edge", "0: there is no interval yet", "a count per cycle", "a speed needs an interval", ("counter num_chan=1", "plain"), lasts=True)
-behaviour("gearchange", "speed-out|dir-out", lambda v: v.invalid(), "an input is NaN", "0", "NaN", HELD, ("gearchange", {"gearchange.0.sel": [True], "gearchange.0.speed-in": [float("nan")]}, {"gearchange.0.max2": -1.0}), lasts=True)
-for component, pins, variant in (("filter_kalman", "xk-out", "filter_kalman"), ("eoffset_per_angle", "eoffset-dbg|kreciprocal", "eoffset_per_angle"), ("gantry", "joint.*", "gantry personality=2")):
-    behaviour(component, pins, lambda v: True, "always", "double precision, as in 2.10", "single precision", "2.10's", (variant, "edges"), lasts=True, within=1e-4, versions=("2.9",))
-THC_AT_WORK = ("thc", {"thc.enable": [True], "thc.torch-on": [True], "thc.arc-ok": [True], "thc.current-vel": [100.0], "thc.requested-vel": [100.0],
-                       "thc.encoder-vel": [0.0], "thc.volts-requested": [100.0], "thc.vel-tol": [1.0]},
-               {"thc.correction-vel": 0.1, "thc.vel-scale": 1.0, "thc.velocity-tol": 10.0})
-behaviour("thc", "offset-value", lambda v: True, "always", "the correction in use", "that of the cycle before", "2.10's", THC_AT_WORK, lasts=True, versions=("2.9",))
-behaviour("thc", "z-pos-out", lambda v: True, "always", "double precision, as in 2.10", "single precision", "2.10's", THC_AT_WORK, lasts=True, within=1e-4, versions=("2.9",))
+inventory(
+    "pid", "feedbackD", "the derivative of the feedback, with `debug=1`", "missing", "an addition"
+)
+behaviour(
+    "spindle",
+    "zero-speed|at-speed|limited|forward|reverse|brake",
+    lambda v: True,
+    "a speed within the last digits of a tolerance",
+    "double precision",
+    "single precision: some cycles earlier or later",
+    "speeds have all digits",
+    ("spindle", "edges"),
+    most_cycles=60,
+)
+behaviour(
+    "counter",
+    "velocity",
+    lambda v: v["phase-A"],
+    "after the first edge",
+    "0: there is no interval yet",
+    "a count per cycle",
+    "a speed needs an interval",
+    ("counter num_chan=1", "plain"),
+    lasts=True,
+)
+behaviour(
+    "gearchange",
+    "speed-out|dir-out",
+    lambda v: v.invalid(),
+    "an input is NaN",
+    "0",
+    "NaN",
+    HELD,
+    (
+        "gearchange",
+        {"gearchange.0.sel": [True], "gearchange.0.speed-in": [float("nan")]},
+        {"gearchange.0.max2": -1.0},
+    ),
+    lasts=True,
+)
+for component, pins, variant in (
+    ("filter_kalman", "xk-out", "filter_kalman"),
+    ("eoffset_per_angle", "eoffset-dbg|kreciprocal", "eoffset_per_angle"),
+    ("gantry", "joint.*", "gantry personality=2"),
+):
+    behaviour(
+        component,
+        pins,
+        lambda v: True,
+        "always",
+        "double precision, as in 2.10",
+        "single precision",
+        "2.10's",
+        (variant, "edges"),
+        lasts=True,
+        within=1e-4,
+        versions=("2.9",),
+    )
+THC_AT_WORK = (
+    "thc",
+    {
+        "thc.enable": [True],
+        "thc.torch-on": [True],
+        "thc.arc-ok": [True],
+        "thc.current-vel": [100.0],
+        "thc.requested-vel": [100.0],
+        "thc.encoder-vel": [0.0],
+        "thc.volts-requested": [100.0],
+        "thc.vel-tol": [1.0],
+    },
+    {"thc.correction-vel": 0.1, "thc.vel-scale": 1.0, "thc.velocity-tol": 10.0},
+)
+behaviour(
+    "thc",
+    "offset-value",
+    lambda v: True,
+    "always",
+    "the correction in use",
+    "that of the cycle before",
+    "2.10's",
+    THC_AT_WORK,
+    lasts=True,
+    versions=("2.9",),
+)
+behaviour(
+    "thc",
+    "z-pos-out",
+    lambda v: True,
+    "always",
+    "double precision, as in 2.10",
+    "single precision",
+    "2.10's",
+    THC_AT_WORK,
+    lasts=True,
+    within=1e-4,
+    versions=("2.9",),
+)

@@ -17,20 +17,23 @@ from .variants import Variant
 @dataclass(frozen=True)
 class Behaviour:
     component: str
-    pins: str                    # a regular expression for the end of the name
-    when: Callable               # of a View
-    condition: str               # the same in words
+    pins: str  # a regular expression for the end of the name
+    when: Callable  # of a View
+    condition: str  # the same in words
     ours: str
     linuxcnc: str
     why: str
     witness: tuple
     lasts: bool = False
-    within: float = math.inf     # the largest difference, relative to values above 1
-    most_cycles: int = 10**9     # of a run in which it occurs
+    within: float = math.inf  # the largest difference, relative to values above 1
+    most_cycles: int = 10**9  # of a run in which it occurs
     versions: tuple = ("2.9", "2.10")
 
     def concerns(self, component, name):
-        return component == self.component and re.search(rf"(?:^|\.)(?:{self.pins})$", name) is not None
+        return (
+            component == self.component
+            and re.search(rf"(?:^|\.)(?:{self.pins})$", name) is not None
+        )
 
     def remaining(self, view, difference):
         """What of the difference this behaviour does not explain, or None."""
@@ -42,29 +45,44 @@ class Behaviour:
             return self.within == math.inf or abs(a - b) <= self.within * max(1.0, abs(a), abs(b))
 
         if not self.lasts:
-            return difference.without(lambda cycle: small(cycle) and bool(self.when(view.at(cycle))))
-        begin = next((cycle for cycle in range(difference.cycles[-1] + 1) if self.when(view.at(cycle))), None)
-        return difference if begin is None else difference.without(lambda cycle: cycle >= begin and small(cycle))
+            return difference.without(
+                lambda cycle: small(cycle) and bool(self.when(view.at(cycle)))
+            )
+        begin = next(
+            (cycle for cycle in range(difference.cycles[-1] + 1) if self.when(view.at(cycle))), None
+        )
+        return (
+            difference
+            if begin is None
+            else difference.without(lambda cycle: cycle >= begin and small(cycle))
+        )
 
 
 @dataclass(frozen=True)
 class InInventory:
     component: str
-    names: str                   # a regular expression for the end of the name
+    names: str  # a regular expression for the end of the name
     ours: str
     linuxcnc: str
     why: str
     versions: tuple = ("2.9", "2.10")
 
     def concerns(self, component, name):
-        return component == self.component and re.search(rf"(?:^|\.)(?:{self.names})$", name) is not None
+        return (
+            component == self.component
+            and re.search(rf"(?:^|\.)(?:{self.names})$", name) is not None
+        )
 
 
 # Components that follow another law on purpose, so that a comparison cycle by cycle has no meaning. "by feature": tests/peers/compare_components.py compares
 # them feature by feature; docs/linuxcnc-compatibility.md has the results. The manual page of each lists what differs; netlists test it.
 FEATURES = "compared [by feature](#our-components-compared-with-linuxcncs)"
 UNLIKE = {
-    "encoder": FEATURES, "limit3": FEATURES, "pid": FEATURES, "pwmgen": FEATURES, "stepgen": FEATURES,
+    "encoder": FEATURES,
+    "limit3": FEATURES,
+    "pid": FEATURES,
+    "pwmgen": FEATURES,
+    "stepgen": FEATURES,
     "anglejog": "acceleration fractions are positive in all directions; a motion that was interrupted goes on braking",
     "bldc": "trapezoids follow `lead-angle`, the angle is extrapolated by fractions of a count, codes outside of the Hall pattern set the outputs to 0",
     "carousel": "`enable` FALSE stops at once; the states have other numbers",
@@ -82,8 +100,12 @@ INVENTORY_ONLY = {
 
 # Components of which 2.10's behaviour is ours: what is newer.
 NEWER = {
-    "encoder": "a reset while latching", "eoffset_per_angle": "double precision", "filter_kalman": "double precision", "gantry": "double precision", "thc": "double precision",
-"thcud": "`correction-vel` is a pin, `cur-offset` works",
+    "encoder": "a reset while latching",
+    "eoffset_per_angle": "double precision",
+    "filter_kalman": "double precision",
+    "gantry": "double precision",
+    "thc": "double precision",
+    "thcud": "`correction-vel` is a pin, `cur-offset` works",
     "toggle2nist": "debounced, on and off have their edges",
 }
 # The version whose inventory inventory.json has for a component, if it is not 2.9.
@@ -95,7 +117,19 @@ BEHAVIOURS = []
 
 def behaviour(component, pins, when, condition, ours, linuxcnc, why, witness, **more):
     variant, *rest = witness
-    BEHAVIOURS.append(Behaviour(component, pins, when, condition, ours, linuxcnc, why, (Variant(*variant.split(" ", 1)), *rest), **more))
+    BEHAVIOURS.append(
+        Behaviour(
+            component,
+            pins,
+            when,
+            condition,
+            ours,
+            linuxcnc,
+            why,
+            (Variant(*variant.split(" ", 1)), *rest),
+            **more,
+        )
+    )
 
 
 def inventory(component, names, ours, linuxcnc, why, **more):

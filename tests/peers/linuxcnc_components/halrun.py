@@ -18,7 +18,9 @@ MAX_COLUMNS = 16  # of a channel; LinuxCNC's limit is 21
 
 
 def available():
-    return shutil.which("halrun", path="/usr/bin") is not None and Path("/usr/bin/rtapi_app").exists()
+    return (
+        shutil.which("halrun", path="/usr/bin") is not None and Path("/usr/bin/rtapi_app").exists()
+    )
 
 
 class HalrunRunner:
@@ -36,41 +38,100 @@ class HalrunRunner:
             if self.user:
                 for path in (folder, *folder.iterdir()):
                     os.chown(path, self.user.pw_uid, self.user.pw_gid)
-            who = {"user": self.user.pw_uid, "group": self.user.pw_gid, "extra_groups": []} if self.user else {}
+            who = (
+                {"user": self.user.pw_uid, "group": self.user.pw_gid, "extra_groups": []}
+                if self.user
+                else {}
+            )
             environment = {"HOME": name, "PATH": "/usr/bin:/bin", "LANG": "C", "TMPDIR": name}
-            done = subprocess.run(["/usr/bin/halrun", *options, "-f", "run.hal"], cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True,
-                                  text=True, errors="replace", timeout=timeout, check=False, **who)
-            left = {path.name: path.read_text(errors="replace") for path in folder.iterdir() if path.is_file()}
+            done = subprocess.run(
+                ["/usr/bin/halrun", *options, "-f", "run.hal"],
+                cwd=folder,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=timeout,
+                check=False,
+                **who,
+            )
+            left = {
+                path.name: path.read_text(errors="replace")
+                for path in folder.iterdir()
+                if path.is_file()
+            }
             return done.stdout, done.stderr, done.returncode, left
 
     def inventory(self, variant):
-        text, errors, status, _ = self.halrun(f"loadrt {variant}\nshow pin\nshow param\nshow funct\n")
+        text, errors, status, _ = self.halrun(
+            f"loadrt {variant}\nshow pin\nshow param\nshow funct\n"
+        )
         if status != 0:
             raise RunError(errors.strip())
         return parse(text)
 
     def run(self, variant, inventory, stimulus, cycles):
         """Settings of the first segment only, and no parameters: they could not be read at a known cycle. Values have six decimals."""
-        outputs = [item for item in inventory.pins("OUT", "I/O") if item.type in "bit float s32 u32".split()]
+        outputs = [
+            item
+            for item in inventory.pins("OUT", "I/O")
+            if item.type in "bit float s32 u32".split()
+        ]
         inputs = list(stimulus.streams)
-        feeds = [inputs[i:i + MAX_COLUMNS] for i in range(0, len(inputs), MAX_COLUMNS)]
-        tapes = [outputs[i:i + MAX_COLUMNS] for i in range(0, len(outputs), MAX_COLUMNS)]
+        feeds = [inputs[i : i + MAX_COLUMNS] for i in range(0, len(inputs), MAX_COLUMNS)]
+        tapes = [outputs[i : i + MAX_COLUMNS] for i in range(0, len(outputs), MAX_COLUMNS)]
         lines = [f"loadrt threads name1=t period1={PERIOD_NS}", f"loadrt {variant}"]
         if feeds:
-            cfg = ",".join("".join(LETTER[inventory.items[name].type] for name in feed) for feed in feeds)
+            cfg = ",".join(
+                "".join(LETTER[inventory.items[name].type] for name in feed) for feed in feeds
+            )
             depth = ",".join([str(cycles + 10)] * len(feeds))
-            lines += [f"loadrt streamer depth={depth} cfg={cfg}"] + [f"addf streamer.{i} t" for i in range(len(feeds))]
+            lines += [f"loadrt streamer depth={depth} cfg={cfg}"] + [
+                f"addf streamer.{i} t" for i in range(len(feeds))
+            ]
         cfg = ",".join("".join(LETTER[item.type] for item in tape) for tape in tapes)
         depth = ",".join([str(cycles + 10)] * len(tapes))
-        lines += [f"addf {name} t" for name in sorted(inventory.functions, key=lambda name: (self.rank(name), name))]
-        lines += [f"loadrt sampler depth={depth} cfg={cfg}"] + [f"addf sampler.{i} t" for i in range(len(tapes))]
-        lines += [f"net in-{k}-{i} streamer.{k}.pin.{i} => {name}" for k, feed in enumerate(feeds) for i, name in enumerate(feed)]
-        lines += [f"net out-{k}-{i} {item.name} => sampler.{k}.pin.{i}" for k, tape in enumerate(tapes) for i, item in enumerate(tape)]
-        signal = {item.name: f"out-{k}-{i}" for k, tape in enumerate(tapes) for i, item in enumerate(tape)}
+        lines += [
+            f"addf {name} t"
+            for name in sorted(inventory.functions, key=lambda name: (self.rank(name), name))
+        ]
+        lines += [f"loadrt sampler depth={depth} cfg={cfg}"] + [
+            f"addf sampler.{i} t" for i in range(len(tapes))
+        ]
+        lines += [
+            f"net in-{k}-{i} streamer.{k}.pin.{i} => {name}"
+            for k, feed in enumerate(feeds)
+            for i, name in enumerate(feed)
+        ]
+        lines += [
+            f"net out-{k}-{i} {item.name} => sampler.{k}.pin.{i}"
+            for k, tape in enumerate(tapes)
+            for i, item in enumerate(tape)
+        ]
+        signal = {
+            item.name: f"out-{k}-{i}" for k, tape in enumerate(tapes) for i, item in enumerate(tape)
+        }
         for name, value in stimulus.settings[0].items() if stimulus.settings else ():
-            lines.append(f"sets {signal[name]} {setp_text(value)}" if name in signal else f"setp {name} {setp_text(value)}")
-        files = [(f"in{k}.txt", "".join(" ".join(repr(float(v)) if isinstance(v, float) else str(int(v)) for v in (stimulus.streams[name][i] for name in feed)) + "\n"
-                                        for i in range(cycles))) for k, feed in enumerate(feeds)]
+            lines.append(
+                f"sets {signal[name]} {setp_text(value)}"
+                if name in signal
+                else f"setp {name} {setp_text(value)}"
+            )
+        files = [
+            (
+                f"in{k}.txt",
+                "".join(
+                    " ".join(
+                        repr(float(v)) if isinstance(v, float) else str(int(v))
+                        for v in (stimulus.streams[name][i] for name in feed)
+                    )
+                    + "\n"
+                    for i in range(cycles)
+                ),
+            )
+            for k, feed in enumerate(feeds)
+        ]
         lines += [f"loadusr -w halstreamer -c {k} in{k}.txt" for k in range(len(feeds))] + ["start"]
         lines += [f"loadusr -w halsampler -c {k} -n {cycles} out{k}.txt" for k in range(len(tapes))]
         _, errors, status, left = self.halrun("\n".join(lines) + "\n", files)

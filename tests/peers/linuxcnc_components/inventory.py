@@ -12,6 +12,7 @@ TRUTH = {"TRUE": "TRUE", "FALSE": "FALSE"}
 @dataclass(frozen=True)
 class Item:
     """A pin or a parameter. `value` is its default as text."""
+
     name: str
     kind: str  # "pin" or "param"
     type: str
@@ -25,7 +26,11 @@ class Inventory:
     functions: list
 
     def pins(self, *directions):
-        return [item for item in self.items.values() if item.kind == "pin" and item.direction in directions]
+        return [
+            item
+            for item in self.items.values()
+            if item.kind == "pin" and item.direction in directions
+        ]
 
     def settings(self):
         """Items that `setp` accepts and that no stream can drive: I/O pins and writable parameters."""
@@ -35,7 +40,9 @@ class Inventory:
         return [item for item in self.items.values() if item.kind == "param"]
 
 
-LINE = re.compile(r"^\s*(?:\d+|[-\w.]+)\s+(bit|float|s32|u32|s64|u64|port)\s+(IN|OUT|I/O|IO|RO|RW)\s+(\S*)\s+(\S+)(?:\s+(?:<=|=|==>).*)?$")
+LINE = re.compile(
+    r"^\s*(?:\d+|[-\w.]+)\s+(bit|float|s32|u32|s64|u64|port)\s+(IN|OUT|I/O|IO|RO|RW)\s+(\S*)\s+(\S+)(?:\s+(?:<=|=|==>).*)?$"
+)
 
 
 def parse(text):
@@ -86,16 +93,25 @@ def differences(ours, theirs):
             yield name, "missing", f"{b.kind} {b.type} {b.direction} {b.value}"
         elif b is None:
             yield name, f"{a.kind} {a.type} {a.direction} {a.value}", "missing"
-        elif (a.kind, a.type, a.direction) != (b.kind, b.type, b.direction) or not same_value(a.value, b.value):
+        elif (a.kind, a.type, a.direction) != (b.kind, b.type, b.direction) or not same_value(
+            a.value, b.value
+        ):
             yield name, f"{a.kind} {a.type} {a.direction} {a.value}", f"{b.kind} {b.type} {b.direction} {b.value}"
     for name in sorted(set(ours.functions) ^ set(theirs.functions)):
-        yield name, *(("function", "missing") if name in ours.functions else ("missing", "function"))
+        yield name, *(
+            ("function", "missing") if name in ours.functions else ("missing", "function")
+        )
 
 
 def as_facts(inventory):
     """The form in which an inventory is kept in inventory.json."""
-    return {"functions": sorted(inventory.functions),
-            "items": [[item.name, item.kind, item.type, item.direction, item.value] for item in sorted(inventory.items.values(), key=lambda i: i.name)]}
+    return {
+        "functions": sorted(inventory.functions),
+        "items": [
+            [item.name, item.kind, item.type, item.direction, item.value]
+            for item in sorted(inventory.items.values(), key=lambda i: i.name)
+        ],
+    }
 
 
 def from_facts(facts):
@@ -111,5 +127,7 @@ def save_facts(path, inventories):
     for name in sorted(inventories):
         facts = as_facts(inventories[name])
         items = ",\n  ".join(json.dumps(item) for item in facts["items"])
-        rows.append(f'{json.dumps(name)}: {{"functions": {json.dumps(facts["functions"])}, "items": [\n  {items}]}}')
+        rows.append(
+            f'{json.dumps(name)}: {{"functions": {json.dumps(facts["functions"])}, "items": [\n  {items}]}}'
+        )
     path.write_text("{\n" + ",\n".join(rows) + "\n}\n")

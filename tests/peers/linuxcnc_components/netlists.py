@@ -10,26 +10,159 @@ from pathlib import Path
 
 # Components of a netlist: (line of loadrt, pins as (name, type, direction), parameters as (name, type, writable), functions).
 PARTS = [
-    ("loadrt and2 count=2", [(f"and2.{i}.{p}", "bit", d) for i in range(2) for p, d in (("in0", "IN"), ("in1", "IN"), ("out", "OUT"))], [], ["and2.0", "and2.1"]),
-    ("loadrt or2 names=either", [("either.in0", "bit", "IN"), ("either.in1", "bit", "IN"), ("either.out", "bit", "OUT")], [], ["either"]),
-    ("loadrt sum2", [("sum2.0.in0", "float", "IN"), ("sum2.0.in1", "float", "IN"), ("sum2.0.out", "float", "OUT")],
-     [("sum2.0.gain0", "float", True), ("sum2.0.gain1", "float", True), ("sum2.0.offset", "float", True)], ["sum2.0"]),
-    ("loadrt mux2", [("mux2.0.in0", "float", "IN"), ("mux2.0.in1", "float", "IN"), ("mux2.0.sel", "bit", "IN"), ("mux2.0.out", "float", "OUT")], [], ["mux2.0"]),
-    ("loadrt conv_float_s32", [("conv-float-s32.0.in", "float", "IN"), ("conv-float-s32.0.out", "s32", "OUT"), ("conv-float-s32.0.out-of-range", "bit", "OUT")],
-     [("conv-float-s32.0.clamp", "bit", True)], ["conv-float-s32.0"]),
-    ("loadrt conv_u32_s32", [("conv-u32-s32.0.in", "u32", "IN"), ("conv-u32-s32.0.out", "s32", "OUT")], [("conv-u32-s32.0.clamp", "bit", True)], ["conv-u32-s32.0"]),
-    ("loadrt tristate_bit", [("tristate-bit.0.in", "bit", "IN"), ("tristate-bit.0.enable", "bit", "IN"), ("tristate-bit.0.out", "bit", "I/O")], [], ["tristate-bit.0"]),
-    ("loadrt tristate_float names=gate", [("gate.in", "float", "IN"), ("gate.enable", "bit", "IN"), ("gate.out", "float", "I/O")], [], ["gate"]),
-    ("loadrt updown", [("updown.0.countup", "bit", "IN"), ("updown.0.countdown", "bit", "IN"), ("updown.0.reset", "bit", "IN"), ("updown.0.count", "s32", "OUT")],
-     [("updown.0.clamp", "bit", True), ("updown.0.wrap", "bit", True), ("updown.0.max", "s32", True), ("updown.0.min", "s32", True)], ["updown.0"]),
+    (
+        "loadrt and2 count=2",
+        [
+            (f"and2.{i}.{p}", "bit", d)
+            for i in range(2)
+            for p, d in (("in0", "IN"), ("in1", "IN"), ("out", "OUT"))
+        ],
+        [],
+        ["and2.0", "and2.1"],
+    ),
+    (
+        "loadrt or2 names=either",
+        [("either.in0", "bit", "IN"), ("either.in1", "bit", "IN"), ("either.out", "bit", "OUT")],
+        [],
+        ["either"],
+    ),
+    (
+        "loadrt sum2",
+        [
+            ("sum2.0.in0", "float", "IN"),
+            ("sum2.0.in1", "float", "IN"),
+            ("sum2.0.out", "float", "OUT"),
+        ],
+        [
+            ("sum2.0.gain0", "float", True),
+            ("sum2.0.gain1", "float", True),
+            ("sum2.0.offset", "float", True),
+        ],
+        ["sum2.0"],
+    ),
+    (
+        "loadrt mux2",
+        [
+            ("mux2.0.in0", "float", "IN"),
+            ("mux2.0.in1", "float", "IN"),
+            ("mux2.0.sel", "bit", "IN"),
+            ("mux2.0.out", "float", "OUT"),
+        ],
+        [],
+        ["mux2.0"],
+    ),
+    (
+        "loadrt conv_float_s32",
+        [
+            ("conv-float-s32.0.in", "float", "IN"),
+            ("conv-float-s32.0.out", "s32", "OUT"),
+            ("conv-float-s32.0.out-of-range", "bit", "OUT"),
+        ],
+        [("conv-float-s32.0.clamp", "bit", True)],
+        ["conv-float-s32.0"],
+    ),
+    (
+        "loadrt conv_u32_s32",
+        [("conv-u32-s32.0.in", "u32", "IN"), ("conv-u32-s32.0.out", "s32", "OUT")],
+        [("conv-u32-s32.0.clamp", "bit", True)],
+        ["conv-u32-s32.0"],
+    ),
+    (
+        "loadrt tristate_bit",
+        [
+            ("tristate-bit.0.in", "bit", "IN"),
+            ("tristate-bit.0.enable", "bit", "IN"),
+            ("tristate-bit.0.out", "bit", "I/O"),
+        ],
+        [],
+        ["tristate-bit.0"],
+    ),
+    (
+        "loadrt tristate_float names=gate",
+        [("gate.in", "float", "IN"), ("gate.enable", "bit", "IN"), ("gate.out", "float", "I/O")],
+        [],
+        ["gate"],
+    ),
+    (
+        "loadrt updown",
+        [
+            ("updown.0.countup", "bit", "IN"),
+            ("updown.0.countdown", "bit", "IN"),
+            ("updown.0.reset", "bit", "IN"),
+            ("updown.0.count", "s32", "OUT"),
+        ],
+        [
+            ("updown.0.clamp", "bit", True),
+            ("updown.0.wrap", "bit", True),
+            ("updown.0.max", "s32", True),
+            ("updown.0.min", "s32", True),
+        ],
+        ["updown.0"],
+    ),
 ]
-THREADS = ["loadrt threads name1=t period1=1000000", "loadrt threads name1=fast period1=100000 name2=slow period2=1000000"]
+THREADS = [
+    "loadrt threads name1=t period1=1000000",
+    "loadrt threads name1=fast period1=100000 name2=slow period2=1000000",
+]
 VALUES = {
     "bit": ["TRUE", "FALSE", "1", "0", "true", "False", "yes", "2", "on", "-1", ""],
-    "float": ["0", "1.5", "-2", "1e3", "0x10", "nan", "inf", "1e400", ".5", "5.", "1,5", "abc", "1e", "-0", "+3", "0.1234567890123", "1_000", "12abc"],
-    "s32": ["0", "5", "-7", "0x10", "010", "2147483647", "2147483648", "-2147483648", "-2147483649", "4294967295", "0xFFFFFFFF", "3000000000", "1.5", "1e3", "abc", "+3",
-            "4294967296", "99999999999999999999"],
-    "u32": ["0", "5", "-1", "-7", "0x10", "010", "4294967295", "4294967296", "2147483648", "0xFFFFFFFF", "1.5", "abc", "+3", "-2147483648", "99999999999999999999"],
+    "float": [
+        "0",
+        "1.5",
+        "-2",
+        "1e3",
+        "0x10",
+        "nan",
+        "inf",
+        "1e400",
+        ".5",
+        "5.",
+        "1,5",
+        "abc",
+        "1e",
+        "-0",
+        "+3",
+        "0.1234567890123",
+        "1_000",
+        "12abc",
+    ],
+    "s32": [
+        "0",
+        "5",
+        "-7",
+        "0x10",
+        "010",
+        "2147483647",
+        "2147483648",
+        "-2147483648",
+        "-2147483649",
+        "4294967295",
+        "0xFFFFFFFF",
+        "3000000000",
+        "1.5",
+        "1e3",
+        "abc",
+        "+3",
+        "4294967296",
+        "99999999999999999999",
+    ],
+    "u32": [
+        "0",
+        "5",
+        "-1",
+        "-7",
+        "0x10",
+        "010",
+        "4294967295",
+        "4294967296",
+        "2147483648",
+        "0xFFFFFFFF",
+        "1.5",
+        "abc",
+        "+3",
+        "-2147483648",
+        "99999999999999999999",
+    ],
 }
 TYPES = ["bit", "float", "s32", "u32"]
 ARROWS = ["", "", "", "=>", "<=", "<=>"]
@@ -50,19 +183,49 @@ class Generator:
         self.aliases = [f"alias-{c}" for c in "xyz"]
 
     def pin(self):
-        return self.rng.choice(self.aliases) if self.rng.random() < 0.05 else self.rng.choice(self.pins)[0] if self.rng.random() < 0.97 else "no.such.pin"
+        return (
+            self.rng.choice(self.aliases)
+            if self.rng.random() < 0.05
+            else self.rng.choice(self.pins)[0]
+            if self.rng.random() < 0.97
+            else "no.such.pin"
+        )
 
     def signal(self):
         return self.rng.choice(self.signals)
 
     def value(self, type_=None):
         """Mostly of the type, sometimes of another."""
-        return self.rng.choice(VALUES[type_ if type_ and self.rng.random() < 0.9 else self.rng.choice(TYPES)])
+        return self.rng.choice(
+            VALUES[type_ if type_ and self.rng.random() < 0.9 else self.rng.choice(TYPES)]
+        )
 
     def command(self):
         rng = self.rng
-        kind = rng.choices(["newsig", "delsig", "net", "linkps", "linksp", "linkpp", "unlinkp", "setp", "sets", "gets", "getp", "addf", "delf", "alias", "unalias", "ptype", "stype",
-                            "lock", "initf"], [6, 1, 12, 4, 3, 1, 4, 10, 8, 4, 4, 8, 3, 3, 2, 2, 2, 0, 0])[0]
+        kind = rng.choices(
+            [
+                "newsig",
+                "delsig",
+                "net",
+                "linkps",
+                "linksp",
+                "linkpp",
+                "unlinkp",
+                "setp",
+                "sets",
+                "gets",
+                "getp",
+                "addf",
+                "delf",
+                "alias",
+                "unalias",
+                "ptype",
+                "stype",
+                "lock",
+                "initf",
+            ],
+            [6, 1, 12, 4, 3, 1, 4, 10, 8, 4, 4, 8, 3, 3, 2, 2, 2, 0, 0],
+        )[0]
         if kind == "newsig":
             return f"newsig {self.signal()} {rng.choice(TYPES + ['FLOAT', 'Bit', 'int'] if rng.random() < 0.15 else TYPES)}"
         if kind in ("delsig", "gets", "stype"):
@@ -72,7 +235,10 @@ class Generator:
             same = [pin[0] for pin in self.pins if pin[1] == wanted] or [self.pin()]
             words = []
             for _ in range(rng.randrange(1, 4)):
-                words += [rng.choice(ARROWS), rng.choice(same) if rng.random() < 0.85 else self.pin()]
+                words += [
+                    rng.choice(ARROWS),
+                    rng.choice(same) if rng.random() < 0.85 else self.pin(),
+                ]
             return " ".join(["net", self.signal(), *[word for word in words if word]])
         if kind == "linkps":
             return f"linkps {self.pin()} {rng.choice(ARROWS)} {self.signal()}"
@@ -86,7 +252,11 @@ class Generator:
             return f"getp {self.pin()}"
         if kind == "setp":
             name, type_, *_ = rng.choice(self.pins + self.parameters + self.parameters)
-            return rng.choice([f"setp {name} {self.value(type_)}", f"{name} = {self.value(type_)}"] if rng.random() < 0.1 else [f"setp {name} {self.value(type_)}"])
+            return rng.choice(
+                [f"setp {name} {self.value(type_)}", f"{name} = {self.value(type_)}"]
+                if rng.random() < 0.1
+                else [f"setp {name} {self.value(type_)}"]
+            )
         if kind == "sets":
             return f"sets {self.signal()} {self.value()}"
         if kind == "addf":
@@ -104,7 +274,9 @@ class Generator:
     def text(self, commands=30):
         lines = self.lines + [self.command() for _ in range(commands)]
         lines += ["save"]
-        lines += [f"getp {pin[0]}" for pin in self.pins] + [f"getp {parameter[0]}" for parameter in self.parameters]
+        lines += [f"getp {pin[0]}" for pin in self.pins] + [
+            f"getp {parameter[0]}" for parameter in self.parameters
+        ]
         return "\n".join(lines) + "\n"
 
 
@@ -113,7 +285,9 @@ def normal(line):
     words = []
     for word in line.split():
         try:
-            words.append(f"{float(int(word, 0)):.6g}" if not word.startswith("0x") else str(int(word, 16)))
+            words.append(
+                f"{float(int(word, 0)):.6g}" if not word.startswith("0x") else str(int(word, 16))
+            )
         except ValueError:
             try:
                 words.append(f"{float(word):.6g}")
@@ -128,7 +302,11 @@ def failed_lines(errors, netlist):
     found = {}
     for line in errors.splitlines():
         place = re.match(r"(?:\S*/)?run\.hal:(\d+):(?:\d+: error:)?\s*(.*)", line)
-        if place and not re.search(r"warning:|^Warning", line[place.start(1):]) and "deprecated" not in line:
+        if (
+            place
+            and not re.search(r"warning:|^Warning", line[place.start(1) :])
+            and "deprecated" not in line
+        ):
             found.setdefault(int(place.group(1)), place.group(2))
         for signal in re.findall(r"^HAL: ERROR: signal '(\S+)' not found", line):
             for number, command in enumerate(netlist, 1):
@@ -139,25 +317,54 @@ def failed_lines(errors, netlist):
 
 # Commands of which one side reports an error: (pattern, the side, why). docs/linuxcnc-compatibility.md has each.
 ACCEPTED = [
-    (r"setp .* -?1e400$|sets .* 1e400$|.* = 1e400$", "ours", "a number beyond the range of float is an error here, infinite there"),
-    (r"(setp|sets) \S+ \d{20,}$|.* = \d{20,}$", "ours", "a number of more than 64 bits is an error here, the largest one there"),
+    (
+        r"setp .* -?1e400$|sets .* 1e400$|.* = 1e400$",
+        "ours",
+        "a number beyond the range of float is an error here, infinite there",
+    ),
+    (
+        r"(setp|sets) \S+ \d{20,}$|.* = \d{20,}$",
+        "ours",
+        "a number of more than 64 bits is an error here, the largest one there",
+    ),
     (r"(setp|sets|.* =).* (yes|on|YES|ON|no|off)$", "LinuxCNC", "`yes` and `on` are bits here"),
-    (r"(un)?alias (pin|param) ", "LinuxCNC", "`alias` and `unalias` take `pin` and `param` for either"),
+    (
+        r"(un)?alias (pin|param) ",
+        "LinuxCNC",
+        "`alias` and `unalias` take `pin` and `param` for either",
+    ),
 ]
 
 
 def comparable(text):
     """The lines of stdout, without times and the order of what `save` sorts differently."""
-    lines = [re.sub(r"(\.\S*)-sig(?= |$)", r"\1", normal(line)) for line in text.splitlines() if line.strip()]  # the signal of linkpp
-    return [line for line in lines if not re.search(r"\.(tmax|time|tmax-increased)\b", line) and "__" not in line]
+    lines = [
+        re.sub(r"(\.\S*)-sig(?= |$)", r"\1", normal(line))
+        for line in text.splitlines()
+        if line.strip()
+    ]  # the signal of linkpp
+    return [
+        line
+        for line in lines
+        if not re.search(r"\.(tmax|time|tmax-increased)\b", line) and "__" not in line
+    ]
 
 
 def run_ours(hal, text, folder):
     """(stdout, stderr, status) of our halrun."""
     folder.joinpath("run.hal").write_text(text)
     halrun = hal.parent / "halrun"
-    done = subprocess.run([str(halrun), "-k", "-f", "run.hal"], cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", timeout=60, check=False,
-                          env=dict(os.environ, NO_COLOR="1", XDG_RUNTIME_DIR=str(folder)))
+    done = subprocess.run(
+        [str(halrun), "-k", "-f", "run.hal"],
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=60,
+        check=False,
+        env=dict(os.environ, NO_COLOR="1", XDG_RUNTIME_DIR=str(folder)),
+    )
     return done.stdout, done.stderr, done.returncode
 
 
@@ -186,16 +393,26 @@ def judged(netlist, failed):
 
 def compare(hal, linuxcnc, seed, accepted):
     """Lines about one random netlist; none if both agree. A line with an error is left out of the next attempt, because LinuxCNC's halcmd may have
-    done a part of the command; so the last attempt has no errors, and its output is compared as a whole."""
+    done a part of the command; so the last attempt has no errors, and its output is compared as a whole.
+    """
     netlist, lines = Generator(seed).text().splitlines(), []
     for _ in range(60):
         ours, theirs = both(hal, linuxcnc, netlist)
         failed = judged(netlist, set(ours[1]) | set(theirs[1]))
         for number in sorted((set(ours[1]) ^ set(theirs[1])) & failed):
             side = "ours" if number in ours[1] else "LinuxCNC"
-            reason = next((why for pattern, who, why in ACCEPTED if who == side and re.match(pattern, netlist[number - 1])), None)
+            reason = next(
+                (
+                    why
+                    for pattern, who, why in ACCEPTED
+                    if who == side and re.match(pattern, netlist[number - 1])
+                ),
+                None,
+            )
             if reason is None:
-                lines.append(f"netlist {seed}: {netlist[number - 1]} | error only in {side}: {ours[1].get(number) or theirs[1].get(number)}")
+                lines.append(
+                    f"netlist {seed}: {netlist[number - 1]} | error only in {side}: {ours[1].get(number) or theirs[1].get(number)}"
+                )
             else:
                 accepted.add(reason)
         if not failed:
@@ -205,6 +422,9 @@ def compare(hal, linuxcnc, seed, accepted):
         lines.append(f"netlist {seed}: exit status ours {ours[2]}, LinuxCNC {theirs[2]}")
     a, b = comparable(theirs[0]), comparable(ours[0])
     if a != b:
-        lines += [f"netlist {seed}: output {line}" for line in difflib.unified_diff(a, b, "LinuxCNC", "ours", lineterm="", n=0)]
+        lines += [
+            f"netlist {seed}: output {line}"
+            for line in difflib.unified_diff(a, b, "LinuxCNC", "ours", lineterm="", n=0)
+        ]
         lines += [f"    {line}" for line in netlist if not line.startswith("getp")]
     return lines

@@ -58,7 +58,9 @@ class SimRunner:
         environment = dict(os.environ, NO_COLOR="1")
         environment.pop("HALCYON_MODULES", None)
         if self.plugins:
-            environment["HALCYON_PLUGIN_PATH"] = ":".join(str(part) for part in (self.plugins, environment.get("HALCYON_PLUGIN_PATH")) if part)
+            environment["HALCYON_PLUGIN_PATH"] = ":".join(
+                str(part) for part in (self.plugins, environment.get("HALCYON_PLUGIN_PATH")) if part
+            )
         return environment
 
     def loadrt(self, variant):
@@ -69,8 +71,17 @@ class SimRunner:
         file = Path(folder, "run.hal")
         file.write_text(text)
         try:
-            return subprocess.run([self.hal, "sim", "--quiet", str(file)], env=self.environment(), cwd=folder, stdin=subprocess.DEVNULL,
-                                  capture_output=True, text=True, errors="replace", timeout=timeout, check=False)
+            return subprocess.run(
+                [self.hal, "sim", "--quiet", str(file)],
+                env=self.environment(),
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=timeout,
+                check=False,
+            )
         except subprocess.TimeoutExpired as error:
             raise RunError(f"a function hangs: {error}") from error
 
@@ -89,7 +100,10 @@ class SimRunner:
             csv = Path(folder, "out.csv")
             if done.returncode != 0 or not csv.exists():
                 raise RunError(done.stderr.strip() or f"status {done.returncode}")
-            rows = [[read_value(cell) for cell in line.split(",")[1:]] for line in csv.read_text().splitlines()[1:]]
+            rows = [
+                [read_value(cell) for cell in line.split(",")[1:]]
+                for line in csv.read_text().splitlines()[1:]
+            ]
             if recorded and any(len(row) != len(recorded) for row in rows):
                 raise RunError(f"a record without {len(recorded)} values: {csv.read_text()[:200]}")
             if len(rows) != cycles:
@@ -103,7 +117,7 @@ class SimRunner:
         values = output.split()
         if names and len(values) % len(names):
             raise RunError(f"{len(values)} values of {len(names)} parameters: {output[:200]}")
-        return {name: values[i::len(names)] for i, name in enumerate(names)}
+        return {name: values[i :: len(names)] for i, name in enumerate(names)}
 
     def netlist(self, folder, variant, inventory, stimulus, cycles):
         streams = stimulus.streams
@@ -113,7 +127,10 @@ class SimRunner:
         lines = [f"loadrt threads name1=t period1={PERIOD_NS}", self.loadrt(variant)]
         if streams:
             letters = "".join(LETTER[by_name[name].type] for name in streams)
-            lines += [f"loadrt --native streamer depth={cycles + 10} cfg={letters}", "addf streamer.0 t"]
+            lines += [
+                f"loadrt --native streamer depth={cycles + 10} cfg={letters}",
+                "addf streamer.0 t",
+            ]
         letters = "".join(LETTER[item.type] for item in outputs) or "b"
         lines += [f"addf {function} t" for function in functions]
         lines += [f"loadrt --native sampler depth={cycles + 10} cfg={letters}", "addf sampler.0 t"]
@@ -121,11 +138,20 @@ class SimRunner:
         lines += [f"net out-{i} {item.name} => sampler.0.pin.{i}" for i, item in enumerate(outputs)]
         signal = {item.name: f"out-{i}" for i, item in enumerate(outputs)}
         if streams:
-            folder.joinpath("in.txt").write_text("".join(" ".join(as_text(column[i]) for column in streams.values()) + "\n" for i in range(cycles)))
+            folder.joinpath("in.txt").write_text(
+                "".join(
+                    " ".join(as_text(column[i]) for column in streams.values()) + "\n"
+                    for i in range(cycles)
+                )
+            )
         segments = len(stimulus.settings)
         for number, changes in enumerate(stimulus.settings):
             for name, value in changes.items():
-                lines.append(f"sets {signal[name]} {setp_text(value)}" if name in signal else f"setp {name} {setp_text(value)}")
+                lines.append(
+                    f"sets {signal[name]} {setp_text(value)}"
+                    if name in signal
+                    else f"setp {name} {setp_text(value)}"
+                )
             if number == 0:
                 lines += [f"loadusr -w {self.hal} play in.txt"] if streams else []
                 lines.append("start")

@@ -10,28 +10,89 @@ from dataclasses import dataclass, field
 
 CLASSES = ("plain", "edges", "wild")
 SEGMENTS = 8
-FLOAT_POOL = [0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 2.0, -2.0, 10.0, -10.0, 0.001, 0.002, 0.005, 0.01, 0.1, 100.0, -100.0, 1e-9, 3.0, 0.25]
-FLOAT_WILD = [math.nan, math.inf, -math.inf, 1e300, -1e300, 1e-300, 5e-324, 2147483647.0, 2147483648.0, -2147483648.0, -2147483649.0, 4294967295.0, 4294967296.0,
-              1e18, -1e18, 9.3e18, 1e12, -1e12]
-INTEGER_POOL = {"s32": [0, 1, -1, 2, 3, 4, 5, 7, 8, -2, 10, 100, -100], "u32": [0, 1, 2, 3, 4, 5, 6, 7, 8, 15, 16, 31, 32, 100]}
-INTEGER_WILD = {"s32": [2147483647, -2147483648, 2147483646, -2147483647, 65536, 1 << 30], "u32": [4294967295, 2147483648, 2147483647, 4294967294, 65536]}
+FLOAT_POOL = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    0.5,
+    -0.5,
+    2.0,
+    -2.0,
+    10.0,
+    -10.0,
+    0.001,
+    0.002,
+    0.005,
+    0.01,
+    0.1,
+    100.0,
+    -100.0,
+    1e-9,
+    3.0,
+    0.25,
+]
+FLOAT_WILD = [
+    math.nan,
+    math.inf,
+    -math.inf,
+    1e300,
+    -1e300,
+    1e-300,
+    5e-324,
+    2147483647.0,
+    2147483648.0,
+    -2147483648.0,
+    -2147483649.0,
+    4294967295.0,
+    4294967296.0,
+    1e18,
+    -1e18,
+    9.3e18,
+    1e12,
+    -1e12,
+]
+INTEGER_POOL = {
+    "s32": [0, 1, -1, 2, 3, 4, 5, 7, 8, -2, 10, 100, -100],
+    "u32": [0, 1, 2, 3, 4, 5, 6, 7, 8, 15, 16, 31, 32, 100],
+}
+INTEGER_WILD = {
+    "s32": [2147483647, -2147483648, 2147483646, -2147483647, 65536, 1 << 30],
+    "u32": [4294967295, 2147483648, 2147483647, 4294967294, 65536],
+}
 INTEGER_POOL |= {"s64": INTEGER_POOL["s32"], "u64": INTEGER_POOL["u32"]}
-INTEGER_WILD |= {"s64": INTEGER_WILD["s32"] + [(1 << 63) - 1, -(1 << 63), 1 << 53], "u64": INTEGER_WILD["u32"] + [(1 << 64) - 1, 1 << 63, 1 << 53]}
+INTEGER_WILD |= {
+    "s64": INTEGER_WILD["s32"] + [(1 << 63) - 1, -(1 << 63), 1 << 53],
+    "u64": INTEGER_WILD["u32"] + [(1 << 64) - 1, 1 << 63, 1 << 53],
+}
 HOLD = {"plain": [1, 2, 5, 20, 100, 300], "edges": [1, 2, 3, 7, 40, 200], "wild": [1, 3, 20, 200]}
 
 
 # Values with which a component does what it is for: (component, end of the name): values, in every class.
 USEFUL = {
-    ("histobins", "binsize"): [0.1, 1.0, 5.0], ("histobins", "nbins"): [4, 20, 200], ("histobins", "pintype"): [0, 1, 2, 3],
+    ("histobins", "binsize"): [0.1, 1.0, 5.0],
+    ("histobins", "nbins"): [4, 20, 200],
+    ("histobins", "pintype"): [0, 1, 2, 3],
     ("lcd", "page_num"): [0],
-    ("limit2", "maxv"): [1.0, 50.0, 0.1], ("limit3", "maxv"): [1.0, 50.0], ("limit3", "maxa"): [10.0, 500.0],
-    ("ohmic", "thcad-0-volt-freq"): [121.0, 140000.0], ("ohmic", "thcad-max-volt-freq"): [925.0, 920000.0], ("ohmic", "thcad-fullscale"): [5.0, 10.0, 300.0],
-    ("ohmic", "thcad-divide"): [1.0, 32.0], ("ohmic", "velocity-in"): [121.0, 500.0, 10000.0, 925.0, 100.0],
-    ("spindle", "select-gear"): [0], ("spindle", "max.0"): [0.0, 3000.0], ("spindle", "accel.0"): [0.0, 500.0], ("spindle", "decel.0"): [0.0, 800.0],
-    ("spindle", "commanded-speed"): [0.0, 100.0, 1200.0, -500.0], ("spindle", "min.0"): [0.0, 60.0],
-    ("simple_tp", "maxvel"): [0.5, 2.0, 30.0, 1e-3], ("simple_tp", "maxaccel"): [1.0, 20.0, 400.0],
+    ("limit2", "maxv"): [1.0, 50.0, 0.1],
+    ("limit3", "maxv"): [1.0, 50.0],
+    ("limit3", "maxa"): [10.0, 500.0],
+    ("ohmic", "thcad-0-volt-freq"): [121.0, 140000.0],
+    ("ohmic", "thcad-max-volt-freq"): [925.0, 920000.0],
+    ("ohmic", "thcad-fullscale"): [5.0, 10.0, 300.0],
+    ("ohmic", "thcad-divide"): [1.0, 32.0],
+    ("ohmic", "velocity-in"): [121.0, 500.0, 10000.0, 925.0, 100.0],
+    ("spindle", "select-gear"): [0],
+    ("spindle", "max.0"): [0.0, 3000.0],
+    ("spindle", "accel.0"): [0.0, 500.0],
+    ("spindle", "decel.0"): [0.0, 800.0],
+    ("spindle", "commanded-speed"): [0.0, 100.0, 1200.0, -500.0],
+    ("spindle", "min.0"): [0.0, 60.0],
+    ("simple_tp", "maxvel"): [0.5, 2.0, 30.0, 1e-3],
+    ("simple_tp", "maxaccel"): [1.0, 20.0, 400.0],
     ("steptest", "maxvel"): [1.0, 20.0],
-    ("watchdog", "timeout-0"): [0.002, 0.01, 0.0035], ("watchdog", "timeout-1"): [0.3, 0.05],
+    ("watchdog", "timeout-0"): [0.002, 0.01, 0.0035],
+    ("watchdog", "timeout-1"): [0.3, 0.05],
 }
 
 
@@ -46,14 +107,14 @@ def useful_values(component, name):
 class Stimulus:
     kind: str
     seed: str
-    streams: dict = field(default_factory=dict)        # pin: [value of each cycle]
-    settings: list = field(default_factory=list)       # of each segment: {name: value}
+    streams: dict = field(default_factory=dict)  # pin: [value of each cycle]
+    settings: list = field(default_factory=list)  # of each segment: {name: value}
 
     def setting(self, name, cycle, cycles):
         """The value of a setting in a cycle; None: its default."""
         segment = cycle * len(self.settings) // cycles
         value = None
-        for changes in self.settings[:segment + 1]:
+        for changes in self.settings[: segment + 1]:
             value = changes.get(name, value)
         return value
 
@@ -62,7 +123,11 @@ def bit_stream(rng, cycles, kind):
     hold = rng.choice(HOLD[kind] + [10**9])
     level, values = rng.random() < 0.5, []
     while len(values) < cycles:
-        length = hold if hold >= 10**9 or rng.random() < 0.2 else max(1, round(rng.expovariate(1 / hold)))
+        length = (
+            hold
+            if hold >= 10**9 or rng.random() < 0.2
+            else max(1, round(rng.expovariate(1 / hold)))
+        )
         values += [level] * min(length, cycles - len(values))
         level = not level
     return values
@@ -136,7 +201,9 @@ def random_stimulus(inventory, variant, kind, seed, cycles, segments=SEGMENTS):
     for item in inventory.pins("IN"):
         useful = useful_values(variant.component, item.name)
         if useful and rng.random() < (1.0 if kind == "plain" else 0.7):
-            result.streams[item.name] = held_stream(rng, cycles, kind, lambda values=useful: rng.choice(values))
+            result.streams[item.name] = held_stream(
+                rng, cycles, kind, lambda values=useful: rng.choice(values)
+            )
             continue
         if item.type in ("bit", "float", "s32", "u32", "s64", "u64") and rng.random() < 0.85:
             result.streams[item.name] = stream(rng, item.type, cycles, kind, pool)
@@ -148,7 +215,11 @@ def random_stimulus(inventory, variant, kind, seed, cycles, segments=SEGMENTS):
         if useful:
             result.settings[0][item.name] = rng.choice(useful)
         for segment in range(segments):
-            chance = {"plain": 0.15 if item.kind == "pin" else 0.0, "edges": 0.5 if segment == 0 else 0.12, "wild": 0.5 if segment == 0 else 0.2}[kind]
+            chance = {
+                "plain": 0.15 if item.kind == "pin" else 0.0,
+                "edges": 0.5 if segment == 0 else 0.12,
+                "wild": 0.5 if segment == 0 else 0.2,
+            }[kind]
             if rng.random() < chance and not (useful and (segment == 0 or rng.random() < 0.7)):
                 result.settings[segment][item.name] = setting_value(rng, item, kind, pool)
     return result

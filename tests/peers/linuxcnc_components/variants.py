@@ -6,6 +6,7 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Variant:
     """A component with the arguments of its `loadrt`."""
+
     component: str
     arguments: str = ""
 
@@ -31,11 +32,27 @@ ARGUMENTS = {
     "gearchange": [""],
     "lcd": ["fmt_strings=%d"],
     "lincurve": ["personality=2", "personality=4"],
-    "logic": ["personality=0x102", "personality=0x204", "personality=0x403", "personality=0x703", "personality=0x804", "personality=0x1002", "personality=0x1805"],
+    "logic": [
+        "personality=0x102",
+        "personality=0x204",
+        "personality=0x403",
+        "personality=0x703",
+        "personality=0x804",
+        "personality=0x1002",
+        "personality=0x1805",
+    ],
     "matrix_kb": ["config=2x3", "config=4x4s"],
     "message": ['names=message.0 messages="hello"'],
     "multiswitch": ["personality=3"],
-    "mux_generic": ["config=bb2", "config=ff3", "config=su4", "config=uf2", "config=fs2", "config=bs3", "config=fb2"],
+    "mux_generic": [
+        "config=bb2",
+        "config=ff3",
+        "config=su4",
+        "config=uf2",
+        "config=fs2",
+        "config=bs3",
+        "config=fb2",
+    ],
     "pid": ["num_chan=1", "num_chan=1 debug=1"],
     "pwmgen": ["output_type=0", "output_type=1", "output_type=2"],
     "sampler": ["depth=5 cfg=bfsu"],

@@ -8,8 +8,12 @@ from .inventory import number
 class View:
     def __init__(self, inventory, stimulus, cycles):
         self.stimulus, self.cycles = stimulus, cycles
-        self.given = [item for item in inventory.items.values() if item.direction in ("IN", "I/O", "RW")]
-        self.defaults = {item.name: number(item.value) for item in self.given if item.type != "port"}
+        self.given = [
+            item for item in inventory.items.values() if item.direction in ("IN", "I/O", "RW")
+        ]
+        self.defaults = {
+            item.name: number(item.value) for item in self.given if item.type != "port"
+        }
         self.cycle = 0
 
     def at(self, cycle):
@@ -44,7 +48,9 @@ class View:
 
     def invalid(self, *endings):
         """True if one of them is NaN or infinite."""
-        return any(isinstance(value, float) and not math.isfinite(value) for value in self.all(*endings))
+        return any(
+            isinstance(value, float) and not math.isfinite(value) for value in self.all(*endings)
+        )
 
     def beyond(self, limit, *endings):
         """True if one of them is NaN or beyond ±limit."""

@@ -25,7 +25,11 @@ def errors(channel):
 
 class Machine:
     def __init__(self, ini):
-        self.command, self.status, self.channel = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
+        self.command, self.status, self.channel = (
+            linuxcnc.command(),
+            linuxcnc.stat(),
+            linuxcnc.error_channel(),
+        )
         self.ini = linuxcnc.ini(ini)
         self.status.poll()
 
@@ -36,7 +40,10 @@ class Machine:
             if condition(self.status):
                 return
             if time.monotonic() > end:
-                raise Failed(f"{what}: not within {LIMIT:.0f} s" + "".join(f"; {text}" for text in errors(self.channel)))
+                raise Failed(
+                    f"{what}: not within {LIMIT:.0f} s"
+                    + "".join(f"; {text}" for text in errors(self.channel))
+                )
             time.sleep(0.02)
 
     def on(self):
@@ -54,7 +61,11 @@ class Machine:
         self.command.wait_complete()
         if any(self.ini.find(f"JOINT_{joint}", "HOME_SEQUENCE") is not None for joint in joints):
             self.command.home(-1)
-            single = [joint for joint in joints if self.ini.find(f"JOINT_{joint}", "HOME_SEQUENCE") is None]
+            single = [
+                joint
+                for joint in joints
+                if self.ini.find(f"JOINT_{joint}", "HOME_SEQUENCE") is None
+            ]
         else:
             single = list(joints)
         sequenced = [joint for joint in joints if joint not in single]

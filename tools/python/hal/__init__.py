@@ -16,7 +16,20 @@ import sys
 
 from hal import _core
 from hal._base import *  # noqa: F403
-from hal._base import (_BY_DIR, _BY_NAME, _TYPES, _ask, _run, _value, _word, MSG_ERR, InvalidArgument, Type, UnknownPin, error)
+from hal._base import (
+    _BY_DIR,
+    _BY_NAME,
+    _TYPES,
+    _ask,
+    _run,
+    _value,
+    _word,
+    MSG_ERR,
+    InvalidArgument,
+    Type,
+    UnknownPin,
+    error,
+)
 from hal._component import Pin, component  # noqa: F401
 from hal._probe import probe  # noqa: F401
 from hal._stream import stream  # noqa: F401
@@ -25,8 +38,16 @@ _msg_level = MSG_ERR
 
 # --- functions of the module ------------------------------------------------------------------------------------------------
 
+
 def _objects(kind, name):
-    return next((one for one in _ask(describe=kind, patterns=[name])["objects"] if name in (one["name"], one.get("alias"))), None)
+    return next(
+        (
+            one
+            for one in _ask(describe=kind, patterns=[name])["objects"]
+            if name in (one["name"], one.get("alias"))
+        ),
+        None,
+    )
 
 
 def component_exists(name):
@@ -100,8 +121,15 @@ sets = set_s
 
 
 def _info(kind, rows):
-    return [{"NAME": one["name"], "VALUE": _value(one["value"], _BY_NAME[one["type"]]), "TYPE": int(_BY_NAME[one["type"]]), **rows(one)}
-            for one in _ask(describe=kind)["objects"]]
+    return [
+        {
+            "NAME": one["name"],
+            "VALUE": _value(one["value"], _BY_NAME[one["type"]]),
+            "TYPE": int(_BY_NAME[one["type"]]),
+            **rows(one),
+        }
+        for one in _ask(describe=kind)["objects"]
+    ]
 
 
 def get_info_pins():

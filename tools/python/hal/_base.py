@@ -49,20 +49,40 @@ class Dir(enum.IntEnum):
     RW = 192
 
 
-HAL_BIT, HAL_FLOAT, HAL_S32, HAL_U32, HAL_PORT, HAL_S64, HAL_U64 = (int(t) for t in (Type.BIT, Type.FLOAT, Type.S32, Type.U32, Type.PORT, Type.S64, Type.U64))
+HAL_BIT, HAL_FLOAT, HAL_S32, HAL_U32, HAL_PORT, HAL_S64, HAL_U64 = (
+    int(t) for t in (Type.BIT, Type.FLOAT, Type.S32, Type.U32, Type.PORT, Type.S64, Type.U64)
+)
 HAL_IN, HAL_OUT, HAL_IO, HAL_RO, HAL_RW = (int(d) for d in Dir)
 MSG_NONE, MSG_ERR, MSG_WARN, MSG_INFO, MSG_DBG, MSG_ALL = range(6)
-RTAPI_MSG_NONE, RTAPI_MSG_ERR, RTAPI_MSG_WARN, RTAPI_MSG_INFO, RTAPI_MSG_DBG, RTAPI_MSG_ALL = range(6)
+RTAPI_MSG_NONE, RTAPI_MSG_ERR, RTAPI_MSG_WARN, RTAPI_MSG_INFO, RTAPI_MSG_DBG, RTAPI_MSG_ALL = range(
+    6
+)
 is_kernelspace, is_userspace, is_rt, is_sim = 0, 1, 1, 0
-streamer_base, sampler_base = 0x48535430, 0x48534130  # as in LinuxCNC, whose modules have their streams under these keys
+streamer_base, sampler_base = (
+    0x48535430,
+    0x48534130,
+)  # as in LinuxCNC, whose modules have their streams under these keys
 
 # the protocol's names and the numbers of the runtime's types
-_TYPES = {Type.BIT: ("bit", 0), Type.FLOAT: ("float", 1), Type.S32: ("s32", 2), Type.U32: ("u32", 3), Type.S64: ("s64", 4), Type.U64: ("u64", 5),
-          Type.PORT: ("port", 6)}
+_TYPES = {
+    Type.BIT: ("bit", 0),
+    Type.FLOAT: ("float", 1),
+    Type.S32: ("s32", 2),
+    Type.U32: ("u32", 3),
+    Type.S64: ("s64", 4),
+    Type.U64: ("u64", 5),
+    Type.PORT: ("port", 6),
+}
 _BY_NAME = {name: kind for kind, (name, _) in _TYPES.items()}
 _BY_NUMBER = {number: kind for kind, (_, number) in _TYPES.items()}
 _DIRS = {Dir.IN: "in", Dir.OUT: "out", Dir.IO: "io", Dir.RO: "ro", Dir.RW: "rw"}
-_BY_DIR = {word: dir for dir, word in _DIRS.items()} | {"IN": Dir.IN, "OUT": Dir.OUT, "I/O": Dir.IO, "RO": Dir.RO, "RW": Dir.RW}
+_BY_DIR = {word: dir for dir, word in _DIRS.items()} | {
+    "IN": Dir.IN,
+    "OUT": Dir.OUT,
+    "I/O": Dir.IO,
+    "RO": Dir.RO,
+    "RW": Dir.RW,
+}
 
 _link = _core.Link()
 
@@ -81,8 +101,10 @@ def _ask(**body):
 
 def _run(command, *words):
     """Runs one command of the shell and returns its output; raises its error."""
+
     def quoted(word):
         return f'"{word}"' if any(c in word for c in " \t$[]{}#'") else word
+
     reply = _ask(run=" ".join([command, *(quoted(str(word)) for word in words)]), name="<python>")
     if reply["status"] != 0:
         raise error(reply["err"].strip() or f"{command} failed")
@@ -95,7 +117,15 @@ def _value(value, kind):
 
 
 def _word(value):
-    return "TRUE" if value is True else "FALSE" if value is False else repr(value) if isinstance(value, float) else str(value)
+    return (
+        "TRUE"
+        if value is True
+        else "FALSE"
+        if value is False
+        else repr(value)
+        if isinstance(value, float)
+        else str(value)
+    )
 
 
 def _plain(value):

@@ -6,13 +6,34 @@ import signal
 import threading
 
 from hal import _core
-from hal._base import (_BY_DIR, _BY_NUMBER, _DIRS, _TYPES, _good, _plain, HAL_BIT, HAL_IN, HAL_IO, HAL_OUT, HAL_PORT, HAL_RO, HAL_RW, Dir,
-                       InvalidArgument, Type, WrongKind, error)
+from hal._base import (
+    _BY_DIR,
+    _BY_NUMBER,
+    _DIRS,
+    _TYPES,
+    _good,
+    _plain,
+    HAL_BIT,
+    HAL_IN,
+    HAL_IO,
+    HAL_OUT,
+    HAL_PORT,
+    HAL_RO,
+    HAL_RW,
+    Dir,
+    InvalidArgument,
+    Type,
+    WrongKind,
+    error,
+)
 
 
 def _interrupt_on_sigterm():
     """Raises KeyboardInterrupt on SIGTERM, so that a program that handles Ctrl-C also cleans up when it is unloaded."""
-    if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
+    if (
+        threading.current_thread() is threading.main_thread()
+        and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    ):
         signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
@@ -81,7 +102,9 @@ class Pin:
 
     def write(self, data):
         """Writes all bytes and returns True, or writes nothing and returns False when the port has too little space."""
-        return self._port(write=(data.encode() if isinstance(data, str) else bytes(data)).hex())["done"]
+        return self._port(write=(data.encode() if isinstance(data, str) else bytes(data)).hex())[
+            "done"
+        ]
 
     def clear(self):
         self.read(self.readable())
@@ -103,15 +126,26 @@ class component:
         if lost not in ("end", "stay"):
             raise ValueError(f"invalid lost={lost!r}; use 'end' or 'stay'")
         object.__setattr__(self, "_ready", False)
-        object.__setattr__(self, "_core", _core.Component(name, prefix if prefix is not None else name, -1 if timeout is None else int(timeout * 1000),
-                                                          max(1, int(every * 1000)) if every else 0, lost == "end"))
+        object.__setattr__(
+            self,
+            "_core",
+            _core.Component(
+                name,
+                prefix if prefix is not None else name,
+                -1 if timeout is None else int(timeout * 1000),
+                max(1, int(every * 1000)) if every else 0,
+                lost == "end",
+            ),
+        )
         object.__setattr__(self, "_safe", safe)
         object.__setattr__(self, "_name", name)
         _interrupt_on_sigterm()
 
     def _new(self, name, kind, dir, safe, doc, unit):
         if self._ready:
-            raise error(f"Invalid argument: component {self._name!r} is ready; create pins and parameters before ready() or after unready()")
+            raise error(
+                f"Invalid argument: component {self._name!r} is ready; create pins and parameters before ready() or after unready()"
+            )
         if kind not in Type.__members__.values():
             raise InvalidArgument(f"Invalid argument: {kind!r} is not a HAL type")
         word, number = _TYPES[Type(kind)]
@@ -124,12 +158,16 @@ class component:
 
     def newpin(self, name, type, dir, *, safe=None, doc="", unit=""):
         if dir not in (HAL_IN, HAL_OUT, HAL_IO):
-            raise InvalidArgument(f"Invalid argument: invalid direction of pin {name!r}; use HAL_IN, HAL_OUT or HAL_IO")
+            raise InvalidArgument(
+                f"Invalid argument: invalid direction of pin {name!r}; use HAL_IN, HAL_OUT or HAL_IO"
+            )
         return self._new(name, type, dir, safe, doc, unit)
 
     def newparam(self, name, type, dir, *, safe=None, doc="", unit=""):
         if dir not in (HAL_RO, HAL_RW):
-            raise InvalidArgument(f"Invalid argument: invalid direction of parameter {name!r}; use HAL_RO or HAL_RW")
+            raise InvalidArgument(
+                f"Invalid argument: invalid direction of parameter {name!r}; use HAL_RO or HAL_RW"
+            )
         return self._new(name, type, dir, safe, doc, unit)
 
     def ready(self):

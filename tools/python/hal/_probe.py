@@ -2,7 +2,14 @@
 """Probes: values of a running machine, sampled at the end of each cycle, as arrays."""
 from hal import _core
 
-_FORMATS = {"f": "d", "s": "q", "l": "q", "b": "Q", "u": "Q", "k": "Q"}  # of memoryview, 8 bytes each
+_FORMATS = {
+    "f": "d",
+    "s": "q",
+    "l": "q",
+    "b": "Q",
+    "u": "Q",
+    "k": "Q",
+}  # of memoryview, 8 bytes each
 
 
 class Rows:
@@ -15,11 +22,18 @@ class Rows:
     def __init__(self, columns, thread, numbers, count, lost, data):
         self.thread, self.lost, self._count = thread, lost, count
         self._data, self._stride = memoryview(data), len(numbers) + 2
-        self._at = {columns[number][0]: (2 + i, _FORMATS[columns[number][1]]) for i, number in enumerate(numbers)}
+        self._at = {
+            columns[number][0]: (2 + i, _FORMATS[columns[number][1]])
+            for i, number in enumerate(numbers)
+        }
         self.cycle, self.time_ns = self._array(0, "Q"), self._array(1, "q")
 
     def _array(self, word, letter):
-        return self._data.cast(letter)[word::self._stride] if self._count else memoryview(b"").cast(letter)
+        return (
+            self._data.cast(letter)[word :: self._stride]
+            if self._count
+            else memoryview(b"").cast(letter)
+        )
 
     @property
     def names(self):
@@ -46,7 +60,9 @@ class probe:
     """
 
     def __init__(self, names, every=1, batch_ms=20, buffer_ms=2000):
-        self._core = _core.Probe([names] if isinstance(names, str) else list(names), every, batch_ms, buffer_ms)
+        self._core = _core.Probe(
+            [names] if isinstance(names, str) else list(names), every, batch_ms, buffer_ms
+        )
         self._columns = self._core.columns()
         self._waiting, self._lost = [], 0
 

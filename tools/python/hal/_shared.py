@@ -12,7 +12,14 @@ class _Handle(ctypes.Structure):
 
 
 class _Value(ctypes.Union):
-    _fields_ = [("f", ctypes.c_double), ("b", ctypes.c_bool), ("s", ctypes.c_int32), ("u", ctypes.c_uint32), ("l", ctypes.c_int64), ("k", ctypes.c_uint64)]
+    _fields_ = [
+        ("f", ctypes.c_double),
+        ("b", ctypes.c_bool),
+        ("s", ctypes.c_int32),
+        ("u", ctypes.c_uint32),
+        ("l", ctypes.c_int64),
+        ("k", ctypes.c_uint64),
+    ]
 
 
 _LETTERS = {1: "b", 2: "f", 3: "s", 4: "u", 6: "l", 7: "k"}
@@ -36,7 +43,13 @@ class Shared:
     def open(cls, key, types):
         library = _library()
         it, handle = cls(), _Handle()
-        if library is None or library.hal_stream_attach(ctypes.byref(handle), 0, key, types.encode() if types else None) != 0:
+        if (
+            library is None
+            or library.hal_stream_attach(
+                ctypes.byref(handle), 0, key, types.encode() if types else None
+            )
+            != 0
+        ):
             return None
         library.hal_stream_readable.restype = library.hal_stream_writable.restype = ctypes.c_bool
         it._library, it._handle = library, handle
@@ -70,7 +83,9 @@ class Shared:
         number = ctypes.c_uint()
         if self._call("read", self._row, ctypes.byref(number)) != 0:
             return None
-        return number.value, tuple(getattr(value, letter) for value, letter in zip(self._row, self.types))
+        return number.value, tuple(
+            getattr(value, letter) for value, letter in zip(self._row, self.types)
+        )
 
     def write(self, record):
         """Returns False when the stream is full."""

@@ -22,8 +22,19 @@ class stream:
             if letter.lower() not in "bfsulk":
                 raise ValueError(f"invalid column type {letter!r}; use b, f, s, u, l or k")
         types = types.lower() if types else None
-        base = next((word for word, first in (("sampler", sampler_base), ("streamer", streamer_base)) if 0 <= key - first < 64), None)
-        self._name = f"{base}.{key - (sampler_base if base == 'sampler' else streamer_base)}" if base else f"stream.{key}"
+        base = next(
+            (
+                word
+                for word, first in (("sampler", sampler_base), ("streamer", streamer_base))
+                if 0 <= key - first < 64
+            ),
+            None,
+        )
+        self._name = (
+            f"{base}.{key - (sampler_base if base == 'sampler' else streamer_base)}"
+            if base
+            else f"stream.{key}"
+        )
         self._comp, self._waiting, self._taken = comp._core, [], 0
         self.num_overruns = self.num_underruns = self.sampleno = 0
         self._shared = None
@@ -32,7 +43,9 @@ class stream:
         else:
             about = self._find(key, types)
             if types is not None and types != about["types"]:
-                raise StreamError(f"stream {self._name} has column types {about['types']}, not {types}")
+                raise StreamError(
+                    f"stream {self._name} has column types {about['types']}, not {types}"
+                )
         self._types, self.maxdepth = about["types"], about["depth"]
 
     def _find(self, key, types):
@@ -60,7 +73,11 @@ class stream:
 
     @property
     def readable(self):
-        return self._shared.readable if self._shared else bool(self._waiting) or self._ask()["waiting"] > 0
+        return (
+            self._shared.readable
+            if self._shared
+            else bool(self._waiting) or self._ask()["waiting"] > 0
+        )
 
     @property
     def writable(self):
@@ -82,12 +99,19 @@ class stream:
             return None
         number, record = self._waiting.pop()
         self.sampleno = number if self._shared else number + 1
-        return tuple(float(value) if letter == "f" else value for letter, value in zip(self._types, record))
+        return tuple(
+            float(value) if letter == "f" else value for letter, value in zip(self._types, record)
+        )
 
     def write(self, record):
-        row = [bool(value) if letter == "b" else _plain(float(value)) if letter == "f" else int(value) for letter, value in zip(self._types, record)]
+        row = [
+            bool(value) if letter == "b" else _plain(float(value)) if letter == "f" else int(value)
+            for letter, value in zip(self._types, record)
+        ]
         if len(row) != len(self._types) or len(record) != len(row):
-            raise ValueError(f"the record has {len(record)} values, but stream {self._name} has {len(self._types)} columns")
+            raise ValueError(
+                f"the record has {len(record)} values, but stream {self._name} has {len(self._types)} columns"
+            )
         if not self._shared.write(row) if self._shared else self._ask(records=[row])["taken"] == 0:
             self.num_overruns += 1
             raise StreamError(errno.ENOSPC, f"stream {self._name} is full")

@@ -26,8 +26,14 @@ def _pin_rows(kind, word, name, ids):
     rows = {}
     for one in _ask(kind, name):
         kind_of = hal._BY_NAME[one["type"]]
-        row = {"haltype": word, "name": one["name"], "type": kind_of, "dir": hal._BY_DIR[one["dir"]], "value": hal._value(one["value"], kind_of),
-               "alias": one.get("alias")}
+        row = {
+            "haltype": word,
+            "name": one["name"],
+            "type": kind_of,
+            "dir": hal._BY_DIR[one["dir"]],
+            "value": hal._value(one["value"], kind_of),
+            "alias": one.get("alias"),
+        }
         if word == "pin":
             row["signal"] = one.get("signal")
         comp = one.get("component", "threads")
@@ -57,8 +63,16 @@ def _signal_rows(name=None):
     for one in _ask("sig", name):
         kind = hal._BY_NAME[one["type"]]
         words = [dirs.get(pin_name) for pin_name in one["pins"]]
-        rows[one["name"]] = {"haltype": "signal", "name": one["name"], "type": kind, "value": hal._value(one["value"], kind), "writers": words.count("OUT"),
-                             "readers": words.count("IN"), "bidirs": words.count("I/O"), "driver": one.get("writer")}
+        rows[one["name"]] = {
+            "haltype": "signal",
+            "name": one["name"],
+            "type": kind,
+            "value": hal._value(one["value"], kind),
+            "writers": words.count("OUT"),
+            "readers": words.count("IN"),
+            "bidirs": words.count("I/O"),
+            "driver": one.get("writer"),
+        }
     return rows
 
 
@@ -72,13 +86,25 @@ def signal(name):
 
 def signalpins(name):
     about = next((one for one in _ask("sig", name) if one["name"] == name), None)
-    return None if about is None else {one: row for one, row in pins().items() if one in about["pins"]}
+    return (
+        None if about is None else {one: row for one, row in pins().items() if one in about["pins"]}
+    )
 
 
 def comps():
     ids = _ids()
-    return {one["name"]: {"haltype": "component", "name": one["name"], "type": CompType.USER if "pid" in one else CompType.REALTIME, "id": ids[one["name"]],
-                          "pid": one.get("pid", 0), "ready": one.get("ready", True), "insmod": " ".join(one.get("loaded", [])) or None} for one in _ask("comp")}
+    return {
+        one["name"]: {
+            "haltype": "component",
+            "name": one["name"],
+            "type": CompType.USER if "pid" in one else CompType.REALTIME,
+            "id": ids[one["name"]],
+            "pid": one.get("pid", 0),
+            "ready": one.get("ready", True),
+            "insmod": " ".join(one.get("loaded", [])) or None,
+        }
+        for one in _ask("comp")
+    }
 
 
 def comp(which):
@@ -87,8 +113,17 @@ def comp(which):
 
 def functs():
     ids = _ids()
-    return {one["name"]: {"haltype": "function", "name": one["name"], "comp": one["component"], "comp_id": ids.get(one["component"], 0),
-                          "users": int("thread" in one), "reentrant": False} for one in _ask("funct")}
+    return {
+        one["name"]: {
+            "haltype": "function",
+            "name": one["name"],
+            "comp": one["component"],
+            "comp_id": ids.get(one["component"], 0),
+            "users": int("thread" in one),
+            "reentrant": False,
+        }
+        for one in _ask("funct")
+    }
 
 
 def funct(name):
@@ -99,10 +134,20 @@ def threads():
     ids = _ids()
     rows = {}
     for one in _ask("thread"):
-        functions = [{"haltype": "threadfunction", "name": function, "index": index, "is_init": is_init}
-                     for is_init in (True, False) for index, function in enumerate(one["init" if is_init else "functions"])]
-        rows[one["name"]] = {"haltype": "thread", "name": one["name"], "comp": "threads", "comp_id": ids.get("threads", 0), "priority": 0,
-                             "period": one["period_ns"], "functions": functions}
+        functions = [
+            {"haltype": "threadfunction", "name": function, "index": index, "is_init": is_init}
+            for is_init in (True, False)
+            for index, function in enumerate(one["init" if is_init else "functions"])
+        ]
+        rows[one["name"]] = {
+            "haltype": "thread",
+            "name": one["name"],
+            "comp": "threads",
+            "comp_id": ids.get("threads", 0),
+            "priority": 0,
+            "period": one["period_ns"],
+            "functions": functions,
+        }
     return rows
 
 
