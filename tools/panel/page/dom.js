@@ -3,71 +3,87 @@
 
 /// Makes an element: h('p', {class: 'x', onclick: f}, 'text', child).
 export function h(name, options = {}, ...children) {
-  const element = document.createElement(name);
-  for (const [key, value] of Object.entries(options)) {
-    if (value === undefined || value === null || value === false) continue;
-    if (key.startsWith('on')) element.addEventListener(key.slice(2), value);
-    else if (key in element && typeof value !== 'string') element[key] = value;
-    else element.setAttribute(key, value);
-  }
-  element.append(...children.flat(9).filter(child => child !== null && child !== undefined && child !== false));
-  return element;
+    const element = document.createElement(name);
+    for (const [key, value] of Object.entries(options)) {
+        if (value === undefined || value === null || value === false) continue;
+        if (key.startsWith('on'))
+            element.addEventListener(key.slice(2), value);
+        else if (key in element && typeof value !== 'string')
+            element[key] = value;
+        else
+            element.setAttribute(key, value);
+    }
+    element.append(...children.flat(9).filter(
+        child => child !== null && child !== undefined && child !== false));
+    return element;
 }
 
 /// Sets a text only when it differs: the browser then has nothing to lay out.
 export function text(element, value) {
-  if (element.textContent !== value) element.textContent = value;
+    if (element.textContent !== value) element.textContent = value;
 }
 
 export function number(value) {
-  if (value === null || value === undefined) return '–';
-  if (typeof value === 'boolean') return value ? 'TRUE' : 'FALSE';
-  if (typeof value === 'string') return value;
-  if (Number.isInteger(value)) return String(value);
-  const size = Math.abs(value);
-  return size !== 0 && (size < 1e-4 || size >= 1e7) ? value.toExponential(4) : String(Number(value.toPrecision(7)));
+    if (value === null || value === undefined) return '–';
+    if (typeof value === 'boolean') return value ? 'TRUE' : 'FALSE';
+    if (typeof value === 'string') return value;
+    if (Number.isInteger(value)) return String(value);
+    const size = Math.abs(value);
+    return size !== 0 && (size < 1e-4 || size >= 1e7) ? value.toExponential(4) :
+                                                        String(Number(value.toPrecision(7)));
 }
 
 /// A duration in ns with a unit.
 export function duration(ns) {
-  if (!(ns > 0)) return '0';
-  for (const [limit, factor, unit] of [[1e3, 1, 'ns'], [1e6, 1e3, 'µs'], [1e9, 1e6, 'ms'], [Infinity, 1e9, 's']])
-    if (ns < limit) return `${Number((ns / factor).toPrecision(3))} ${unit}`;
+    if (!(ns > 0)) return '0';
+    for (const [limit, factor, unit] of [
+             [1e3, 1, 'ns'], [1e6, 1e3, 'µs'], [1e9, 1e6, 'ms'], [Infinity, 1e9, 's']])
+        if (ns < limit) return `${Number((ns / factor).toPrecision(3))} ${unit}`;
 }
 
-export const colour = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-export const typeColour = type => colour(type === 'bit' ? '--t-bit' : type === 'float' ? '--t-float' : type === 'port' ? '--t-port' : '--t-int');
+export const colour = name =>
+    getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+export const typeColour = type => colour(
+    type === 'bit'       ? '--t-bit' :
+        type === 'float' ? '--t-float' :
+        type === 'port'  ? '--t-port' :
+                           '--t-int');
 
 export const dark = matchMedia('(prefers-color-scheme: dark)');
-dark.addEventListener('change', () => { for (const canvas of document.querySelectorAll('canvas')) canvas.dispatchEvent(new Event('redraw')); });
+dark.addEventListener('change', () => {
+    for (const canvas of document.querySelectorAll('canvas'))
+        canvas.dispatchEvent(new Event('redraw'));
+});
 
-/// Prepares a canvas for drawing in CSS pixels at the screen's resolution; draw() is called once per frame after request(). Redraws at a change of size.
-/// `opaque`: draw() paints every pixel.
+/// Prepares a canvas for drawing in CSS pixels at the screen's resolution; draw() is called once
+/// per frame after request(). Redraws at a change of size. `opaque`: draw() paints every pixel.
 export function surface(canvas, draw, opaque = false) {
-  let asked = false;
-  const paint = () => {
-    asked = false;
-    if (!canvas.isConnected) return;
-    const ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
-    if (width === 0 || height === 0) return;
-    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-      canvas.width = Math.round(width * ratio);
-      canvas.height = Math.round(height * ratio);
-    }
-    const context = canvas.getContext('2d', {alpha: !opaque});
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    if (!opaque) context.clearRect(0, 0, width, height);
-    draw(context, width, height, ratio);
-  };
-  const request = () => {
-    if (!asked) requestAnimationFrame(paint);
-    asked = true;
-  };
-  const watch = new ResizeObserver(request);
-  watch.observe(canvas);
-  canvas.addEventListener('redraw', request);
-  request();
-  return {request, end: () => watch.disconnect()};
+    let asked = false;
+    const paint = () => {
+        asked = false;
+        if (!canvas.isConnected) return;
+        const ratio = devicePixelRatio || 1, width = canvas.clientWidth,
+              height = canvas.clientHeight;
+        if (width === 0 || height === 0) return;
+        if (canvas.width !== Math.round(width * ratio) ||
+            canvas.height !== Math.round(height * ratio)) {
+            canvas.width = Math.round(width * ratio);
+            canvas.height = Math.round(height * ratio);
+        }
+        const context = canvas.getContext('2d', {alpha: !opaque});
+        context.setTransform(ratio, 0, 0, ratio, 0, 0);
+        if (!opaque) context.clearRect(0, 0, width, height);
+        draw(context, width, height, ratio);
+    };
+    const request = () => {
+        if (!asked) requestAnimationFrame(paint);
+        asked = true;
+    };
+    const watch = new ResizeObserver(request);
+    watch.observe(canvas);
+    canvas.addEventListener('redraw', request);
+    request();
+    return {request, end: () => watch.disconnect()};
 }
 
 export function announce(message) { document.getElementById('announce').textContent = message; }

@@ -1,178 +1,240 @@
 // SPDX-License-Identifier: MIT
-// The connection to the server: requests with replies, subscriptions that survive a restart of the machine, the state of both.
+// The connection to the server: requests with replies, subscriptions that survive a restart of the
+// machine, the state of both.
 
 const listeners = new Map();  // event -> Set of functions
 export function on(event, act) {
-  if (!listeners.has(event)) listeners.set(event, new Set());
-  listeners.get(event).add(act);
-  return () => listeners.get(event).delete(act);
+    if (!listeners.has(event)) listeners.set(event, new Set());
+    listeners.get(event).add(act);
+    return () => listeners.get(event).delete(act);
 }
 function emit(event, data, payload) {
-  for (const act of [...(listeners.get(event) ?? [])]) act(data, payload);
+    for (const act of [...(listeners.get(event) ?? [])])
+        act(data, payload);
 }
 
-export const state = {server: 'connecting', machine: false, responding: true, instance: '', version: '', pid: 0, write: false, token: false, held: false, holder: null, panel: null, reason: '', log: [], stats: {messages: 0, bytes: 0}};
+export const state = {
+    server: 'connecting',
+    machine: false,
+    responding: true,
+    instance: '',
+    version: '',
+    pid: 0,
+    write: false,
+    token: false,
+    held: false,
+    holder: null,
+    panel: null,
+    reason: '',
+    log: [],
+    stats: {messages: 0, bytes: 0}
+};
 
 let socket = null, nextId = 1, replies = new Map(), samples = null, lastReply = 0;
 const subscriptions = new Set(), probes = new Set();
 
 function takeToken() {
-  const found = /(?:^#|[#&])t=([0-9a-f]+)/.exec(location.hash);
-  if (found) {
-    sessionStorage.setItem('token', found[1]);
-    history.replaceState(null, '', location.pathname + '#/overview');
-  }
-  return sessionStorage.getItem('token');
+    const found = /(?:^#|[#&])t=([0-9a-f]+)/.exec(location.hash);
+    if (found) {
+        sessionStorage.setItem('token', found[1]);
+        history.replaceState(null, '', location.pathname + '#/overview');
+    }
+    return sessionStorage.getItem('token');
 }
 
 /// Sends a request of the control protocol. Resolves with the reply.
 export function request(body) {
-  if (!socket || socket.readyState !== WebSocket.OPEN || !state.machine) return Promise.resolve({ok: false, error: 'the machine is not running'});
-  const id = nextId++;
-  return new Promise(resolve => {
-    replies.set(id, resolve);
-    socket.send(JSON.stringify({id, ...body}));
-  });
+    if (!socket || socket.readyState !== WebSocket.OPEN || !state.machine)
+        return Promise.resolve({ok: false, error: 'the machine is not running'});
+    const id = nextId++;
+    return new Promise(resolve => {
+        replies.set(id, resolve);
+        socket.send(JSON.stringify({id, ...body}));
+    });
 }
 export function tell(body) {
-  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(body));
+    if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(body));
 }
 
 /// Subscribes to values: act(values, event) for each event. Returns a function that ends it.
 export function subscribe(names, every_ms, act, changes = false) {
-  const one = {names, every_ms, act, changes, number: null};
-  subscriptions.add(one);
-  start(one);
-  return () => {
-    subscriptions.delete(one);
-    if (one.number !== null) request({unsubscribe: one.number});
-    one.number = null;
-  };
+    const one = {names, every_ms, act, changes, number: null};
+    subscriptions.add(one);
+    start(one);
+    return () => {
+        subscriptions.delete(one);
+        if (one.number !== null) request({unsubscribe: one.number});
+        one.number = null;
+    };
 }
 async function start(one) {
-  if (!state.machine || one.names.length === 0) return;
-  const reply = await request({subscribe: one.names, every_ms: one.every_ms, changes: one.changes});
-  if (reply.ok) {
-    if (subscriptions.has(one)) one.number = reply.subscription;
-    else request({unsubscribe: reply.subscription});
-  }
+    if (!state.machine || one.names.length === 0) return;
+    const reply =
+        await request({subscribe: one.names, every_ms: one.every_ms, changes: one.changes});
+    if (reply.ok) {
+        if (subscriptions.has(one))
+            one.number = reply.subscription;
+        else
+            request({unsubscribe: reply.subscription});
+    }
 }
 
-/// Probes names: act(event, ArrayBuffer of the rows, layout). Calls failed(reply) when the machine has no probes. Returns a function that ends it.
+/// Probes names: act(event, ArrayBuffer of the rows, layout). Calls failed(reply) when the machine
+/// has no probes. Returns a function that ends it.
 export function probe(names, options, act, failed) {
-  const one = {names, options, act, failed, number: null, layout: null};
-  probes.add(one);
-  startProbe(one);
-  return () => {
-    probes.delete(one);
-    if (one.number !== null) request({unprobe: one.number});
-    one.number = null;
-  };
+    const one = {names, options, act, failed, number: null, layout: null};
+    probes.add(one);
+    startProbe(one);
+    return () => {
+        probes.delete(one);
+        if (one.number !== null) request({unprobe: one.number});
+        one.number = null;
+    };
 }
 async function startProbe(one) {
-  if (!state.machine || one.names.length === 0) return;
-  const reply = await request({probe: one.names, ...one.options});
-  if (!reply.ok) return one.failed(reply);
-  if (!probes.has(one)) return request({unprobe: reply.probe});
-  one.number = reply.probe;
-  one.layout = reply;
+    if (!state.machine || one.names.length === 0) return;
+    const reply = await request({probe: one.names, ...one.options});
+    if (!reply.ok) return one.failed(reply);
+    if (!probes.has(one)) return request({unprobe: reply.probe});
+    one.number = reply.probe;
+    one.layout = reply;
 }
 
 function settle() {
-  for (const resolve of replies.values()) resolve({ok: false, error: 'the connection is lost'});
-  replies.clear();
-  for (const one of subscriptions) one.number = null;
-  for (const one of probes) one.number = null;
+    for (const resolve of replies.values())
+        resolve({ok: false, error: 'the connection is lost'});
+    replies.clear();
+    for (const one of subscriptions)
+        one.number = null;
+    for (const one of probes)
+        one.number = null;
 }
 
 function machine(event) {
-  settle();
-  state.machine = event.up;
-  if (event.up) Object.assign(state, {version: event.hello.version, pid: event.hello.pid, responding: true});
-  lastReply = performance.now();
-  emit('state');
-  note({kind: 'machine', unix_ms: Date.now(), text: event.up ? `machine '${state.instance}' is running, process ${state.pid}` : `machine '${state.instance}' is lost`});
-  if (!event.up) return;
-  for (const one of subscriptions) start(one);
-  for (const one of probes) startProbe(one);
-  emit('machine');
+    settle();
+    state.machine = event.up;
+    if (event.up)
+        Object.assign(
+            state, {version: event.hello.version, pid: event.hello.pid, responding: true});
+    lastReply = performance.now();
+    emit('state');
+    note({
+        kind: 'machine',
+        unix_ms: Date.now(),
+        text: event.up ? `machine '${state.instance}' is running, process ${state.pid}` :
+                         `machine '${state.instance}' is lost`
+    });
+    if (!event.up) return;
+    for (const one of subscriptions)
+        start(one);
+    for (const one of probes)
+        startProbe(one);
+    emit('machine');
 }
 
 function note(entry) {
-  if (state.log.some(one => one.unix_ms === entry.unix_ms && one.text === entry.text)) return;  // sent again after a reconnection
-  state.log.push(entry);
-  if (state.log.length > 1000) state.log.shift();
-  emit('logged');
+    if (state.log.some(one => one.unix_ms === entry.unix_ms && one.text === entry.text))
+        return;  // sent again after a reconnection
+    state.log.push(entry);
+    if (state.log.length > 1000) state.log.shift();
+    emit('logged');
 }
 
 function receive(text) {
-  const message = JSON.parse(text);
-  lastReply = performance.now();
-  if (!message.event) {
-    const resolve = replies.get(message.id);
-    replies.delete(message.id);
-    if (resolve) resolve(message);
-    return;
-  }
-  switch (message.event) {
-    case 'welcome': Object.assign(state, {server: 'up', instance: message.instance, write: message.write, token: message.token, panel: message.panel ?? null}); emit('welcome'); emit('state'); break;
-    case 'machine': machine(message); break;
-    case 'control': Object.assign(state, {held: message.held, holder: message.holder}); emit('state'); break;
-    case 'values':
-      for (const one of subscriptions) if (one.number === message.subscription) one.act(message.values, message);
-      break;
-    case 'samples': samples = message; break;
-    case 'layout':
-      for (const one of probes) if (one.number === message.probe) Object.assign(one.layout, message);
-      break;
-    case 'log': note(message); break;
-    case 'journal': note({kind: message.kind, text: message.text, unix_ms: Date.now()}); break;
-    default: emit(message.event, message);
-  }
+    const message = JSON.parse(text);
+    lastReply = performance.now();
+    if (!message.event) {
+        const resolve = replies.get(message.id);
+        replies.delete(message.id);
+        if (resolve) resolve(message);
+        return;
+    }
+    switch (message.event) {
+        case 'welcome':
+            Object.assign(state, {
+                server: 'up',
+                instance: message.instance,
+                write: message.write,
+                token: message.token,
+                panel: message.panel ?? null
+            });
+            emit('welcome');
+            emit('state');
+            break;
+        case 'machine':
+            machine(message);
+            break;
+        case 'control':
+            Object.assign(state, {held: message.held, holder: message.holder});
+            emit('state');
+            break;
+        case 'values':
+            for (const one of subscriptions)
+                if (one.number === message.subscription) one.act(message.values, message);
+            break;
+        case 'samples':
+            samples = message;
+            break;
+        case 'layout':
+            for (const one of probes)
+                if (one.number === message.probe) Object.assign(one.layout, message);
+            break;
+        case 'log':
+            note(message);
+            break;
+        case 'journal':
+            note({kind: message.kind, text: message.text, unix_ms: Date.now()});
+            break;
+        default:
+            emit(message.event, message);
+    }
 }
 
 function receiveBytes(bytes) {
-  const event = samples;
-  samples = null;
-  if (!event) return;
-  for (const one of probes) if (one.number === event.probe) one.act(event, bytes, one.layout);
+    const event = samples;
+    samples = null;
+    if (!event) return;
+    for (const one of probes)
+        if (one.number === event.probe) one.act(event, bytes, one.layout);
 }
 
 export function connect() {
-  const token = takeToken();
-  socket = new WebSocket(`ws://${location.host}/`, 'halcyon.panel.v1');
-  socket.binaryType = 'arraybuffer';
-  socket.onopen = () => tell({hello: token ? {token} : {}});
-  socket.onmessage = message => {
-    state.stats.messages++;
-    state.stats.bytes += message.data.length ?? message.data.byteLength;
-    if (typeof message.data === 'string') receive(message.data);
-    else receiveBytes(message.data);
-  };
-  socket.onclose = event => {
-    settle();
-    state.server = 'lost';
-    state.machine = state.held = false;
-    state.reason = event.reason;
-    if (event.reason === 'wrong token') sessionStorage.removeItem('token');
-    emit('state');
-    setTimeout(connect, 1000);
-  };
+    const token = takeToken();
+    socket = new WebSocket(`ws://${location.host}/`, 'halcyon.panel.v1');
+    socket.binaryType = 'arraybuffer';
+    socket.onopen = () => tell({hello: token ? {token} : {}});
+    socket.onmessage = message => {
+        state.stats.messages++;
+        state.stats.bytes += message.data.length ?? message.data.byteLength;
+        if (typeof message.data === 'string')
+            receive(message.data);
+        else
+            receiveBytes(message.data);
+    };
+    socket.onclose = event => {
+        settle();
+        state.server = 'lost';
+        state.machine = state.held = false;
+        state.reason = event.reason;
+        if (event.reason === 'wrong token') sessionStorage.removeItem('token');
+        emit('state');
+        setTimeout(connect, 1000);
+    };
 }
 window.addEventListener('hashchange', () => {
-  if (/[#&]t=/.test(location.hash)) {
-    takeToken();
-    socket?.close();
-  }
+    if (/[#&]t=/.test(location.hash)) {
+        takeToken();
+        socket?.close();
+    }
 });
 
 // A machine that is stopped (SIGSTOP, a debugger) keeps its connection and answers nothing.
 setInterval(async () => {
-  if (!state.machine) return;
-  const responding = performance.now() - lastReply < 3000;
-  if (responding !== state.responding) {
-    state.responding = responding;
-    emit('state');
-  }
-  if (replies.size < 20) request({list: 'thread'});
+    if (!state.machine) return;
+    const responding = performance.now() - lastReply < 3000;
+    if (responding !== state.responding) {
+        state.responding = responding;
+        emit('state');
+    }
+    if (replies.size < 20) request({list: 'thread'});
 }, 1000);

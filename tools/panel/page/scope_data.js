@@ -5,187 +5,235 @@ const capacity = 1 << 18;
 
 /// Rows that were sampled together: times in seconds, and the values of some channels.
 class Group {
-  constructor(columns) {
-    this.columns = columns;
-    this.times = new Float64Array(capacity);
-    this.values = columns.map(() => new Float64Array(capacity));
-    this.count = 0;  // rows ever added; row i is at i % capacity
-  }
-  get first() { return Math.max(0, this.count - capacity + 1); }
-  time(row) { return this.times[row & (capacity - 1)]; }
-  value(column, row) { return this.values[column][row & (capacity - 1)]; }
-  /// Begins a row; returns its place in the columns.
-  add(time) {
-    const at = this.count++ & (capacity - 1);
-    this.times[at] = time;
-    return at;
-  }
-  /// The first row at or after a time.
-  row(time) {
-    let low = this.first, high = this.count;
-    while (low < high) {
-      const middle = Math.floor((low + high) / 2);
-      if (this.time(middle) < time) low = middle + 1;
-      else high = middle;
+    constructor(columns) {
+        this.columns = columns;
+        this.times = new Float64Array(capacity);
+        this.values = columns.map(() => new Float64Array(capacity));
+        this.count = 0;  // rows ever added; row i is at i % capacity
     }
-    return low;
-  }
+    get first() { return Math.max(0, this.count - capacity + 1); }
+    time(row) { return this.times[row & (capacity - 1)]; }
+    value(column, row) { return this.values[column][row & (capacity - 1)]; }
+    /// Begins a row; returns its place in the columns.
+    add(time) {
+        const at = this.count++ & (capacity - 1);
+        this.times[at] = time;
+        return at;
+    }
+    /// The first row at or after a time.
+    row(time) {
+        let low = this.first, high = this.count;
+        while (low < high) {
+            const middle = Math.floor((low + high) / 2);
+            if (this.time(middle) < time)
+                low = middle + 1;
+            else
+                high = middle;
+        }
+        return low;
+    }
 }
 
-/// Minimum and maximum of a channel in each interval of `width` seconds, kept up to date as rows arrive: what a column of pixels shows.
+/// Minimum and maximum of a channel in each interval of `width` seconds, kept up to date as rows
+/// arrive: what a column of pixels shows.
 class Columns {
-  static size = 1 << 13;
-  constructor(group, column, width) {
-    Object.assign(this, {group, column, width, row: group.first, newest: -1, last: NaN, mask: Columns.size - 1});  // interval i is at i & mask, if index has i there
-    this.index = new Float64Array(Columns.size).fill(NaN);
-    this.low = new Float64Array(Columns.size);
-    this.high = new Float64Array(Columns.size);
-  }
-  update() {
-    const {group, index, low, high, width} = this, {times} = group, values = group.values[this.column], mask = capacity - 1;
-    for (let row = Math.max(this.row, group.first); row < group.count; row++) {
-      const value = values[row & mask], interval = Math.floor(times[row & mask] / width), at = interval & (Columns.size - 1);
-      if (Number.isNaN(value)) continue;
-      if (index[at] !== interval) {  // from the last value on, so that the trace has no holes
-        index[at] = interval;
-        low[at] = this.last < value ? this.last : value;
-        high[at] = this.last > value ? this.last : value;
-      } else if (value < low[at]) low[at] = value;
-      else if (value > high[at]) high[at] = value;
-      this.newest = interval;
-      this.last = value;
+    static size = 1 << 13;
+    constructor(group, column, width) {
+        Object.assign(this, {
+            group,
+            column,
+            width,
+            row: group.first,
+            newest: -1,
+            last: NaN,
+            mask: Columns.size - 1
+        });  // interval i is at i & mask, if index has i there
+        this.index = new Float64Array(Columns.size).fill(NaN);
+        this.low = new Float64Array(Columns.size);
+        this.high = new Float64Array(Columns.size);
     }
-    this.row = group.count;
-  }
+    update() {
+        const {group, index, low, high, width} = this, {times} = group,
+                                        values = group.values[this.column], mask = capacity - 1;
+        for (let row = Math.max(this.row, group.first); row < group.count; row++) {
+            const value = values[row & mask], interval = Math.floor(times[row & mask] / width),
+                  at = interval & (Columns.size - 1);
+            if (Number.isNaN(value)) continue;
+            if (index[at] !== interval) {  // from the last value on, so that the trace has no holes
+                index[at] = interval;
+                low[at] = this.last < value ? this.last : value;
+                high[at] = this.last > value ? this.last : value;
+            } else if (value < low[at])
+                low[at] = value;
+            else if (value > high[at])
+                high[at] = value;
+            this.newest = interval;
+            this.last = value;
+        }
+        this.row = group.count;
+    }
 }
 
 export class Store {
-  constructor() { this.clear(); }
-  clear() {
-    this.groups = [];
-    this.place = new Map();  // channel -> [group, column]
-    this.newest = 0;
-    this.lost = 0;
-    this.rows = 0;
-    this.gaps = 0;
-    this.origin = null;
-    this.cut = new Map();  // channel -> Columns
-  }
-  /// The Columns of a channel, up to date.
-  columns(name, width) {
-    let columns = this.cut.get(name);
-    if (!columns || columns.width !== width) this.cut.set(name, columns = new Columns(...this.place.get(name), width));
-    columns.update();
-    return columns;
-  }
-  layout(groups, names) {
-    this.clear();
-    this.groups = groups.map(group => new Group(group.columns));
-    this.cycles = groups.map(() => -1);
-    groups.forEach((group, g) => group.columns.forEach((channel, column) => this.place.set(names[channel], [this.groups[g], column])));
-  }
-  seconds(ns) {
-    this.origin ??= ns;
-    return (ns - this.origin) / 1e9;
-  }
-  /// Takes a batch of a probe: rows of 8-byte words, cycle, time, values; little-endian, as all browsers are.
-  samples(event, bytes, layout) {
-    const reals = new Float64Array(bytes), lows = new Uint32Array(bytes), highs = new Int32Array(bytes), every = layout.every ?? 1;
-    let word = 0;
-    for (const part of event.parts) {
-      const group = this.groups[part.group], types = group.columns.map(channel => layout.columns[channel].type);
-      this.lost += part.lost;
-      for (let row = 0; row < part.rows; row++) {
-        const cycle = lows[2 * word] + lows[2 * word + 1] * 4294967296;
-        if (cycle > 0 && this.cycles[part.group] >= 0 && cycle !== this.cycles[part.group] + every) this.gaps++;
-        this.cycles[part.group] = cycle;
-        const at = group.add(this.seconds(lows[2 * word + 2] + highs[2 * word + 3] * 4294967296));
-        word += 2;
-        for (let column = 0; column < types.length; column++, word++) {
-          const type = types[column];
-          group.values[column][at] = type === 'float' ? reals[word] : lows[2 * word] + (type === 's32' || type === 's64' ? highs[2 * word + 1] : lows[2 * word + 1]) * 4294967296;
-        }
-      }
-      this.rows += part.rows;
+    constructor() { this.clear(); }
+    clear() {
+        this.groups = [];
+        this.place = new Map();  // channel -> [group, column]
+        this.newest = 0;
+        this.lost = 0;
+        this.rows = 0;
+        this.gaps = 0;
+        this.origin = null;
+        this.cut = new Map();  // channel -> Columns
     }
-    this.newest = Math.max(this.newest, this.seconds(event.until_ns));
-  }
-  /// Takes the values of a subscription.
-  values(event) {
-    const time = this.seconds(event.time_ns), [group] = this.groups, at = group.add(time);
-    group.columns.forEach((channel, column) => { group.values[column][at] = Number(event.values[channel] ?? NaN); });
-    this.rows++;
-    this.lost += event.skipped ?? 0;
-    this.newest = time;
-  }
+    /// The Columns of a channel, up to date.
+    columns(name, width) {
+        let columns = this.cut.get(name);
+        if (!columns || columns.width !== width)
+            this.cut.set(name, columns = new Columns(...this.place.get(name), width));
+        columns.update();
+        return columns;
+    }
+    layout(groups, names) {
+        this.clear();
+        this.groups = groups.map(group => new Group(group.columns));
+        this.cycles = groups.map(() => -1);
+        groups.forEach(
+            (group, g) => group.columns.forEach(
+                (channel, column) => this.place.set(names[channel], [this.groups[g], column])));
+    }
+    seconds(ns) {
+        this.origin ??= ns;
+        return (ns - this.origin) / 1e9;
+    }
+    /// Takes a batch of a probe: rows of 8-byte words, cycle, time, values; little-endian, as all
+    /// browsers are.
+    samples(event, bytes, layout) {
+        const reals = new Float64Array(bytes), lows = new Uint32Array(bytes),
+              highs = new Int32Array(bytes), every = layout.every ?? 1;
+        let word = 0;
+        for (const part of event.parts) {
+            const group = this.groups[part.group],
+                  types = group.columns.map(channel => layout.columns[channel].type);
+            this.lost += part.lost;
+            for (let row = 0; row < part.rows; row++) {
+                const cycle = lows[2 * word] + lows[2 * word + 1] * 4294967296;
+                if (cycle > 0 && this.cycles[part.group] >= 0 &&
+                    cycle !== this.cycles[part.group] + every)
+                    this.gaps++;
+                this.cycles[part.group] = cycle;
+                const at =
+                    group.add(this.seconds(lows[2 * word + 2] + highs[2 * word + 3] * 4294967296));
+                word += 2;
+                for (let column = 0; column < types.length; column++, word++) {
+                    const type = types[column];
+                    group.values[column][at] = type === 'float' ? reals[word] :
+                                                                  lows[2 * word] +
+                            (type === 's32' || type === 's64' ? highs[2 * word + 1] :
+                                                                lows[2 * word + 1]) *
+                                4294967296;
+                }
+            }
+            this.rows += part.rows;
+        }
+        this.newest = Math.max(this.newest, this.seconds(event.until_ns));
+    }
+    /// Takes the values of a subscription.
+    values(event) {
+        const time = this.seconds(event.time_ns), [group] = this.groups, at = group.add(time);
+        group.columns.forEach((channel, column) => {
+            group.values[column][at] = Number(event.values[channel] ?? NaN);
+        });
+        this.rows++;
+        this.lost += event.skipped ?? 0;
+        this.newest = time;
+    }
 }
 
-/// Finds edges as samples arrive. A rising edge is armed below level - hysteresis and fires at the first value not below the level.
+/// Finds edges as samples arrive. A rising edge is armed below level - hysteresis and fires at the
+/// first value not below the level.
 export class Trigger {
-  constructor(name, edge, level) {
-    Object.assign(this, {name, edge, level, armed: 0, row: 0, last: null});
-  }
-  /// Returns the times of the edges since the last call, interpolated between two samples.
-  scan(store) {
-    const found = [], place = store.place.get(this.name);
-    if (!place) return found;
-    const [group, column] = place;
-    let row = Math.max(this.row, group.first);
-    for (; row < group.count; row++) {
-      const value = group.value(column, row);
-      if (this.range === undefined) this.range = [value, value];
-      this.range[0] = Math.min(this.range[0], value);
-      this.range[1] = Math.max(this.range[1], value);
-      const gap = (this.range[1] - this.range[0]) * .01;
-      for (const rising of this.edge === 'either' ? [true, false] : [this.edge === 'rising']) {
-        const bit = rising ? 1 : 2, sign = rising ? 1 : -1;
-        if (sign * (value - this.level) < -gap || (gap === 0 && sign * (value - this.level) < 0)) this.armed |= bit;
-        else if (sign * (value - this.level) >= 0 && this.armed & bit) {
-          this.armed &= ~bit;
-          const before = row > group.first ? group.value(column, row - 1) : value, t = group.time(row), t0 = row > group.first ? group.time(row - 1) : t;
-          found.push(value === before ? t : t0 + (t - t0) * Math.min(1, Math.max(0, (this.level - before) / (value - before))));
-        }
-      }
+    constructor(name, edge, level) {
+        Object.assign(this, {name, edge, level, armed: 0, row: 0, last: null});
     }
-    this.row = row;
-    return found;
-  }
+    /// Returns the times of the edges since the last call, interpolated between two samples.
+    scan(store) {
+        const found = [], place = store.place.get(this.name);
+        if (!place) return found;
+        const [group, column] = place;
+        let row = Math.max(this.row, group.first);
+        for (; row < group.count; row++) {
+            const value = group.value(column, row);
+            if (this.range === undefined) this.range = [value, value];
+            this.range[0] = Math.min(this.range[0], value);
+            this.range[1] = Math.max(this.range[1], value);
+            const gap = (this.range[1] - this.range[0]) * .01;
+            for (const rising of this.edge === 'either' ? [true, false] :
+                                                          [this.edge === 'rising']) {
+                const bit = rising ? 1 : 2, sign = rising ? 1 : -1;
+                if (sign * (value - this.level) < -gap ||
+                    (gap === 0 && sign * (value - this.level) < 0))
+                    this.armed |= bit;
+                else if (sign * (value - this.level) >= 0 && this.armed & bit) {
+                    this.armed &= ~bit;
+                    const before = row > group.first ? group.value(column, row - 1) : value,
+                          t = group.time(row), t0 = row > group.first ? group.time(row - 1) : t;
+                    found.push(
+                        value === before ? t :
+                                           t0 +
+                                (t - t0) *
+                                    Math.min(
+                                        1, Math.max(0, (this.level - before) / (value - before))));
+                }
+            }
+        }
+        this.row = row;
+        return found;
+    }
 }
 
-/// Minimum, maximum, mean, rms and frequency between two times; null without samples. The frequency needs two rising crossings of the middle.
+/// Minimum, maximum, mean, rms and frequency between two times; null without samples. The frequency
+/// needs two rising crossings of the middle.
 export function measure(store, name, from, to) {
-  const place = store.place.get(name);
-  if (!place) return null;
-  const [group, column] = place, begin = group.row(from), end = group.row(to);
-  let min = Infinity, max = -Infinity, sum = 0, squares = 0, count = 0;
-  for (let row = begin; row < end; row++) {
-    const value = group.value(column, row);
-    if (!Number.isFinite(value)) continue;
-    min = Math.min(min, value);
-    max = Math.max(max, value);
-    sum += value;
-    squares += value * value;
-    count++;
-  }
-  if (count === 0) return null;
-  const middle = (min + max) / 2, gap = (max - min) * .1, edges = [];
-  let armed = false;
-  for (let row = begin + 1; row < end && max > min; row++) {
-    const value = group.value(column, row), before = group.value(column, row - 1);
-    if (value < middle - gap) armed = true;
-    else if (armed && value >= middle) {
-      armed = false;
-      edges.push(group.time(row - 1) + (group.time(row) - group.time(row - 1)) * (value === before ? 0 : Math.min(1, Math.max(0, (middle - before) / (value - before)))));
+    const place = store.place.get(name);
+    if (!place) return null;
+    const [group, column] = place, begin = group.row(from), end = group.row(to);
+    let min = Infinity, max = -Infinity, sum = 0, squares = 0, count = 0;
+    for (let row = begin; row < end; row++) {
+        const value = group.value(column, row);
+        if (!Number.isFinite(value)) continue;
+        min = Math.min(min, value);
+        max = Math.max(max, value);
+        sum += value;
+        squares += value * value;
+        count++;
     }
-  }
-  const frequency = edges.length > 1 ? (edges.length - 1) / (edges[edges.length - 1] - edges[0]) : null;
-  return {min, max, mean: sum / count, rms: Math.sqrt(squares / count), frequency, count};
+    if (count === 0) return null;
+    const middle = (min + max) / 2, gap = (max - min) * .1, edges = [];
+    let armed = false;
+    for (let row = begin + 1; row < end && max > min; row++) {
+        const value = group.value(column, row), before = group.value(column, row - 1);
+        if (value < middle - gap)
+            armed = true;
+        else if (armed && value >= middle) {
+            armed = false;
+            edges.push(
+                group.time(row - 1) +
+                (group.time(row) - group.time(row - 1)) *
+                    (value === before ?
+                         0 :
+                         Math.min(1, Math.max(0, (middle - before) / (value - before)))));
+        }
+    }
+    const frequency =
+        edges.length > 1 ? (edges.length - 1) / (edges[edges.length - 1] - edges[0]) : null;
+    return {min, max, mean: sum / count, rms: Math.sqrt(squares / count), frequency, count};
 }
 
 /// The value of a channel at a time: that of the last row not after it.
 export function valueAt(store, name, time) {
-  const place = store.place.get(name);
-  if (!place) return null;
-  const row = place[0].row(time + 1e-12) - 1;
-  return row < place[0].first ? null : place[0].value(place[1], row);
+    const place = store.place.get(name);
+    if (!place) return null;
+    const row = place[0].row(time + 1e-12) - 1;
+    return row < place[0].first ? null : place[0].value(place[1], row);
 }

@@ -1,72 +1,95 @@
 // SPDX-License-Identifier: MIT
-// The picture of the scope, pixel by pixel: all its lines are horizontal or vertical, and without a GPU this takes a tenth of the time of strokes.
+// The picture of the scope, pixel by pixel: all its lines are horizontal or vertical, and without a
+// GPU this takes a tenth of the time of strokes.
 
 /// A colour of CSS as a pixel.
 function pixel(name) {
-  const context = pixel.context ??= document.createElement('canvas').getContext('2d', {willReadFrequently: true});
-  context.fillStyle = name;
-  context.fillRect(0, 0, 1, 1);
-  return new Uint32Array(context.getImageData(0, 0, 1, 1).data.buffer)[0];
+    const context = pixel.context ??=
+        document.createElement('canvas').getContext('2d', {willReadFrequently: true});
+    context.fillStyle = name;
+    context.fillRect(0, 0, 1, 1);
+    return new Uint32Array(context.getImageData(0, 0, 1, 1).data.buffer)[0];
 }
 
 export class Picture {
-  constructor() { this.colours = new Map(); }
-  /// Begins a picture of that many pixels. `thick`: pixels of a line.
-  begin(width, height, thick, back) {
-    if (!this.image || this.image.width !== width || this.image.height !== height) {
-      this.image = new ImageData(width, height);
-      this.pixels = new Uint32Array(this.image.data.buffer);
+    constructor() { this.colours = new Map(); }
+    /// Begins a picture of that many pixels. `thick`: pixels of a line.
+    begin(width, height, thick, back) {
+        if (!this.image || this.image.width !== width || this.image.height !== height) {
+            this.image = new ImageData(width, height);
+            this.pixels = new Uint32Array(this.image.data.buffer);
+        }
+        Object.assign(this, {width, height, thick});
+        this.pixels.fill(this.colour(back));
     }
-    Object.assign(this, {width, height, thick});
-    this.pixels.fill(this.colour(back));
-  }
-  colour(name) {
-    if (!this.colours.has(name)) this.colours.set(name, pixel(name));
-    return this.colours.get(name);
-  }
-  /// Pixels [x, x + wide) of the rows [y0, y1].
-  fill(x, wide, y0, y1, paint) {
-    const {width, pixels} = this, begin = Math.max(0, x), end = Math.min(width, x + wide), top = Math.max(0, y0), bottom = Math.min(this.height - 1, y1);
-    for (let y = top; y <= bottom; y++) for (let at = y * width + begin, stop = y * width + end; at < stop; at++) pixels[at] = paint;
-  }
-  vertical(x, name, dotted = false) {
-    const paint = this.colour(name);
-    for (let y = 0; y < this.height; y += dotted ? 6 : this.height) this.fill(Math.round(x), this.thick, y, dotted ? y + 1 : this.height, paint);
-  }
-  horizontal(y, name, dotted = false) {
-    const paint = this.colour(name), row = Math.round(y);
-    for (let x = 0; x < this.width; x += dotted ? 6 : this.width) this.fill(x, dotted ? 2 : this.width, row, row + this.thick - 1, paint);
-  }
+    colour(name) {
+        if (!this.colours.has(name)) this.colours.set(name, pixel(name));
+        return this.colours.get(name);
+    }
+    /// Pixels [x, x + wide) of the rows [y0, y1].
+    fill(x, wide, y0, y1, paint) {
+        const {width, pixels} = this, begin = Math.max(0, x), end = Math.min(width, x + wide),
+                      top = Math.max(0, y0), bottom = Math.min(this.height - 1, y1);
+        for (let y = top; y <= bottom; y++)
+            for (let at = y * width + begin, stop = y * width + end; at < stop; at++)
+                pixels[at] = paint;
+    }
+    vertical(x, name, dotted = false) {
+        const paint = this.colour(name);
+        for (let y = 0; y < this.height; y += dotted ? 6 : this.height)
+            this.fill(Math.round(x), this.thick, y, dotted ? y + 1 : this.height, paint);
+    }
+    horizontal(y, name, dotted = false) {
+        const paint = this.colour(name), row = Math.round(y);
+        for (let x = 0; x < this.width; x += dotted ? 6 : this.width)
+            this.fill(x, dotted ? 2 : this.width, row, row + this.thick - 1, paint);
+    }
 
-  /// A channel. With many samples per column of pixels, a column is a line from their minimum to their maximum; with few, the trace is stairs.
-  /// `line`: {name, thick, dashed}. A value is at the row zero - value * perUnit.
-  trace(store, channel, from, to, zero, perUnit, line) {
-    const place = store.place.get(channel), each = (to - from) / this.width;
-    if (!place) return;
-    const [group, column] = place, begin = Math.max(group.row(from) - 1, group.first), end = Math.min(group.row(to) + 1, group.count), paint = this.colour(line.name);
-    const pixelRow = row => Math.max(-9, Math.min(this.height + 9, Math.round(zero - group.value(column, row) * perUnit)));
-    if (end - begin < 2 * this.width) {
-      for (let row = begin; row < end; row++) {
-        const at = Math.floor((group.time(row) - from) / each), next = row + 1 < end ? Math.floor((group.time(row + 1) - from) / each) : this.width;
-        const here = pixelRow(row), before = row > begin ? pixelRow(row - 1) : here;
-        if (line.dashed) { for (let x = Math.max(at, 0); x < Math.min(next, this.width); x++) if (x % 12 < 8) this.fill(x, 1, here, here + line.thick - 1, paint); }
-        else this.fill(at, next - at, here, here + line.thick - 1, paint);
-        if (here !== before) this.fill(at, line.thick, Math.min(here, before), Math.max(here, before) + line.thick - 1, paint);
-      }
-      return;
+    /// A channel. With many samples per column of pixels, a column is a line from their minimum to
+    /// their maximum; with few, the trace is stairs. `line`: {name, thick, dashed}. A value is at
+    /// the row zero - value * perUnit.
+    trace(store, channel, from, to, zero, perUnit, line) {
+        const place = store.place.get(channel), each = (to - from) / this.width;
+        if (!place) return;
+        const [group, column] = place, begin = Math.max(group.row(from) - 1, group.first),
+                      end = Math.min(group.row(to) + 1, group.count),
+                      paint = this.colour(line.name);
+        const pixelRow = row => Math.max(
+            -9, Math.min(this.height + 9, Math.round(zero - group.value(column, row) * perUnit)));
+        if (end - begin < 2 * this.width) {
+            for (let row = begin; row < end; row++) {
+                const at = Math.floor((group.time(row) - from) / each),
+                      next = row + 1 < end ? Math.floor((group.time(row + 1) - from) / each) :
+                                             this.width;
+                const here = pixelRow(row), before = row > begin ? pixelRow(row - 1) : here;
+                if (line.dashed) {
+                    for (let x = Math.max(at, 0); x < Math.min(next, this.width); x++)
+                        if (x % 12 < 8) this.fill(x, 1, here, here + line.thick - 1, paint);
+                } else
+                    this.fill(at, next - at, here, here + line.thick - 1, paint);
+                if (here !== before)
+                    this.fill(
+                        at, line.thick, Math.min(here, before),
+                        Math.max(here, before) + line.thick - 1, paint);
+            }
+            return;
+        }
+        const columns = store.columns(channel, each), first = Math.floor(from / each),
+              {width, height, pixels} = this, {dashed, thick} = line;
+        let top = NaN, bottom = NaN;
+        for (let x = 0; x < width; x++) {  // the hot loop: no calls
+            const interval = first + x, at = interval & columns.mask;
+            if (columns.index[at] === interval) {
+                top = Math.round(zero - columns.high[at] * perUnit);
+                bottom = Math.round(zero - columns.low[at] * perUnit);
+            } else if (interval > columns.newest || top !== top)
+                continue;
+            else
+                top = bottom;  // no sample in this column: the last value holds
+            if (dashed && x % 12 >= 8) continue;
+            const end = (bottom + thick < height ? bottom + thick : height) * width;
+            for (let cell = (top > 0 ? top : 0) * width + x; cell < end; cell += width)
+                pixels[cell] = paint;
+        }
     }
-    const columns = store.columns(channel, each), first = Math.floor(from / each), {width, height, pixels} = this, {dashed, thick} = line;
-    let top = NaN, bottom = NaN;
-    for (let x = 0; x < width; x++) {  // the hot loop: no calls
-      const interval = first + x, at = interval & columns.mask;
-      if (columns.index[at] === interval) {
-        top = Math.round(zero - columns.high[at] * perUnit);
-        bottom = Math.round(zero - columns.low[at] * perUnit);
-      } else if (interval > columns.newest || top !== top) continue;
-      else top = bottom;  // no sample in this column: the last value holds
-      if (dashed && x % 12 >= 8) continue;
-      const end = (bottom + thick < height ? bottom + thick : height) * width;
-      for (let cell = (top > 0 ? top : 0) * width + x; cell < end; cell += width) pixels[cell] = paint;
-    }
-  }
 }
