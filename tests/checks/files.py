@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""files.py ROOT: every folder has a short README that names only files that exist; every page links to existing files; every source has its
+"""files.py ROOT: every folder has a README that names only files that exist; every page links to existing files; every source has its
 licence line."""
 import os
 import re
@@ -8,9 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-MAX_README = 40  # a folder's README is read in a minute; the glossary and the root's are longer
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".py", ".sh", ".cmake"}
-LONGER_READMES = {"README.md", "runtime/README.md"}
 # Folders that the parent's README describes: data, one folder per case, and folders of folders.
 NO_README = (
     "runtime/abi/hal",
@@ -88,11 +86,6 @@ def main(root):
             errors.append(
                 f"{name}: missing README.md: purpose, what the folder must not do, where to start reading"
             )
-        elif (
-            readme.as_posix() not in LONGER_READMES
-            and len((root / readme).read_text().splitlines()) > MAX_README
-        ):
-            errors.append(f"{readme}: longer than {MAX_README} lines")
     for page in files:
         if page.suffix == ".md":
             errors += [
