@@ -31,7 +31,9 @@ struct Factor {
         if (std::isnan(exact)) {
             return T{};
         }
-        return exact >= high ? Limits::max() : exact > low ? static_cast<T>(exact) : Limits::min();
+        if (exact >= high) return Limits::max();
+        if (exact > low) return static_cast<T>(exact);
+        return Limits::min();
     }
     /// Converts like to_drive(), without sign. [any]
     std::uint32_t amount(double user) const noexcept {

@@ -10,7 +10,9 @@ namespace {
 double limited(double value, double limit) {
     const double bound = std::fabs(limit);
     if (bound > 0.0) {
-        return value < -bound ? -bound : value > bound ? bound : value;  // NaN passes
+        if (value < -bound) return -bound;
+        if (value > bound) return bound;
+        return value;  // NaN passes
     }
     return value;
 }
@@ -168,7 +170,9 @@ public:
 private:
     double beyond_deadband(double e) const {
         const double band = std::fabs(deadband);
-        return e > band ? e - band : e < -band ? e + band : e * 0.0;  // 0, or NaN
+        if (e > band) return e - band;
+        if (e < -band) return e + band;
+        return e * 0.0;  // 0, or NaN
     }
 
     /// Estimates all derivatives, also while disabled, so that enabling causes no spike. The slope

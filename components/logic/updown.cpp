@@ -31,7 +31,13 @@ struct Updown : hal::Component {
         was_up_ = up;
         was_down_ = down;
         if (wrap || clamp) {
-            n = n > max ? (wrap ? min : max).get() : n < min ? (wrap ? max : min).get() : n;
+            if (n > max) {
+                n = (wrap ? min : max).get();
+            } else if (n < min) {
+                n = (wrap ? max : min).get();
+            } else {
+                n = n;
+            }
         }
         count_ = static_cast<std::int32_t>(n);
         count = count_;

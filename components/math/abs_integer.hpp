@@ -19,9 +19,13 @@ struct AbsInteger : hal::Component {
 
     void update(hal::Cycle) noexcept {
         const T value = in;
-        out = value >= 0                              ? value
-              : value > std::numeric_limits<T>::min() ? -value
-                                                      : std::numeric_limits<T>::max();
+        if (value >= 0) {
+            out = value;
+        } else if (value > std::numeric_limits<T>::min()) {
+            out = -value;
+        } else {
+            out = std::numeric_limits<T>::max();
+        }
         sign = value < 0;
         is_positive = value > 0;
         is_negative = value < 0;

@@ -45,7 +45,13 @@ struct Quantizer : hal::Component {
             const double low = rounded(exact - band);
 
             const double high = rounded(exact + band);
-            wanted = low > level_ ? low : high < level_ ? high : level_;
+            if (low > level_) {
+                wanted = low;
+            } else if (high < level_) {
+                wanted = high;
+            } else {
+                wanted = level_;
+            }
         }
         const double low = std::isfinite(min) ? std::clamp(std::ceil(min), -most, most) : -most;
         const double high = std::isfinite(max) ? std::clamp(std::floor(max), -most, most) : most;

@@ -18,7 +18,9 @@ public:
             started_ = true;
             return 0;  // the first sample has no edges
         }
-        return moved == 1 ? 1 : moved == 3 ? -1 : 0;
+        if (moved == 1) return 1;
+        if (moved == 3) return -1;
+        return 0;
     }
 
 private:

@@ -123,7 +123,13 @@ struct DualChannel : hal::Component {
         ok = healthy;
         fault = !healthy;
         differs = found != agree;
-        reason = !healthy ? fault_ : found == agree ? std::uint32_t{agree} : std::uint32_t{differ};
+        if (!healthy) {
+            reason = fault_;
+        } else if (found == agree) {
+            reason = std::uint32_t{agree};
+        } else {
+            reason = std::uint32_t{differ};
+        }
         out = healthy || !use_substitute || !std::isfinite(substitute) ? good_ : substitute.get();
         bit_out = healthy && first_bit && second_bit;
         difference = numbers ? apart : 0.0;

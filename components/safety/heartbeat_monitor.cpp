@@ -186,9 +186,13 @@ private:
         if (!watched) {
             reason = enable ? bad_parameter : disabled;
         } else {
-            reason = fault_ != alive ? fault_
-                     : healthy       ? std::uint32_t{alive}
-                                     : std::uint32_t{waiting};
+            if (fault_ != alive) {
+                reason = fault_;
+            } else if (healthy) {
+                reason = std::uint32_t{alive};
+            } else {
+                reason = std::uint32_t{waiting};
+            }
         }
         age = static_cast<double>(age_ns_) * 1e-9;
         interval = static_cast<double>(interval_ns_) * 1e-9;

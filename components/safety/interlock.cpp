@@ -149,9 +149,13 @@ private:
             const std::uint64_t bit = std::uint64_t{1} << i;
             const bool flashing = (unheard_ & bit) != 0;
             const bool is_first = (first_ & bit) != 0;
-            lamp[i] = is_first && flashing   ? fast
-                      : is_first || flashing ? slow
-                                             : (tripped_ & bit) != 0;
+            if (is_first && flashing) {
+                lamp[i] = fast;
+            } else if (is_first || flashing) {
+                lamp[i] = slow;
+            } else {
+                lamp[i] = (tripped_ & bit) != 0;
+            }
         }
     }
 

@@ -196,7 +196,9 @@ private:
     }
     bool stops(std::uint32_t what) const noexcept { return reaction(what) >= stop_2; }
     static std::uint32_t state_of(std::uint32_t of_reaction) noexcept {
-        return of_reaction == stop_2 ? braking_2 : of_reaction == stop_1 ? braking_1 : powerless;
+        if (of_reaction == stop_2) return braking_2;
+        if (of_reaction == stop_1) return braking_1;
+        return powerless;
     }
 
     /// What has been exceeded for longer than the filter time; of several what has the strongest

@@ -215,7 +215,10 @@ inline double sane(double value, double least) noexcept {
 
 /// An input of a plant: what is not a number counts as 0. [any]
 inline double force(double value) noexcept {
-    return std::fabs(value) < 1e15 ? value : value > 0.0 ? 1e15 : value < 0.0 ? -1e15 : 0.0;
+    if (std::fabs(value) < 1e15) return value;
+    if (value > 0.0) return 1e15;
+    if (value < 0.0) return -1e15;
+    return 0.0;
 }
 
 }  // namespace sim

@@ -40,7 +40,15 @@ std::optional<std::uint32_t> rate(std::string_view text) {
     const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (wrong != std::errc{}) return std::nullopt;
     const std::string_view unit(end, static_cast<std::size_t>(text.data() + text.size() - end));
-    value *= unit == "k" ? 1e3 : unit == "M" ? 1e6 : unit.empty() ? 1.0 : -1.0;
+    if (unit == "k") {
+        value *= 1e3;
+    } else if (unit == "M") {
+        value *= 1e6;
+    } else if (unit.empty()) {
+        value *= 1.0;
+    } else {
+        value *= -1.0;
+    }
     if (!(value >= 1.0 && value <= 20e6)) return std::nullopt;
     return static_cast<std::uint32_t>(value);
 }

@@ -42,7 +42,15 @@ std::string to_duration(std::string_view key, std::string_view value, std::int64
     double number = 0;
     const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), number);
     const std::string_view unit(end, static_cast<std::size_t>(value.data() + value.size() - end));
-    number *= unit == "ns" ? 1.0 : unit == "us" ? 1e3 : unit == "ms" ? 1e6 : -1.0;
+    if (unit == "ns") {
+        number *= 1.0;
+    } else if (unit == "us") {
+        number *= 1e3;
+    } else if (unit == "ms") {
+        number *= 1e6;
+    } else {
+        number *= -1.0;
+    }
     if (wrong != std::errc{} || !(number >= 0.0 && number <= 1e9)) {
         return "invalid " + std::string(key) + " " + quoted(value) +
                "; write a time up to 1 s with its unit, as in 150us";

@@ -103,7 +103,9 @@ std::string absolute_path(const std::string& path) {
 
 std::string folder_of(const std::string& path) {
     const auto slash = path.rfind('/');
-    return slash == path.npos ? "" : slash == 0 ? "/" : path.substr(0, slash);
+    if (slash == path.npos) return "";
+    if (slash == 0) return "/";
+    return path.substr(0, slash);
 }
 
 }  // namespace hal

@@ -15,7 +15,9 @@ nlohmann::ordered_json to_json(hal_type type, const hal_value& value) {
     case HAL_TYPE_BIT: return value.bit;
     case HAL_TYPE_FLOAT:
         if (std::isfinite(value.real)) return value.real;
-        return std::isnan(value.real) ? "nan" : value.real > 0 ? "inf" : "-inf";
+        if (std::isnan(value.real)) return "nan";
+        if (value.real > 0) return "inf";
+        return "-inf";
     case HAL_TYPE_S32: return value.s32;
     case HAL_TYPE_U32: return value.u32;
     case HAL_TYPE_S64: return value.s64;
@@ -33,7 +35,13 @@ void json_value(std::string& to, hal_type type, const hal_value& value) {
     if (type == HAL_TYPE_BIT) {
         to += value.bit ? "true" : "false";
     } else if (type == HAL_TYPE_FLOAT && !std::isfinite(value.real)) {
-        to += std::isnan(value.real) ? "\"nan\"" : value.real > 0 ? "\"inf\"" : "\"-inf\"";
+        if (std::isnan(value.real)) {
+            to += "\"nan\"";
+        } else if (value.real > 0) {
+            to += "\"inf\"";
+        } else {
+            to += "\"-inf\"";
+        }
     } else {
         to += format_exact(type, value);
     }

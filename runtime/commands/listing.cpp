@@ -104,11 +104,15 @@ const LoadedComponent* owner(const Pin& pin) {
 }
 
 const char* arrow_of_pin(const Pin& pin) {
-    return pin.dir == HAL_DIR_OUT ? "==>" : pin.dir == HAL_DIR_IO ? "<=>" : "<==";
+    if (pin.dir == HAL_DIR_OUT) return "==>";
+    if (pin.dir == HAL_DIR_IO) return "<=>";
+    return "<==";
 }
 
 const char* arrow_of_signal(const Pin& pin) {
-    return pin.dir == HAL_DIR_OUT ? "<==" : pin.dir == HAL_DIR_IO ? "<=>" : "==>";
+    if (pin.dir == HAL_DIR_OUT) return "<==";
+    if (pin.dir == HAL_DIR_IO) return "<=>";
+    return "==>";
 }
 
 std::string table_value(hal_type type, const hal_value& value) {

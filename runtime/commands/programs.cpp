@@ -212,7 +212,13 @@ public:
     /// True after 1 s, 10 s, and then every minute.
     bool report_due() {
         if (waited() < report_) return false;
-        report_ = report_ < 10s ? 10s : report_ < 60s ? 60s : report_ + 60s;
+        if (report_ < 10s) {
+            report_ = 10s;
+        } else if (report_ < 60s) {
+            report_ = 60s;
+        } else {
+            report_ = report_ + 60s;
+        }
         return true;
     }
     std::string text() const {

@@ -78,7 +78,13 @@ std::string lines_of(const Sources& sources, const std::vector<Span>& spans,
         }
         std::string row;
         for (std::size_t i = 0; i < runs.size(); ++i) {
-            row += i == 0 ? "" : i + 1 == runs.size() ? " and " : ", ";
+            if (i == 0) {
+                row += "";
+            } else if (i + 1 == runs.size()) {
+                row += " and ";
+            } else {
+                row += ", ";
+            }
             row += std::to_string(runs[i].first);
             if (runs[i].second != runs[i].first) {
                 row += " to " + std::to_string(runs[i].second);

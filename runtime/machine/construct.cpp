@@ -314,9 +314,13 @@ bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadR
         instance->loaded = request.at;
         const std::string serial =
             !request.names.empty() || singleton ? "" : std::to_string(edit.take_number(component));
-        instance->name = !request.names.empty() ? request.names[i]
-                         : singleton            ? dashed(component.name)
-                                                : dashed(component.name) + "." + serial;
+        if (!request.names.empty()) {
+            instance->name = request.names[i];
+        } else if (singleton) {
+            instance->name = dashed(component.name);
+        } else {
+            instance->name = dashed(component.name) + "." + serial;
+        }
         instance->memory = static_cast<char*>(storage.get()) + in_block++ * stride;
         instance->storage = storage;
         instance->load = component.loads.empty() ? 0 : component.loads.size() - 1;

@@ -24,9 +24,13 @@ void edits::net(Elaboration& on, Args args) {
     Arrow arrow = Arrow::none;
     for (const Token& token : args.subspan(1)) {
         if (is_arrow(token.text)) {
-            arrow = token.text == "=>"   ? Arrow::to_pin
-                    : token.text == "<=" ? Arrow::from_pin
-                                         : Arrow::both;
+            if (token.text == "=>") {
+                arrow = Arrow::to_pin;
+            } else if (token.text == "<=") {
+                arrow = Arrow::from_pin;
+            } else {
+                arrow = Arrow::both;
+            }
             continue;
         }
         if (Pin* const pin = on.edit.pin(word(token))) {

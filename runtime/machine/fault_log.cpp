@@ -219,11 +219,15 @@ std::string message_of(const SessionState& s, const Thread& thread, const Stall&
         text += (function ? function_text(*function) + " has not returned, no cycle ended for "
                           : "no cycle ended for ") +
                 silent;
-        text += stall.cause == busy ? ", it uses CPU time (a long computation or an endless loop)"
-                : stall.cause == waiting ? ", it waits in a system call"
-                : stall.tracer != 0
-                    ? ", stopped by the debugger with process ID " + std::to_string(stall.tracer)
-                    : std::string(", stopped by a signal");
+        if (stall.cause == busy) {
+            text += ", it uses CPU time (a long computation or an endless loop)";
+        } else if (stall.cause == waiting) {
+            text += ", it waits in a system call";
+        } else if (stall.tracer != 0) {
+            text += ", stopped by the debugger with process ID " + std::to_string(stall.tracer);
+        } else {
+            text += std::string(", stopped by a signal");
+        }
         break;
     }
     text += limit_of(thread) + " at cycle " + grouped(stall.cycle);

@@ -51,7 +51,10 @@ struct Spec {
 
     bool upper() const noexcept { return conversion >= 'A' && conversion <= 'Z'; }
     std::string_view sign(bool negative) const noexcept {
-        return negative ? "-" : plus ? "+" : blank ? " " : "";
+        if (negative) return "-";
+        if (plus) return "+";
+        if (blank) return " ";
+        return "";
     }
 };
 
@@ -123,17 +126,17 @@ std::int64_t signed_argument(const Spec& spec, Arguments& arguments) noexcept {
     if (spec.longs >= 2) return va_arg(arguments.list, long long);
     if (spec.longs == 1) return va_arg(arguments.list, long);
     const int value = va_arg(arguments.list, int);
-    return spec.longs == -1   ? static_cast<short>(value)
-           : spec.longs == -2 ? static_cast<signed char>(value)
-                              : value;
+    if (spec.longs == -1) return static_cast<short>(value);
+    if (spec.longs == -2) return static_cast<signed char>(value);
+    return value;
 }
 std::uint64_t unsigned_argument(const Spec& spec, Arguments& arguments) noexcept {
     if (spec.longs >= 2) return va_arg(arguments.list, unsigned long long);
     if (spec.longs == 1) return va_arg(arguments.list, unsigned long);
     const unsigned value = va_arg(arguments.list, unsigned);
-    return spec.longs == -1   ? static_cast<unsigned short>(value)
-           : spec.longs == -2 ? static_cast<unsigned char>(value)
-                              : value;
+    if (spec.longs == -1) return static_cast<unsigned short>(value);
+    if (spec.longs == -2) return static_cast<unsigned char>(value);
+    return value;
 }
 
 /// %g with the alternate form keeps its zeros, so it is written as %e or %f with the digits that

@@ -46,9 +46,9 @@ Interface interface_of(const ElfFile& file, const std::string& folder) {
 }
 
 const char* version_text(Interface interface) noexcept {
-    return interface == Interface::v2_9    ? "2.9"
-           : interface == Interface::v2_10 ? "2.10"
-                                           : "2.9 or 2.10";
+    if (interface == Interface::v2_9) return "2.9";
+    if (interface == Interface::v2_10) return "2.10";
+    return "2.9 or 2.10";
 }
 
 }  // namespace hal::modules

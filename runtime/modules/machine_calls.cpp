@@ -48,7 +48,11 @@ int type_of(hal_type type) {
     default: return 0;
     }
 }
-int width_of(int type) { return type == bit ? 1 : type == s32 || type == u32 ? 4 : 8; }
+int width_of(int type) {
+    if (type == bit) return 1;
+    if (type == s32 || type == u32) return 4;
+    return 8;
+}
 
 /// Sets a parameter of another component, or of one that is being loaded.
 int set_parameter(const char* name, int type, const void* value) {

@@ -106,10 +106,15 @@ int new_slot(const char* function, bool parameter, const char* name, int type, i
     hal_pin* const pin =
         static_cast<hal_pin*>(host->allocate(host, sizeof(hal_pin), alignof(hal_pin)));
     if (!pin) return -ENOMEM;
-    decl.dir = parameter    ? HAL_DIR_PARAM
-               : dir == in  ? HAL_DIR_IN
-               : dir == out ? HAL_DIR_OUT
-                            : HAL_DIR_IO;
+    if (parameter) {
+        decl.dir = HAL_DIR_PARAM;
+    } else if (dir == in) {
+        decl.dir = HAL_DIR_IN;
+    } else if (dir == out) {
+        decl.dir = HAL_DIR_OUT;
+    } else {
+        decl.dir = HAL_DIR_IO;
+    }
     decl.flags = dir == read_only ? HAL_PIN_READ_ONLY : 0;
     decl.name = name;
     decl.doc = decl.unit = "";

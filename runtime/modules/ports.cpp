@@ -36,7 +36,9 @@ hal_port* port_of(std::intptr_t given) noexcept {
     if (number < 1 || number > static_cast<int>(pins.size())) return nullptr;
     const PortPin* const pin =
         pins[static_cast<std::size_t>(number) - 1].load(std::memory_order_acquire);
-    return !pin ? nullptr : pin->own ? pin->own : pin->pin.slot->port;
+    if (!pin) return nullptr;
+    if (pin->own) return pin->own;
+    return pin->pin.slot->port;
 }
 std::uint32_t held_by(const hal_port& port) noexcept {
     return static_cast<std::uint32_t>(__atomic_load_n(&port.head, __ATOMIC_ACQUIRE) -

@@ -321,7 +321,11 @@ int rtapi_task_resume(int id) {
     return 0;
 }
 
-int rtapi_task_self() { return current ? number_of(*current) : in_cycle ? 0 : -EINVAL; }
+int rtapi_task_self() {
+    if (current) return number_of(*current);
+    if (in_cycle) return 0;
+    return -EINVAL;
+}
 
 void rtapi_wait() {
     Task* const task = current;
@@ -352,6 +356,8 @@ void rtapi_wait() {
 }
 
 long long rtapi_task_pll_get_reference() {
-    return current ? current->due_ns : in_cycle ? cycle_now->start_ns : -EINVAL;
+    if (current) return current->due_ns;
+    if (in_cycle) return cycle_now->start_ns;
+    return -EINVAL;
 }
 }

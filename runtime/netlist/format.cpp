@@ -164,7 +164,13 @@ private:
             const std::string_view between =
                 text.empty() ? "" : sources_.text({source_, end, span.begin});
             const bool here = between.find('\n') != between.npos;
-            text += here ? " \\\n    " : text.empty() ? "" : " ";
+            if (here) {
+                text += " \\\n    ";
+            } else if (text.empty()) {
+                text += "";
+            } else {
+                text += " ";
+            }
             text += word;
             end = span.end;
             broken = broken || here;

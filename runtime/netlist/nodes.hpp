@@ -27,7 +27,9 @@ struct NodeLine {
     /// The default is ten intervals, at least 100 ms: without real-time scheduling a message may be
     /// that late.
     std::int64_t deadline() const {
-        return deadline_ns != 0 ? deadline_ns : rate() < 10'000'000 ? 100'000'000 : 10 * rate();
+        if (deadline_ns != 0) return deadline_ns;
+        if (rate() < 10'000'000) return 100'000'000;
+        return 10 * rate();
     }
 };
 

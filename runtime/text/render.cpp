@@ -20,16 +20,18 @@ constexpr std::string_view ellipsis = "…";
 struct Style {
     const char *error = "", *warning = "", *note = "", *gutter = "", *strong = "", *off = "";
     const char* of(Severity severity) const {
-        return severity == Severity::error ? error : severity == Severity::warning ? warning : note;
+        if (severity == Severity::error) return error;
+        if (severity == Severity::warning) return warning;
+        return note;
     }
 };
 constexpr Style plain{};
 constexpr Style colored{"\033[1;31m", "\033[1;33m", "\033[1;36m", "\033[34m", "\033[1m", "\033[0m"};
 
 constexpr const char* word(Severity severity) {
-    return severity == Severity::error     ? "error"
-           : severity == Severity::warning ? "warning"
-                                           : "note";
+    if (severity == Severity::error) return "error";
+    if (severity == Severity::warning) return "warning";
+    return "note";
 }
 
 /// A label with the columns its span has in the row being drawn.

@@ -95,7 +95,13 @@ struct MarkdownWriter : PageWriter {
 std::string troff(const std::string& line) {
     std::string text = line.starts_with('.') || line.starts_with('\'') ? "\\&" : "";
     for (const char c : line) {
-        text += c == '\\' ? std::string("\\e") : c == '-' ? std::string("\\-") : std::string(1, c);
+        if (c == '\\') {
+            text += std::string("\\e");
+        } else if (c == '-') {
+            text += std::string("\\-");
+        } else {
+            text += std::string(1, c);
+        }
     }
     return text;
 }

@@ -189,9 +189,11 @@ private:
     /// Returns what a net label has in place of the line's style.
     static std::string age(const Pin& from, const Pin& to) {
         const std::string_view line = style(from, to);
-        return line == "dashed"   ? " z⁻¹"
-               : line == "dotted" ? fmt::format(" from {}", thread_of(from)->name)
-                                  : "";
+        if (line == "dashed") return " z⁻¹";
+        if (line == "dotted") {
+            return fmt::format(" from {}", thread_of(from)->name);
+        }
+        return "";
     }
 
     /// A pin of a thread or of a function's times is a small node of its own.

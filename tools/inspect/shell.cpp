@@ -98,9 +98,13 @@ Client::Options client_options(const RemoteShellOptions& options) {
     how.script = options.script;
     how.json = options.json;
     how.color = colours(STDERR_FILENO);
-    how.level = options.loudness == Loudness::nothing   ? "nothing"
-                : options.loudness == Loudness::results ? "results"
-                                                        : "errors";
+    if (options.loudness == Loudness::nothing) {
+        how.level = "nothing";
+    } else if (options.loudness == Loudness::results) {
+        how.level = "results";
+    } else {
+        how.level = "errors";
+    }
     std::error_code unknown;
     how.directory = std::filesystem::current_path(unknown).string();
     return how;

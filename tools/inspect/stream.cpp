@@ -61,12 +61,22 @@ bool Stream::open(const StreamOptions& options, const char* component) {
                          words.size() == 2 ? words.front() : words.back()));
         return false;
     }
-    if (!words.empty()) {
-        file = words.front();
+    if (channel.empty()) {
+        if (!words.empty()) {
+            file = words.front();
+        }
+        name = fmt::format("{}.0", component);
+    } else if (number(channel)) {
+        if (!words.empty()) {
+            file = words.front();
+        }
+        name = fmt::format("{}.{}", component, channel);
+    } else {
+        if (!words.empty()) {
+            file = words.front();
+        }
+        name = channel;
     }
-    name = channel.empty()   ? fmt::format("{}.0", component)
-           : number(channel) ? fmt::format("{}.{}", component, channel)
-                             : channel;
     std::string problem;
     client = Client::connect(instance_wanted(options.name), problem);
     if (!client) {

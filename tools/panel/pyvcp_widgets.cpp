@@ -19,9 +19,9 @@ constexpr std::array<std::string_view, 20> widgets{
     "scale",  "dial",       "jogwheel", "image_bit", "image_u32", "axis_image"};
 
 bool truth(const Json& value) {
-    return value.is_boolean()  ? value.get<bool>()
-           : value.is_number() ? value.get<double>() != 0
-                               : !value.is_null() && !value.empty();
+    if (value.is_boolean()) return value.get<bool>();
+    if (value.is_number()) return value.get<double>() != 0;
+    return !value.is_null() && !value.empty();
 }
 
 double real(const Json& options, const char* key, double otherwise) {

@@ -23,7 +23,9 @@ std::string text_of(const Json& json) {
 }
 
 Json zero_of(const PanelPin& pin) {
-    return pin.type == "bit" ? Json(false) : pin.type == "float" ? Json(0.0) : Json(0);
+    if (pin.type == "bit") return Json(false);
+    if (pin.type == "float") return Json(0.0);
+    return Json(0);
 }
 
 /// Converts a value to the type of a pin. Returns false when it does not fit.

@@ -9,10 +9,10 @@ namespace hal::python {
 namespace {
 
 double real(const Json& value) {
-    return value.is_number() ? value.get<double>()
-           : value == "inf"  ? HUGE_VAL
-           : value == "-inf" ? -HUGE_VAL
-                             : NAN;
+    if (value.is_number()) return value.get<double>();
+    if (value == "inf") return HUGE_VAL;
+    if (value == "-inf") return -HUGE_VAL;
+    return NAN;
 }
 
 template <class T>
@@ -42,10 +42,10 @@ Json integer(const Item& item, const py::object& value) {
 }  // namespace
 
 Json initial_value(hal_type type) {
-    return type == HAL_TYPE_BIT     ? Json(false)
-           : type == HAL_TYPE_FLOAT ? Json(0.0)
-           : type == HAL_TYPE_PORT  ? Json(nullptr)
-                                    : Json(0);
+    if (type == HAL_TYPE_BIT) return Json(false);
+    if (type == HAL_TYPE_FLOAT) return Json(0.0);
+    if (type == HAL_TYPE_PORT) return Json(nullptr);
+    return Json(0);
 }
 
 py::object to_python(const Item& item) {
@@ -74,7 +74,9 @@ Json to_json(const Item& item, const py::object& value) {
         if (!number) throw py::error_already_set();
         const double got = PyFloat_AsDouble(number.ptr());
         if (std::isfinite(got)) return got;
-        return std::isnan(got) ? "nan" : got > 0 ? "inf" : "-inf";
+        if (std::isnan(got)) return "nan";
+        if (got > 0) return "inf";
+        return "-inf";
     }
     case HAL_TYPE_S32: return integer<std::int32_t>(item, value);
     case HAL_TYPE_U32: return integer<std::uint32_t>(item, value);

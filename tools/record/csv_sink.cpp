@@ -68,10 +68,14 @@ public:
     }
     std::uint64_t bytes() const override { return bytes_; }
     int error() const override {
-        return held_.error != 0 ? held_.error : file_.error() != 0 ? file_.error() : closing_;
+        if (held_.error != 0) return held_.error;
+        if (file_.error() != 0) return file_.error();
+        return closing_;
     }
     std::string problem() const override {
-        return !held_.problem.empty() ? held_.problem : error() != 0 ? std::strerror(error()) : "";
+        if (!held_.problem.empty()) return held_.problem;
+        if (error() != 0) return std::strerror(error());
+        return "";
     }
     std::string where() const override { return held_.error == 0 ? path_ : ""; }
     std::uint64_t rows() const override { return file_.records() == 0 ? 0 : file_.records() - 1; }

@@ -143,9 +143,9 @@ public:
     std::uint64_t bytes() const override { return writer_.bytes(); }
     int error() const override { return writer_.error(); }
     std::string problem() const override {
-        return !writer_.problem().empty() ? writer_.problem()
-               : writer_.error() != 0     ? std::strerror(writer_.error())
-                                          : "";
+        if (!writer_.problem().empty()) return writer_.problem();
+        if (writer_.error() != 0) return std::strerror(writer_.error());
+        return "";
     }
     std::string kept() const override { return writer_.kept(); }
     std::string where() const override { return writer_.where(); }

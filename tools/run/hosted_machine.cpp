@@ -38,9 +38,13 @@ ShellOptions shell_options(const NetlistOptions& options) {
     how.script = options.script;
     how.color = colours(STDERR_FILENO);
     how.node = options.part;
-    how.level = options.loudness == Loudness::nothing   ? Level::nothing
-                : options.loudness == Loudness::results ? Level::results
-                                                        : Level::errors;
+    if (options.loudness == Loudness::nothing) {
+        how.level = Level::nothing;
+    } else if (options.loudness == Loudness::results) {
+        how.level = Level::results;
+    } else {
+        how.level = Level::errors;
+    }
     return how;
 }
 

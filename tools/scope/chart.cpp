@@ -52,9 +52,13 @@ struct TimeUnit {
 };
 TimeUnit time_unit(std::int64_t length_ns) {
     const auto length = static_cast<double>(length_ns);
-    return length >= 2e9   ? TimeUnit{"s", 1e9}
-           : length >= 2e6 ? TimeUnit{"ms", 1e6}
-                           : TimeUnit{"us", 1e3};
+    if (length >= 2e9) {
+        return TimeUnit{"s", 1e9};
+    }
+    if (length >= 2e6) {
+        return TimeUnit{"ms", 1e6};
+    }
+    return TimeUnit{"us", 1e3};
 }
 
 std::string label(double value, double step) {

@@ -33,12 +33,22 @@ TriggerText read_trigger(std::string_view text) {
     const auto at = rest.find_first_of("<>");
     if (at == rest.npos) {
         const bool falling = rest.starts_with('!');
-        if (falling) {
-            rest = trimmed(rest.substr(1));
+        if (state) {
+            if (falling) {
+                rest = trimmed(rest.substr(1));
+            }
+            read.trigger.edge = (falling ? Edge::below : Edge::above);
+        } else if (falling) {
+            if (falling) {
+                rest = trimmed(rest.substr(1));
+            }
+            read.trigger.edge = Edge::falling;
+        } else {
+            if (falling) {
+                rest = trimmed(rest.substr(1));
+            }
+            read.trigger.edge = Edge::rising;
         }
-        read.trigger.edge = state     ? (falling ? Edge::below : Edge::above)
-                            : falling ? Edge::falling
-                                      : Edge::rising;
         read.trigger.level = 0.5;
     } else {
         const std::string_view relation =
@@ -60,9 +70,13 @@ TriggerText read_trigger(std::string_view text) {
         }
         read.trigger.level = *level;
         read.has_level = true;
-        read.trigger.edge = relation == "<>"  ? Edge::either
-                            : relation == ">" ? (state ? Edge::above : Edge::rising)
-                                              : (state ? Edge::below : Edge::falling);
+        if (relation == "<>") {
+            read.trigger.edge = Edge::either;
+        } else if (relation == ">") {
+            read.trigger.edge = (state ? Edge::above : Edge::rising);
+        } else {
+            read.trigger.edge = (state ? Edge::below : Edge::falling);
+        }
         rest = trimmed(rest.substr(0, at));
     }
     if (rest.size() > 2 && rest.front() == '|' && rest.back() == '|') {

@@ -42,7 +42,9 @@ std::string tcl_word(std::string_view text) {
 }
 
 const char* name_of(Pass pass) {
-    return pass == Pass::loads ? "loads" : pass == Pass::rest ? "rest" : "both";
+    if (pass == Pass::loads) return "loads";
+    if (pass == Pass::rest) return "rest";
+    return "both";
 }
 
 std::string prelude_of(const TclScript& script, const std::string& requests,

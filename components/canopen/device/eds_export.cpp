@@ -108,9 +108,13 @@ eds::Entry entry_of(const EntryDescription& e) {
     case Access::write_only: out.access = eds::Access::wo; break;
     case Access::constant: out.access = eds::Access::constant; break;
     case Access::read_write:
-        out.access = e.rpdo == e.tpdo ? eds::Access::rw
-                     : e.rpdo         ? eds::Access::rww
-                                      : eds::Access::rwr;
+        if (e.rpdo == e.tpdo) {
+            out.access = eds::Access::rw;
+        } else if (e.rpdo) {
+            out.access = eds::Access::rww;
+        } else {
+            out.access = eds::Access::rwr;
+        }
         break;
     }
     out.default_value = value_text(e);
@@ -130,10 +134,13 @@ eds::Object object_of(const Description& d, std::span<const EntryDescription* co
     const auto& first = *entries.front();
     eds::Object out;
     out.index = first.index;
-    out.category = first.index == 0x1000 || first.index == 0x1001 || first.index == 0x1018
-                       ? eds::Category::mandatory
-                   : first.index >= 0x2000 && first.index <= 0x5fff ? eds::Category::manufacturer
-                                                                    : eds::Category::optional;
+    if (first.index == 0x1000 || first.index == 0x1001 || first.index == 0x1018) {
+        out.category = eds::Category::mandatory;
+    } else if (first.index >= 0x2000 && first.index <= 0x5fff) {
+        out.category = eds::Category::manufacturer;
+    } else {
+        out.category = eds::Category::optional;
+    }
     for (const auto* e : entries) {
         out.entries.push_back(entry_of(*e));
     }

@@ -46,10 +46,15 @@ EntryDescription made(std::uint16_t index, const Entry& entry, const DataType& t
     out.name = entry.name;
     out.type = static_cast<Type>(type.code);
     using Right = hal::canopen::Access;
-    out.access = entry.access == Access::constant ? Right::constant
-                 : !entry.writable()              ? Right::read_only
-                 : !entry.readable()              ? Right::write_only
-                                                  : Right::read_write;
+    if (entry.access == Access::constant) {
+        out.access = Right::constant;
+    } else if (!entry.writable()) {
+        out.access = Right::read_only;
+    } else if (!entry.readable()) {
+        out.access = Right::write_only;
+    } else {
+        out.access = Right::read_write;
+    }
     out.rpdo = entry.pdo_mapping && entry.writable() && entry.access != Access::rwr;
     out.tpdo = entry.pdo_mapping && entry.readable() && entry.access != Access::rww &&
                entry.access != Access::constant;

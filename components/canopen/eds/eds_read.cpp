@@ -296,9 +296,9 @@ private:
         return index >= 0x2000 && index < 0x6000 ? Category::manufacturer : Category::optional;
     }
     static std::string_view list_of(Category category) {
-        return category == Category::mandatory  ? "MandatoryObjects"
-               : category == Category::optional ? "OptionalObjects"
-                                                : "ManufacturerObjects";
+        if (category == Category::mandatory) return "MandatoryObjects";
+        if (category == Category::optional) return "OptionalObjects";
+        return "ManufacturerObjects";
     }
 
     void dynamic_channels() {
@@ -316,11 +316,17 @@ private:
             one.type =
                 static_cast<std::uint16_t>(keys_.number(*section, "Type" + i, 0xFFFF).value_or(0));
             const std::string dir = lower(keys_.bare(*section, "Dir" + i));
-            one.access = dir == "ro"    ? Access::ro
-                         : dir == "wo"  ? Access::wo
-                         : dir == "rwr" ? Access::rwr
-                         : dir == "rww" ? Access::rww
-                                        : Access::rw;
+            if (dir == "ro") {
+                one.access = Access::ro;
+            } else if (dir == "wo") {
+                one.access = Access::wo;
+            } else if (dir == "rwr") {
+                one.access = Access::rwr;
+            } else if (dir == "rww") {
+                one.access = Access::rww;
+            } else {
+                one.access = Access::rw;
+            }
             one.range = keys_.bare(*section, "Range" + i);
             one.image_offset = static_cast<std::uint32_t>(
                 keys_.number(*section, "PPOffset" + i, 0xFFFFFFFF).value_or(0));

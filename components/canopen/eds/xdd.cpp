@@ -314,10 +314,13 @@ private:
         out.name = own.name;
         out.type = own.type;
         out.flags = own.flags;
-        out.category = out.index == 0x1000 || out.index == 0x1001 || out.index == 0x1018
-                           ? Category::mandatory
-                       : out.index >= 0x2000 && out.index < 0x6000 ? Category::manufacturer
-                                                                   : Category::optional;
+        if (out.index == 0x1000 || out.index == 0x1001 || out.index == 0x1018) {
+            out.category = Category::mandatory;
+        } else if (out.index >= 0x2000 && out.index < 0x6000) {
+            out.category = Category::manufacturer;
+        } else {
+            out.category = Category::optional;
+        }
         for (Node child = node.first_child(); child; child = child.next_sibling()) {
             if (local(child) != "CANopenSubObject") continue;
             const auto sub = number(child, "subIndex", 0xFF, true);

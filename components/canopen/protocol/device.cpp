@@ -8,10 +8,16 @@ namespace hal::canopen {
 namespace {
 /// The objects that a sub-index of 1010h or 1011h covers (CiA 301).
 constexpr std::pair<std::uint16_t, std::uint16_t> objects_of(std::uint8_t sub) noexcept {
-    return sub == 1   ? std::pair<std::uint16_t, std::uint16_t>{0x1000, 0xffff}
-           : sub == 2 ? std::pair<std::uint16_t, std::uint16_t>{0x1000, 0x1fff}
-           : sub == 3 ? std::pair<std::uint16_t, std::uint16_t>{0x6000, 0x9fff}
-                      : std::pair<std::uint16_t, std::uint16_t>{0x2000, 0x5fff};
+    if (sub == 1) {
+        return std::pair<std::uint16_t, std::uint16_t>{0x1000, 0xffff};
+    }
+    if (sub == 2) {
+        return std::pair<std::uint16_t, std::uint16_t>{0x1000, 0x1fff};
+    }
+    if (sub == 3) {
+        return std::pair<std::uint16_t, std::uint16_t>{0x6000, 0x9fff};
+    }
+    return std::pair<std::uint16_t, std::uint16_t>{0x2000, 0x5fff};
 }
 constexpr std::uint32_t save = 0x65766173;
 constexpr std::uint32_t load_defaults = 0x64616f6c;

@@ -75,7 +75,9 @@ Type standard_type(std::uint16_t index, std::uint8_t sub) noexcept {
     }
     if (index >= 0x1200 && index <= 0x12ff) return sub == 1 || sub == 2 ? unsigned32 : unsigned8;
     if ((index >= 0x1400 && index <= 0x15ff) || (index >= 0x1800 && index <= 0x19ff)) {
-        return sub == 1 ? unsigned32 : sub == 3 || sub == 5 ? unsigned16 : unsigned8;
+        if (sub == 1) return unsigned32;
+        if (sub == 3 || sub == 5) return unsigned16;
+        return unsigned8;
     }
     if ((index >= 0x1600 && index <= 0x17ff) || (index >= 0x1a00 && index <= 0x1bff)) {
         return count ? unsigned8 : unsigned32;
@@ -110,7 +112,9 @@ Abort check_range(const Entry& e, std::span<const std::uint8_t> bytes) noexcept 
                    ? Abort::too_low
                    : Abort::none;
     }
-    return value > e.high ? Abort::too_high : value < e.low ? Abort::too_low : Abort::none;
+    if (value > e.high) return Abort::too_high;
+    if (value < e.low) return Abort::too_low;
+    return Abort::none;
 }
 
 }  // namespace

@@ -89,9 +89,13 @@ Abort Pdos::read_mapping(Pdo& p, bool received) noexcept {
     const auto index = static_cast<std::uint16_t>((received ? rpdo_base : tpdo_base) +
                                                   mapping_offset + p.number - 1);
     const auto count = dictionary_.get<std::uint8_t>(index, 0, 0);
-    p.kind = count == 0xff   ? Kind::destination_address
-             : count == 0xfe ? Kind::source_address
-                             : Kind::plain;
+    if (count == 0xff) {
+        p.kind = Kind::destination_address;
+    } else if (count == 0xfe) {
+        p.kind = Kind::source_address;
+    } else {
+        p.kind = Kind::plain;
+    }
     p.mapping.clear();
     if (p.kind != Kind::plain) return Abort::none;
     std::array<std::uint32_t, 64> entries{};
@@ -176,7 +180,10 @@ Abort Pdos::check_communication(const Entry& e, std::span<const std::uint8_t> va
         if (value[0] > 240 && value[0] < (received ? 254 : 252)) return Abort::value;
         return Abort::none;
     case 3: return p.valid() && !received ? Abort::access : Abort::none;
-    case 6: return p.valid() ? Abort::access : value[0] > 240 ? Abort::value : Abort::none;
+    case 6:
+        if (p.valid()) return Abort::access;
+        if (value[0] > 240) return Abort::value;
+        return Abort::none;
     default: return Abort::none;
     }
 }

@@ -242,10 +242,10 @@ bool Keys::take_time(const char* key, std::int64_t& to, std::int64_t least, std:
         return true;
     }
     const auto text = [](std::int64_t t) {
-        return t % 1'000'000'000 == 0 ? std::to_string(t / 1'000'000'000) + "s"
-               : t % 1'000'000 == 0   ? std::to_string(t / 1'000'000) + "ms"
-               : t % 1'000 == 0       ? std::to_string(t / 1000) + "us"
-                                      : std::to_string(t) + "ns";
+        if (t % 1'000'000'000 == 0) return std::to_string(t / 1'000'000'000) + "s";
+        if (t % 1'000'000 == 0) return std::to_string(t / 1'000'000) + "ms";
+        if (t % 1'000 == 0) return std::to_string(t / 1000) + "us";
+        return std::to_string(t) + "ns";
     };
     reject(*line, "a time of " + text(least) + ".." + text(most) + ", as in 1ms or 250us");
     return false;

@@ -108,9 +108,13 @@ private:
                   "delete syncToRefClock; refClockSyncCycles=\"-1\" synchronises the thread to the "
                   "reference clock");
         }
-        bus.setup.lead = follow     ? master::ClockLead::reference
-                         : sync > 0 ? master::ClockLead::thread
-                                    : master::ClockLead::none;
+        if (follow) {
+            bus.setup.lead = master::ClockLead::reference;
+        } else if (sync > 0) {
+            bus.setup.lead = master::ClockLead::thread;
+        } else {
+            bus.setup.lead = master::ClockLead::none;
+        }
         const auto reference = number(node, "refClockSlaveIdx", -1, 65535).value_or(-1);
         bus_ = &bus;
         children(node, {"slave"}, [&](const Xml& slave) { slave_of(slave); });
@@ -449,10 +453,13 @@ private:
         } else if (type == "u32" || type.empty()) {
             e.type = type_of(std::max<unsigned>(bits, 2), false);
         } else if (is_float) {
-            e.type = type == "float-ieee" ? Type::real32
-                     : type == "float-double-ieee"
-                         ? Type::real64
-                         : type_of(std::max<unsigned>(bits, 2), type == "float");
+            if (type == "float-ieee") {
+                e.type = Type::real32;
+            } else if (type == "float-double-ieee") {
+                e.type = Type::real64;
+            } else {
+                e.type = type_of(std::max<unsigned>(bits, 2), type == "float");
+            }
             e.scaled = true;
             e.scale = real("scale", 1);
             e.offset = real("offset", 0);

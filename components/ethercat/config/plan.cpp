@@ -58,7 +58,13 @@ std::vector<PlannedFrame> frames_of(const master::Setup& setup) {
         for (unsigned n = frame.first; n < frame.last; ++n) {
             const ProcessImage::Datagram& d = image.datagrams()[n];
             PlannedDatagram p;
-            p.command = d.out_to == 0 ? "LRD" : d.in_to > d.in_from ? "LRW" : "LWR";
+            if (d.out_to == 0) {
+                p.command = "LRD";
+            } else if (d.in_to > d.in_from) {
+                p.command = "LRW";
+            } else {
+                p.command = "LWR";
+            }
             p.domain = setup.domains.empty() ? "default" : setup.domains[d.domain].name;
             p.data_bytes = d.length;
             p.output_bytes = d.out_to;

@@ -51,7 +51,9 @@ Known SlavePdos::known(std::uint16_t index, std::uint8_t sub) const {
 
 const std::vector<esi::Pdo>& SlavePdos::described(bool output) const {
     static const std::vector<esi::Pdo> none;
-    return device_ == nullptr ? none : output ? device_->rx : device_->tx;
+    if (device_ == nullptr) return none;
+    if (output) return device_->rx;
+    return device_->tx;
 }
 
 void SlavePdos::read() {

@@ -324,11 +324,15 @@ private:
         if (chosen != nullptr) {
             const std::int64_t cycle = in_.bus.setup.cycle_ns;
             dc.assign_activate = chosen->assign_activate;
-            dc.sync0_cycle_ns = chosen->sync0_cycle_ns != 0 ? chosen->sync0_cycle_ns
-                                : chosen->sync0_factor > 1  ? cycle * chosen->sync0_factor
-                                : chosen->sync0_factor < -1
-                                    ? cycle / -std::int64_t{chosen->sync0_factor}
-                                    : 0;
+            if (chosen->sync0_cycle_ns != 0) {
+                dc.sync0_cycle_ns = chosen->sync0_cycle_ns;
+            } else if (chosen->sync0_factor > 1) {
+                dc.sync0_cycle_ns = cycle * chosen->sync0_factor;
+            } else if (chosen->sync0_factor < -1) {
+                dc.sync0_cycle_ns = cycle / -std::int64_t{chosen->sync0_factor};
+            } else {
+                dc.sync0_cycle_ns = 0;
+            }
             const std::int64_t base = dc.sync0_cycle_ns != 0 ? dc.sync0_cycle_ns : cycle;
             dc.sync1_cycle_ns =
                 chosen->sync1_cycle_ns != 0 ? chosen->sync1_cycle_ns : base * chosen->sync1_factor;

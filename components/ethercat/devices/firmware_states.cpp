@@ -11,11 +11,11 @@ constexpr std::int64_t op_timeout_ns = 200'000'000;
 constexpr std::int64_t lost_pulses = 10;
 
 int rank(State s) noexcept {
-    return s == State::op       ? 4
-           : s == State::safeop ? 3
-           : s == State::preop  ? 2
-           : s == State::boot   ? 1
-                                : 0;
+    if (s == State::op) return 4;
+    if (s == State::safeop) return 3;
+    if (s == State::preop) return 2;
+    if (s == State::boot) return 1;
+    return 0;
 }
 
 }  // namespace

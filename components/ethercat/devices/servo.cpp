@@ -282,9 +282,13 @@ std::uint16_t ServoAxis::status_bits() const noexcept {
             break;
         case Mode::profile_velocity: word |= velocity_ == 0.0 ? status::speed_is_zero : 0U; break;
         case Mode::homing:
-            word |= homed_    ? status::homing_attained | status::target_reached
-                    : homing_ ? 0U
-                              : status::target_reached + 0U;
+            if (homed_) {
+                word |= status::homing_attained | status::target_reached;
+            } else if (homing_) {
+                word |= 0U;
+            } else {
+                word |= status::target_reached + 0U;
+            }
             break;
         default: break;
         }

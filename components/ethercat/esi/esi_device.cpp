@@ -208,7 +208,13 @@ sii::Contents sii_contents(const File& file, const Device& d) {
         g.ds402_channels = 1;
     }
     for (std::size_t i = 0; i < 4 && i < d.physics.size(); ++i) {
-        g.ports[i] = d.physics[i] == 'Y' ? 1 : d.physics[i] == 'K' ? 3 : 0;
+        if (d.physics[i] == 'Y') {
+            g.ports[i] = 1;
+        } else if (d.physics[i] == 'K') {
+            g.ports[i] = 3;
+        } else {
+            g.ports[i] = 0;
+        }
     }
     out.others = d.categories;
     return out;

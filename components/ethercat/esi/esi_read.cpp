@@ -129,11 +129,17 @@ private:
     void sync_manager(const Xml& node, Device& d) {
         SyncManager s;
         const std::string type = lower(trimmed(node.child_value()));
-        s.type = type == "mboxout"   ? sii::SmType::mailbox_out
-                 : type == "mboxin"  ? sii::SmType::mailbox_in
-                 : type == "outputs" ? sii::SmType::outputs
-                 : type == "inputs"  ? sii::SmType::inputs
-                                     : sii::SmType::unused;
+        if (type == "mboxout") {
+            s.type = sii::SmType::mailbox_out;
+        } else if (type == "mboxin") {
+            s.type = sii::SmType::mailbox_in;
+        } else if (type == "outputs") {
+            s.type = sii::SmType::outputs;
+        } else if (type == "inputs") {
+            s.type = sii::SmType::inputs;
+        } else {
+            s.type = sii::SmType::unused;
+        }
         s.start = context_.attribute<std::uint16_t>(node, "StartAddress");
 
         s.default_size = context_.attribute<std::uint16_t>(node, "DefaultSize");

@@ -206,9 +206,13 @@ void ProcessImage::add(FrameWriter& writer, Frame& frame, Command command, std::
     d.domain = b.domain;
     d.first_slave = b.first;
     d.last_slave = b.last;
-    d.out_to = command == Command::lwr   ? d.length
-               : command == Command::lrw ? static_cast<std::uint16_t>(b.out_bytes)
-                                         : std::uint16_t{0};
+    if (command == Command::lwr) {
+        d.out_to = d.length;
+    } else if (command == Command::lrw) {
+        d.out_to = static_cast<std::uint16_t>(b.out_bytes);
+    } else {
+        d.out_to = std::uint16_t{0};
+    }
     d.in_from = command == Command::lrw ? d.out_to : std::uint16_t{0};
     d.in_to = command == Command::lwr ? std::uint16_t{0} : d.length;
     if (command == Command::lwr) {

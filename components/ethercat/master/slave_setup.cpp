@@ -40,9 +40,9 @@ void put_fmmu(std::uint8_t* to, std::uint32_t logical, std::uint16_t length, std
 
 /// Physical start of a sync manager: of the setup, else of the SII.
 std::uint16_t start_of(const SyncManager& sm, const BusSlave& s) noexcept {
-    return sm.start != 0                     ? sm.start
-           : sm.number < s.sii_sync_managers ? s.sii[sm.number].start
-                                             : std::uint16_t{0};
+    if (sm.start != 0) return sm.start;
+    if (sm.number < s.sii_sync_managers) return s.sii[sm.number].start;
+    return std::uint16_t{0};
 }
 
 }  // namespace

@@ -476,7 +476,13 @@ void judge_counters(Bus& bus) noexcept {
             seen = complete ? WkcState::complete : WkcState::part;
         }
     }
-    bus.status.wkc_state = part ? WkcState::part : any ? WkcState::complete : WkcState::none;
+    if (part) {
+        bus.status.wkc_state = WkcState::part;
+    } else if (any) {
+        bus.status.wkc_state = WkcState::complete;
+    } else {
+        bus.status.wkc_state = WkcState::none;
+    }
 }
 
 }  // namespace hal::ethercat::master

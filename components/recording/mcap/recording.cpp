@@ -33,7 +33,13 @@ std::string json_text(std::string_view object, std::string_view key) {
             continue;
         }
         const char c = object[++at];
-        text += c == 'n' ? '\n' : c == 't' ? '\t' : c;
+        if (c == 'n') {
+            text += '\n';
+        } else if (c == 't') {
+            text += '\t';
+        } else {
+            text += c;
+        }
     }
     return text;
 }

@@ -361,7 +361,9 @@ bool Writer::close() {
 }
 
 std::string Writer::where() const {
-    return named_ ? path_ : removed_ || held_.error != 0 ? "" : held_.path;
+    if (named_) return path_;
+    if (removed_ || held_.error != 0) return "";
+    return held_.path;
 }
 
 std::uint64_t Writer::messages() const {

@@ -57,7 +57,9 @@ class Kernel final : public VideoSystem {
         pollfd one{fd, POLLIN, 0};
         const int found = ::poll(&one, 1, timeout_ms);
         if (found < 0) return errno == EINTR ? 0 : -1;
-        return found == 0 ? 0 : (one.revents & (POLLERR | POLLHUP | POLLNVAL)) != 0 ? -1 : 1;
+        if (found == 0) return 0;
+        if ((one.revents & (POLLERR | POLLHUP | POLLNVAL)) != 0) return -1;
+        return 1;
     }
     void close(int fd) override { ::close(fd); }
 };
@@ -125,7 +127,9 @@ public:
         }
         if (!there) return Got::nothing;
         const bool useful = take(newest, now, frame);
-        return !give_back(newest) ? unplugged() : useful ? Got::frame : Got::bad;
+        if (!give_back(newest)) return unplugged();
+        if (useful) return Got::frame;
+        return Got::bad;
     }
 
     void close() noexcept override {

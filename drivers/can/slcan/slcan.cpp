@@ -40,12 +40,15 @@ std::string greeting(const Options& o) {
 link::Descriptor open_line(const std::string& device, const Options& o, std::string& problem) {
     link::Descriptor fd(::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
     if (!fd) {
-        problem = errno == ENOENT ? "no such device; to list adapters: ls /dev/serial/by-id"
-                  : errno == EACCES
-                      ? "permission denied; type: sudo usermod -aG dialout $USER, and log in again"
-                  : errno == EBUSY
-                      ? "the line is in use by another program; to find it: fuser " + device
-                      : "cannot open: " + link::reason();
+        if (errno == ENOENT) {
+            problem = "no such device; to list adapters: ls /dev/serial/by-id";
+        } else if (errno == EACCES) {
+            problem = "permission denied; type: sudo usermod -aG dialout $USER, and log in again";
+        } else if (errno == EBUSY) {
+            problem = "the line is in use by another program; to find it: fuser " + device;
+        } else {
+            problem = "cannot open: " + link::reason();
+        }
         return {};
     }
     termios t{};

@@ -100,9 +100,13 @@ public:
           outgoing_(options.send_capacity),
           monitor_(name, counting_, interface.index, options.restart_ms,
                    [this](int index) { return reopen(index); }) {
-        counting_.bit_rate = interface.bit_rate != 0         ? interface.bit_rate
-                             : options.bit_rate != unlimited ? options.bit_rate
-                                                             : 0;
+        if (interface.bit_rate != 0) {
+            counting_.bit_rate = interface.bit_rate;
+        } else if (options.bit_rate != unlimited) {
+            counting_.bit_rate = options.bit_rate;
+        } else {
+            counting_.bit_rate = 0;
+        }
         counting_.data_rate = interface.data_rate != 0 ? interface.data_rate : options.data_rate;
         if (interface.has_state) {
             counting_.state = interface.state;

@@ -104,9 +104,13 @@ public:
         } else {
             const double gate = std::max(4 * scatter_, period * 1e-3);
             const bool beyond = std::abs(residual) > gate;
-            beyond_ = !beyond        ? 0
-                      : residual > 0 ? std::max(beyond_, 0) + 1
-                                     : std::min(beyond_, 0) - 1;
+            if (!beyond) {
+                beyond_ = 0;
+            } else if (residual > 0) {
+                beyond_ = std::max(beyond_, 0) + 1;
+            } else {
+                beyond_ = std::min(beyond_, 0) - 1;
+            }
             scatter_ += (std::min(std::abs(residual), 2 * gate) - scatter_) / 16;
             if (std::abs(beyond_) >= 4) {
                 phase_ = error;

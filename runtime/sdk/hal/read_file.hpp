@@ -17,11 +17,11 @@ namespace hal {
 
 /// What kind of file it is, in words; empty for a regular file. [any]
 inline const char* special_kind(mode_t mode) {
-    return S_ISREG(mode)    ? ""
-           : S_ISDIR(mode)  ? "it is a directory"
-           : S_ISFIFO(mode) ? "it is a FIFO, not a regular file"
-           : S_ISSOCK(mode) ? "it is a socket, not a regular file"
-                            : "it is a device, not a regular file";
+    if (S_ISREG(mode)) return "";
+    if (S_ISDIR(mode)) return "it is a directory";
+    if (S_ISFIFO(mode)) return "it is a FIFO, not a regular file";
+    if (S_ISSOCK(mode)) return "it is a socket, not a regular file";
+    return "it is a device, not a regular file";
 }
 
 /// A descriptor that this process was given, as the shell's `<(command)` names it.

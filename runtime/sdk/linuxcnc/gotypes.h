@@ -55,9 +55,9 @@ static inline const char* go_result_to_string(int result) {
     return result >= 0 && result <= GO_RESULT_BUG ? names[result] : "?";
 }
 static inline const char* go_quantity_to_string(int quantity) {
-    return quantity == GO_QUANTITY_LENGTH  ? "Length"
-           : quantity == GO_QUANTITY_ANGLE ? "Angle"
-                                           : "None";
+    if (quantity == GO_QUANTITY_LENGTH) return "Length";
+    if (quantity == GO_QUANTITY_ANGLE) return "Angle";
+    return "None";
 }
 
 #endif

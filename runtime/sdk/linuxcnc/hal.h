@@ -75,9 +75,9 @@ static inline rtapi_s32 hal_get_si32(hal_sint_t from) { return (rtapi_s32)from->
 static inline rtapi_u32 hal_get_ui32(hal_uint_t from) { return (rtapi_u32)from->value; }
 static inline rtapi_s32 hal_get_si32_clamped(hal_sint_t from) {
     const rtapi_sint value = from->value;
-    return value < RTAPI_INT32_MIN   ? RTAPI_INT32_MIN
-           : value > RTAPI_INT32_MAX ? RTAPI_INT32_MAX
-                                     : (rtapi_s32)value;
+    if (value < RTAPI_INT32_MIN) return RTAPI_INT32_MIN;
+    if (value > RTAPI_INT32_MAX) return RTAPI_INT32_MAX;
+    return (rtapi_s32)value;
 }
 static inline rtapi_u32 hal_get_ui32_clamped(hal_uint_t from) {
     const rtapi_uint value = from->value;

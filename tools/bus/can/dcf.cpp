@@ -56,7 +56,9 @@ Read read_object(NodeClient& station, std::uint8_t node, std::uint16_t index, st
     request = {.index = index, .sub = sub, .upload = true, .buffer = bytes};
     const bool read = station.transfer(node, request);
     bytes.resize(request.ok() ? request.size : 0);
-    return read ? Read::value : request.aborted_by_server ? Read::refused : Read::failed;
+    if (read) return Read::value;
+    if (request.aborted_by_server) return Read::refused;
+    return Read::failed;
 }
 
 void date(eds::DeviceDescription& description, const DcfReadOptions& options) {

@@ -127,9 +127,9 @@ std::function<void()> DriveShell::meanwhile() {
 
 SdoAxis::Interruption DriveShell::interruption() const {
     using enum SdoAxis::Interruption;
-    return station_.bus.stop.requested() || supervision_.collided() ? end
-           : pressed_.load()                                        ? stop
-                                                                    : none;
+    if (station_.bus.stop.requested() || supervision_.collided()) return end;
+    if (pressed_.load()) return stop;
+    return none;
 }
 
 SdoAxis& DriveShell::axis(unsigned number) {

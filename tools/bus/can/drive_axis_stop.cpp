@@ -110,12 +110,15 @@ bool SdoAxis::secure(std::string& what) {
     if (!look()) return false;
     state = state_of(feedback_.statusword);
     if (!had_torque) return true;
-    what = has_torque() ? fmt::format("not stopped within {:g} s",
-                                      static_cast<double>(rules.limits.stop) / 1e9)
-           : state == State::fault || state == State::fault_reaction_active
-               ? fmt::format("in fault (error 0x{:04X}: {}), off, at {:.10g}", feedback_.error_code,
-                             error_word(feedback_.error_code), position())
-               : fmt::format("stopped and off, at {:.10g}", position());
+    if (has_torque()) {
+        what =
+            fmt::format("not stopped within {:g} s", static_cast<double>(rules.limits.stop) / 1e9);
+    } else if (state == State::fault || state == State::fault_reaction_active) {
+        what = fmt::format("in fault (error 0x{:04X}: {}), off, at {:.10g}", feedback_.error_code,
+                           error_word(feedback_.error_code), position());
+    } else {
+        what = fmt::format("stopped and off, at {:.10g}", position());
+    }
     return !has_torque();
 }
 

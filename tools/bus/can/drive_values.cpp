@@ -61,10 +61,10 @@ const Setting* find_setting(const std::string& name) {
 }
 
 double factor_of(const SdoAxis& a, Setting::Unit unit) {
-    return unit == position       ? a.rules.position.ratio()
-           : unit == velocity     ? std::fabs(a.rules.velocity.ratio())
-           : unit == acceleration ? std::fabs(a.rules.acceleration.ratio())
-                                  : 1.0;
+    if (unit == position) return a.rules.position.ratio();
+    if (unit == velocity) return std::fabs(a.rules.velocity.ratio());
+    if (unit == acceleration) return std::fabs(a.rules.acceleration.ratio());
+    return 1.0;
 }
 
 Factor* find_factor(SdoAxis& a, const std::string& name) {

@@ -35,9 +35,9 @@ const char* flash_error(std::uint32_t code) {
                                      "flash write error",
                                      "address error",
                                      "flash secured"};
-    return code < std::size(words) ? words[code]
-           : code == 63            ? "unspecified error"
-                                   : "manufacturer-specific error";
+    if (code < std::size(words)) return words[code];
+    if (code == 63) return "unspecified error";
+    return "manufacturer-specific error";
 }
 
 class Flash {
@@ -93,7 +93,9 @@ private:
         if (ok) {
             std::memcpy(&value, room, sizeof value);
         }
-        return ok ? Answer::value : last_.aborted_by_server ? Answer::refused : Answer::silent;
+        if (ok) return Answer::value;
+        if (last_.aborted_by_server) return Answer::refused;
+        return Answer::silent;
     }
     /// Sends a command. A node that restarts into its boot loader may not respond; settle() finds
     /// out.

@@ -49,9 +49,13 @@ std::string timeline_text(const Table& t, const Mode& m) {
     std::vector<bool> used(t.nodes.size());
     for (const auto& uses : m.slots) {
         const Use* u = uses.empty() ? nullptr : &uses.front();
-        line += u == nullptr || u->kind == Kind::shared ? '.'
-                : u->kind == Kind::sync                 ? '|'
-                                                        : letters[u->node % letters.size()];
+        if (u == nullptr || u->kind == Kind::shared) {
+            line += '.';
+        } else if (u->kind == Kind::sync) {
+            line += '|';
+        } else {
+            line += letters[u->node % letters.size()];
+        }
         for (const Use& one : uses) {
             if (one.kind == Kind::priv) {
                 used[one.node] = true;

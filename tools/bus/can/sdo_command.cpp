@@ -43,9 +43,13 @@ bool parse_target(const SdoOptions& options, SdoTarget& target) {
         fail(options, "--block and --segmented exclude each other");
         return false;
     }
-    target.mode = options.block       ? SdoMode::block
-                  : options.segmented ? SdoMode::segmented
-                                      : SdoMode::automatic;
+    if (options.block) {
+        target.mode = SdoMode::block;
+    } else if (options.segmented) {
+        target.mode = SdoMode::segmented;
+    } else {
+        target.mode = SdoMode::automatic;
+    }
     return true;
 }
 

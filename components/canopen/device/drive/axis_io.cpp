@@ -34,9 +34,9 @@ constexpr std::uint16_t heartbeat_lost = 0x8130;
 constexpr Time longest_step = 20 * millisecond;
 
 std::uint8_t register_bits(std::uint16_t code) noexcept {
-    return code == heartbeat_lost || code == sync_missing ? error_communication
-           : code == encoder_lost                         ? error_profile
-                                                          : error_manufacturer;
+    if (code == heartbeat_lost || code == sync_missing) return error_communication;
+    if (code == encoder_lost) return error_profile;
+    return error_manufacturer;
 }
 
 }  // namespace

@@ -18,9 +18,9 @@ namespace hal::canopen::cia402 {
 /// Rounds to the next integer; clamps what is beyond any counter. [any]
 inline std::int64_t whole(double value) noexcept {
     constexpr double most = 1LL << 52;
-    return value >= -most && value <= most ? std::llround(value)
-           : value > 0                     ? 1LL << 52
-                                           : -(1LL << 52);
+    if (value >= -most && value <= most) return std::llround(value);
+    if (value > 0) return 1LL << 52;
+    return -(1LL << 52);
 }
 
 /// Converts 1/min to 1/s. [any]

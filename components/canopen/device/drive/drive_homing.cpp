@@ -31,9 +31,9 @@ bool HomingSearch::supports(int method) noexcept {
 }
 
 Range HomingSearch::range(const Plant& plant, Switch which) noexcept {
-    return which == Switch::negative   ? plant.negative_limit()
-           : which == Switch::positive ? plant.positive_limit()
-                                       : plant.home();
+    if (which == Switch::negative) return plant.negative_limit();
+    if (which == Switch::positive) return plant.positive_limit();
+    return plant.home();
 }
 
 HomingSearch::Region HomingSearch::before_edge() const noexcept {

@@ -43,7 +43,13 @@ void Plant::step(double dt, double demand, double load, bool brake_closed) noexc
         torque_ = towards(torque_, demand, h, motor_.current_loop_time);
         double speed = (speed_ + h * (torque_ + load) / motor_.inertia) /
                        (1 + h * motor_.viscous_friction / motor_.inertia);
-        speed = speed > still ? speed - still : speed < -still ? speed + still : 0;
+        if (speed > still) {
+            speed = speed - still;
+        } else if (speed < -still) {
+            speed = speed + still;
+        } else {
+            speed = 0;
+        }
         // Trapezoidal in the place: exact for a constant acceleration.
         place_ += 0.5 * (speed_ + speed) * h * per_radian_;
         speed_ = speed;

@@ -88,9 +88,13 @@ MasterObjects::MasterObjects(Dictionary& dictionary, Master& master) : master_(m
 Abort MasterObjects::reading(Entry& e) noexcept {
     if (e.sub == 0 || e.sub >= all_nodes) return Abort::none;
     const auto& s = master_.status(e.sub);
-    e.data[0] = !s.online           ? node_missing
-                : s.last_heard == 0 ? state_unknown
-                                    : static_cast<std::uint8_t>(s.state);
+    if (!s.online) {
+        e.data[0] = node_missing;
+    } else if (s.last_heard == 0) {
+        e.data[0] = state_unknown;
+    } else {
+        e.data[0] = static_cast<std::uint8_t>(s.state);
+    }
     return Abort::none;
 }
 

@@ -99,9 +99,9 @@ std::uint64_t raw_of(const Object& o, double pin_value) {
                                        : static_cast<std::int64_t>(rounded);
         return static_cast<std::uint64_t>(whole);
     }
-    return rounded >= static_cast<double>(ones) ? ones
-           : rounded <= 0                       ? 0
-                                                : static_cast<std::uint64_t>(rounded) & ones;
+    if (rounded >= static_cast<double>(ones)) return ones;
+    if (rounded <= 0) return 0;
+    return static_cast<std::uint64_t>(rounded) & ones;
 }
 
 void NodeReader::object_options() {

@@ -299,10 +299,15 @@ bool NodeReader::default_objects(const PdoWish& wish, Pdo& pdo) {
         unknown.name = dashed(object_label(index, unknown.sub));
 
         unknown.about = object_label(index, unknown.sub);
-        unknown.type = bits > 32   ? Type::unsigned64
-                       : bits > 16 ? Type::unsigned32
-                       : bits > 8  ? Type::unsigned16
-                                   : Type::unsigned8;
+        if (bits > 32) {
+            unknown.type = Type::unsigned64;
+        } else if (bits > 16) {
+            unknown.type = Type::unsigned32;
+        } else if (bits > 8) {
+            unknown.type = Type::unsigned16;
+        } else {
+            unknown.type = Type::unsigned8;
+        }
         Object out =
             known_object(known != nullptr && known->type != Type::none ? *known : unknown, bits);
         out.filler = index <= 0x1b;

@@ -19,7 +19,9 @@ constexpr std::uint16_t dispatcher_list = 0x1fd0;
 constexpr unsigned per_index = 254;
 
 Type own_type(Type type) {
-    return is_real(type) ? type : is_signed(type) ? Type::integer64 : Type::unsigned64;
+    if (is_real(type)) return type;
+    if (is_signed(type)) return Type::integer64;
+    return Type::unsigned64;
 }
 
 void set(Description& d, std::uint16_t index, std::uint8_t sub, std::uint64_t value,

@@ -287,9 +287,13 @@ struct NodePins {
         emcy = s.emergency.time != 0 ? s.emergency.code : 0;
         emcy_count = static_cast<std::uint32_t>(s.emergencies);
         retries = s.retries;
-        boot_result = s.result == BootResult::none ? 0U
-                      : booted(s.result)           ? 1U
-                                                   : static_cast<std::uint32_t>(s.result);
+        if (s.result == BootResult::none) {
+            boot_result = 0U;
+        } else if (booted(s.result)) {
+            boot_result = 1U;
+        } else {
+            boot_result = static_cast<std::uint32_t>(s.result);
+        }
         age = s.last_heard == 0 ? -1.0 : static_cast<double>(now - s.last_heard) * 1e-6;
         if (restart && !was_restart) {
             runner.restart_node(place, now);

@@ -18,7 +18,13 @@ std::string format_text(const char* form, Arguments... arguments) {
 std::string upper(const char* text) {
     std::string out = text;
     for (char& c : out) {
-        c = c == '-' ? '_' : c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+        if (c == '-') {
+            c = '_';
+        } else if (c >= 'a' && c <= 'z') {
+            c = static_cast<char>(c - 'a' + 'A');
+        } else {
+            c = c;
+        }
     }
     return out;
 }

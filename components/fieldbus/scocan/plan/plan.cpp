@@ -66,9 +66,13 @@ private:
         }
         // A value that just missed its slot is sent in the next turn: that is expected.
         const Time turn = l.gap * l.turns;
-        l.deadline = m.deadline > 0 ? m.deadline
-                     : l.priv       ? std::max(m.period, turn) + m.jitter + t_.slot()
-                                    : m.period;
+        if (m.deadline > 0) {
+            l.deadline = m.deadline;
+        } else if (l.priv) {
+            l.deadline = std::max(m.period, turn) + m.jitter + t_.slot();
+        } else {
+            l.deadline = m.period;
+        }
         l.in_time =
             l.worst >= 0 && l.worst <= l.deadline && (!l.priv || m.period == 0 || turn <= m.period);
         return l;

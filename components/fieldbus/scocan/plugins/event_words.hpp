@@ -124,10 +124,10 @@ private:
     }
     std::string owner(std::uint32_t who, std::uint32_t id) const {
         if (who >= t_.nodes.size()) {
-            return id == sync_id       ? "; a SYNC, of node " + sync_node() + " or a backup"
-                   : id == announce_id ? "; an idle slot announced by the monitor"
-                   : is_reserved(id)   ? "; reserved for the bus itself"
-                                       : "; its sender is not in the table";
+            if (id == sync_id) return "; a SYNC, of node " + sync_node() + " or a backup";
+            if (id == announce_id) return "; an idle slot announced by the monitor";
+            if (is_reserved(id)) return "; reserved for the bus itself";
+            return "; its sender is not in the table";
         }
         return (t_.nodes[who].name == own_ ? "; sent by this node, " : "; probably sent by node ") +
                t_.nodes[who].name;

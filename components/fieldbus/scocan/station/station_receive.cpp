@@ -283,12 +283,19 @@ void Station::judge(Time now) noexcept {
     }
     was_silent_ = silent;
     const State before = state_;
-    state_ = down                            ? State::down
-             : silenced_                     ? State::silenced
-             : listen_only_ || mode_unknown_ ? State::listen_only
-             : !clock_.known()               ? State::listening
-             : silent                        ? State::silent
-                                             : State::running;
+    if (down) {
+        state_ = State::down;
+    } else if (silenced_) {
+        state_ = State::silenced;
+    } else if (listen_only_ || mode_unknown_) {
+        state_ = State::listen_only;
+    } else if (!clock_.known()) {
+        state_ = State::listening;
+    } else if (silent) {
+        state_ = State::silent;
+    } else {
+        state_ = State::running;
+    }
     if (state_ == State::running && before != State::running) {
         raise(Event::running);
     }

@@ -124,9 +124,13 @@ std::string block_of(const Schedule& s, std::size_t index) {
                        "\nguard " + plain(s.guard) + "\nforward " + plain(s.forward) + "\nlost " +
                        std::to_string(s.lost) + "\nrounds " + std::to_string(s.rounds) +
                        "\nheartbeat " + std::to_string(s.heartbeat_ms) + "\n";
-    text += e.role == Role::master   ? "master:\n"
-            : e.role == Role::backup ? "backup-master:\n"
-                                     : "slave:\n";
+    if (e.role == Role::master) {
+        text += "master:\n";
+    } else if (e.role == Role::backup) {
+        text += "backup-master:\n";
+    } else {
+        text += "slave:\n";
+    }
     text += "name " + e.name + "\nphase " + plain(e.phase) + "\nlead " + plain(e.lead) + "\n";
     if (e.ip) {
         text += "ip " + to_string(*e.ip) + "\n";

@@ -223,9 +223,9 @@ private:
         return !station_->setup().configured || cycle.period_ns() == station_->setup().cycle;
     }
     Companion* companion() const noexcept {
-        return service_     ? static_cast<Companion*>(&service_->server())
-               : applicant_ ? &applicant_->client()
-                            : nullptr;
+        if (service_) return static_cast<Companion*>(&service_->server());
+        if (applicant_) return &applicant_->client();
+        return nullptr;
     }
 
     static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();

@@ -89,7 +89,10 @@ double ClockEstimate::uncertainty() const noexcept {
 }
 
 double ClockEstimate::drift() const noexcept {
-    return leading_ ? drift_ : is_certain() ? long_drift_ : holds_ ? held_ : drift_;
+    if (leading_) return drift_;
+    if (is_certain()) return long_drift_;
+    if (holds_) return held_;
+    return drift_;
 }
 
 /// Updates the long average.

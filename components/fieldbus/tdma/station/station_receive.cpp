@@ -146,7 +146,13 @@ void Station::take_sync(const Decoded& d, Time arrived, Time now) noexcept {
     if (setup_.role == Role::master && !status_.leading) {
         // The syncs of a backup are delayed by its offset. Without a delay the sender is another
         // master: nothing to take over.
-        master_row_ = !is_from_master(lateness) ? 0 : d.from == master_ ? master_row_ + 1 : 1;
+        if (!is_from_master(lateness)) {
+            master_row_ = 0;
+        } else if (d.from == master_) {
+            master_row_ = master_row_ + 1;
+        } else {
+            master_row_ = 1;
+        }
         master_ = d.from;
         if (master_row_ >= rows) return withdraw(Event::master_there, d.from);
     }
@@ -238,7 +244,13 @@ void Station::listen_to(const Decoded& d, Time arrived, Time now) noexcept {
         return;
     }
     // of two masters, the first with three
-    good_row_ = fits && s.cycle != heard_cycle_ ? good_row_ + 1 : c.row >= rows ? rows : 1;
+    if (fits && s.cycle != heard_cycle_) {
+        good_row_ = good_row_ + 1;
+    } else if (c.row >= rows) {
+        good_row_ = rows;
+    } else {
+        good_row_ = 1;
+    }
     if (!fits) {
         clock_.clear();
     }

@@ -20,9 +20,9 @@ constexpr std::size_t tunnel_mtu(std::size_t size) noexcept {
     constexpr std::size_t smallest = 68;
 
     constexpr std::size_t largest = ethernet::largest_frame - ethernet::header_bytes - rtmac_bytes;
-    return size < smallest + rtmac_bytes  ? 0
-           : size - rtmac_bytes < largest ? size - rtmac_bytes
-                                          : largest;
+    if (size < smallest + rtmac_bytes) return 0;
+    if (size - rtmac_bytes < largest) return size - rtmac_bytes;
+    return largest;
 }
 
 /// Returns the MTU of a station's slot for ordinary packets; 0: no such slot. [any]
