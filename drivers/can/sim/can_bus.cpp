@@ -224,154 +224,197 @@ bool Bus::hears(const Node& n) const noexcept {
     return !n.off && !n.cut.load(std::memory_order_relaxed);
 }
 
-/// Arbitrates between all frames ready at `start`; the winner is sent, disturbed or not.
-void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
-    Candidate winner;
-    std::uint32_t best = UINT32_MAX;
-    unsigned acknowledging = 0;
+bool Bus::is_ready(Node& n, std::int64_t start) noexcept {
+    const Frame* const f = n.outgoing.front();
+    return n.hold_until <= start && f != nullptr && f->time_ns <= start;
+}
+
+/// A node that is cut off the bus gets no acknowledgement. Once passive, it stays passive and
+/// repeats for ever.
+void Bus::send_alone(Node& n, std::int64_t start, std::int64_t now) noexcept {
+    if (!is_ready(n, start)) return;
+    if (n.tec < 128) {
+        n.tec += 8;
+    }
+    const auto length = frame_bits(*n.outgoing.front());
+    const auto repeats = start + duration_ns(length, bit_rate, data_rate) + bits(error_frame_bits);
+    n.hold_until = n.tec < 128 ? repeats : now;
+    count(n.errors);
+    publish(n);
+    event(n, error_no_acknowledge, start);
+}
+
+/// Arbitrates between all frames ready at `start`.
+Bus::Arbitration Bus::arbitrate(std::int64_t start, std::int64_t now) noexcept {
+    Arbitration result;
+    const auto compete = [&](Node& n, const Frame& f, bool babbling) {
+        const auto rank = arbitration_rank(f);
+        if (result.winner.node != nullptr && rank >= result.rank) return;
+        result.rank = rank;
+        result.winner = {&n, &f, babbling};
+    };
     for (Node* n : nodes) {
         if (hears(*n) && !n->listen_only) {
-            ++acknowledging;
+            ++result.acknowledging;
         }
         if (n->off || n->hold_until > start) continue;
-        const auto compete = [&](const Frame& f, bool babbling) {
-            const auto rank = arbitration_rank(f);
-            if (winner.node != nullptr && rank >= best) return;
-            best = rank;
-            winner = {n, &f, babbling};
-        };
         if (n->cut.load(std::memory_order_relaxed)) {
-            const Frame* f = n->outgoing.front();
-            if (f == nullptr || f->time_ns > start) continue;
-            // Alone on the bus: no acknowledgement. Once passive it stays passive and repeats for
-            // ever.
-            if (n->tec < 128) {
-                n->tec += 8;
-            }
-            n->hold_until = n->tec < 128
-                                ? start + duration_ns(frame_bits(*f), bit_rate, data_rate) +
-                                      bits(error_frame_bits)
-                                : now;
-            count(n->errors);
-            publish(*n);
-            event(*n, error_no_acknowledge, start);
+            send_alone(*n, start, now);
             continue;
         }
         if (n->babble_period > 0 && n->babble_at <= start) {
-            compete(n->babble, true);
+            compete(*n, n->babble, true);
         }
-        if (const Frame* f = n->outgoing.front(); f != nullptr && f->time_ns <= start) {
-            compete(*f, false);
+        if (is_ready(*n, start)) {
+            compete(*n, *n->outgoing.front(), false);
         }
     }
-    if (winner.node == nullptr) return;
-    Node& sender = *winner.node;
-    const Frame frame = *winner.frame;
+    return result;
+}
 
-    const Bits length = frame_bits(frame);
+/// True when a node other than the winner sends a frame of the same rank at the same time.
+bool Bus::also_sends(Node& n, const Arbitration& a, std::int64_t start) const noexcept {
+    return &n != a.winner.node && hears(n) && is_ready(n, start) &&
+           arbitration_rank(*n.outgoing.front()) == a.rank;
+}
+
+/// Nodes with the same identifier do not detect lost arbitration. Equal frames merge; different
+/// ones destroy each other.
+bool Bus::collides(const Arbitration& a, std::int64_t start) const noexcept {
+    return std::any_of(nodes.begin(), nodes.end(), [&](Node* n) {
+        return also_sends(*n, a, start) && !n->outgoing.front()->same(*a.winner.frame);
+    });
+}
+
+/// Gives up the frame of a node that sends it once only.
+void Bus::discard_single_shot(const Candidate& c) noexcept {
+    if (!c.babbling && c.node->outgoing.front()->single_shot) {
+        discard(*c.node);
+    }
+}
+
+/// Handles a frame that nobody acknowledges.
+void Bus::fail_to_acknowledge(const Candidate& c, std::int64_t start, std::int64_t now) noexcept {
+    Node& sender = *c.node;
+    const Bits length = frame_bits(*c.frame);
     const auto end =
         start + duration_ns({length.nominal - intermission_bits, length.data}, bit_rate, data_rate);
     const auto idle = start + duration_ns(length, bit_rate, data_rate);
-    if (acknowledging < 2) {  // only the sender
-        if (sender.tec < 128) {
-            sender.tec += 8;
-        }
-        occupy(start, sender.tec < 128 ? idle + bits(error_frame_bits) : std::max(now, idle));
-        if (winner.babbling) {
-            sender.babble_at = free_at_ + sender.babble_period;
-        } else if (sender.outgoing.front()->single_shot) {
-            discard(sender);
-        }
-        count(sender.errors);
-        publish(sender);
-        return event(sender, error_no_acknowledge, end);
+    if (sender.tec < 128) {
+        sender.tec += 8;
     }
+    occupy(start, sender.tec < 128 ? idle + bits(error_frame_bits) : std::max(now, idle));
+    discard_single_shot(c);
+    if (c.babbling) {
+        sender.babble_at = free_at_ + sender.babble_period;
+    }
+    count(sender.errors);
+    publish(sender);
+    event(sender, error_no_acknowledge, end);
+}
 
-    // Nodes with the same identifier do not detect lost arbitration. Equal frames merge; different
-    // ones destroy each other.
-    bool collision = false;
-    for (Node* n : nodes) {
-        if (n == &sender || !hears(*n) || n->hold_until > start) continue;
-        const Frame* f = n->outgoing.front();
-        collision = collision || (f != nullptr && f->time_ns <= start &&
-                                  arbitration_rank(*f) == best && !f->same(frame));
+/// Counts a destroyed frame at one node: senders by 8, receivers by 1.
+void Bus::count_protocol_error(const Candidate& c, bool sending, std::int64_t noticed) noexcept {
+    Node& n = *c.node;
+    if (sending) {
+        n.tec += 8;
+        discard_single_shot(c);
+    } else if (n.rec < 255) {
+        ++n.rec;
     }
-    Active* const fault = struck(winner, start);
-    if (fault != nullptr && fault->what.fault == Fault::delay) {
-        sender.hold_until = start + std::max<std::int64_t>(1, fault->what.delay_ns);
-        if (winner.babbling) {
+    count(n.errors);
+    if (sending && n.tec > 255) {
+        failed(n, noticed);
+    } else if (sending && n.tec >= 128) {  // passive nodes suspend transmission
+        n.hold_until = free_at_ + bits(8);
+    }
+    publish(n);
+    event(n, error_protocol, noticed);
+}
+
+/// Destroys the winner's frame, by a collision or by a disturbance.
+void Bus::destroy(const Arbitration& a, bool collision, std::int64_t start) noexcept {
+    const Bits length = frame_bits(*a.winner.frame);
+    const unsigned body = length.total() - intermission_bits;
+    const unsigned broken =
+        collision ? std::min(body, 40U) : 1 + static_cast<unsigned>(draw() % body);
+    const unsigned slow = std::min(broken, length.nominal);
+    const auto noticed = start + duration_ns({slow, broken - slow}, bit_rate, data_rate);
+    occupy(start, noticed + bits(error_frame_bits));
+    for (Node* n : nodes) {
+        if (!hears(*n)) continue;
+        const bool is_winner = n == a.winner.node;
+        const bool sending = is_winner || (collision && also_sends(*n, a, start));
+        count_protocol_error({n, nullptr, is_winner && a.winner.babbling}, sending, noticed);
+    }
+    if (a.winner.babbling) {
+        a.winner.node->babble_at = free_at_ + a.winner.node->babble_period;
+    }
+}
+
+/// Receivers of a good frame forget an error.
+void Bus::credit_receivers(const Node& sender) noexcept {
+    for (Node* n : nodes) {
+        if (n == &sender || !hears(*n) || n->rec == 0) continue;
+        n->rec = n->rec > 127 ? 127 : n->rec - 1;
+        publish(*n);
+    }
+}
+
+/// Handles a frame that the receivers take and the sender repeats: its last bit was disturbed.
+void Bus::duplicate(const Candidate& c, std::int64_t end) noexcept {
+    Node& sender = *c.node;
+    sender.tec += 8;
+    sender.doubled = true;
+    discard_single_shot(c);
+    if (sender.tec > 255) {
+        failed(sender, end);
+    }
+    publish(sender);
+}
+
+/// Ends a good frame of the winner, and the equal frames that were merged with it.
+void Bus::complete(const Arbitration& a, std::int64_t start, std::int64_t end) noexcept {
+    const Frame frame = *a.winner.frame;
+    for (Node* n : nodes) {
+        if (also_sends(*n, a, start) && n->outgoing.front()->same(frame)) {
+            done({n, n->outgoing.front(), false}, end);
+        }
+    }
+    done(a.winner, end);
+}
+
+/// Sends the frame that wins the arbitration at `start`, disturbed or not.
+void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
+    const Arbitration a = arbitrate(start, now);
+    if (a.winner.node == nullptr) return;
+    Node& sender = *a.winner.node;
+    if (a.acknowledging < 2) return fail_to_acknowledge(a.winner, start, now);  // only the sender
+
+    const bool collision = collides(a, start);
+    const Active* const active = struck(a.winner, start);
+    const auto has_fault = [&](Fault fault) {
+        return active != nullptr && active->what.fault == fault;
+    };
+    if (has_fault(Fault::delay)) {
+        sender.hold_until = start + std::max<std::int64_t>(1, active->what.delay_ns);
+        if (a.winner.babbling) {
             sender.babble_at = sender.hold_until;
         }
         return;
     }
-    if (collision || (fault != nullptr && fault->what.fault == Fault::error)) {
-        const unsigned body = length.total() - intermission_bits;
-        const unsigned broken =
-            collision ? std::min(body, 40U) : 1 + static_cast<unsigned>(draw() % body);
-        const unsigned slow = std::min(broken, length.nominal);
-        const auto noticed = start + duration_ns({slow, broken - slow}, bit_rate, data_rate);
-        const auto also_sends = [&](Node& n) {
-            const Frame* f = n.outgoing.front();
-            return collision && n.hold_until <= start && f != nullptr && f->time_ns <= start &&
-                   arbitration_rank(*f) == best;
-        };
-        occupy(start, noticed + bits(error_frame_bits));
-        for (Node* n : nodes) {
-            if (!hears(*n)) continue;
-            const bool sending = n == &sender || also_sends(*n);
-            if (sending) {
-                n->tec += 8;
-            } else if (n->rec < 255) {
-                ++n->rec;
-            }
-            if (sending && !(n == &sender && winner.babbling) && n->outgoing.front()->single_shot) {
-                discard(*n);
-            }
-            count(n->errors);
-            if (sending && n->tec > 255) {
-                failed(*n, noticed);
-            }
-            // passive nodes suspend transmission
-            else if (n->tec >= 128 && sending) {
-                n->hold_until = free_at_ + bits(8);
-            }
-            publish(*n);
-            event(*n, error_protocol, noticed);
-        }
-        if (winner.babbling) {
-            sender.babble_at = free_at_ + sender.babble_period;
-        }
-        return;
+    if (collision || has_fault(Fault::error)) return destroy(a, collision, start);
+
+    const Bits length = frame_bits(*a.winner.frame);
+    const auto end =
+        start + duration_ns({length.nominal - intermission_bits, length.data}, bit_rate, data_rate);
+    occupy(start, start + duration_ns(length, bit_rate, data_rate));
+    if (active == nullptr || has_fault(Fault::duplicate)) {
+        deliver(sender, Frame(*a.winner.frame), end);
     }
-    occupy(start, idle);
-    if (fault == nullptr || fault->what.fault == Fault::duplicate) {
-        deliver(sender, frame, end);
-    }
-    for (Node* n : nodes) {
-        if (n != &sender && hears(*n) && n->rec > 0) {
-            n->rec = n->rec > 127 ? 127 : n->rec - 1;
-            publish(*n);
-        }
-    }
-    if (fault != nullptr && fault->what.fault == Fault::duplicate) {
-        sender.tec += 8;
-        sender.doubled = true;
-        if (!winner.babbling && sender.outgoing.front()->single_shot) {
-            discard(sender);
-        }
-        if (sender.tec > 255) {
-            failed(sender, end);
-        }
-        return publish(sender);
-    }
-    for (Node* n : nodes) {  // those whose equal frame was merged with this one
-        const Frame* f = n->outgoing.front();
-        if (n != &sender && hears(*n) && n->hold_until <= start && f != nullptr &&
-            f->time_ns <= start && f->same(frame)) {
-            done({n, f, false}, end);
-        }
-    }
-    done(winner, end);
+    credit_receivers(sender);
+    if (has_fault(Fault::duplicate)) return duplicate(a.winner, end);
+    complete(a, start, end);
 }
 
 /// Handles a frame that was sent and acknowledged.

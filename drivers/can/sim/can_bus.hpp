@@ -136,12 +136,29 @@ private:
         const Frame* frame = nullptr;
         bool babbling = false;
     };
+    struct Arbitration {
+        Candidate winner;
+        std::uint32_t rank = UINT32_MAX;  ///< of the winner's frame
+        unsigned acknowledging = 0;  ///< nodes that can acknowledge, the sender included
+    };
 
     void work(std::int64_t now) noexcept;
     void work_untimed(std::int64_t now) noexcept;
     void recover(std::int64_t now) noexcept;
     std::int64_t earliest() noexcept;
     void transmit(std::int64_t start, std::int64_t now) noexcept;
+    Arbitration arbitrate(std::int64_t start, std::int64_t now) noexcept;
+    void send_alone(Node&, std::int64_t start, std::int64_t now) noexcept;
+    bool also_sends(Node&, const Arbitration&, std::int64_t start) const noexcept;
+    bool collides(const Arbitration&, std::int64_t start) const noexcept;
+    void fail_to_acknowledge(const Candidate&, std::int64_t start, std::int64_t now) noexcept;
+    void destroy(const Arbitration&, bool collision, std::int64_t start) noexcept;
+    void count_protocol_error(const Candidate&, bool sending, std::int64_t noticed) noexcept;
+    void discard_single_shot(const Candidate&) noexcept;
+    void credit_receivers(const Node& sender) noexcept;
+    void duplicate(const Candidate&, std::int64_t end) noexcept;
+    void complete(const Arbitration&, std::int64_t start, std::int64_t end) noexcept;
+    static bool is_ready(Node&, std::int64_t start) noexcept;
     void deliver(Node& from, const Frame&, std::int64_t time) noexcept;
     void done(const Candidate&, std::int64_t time) noexcept;
     void failed(Node&, std::int64_t time) noexcept;
