@@ -294,93 +294,116 @@ void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, T
     }
 }
 
-/// Sets the targets and the upper bits of the controlword that belong to the mode.
-void Axis::move(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
-    const Mode mode = orders_.mode;
-    const bool halted = command.halt || !active_;
-    const bool by_velocity =
-        mode == Mode::profile_velocity || mode == Mode::velocity || mode == Mode::cyclic_velocity;
-    const bool by_torque = mode == Mode::profile_torque || mode == Mode::cyclic_torque;
-    if (active_ && !(std::isfinite(command.velocity) && std::isfinite(command.torque))) {
-        fail(Cause::bad_command,
-             std::isfinite(command.velocity) ? command.torque : command.velocity, 0.0);
-    }
-
-    if (!active_ || halted || !by_position(mode)) {
+/// Follows the commanded position in the modes that take one in each cycle.
+void Axis::move_by_position(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
+    const bool by_cycle = by_position(orders_.mode);
+    const bool follows = active_ && !command.halt && by_cycle;
+    if (!follows) {
         following_ = false;
-    }
-    if (active_ && !halted && by_position(mode) && !failure_) {
+    } else if (!failure_) {
         follow_position(command, rules, now);
     }
     if (failure_) {
         active_ = false;
         following_ = false;
     }
-    if (!active_ && mode != Mode::profile_position) {
+    if (!active_ && orders_.mode != Mode::profile_position) {
         orders_.target_position = in_.position;
     }
-    if (!active_ || !by_position(mode)) {
+    if (!active_ || !by_cycle) {
         commanded_ = position_;
     }
     orders_.interpolation = orders_.target_position;
+}
 
-    if (mode != Mode::profile_position || !active_) {
+/// Queues the position of a command that begins now as a set-point.
+void Axis::queue_set_point(const AxisCommand& command, const AxisRules& rules) noexcept {
+    const double count = command.position * rules.position.ratio();
+    if (!active_) {
+        if (!failure_) {
+            fail(Cause::not_enabled, Request::go);
+        }
+        return;
+    }
+    if (!(std::fabs(count) < farthest_count)) {
+        fail(Cause::bad_command, command.position, 0.0);
+        failure_.request = Request::go;
+        return;
+    }
+    SetPoint p;
+    p.target = Counter::low_bits(static_cast<std::uint32_t>(std::llround(count)),
+                                 command.relative ? 32 : rules.counter_bits);
+    p.relative = command.relative;
+    p.immediate = command.immediate;
+    p.blend = command.blend;
+    set_points_.push(p);
+}
+
+/// Exchanges set-points with the drive in profile position mode.
+void Axis::move_by_set_points(const AxisCommand& command, const AxisRules& rules,
+                              Time now) noexcept {
+    const bool by_set_points = orders_.mode == Mode::profile_position;
+    if (!by_set_points || !active_) {
         set_points_.clear();
         target_reached_ = (in_.statusword & status::target_reached) != 0;
     }
     const bool later = enabled_ && !active_;  // during a mode change or homing
-    const bool goes = command.go && !was_go_ && mode == Mode::profile_position && !later;
+    const bool begins = command.go && !was_go_;
     if (!later || !command.go) {
         was_go_ = command.go;
     }
-    if (goes) {
-        const double count = command.position * rules.position.ratio();
-        if (!active_) {
-            if (!failure_) {
-                fail(Cause::not_enabled, Request::go);
-            }
-        } else if (!(std::fabs(count) < farthest_count)) {
-            fail(Cause::bad_command, command.position, 0.0);
-            failure_.request = Request::go;
-        } else {
-            SetPoint p;
-            p.target = Counter::low_bits(static_cast<std::uint32_t>(std::llround(count)),
-                                         command.relative ? 32 : rules.counter_bits);
-            p.relative = command.relative;
-            p.immediate = command.immediate;
-            p.blend = command.blend;
-            set_points_.push(p);
-        }
+    if (begins && by_set_points && !later) {
+        queue_set_point(command, rules);
     }
-    if (active_ && mode == Mode::profile_position) {
-        orders_.controlword |=
-            set_points_.step(in_.statusword, now, rules.limits.step, orders_.target_position);
-        target_reached_ = set_points_.done();
-        if (set_points_.failure()) {
-            failure_ = set_points_.failure();
-            wanted_ = active_ = false;
-        }
+    if (!active_ || !by_set_points) return;
+    orders_.controlword |=
+        set_points_.step(in_.statusword, now, rules.limits.step, orders_.target_position);
+    target_reached_ = set_points_.done();
+    if (set_points_.failure()) {
+        failure_ = set_points_.failure();
+        wanted_ = false;
+        active_ = false;
     }
+}
 
+/// Sets the targets of velocity and torque, their feed-forward and the ramps.
+void Axis::set_velocity_and_torque(const AxisCommand& command, const AxisRules& rules) noexcept {
+    const Mode mode = orders_.mode;
     const bool still = !active_ || (command.halt && !can_halt(mode));
-    orders_.target_velocity =
-        !still && by_velocity ? rules.velocity.to_drive<std::int32_t>(command.velocity) : 0;
-    orders_.vl_target_velocity = !still && mode == Mode::velocity
-                                     ? rules.vl.to_drive<std::int16_t>(command.velocity)
-                                     : std::int16_t{0};
-    orders_.target_torque =
-        !still && by_torque ? rules.torque.to_drive<std::int16_t>(command.torque) : std::int16_t{0};
-    orders_.velocity_offset =
-        following_ ? rules.velocity.to_drive<std::int32_t>(command.velocity) : 0;
-    const bool ahead = following_ || (!still && mode == Mode::cyclic_velocity);
-    orders_.torque_offset =
-        ahead ? rules.torque.to_drive<std::int16_t>(command.torque) : std::int16_t{0};
+    const bool by_velocity =
+        mode == Mode::profile_velocity || mode == Mode::velocity || mode == Mode::cyclic_velocity;
+    const bool by_torque = mode == Mode::profile_torque || mode == Mode::cyclic_torque;
+    const bool feeds_torque = following_ || (!still && mode == Mode::cyclic_velocity);
+    orders_.target_velocity = 0;
+    orders_.vl_target_velocity = 0;
+    orders_.target_torque = 0;
+    orders_.velocity_offset = 0;
+    orders_.torque_offset = 0;
+    if (!still && by_velocity) {
+        orders_.target_velocity = rules.velocity.to_drive<std::int32_t>(command.velocity);
+    }
+    if (!still && mode == Mode::velocity) {
+        orders_.vl_target_velocity = rules.vl.to_drive<std::int16_t>(command.velocity);
+    }
+    if (!still && by_torque) {
+        orders_.target_torque = rules.torque.to_drive<std::int16_t>(command.torque);
+    }
+    if (following_) {
+        orders_.velocity_offset = rules.velocity.to_drive<std::int32_t>(command.velocity);
+    }
+    if (feeds_torque) {
+        orders_.torque_offset = rules.torque.to_drive<std::int16_t>(command.torque);
+    }
     orders_.profile_velocity = rules.velocity.amount(command.profile_velocity);
     orders_.profile_acceleration = rules.acceleration.amount(command.profile_acceleration);
     orders_.profile_deceleration = rules.acceleration.amount(command.profile_deceleration);
+}
 
+/// Sets the upper bits of the controlword that belong to the mode.
+void Axis::set_mode_bits(const AxisCommand& command) noexcept {
     constexpr std::uint16_t ramps =
         control::enable_ramp | control::unlock_ramp | control::reference_ramp;
+    const Mode mode = orders_.mode;
     if (active_ && mode == Mode::velocity && !command.halt) {
         orders_.controlword |= ramps;
     }
@@ -390,6 +413,18 @@ void Axis::move(const AxisCommand& command, const AxisRules& rules, Time now) no
     if (command.halt && enabled_ && can_halt(mode)) {
         orders_.controlword |= control::halt;
     }
+}
+
+/// Sets the targets and the upper bits of the controlword that belong to the mode.
+void Axis::move(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
+    const bool velocity_is_finite = std::isfinite(command.velocity);
+    if (active_ && !(velocity_is_finite && std::isfinite(command.torque))) {
+        fail(Cause::bad_command, velocity_is_finite ? command.torque : command.velocity, 0.0);
+    }
+    move_by_position(command, rules, now);
+    move_by_set_points(command, rules, now);
+    set_velocity_and_torque(command, rules);
+    set_mode_bits(command);
 }
 
 }  // namespace hal::canopen::cia402

@@ -143,6 +143,11 @@ private:
     void home(const AxisCommand&, const AxisRules&, Time now) noexcept;
     void follow_position(const AxisCommand&, const AxisRules&, Time now) noexcept;
     void move(const AxisCommand&, const AxisRules&, Time now) noexcept;
+    void move_by_position(const AxisCommand& command, const AxisRules& rules, Time now) noexcept;
+    void move_by_set_points(const AxisCommand& command, const AxisRules& rules, Time now) noexcept;
+    void queue_set_point(const AxisCommand& command, const AxisRules& rules) noexcept;
+    void set_velocity_and_torque(const AxisCommand& command, const AxisRules& rules) noexcept;
+    void set_mode_bits(const AxisCommand& command) noexcept;
     void fail(Cause, Request) noexcept;
     void fail(Cause, double value, double limit) noexcept;
 
