@@ -153,102 +153,155 @@ bool NodeReader::multiplexable(const Object& o, const Pdo& pdo) {
     return false;
 }
 
+namespace {
+
+constexpr std::uint8_t rtr_synchronous = 252;  // transmission types
+constexpr std::uint8_t rtr_event_driven = 253;
+
+/// The transmission type that a text names; nothing when it names none.
+std::optional<std::uint64_t> transmission_of(const Word& text) {
+    const std::string value = lower(text.text);
+    if (value == "sync") return 1;
+    if (value == "event") return 255;
+    if (value == "sync on change") return 0;
+    const auto words = words_of(text);
+    if (words.size() == 2 && lower(words[0].text) == "sync") {
+        const auto every = parse_natural(words[1].text);
+        return every && *every >= 1 && *every <= 240 ? every : std::nullopt;
+    }
+    return parse_natural(value);
+}
+
+bool is_on_request(std::uint64_t type) {
+    return type == rtr_synchronous || type == rtr_event_driven;
+}
+
+std::string name_of(bool to_node, unsigned number) {
+    return (to_node ? "rpdo" : "tpdo") + std::to_string(number);
+}
+
+}  // namespace
+
+void NodeReader::set_transmission(const PdoWish& wish, const Line& line, Pdo& pdo) {
+    const auto type = transmission_of(line.value);
+    const bool is_requested = wish.options.contains("request");
+    if (type &&
+        (*type <= 240 || *type == 254 || *type == 255 || (is_requested && is_on_request(*type)))) {
+        pdo.transmission = static_cast<std::uint8_t>(*type);
+    } else if (type && is_on_request(*type) && !wish.to_node) {
+        report_.error(Topic::node, line.value.at, "this PDO is sent only on request (RTR)",
+                      "write tpdo" + std::to_string(wish.number) + ".request = 100ms");
+    } else {
+        keys_.reject(line, "sync, sync N, sync on change, or event");
+    }
+}
+
+void NodeReader::set_request(const PdoWish& wish, const Line& line, Pdo& pdo) {
+    const auto time = duration(lower(line.value.text));
+    if (wish.to_node) {
+        report_.error(Topic::value, line.key.at, "only a tpdo can be requested",
+                      "the master sends an rpdo by itself");
+    } else if (!time || *time < millisecond || *time > 3600 * second) {
+        keys_.reject(line, "a time of 1ms..3600s");
+    } else {
+        pdo.request = *time;
+    }
+}
+
+std::optional<Time> NodeReader::time_up_to(const Line& line, Time max) {
+    const auto time = duration(lower(line.value.text));
+    if (time && *time <= max) return time;
+    keys_.reject(line, "a time up to " + std::to_string(max / millisecond) + "ms");
+    return std::nullopt;
+}
+
+void NodeReader::set_inhibit(const PdoWish&, const Line& line, Pdo& pdo) {
+    if (const auto time = time_up_to(line, 6553 * millisecond)) {
+        pdo.inhibit_100us = static_cast<std::uint16_t>(*time / (100 * microsecond));
+    }
+}
+
+void NodeReader::set_event_timer(const PdoWish&, const Line& line, Pdo& pdo) {
+    if (const auto time = time_up_to(line, 65535 * millisecond)) {
+        pdo.event_ms = static_cast<std::uint16_t>(*time / millisecond);
+    }
+}
+
+void NodeReader::set_timeout(const PdoWish& wish, const Line& line, Pdo& pdo) {
+    const auto time = time_up_to(line, 65535 * millisecond);
+    if (!time) return;
+    if (wish.to_node) {
+        report_.error(Topic::value, line.key.at, "only a tpdo has a timeout",
+                      "the node can supervise an rpdo: write event-timer");
+    } else {
+        pdo.limit = *time;
+    }
+}
+
+void NodeReader::set_cob_id(const PdoWish&, const Line& line, Pdo& pdo) {
+    const std::string value = lower(line.value.text);
+    const bool is_relative = value.starts_with("$nodeid+");
+    const auto number = parse_natural(is_relative ? value.substr(8) : value);
+    const std::uint64_t cob = number.value_or(0) + (is_relative ? node_.setup.id : 0);
+    const bool is_extended = cob > 0x7ff;
+    if (!number || cob == 0 || cob > 0x1fffffff) {
+        keys_.reject(line, "an identifier such as 0x1C1, or $NODEID+0x180");
+    } else if (!is_extended &&
+               (restricted(static_cast<std::uint32_t>(cob)) || cob == cob_id(bus_.sync_cob))) {
+        report_.error(
+            Topic::value, line.value.at,
+            "identifier '" + line.value.text + "' is reserved for another CANopen service",
+            "use 0x181..0x57F");
+    } else {
+        pdo.cob = static_cast<std::uint32_t>(cob) | (is_extended ? cob_extended : 0);
+    }
+}
+
+void NodeReader::set_sync_start(const PdoWish&, const Line& line, Pdo& pdo) {
+    const auto number = parse_natural(lower(line.value.text));
+    if (!number || *number > 240) {
+        keys_.reject(line, "a number of 0..240");
+    } else if (bus_.sync_counter == 0 && *number != 0) {
+        report_.error(Topic::node, line.value.at, "sync-start needs a SYNC counter",
+                      "write sync-counter = N in [bus]");
+    } else {
+        pdo.sync_start = static_cast<std::uint8_t>(*number);
+    }
+}
+
+const std::vector<NodeReader::PdoOption>& NodeReader::pdo_option_rows() {
+    static const std::vector<PdoOption> rows{
+        {"transmission", &NodeReader::set_transmission}, {"inhibit", &NodeReader::set_inhibit},
+        {"event-timer", &NodeReader::set_event_timer},   {"timeout", &NodeReader::set_timeout},
+        {"request", &NodeReader::set_request},           {"cob-id", &NodeReader::set_cob_id},
+        {"sync-start", &NodeReader::set_sync_start},
+    };
+    return rows;
+}
+
 void NodeReader::pdo_options(const PdoWish& wish, Pdo& pdo) {
-    const bool asked = wish.options.contains("request");
-    if (asked) {
-        pdo.transmission = 253;
+    const auto& rows = pdo_option_rows();
+    if (wish.options.contains("request")) {
+        pdo.transmission = rtr_event_driven;
     }
     for (const auto& [name, line] : wish.options) {
-        const std::string value = lower(line->value.text);
-        if (name == "transmission") {
-            const auto words = words_of(line->value);
-            const auto every = words.size() == 2 && lower(words[0].text) == "sync"
-                                   ? parse_natural(words[1].text)
-                                   : std::nullopt;
-            const auto number = parse_natural(value);
-            if (value == "sync") {
-                pdo.transmission = 1;
-            } else if (value == "event") {
-                pdo.transmission = 255;
-            } else if (value == "sync on change") {
-                pdo.transmission = 0;
-            } else if (every && *every >= 1 && *every <= 240) {
-                pdo.transmission = static_cast<std::uint8_t>(*every);
-            } else if (number && (*number <= 240 || *number == 254 || *number == 255 ||
-                                  (asked && (*number == 252 || *number == 253)))) {
-                pdo.transmission = static_cast<std::uint8_t>(*number);
-            } else if (number && (*number == 252 || *number == 253) && !wish.to_node) {
-                report_.error(Topic::node, line->value.at, "this PDO is sent only on request (RTR)",
-                              "write tpdo" + std::to_string(wish.number) + ".request = 100ms");
-            } else {
-                keys_.reject(*line, "sync, sync N, sync on change, or event");
-            }
-        } else if (name == "request") {
-            const auto time = duration(value);
-            if (wish.to_node) {
-                report_.error(Topic::value, line->key.at, "only a tpdo can be requested",
-                              "the master sends an rpdo by itself");
-            } else if (!time || *time < millisecond || *time > 3600 * second) {
-                keys_.reject(*line, "a time of 1ms..3600s");
-            } else {
-                pdo.request = *time;
-            }
-        } else if (name == "inhibit" || name == "event-timer" || name == "timeout") {
-            const auto time = duration(value);
-            const Time most = name == "inhibit" ? 6553 * millisecond : 65535 * millisecond;
-            if (!time || *time > most) {
-                keys_.reject(*line, "a time up to " + std::to_string(most / millisecond) + "ms");
-            } else if (name == "inhibit") {
-                pdo.inhibit_100us = static_cast<std::uint16_t>(*time / (100 * microsecond));
-            } else if (name == "event-timer") {
-                pdo.event_ms = static_cast<std::uint16_t>(*time / millisecond);
-            } else if (!wish.to_node) {
-                pdo.limit = *time;
-            } else {
-                report_.error(Topic::value, line->key.at, "only a tpdo has a timeout",
-                              "the node can supervise an rpdo: write event-timer");
-            }
-        } else if (name == "cob-id") {
-            const bool plus = value.starts_with("$nodeid+");
-            const auto id =
-                parse_natural(plus ? std::string_view(value).substr(8) : std::string_view(value));
-            const std::uint64_t cob = id.value_or(0x20000000) + (plus ? node_.setup.id : 0);
-            if (!id || cob == 0 || cob > 0x1fffffff) {
-                keys_.reject(*line, "an identifier such as 0x1C1, or $NODEID+0x180");
-            } else if (cob <= 0x7ff && (restricted(static_cast<std::uint32_t>(cob)) ||
-                                        cob == cob_id(bus_.sync_cob))) {
-                report_.error(
-                    Topic::value, line->value.at,
-                    "identifier '" + line->value.text + "' is reserved for another CANopen service",
-                    "use 0x181..0x57F");
-            } else {
-                pdo.cob = static_cast<std::uint32_t>(cob) | (cob > 0x7ff ? cob_extended : 0);
-            }
-        } else if (name == "sync-start") {
-            const auto number = parse_natural(value);
-            if (!number || *number > 240) {
-                keys_.reject(*line, "a number of 0..240");
-            } else if (bus_.sync_counter == 0 && *number != 0) {
-                report_.error(Topic::node, line->value.at, "sync-start needs a SYNC counter",
-                              "write sync-counter = N in [bus]");
-            } else {
-                pdo.sync_start = static_cast<std::uint8_t>(*number);
-            }
-        } else {
-            report_.error(Topic::line, line->key.at, "unknown PDO option '" + name + "'",
-                          suggestion(name,
-                                     {"transmission", "inhibit", "event-timer", "timeout",
-                                      "request", "cob-id", "sync-start"},
-                                     "the options are"));
+        const auto row = std::find_if(rows.begin(), rows.end(),
+                                      [&](const PdoOption& one) { return one.name == name; });
+        if (row != rows.end()) {
+            (this->*row->apply)(wish, *line, pdo);
+            continue;
         }
+        std::vector<std::string> names;
+        for (const PdoOption& one : rows) {
+            names.emplace_back(one.name);
+        }
+        report_.error(Topic::line, line->key.at, "unknown PDO option '" + name + "'",
+                      suggestion(name, names, "the options are"));
     }
     if (pdo.synchronous() && bus_.sync == SyncMode::none) {
-        report_.error(Topic::node, pdo.at,
-                      std::string(wish.to_node ? "rpdo" : "tpdo") + std::to_string(wish.number) +
-                          " is synchronous, but the bus has no SYNC",
-                      "write sync = cycle in [bus], or " +
-                          std::string(wish.to_node ? "rpdo" : "tpdo") +
-                          std::to_string(wish.number) + ".transmission = event");
+        const std::string which = name_of(wish.to_node, wish.number);
+        report_.error(Topic::node, pdo.at, which + " is synchronous, but the bus has no SYNC",
+                      "write sync = cycle in [bus], or " + which + ".transmission = event");
     }
 }
 
@@ -267,7 +320,7 @@ bool NodeReader::default_objects(const PdoWish& wish, Pdo& pdo) {
         static_cast<std::uint16_t>((wish.to_node ? 0x1600U : 0x1A00U) + wish.number - 1);
     const auto count = catalog_->number(mapping, 0, 0);
     const Span at = wish.objects != nullptr ? wish.objects->value.at : node_.at;
-    const std::string which = (wish.to_node ? "rpdo" : "tpdo") + std::to_string(wish.number);
+    const std::string which = name_of(wish.to_node, wish.number);
     if (count == 0xfe || count == 0xff) {
         const std::string sentence =
             which + " is a multiplexed PDO: the device description does not list its objects";

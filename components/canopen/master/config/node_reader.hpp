@@ -50,6 +50,11 @@ private:
         const Line* objects = nullptr;
         std::map<std::string, const Line*> options{};
     };
+    /// An option of a PDO, such as `transmission`, and what applies its line.
+    struct PdoOption {
+        std::string_view name;
+        void (NodeReader::*apply)(const PdoWish& wish, const Line& line, Pdo& pdo);
+    };
     void describe();
     void identity(const char* key, std::uint32_t& to, std::uint64_t described);
     void settings();
@@ -63,6 +68,16 @@ private:
                                                         unsigned most = 512);
     void pdo(const PdoWish& wish);
     void pdo_options(const PdoWish& wish, Pdo& pdo);
+    static const std::vector<PdoOption>& pdo_option_rows();
+    void set_transmission(const PdoWish& wish, const Line& line, Pdo& pdo);
+    void set_request(const PdoWish& wish, const Line& line, Pdo& pdo);
+    void set_inhibit(const PdoWish& wish, const Line& line, Pdo& pdo);
+    void set_event_timer(const PdoWish& wish, const Line& line, Pdo& pdo);
+    void set_timeout(const PdoWish& wish, const Line& line, Pdo& pdo);
+    void set_cob_id(const PdoWish& wish, const Line& line, Pdo& pdo);
+    void set_sync_start(const PdoWish& wish, const Line& line, Pdo& pdo);
+    /// The time that the line gives; reports one that is wrong or longer.
+    std::optional<Time> time_up_to(const Line& line, Time max);
     void objects_of(const Word& list, Pdo& pdo);
     void srdos();
     void srdo(const PdoWish& wish);
