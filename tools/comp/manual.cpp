@@ -124,62 +124,126 @@ private:
         }
         (out_ += inline_text(line)) += '\n';
     }
+    /// A macro with its arguments, whose escapes are converted.
+    struct Macro {
+        std::string_view name;
+        std::vector<std::string> words;
+        std::string all;  ///< the words, separated by blanks
+    };
+    struct MacroRow {
+        std::string_view name;
+        void (Converter::*convert)(const Macro& macro);
+    };
+
+    static Macro parse_macro(std::string_view line) {
+        const std::size_t end = std::min(line.find_first_of(" \t", 1), line.size());
+        Macro macro{line.substr(1, end - 1), arguments(line.substr(end)), {}};
+        for (std::string& word : macro.words) {
+            word = inline_text(word);
+            macro.all += (macro.all.empty() ? "" : " ") + word;
+        }
+        return macro;
+    }
+
+    void begin_verbatim(const Macro&) { verbatim(true); }
+    void end_verbatim(const Macro&) { verbatim(false); }
+    void begin_paragraph(const Macro&) { paragraph(); }
+    void ignore(const Macro&) {}
+
+    void break_line(const Macro&) {
+        if (out_.empty() || verbatim_) return;
+        if (out_.ends_with('\n')) {
+            out_.insert(out_.size() - 1, "\\");
+        } else {
+            out_ += "\\\n";
+        }
+    }
+
+    void tagged_paragraph(const Macro&) {
+        paragraph();
+        tag_ = true;
+    }
+
+    void indented_paragraph(const Macro& macro) {
+        paragraph();
+        const std::string mark = macro.words.empty() ? "" : plain(macro.words[0]);
+        const bool is_bullet =
+            mark == "•" || mark == "-" || mark == "*" || mark == "o" || mark == "·";
+        if (is_bullet) {
+            out_ += "- ";
+        } else if (!mark.empty()) {
+            out_ += "**" + mark + "**\n";
+        }
+    }
+
+    void heading(const Macro& macro) {
+        paragraph();
+        out_ += (macro.name == "SH" ? "## " : "### ") + macro.all + "\n\n";
+    }
+
+    void bold(const Macro& macro) { out_ += "**" + macro.all + "**\n"; }
+    void italic(const Macro& macro) { out_ += "*" + macro.all + "*\n"; }
+
+    static bool is_fonts_in_turn(std::string_view name) {
+        return name.size() == 2 && name.find_first_not_of("BIR") == std::string_view::npos;
+    }
+    static std::string_view mark_of(char font) {
+        if (font == 'B') return "**";
+        if (font == 'I') return "*";
+        return "";
+    }
+    /// The words have the two fonts in turn, without blanks between them.
+    void fonts_in_turn(const Macro& macro) {
+        for (std::size_t i = 0; i < macro.words.size(); ++i) {
+            const std::string_view mark = mark_of(macro.name[i % 2]);
+            out_ += mark;
+            out_ += macro.words[i];
+            out_ += mark;
+        }
+        out_ += '\n';
+    }
+
     void macro(std::string_view line) {
-        const bool fonts = line.starts_with(".B") || line.starts_with(".I ");
-        if (fonts) {
+        static const std::vector<MacroRow> rows{
+            {"nf", &Converter::begin_verbatim},
+            {"EX", &Converter::begin_verbatim},
+            {"fi", &Converter::end_verbatim},
+            {"EE", &Converter::end_verbatim},
+            {"P", &Converter::begin_paragraph},
+            {"PP", &Converter::begin_paragraph},
+            {"LP", &Converter::begin_paragraph},
+            {"sp", &Converter::begin_paragraph},
+            {"RS", &Converter::begin_paragraph},
+            {"RE", &Converter::begin_paragraph},
+            {"br", &Converter::break_line},
+            {"TP", &Converter::tagged_paragraph},
+            {"TQ", &Converter::tagged_paragraph},
+            {"IP", &Converter::indented_paragraph},
+            {"HP", &Converter::indented_paragraph},
+            {"SH", &Converter::heading},
+            {"SS", &Converter::heading},
+            {"B", &Converter::bold},
+            {"SB", &Converter::bold},
+            {"I", &Converter::italic},
+            {"", &Converter::ignore},
+            {"TH", &Converter::ignore},
+            {"ft", &Converter::ignore},
+            {"ad", &Converter::ignore},
+            {"na", &Converter::ignore},
+            {"in", &Converter::ignore},
+            {"ti", &Converter::ignore},
+        };
+        if (line.starts_with(".B") || line.starts_with(".I ")) {
             tag_ = false;
         }
-        const std::size_t end = std::min(line.find_first_of(" \t", 1), line.size());
-        const std::string_view name = line.substr(1, end - 1);
-        std::vector<std::string> words = arguments(line.substr(end));
-        for (std::string& word : words) {
-            word = inline_text(word);
-        }
-        std::string all;
-        for (const std::string& word : words) {
-            all += (all.empty() ? "" : " ") + word;
-        }
-        if (name == "nf" || name == "EX") {
-            verbatim(true);
-        } else if (name == "fi" || name == "EE") {
-            verbatim(false);
-        } else if (name == "P" || name == "PP" || name == "LP" || name == "sp" || name == "RS" ||
-                   name == "RE") {
-            paragraph();
-        } else if (name == "br") {
-            if (!out_.empty() && !verbatim_) {
-                out_ += out_.ends_with('\n') ? (out_.insert(out_.size() - 1, "\\"), "") : "\\\n";
-            }
-        } else if (name == "TP" || name == "TQ") {
-            paragraph();
-            tag_ = true;
-        } else if (name == "IP" || name == "HP") {
-            paragraph();
-            const std::string mark = words.empty() ? "" : plain(words[0]);
-            if (mark == "•" || mark == "-" || mark == "*" || mark == "o" || mark == "·") {
-                out_ += "- ";
-            } else if (!mark.empty()) {
-                out_ += "**" + mark + "**\n";
-            }
-        } else if (name == "SH" || name == "SS") {
-            paragraph();
-            out_ += (name == "SH" ? "## " : "### ") + all + "\n\n";
-        } else if (name == "B" || name == "SB") {
-            out_ += "**" + all + "**\n";
-        } else if (name == "I") {
-            out_ += "*" + all + "*\n";
-        } else if (name.size() == 2 &&
-                   name.find_first_not_of("BIR") ==
-                       std::string_view::npos) {  // fonts in turn, without blanks
-            for (std::size_t i = 0; i < words.size(); ++i) {
-                const std::string mark = name[i % 2] == 'B' ? "**" : name[i % 2] == 'I' ? "*" : "";
-                out_ += mark + words[i] + mark;
-            }
-            out_ += '\n';
-        } else if (name.empty() || name.starts_with("\\\"") || name == "TH" || name == "ft" ||
-                   name == "ad" || name == "na" || name == "in" || name == "ti") {
-            return;
-        } else {
+        const Macro macro = parse_macro(line);
+        const auto row = std::find_if(rows.begin(), rows.end(),
+                                      [&](const MacroRow& one) { return one.name == macro.name; });
+        if (row != rows.end()) {
+            (this->*row->convert)(macro);
+        } else if (is_fonts_in_turn(macro.name)) {
+            fonts_in_turn(macro);
+        } else if (!macro.name.starts_with("\\\"")) {
             (out_ += inline_text(line)) += '\n';  // not a macro after all: ".5 is a half"
         }
     }

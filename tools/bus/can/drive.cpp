@@ -222,59 +222,40 @@ bool DriveShell::run(Words words) {
     return command(a, verb, std::move(words));
 }
 
-bool DriveShell::command(SdoAxis& a, const std::string& verb, Words arguments) {
-    const std::string rest = arguments_of(verb);
+/// Removes `within TIME` from the arguments; nothing when its time is missing or wrong.
+std::optional<std::int64_t> DriveShell::take_within(Words& arguments) const {
+    const auto at = std::find(arguments.begin(), arguments.end(), "within");
+    if (at == arguments.end()) return settings_.within_ns;
+    const auto ns = at + 1 == arguments.end() ? std::nullopt : parse_duration_ns(at[1]);
+    if (!ns || *ns <= 0) return std::nullopt;
+    arguments.erase(at, at + 2);
+    return ns;
+}
 
-    const std::string shown =
-        fmt::format("type: {} {}{}{}", a.letter(), verb, rest.empty() ? "" : " ", rest);
-    const auto usage = [&] { return wrong(shown); };
-    std::int64_t within = settings_.within_ns;
-    if (const auto at = std::find(arguments.begin(), arguments.end(), "within");
-        at != arguments.end()) {
-        const auto ns = at + 1 == arguments.end() ? std::nullopt : parse_duration_ns(at[1]);
-        if (!ns || *ns <= 0) {
-            return wrong(fmt::format("{}: missing time after within; type: {} {} within 30s", verb,
-                                     a.letter(), verb));
-        }
-        within = *ns;
-        arguments.erase(at, at + 2);
+bool DriveShell::set_mode(SdoAxis& a, const std::string& wanted) {
+    constexpr Mode by_hand[] = {Mode::profile_position, Mode::profile_velocity,
+                                Mode::profile_torque, Mode::velocity};
+    for (const Mode mode : by_hand) {
+        if (wanted != abbreviation(mode)) continue;
+        return a.set_mode(mode) && print_line(fmt::format("{}: mode {}", a.letter(), wanted));
     }
-    const bool moving = verb == "go" || verb == "speed" || verb == "torque" || verb == "home";
-    a.allow(within > 0 ? within : moving || verb == "wait" ? motion_ns : step_ns);
-    if (moving) return motion(a, verb, std::move(arguments), shown);
-    const char letter = a.letter();
-    if (verb == "mode") {
-        constexpr Mode by_hand[] = {Mode::profile_position, Mode::profile_velocity,
-                                    Mode::profile_torque, Mode::velocity};
-        if (arguments.size() != 1) return usage();
-        for (const Mode mode : by_hand) {
-            if (arguments[0] == abbreviation(mode)) {
-                return a.set_mode(mode) &&
-                       print_line(fmt::format("{}: mode {}", letter, arguments[0]));
-            }
+    for (const ModeRow& m : modes) {
+        if (wanted != m.abbreviation) continue;
+        if (m.mode == Mode::homing) {
+            return wrong(fmt::format("homing is a command: {} home", a.letter()));
         }
-        for (const ModeRow& m : modes) {
-            if (arguments[0] == m.abbreviation) {
-                return wrong(m.mode == Mode::homing
-                                 ? fmt::format("homing is a command: {} home", letter)
-                                 : fmt::format("mode {} needs a set-point every cycle; use "
-                                               "component cia402 in a netlist",
-                                               m.abbreviation));
-            }
-        }
-        return wrong(fmt::format("invalid mode '{}'; write pp, pv, tq or vl", arguments[0]));
-    }
-    if (verb == "set") {
-        if (arguments.size() == 1 && arguments[0].ends_with('?')) {
-            return query(a, arguments[0].substr(0, arguments[0].size() - 1));
-        }
-        return arguments.size() == 2 ? set(a, arguments[0], arguments[1]) : usage();
-    }
-    if (!arguments.empty()) {
         return wrong(
-            fmt::format("unexpected argument '{}'; type: {} {}", arguments[0], letter, verb));
+            fmt::format("mode {} needs a set-point every cycle; use component cia402 in a netlist",
+                        m.abbreviation));
     }
-    if ((verb == "on" || verb == "reset") && !watched(a)) return false;
+    return wrong(fmt::format("invalid mode '{}'; write pp, pv, tq or vl", wanted));
+}
+
+/// A command without arguments.
+bool DriveShell::simple(SdoAxis& a, const std::string& verb) {
+    const char letter = a.letter();
+    const bool needs_watch = verb == "on" || verb == "reset";
+    if (needs_watch && !watched(a)) return false;
     if (verb == "on") {
         return a.on() && print_line(fmt::format("{}: on", letter));
     }
@@ -295,6 +276,34 @@ bool DriveShell::command(SdoAxis& a, const std::string& verb, Words arguments) {
         return a.wait() && print_line(fmt::format("{}: at {:.10g}", letter, a.position()));
     }
     return status(a);
+}
+
+bool DriveShell::command(SdoAxis& a, const std::string& verb, Words arguments) {
+    const std::string rest = arguments_of(verb);
+    const std::string usage =
+        fmt::format("type: {} {}{}{}", a.letter(), verb, rest.empty() ? "" : " ", rest);
+    const auto within = take_within(arguments);
+    if (!within) {
+        return wrong(fmt::format("{}: missing time after within; type: {} {} within 30s", verb,
+                                 a.letter(), verb));
+    }
+    const bool moving = verb == "go" || verb == "speed" || verb == "torque" || verb == "home";
+    const std::int64_t by_default = moving || verb == "wait" ? motion_ns : step_ns;
+    a.allow(*within > 0 ? *within : by_default);
+    if (moving) return motion(a, verb, std::move(arguments), usage);
+    if (verb == "mode") {
+        return arguments.size() == 1 ? set_mode(a, arguments[0]) : wrong(usage);
+    }
+    if (verb == "set") {
+        if (arguments.size() == 2) return set(a, arguments[0], arguments[1]);
+        if (arguments.size() != 1 || !arguments[0].ends_with('?')) return wrong(usage);
+        return query(a, arguments[0].substr(0, arguments[0].size() - 1));
+    }
+    if (!arguments.empty()) {
+        return wrong(
+            fmt::format("unexpected argument '{}'; type: {} {}", arguments[0], a.letter(), verb));
+    }
+    return simple(a, verb);
 }
 
 bool DriveShell::motion(SdoAxis& a, const std::string& verb, Words arguments,

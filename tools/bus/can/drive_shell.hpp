@@ -54,6 +54,9 @@ private:
     /// Reports a factor that no command uses. Returns false.
     bool without_effect(const std::string& command) const;
     bool command(SdoAxis&, const std::string& verb, Words arguments);
+    std::optional<std::int64_t> take_within(Words& arguments) const;
+    bool set_mode(SdoAxis& a, const std::string& wanted);
+    bool simple(SdoAxis& a, const std::string& verb);
     bool motion(SdoAxis&, const std::string& verb, Words arguments, const std::string& usage);
     bool query(SdoAxis&, const std::string& name);
     bool set(SdoAxis&, const std::string& name, const std::string& value);
