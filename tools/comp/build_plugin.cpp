@@ -197,135 +197,192 @@ std::string find_compiler(Language language, std::string& problem) {
     return {};
 }
 
-BuiltPlugin build_plugin(const PluginSource& source, const BuildOptions& options) {
-    BuiltPlugin built;
-    const auto fail = [&](std::string why) {
-        built.problem = std::move(why);
-        return built;
-    };
-    const std::string folder = options.folder.empty()
-                                   ? user_folder(source.program ? "bin" : "components")
-                                   : options.folder;
-    if (folder.empty()) {
-        return fail(
-            "no folder to install in: neither XDG_DATA_HOME nor HOME is set; use --output DIR");
-    }
-    const std::string compiler = find_compiler(source.language, built.problem);
-    if (compiler.empty()) return built;
-    const std::vector<std::string> headers = sdk_includes();
-    if (headers.empty()) {
-        return fail(
-            fmt::format("Halcyon's headers are neither in {} nor beside the program; install them: "
-                        "cmake --install",
-                        paths::install_includes));
-    }
-    const TemporaryFolder temporary;
-    if (!temporary.problem().empty()) return fail(temporary.problem());
+namespace {
 
-    std::string file = source.path;
-    if (source.text) {
-        file = temporary.file(source.name + (source.language == Language::cpp ? ".cpp" : ".c"));
-        if (const std::string why = write_file(file, *source.text); !why.empty()) return fail(why);
-        if (const std::string why =
-                options.keep.empty() ? "" : write_file(options.keep, *source.text);
-            !why.empty()) {
-            return fail(why);
+/// One build, step by step. A step that fails sets the problem and returns false.
+class PluginBuild {
+public:
+    PluginBuild(const PluginSource& source, const BuildOptions& options)
+        : source_(source), options_(options) {}
+
+    BuiltPlugin run() {
+        built_.good = find_tools() && write_sources() && compile() && try_out() && install_it();
+        return std::move(built_);
+    }
+
+private:
+    bool fail(std::string why) {
+        built_.problem = std::move(why);
+        return false;
+    }
+
+    bool find_tools() {
+        folder_ = options_.folder;
+        if (folder_.empty()) {
+            folder_ = user_folder(source_.program ? "bin" : "components");
         }
+        if (folder_.empty()) {
+            return fail(
+                "no folder to install in: neither XDG_DATA_HOME nor HOME is set; use --output DIR");
+        }
+        compiler_ = find_compiler(source_.language, built_.problem);
+        if (compiler_.empty()) return false;
+        headers_ = sdk_includes();
+        if (headers_.empty()) {
+            return fail(fmt::format(
+                "Halcyon's headers are neither in {} nor beside the program; install them: "
+                "cmake --install",
+                paths::install_includes));
+        }
+        return temporary_.problem().empty() || fail(temporary_.problem());
     }
-    const std::string map = temporary.file("plugin.map");
 
-    const std::string library =
-        temporary.file(source.program ? source.name + ".program" : source.name + ".so");
-    if (const std::string why = write_file(map, "{ global: hal_plugin; local: *; };\n");
-        !why.empty()) {
-        return fail(why);
+    bool write(const std::string& path, const std::string& text) {
+        const std::string why = write_file(path, text);
+        return why.empty() || fail(why);
     }
 
-    std::vector<std::string> words = split_words(compiler);
-    std::string version;
-    std::vector<std::string> ask = words;
-    ask.push_back("--version");
-    run_program(ask, version);
-    const bool clang = version.find("clang") != std::string::npos;
-    for (std::string& flag : flags(source.language, clang, source.program)) {
-        words.push_back(std::move(flag));
+    bool write_sources() {
+        file_ = source_.path;
+        map_ = temporary_.file("plugin.map");
+        library_ = temporary_.file(source_.name + (source_.program ? ".program" : ".so"));
+        if (source_.text) {
+            const char* const ending = source_.language == Language::cpp ? ".cpp" : ".c";
+            file_ = temporary_.file(source_.name + ending);
+            if (!write(file_, *source_.text)) return false;
+            if (!options_.keep.empty() && !write(options_.keep, *source_.text)) return false;
+        }
+        return write(map_, "{ global: hal_plugin; local: *; };\n");
     }
-    for (const std::string& include : source.includes) {
-        words.insert(words.end(), {"-I", include});
+
+    bool is_clang() const {
+        std::vector<std::string> ask = split_words(compiler_);
+        ask.push_back("--version");
+        std::string version;
+        run_program(ask, version);
+        return version.find("clang") != std::string::npos;
     }
-    const std::string own = fs::path(source.path).parent_path().string();
-    words.insert(words.end(), {"-I", own.empty() ? "." : own});
-    for (const std::string& include : headers) {
-        words.insert(words.end(), {"-I", include});
+
+    static void add_include(std::vector<std::string>& words, const std::string& folder) {
+        words.insert(words.end(), {"-I", folder});
     }
-    std::vector<std::string> behind;
-    if (source.linuxcnc) {
+
+    /// The words for a LinuxCNC component; `sources` receives the files compiled with it.
+    bool add_linuxcnc(std::vector<std::string>& words, std::vector<std::string>& sources) {
         const std::string shim = linuxcnc_folder();
         if (shim.empty()) {
             return fail(
                 "the headers for LinuxCNC components (linuxcnc/hal.h) are not installed with "
                 "Halcyon's others; install it again");
         }
-        words.insert(words.end(), {"-I", shim, source.program ? "-DULAPI=1" : "-DRTAPI=1",
-                                   fmt::format("-DHALCYON_COMPONENT=\"{}\"", source.name)});
-        if (source.program) {
+        add_include(words, shim);
+        words.push_back(source_.program ? "-DULAPI=1" : "-DRTAPI=1");
+        words.push_back(fmt::format("-DHALCYON_COMPONENT=\"{}\"", source_.name));
+        if (source_.program) {
             words.push_back("-DHALCYON_PROGRAM=1");
         }
         for (const LinuxcncSource& part : linuxcnc_sources) {
-            if (part.needed(source)) {
-                behind.push_back(shim + "/" + part.file);
+            if (part.needed(source_)) {
+                sources.push_back(shim + "/" + part.file);
             }
         }
-    }
-    add_from_environment(source.language == Language::cpp ? "CXXFLAGS" : "CFLAGS", words);
-    words.push_back(file);
-    words.insert(words.end(), behind.begin(), behind.end());
-    words.insert(words.end(), source.options.begin(), source.options.end());
-    add_from_environment("LDFLAGS", words);
-    words.insert(words.end(), {"-o", library, "-pthread", "-lm"});
-    if (!source.program) {
-        words.insert(words.end(), {"-Wl,--version-script=" + map, "-Wl,-z,defs"});
+        return true;
     }
 
-    const int status = run_program(words, built.messages);
-    if (source.language == Language::cpp && status != 0) {
-        built.messages = without_false_hint(built.messages, source);
+    /// The compiler's command line; empty: it failed.
+    std::vector<std::string> command_line() {
+        std::vector<std::string> words = split_words(compiler_);
+        for (std::string& flag : flags(source_.language, is_clang(), source_.program)) {
+            words.push_back(std::move(flag));
+        }
+        for (const std::string& include : source_.includes) {
+            add_include(words, include);
+        }
+        const std::string own = fs::path(source_.path).parent_path().string();
+        add_include(words, own.empty() ? "." : own);
+        for (const std::string& include : headers_) {
+            add_include(words, include);
+        }
+        std::vector<std::string> sources{file_};
+        if (source_.linuxcnc && !add_linuxcnc(words, sources)) return {};
+        add_from_environment(source_.language == Language::cpp ? "CXXFLAGS" : "CFLAGS", words);
+        words.insert(words.end(), sources.begin(), sources.end());
+        words.insert(words.end(), source_.options.begin(), source_.options.end());
+        add_from_environment("LDFLAGS", words);
+        words.insert(words.end(), {"-o", library_, "-pthread", "-lm"});
+        if (!source_.program) {
+            words.insert(words.end(), {"-Wl,--version-script=" + map_, "-Wl,-z,defs"});
+        }
+        return words;
     }
-    if (status == -1) {
-        return fail(fmt::format("{} cannot be run: {}", words.front(), std::strerror(errno)));
+
+    bool compile() {
+        const std::vector<std::string> words = command_line();
+        if (words.empty()) return false;
+        const int status = run_program(words, built_.messages);
+        if (status == -1) {
+            return fail(fmt::format("{} cannot be run: {}", words.front(), std::strerror(errno)));
+        }
+        if (source_.language == Language::cpp && status != 0) {
+            built_.messages = without_false_hint(built_.messages, source_);
+        }
+        if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return true;
+        if (built_.messages.empty()) {
+            return fail(
+                fmt::format("{} failed with status {} and no message", words.front(), status));
+        }
+        return fail(fmt::format("'{}' does not compile; nothing was installed", source_.path));
     }
-    if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
-        return fail(
-            built.messages.empty()
-                ? fmt::format("{} failed with status {} and no message", words.front(), status)
-                : fmt::format("'{}' does not compile; nothing was installed", source.path));
+
+    bool try_out() {
+        built_.name = source_.name;
+        const bool is_loaded = options_.load && !source_.program;
+        if (is_loaded && !try_plugin(temporary_.path(), source_.name, source_, built_)) {
+            if (built_.loads) {
+                return fail(fmt::format("{}; nothing was installed", built_.problem));
+            }
+            return fail(
+                fmt::format("'{}' compiles, but is not a component: {}; nothing was installed",
+                            source_.path, built_.problem));
+        }
+        if (built_.name.empty() || built_.name.find('/') != std::string::npos) {
+            return fail(
+                fmt::format("'{}' names its component '{}', which cannot be a file's name; "
+                            "nothing was installed",
+                            source_.path, built_.name));
+        }
+        built_.path = library_;
+        if (options_.fit && !source_.program && !options_.fit(built_)) {
+            return fail(fmt::format("'{}' was not installed", source_.path));
+        }
+        return true;
     }
-    built.name = source.name;
-    if (options.load && !source.program &&
-        !try_plugin(temporary.path(), source.name, source, built)) {
-        return fail(
-            built.loads
-                ? fmt::format("{}; nothing was installed", built.problem)
-                : fmt::format("'{}' compiles, but is not a component: {}; nothing was installed",
-                              source.path, built.problem));
+
+    bool install_it() {
+        const std::string file = built_.name + (source_.program ? "" : ".so");
+        if (const std::string problem = install(library_, folder_, file); !problem.empty()) {
+            return fail(problem);
+        }
+        built_.path = folder_ + "/" + file;
+        return true;
     }
-    if (built.name.empty() || built.name.find('/') != std::string::npos) {
-        return fail(fmt::format(
-            "'{}' names its component '{}', which cannot be a file's name; nothing was installed",
-            source.path, built.name));
-    }
-    built.path = library;
-    if (options.fit && !source.program && !options.fit(built)) {
-        return fail(fmt::format("'{}' was not installed", source.path));
-    }
-    if (const std::string problem =
-            install(library, folder, built.name + (source.program ? "" : ".so"));
-        !problem.empty()) {
-        return fail(problem);
-    }
-    built.path = folder + "/" + built.name + (source.program ? "" : ".so");
-    built.good = true;
-    return built;
+
+    const PluginSource& source_;
+    const BuildOptions& options_;
+    const TemporaryFolder temporary_;
+    BuiltPlugin built_;
+    std::string folder_;  ///< where the plugin is installed
+    std::string compiler_;
+    std::vector<std::string> headers_;
+    std::string file_;  ///< what is compiled
+    std::string map_;  ///< the linker's version script
+    std::string library_;  ///< what is made, before it is installed
+};
+
+}  // namespace
+
+BuiltPlugin build_plugin(const PluginSource& source, const BuildOptions& options) {
+    return PluginBuild(source, options).run();
 }
 
 }  // namespace hal::tools
