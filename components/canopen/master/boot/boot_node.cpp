@@ -246,15 +246,80 @@ std::uint64_t Master::Node::number() const noexcept {
     return value;
 }
 
+void Master::Node::producer_answered() noexcept {
+    const bool is_watching = status.step == Step::watching;
+    if (no_response()) {
+        return fail_transfer(is_watching ? BootResult::watching : BootResult::no_heartbeat);
+    }
+    producer_ms_ = ok() ? static_cast<std::uint16_t>(number()) : std::uint16_t{0};
+    if (is_watching) return await_heartbeat();
+    if (producer_ms_ == 0) return state_known(false);  // no heartbeat, so it was not configured yet
+    deadline_ = now() + limit() + 100 * millisecond;
+}
+
+void Master::Node::program_id_answered() noexcept {
+    if (!ok()) return fail_transfer(BootResult::no_program);
+    if (number() != setup.program.id) {
+        note_request(setup.program.id, number());
+        return program_differs();
+    }
+    if (!setup.program.version.empty()) return read(Task::program_version, 0x100a, 0);
+    program_right();
+}
+
+void Master::Node::program_version_answered() noexcept {
+    if (!ok()) return fail_transfer(BootResult::no_program);
+    const std::string& expected = setup.program.version;
+    std::string_view found(reinterpret_cast<const char*>(buffer_.data()), request_.size);
+    found = found.substr(0, found.find('\0'));
+    if (found == expected) return program_right();
+    note_request(0, 0);
+    std::memcpy(&status.found, found.data(), std::min<std::size_t>(found.size(), 8));
+    std::memcpy(&status.expected, expected.data(), std::min<std::size_t>(expected.size(), 8));
+    program_differs();
+}
+
+void Master::Node::restore_answered() noexcept {
+    if (!ok()) return fail_transfer(BootResult::configuration);
+    restored_ = true;
+    again_ = false;
+    set_sdo_timeout(0);
+    reset(NmtCommand::reset_node);
+}
+
+/// 1020h, date and time of the node's configuration.
+void Master::Node::date_answered(Task task) noexcept {
+    if (no_response()) return fail_transfer(BootResult::configuration);
+    const bool is_date = task == Task::date;
+    const auto expected = is_date ? setup.configuration_date : setup.configuration_time;
+    if (!ok()) {
+        status.notes |= note_no_date;
+    }
+    if (!ok() || number() != expected) return configure_anew();
+    if (is_date) return read(Task::time, 0x1020, 2);
+    configuration_current_ = true;
+    configure_from(own_group_);
+}
+
+void Master::Node::save_answered() noexcept {
+    set_sdo_timeout(0);
+    if (!ok()) return fail_transfer(BootResult::configuration);
+    watch();
+}
+
+void Master::Node::heard_by_sdo() noexcept {
+    if (!status.online) {
+        status.online = true;
+        master_.dirty_ = true;
+    }
+    status.last_heard = now();
+    missing = false;
+}
+
 void Master::Node::answered() noexcept {
     status.sdo_retries += request_.retries;
     if (!no_response()) {
-        if (!status.online) {
-            status.online = true;
-            master_.dirty_ = true;
-        }
-        status.last_heard = now();
-        missing = false;
+        heard_by_sdo();
     }
     const auto task = task_;
     task_ = Task::none;
@@ -265,69 +330,24 @@ void Master::Node::answered() noexcept {
     case Task::product:
     case Task::revision:
     case Task::serial: return identified();
-    case Task::producer:
-        if (no_response()) {
-            return fail_transfer(status.step == Step::watching ? BootResult::watching
-                                                               : BootResult::no_heartbeat);
-        }
-        producer_ms_ = ok() ? static_cast<std::uint16_t>(number()) : std::uint16_t{0};
-        if (status.step == Step::watching) return await_heartbeat();
-        // no heartbeat, so it was not configured yet
-        if (producer_ms_ == 0) return state_known(false);
-        deadline_ = now() + limit() + 100 * millisecond;
-        return;
-    case Task::program_id:
-        if (!ok()) return fail_transfer(BootResult::no_program);
-        if (number() != setup.program.id) {
-            note_request(setup.program.id, number());
-            return program_differs();
-        }
-        if (!setup.program.version.empty()) return read(Task::program_version, 0x100a, 0);
-        return program_right();
-    case Task::program_version: {
-        if (!ok()) return fail_transfer(BootResult::no_program);
-        std::string_view found(reinterpret_cast<const char*>(buffer_.data()), request_.size);
-        found = found.substr(0, found.find('\0'));
-        if (found == setup.program.version) return program_right();
-        note_request(0, 0);
-        std::memcpy(&status.found, found.data(), std::min<std::size_t>(found.size(), 8));
-        std::memcpy(&status.expected, setup.program.version.data(),
-                    std::min<std::size_t>(setup.program.version.size(), 8));
-        return program_differs();
-    }
+    case Task::producer: return producer_answered();
+    case Task::program_id: return program_id_answered();
+    case Task::program_version: return program_version_answered();
     case Task::control_read:
     case Task::stop:
     case Task::erase:
     case Task::flash:
     case Task::download:
     case Task::launch: task_ = task; return update_answered();
-    case Task::restore:
-        if (!ok()) return fail_transfer(BootResult::configuration);
-        restored_ = true;
-        again_ = false;
-        set_sdo_timeout(0);
-        return reset(NmtCommand::reset_node);
+    case Task::restore: return restore_answered();
     case Task::date:
-    case Task::time:
-        if (no_response()) return fail_transfer(BootResult::configuration);
-        if (!ok()) {
-            status.notes |= note_no_date;
-        }
-        if (!ok() || number() != (task == Task::date ? setup.configuration_date
-                                                     : setup.configuration_time)) {
-            return configure_anew();
-        }
-        if (task == Task::date) return read(Task::time, 0x1020, 2);
-        configuration_current_ = true;
-        return configure_from(own_group_);
+    case Task::time: return date_answered(task);
     case Task::compare: return compared();
     case Task::write: return written();
     case Task::verify: return verified();
     case Task::consumer_count:
     case Task::consumer_entry: task_ = task; return consumer_answered();
-    case Task::save:
-        set_sdo_timeout(0);
-        return ok() ? watch() : fail_transfer(BootResult::configuration);
+    case Task::save: return save_answered();
     }
 }
 

@@ -123,6 +123,13 @@ private:
     void write(Task, std::uint16_t index, std::uint8_t sub, std::uint32_t value,
                unsigned size) noexcept;
     void answered() noexcept;
+    void producer_answered() noexcept;
+    void program_id_answered() noexcept;
+    void program_version_answered() noexcept;
+    void restore_answered() noexcept;
+    void date_answered(Task task) noexcept;
+    void save_answered() noexcept;
+    void heard_by_sdo() noexcept;
     bool ok() const noexcept { return request_.abort == Abort::none; }
     bool no_response() const noexcept {
         return !ok() && !request_.aborted_by_server && request_.abort != Abort::memory;
