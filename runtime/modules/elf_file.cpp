@@ -7,7 +7,6 @@
 #include <elf.h>
 #include <fstream>
 #include <iterator>
-#include <link.h>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -63,84 +62,103 @@ ElfFile::ElfFile(const std::string& path) {
 }
 
 void ElfFile::read() {
+    if (!check_header() || !read_sections()) return;
+    read_symbols();
+    if (symbol_values_.empty()) {
+        problem_ = "it has no table of symbols";
+        return;
+    }
+    read_pointers();
+}
+
+bool ElfFile::check_header() {
     const auto header = at<ElfW(Ehdr)>(content_, 0);
     if (content_.size() < SELFMAG || std::memcmp(content_.data(), ELFMAG, SELFMAG) != 0) {
         problem_ = content_.empty() ? "the file is empty" : "it is not a shared object";
-        return;
+        return false;
     }
     // e_machine is in the same place in both classes
     const auto machine = at<std::uint16_t>(content_, 18);
-    if (!header || !machine || content_[EI_CLASS] != (is_64_bit ? ELFCLASS64 : ELFCLASS32) ||
-        (this_machine != EM_NONE && *machine != this_machine)) {
-        problem_ = "it is built for " + (machine ? machine_name(*machine) : "an unknown machine") +
-                   ", this program for " + machine_name(this_machine);
-        return;
-    }
-    std::vector<ElfW(Shdr)> all;
+    const bool is_this_class = content_[EI_CLASS] == (is_64_bit ? ELFCLASS64 : ELFCLASS32);
+    const bool is_this_machine = machine && (this_machine == EM_NONE || *machine == this_machine);
+    if (header && is_this_class && is_this_machine) return true;
+    problem_ = "it is built for " + (machine ? machine_name(*machine) : "an unknown machine") +
+               ", this program for " + machine_name(this_machine);
+    return false;
+}
+
+bool ElfFile::is_whole(const ElfW(Shdr) & section) const {
+    if (section.sh_type == SHT_NOBITS) return true;
+    return section.sh_offset <= content_.size() &&
+           section.sh_size <= content_.size() - section.sh_offset;
+}
+
+bool ElfFile::read_sections() {
+    const auto header = at<ElfW(Ehdr)>(content_, 0);
     for (unsigned i = 0; i < header->e_shnum; ++i) {
         const auto section =
             at<ElfW(Shdr)>(content_, header->e_shoff + std::uint64_t{i} * sizeof(ElfW(Shdr)));
-        const bool whole = section && (section->sh_type == SHT_NOBITS ||
-                                       (section->sh_offset <= content_.size() &&
-                                        section->sh_size <= content_.size() - section->sh_offset));
-        if (!whole) {
+        if (!section || !is_whole(*section)) {
             problem_ = "the file is cut short";
-            return;
+            return false;
         }
-        all.push_back(*section);
+        headers_.push_back(*section);
         if ((section->sh_flags & SHF_ALLOC) && section->sh_type != SHT_NOBITS) {
             sections_[section->sh_addr] = {section->sh_addr, section->sh_offset, section->sh_size};
         }
     }
-    std::vector<ElfW(Sym)> symbols;
-    for (const auto& section : all) {
-        if (section.sh_type != SHT_DYNSYM || section.sh_link >= all.size()) continue;
-        const auto& names = all[section.sh_link];
+    return true;
+}
+
+void ElfFile::read_symbols() {
+    for (const auto& section : headers_) {
+        if (section.sh_type != SHT_DYNSYM || section.sh_link >= headers_.size()) continue;
+        const auto& names = headers_[section.sh_link];
         const std::string_view table = std::string_view(content_).substr(
             names.sh_offset, names.sh_type == SHT_NOBITS ? 0 : names.sh_size);
         for (std::uint64_t i = 0; i < section.sh_size / sizeof(ElfW(Sym)); ++i) {
             const auto symbol = at<ElfW(Sym)>(content_, section.sh_offset + i * sizeof(ElfW(Sym)));
             if (!symbol) break;
-            symbols.push_back(*symbol);
-            const std::string name = text_at(table, symbol->st_name);
-            const bool weak = ELF64_ST_BIND(symbol->st_info) == STB_WEAK;
-            if (name.empty()) continue;
-            if (symbol->st_shndx == SHN_UNDEF) {
-                if (!weak) {
-                    undefined_.insert(name);
-                }
-            } else {
-                defined_.emplace(name, symbol->st_value);
-            }
+            symbol_values_.push_back(symbol->st_value);
+            add_symbol(*symbol, text_at(table, symbol->st_name));
         }
     }
-    if (symbols.empty()) {
-        problem_ = "it has no table of symbols";
-        return;
+}
+
+void ElfFile::add_symbol(const ElfW(Sym) & symbol, const std::string& name) {
+    if (name.empty()) return;
+    if (symbol.st_shndx != SHN_UNDEF) {
+        defined_.emplace(name, symbol.st_value);
+    } else if (ELF64_ST_BIND(symbol.st_info) != STB_WEAK) {
+        undefined_.insert(name);
     }
-    for (const auto& section : all) {
+}
+
+void ElfFile::read_pointers() {
+    for (const auto& section : headers_) {
         if (section.sh_type != SHT_RELA && section.sh_type != SHT_REL) continue;
         const bool with_addend = section.sh_type == SHT_RELA;
         const std::uint64_t size = with_addend ? sizeof(ElfW(Rela)) : sizeof(ElfW(Rel));
         for (std::uint64_t i = 0; i < section.sh_size / size; ++i) {
-            const auto entry = at<ElfW(Rel)>(content_, section.sh_offset + i * size);
+            const std::uint64_t offset = section.sh_offset + i * size;
+            const auto entry = at<ElfW(Rel)>(content_, offset);
             if (!entry) break;
-            std::uint64_t target = 0;
-            if (with_addend) {
-                target = static_cast<std::uint64_t>(
-                    at<ElfW(Rela)>(content_, section.sh_offset + i * size)
-                        .value_or(ElfW(Rela){})
-                        .r_addend);
-            } else if (const auto there = at<ElfW(Addr)>(at_address(entry->r_offset), 0)) {
-                target = *there;
-            }
+            const std::uint64_t addend =
+                with_addend ? addend_at(offset) : addend_in_place(entry->r_offset);
             const std::uint64_t index = symbol_of(entry->r_info);
-            if (index < symbols.size()) {
-                target += symbols[index].st_value;
-            }
-            pointers_.emplace(entry->r_offset, target);
+            const std::uint64_t value = index < symbol_values_.size() ? symbol_values_[index] : 0;
+            pointers_.emplace(entry->r_offset, value + addend);
         }
     }
+}
+
+std::uint64_t ElfFile::addend_at(std::uint64_t offset) const {
+    const auto entry = at<ElfW(Rela)>(content_, offset);
+    return entry ? static_cast<std::uint64_t>(entry->r_addend) : 0;
+}
+
+std::uint64_t ElfFile::addend_in_place(std::uint64_t address) const {
+    return at<ElfW(Addr)>(at_address(address), 0).value_or(0);
 }
 
 std::string_view ElfFile::at_address(std::uint64_t address) const {

@@ -4,9 +4,12 @@
 #pragma once
 
 #include <cstdint>
+#include <link.h>
 #include <map>
 #include <set>
 #include <string>
+#include <string_view>
+#include <vector>
 
 namespace hal::modules {
 
@@ -32,6 +35,15 @@ public:
 
 private:
     void read();
+    bool check_header();
+    bool read_sections();
+    void read_symbols();
+    void read_pointers();
+    bool is_whole(const ElfW(Shdr) & section) const;
+    void add_symbol(const ElfW(Sym) & symbol, const std::string& name);
+    /// The addend of the relocation at a file offset, and that of one stored where it applies.
+    std::uint64_t addend_at(std::uint64_t offset) const;
+    std::uint64_t addend_in_place(std::uint64_t address) const;
     /// The file's bytes from a virtual address to the end of its section.
     std::string_view at_address(std::uint64_t address) const;
 
@@ -42,6 +54,8 @@ private:
     struct Section {
         std::uint64_t address, offset, size;
     };
+    std::vector<ElfW(Shdr)> headers_;
+    std::vector<std::uint64_t> symbol_values_;  // by index in the table of symbols
     std::map<std::uint64_t, Section> sections_;  // those with content in memory, by address
 };
 

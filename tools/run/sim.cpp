@@ -116,43 +116,32 @@ bool summary_wanted(const SimOptions& options, bool printed) {
 
 int run_sim(const SimOptions& options) { return simulate(options, nullptr); }
 
-int simulate(const SimOptions& options, const SimRecorder* recorder) {
-    const bool advance = options.for_ns >= 0 || options.cycles != 0;
-    if (!options.record.empty() && !advance) {
-        return fail(options, "--record needs --for TIME or --cycles N");
-    }
-    if (!options.values.empty() && options.record.empty()) {
-        return fail(options, "--values needs --record FILE");
-    }
-    if (!options.profile.empty() && options.record.empty()) {
-        return fail(options, "--profile needs --record FILE.mcap");
-    }
+namespace {
+
+bool is_advanced(const SimOptions& options) { return options.for_ns >= 0 || options.cycles != 0; }
+
+/// What is wrong with the combination of options; empty: nothing.
+std::string problem_of(const SimOptions& options) {
+    const bool records = !options.record.empty();
+    if (records && !is_advanced(options)) return "--record needs --for TIME or --cycles N";
+    if (!options.values.empty() && !records) return "--values needs --record FILE";
+    if (!options.profile.empty() && !records) return "--profile needs --record FILE.mcap";
     if (options.for_ns >= 0 && options.cycles != 0) {
-        return fail(options, "--for and --cycles exclude each other; leave one out");
+        return "--for and --cycles exclude each other; leave one out";
     }
-    auto nodes = requested_nodes(options);
-    if (!nodes) return 1;
-    if (!nodes->empty() && !options.record.empty()) {
-        return fail(options, "--record records one machine; add --node NAME");
-    }
-    if (recorder && !options.record.empty() && recorder->check(options) != 0) return 1;
-    if (!nodes->empty()) return sim_cell(options, std::move(*nodes));
-    HostedMachine machine(
-        options, options.name.empty() ? fmt::format("sim-{}", ::getpid()) : options.name, true);
-    if (!machine.serve(!options.name.empty())) return 1;
-    TrackedOutput output;
-    const auto begun = std::chrono::steady_clock::now();
-    int status = machine.load(&output);
-    const bool loaded = status == 0;
-    if (loaded && advance) {
-        machine.start_threads();
-        if (recorder && !options.record.empty()) {
-            status = recorder->advance(options, machine);
-        } else {
-            machine.advance(options.for_ns, options.cycles);
-        }
-    }
-    const auto wall = std::chrono::steady_clock::now() - begun;
+    return "";
+}
+
+int advance(const SimOptions& options, const SimRecorder* recorder, HostedMachine& machine) {
+    machine.start_threads();
+    if (recorder && !options.record.empty()) return recorder->advance(options, machine);
+    machine.advance(options.for_ns, options.cycles);
+    return 0;
+}
+
+/// Executes the command lines, then shows values; returns the status of the first that fails.
+int execute_and_show(const SimOptions& options, HostedMachine& machine, TrackedOutput& output) {
+    int status = 0;
     for (const std::string& command : options.execute) {
         if (status == 0 && !machine.stop.requested()) {
             status = machine.shell.execute(command, output, "<commandline>");
@@ -160,6 +149,39 @@ int simulate(const SimOptions& options, const SimRecorder* recorder) {
     }
     if (status == 0 && !options.show.empty()) {
         status = show_values(options, machine.session);
+    }
+    return status;
+}
+
+}  // namespace
+
+int simulate(const SimOptions& options, const SimRecorder* recorder) {
+    const bool records = !options.record.empty();
+    if (const std::string problem = problem_of(options); !problem.empty()) {
+        return fail(options, problem);
+    }
+    auto nodes = requested_nodes(options);
+    if (!nodes) return 1;
+    if (!nodes->empty() && records) {
+        return fail(options, "--record records one machine; add --node NAME");
+    }
+    if (recorder && records && recorder->check(options) != 0) return 1;
+    if (!nodes->empty()) return sim_cell(options, std::move(*nodes));
+
+    const std::string name =
+        options.name.empty() ? fmt::format("sim-{}", ::getpid()) : options.name;
+    HostedMachine machine(options, name, true);
+    if (!machine.serve(!options.name.empty())) return 1;
+    TrackedOutput output;
+    const auto begun = std::chrono::steady_clock::now();
+    int status = machine.load(&output);
+    const bool loaded = status == 0;
+    if (loaded && is_advanced(options)) {
+        status = advance(options, recorder, machine);
+    }
+    const auto wall = std::chrono::steady_clock::now() - begun;
+    if (status == 0) {
+        status = execute_and_show(options, machine, output);
     }
     if (loaded && status == 0) {
         machine.shell.warn_when_nothing_ran(output);
