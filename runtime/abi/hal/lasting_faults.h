@@ -11,7 +11,7 @@ typedef struct hal_lasting_faults {
     uint64_t lasting; /* conditions that last now; written by the host, read atomically [any] */
     /* [realtime] The condition that `self` raises with the same `reason` begins (call it before raise) or is over. While it lasts, `clear`
        does not acknowledge its newest fault. The host ends the conditions of an instance that is stopped. */
-    void (*lasts)(const hal_faults*, const void* self, const char* reason, bool lasts);
+    void (*lasts)(const hal_faults *, const void *self, const char *reason, bool lasts);
 } hal_lasting_faults;
 
 #endif

@@ -11,8 +11,8 @@ typedef struct hal_messages {
     size_t size; /* of this struct */
     /* Adds a line without its newline, which is copied; does nothing while nobody records. Waits for other callers only. From start()
      * until stop() returns. [any but a cycle] */
-    void (*add)(const struct hal_messages* self, const char* line, size_t bytes);
-    void* data; /* the host's */
+    void (*add)(const struct hal_messages *self, const char *line, size_t bytes);
+    void *data; /* the host's */
 } hal_messages;
 
 #endif

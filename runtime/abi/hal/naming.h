@@ -16,13 +16,13 @@ extern "C" {
 typedef struct hal_naming {
     uint32_t size;
     /* Names the instance PREFIX.N, N with at least `digits` digits, unless names= is given. Call it before declaring a pin. [setup] */
-    void (*instance)(const hal_host*, const char* prefix, unsigned digits);
+    void (*instance)(const hal_host *, const char *prefix, unsigned digits);
     /* Declares that the names of all further functions are complete. [setup] */
-    void (*whole_function_names)(const hal_host*);
+    void (*whole_function_names)(const hal_host *);
     /* Sets the number of instances from this argument when neither names= nor count= is given. [setup] */
-    void (*count)(const hal_host*, const char* argument, uint64_t instances);
+    void (*count)(const hal_host *, const char *argument, uint64_t instances);
     /* Returns the name of the instance, valid until create returns. Call it after instance(). [setup] */
-    const char* (*name)(const hal_host*);
+    const char *(*name)(const hal_host *);
 } hal_naming;
 
 #ifdef __cplusplus

@@ -20,8 +20,8 @@ typedef struct hal_path_delay {
      * the instance's. `cycles`: cycles of this instance's thread from the one that sends the value to the one that receives it.
      * `round_trip`: cycles until an input at the far end that follows this value is received here; 0: unknown. `worst_ns`: the longest
      * delay, of an input that changed just after it was read. Texts are copied. Returns false when out of memory. [setup] */
-    bool (*report)(const struct hal_path_delay*, const hal_host*, const char* pin, const char* far,
-                   uint32_t cycles, uint32_t round_trip, int64_t worst_ns);
+    bool (*report)(const struct hal_path_delay *, const hal_host *, const char *pin, const char *far, uint32_t cycles, uint32_t round_trip,
+                 int64_t worst_ns);
 } hal_path_delay;
 
 #ifdef __cplusplus

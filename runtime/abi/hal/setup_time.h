@@ -19,7 +19,7 @@ typedef struct hal_setup_time {
     uint32_t pad;
     /* In start or stop: this call may take `ns` from its beginning, 60 s at most. `why` completes "NAME needs up to 5 s to stop: " and lives
      * as long as the plugin. [setup] */
-    void (*expect)(const struct hal_setup_time*, int64_t ns, const char* why);
+    void (*expect)(const struct hal_setup_time *, int64_t ns, const char *why);
 } hal_setup_time;
 
 #ifdef __cplusplus

@@ -10,8 +10,7 @@
 typedef struct hal_supervision {
     uint32_t size;
     uint32_t pad;
-    uint64_t
-        progress; /* grows each time the supervisor finds that every supervised thread has ended a cycle within its limit; written by
+    uint64_t progress; /* grows each time the supervisor finds that every supervised thread has ended a cycle within its limit; written by
                           the host, read atomically [any] */
 } hal_supervision;
 
