@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Where a ring is broken, by counting. On a closed ring the copy of a broadcast that left on the
 // primary port passes all slaves and arrives at the backup port; the other copy arrives at the
-// primary port and was processed by nobody. On a broken ring the primary port's copy comes back to
+// primary port and was processed by nobody. On a broken ring the primary port's copy returns to
 // it, from the slaves before the break.
 #include "ethercat/master/bus.hpp"
 
