@@ -153,6 +153,25 @@ def check_files(root):
     )
     expect("a page with a dead link", run(files, root), 1, "runtime/page.md:1: mentions gone.md")
     (root / "runtime/page.md").unlink()
+    inside = root / "docs/internals/bus.md"
+    write(
+        root,
+        {
+            "docs/README.md": "x\n",
+            "docs/internals/bus.md": "`runtime/base/a.cpp`, `a.cpp`, `base/`, `runtime/base/`, `plugins/NAME.cpp`, `sim:x`\n",
+        },
+    )
+    expect("a page about the inside", run(files, root), 0)
+    inside.write_text("`a.cpp` and `gone.cpp`\n\n`base/`, `case/`, `runtime/a.cpp`\n")
+    expect(
+        "a page about the inside that names missing files",
+        run(files, root),
+        1,
+        "docs/internals/bus.md:1: mentions gone.cpp",
+        "docs/internals/bus.md:3: mentions case/",
+        "docs/internals/bus.md:3: mentions runtime/a.cpp",
+    )
+    inside.unlink()
     write(root, readmes | {"runtime/base/z.py": "import sys\n", "tools/x.cpp": SPDX})
     expect(
         "unlicensed, undocumented",

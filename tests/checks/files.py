@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""files.py ROOT: every folder has a README that names only files that exist; every page links to existing files; every source has its
-licence line."""
+"""files.py ROOT: every folder has a README that names only files that exist; every page links to existing files; every file and folder
+that a page about the inside names exists; every source has its licence line."""
 import os
 import re
 import subprocess
@@ -26,6 +26,31 @@ NO_README = (
 MENTIONED = re.compile(
     r"`([\w./-]+\.(?:cpp|hpp|h|py|sh|md|hal|ini|expected))`|\]\((?!https?:|#)([^)#]+)[^)]*\)"
 )
+
+# Pages for maintainers name files and folders by their path from the root or by its end: `runner.hpp`, `master/cycle/`. A name with NAME in
+# it is a pattern.
+INSIDE = "docs/internals"
+NAMED_INSIDE = re.compile(
+    r"`((?:[\w.-]+/)*[\w.-]+\.(?:c|cpp|hpp|h|py|sh|md|hal|ini|expected|cmake|txt|js|lua)|(?:[\w.-]+/)+)`"
+)
+
+
+def ends_of(files):
+    """Every end of the path of every file, and of every folder with a slash behind it."""
+    ends = set()
+    folders = {parent for path in files for parent in path.parents}
+    for name in [f.as_posix() for f in files] + [f"{f.as_posix()}/" for f in folders]:
+        parts = name.split("/")
+        ends |= {"/".join(parts[n:]) for n in range(len(parts))}
+    return ends
+
+
+def absent_inside(root, page, ends):
+    """(line number, name) of each file or folder that a page about the inside names and that does not exist."""
+    for number, line in enumerate((root / page).read_text(errors="replace").splitlines(), 1):
+        for name in NAMED_INSIDE.findall(line):
+            if "NAME" not in name and name not in ends:
+                yield number, name
 
 
 def absent(root, page, files):
@@ -86,12 +111,22 @@ def main(root):
             errors.append(
                 f"{name}: missing README.md: purpose, what the folder must not do, where to start reading"
             )
+        elif (
+            readme.as_posix() not in LONGER_READMES
+            and len((root / readme).read_text().splitlines()) > MAX_README
+        ):
+            errors.append(f"{readme}: longer than {MAX_README} lines")
+    ends = ends_of(files)
     for page in files:
-        if page.suffix == ".md":
-            errors += [
-                f"{page}:{number}: mentions {name}, which does not exist"
-                for number, name in absent(root, page, files)
-            ]
+        if page.suffix != ".md":
+            continue
+        missing = list(absent(root, page, files))
+        if page.parent.as_posix() == INSIDE:
+            missing += absent_inside(root, page, ends)
+        errors += [
+            f"{page}:{number}: mentions {name}, which does not exist"
+            for number, name in sorted(set(missing))
+        ]
     print("\n".join(errors) if errors else f"{len(files)} files checked")
     return 1 if errors else 0
 
