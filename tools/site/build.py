@@ -40,6 +40,8 @@ NAVIGATION = (  # title, pages: a path, or a pattern of paths
             "SECURITY.md",
             "docs/versioning.md",
             "docs/design.md",
+            "docs/internals/README.md",
+            "docs/internals/*.md",
             "docs/decisions/README.md",
         ),
     ),
