@@ -111,11 +111,6 @@ def main(root):
             errors.append(
                 f"{name}: missing README.md: purpose, what the folder must not do, where to start reading"
             )
-        elif (
-            readme.as_posix() not in LONGER_READMES
-            and len((root / readme).read_text().splitlines()) > MAX_README
-        ):
-            errors.append(f"{readme}: longer than {MAX_README} lines")
     ends = ends_of(files)
     for page in files:
         if page.suffix != ".md":
