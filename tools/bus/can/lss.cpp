@@ -7,6 +7,7 @@
 
 #include "base/types.hpp"
 #include "bus/can/node_client.hpp"
+#include "bus/number_text.hpp"
 #include "cli/output.hpp"
 #include "text/diagnostic.hpp"
 
@@ -59,13 +60,9 @@ struct Lss {
     }
     bool number(std::size_t n, const char* what, std::uint64_t most, std::uint32_t& value) const {
         const std::string& text = arguments[n];
-        const bool hex = text.starts_with("0x");
-        const char* end = text.data() + text.size();
-        std::uint64_t read = 0;
-        const auto [stop, error] =
-            std::from_chars(text.data() + (hex ? 2 : 0), end, read, hex ? 16 : 10);
-        if (error == std::errc() && stop == end && read <= most) {
-            value = static_cast<std::uint32_t>(read);
+        const std::optional<std::uint64_t> read = parse_number(text);
+        if (read && *read <= most) {
+            value = static_cast<std::uint32_t>(*read);
             return true;
         }
         fail(options,

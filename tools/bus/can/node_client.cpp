@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "bus/can/node_client.hpp"
 
-#include <charconv>
 #include <fmt/core.h>
 
+#include "bus/number_text.hpp"
 #include "bus/transfer_progress.hpp"
 #include "cli/output.hpp"
 
@@ -173,13 +173,9 @@ int NodeClient::fail_transfer(std::uint8_t node, const canopen::SdoRequest& requ
 }
 
 bool parse_node(const std::string& text, std::uint8_t& node) {
-    const bool hex = text.starts_with("0x");
-    const char* end = text.data() + text.size();
-    unsigned number = 0;
-    const auto [stop, error] =
-        std::from_chars(text.data() + (hex ? 2 : 0), end, number, hex ? 16 : 10);
-    if (error != std::errc() || stop != end || number < 1 || number > 127) return false;
-    node = static_cast<std::uint8_t>(number);
+    const std::optional<std::uint64_t> number = parse_number(text);
+    if (!number || *number < 1 || *number > 127) return false;
+    node = static_cast<std::uint8_t>(*number);
     return true;
 }
 

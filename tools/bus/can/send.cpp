@@ -2,11 +2,11 @@
 // `hal can send`: sends frames, once or periodically. `hal can nmt`: sends an NMT command.
 #include "bus/can/send.hpp"
 
-#include <charconv>
 #include <fmt/core.h>
 #include <unistd.h>
 
 #include "bus/can/bus.hpp"
+#include "bus/number_text.hpp"
 #include "canopen/protocol/numbers.hpp"
 #include "cli/output.hpp"
 #include "text/diagnostic.hpp"
@@ -91,19 +91,15 @@ int run_can_nmt(const NmtOptions& options) {
             fmt::format("unknown command '{}'; {}", word,
                         hint.empty() ? "write start, stop, preop, reset or reset-comm" : hint));
     }
-    unsigned node = 0;
-    const bool hex = node_text.starts_with("0x");
-    const char* end = node_text.data() + node_text.size();
-    const auto read = std::from_chars(node_text.data() + (hex ? 2 : 0), end, node, hex ? 16 : 10);
-    if (node_text != "all" &&
-        (read.ec != std::errc() || read.ptr != end || node < 1 || node > 127)) {
+    const bool all = node_text == "all";
+    const std::uint64_t node = all ? 0 : parse_number(node_text).value_or(0);
+    if (!all && (node < 1 || node > 127)) {
         return fail(options, fmt::format("invalid node '{}'; write 1..127, or all", node_text));
     }
     Bus bus;
     if (!bus.open(options, options.words[0], false)) return 1;
-    send_with_timeout(
-        bus, can::Frame(0x000, {static_cast<std::uint8_t>(*command),
-                                static_cast<std::uint8_t>(node_text == "all" ? 0 : node)}));
+    send_with_timeout(bus, can::Frame(0x000, {static_cast<std::uint8_t>(*command),
+                                              static_cast<std::uint8_t>(node)}));
     return finish_sending(bus, options, 1);
 }
 

@@ -15,6 +15,7 @@
 #include "bus/node/background_writer.hpp"
 #include "bus/node/kinds.hpp"
 #include "bus/node/tdma_station.hpp"
+#include "bus/number_text.hpp"
 #include "canopen/device/eds_export.hpp"
 #include "canopen/device/node.hpp"
 #include "cli/output.hpp"
@@ -85,17 +86,14 @@ bool parse_id(const NodeOptions& options, const NodeKind& kind, std::uint8_t& id
         id = canopen::unconfigured;
         return true;
     }
-    const bool hex = text.starts_with("0x");
-    unsigned value = 0;
-    const auto [end, wrong] = std::from_chars(text.data() + (hex ? 2 : 0),
-                                              text.data() + text.size(), value, hex ? 16 : 10);
-    if (wrong != std::errc() || end != text.data() + text.size() || value < 1 || value > 127) {
+    const std::optional<std::uint64_t> value = parse_number(text);
+    if (!value || *value < 1 || *value > 127) {
         problem = fmt::format(
             "invalid --id '{}'; write 1..127, 0x50, or none to wait for an LSS master", text);
 
         return false;
     }
-    id = static_cast<std::uint8_t>(value);
+    id = static_cast<std::uint8_t>(*value);
     return true;
 }
 
