@@ -123,7 +123,7 @@ int run_ethercat_pdos(const EthercatOptions& options) {
             }
         }
     }
-    return print(options.json ? (json.empty() ? "[" : json) + "]\n" : text) ? 0 : 1;
+    return print(list_or_text(options.json, json, text)) ? 0 : 1;
 }
 
 int run_ethercat_dc(const EthercatOptions& options) {
@@ -157,7 +157,7 @@ int run_ethercat_dc(const EthercatOptions& options) {
                             json.empty() ? "[" : ",\n ", n, deviation,
                             ethercat::get<std::uint32_t>(delay->data()), sync);
     }
-    return print(options.json ? (json.empty() ? "[" : json) + "]\n" : text) ? 0 : 1;
+    return print(list_or_text(options.json, json, text)) ? 0 : 1;
 }
 
 int run_ethercat_check(const EthercatCheckOptions& options) {
@@ -213,7 +213,7 @@ int run_ethercat_plan(const EthercatPlanOptions& options) {
         text += (reading.buses.size() == 1 ? "" : "master " + bus.name + ":\n") + p.text;
         json += (json.empty() ? "[" : ",\n ") + plan_json(p);
     }
-    if (!print(options.json ? (json.empty() ? "[" : json) + "]\n" : text)) return 1;
+    if (!print(list_or_text(options.json, json, text))) return 1;
     if (fits) return 0;
     return fail(options, fmt::format("{}: the cycle is too short; raise `cycle`, or exchange slow "
                                      "slaves in a [domain] with every = 4",

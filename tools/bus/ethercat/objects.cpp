@@ -138,7 +138,7 @@ int run_ethercat_sdos(const EthercatPositionOptions& options) {
         }
         json += "]}";
     }
-    return print(options.json ? (json.empty() ? "[" : json) + "]\n" : text) ? 0 : 1;
+    return print(list_or_text(options.json, json, text)) ? 0 : 1;
 }
 
 int run_ethercat_foe_read(const EthercatFileOptions& options) {

@@ -36,6 +36,13 @@ inline std::string hex_words(std::span<const std::uint8_t> bytes) {
     return text;
 }
 
+/// Returns what a command prints: its JSON `items`, which begin with "[" unless there are none, as
+/// a whole list, or its text. [any]
+inline std::string list_or_text(bool json, const std::string& items, const std::string& text) {
+    if (!json) return text;
+    return (items.empty() ? "[" : items) + "]\n";
+}
+
 /// Returns a text as a JSON string. [any]
 inline std::string json_string(std::string_view text) {
     std::string out;
