@@ -175,6 +175,7 @@ bool enter_declared(Construction& c) {
             function->instances.push_back(&instance);
             function->component = &component;
             function->shared = decl.shared;
+            function->required = decl.required;
             function->id = c.model.next_id++;
             c.edit->add_time_pins(*function);
             own.push_back(std::move(made));

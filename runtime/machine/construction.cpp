@@ -98,7 +98,8 @@ bool take_function(const hal_host* host, const hal_function_decl* decl) {
     }
     c.functions.push_back({std::move(full), decl->doc ? decl->doc : "", decl->step,
                            decl->size >= sizeof *decl ? decl->row : nullptr, decl->self,
-                           decl->identity, shared});
+                           decl->identity, shared,
+                           (decl->flags & HAL_FUNCTION_REQUIRED) != 0});
     return true;
 }
 

@@ -29,6 +29,7 @@ struct DeclaredFunction {
     void* self;
     const void* identity;
     bool shared;
+    bool required;
 };
 
 /// What one constructor declares while it runs.

@@ -169,6 +169,29 @@ void SessionState::forget_reported(const Diagnostics& found, bool whole) {
     });
 }
 
+namespace {
+
+/// No thread runs these instances any more: their devices get their safe values, as on `stop`.
+void make_abandoned_safe(const Model& model, const Edit& edit) noexcept {
+    const hal_cycle none{
+        .size = sizeof none, .pad = 0, .period_ns = 0, .period_s = 0.0, .start_ns = 0, .number = 0};
+    const auto runs = [](const LoadedFunction* function) { return function->thread != nullptr; };
+    for (const LoadedFunction* const function : edit.taken_functions()) {
+        for (const Instance* const instance : function->instances) {
+            const bool is_loaded = model.find_instance(instance->name) == instance;
+            if (!is_loaded || !instance->started ||
+                std::any_of(instance->functions.begin(), instance->functions.end(), runs)) {
+                continue;
+            }
+            for (const plan::Step& step : instance->emergency) {
+                step.step(step.self, &none);
+            }
+        }
+    }
+}
+
+}  // namespace
+
 bool SessionState::carry_out(Diagnostics& diagnostics) {
     if (!edit->structural() &&
         edit->pin_values.size() + edit->signal_values.size() <= Core::most_writes / 2) {
@@ -215,12 +238,14 @@ bool SessionState::carry_out(Diagnostics& diagnostics) {
     }
     if (diagnostics.failed()) return false;
     touched = true;
+    edit->make_taken_safe();
     if (!start_replaced(diagnostics)) return false;
     if (!make_threads(diagnostics) || !end_threads(edit->removed().threads, diagnostics) ||
         !synchronise(diagnostics)) {
         return false;
     }
     stuck.clear();
+    make_abandoned_safe(model, *edit);
     close_edit();
     return true;
 }

@@ -142,6 +142,10 @@ public:
     // (not).
     Notes<Pin, hal_value> pin_values;
     Notes<Signal, hal_value> signal_values;
+    /// functions that this edit took from a thread; it may have put them into another one since
+    const std::vector<LoadedFunction*>& taken_functions() const { return taken_; }
+    /// Gives the outputs of functions that are in no thread any more their declared safe values.
+    void make_taken_safe();
     Notes<Signal, Pin*> inherited;  ///< a signal that takes the value the pin has
     std::unordered_map<const Pin*, hal_pin*>
         old_memory;  ///< of pins that were replaced: what the threads know until they take the new plan
@@ -181,6 +185,7 @@ private:
     Removed removed_;
     std::deque<Replaced> replaced_;
     std::vector<Instance*> added_instances_;
+    std::vector<LoadedFunction*> taken_;
     bool structural_ = false;
 };
 

@@ -185,6 +185,7 @@ void Edit::take_from_thread(LoadedFunction& function) {
     const bool init = function.init;
     auto& row = init ? from->init : from->functions;
     const auto at = std::find(row.begin(), row.end(), &function);
+    make_room(taken_);
     on_undo([&function, from, init, position = at - row.begin()] {
         auto& functions = init ? from->init : from->functions;
         functions.insert(functions.begin() + position, &function);
@@ -193,7 +194,32 @@ void Edit::take_from_thread(LoadedFunction& function) {
     });
     row.erase(at);
     function.thread = nullptr;
+    taken_.push_back(&function);
     structural_ = true;
+}
+
+void Edit::make_taken_safe() {
+    const auto runs = [](const LoadedFunction* function) { return function->thread != nullptr; };
+    for (const LoadedFunction* const function : taken_) {
+        if (function->thread) continue;
+        for (const Instance* const instance : function->instances) {
+            if (model_.find_instance(instance->name) != instance) continue;  // unloaded
+            const bool any_runs =
+                std::any_of(instance->functions.begin(), instance->functions.end(), runs);
+            for (const auto& pin : instance->pins) {
+                const bool is_computed =
+                    pin->function ? pin->function->thread != nullptr : any_runs;
+                if (is_computed || pin->dir != HAL_DIR_OUT || (pin->flags & HAL_PIN_SAFE) == 0) {
+                    continue;
+                }
+                if (pin->signal) {
+                    signal_values.try_emplace(pin->signal, pin->safe);
+                } else {
+                    pin_values.try_emplace(pin.get(), pin->safe);
+                }
+            }
+        }
+    }
 }
 
 }  // namespace hal

@@ -90,6 +90,8 @@ struct LoadedFunction {
     std::vector<Instance*> instances;  ///< whose steps these are, in the same order
     LoadedComponent* component = nullptr;
     bool shared = false;
+    /// the instances' other functions do not work while this one is in no thread
+    bool required = false;
     Thread* thread = nullptr;
     bool init = false;  ///< placed by initf rather than addf
     /// not run: a reload failed and the old instance did not start again

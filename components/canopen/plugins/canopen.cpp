@@ -17,6 +17,7 @@
 #include "canopen_arguments.hpp"
 #include "fault_messages.hpp"
 #include "hal/component.hpp"
+#include "hal/function_pair.hpp"
 #include "hal/lasting_fault.hpp"
 #include "hal/naming.hpp"
 #include "hal/path_delay.hpp"
@@ -38,9 +39,11 @@ public:
         } else {
             receive_.emplace(
                 *this, "receive", &Canopen::receive,
-                "receives frames, boots and monitors nodes, copies received objects to pins");
+                "receives frames, boots and monitors nodes, copies received objects to pins",
+                hal::FunctionOptions{.required = true});
             transmit_.emplace(*this, "transmit", &Canopen::transmit,
-                              "copies pins to objects, sends the SYNC and the PDOs of this cycle");
+                              "copies pins to objects, sends the SYNC and the PDOs of this cycle",
+                              hal::FunctionOptions{.required = true});
         }
         runner_ = std::make_unique<Runner>(config_, static_cast<RunnerEvents&>(*this));
         const hal::Function& shows = by_index() ? *update_ : *receive_;
@@ -106,7 +109,7 @@ public:
         }
         link_ = std::move(opened);
         period_ = 0;
-        unsent_ = unheard_ = 0;
+        functions_.start(faults_, this);
         reported_notes_.assign(nodes_.size(), 0);
         reporter_->start();
         runner_->open(*link_);
@@ -137,10 +140,9 @@ public:
             }
         }
         now_ = now;
-        unheard_ = 0;
-        unsent_ += period_;
-        if (is_long_now(unsent_, period_)) {
-            reporter_->missing(true);
+        if (!by_index() && !functions_.receive()) {
+            show_offline(cycle);
+            return;
         }
         const bool interrupted = interrupted_.exchange(false, std::memory_order_acquire);
         runner_->receive(now);
@@ -163,10 +165,11 @@ public:
     }
 
     void transmit(hal::Cycle cycle) noexcept {
-        unsent_ = 0;
-        unheard_ += cycle.period_ns();
-        if (is_long_now(unheard_, cycle.period_ns())) {
-            reporter_->missing(false);
+        if (!by_index() && !functions_.transmit()) {
+            if (functions_.receive_is_missing()) {
+                make_safe(cycle);
+            }
+            return;
         }
         objects_->take(*runner_);
         runner_->transmit(
@@ -192,11 +195,19 @@ private:
         return naming != nullptr ? naming->name(host) : "canopen.0";
     }
     bool by_index() const { return arguments_.by_index(); }
-    /// Returns true when adding `added` brings `sum` to a second or three cycles, whichever is
-    /// longer.
-    static bool is_long_now(Time sum, Time added) noexcept {
-        const Time limit = std::max<Time>(second, 3 * added);
-        return sum >= limit && sum - added < limit;
+    /// Sends the safe values, and shows the network as offline while nothing is sent. It is booted
+    /// again when transmit() runs. [realtime]
+    void show_offline(hal::Cycle cycle) noexcept {
+        make_safe(cycle);
+        bus_->show_offline();
+        if (flying_) {
+            flying_->show_offline();
+        }
+        for (NodePins& node : nodes_) {
+            node.show_offline();
+        }
+        objects_->show_safe(*runner_);
+        safety_->show_offline();
     }
 
     /// Reports the latency of each pin on a bus with a known schedule: that of the station named as
@@ -470,8 +481,7 @@ private:
     std::vector<std::uint8_t> reported_notes_;  // bits of NodeStatus::notes, by node
     Time period_ = 0;
     Time now_ = 0;
-    Time unsent_ = 0;
-    Time unheard_ = 0;  // time since transmit, since receive
+    hal::FunctionPair functions_{name_ + ".receive", name_ + ".transmit"};
     bool overran_ = false;
     // set by make_safe() in any thread, taken by receive()
     std::atomic<bool> interrupted_{false};

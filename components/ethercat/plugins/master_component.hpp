@@ -3,8 +3,6 @@
 // `lcec`.
 #pragma once
 
-#include <pthread.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -29,6 +27,7 @@
 #include "hal/clock.hpp"
 #include "hal/component.hpp"
 #include "hal/discipline.hpp"
+#include "hal/function_pair.hpp"
 #include "hal/lasting_fault.hpp"
 #include "hal/naming.hpp"
 #include "hal/reporter.hpp"
@@ -82,16 +81,6 @@ public:
         nobody_words_ = "no slave answers on " + bus_.link;
         link_words_ = bus_.link + " has no link; no process data is exchanged";
         other_words_ = "another EtherCAT master sends on " + bus_.link + "; the slaves obey both";
-        const std::string receive = Names::function(name_, Names::receive);
-
-        const std::string transmit = Names::function(name_, Names::transmit);
-        no_transmit_words_ = "'" + receive + "' runs, but '" + transmit +
-                             "' does not; nothing is sent; type: addf " + transmit + " THREAD";
-        no_receive_words_ = "'" + transmit + "' runs, but '" + receive +
-                            "' does not; nothing is sent; type: addf " + receive + " THREAD";
-        apart_words_ = "'" + receive + "' and '" + transmit +
-                       "' are in different threads; nothing is sent; type: delf " + transmit +
-                       " THREAD, and add it to the thread of the other";
     }
 
     void start() {
@@ -146,8 +135,7 @@ public:
         failed_.assign(bus_.setup.slaves.size(), Event::slave_operational);
         slave_faults_.resize(bus_.setup.slaves.size());
         clock_faults_.resize(bus_.setup.slaves.size());
-        unsent_ = unreceived_ = apart_ = 0;
-        idle_cycles_.store(0, std::memory_order_relaxed);
+        functions_.start(faults_, this);
         interrupted_.store(false);
         filter_ = config::EventFilter(bus_.setup.slaves.size());
         discipline_.lose();
@@ -183,15 +171,7 @@ public:
             show_offline(cycle);
             return;
         }
-        unreceived_ = 0;
-        receiver_.store(pthread_self(), std::memory_order_relaxed);
-        if (unreceived_fault_.lasts()) {
-            unreceived_fault_.end(faults_, this);
-        }
-        if (++unsent_ == tolerated_cycles) {
-            begin(unsent_fault_, no_transmit_words_);
-        }
-        if (idle_cycles_.fetch_add(1, std::memory_order_relaxed) >= tolerated_cycles) {
+        if (!functions_.receive()) {
             show_offline(cycle);
             return;
         }
@@ -216,23 +196,12 @@ public:
 
     void transmit(hal::Cycle cycle) noexcept {
         if (!master_ || !fits(cycle)) return;
-        unsent_ = 0;
-        if (unsent_fault_.lasts()) {
-            unsent_fault_.end(faults_, this);
+        if (!functions_.transmit()) {
+            if (functions_.receive_is_missing() && !interrupted_.load(std::memory_order_relaxed)) {
+                make_safe(cycle);
+            }
+            return;
         }
-        if (++unreceived_ == tolerated_cycles) {
-            begin(unreceived_fault_, no_receive_words_);
-        }
-        apart_ = receiver_.load(std::memory_order_relaxed) == pthread_self() ? 0 : apart_ + 1;
-        if (apart_ == tolerated_cycles) {
-            begin(apart_fault_, apart_words_);
-        } else if (apart_ == 0 && apart_fault_.lasts()) {
-            apart_fault_.end(faults_, this);
-        }
-        if (unreceived_ > 2 || apart_ > 2) {
-            return;  // outputs must not move without their inputs
-        }
-        idle_cycles_.store(0, std::memory_order_relaxed);
         // The thread was declared hung, but its cycle goes on.
         if (interrupted_.load(std::memory_order_acquire)) return;
         entries_.take(areas_);
@@ -251,8 +220,6 @@ public:
     }
 
 private:
-    /// without the other function, while the netlist is loaded
-    static constexpr unsigned tolerated_cycles = 100;
     /// a mailbox whose state is not in the process data is looked at
     static constexpr std::int64_t emergencies_every_ns = 100'000'000;
     static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
@@ -495,13 +462,13 @@ private:
         Names::receive,
         &MasterComponent::receive,
         "takes the inputs of the slaves; first in the thread, whose period is the cycle",
-        {.shared = Names::shared}};
+        {.shared = Names::shared, .required = true}};
     hal::Function transmit_{
         *this,
         Names::transmit,
         &MasterComponent::transmit,
         "sends the outputs of the slaves, starts and watches them; last in the thread",
-        {.shared = Names::shared}};
+        {.shared = Names::shared, .required = true}};
     hal::Emergency emergency_{
         *this, &MasterComponent::make_safe,
         "takes the slaves to SAFE-OP at once, where outputs are off; they are started again "
@@ -514,15 +481,10 @@ private:
     std::vector<std::string> lost_words_, left_words_, clock_words_, identity_words_,
         missing_words_, ambiguous_words_, failed_words_;
     std::vector<Event> failed_;  // why a slave is not started, or slave_operational
-    std::string unknown_words_, nobody_words_, link_words_, period_words_, other_words_,
-        no_transmit_words_, no_receive_words_, apart_words_;
+    std::string unknown_words_, nobody_words_, link_words_, period_words_, other_words_;
     config::EventFilter filter_{0};
-    unsigned unsent_ = 0;
-    unsigned unreceived_ = 0;
-    unsigned apart_ = 0;
-    /// cycles of receive() since transmit() last exchanged process data
-    std::atomic<unsigned> idle_cycles_{0};
-    std::atomic<pthread_t> receiver_{};
+    hal::FunctionPair functions_{Names::function(name_, Names::receive),
+                                 Names::function(name_, Names::transmit)};
     /// set by make_safe() in any thread, taken by receive()
     std::atomic<bool> interrupted_{false};
 
@@ -543,8 +505,7 @@ private:
     }, 256, [](const config::Happened& h, const std::string&) { return config::subject(h); }};
     const hal_faults* faults_ = nullptr;
     std::vector<hal::LastingFault> slave_faults_, clock_faults_;  // by slave
-    hal::LastingFault unsent_fault_, unreceived_fault_, apart_fault_, period_fault_, unknown_fault_,
-        nobody_fault_, link_fault_, other_fault_;
+    hal::LastingFault period_fault_, unknown_fault_, nobody_fault_, link_fault_, other_fault_;
     std::int64_t now_ns_ = 0;
     std::int64_t other_seen_ns_ = 0;
     bool unknown_raised_ = false;

@@ -100,7 +100,8 @@ typedef void (*hal_row)(const hal_call *first, const hal_call *last, const hal_c
 
 enum {
     HAL_FUNCTION_SHARED = 1,   /* one function per component, running all its instances in order of creation */
-    HAL_FUNCTION_EMERGENCY = 2 /* never in a thread: the host calls it to make hardware outputs safe; async-signal-safe */
+    HAL_FUNCTION_EMERGENCY = 2, /* never in a thread: the host calls it to make hardware outputs safe; async-signal-safe */
+    HAL_FUNCTION_REQUIRED = 4 /* since 1.2: the other functions of the instance do not work while this one is in no thread */
 };
 
 typedef struct hal_function_decl {

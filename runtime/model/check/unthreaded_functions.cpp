@@ -5,10 +5,33 @@
 
 namespace hal {
 
+namespace {
+
+/// Returns a function in a thread that does not work without `function`; nullptr if there is none.
+const LoadedFunction* waiting_for(const LoadedFunction& function) {
+    if (!function.required) return nullptr;
+    for (const Instance* instance : function.instances) {
+        for (const LoadedFunction* other : instance->functions) {
+            if (other->thread) return other;
+        }
+    }
+    return nullptr;
+}
+
+}  // namespace
+
 void check_unthreaded_functions(const Model& model, Diagnostics& diagnostics) {
     for (const auto& component : model.components) {
         for (const auto& function : component->functions) {
             if (function->thread) continue;
+            if (const LoadedFunction* const other = waiting_for(*function)) {
+                diagnostics.warning("unthreaded-function", function->instances.front()->loaded,
+                                    "function '" + function->name + "' is in no thread, but '" +
+                                        other->name + "' is in thread '" + other->thread->name +
+                                        "' and does not work without it",
+                                    "", "addf " + function->name + " " + other->thread->name);
+                continue;
+            }
             const bool linked = std::any_of(function->instances.begin(), function->instances.end(),
                                             [&](const Instance* instance) {
                 return !instance->own_threads &&

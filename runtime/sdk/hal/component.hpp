@@ -66,6 +66,14 @@ struct PinOptions {
 struct FunctionOptions {
     /// one function per component that runs all instances (`encoder.update-counters`)
     bool shared = false;
+    /// the other functions of the instance do not work without it: `hal check` warns when it is in
+    /// no thread
+    bool required = false;
+
+    unsigned flags() const {
+        return (shared ? unsigned{HAL_FUNCTION_SHARED} : 0U) |
+               (required ? unsigned{HAL_FUNCTION_REQUIRED} : 0U);
+    }
 };
 
 /// What may follow an argument's documentation.
@@ -194,14 +202,14 @@ public:
     Function(C& component, const char* name, void (B::*step)(Cycle) noexcept, const char* doc,
              FunctionOptions options = {}) {
         declare(static_cast<B*>(&component), name, entry(step), doc,
-                options.shared ? unsigned{HAL_FUNCTION_SHARED} : 0u);
+                options.flags());
     }
     template <std::derived_from<Component> C, class B, void (B::*step)(Cycle) noexcept>
         requires std::derived_from<C, B>
     Function(C& component, const char* name, Step<step>, const char* doc,
              FunctionOptions options = {}) {
         declare(static_cast<B*>(&component), name, entry(step), doc,
-                options.shared ? unsigned{HAL_FUNCTION_SHARED} : 0u, detail::run_row<B, step>);
+                options.flags(), detail::run_row<B, step>);
     }
     // The compiler shows this line where something else was given.
     template <std::derived_from<Component> C, class F>
@@ -240,8 +248,8 @@ protected:
     }
 };
 
-/// What the host calls to make hardware outputs safe: on stop, unload, a fault that stops the
-/// thread, the end of the process and in a crash handler. Must be async-signal-safe: it may write
+/// What the host calls to make hardware outputs safe: on stop, unload, `delf` of the instance's last
+/// function, a fault that stops the thread, the end of the process and in a crash handler. Must be async-signal-safe: it may write
 /// to devices and must not allocate, lock or log.
 class Emergency : Function {
 public:

@@ -53,10 +53,6 @@ public:
         reported_.tell(e);
     }
     void cycle(Time period) noexcept { reported_.tell({Event::cycle, {}, {}, {}, {}, period}); }
-    /// One of its two functions does not run.
-    void missing(bool sends) noexcept {
-        reported_.tell({sends ? Event::no_transmit : Event::no_receive, {}, {}, {}, {}, 0});
-    }
     void foreign(const RunnerEvents::Foreign& f) noexcept {
         reported_.tell({Event::foreign, {}, {}, {}, {}, 0, 0, {}, f});
     }
@@ -77,8 +73,6 @@ private:
             waiting,
             cycle,
             flying,
-            no_transmit,
-            no_receive,
             rejected,
             foreign,
         } kind = node;
@@ -185,8 +179,6 @@ private:
                        : "node " + std::to_string(e.master) +
                              " is the NMT master; this one is ready to take over";
         case Event::foreign: return foreign_words(e.of_foreign);
-        case Event::no_transmit: return missing_words("transmit", "nothing is sent");
-        case Event::no_receive: return missing_words("receive", "no node is booted");
         case Event::rejected: return can::to_string(e.of_link);
         case Event::cycle:
             for (const config::Message& m : config::load_messages(config_, e.period, file_)) {
@@ -243,10 +235,6 @@ private:
         case NmtCommand::reset_communication: return "reset communication";
         }
         return "command " + std::to_string(command);
-    }
-    std::string missing_words(const std::string& function, const char* so) const {
-        return "its function " + function + " runs in no thread, so " + so + "; type: addf " +
-               instance_ + "." + function + " THREAD";
     }
     static const char* bus_words(can::State state) {
         switch (state) {

@@ -109,28 +109,13 @@ public:
 
     /// [realtime]
     void show(Runner& runner) noexcept {
-        const auto slots = runner.slots();
-        const auto raw = [&](std::size_t n) noexcept {
-            const Slot& s = slots[n];
-            return s.has_safe && !runner.operational(s.node) ? s.safe : number_in(*s.entry);
-        };
-        for (auto& b : out_bits_) {
-            b.pin = b.bit == whole ? raw(b.slot) != 0 : (raw(b.slot) >> b.bit & 1) != 0;
-        }
-        for (auto& b : out_real_) {
-            b.pin = (real_of(b.type, raw(b.slot)) - b.offset) / b.scale;
-        }
-        const auto integers = [&](auto& pins) noexcept {
-            for (auto& b : pins) {
-                using T = decltype(b.pin.get());
-                b.pin = is_real(b.type) ? static_cast<T>(cut<T>(real_of(b.type, raw(b.slot))))
-                                        : static_cast<T>(raw(b.slot));
-            }
-        };
-        integers(out_s32_);
-        integers(out_u32_);
-        integers(out_s64_);
-        integers(out_u64_);
+        show(runner.slots(), [&runner](const Slot& s) noexcept {
+            return s.has_safe && !runner.operational(s.node);
+        });
+    }
+    /// Shows the safe values of all nodes, and the last ones of objects without. [realtime]
+    void show_safe(Runner& runner) noexcept {
+        show(runner.slots(), [](const Slot& s) noexcept { return s.has_safe; });
     }
 
     /// [realtime]
@@ -171,6 +156,32 @@ public:
 
 private:
     static constexpr unsigned whole = 64;
+
+    /// Sets the output pins; `is_safe` selects the slots that have their safe value. [realtime]
+    template <class Slots, class IsSafe>
+    void show(Slots slots, IsSafe is_safe) noexcept {
+        const auto raw = [&](std::size_t n) noexcept {
+            const Slot& s = slots[n];
+            return is_safe(s) ? s.safe : number_in(*s.entry);
+        };
+        for (auto& b : out_bits_) {
+            b.pin = b.bit == whole ? raw(b.slot) != 0 : (raw(b.slot) >> b.bit & 1) != 0;
+        }
+        for (auto& b : out_real_) {
+            b.pin = (real_of(b.type, raw(b.slot)) - b.offset) / b.scale;
+        }
+        const auto integers = [&](auto& pins) noexcept {
+            for (auto& b : pins) {
+                using T = decltype(b.pin.get());
+                b.pin = is_real(b.type) ? static_cast<T>(cut<T>(real_of(b.type, raw(b.slot))))
+                                        : static_cast<T>(raw(b.slot));
+            }
+        };
+        integers(out_s32_);
+        integers(out_u32_);
+        integers(out_s64_);
+        integers(out_u64_);
+    }
 
     template <class T, class Ins, class Outs>
     void add(Component& component, const std::string& name, const std::string& about, bool to_node,
@@ -300,6 +311,13 @@ struct NodePins {
         }
         was_restart = restart;
     }
+    /// Nothing is sent to the node. [realtime]
+    void show_offline() noexcept {
+        online = false;
+        operational = false;
+        state = 0U;
+        step = 0U;
+    }
 };
 
 /// Which of several flying masters leads.
@@ -322,6 +340,11 @@ struct FlyingPins {
         state = static_cast<std::uint32_t>(flying.state());
         master = flying.master();
         negotiations = static_cast<std::uint32_t>(flying.negotiations());
+    }
+    /// [realtime]
+    void show_offline() noexcept {
+        active = false;
+        state = 0U;
     }
 };
 
@@ -380,6 +403,12 @@ struct BusPins {
             runner.restart(now);
         }
         was_restart = restart;
+    }
+    /// Nothing is sent. [realtime]
+    void show_offline() noexcept {
+        operational = false;
+        state = 0U;
+        nodes_operational = 0U;
     }
 };
 

@@ -60,6 +60,15 @@ public:
         was_fail_safe_ = *fail_safe_;
     }
 
+    /// Nothing is sent. [realtime]
+    void show_offline() noexcept {
+        for (Row& row : rows_) {
+            if (row.received) {
+                row.received->valid = false;
+            }
+        }
+    }
+
     /// Returns the message of a fault, formatted before the first cycle. [realtime]
     const char* words(std::size_t place, SrdoFault fault) const noexcept {
         return rows_[place].words[static_cast<std::size_t>(fault) & 7].c_str();

@@ -14,6 +14,7 @@
 #include "event_words.hpp"
 #include "hal/component.hpp"
 #include "hal/discipline.hpp"
+#include "hal/function_pair.hpp"
 #include "hal/lasting_fault.hpp"
 #include "hal/naming.hpp"
 #include "hal/reporter.hpp"
@@ -91,6 +92,8 @@ public:
         link_ = std::move(opened.link);
         station_->attach(*link_);
         discipline_.lose();
+        functions_.start(faults_, this);
+        silent_ = false;
         followed_ = 0;
         raised_.fill(std::numeric_limits<Time>::min());
         for (auto& m : sent_) {
@@ -124,6 +127,19 @@ public:
             recover();
         }
         was_reset_ = pins_.reset;
+        const bool sends = functions_.receive();
+        if (sends == silent_) {
+            set_silent(!sends);
+        }
+        if (silent_) {
+            exchange_->state.store(can::State::down, std::memory_order_relaxed);
+            for (auto& m : received_) {
+                m.show(now_);
+            }
+            pins_.show(*station_);
+            received();
+            return;
+        }
         if (interrupted_.exchange(false, std::memory_order_acquire)) {
             restart();
         }
@@ -143,6 +159,13 @@ public:
 
     void transmit(hal::Cycle cycle) noexcept {
         if (!link_) return;
+        if (!functions_.transmit()) {
+            if (functions_.receive_is_missing()) {
+                interrupted_.store(true, std::memory_order_release);
+                exchange_->state.store(can::State::down, std::memory_order_relaxed);
+            }
+            return;
+        }
         now_ = cycle.start_ns();
         for (auto& m : sent_) {
             m.transmit(*station_, now_);
@@ -211,6 +234,14 @@ protected:
             counts ? static_cast<double>(value) : std::numeric_limits<double>::quiet_NaN());
     }
 
+    /// transmit() is missing, or runs again: the node begins anew, and listens before it sends.
+    /// [realtime]
+    void set_silent(bool silent) noexcept {
+        silent_ = silent;
+        restart();
+        pins_.fault = silent || fault_.lasts();
+    }
+
     /// The fault is over. [realtime]
     void recover() noexcept {
         pins_.fault = false;
@@ -248,10 +279,16 @@ protected:
 
     const std::string name_;
     TableArguments arguments_{*this};
-    hal::Function receive_{*this, "receive", &StationComponent::receive,
-                           "receives frames and follows the SYNC; first in the thread"};
-    hal::Function transmit_{*this, "transmit", &StationComponent::transmit,
-                            "sends in the slots until the next cycle; last in the thread"};
+    hal::Function receive_{*this,
+                           "receive",
+                           &StationComponent::receive,
+                           "receives frames and follows the SYNC; first in the thread",
+                           {.required = true}};
+    hal::Function transmit_{*this,
+                            "transmit",
+                            &StationComponent::transmit,
+                            "sends in the slots until the next cycle; last in the thread",
+                            {.required = true}};
     hal::Emergency interruption_{*this, &StationComponent::interrupt,
                                  "when the thread runs again, the node listens before it sends"};
     StationPins pins_{*this, receive_};
@@ -271,7 +308,9 @@ protected:
     std::array<Time, 32> raised_{};
     std::uint64_t followed_ = 0;
     Time now_ = 0;
+    hal::FunctionPair functions_{name_ + ".receive", name_ + ".transmit"};
     bool was_reset_ = false;
+    bool silent_ = false;  // transmit() is missing
     // set by interrupt(), taken by receive()
     std::atomic<bool> interrupted_{false};
 };

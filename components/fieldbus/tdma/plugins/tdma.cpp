@@ -21,6 +21,7 @@
 #include "hal/background.hpp"
 #include "hal/component.hpp"
 #include "hal/discipline.hpp"
+#include "hal/function_pair.hpp"
 #include "hal/lasting_fault.hpp"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
@@ -113,7 +114,8 @@ public:
             hal::MessageLog(name_).print(remark);
         }
         discipline_.lose();
-        period_reported_ = was_reset_ = false;
+        functions_.start(faults_, this);
+        period_reported_ = was_reset_ = silent_ = false;
         had_carrier_ = true;
         words_ = own_words_.get();
         if (service_) {
@@ -159,6 +161,15 @@ public:
             raise(words_->period, static_cast<double>(cycle.period_ns()) * 1e-3);
             reporter_->event(Event::wrong_period, {}, cycle.period_ns());
         }
+        const bool sends = functions_.receive();
+        if (sends == silent_) {
+            set_silent(!sends);
+        }
+        if (silent_) {
+            follow(cycle.period_ns());
+            show();
+            return;
+        }
         const bool interrupted = interrupted_.exchange(false, std::memory_order_acquire);
         if (fits) {
             if (interrupted) {
@@ -181,7 +192,11 @@ public:
     }
 
     void transmit(hal::Cycle cycle) noexcept {
-        if (is_cycle(cycle)) {
+        const bool receives = functions_.transmit();
+        if (functions_.receive_is_missing()) {
+            interrupted_.store(true, std::memory_order_release);
+        }
+        if (receives && is_cycle(cycle)) {
             station_->transmit(cycle.start_ns());
         }
         for (std::size_t i = 0; i < waiting_->size(); ++i) {
@@ -208,6 +223,14 @@ private:
             }
         }
         return times;
+    }
+
+    /// transmit() is missing, or runs again: the station begins anew, and listens before it sends.
+    /// [realtime]
+    void set_silent(bool silent) noexcept {
+        silent_ = silent;
+        station_->restart();
+        pins_.fault = silent || fault_.lasts();
     }
 
     /// Uses a schedule received by RTcfg. [realtime]
@@ -402,12 +425,18 @@ private:
     const std::string name_ = hal::own_name("tdma.0");
     StationArguments arguments_{*this};
 
-    hal::Function receive_{*this, "receive", &Tdma::receive,
+    hal::Function receive_{*this,
+                           "receive",
+                           &Tdma::receive,
                            "receives frames and synchronises the clock; first in the thread, whose "
-                           "period is the cycle"};
-    hal::Function transmit_{*this, "transmit", &Tdma::transmit,
+                           "period is the cycle",
+                           {.required = true}};
+    hal::Function transmit_{*this,
+                            "transmit",
+                            &Tdma::transmit,
                             "sends the frames queued for the slots of this cycle, and the master's "
-                            "sync; last in the thread"};
+                            "sync; last in the thread",
+                            {.required = true}};
 
     hal::Emergency interruption_{*this, &Tdma::interrupt,
                                  "when the thread runs again, the station listens before it sends"};
@@ -432,7 +461,9 @@ private:
     hal::Discipline discipline_;
     const hal_faults* faults_ = nullptr;
     hal::LastingFault fault_;
+    hal::FunctionPair functions_{name_ + ".receive", name_ + ".transmit"};
     bool leads_ = false;
+    bool silent_ = false;  // transmit() is missing
     bool period_reported_ = false;
     bool was_reset_ = false;
     bool was_synchronised_ = false;
