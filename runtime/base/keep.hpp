@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Objects that are never freed, because a hung thread may still use them.
+// Objects that are never freed: a hung thread may still use them, or the process ends.
 #pragma once
 
 #include <array>

@@ -48,7 +48,7 @@ void keep_type(std::vector<const T*>& objects, std::optional<hal_type> type) {
 
 void describe_pins(std::string& to, Session& session, bool parameters, const Patterns& patterns,
                    std::optional<hal_type> type) {
-    auto pins = pins_by_name(session.model(), parameters, patterns);
+    auto pins = pins_by_name(session, parameters, patterns);
     keep_type(pins, type);
     const auto values = session.values().read_pins(pins);
     array(to, session, pins, [&](const Pin* pin, std::size_t i) {
@@ -87,7 +87,7 @@ void describe_pins(std::string& to, Session& session, bool parameters, const Pat
 
 void describe_signals(std::string& to, Session& session, const Patterns& patterns,
                       std::optional<hal_type> type) {
-    auto signals = signals_by_name(session.model(), patterns);
+    auto signals = signals_by_name(session, patterns);
     keep_type(signals, type);
     const auto values = session.values().read_signals(signals);
     array(to, session, signals, [&](const Signal* signal, std::size_t i) {
@@ -190,7 +190,7 @@ void describe_threads(std::string& to, Session& session, const Patterns& pattern
 void describe_aliases(std::string& to, Session& session, const Patterns& patterns) {
     std::vector<const Pin*> aliased;
     for (const bool parameters : {false, true}) {
-        for (const Pin* const pin : pins_by_name(session.model(), parameters, patterns)) {
+        for (const Pin* const pin : pins_by_name(session, parameters, patterns)) {
             if (!pin->alias.empty()) {
                 aliased.push_back(pin);
             }
@@ -226,7 +226,7 @@ std::optional<Listed> listed_kind(std::string_view word) {
     return std::nullopt;
 }
 
-std::vector<std::string> names_of(const Model& model, Listed kind, const Patterns& patterns) {
+std::vector<std::string> names_of(const Session& session, Listed kind, const Patterns& patterns) {
     std::vector<std::string> names;
     const auto add = [&](const auto& objects, auto&& name) {
         for (const auto* const object : objects) {
@@ -235,15 +235,15 @@ std::vector<std::string> names_of(const Model& model, Listed kind, const Pattern
     };
     const auto own = [](const auto& object) { return object.name; };
     switch (kind) {
-    case Listed::components: add(components_newest_first(model, patterns), own); break;
-    case Listed::pins: add(pins_by_name(model, false, patterns), shown_name); break;
-    case Listed::parameters: add(pins_by_name(model, true, patterns), shown_name); break;
-    case Listed::signals: add(signals_by_name(model, patterns), own); break;
-    case Listed::functions: add(functions_by_name(model, patterns), own); break;
-    case Listed::threads: add(threads_slowest_first(model, patterns), own); break;
+    case Listed::components: add(components_newest_first(session.model(), patterns), own); break;
+    case Listed::pins: add(pins_by_name(session, false, patterns), shown_name); break;
+    case Listed::parameters: add(pins_by_name(session, true, patterns), shown_name); break;
+    case Listed::signals: add(signals_by_name(session, patterns), own); break;
+    case Listed::functions: add(functions_by_name(session.model(), patterns), own); break;
+    case Listed::threads: add(threads_slowest_first(session.model(), patterns), own); break;
     case Listed::aliases:
         for (const bool parameters : {false, true}) {
-            for (const Pin* const pin : pins_by_name(model, parameters, patterns)) {
+            for (const Pin* const pin : pins_by_name(session, parameters, patterns)) {
                 if (!pin->alias.empty()) {
                     names.push_back(pin->alias);
                 }
@@ -253,7 +253,7 @@ std::vector<std::string> names_of(const Model& model, Listed kind, const Pattern
     case Listed::all:
         for (const Listed each : {Listed::components, Listed::pins, Listed::signals,
                                   Listed::parameters, Listed::functions, Listed::threads}) {
-            auto more = names_of(model, each, patterns);
+            auto more = names_of(session, each, patterns);
             std::move(more.begin(), more.end(), std::back_inserter(names));
         }
         break;

@@ -19,7 +19,7 @@ enum class Listed { components, pins, signals, parameters, functions, threads, a
 std::optional<Listed> listed_kind(std::string_view word);
 
 /// The names `list` prints, in its order.
-std::vector<std::string> names_of(const Model& model, Listed kind, const Patterns& patterns);
+std::vector<std::string> names_of(const Session& session, Listed kind, const Patterns& patterns);
 
 /// Appends an array of objects, or for Listed::all an object with an array per kind. Values come
 /// from one bulk read per kind; the session's lock must be held. The members of each object are

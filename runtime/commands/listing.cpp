@@ -30,29 +30,57 @@ const char* direction_text(const Pin& pin) {
                                                                               : name(pin.dir);
 }
 
-std::vector<const Pin*> pins_by_name(const Model& model, bool parameters,
+namespace {
+
+/// Sorts in short steps, between which the end of the machine interrupts it; then `row` is empty.
+template <class T, class Less>
+void sort_until_end(std::vector<T>& row, const Session& session, Less less) {
+    constexpr std::size_t step = 4096;
+    const auto begin = row.begin();
+    const std::size_t size = row.size();
+    for (std::size_t first = 0; first < size; first += step) {
+        if (session.ending()) return row.clear();
+        std::sort(begin + static_cast<std::ptrdiff_t>(first),
+                  begin + static_cast<std::ptrdiff_t>(std::min(first + step, size)), less);
+    }
+    for (std::size_t width = step; width < size; width *= 2) {
+        for (std::size_t first = 0; first + width < size; first += 2 * width) {
+            if (session.ending()) return row.clear();
+            std::inplace_merge(
+                begin + static_cast<std::ptrdiff_t>(first),
+                begin + static_cast<std::ptrdiff_t>(first + width),
+                begin + static_cast<std::ptrdiff_t>(std::min(first + 2 * width, size)), less);
+        }
+    }
+}
+
+}  // namespace
+
+std::vector<const Pin*> pins_by_name(const Session& session, bool parameters,
                                      const Patterns& patterns) {
     std::vector<const Pin*> chosen;
-    for (const auto& [name, pin] : model.pin) {
+    for (const auto& [name, pin] : session.model().pin) {
+        if (session.ending()) return {};
         if (name == pin->name && is_parameter(*pin) == parameters &&
             patterns.match(shown_name(*pin))) {
             chosen.push_back(pin);
         }
     }
-    std::sort(chosen.begin(), chosen.end(),
-              [](const Pin* a, const Pin* b) { return shown_name(*a) < shown_name(*b); });
+    sort_until_end(chosen, session,
+                   [](const Pin* a, const Pin* b) { return shown_name(*a) < shown_name(*b); });
     return chosen;
 }
 
-std::vector<const Signal*> signals_by_name(const Model& model, const Patterns& patterns) {
+std::vector<const Signal*> signals_by_name(const Session& session, const Patterns& patterns) {
     std::vector<const Signal*> chosen;
-    for (const auto& signal : model.signals) {
+    for (const auto& signal : session.model().signals) {
+        if (session.ending()) return {};
         if (patterns.match(signal->name)) {
             chosen.push_back(signal.get());
         }
     }
-    std::sort(chosen.begin(), chosen.end(),
-              [](const Signal* a, const Signal* b) { return a->name < b->name; });
+    sort_until_end(chosen, session,
+                   [](const Signal* a, const Signal* b) { return a->name < b->name; });
     return chosen;
 }
 

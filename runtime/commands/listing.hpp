@@ -34,9 +34,11 @@ bool is_parameter(const Pin& pin);
 /// "IN", "OUT", "I/O" or, of a parameter, "RO", "RW".
 const char* direction_text(const Pin& pin);
 
-/// By the name that is shown.
-std::vector<const Pin*> pins_by_name(const Model& model, bool parameters, const Patterns& patterns);
-std::vector<const Signal*> signals_by_name(const Model& model, const Patterns& patterns);
+/// By the name that is shown. Empty when the end of the machine interrupts it: sorting many names
+/// takes long.
+std::vector<const Pin*> pins_by_name(const Session& session, bool parameters,
+                                     const Patterns& patterns);
+std::vector<const Signal*> signals_by_name(const Session& session, const Patterns& patterns);
 std::vector<const LoadedFunction*> functions_by_name(const Model& model, const Patterns& patterns);
 /// Newest first, as LinuxCNC lists them.
 std::vector<const LoadedComponent*> components_newest_first(const Model& model,

@@ -99,7 +99,7 @@ void save_comp(Context& context, Text& text) {
 void save_alias(Context& context, Text& text) {
     for (const bool parameters : {false, true}) {
         text.add("# {} aliases\n", parameters ? "param" : "pin");
-        for (const Pin* const pin : pins_by_name(context.session.model(), parameters, {})) {
+        for (const Pin* const pin : pins_by_name(context.session, parameters, {})) {
             if (!pin->alias.empty()) {
                 text.add("alias {} {} {}\n", parameters ? "param" : "pin", pin->name, pin->alias);
             }
@@ -113,14 +113,15 @@ void new_signal(Text& text, const Signal& signal) {
 
 void save_sig(Context& context, Text& text) {
     text.add("# signals\n");
-    for (const Signal* const signal : signals_by_name(context.session.model(), {})) {
+    for (const Signal* const signal : signals_by_name(context.session, {})) {
+        if (context.session.ending()) return;
         new_signal(text, *signal);
     }
 }
 
 void save_sigu(Context& context, Text& text) {
     text.add("# signals\n");
-    for (const Signal* const signal : signals_by_name(context.session.model(), {})) {
+    for (const Signal* const signal : signals_by_name(context.session, {})) {
         if (context.session.ending()) return;
         if (signal->pins.empty()) {
             new_signal(text, *signal);
@@ -130,7 +131,8 @@ void save_sigu(Context& context, Text& text) {
 
 void save_links(Context& context, Text& text, bool arrows) {
     text.add("# links\n");
-    for (const Pin* const pin : pins_by_name(context.session.model(), false, {})) {
+    for (const Pin* const pin : pins_by_name(context.session, false, {})) {
+        if (context.session.ending()) return;
         if (pin->signal) {
             text.add("linkps {} {} {}\n", shown_name(*pin), arrows ? arrow_of_pin(*pin) : "",
                      pin->signal->name);
@@ -150,7 +152,8 @@ std::vector<const Pin*> by_name(const Signal& signal) {
 
 void save_nets(Context& context, Text& text, bool arrows) {
     text.add("# nets\n");
-    for (const Signal* const signal : signals_by_name(context.session.model(), {})) {
+    for (const Signal* const signal : signals_by_name(context.session, {})) {
+        if (context.session.ending()) return;
         new_signal(text, *signal);
         for (const Pin* const pin : by_name(*signal)) {
             text.add("linksp {} {} {}\n", signal->name, arrows ? arrow_of_signal(*pin) : "",
@@ -164,7 +167,7 @@ void save_neta(Context& context, Text& text) { save_nets(context, text, true); }
 
 void save_netl(Context& context, Text& text) {
     text.add("# nets\n");
-    for (const Signal* const signal : signals_by_name(context.session.model(), {})) {
+    for (const Signal* const signal : signals_by_name(context.session, {})) {
         if (context.session.ending()) return;
         if (signal->pins.empty()) continue;
         text.add("net {}", signal->name);
@@ -179,7 +182,7 @@ void save_netl(Context& context, Text& text) {
 /// readers.
 void save_netla(Context& context, Text& text) {
     text.add("# nets\n");
-    for (const Signal* const signal : signals_by_name(context.session.model(), {})) {
+    for (const Signal* const signal : signals_by_name(context.session, {})) {
         if (context.session.ending()) return;
         if (signal->pins.empty()) continue;
         text.add("net {}", signal->name);
@@ -203,6 +206,7 @@ void save_netla(Context& context, Text& text) {
 void save_values(Context& context, Text& text, const std::vector<const Pin*>& pins) {
     const auto values = context.session.values().read_pins(pins);
     for (std::size_t i = 0; i < pins.size(); ++i) {
+        if (context.session.ending()) return;
         if (pins[i]->type != HAL_TYPE_PORT) {
             text.add("setp {} {:>20}\n", shown_name(*pins[i]),
                      saved_value(pins[i]->type, values[i]));
@@ -212,7 +216,7 @@ void save_values(Context& context, Text& text, const std::vector<const Pin*>& pi
 
 void save_param(Context& context, Text& text) {
     text.add("# parameter values\n");
-    auto parameters = pins_by_name(context.session.model(), true, {});
+    auto parameters = pins_by_name(context.session, true, {});
     std::erase_if(parameters,
                   [](const Pin* pin) { return pin->dir != HAL_DIR_PARAM || pin->read_only(); });
     save_values(context, text, parameters);
@@ -220,7 +224,7 @@ void save_param(Context& context, Text& text) {
 
 void save_unconnected(Context& context, Text& text) {
     text.add("# unconnected pin values\n");
-    auto pins = pins_by_name(context.session.model(), false, {});
+    auto pins = pins_by_name(context.session, false, {});
     std::erase_if(pins, [](const Pin* pin) { return pin->signal || pin->dir == HAL_DIR_OUT; });
     save_values(context, text, pins);
 }
@@ -228,12 +232,13 @@ void save_unconnected(Context& context, Text& text) {
 /// Signals nobody writes keep what sets gave them.
 void save_signal_values(Context& context, Text& text) {
     text.add("# signal values\n");
-    auto signals = signals_by_name(context.session.model(), {});
+    auto signals = signals_by_name(context.session, {});
     std::erase_if(signals, [](const Signal* signal) {
         return signal->type == HAL_TYPE_PORT ? !signal->port : signal->writer || signal->ios > 0;
     });
     const auto values = context.session.values().read_signals(signals);
     for (std::size_t i = 0; i < signals.size(); ++i) {
+        if (context.session.ending()) return;
         const Signal& signal = *signals[i];
         text.add("sets {} {:>20}\n", signal.name,
                  signal.type == HAL_TYPE_PORT ? std::to_string(signal.port->capacity)

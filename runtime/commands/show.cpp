@@ -64,10 +64,11 @@ void show_comp(Request& request) {
 void show_pins(Request& request, bool parameters) {
     request.title(parameters ? "Parameters:\n" : "Component Pins:\n");
     request.title("Owner   Type  Dir                 Value  Name\n");
-    auto pins = pins_by_name(request.model(), parameters, request.patterns);
+    auto pins = pins_by_name(request.context.session, parameters, request.patterns);
     keep_type(pins, request.type);
     const auto values = request.context.session.values().read_pins(pins);
     for (std::size_t i = 0; i < pins.size(); ++i) {
+        if (request.context.session.ending()) return;
         const Pin& pin = *pins[i];
         const LoadedComponent* const whose = owner(pin);
         const std::string value = value_text(request, pin.type, values[i]);
@@ -91,11 +92,12 @@ void show_param(Request& request) { show_pins(request, true); }
 
 void show_sig(Request& request) {
     request.title("Signals:\nType                  Value  Name     (linked to)\n");
-    auto signals = signals_by_name(request.model(), request.patterns);
+    auto signals = signals_by_name(request.context.session, request.patterns);
     keep_type(signals, request.type);
     const auto values = request.context.session.values().read_signals(signals);
     std::vector<const Pin*> pins;
     for (std::size_t i = 0; i < signals.size(); ++i) {
+        if (request.context.session.ending()) return;
         const Signal& signal = *signals[i];
         const std::string value = value_text(request, signal.type, values[i]);
         if (request.script()) {
@@ -186,7 +188,8 @@ void show_thread(Request& request) {
 void show_aliases(Request& request, bool parameters) {
     request.title(parameters ? "Parameter Aliases:\n" : "Pin Aliases:\n");
     request.title(fmt::format(" {:<48} {}\n", "Alias", "Original Name"));
-    for (const Pin* const pin : pins_by_name(request.model(), parameters, request.patterns)) {
+    for (const Pin* const pin :
+         pins_by_name(request.context.session, parameters, request.patterns)) {
         if (pin->alias.empty()) continue;
         if (request.script()) {
             request.add(" {}  {}\n", pin->alias, pin->name);
@@ -300,8 +303,7 @@ void command_list(Context& context) {
     std::vector<std::string> patterns;
     std::optional<hal_type> no_type;
     if (!kind || !read_patterns(context, patterns, no_type)) return;
-    const auto names =
-        names_of(context.session.model(), kind->listed, Patterns(std::move(patterns)));
+    const auto names = names_of(context.session, kind->listed, Patterns(std::move(patterns)));
     std::string text;
     if (context.options().json) {
         text = json_text(names);

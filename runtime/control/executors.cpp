@@ -54,7 +54,7 @@ void Executors::carry_out(ServedClient& client) {
     const std::uint64_t rubbish = connection.rubbish();
     std::size_t taken = 0;
     while (taken < turn.lines.size() && turn.replies.size() <= turn.capacity &&
-           turn.waiting.empty() && !turn.stop) {
+           turn.waiting.empty() && !turn.stop && (taken == 0 || !ends_())) {
         const std::size_t end = turn.lines.find('\n', taken);
         std::string_view line = std::string_view(turn.lines).substr(taken, end - taken);
         if (line.ends_with('\r')) {

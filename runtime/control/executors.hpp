@@ -118,7 +118,10 @@ struct ServedClient {
 /// session's lock for long: the server's thread never does.
 class Executors {
 public:
-    explicit Executors(std::function<void()> told) : told_(std::move(told)) {}
+    /// `told` is called after each turn; while `ends` is true a turn is one request. Both are
+    /// called by the executors' threads.
+    Executors(std::function<void()> told, std::function<bool()> ends)
+        : told_(std::move(told)), ends_(std::move(ends)) {}
     ~Executors() { end(); }
     void start();
     void give(ServedClient& client);
@@ -127,9 +130,10 @@ public:
 
 private:
     void work();
-    static void carry_out(ServedClient& client);
+    void carry_out(ServedClient& client);
 
-    std::function<void()> told_;
+    const std::function<void()> told_;
+    const std::function<bool()> ends_;
     std::mutex mutex_;
     std::condition_variable wake_;
     std::deque<ServedClient*> queue_;  // guarded by mutex_

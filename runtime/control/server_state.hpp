@@ -13,9 +13,11 @@
 
 #include <sys/eventfd.h>
 
+#include "commands/shell.hpp"
 #include "control/endpoint.hpp"
 #include "control/executors.hpp"
 #include "control/server.hpp"
+#include "machine/session.hpp"
 
 namespace hal {
 
@@ -41,7 +43,8 @@ struct Server::State {
     /// accept has failed because the process has no descriptor left
     bool files_short = false;
     std::vector<std::unique_ptr<ServedClient>> clients;
-    Executors pool{[this] { eventfd_write(wake, 1); }};
+    Executors pool{[this] { eventfd_write(wake, 1); },
+                   [this] { return ending || shell.session().ending(); }};
     std::atomic<std::uint64_t> connected{0};
     std::atomic<std::uint64_t> accepted{0};
     std::atomic<std::uint64_t> dropped{0};

@@ -112,7 +112,7 @@ void Connection::State::list(const Json& body, std::string& reply) {
     const Patterns patterns = patterns_of(body);
     const auto lock = session.lock();
     reply += ",\"names\":[";
-    for (const auto& name : names_of(session.model(), kind, patterns)) {
+    for (const auto& name : names_of(session, kind, patterns)) {
         if (reply.back() != '[') {
             reply += ',';
         }
