@@ -65,11 +65,13 @@ void command_debug(Context& context) {
                                   "levels are 0..5: 0 prints nothing, 5 everything");
         return;
     }
+    if (context.checking()) return;
     context.shell.options.level = static_cast<Level>(std::min(level, 3));
 }
 
 void command_help(Context& context) {
     if (context.count() == 0) {
+        if (context.checking()) return;
         std::string text;
         for (const auto& row : command_table()) {
             text += fmt::format("  {:<14} {}\n", names_of(row), row.summary);
@@ -79,6 +81,7 @@ void command_help(Context& context) {
     }
     const std::string& name = context.argument(0);
     if (const CommandRow* const row = find_command(name)) {
+        if (context.checking()) return;
         context.output.out(to_string(row->usage()) + "\n  " + row->summary + "\n" +
                            (*row->help ? std::string(row->help) + "\n" : ""));
         return;
@@ -90,6 +93,7 @@ void command_help(Context& context) {
 void command_explain(Context& context) {
     const std::string& code = context.argument(0);
     const std::string page = Shell::explain(code);
+    if (!page.empty() && context.checking()) return;
     if (!page.empty()) return context.output.out(page + "\n");
     std::vector<std::string> codes;
     for (const CodePage& row : all_code_pages()) {

@@ -76,6 +76,7 @@ bool restart_option(Context& context, Plan& plan, std::size_t i, const std::stri
 
 /// The options before the program. False after reporting.
 bool read_options(Context& context, Plan& plan) {
+    const std::size_t errors_before = context.diagnostics.errors();
     std::size_t i = 0;
     for (; i < context.count() && context.argument(i).starts_with('-'); ++i) {
         const std::string& option = context.argument(i);
@@ -88,7 +89,7 @@ bool read_options(Context& context, Plan& plan) {
         } else if (option == "-iw" || option == "-wi") {
             plan.wait_end = plan.ignore_status = true;
         } else if (restart_option(context, plan, i, option)) {
-            if (context.diagnostics.failed()) return false;
+            if (context.diagnostics.errors() > errors_before) return false;
         } else if (option == "-Wn" && i + 1 < context.count()) {
             plan.wait_ready = true;
             plan.any_name = false;
@@ -247,6 +248,20 @@ void timed_out(Context& context, std::int64_t limit_ns, const std::string& what,
                               "", std::move(help));
 }
 
+void name_in_use(Context& context, const Plan& plan, const Programs::Entry* entry) {
+    const std::string who = entry ? "process " + std::to_string(entry->pid) + ", " + entry->state()
+                                  : "a component in the machine";
+    context.diagnostics.error(
+        "name-taken", context.span(plan.name_at),
+        "the name '" + plan.name + "' is in use (" + who + ")", "in use",
+        entry ? "end the program first: unload " + plan.name : "give the program another name");
+}
+
+bool is_name_of_component(Context& context, const std::string& name) {
+    const Model& model = context.session.model();
+    return model.find_component(name) || model.find_instance(name);
+}
+
 /// Waits until the name that the program is to have is free or a dead program's. False after
 /// reporting.
 bool wait_for_name(Context& context, const Plan& plan, Timeout& timeout) {
@@ -257,19 +272,9 @@ bool wait_for_name(Context& context, const Plan& plan, Timeout& timeout) {
         const bool comes_back =
             dead && (entry->restart_ns != 0 || (runs && entry->restart.when != Restart::no));
         if (dead && !comes_back && !runs) return true;
-        if (!entry && !context.session.model().find_component(plan.name) &&
-            !context.session.model().find_instance(plan.name)) {
-            return true;
-        }
+        if (!entry && !is_name_of_component(context, plan.name)) return true;
         if (!entry || !(entry->stopping || (dead && !comes_back))) {
-            const std::string who =
-                !entry ? "a component in the machine"
-                       : "process " + std::to_string(entry->pid) + ", " + entry->state();
-            context.diagnostics.error("name-taken", context.span(plan.name_at),
-                                      "the name '" + plan.name + "' is in use (" + who + ")",
-                                      "in use",
-                                      entry ? "end the program first: unload " + plan.name
-                                            : "give the program another name");
+            name_in_use(context, plan, entry);
             return false;
         }
         if (timeout.over()) {
@@ -394,6 +399,12 @@ void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipe
 void command_loadusr(Context& context) {
     Plan plan;
     if (!read_options(context, plan)) return;
+    if (context.checking()) {
+        if (!plan.any_name && !plan.wait_end && is_name_of_component(context, plan.name)) {
+            name_in_use(context, plan, nullptr);
+        }
+        return;
+    }
 
     ProcessStart start;
     start.directory = context.options().directory;
@@ -441,7 +452,7 @@ void command_loadusr(Context& context) {
 void command_waitusr(Context& context) {
     const bool limited = context.argument(0) == "-t";
     const std::int64_t limit_ns = limited ? timeout_option(context, 1) : 0;
-    if (context.diagnostics.failed()) return;
+    if (limited && limit_ns == 0) return;
     if (context.count() != (limited ? 3U : 1U)) {
         context.diagnostics.error("wrong-arguments", context.command.span,
                                   "'waitusr' requires one program", "", context.usage());
@@ -495,6 +506,8 @@ void no_program(Context& context, const std::string& name) {
 
 void command_unloadusr(Context& context) {
     const std::string& name = context.argument(0);
+    // programs are not started there
+    if (context.checking() && (name == "all" || context.session.absences().has_programs())) return;
     const auto unload = [&](Programs::Entry& entry) {
         const std::string why = context.programs.unload(*context.transaction, entry);
         if (!why.empty()) {

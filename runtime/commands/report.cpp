@@ -114,13 +114,14 @@ std::string state_of(const ThreadReport& r) {
 
 void command_status(Context& context) {
     const std::string_view what = context.argument_or(0, "all");
-    if (what == "instance") return context.output.out(context.session.reports().status_text());
-    if (what != "all" && what != "lock" && what != "mem") {
+    if (what != "all" && what != "lock" && what != "mem" && what != "instance") {
         context.diagnostics.error("unknown-word", context.span(0),
                                   "unknown status '" + std::string(what) + "'", "",
                                   "the choices are: lock, mem, instance, all");
         return;
     }
+    if (context.checking()) return;
+    if (what == "instance") return context.output.out(context.session.reports().status_text());
     if (context.options().json) return context.output.out(status_json(context.session));
     std::string text;
     if (what != "mem") {
@@ -274,6 +275,7 @@ void report_lasting(const std::vector<FaultRecord>& lasting, Span span, Diagnost
 void command_fault(Context& context) {
     Session& session = context.session;
     if (context.argument(0) == "clear") {
+        if (context.checking()) return;
         return context.transaction->when_committed(
             [&session, &diagnostics = context.diagnostics, span = context.command.span] {
             report_lasting(session.reports().clear_faults(), span, diagnostics);

@@ -308,6 +308,7 @@ void command_save(Context& context) {
             did_you_mean(wanted, names), "the choices are: " + listed(names, names.size()));
         return;
     }
+    if (context.checking()) return;
     if (context.count() < 2) return context.output.out(text.text);
     if (const std::string problem = replace_file(context.path(context.argument(1)), text.text);
         !problem.empty()) {

@@ -270,9 +270,16 @@ void Script::defer(const Command& command, const CommandRow& row) {
 }
 
 void Script::act(const Command& command, const CommandRow& row) {
-    if (shell_.options.check && row.function.act == command_loadusr) return note_program(command);
-    if (shell_.options.check && !(row.flags & command_checked)) return;
-    const bool apart = (row.flags & command_apart) || only_looks(row, command);
+    const bool checking = shell_.options.check;
+    if (checking && row.function.act == command_loadusr) {
+        note_program(command);
+    }
+    if (checking && !(row.flags & command_checked)) return;
+    if (checking) {
+        session_.absences().begin(command.span);
+    }
+    // a check is one transaction: nothing acts
+    const bool apart = checking || (row.flags & command_apart) || only_looks(row, command);
     if (!apart) {
         if (!rows_.empty()) {
             --rows_.back().next;  // not carried out yet
@@ -282,7 +289,7 @@ void Script::act(const Command& command, const CommandRow& row) {
             ++rows_.back().next;
         }
         if (stop()) return;
-    } else if (only_looks(row, command) && pending_.failed()) {
+    } else if (!checking && only_looks(row, command) && pending_.failed()) {
         return;  // it would show edits that are rolled back
     }
     const std::size_t errors_before = pending_.errors();

@@ -140,8 +140,10 @@ void Script::report(Diagnostics& found, std::size_t edits, bool took_effect) {
     if (!shown.all().empty()) {
         std::string text = render(shown, session_.sources, options.color);
         const std::string counts = "\n" + summary(shown.errors(), shown.warnings(), shown.notes());
-        if (!separately() && options.check && edits > 0) {
-            text += counts + "\n";
+        if (!separately() && options.check) {
+            if (edits > 0 || shown.errors() > 1) {
+                text += counts + "\n";
+            }
         } else if (!separately() && shown.failed()) {
             if (const std::string became = outcome(edits > 0); !became.empty()) {
                 text += counts + "; " + became + "\n";

@@ -286,7 +286,7 @@ void command_show(Context& context) {
     const Kind* const kind = find_kind(context, false);
     Request request(context);
     std::vector<std::string> patterns;
-    if (!kind || !read_patterns(context, patterns, request.type)) return;
+    if (!kind || !read_patterns(context, patterns, request.type) || context.checking()) return;
     if (kind->report) return kind->report(context);
     request.patterns = Patterns(std::move(patterns));
     if (context.options().json) {
@@ -302,7 +302,7 @@ void command_list(Context& context) {
     const Kind* const kind = find_kind(context, true);
     std::vector<std::string> patterns;
     std::optional<hal_type> no_type;
-    if (!kind || !read_patterns(context, patterns, no_type)) return;
+    if (!kind || !read_patterns(context, patterns, no_type) || context.checking()) return;
     const auto names = names_of(context.session, kind->listed, Patterns(std::move(patterns)));
     std::string text;
     if (context.options().json) {

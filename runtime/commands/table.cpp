@@ -60,15 +60,15 @@ constexpr CommandRow rows[] = {
      "terminated it or its exit status is\n"
      "not 0; --restart=always restarts it whenever it has ended. unloadusr ends it for good; after "
      "5 restarts within 10 s no other follows.",
-     command_loadusr, load, command_waits},
+     command_loadusr, load, command_waits | command_checked},
     {"waitusr", "", "[-t TIME] PROCESS", "wait until a program has ended",
      "-t TIME (10s, 500ms) limits the wait: then the command fails, and the program continues.",
-     command_waitusr, 0, command_waits},
+     command_waitusr, 0, command_waits | command_checked},
     {"unloadusr", "", "PROCESS|all", "end a program (SIGTERM)",
      "Sends SIGTERM and does not wait for the program to end (waitusr does); until then `show "
      "comp` shows it as stopping. Its pins\n"
      "are removed when it ends, those of a dead program at once.",
-     command_unloadusr, load, command_deferred},
+     command_unloadusr, load, command_deferred | command_checked},
     // --- threads and functions
     {"newthread", "",
      "NAME PERIOD_NS [fp] [cpu=N] [policy=fifo|deadline|other] [priority=N] [spin=TIME] "
@@ -104,7 +104,7 @@ constexpr CommandRow rows[] = {
      "let time pass: `advance 10 cycles` of the fastest thread, or `advance 50ms`",
      "On the virtual clock (hal sim) the threads run for exactly this time; on the real clock the "
      "command waits.",
-     command_advance, 0, command_waits},
+     command_advance, 0, command_waits | command_checked},
     // --- signals
     {"net", "", "SIGNAL PIN...", "link pins to a signal, which is created if needed",
      "Pins may be preceded by arrows (=>, <=, <=>), which must agree with the directions of the "
@@ -129,16 +129,16 @@ constexpr CommandRow rows[] = {
      "set an unlinked input pin or a parameter; also: NAME = VALUE", "", edits::setp, params,
      command_traceless},
     {"getp", "", "PIN-OR-PARAMETER", "print the value of a pin or parameter", "", command_getp, 0,
-     command_query | command_each},
+     command_query | command_each | command_checked},
     {"ptype", "", "PIN-OR-PARAMETER", "print the type of a pin or parameter", "", command_ptype, 0,
-     command_query | command_each},
+     command_query | command_each | command_checked},
     {"sets", "", "SIGNAL VALUE",
      "set a signal that has no writer; for a port signal: allocate its buffer (bytes)", "",
      edits::sets, 0, command_traceless},
     {"gets", "", "SIGNAL", "print the value of a signal", "", command_gets, 0,
-     command_query | command_each},
+     command_query | command_each | command_checked},
     {"stype", "", "SIGNAL", "print the type of a signal", "", command_stype, 0,
-     command_query | command_each},
+     command_query | command_each | command_checked},
     {"alias", "", "pin|param PIN-OR-PARAMETER NAME", "give a pin or parameter a second name", "",
      edits::alias, config, command_plain},
     {"unalias", "", "pin|param ALIAS", "remove the second name", "", edits::unalias, config,
@@ -165,30 +165,31 @@ constexpr CommandRow rows[] = {
      "timing: cycles, missed periods and wake-up latency of each thread, execution times of each "
      "function. latency: delay of each\n"
      "signal in cycles, with the reason. fault: the faults since start.",
-     command_show, 0, command_query},
+     command_show, 0, command_query | command_checked},
     {"list", "", "comp|pin|sig|signal|param|parameter|funct|function|thread [PATTERN]...",
-     "list names on one line", "", command_list, 0, command_query},
+     "list names on one line", "", command_list, 0, command_query | command_checked},
     {"status", "", "[lock|mem|instance|all]", "show the locks and the number of objects",
-     "instance: threads and faults as lines, for hal top.", command_status, 0, command_query},
+     "instance: threads and faults as lines, for hal top.", command_status, 0,
+     command_query | command_checked},
     {"save", "",
      "[comp|alias|sig|signal|sigu|link|linka|net|neta|netl|netla|netal|param|parameter|thread|"
      "unconnectedinpins|signalvalues|all|allu] [FILE]",
      "print the state as commands, to the terminal or a file",
      "all (or nothing): comp, alias, sigu, netla, param, thread; allu also sets unlinked inputs "
      "and signals without writer.",
-     command_save, 0, command_query | command_path},
+     command_save, 0, command_query | command_path | command_checked},
     {"fault", "", "clear", "acknowledge all faults that are over",
      "A fault whose condition lasts, such as a thread that hangs or a node that is offline, stays "
      "a fault: the command names it.",
-     command_fault, 0, command_deferred},
+     command_fault, 0, command_deferred | command_checked},
     // --- locks
     {"lock", "", "[none|tune|all]",
      "forbid changes: tune still allows values, start and stop; all (the default) forbids "
      "everything",
      "Values of pins and signals are never locked; `lock all` forbids setp of parameters.",
      command_lock, 0, command_deferred | command_checked},
-    {"unlock", "", "[all|tune]", "release all locks, or those of tune only", "", command_unlock, 0,
-     command_deferred | command_checked},
+    {"unlock", "", "[all|none|tune]", "release all locks (all, none), or those of tune only", "",
+     command_unlock, 0, command_deferred | command_checked},
     // --- the shell itself
     {"source", "", "FILE", "run the commands of a file",
      "After `begin` its edits are collected: all of them, or none if a line has an error.",
@@ -206,13 +207,13 @@ constexpr CommandRow rows[] = {
     {"unecho", "", "", "end echo", "", command_unecho, 0, command_apart},
     {"debug", "", "LEVEL",
      "set the verbosity: 0 nothing, 1 errors, 2 also results, 3..5 everything", "", command_debug,
-     0, command_apart},
+     0, command_apart | command_checked},
     {"print", "", "[TEXT]...", "print file, line and the text on stderr", "", command_print, 0,
      command_apart},
     {"help", "", "[COMMAND]", "list all commands, or describe one", "", command_help, 0,
-     command_apart},
+     command_apart | command_checked},
     {"explain", "", "CODE", "explain an error code: what it means and what to do", "",
-     command_explain, 0, command_apart},
+     command_explain, 0, command_apart | command_checked},
     {"setexact_for_test_suite_only", "", "", "accepted without effect: periods are always exact",
      "", command_nothing, 0, command_apart | command_checked},
     {"quit", "exit", "[STATUS]", "leave the shell, or stop reading the file",
@@ -244,6 +245,10 @@ bool sets_parameter(const Command& command, const Model& model) {
 }  // namespace
 
 std::string Context::usage() const { return to_string(row.usage()); }
+
+bool Context::is_absent(std::string_view name, Absences::Kind kind) const {
+    return checking() && session.absences().explains(name, kind, session.model());
+}
 
 std::span<const CommandRow> command_table() { return rows; }
 

@@ -46,6 +46,10 @@ struct Context {
     }
     Span span(std::size_t i) const { return i < count() ? command.args[i].span : command.span; }
     std::string usage() const;
+    /// `hal check`: the function reports what is wrong with its arguments, and does nothing.
+    bool checking() const { return options().check; }
+    /// `hal check`: true when `name` is missing because something else is, which was reported.
+    bool is_absent(std::string_view name, Absences::Kind kind) const;
     /// A path of the command line, relative to the shell's directory, `~` expanded.
     std::string path(const std::string& text) const;
     /// True when the command should stop waiting; reports `interrupted`.
@@ -67,7 +71,7 @@ enum CommandFlags : unsigned {
     command_apart = 1,        ///< does not access the machine: does not end a transaction
     command_waits = 2,        ///< may wait for something outside
     command_transaction = 4,  ///< begin, commit, abort
-    command_checked = 8,      ///< executed under `hal check`, too
+    command_checked = 8,      ///< called under `hal check`, too: see Context::checking()
     /// only reads the machine, including the edits made so far: does not end a transaction
     command_query = 16,
     /// part of a transaction: executed after its commit, and not at all after a rollback

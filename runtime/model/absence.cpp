@@ -48,6 +48,7 @@ void Absences::assume(const std::string& name) {
 }
 
 void Absences::note_program(const std::string& program, const std::vector<std::string>& names) {
+    has_programs_ = true;
     const Cause cause =
         add("program " + quoted(program), "which is not started here", {}, Scope::names);
     for (const std::string& name : names) {

@@ -54,6 +54,7 @@ public:
 
     /// `hal check` does not start programs: the names that this one would register as components.
     void note_program(const std::string& program, const std::vector<std::string>& names);
+    bool has_programs() const { return has_programs_; }
     /// A netlist that cannot be read: names that it may define are not errors in the texts after
     /// it.
     void note_missing_text(const std::string& path);
@@ -85,6 +86,7 @@ private:
     std::unordered_set<std::string> heads_;  ///< the names of the model up to their first dot
     std::size_t heads_of_ = 0;  ///< how many names the model had
     bool open_ = false;
+    bool has_programs_ = false;
 };
 
 }  // namespace hal

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """hal check: several files, INI files, missing parts; special files, for every command that reads a file."""
 import os
+import re
 import subprocess
 import unittest
 
@@ -151,6 +152,58 @@ class Check(Case):
         self.environment["HALLIB_PATH"] = ".:" + str(self.folder / "library")
         self.assertIn("no errors", self.run_program("check", "y.ini").stderr)
         self.assertIn("HALCMD MSG: found", self.run_program("y.ini", name="halrun").stderr)
+
+    def test_commands_that_act_or_look_are_rejected_as_when_they_run(self):
+        start = "loadrt threads name1=t period1=1000000\nloadrt and2 names=a\naddf a t\nnewsig good bit\n"
+        last_line = re.compile(
+            r"\n\d+ errors?.*\n$|no time simulated.*\n|.*no function has run.*\n"
+        )
+        for line in (
+            "getp a.in9",
+            "gets godo",
+            "gets a.in0",
+            "ptype a",
+            "stype nothing",
+            "show foo",
+            "show pin -t x",
+            "list foo",
+            "list",
+            "status foo",
+            "save foo",
+            "help foo",
+            "debug x",
+            "explain foo",
+            "advance 3",
+            "lock foo",
+            "unlock foo",
+            "fault foo",
+            "unloadusr foo",
+            "waitusr and2",
+            "loadusr",
+            "loadusr -x true",
+            "loadusr -w --restart=always true",
+            "loadusr -Wn a sleep 9",
+            "source missing.hal",
+        ):
+            with self.subTest(line=line):
+                self.write("one.hal", start + line + "\n")
+                texts = [
+                    last_line.sub("", self.bad(command, "one.hal")) for command in ("check", "sim")
+                ]
+                self.assertEqual(texts[1].rstrip("\n"), texts[0].rstrip("\n"))
+                self.write("outer.hal", "source one.hal\n")
+                self.assertIn(texts[0].rstrip("\n"), self.bad("check", "outer.hal"))
+
+    def test_commands_that_look_have_no_effect(self):
+        self.write(
+            "a.hal",
+            SERVO + "save all out.hal\ndebug 5\nshow\ngetp adder.out\nhelp\nadvance 10 cycles\n"
+            "loadusr -Wn panel pyvcp panel.xml\ngetp panel.led\nunloadusr panel\nfault clear\n",
+        )
+        done = self.run_program("check", "a.hal")
+        self.assertEqual(0, done.returncode, done.stderr)
+        self.assertIn("depends on program 'pyvcp', which is not started here", done.stderr)
+        self.assertFalse((self.folder / "out.hal").exists())
 
     def test_a_file_with_errors_is_used_for_the_next_file(self):
         self.write("a.hal", SERVO + "setp adder.nothing 1\n")
