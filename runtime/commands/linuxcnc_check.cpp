@@ -190,6 +190,13 @@ void LinuxcncCheck::command(const Command& command, const Model& model, Diagnost
     check_type(command, diagnostics);
     check_alias(command, model, diagnostics);
     check_arguments(command, model, diagnostics);
+    if (verb == "loadrt") {
+        check_linuxcnc_arguments(command, diagnostics);
+        floating_point_.load(command);
+    }
+    if (verb == "addf") {
+        floating_point_.add(command, model, diagnostics);
+    }
     if (verb == "alias" && command.args.size() == 3) {
         name(command.args[2].text, "alias", command.args[2].span, diagnostics);
     }

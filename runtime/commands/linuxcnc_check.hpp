@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "commands/linuxcnc_arguments.hpp"
 #include "model/model.hpp"
 #include "netlist/netlist.hpp"
 #include "text/diagnostic.hpp"
@@ -23,6 +24,7 @@ private:
     void name(const std::string& name, const char* kind, Span at, Diagnostics& diagnostics);
 
     std::set<std::string, std::less<>> reported_;
+    LinuxcncFloatingPoint floating_point_;
 };
 
 }  // namespace hal

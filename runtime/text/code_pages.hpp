@@ -262,6 +262,12 @@ inline constexpr CodePage code_pages[] = {
      "A linked pin takes its value from its signal, which would overwrite the value of setp in the "
      "next cycle.\n\n"
      "Set the signal with sets (if it has no writer), or unlink the pin with unlinkp first."},
+    {"linuxcnc-argument",
+     "`hal check --linuxcnc`: the loader of LinuxCNC 2.9, or its module, rejects this argument of "
+     "loadrt: it is unknown there, missing, not a whole number, a list that is too long, or out of "
+     "range. Up to 2.9.8, a thread with `fp1=0` also takes no function that uses floating "
+     "point.\n\n"
+     "`hal doc COMPONENT` lists the arguments that work here."},
     {"linuxcnc-command",
      "`hal check --linuxcnc` reports what runs here and is an error for LinuxCNC 2.9. This "
      "command, option or range of names is an addition of ours; halcmd "

@@ -1,0 +1,1 @@
+hal check --linuxcnc linuxcnc-argument.hal
