@@ -27,10 +27,12 @@ struct Order {
 /// The outputs of a motor with several phases: bit 0 is phase A. Full steps drive one phase or two
 /// neighbours, half steps alternate; bipolar ones are two bridges, A-B and C-D, that carry current
 /// where their two outputs differ.
+constexpr int max_states = 18;
+
 struct Sequence {
     int phases;
     int length;
-    std::array<std::uint8_t, 10> states;
+    std::array<std::uint8_t, max_states> states;
 };
 constexpr int first_sequence = 2;
 constexpr int user_type = 15;
@@ -82,7 +84,7 @@ struct Stepgen : hal::Component {
                               {.per_instance = true}};
     hal::TextArgument user{
         *this, "user_step_type", "",
-        "states of step type 15: at most 10 numbers of up to 5 bits, 0x1,0x2,0x4"};
+        "states of step type 15: at most 18 numbers of up to 5 bits, 0x1,0x2,0x4"};
 
     hal::Function make{*this,
                        "make-pulses",
@@ -369,10 +371,10 @@ private:
             char* end = nullptr;
             const long state = std::strtol(at, &end, 0);
             if (end == at || (*end != ',' && *end != '\0') || state < 0 || state > 31 ||
-                made.length == 10) {
+                made.length == max_states) {
                 throw hal::ArgumentError("user_step_type",
                                          "user_step_type=" + user.get() +
-                                             " is not a list of up to 10 numbers from 0 to 31");
+                                             " is not a list of up to 18 numbers from 0 to 31");
             }
             made.states[static_cast<std::size_t>(made.length++)] = static_cast<std::uint8_t>(state);
             used |= static_cast<unsigned>(state);

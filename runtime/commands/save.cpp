@@ -10,11 +10,33 @@
 #include "commands/text_writer.hpp"
 #include "hal/replace_file.hpp"
 #include "model/modules.hpp"
+#include "text/numbers.hpp"
 
 namespace hal {
 namespace {
 
 using Text = TextWriter;
+
+/// Words of the arguments of a loadrt.
+std::vector<std::string> words_of(const std::string& arguments) {
+    std::vector<std::string> words;
+    for (std::size_t at = 0; at < arguments.size();) {
+        const auto end = std::min(arguments.find(' ', at), arguments.size());
+        words.push_back(arguments.substr(at, end - at));
+        at = end + 1;
+    }
+    return words;
+}
+
+/// True for name1 when period1 is 0 or less: loadrt does not create that thread.
+bool is_omitted(std::string_view name, const std::vector<std::string>& words) {
+    const std::string period = "period" + std::string(name.substr(4)) + "=";
+    return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
+        if (!word.starts_with(period)) return false;
+        const auto ns = parse_duration_ns(word.substr(period.size()), 1.0);
+        return ns && *ns <= 0;
+    });
+}
 
 /// Threads of `loadrt threads` that a delthread removed again.
 std::vector<std::string> deleted_threads(const Model& model) {
@@ -22,15 +44,14 @@ std::vector<std::string> deleted_threads(const Model& model) {
     const LoadedComponent* const threads = model.find_component("threads");
     if (!threads) return gone;
     for (const std::string& arguments : threads->arguments) {
-        for (std::size_t at = 0; at < arguments.size();) {
-            const auto end = std::min(arguments.find(' ', at), arguments.size());
-            const std::string word = arguments.substr(at, end - at);
+        const auto words = words_of(arguments);
+        for (const std::string& word : words) {
             const auto equals = word.find('=');
             if (word.starts_with("name") && equals != word.npos &&
-                !model.find_thread(word.substr(equals + 1))) {
+                !model.find_thread(word.substr(equals + 1)) &&
+                !is_omitted(word.substr(0, equals), words)) {
                 gone.push_back(word.substr(equals + 1));
             }
-            at = end + 1;
         }
     }
     return gone;
@@ -294,9 +315,10 @@ void command_save(Context& context) {
                                                : wanted == section.name || (!section.also.empty() &&
                                                                             wanted == section.also);
         if (!chosen) continue;
+        known = true;
+        if (context.checking()) continue;
         section.save(context, text);
         if (context.session.ending()) return;
-        known = true;
     }
     if (!known) {
         std::vector<std::string> names{"all", "allu"};

@@ -121,6 +121,9 @@ bool read_request(Elaboration& on, const Token& name, Origin origin, Args args,
             !names_itself(on, name, origin);
         if (says_instances && key == "names") {
             request.names = split_list(value);
+            if (request.names.size() > 1 && request.names.back().empty()) {
+                request.names.pop_back();  // names=a,b, as real files have it
+            }
             names_at = token.span;
             for (const std::string& one : request.names) {
                 if (one.empty()) {

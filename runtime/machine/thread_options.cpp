@@ -16,6 +16,12 @@ bool whole(std::string_view text, std::int64_t& value) {
     return problem == std::errc{} && end == text.data() + text.size();
 }
 
+/// A period of 0 or below in `loadrt threads`, as LinuxCNC reads it.
+bool is_no_period(std::string_view text) {
+    const auto ns = parse_duration_ns(text, 1.0);
+    return ns && *ns <= 0;
+}
+
 bool set_period(NewThread& thread, std::string_view text, Span at, Diagnostics& diagnostics) {
     thread.period_at = at;
     const auto ns = parse_duration_ns(text, 1.0);
@@ -142,6 +148,8 @@ bool parse_threads(std::span<const Token> args, Span at, std::vector<NewThread>&
             if (key == "name") {
                 thread.name = value;
                 thread.at = token.span;
+            } else if (key == "period" && is_no_period(value)) {
+                thread.omitted = true;
             } else if (key == "period") {
                 good = set_period(thread, value, token.span, diagnostics) && good;
             } else {
@@ -160,6 +168,7 @@ bool parse_threads(std::span<const Token> args, Span at, std::vector<NewThread>&
         by_number[1];
     }
     for (auto& [number, thread] : by_number) {
+        if (thread.omitted) continue;
         if (thread.name.empty()) {
             thread.name = "thread" + std::to_string(number);
         }
