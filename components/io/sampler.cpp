@@ -18,6 +18,7 @@ struct Sampler : hal::Component {
                         "slots of the FIFO; it holds one record less",
                         {.per_instance = true, .min = 2, .max = 1 << 26}};
 
+    stream::ChannelCount channels{*this};
     stream::Columns<stream::AnyIn> columns{*this, cfg.get(), depth, false, "value to record"};
     hal::In<bool> enable{*this, "enable", "FALSE pauses the recording", {.initial = true}};
     hal::Out<std::int32_t> waiting{
@@ -85,6 +86,9 @@ In each cycle in which `enable` is TRUE, the values of all pins are written to t
 LinuxCNC-style `halsampler` read it while the machine runs. A FIFO of `depth=N` holds N - 1 records. If it is full, the new record is lost,
 never an old one: `overruns` counts it, and `hal record` prints `overrun` at this place; the numbers have no gap. The number of pins is not
 limited.
+
+With both arguments, there are as many instances as the shorter list has values: `depth=100,50 cfg=ff,b` makes `sampler.0` and
+`sampler.1`, `depth=100 cfg=ff,b` only `sampler.0`, as in LinuxCNC. Without `depth=`, all that `cfg=` lists have the default.
 
 **Differences from LinuxCNC:** `sample-num` is the number of the next record (LinuxCNC: always 0). `depth=1` is an error (LinuxCNC: every
 record is lost).

@@ -2,15 +2,19 @@
 // Shared by sampler and streamer: an array of pins of several types, and their FIFO of records.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <deque>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "hal/component.hpp"
+#include "hal/naming.h"
 #include "hal/stream_times.h"
 
 namespace stream {
@@ -24,6 +28,40 @@ using AnyIn = std::variant<std::monostate, hal::In<bool>, hal::In<double>, hal::
 using AnyOut =
     std::variant<std::monostate, hal::Out<bool>, hal::Out<double>, hal::Out<std::int32_t>,
                  hal::Out<std::uint32_t>, hal::Out<std::int64_t>, hal::Out<std::uint64_t>>;
+
+/// Sets the number of instances as LinuxCNC counts channels: up to the first one without letters in
+/// cfg= or without a depth above 0. An argument that is not given has its default for all of them.
+/// A member after the arguments.
+class ChannelCount {
+public:
+    explicit ChannelCount(hal::Component&) {
+        const std::optional<std::size_t> by_cfg =
+            count("cfg", [](const std::string& cfg) { return !cfg.empty(); });
+        const std::optional<std::size_t> by_depth =
+            count("depth", [](const std::string& depth) { return std::atoll(depth.c_str()) > 0; });
+        const std::size_t channels =
+            std::min(by_cfg.value_or(SIZE_MAX), by_depth.value_or(SIZE_MAX));
+        const auto* naming = hal::extension<hal_naming>(HAL_NAMING);
+        if (naming == nullptr || channels == 0 || channels == SIZE_MAX) return;
+        naming->count(hal::detail::creating, by_cfg == channels ? "cfg" : "depth", channels);
+    }
+
+private:
+    /// Returns how many elements of a list come before the first that is not valid, or nothing when
+    /// the argument is not given.
+    template <class Valid>
+    static std::optional<std::size_t> count(const char* name, Valid valid) {
+        const std::string list = hal::Argument::ask(name, "", "", {});
+        if (list.empty()) return std::nullopt;
+        std::size_t elements = 0;
+        for (std::size_t from = 0; from <= list.size(); ++elements) {
+            const std::size_t end = std::min(list.find(',', from), list.size());
+            if (!valid(list.substr(from, end - from))) break;
+            from = end + 1;
+        }
+        return elements;
+    }
+};
 
 /// The pins `pin.0`, `pin.1` … one per letter of cfg, and the memory of the FIFO. As in LinuxCNC, a
 /// FIFO of depth N holds N - 1 records.

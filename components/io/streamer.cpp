@@ -19,6 +19,7 @@ struct Streamer : hal::Component {
                         "slots of the FIFO; it holds one record less",
                         {.per_instance = true, .min = 2, .max = 1 << 26}};
 
+    stream::ChannelCount channels{*this};
     stream::Columns<stream::AnyOut> columns{*this, cfg.get(), depth, true,
                                             "value of the newest record"};
     hal::In<bool> enable{*this, "enable", "FALSE holds the pins", {.initial = true}};

@@ -340,7 +340,9 @@ bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadR
             if (!all_known(component, request, c.asked, diagnostics)) return false;
             if (!known) {
                 known = true;
-                total = c.list_length > 0 ? c.list_length : plugin.default_count;
+                total = c.declared_count > 0 ? c.declared_count
+                        : c.list_length > 0  ? c.list_length
+                                             : plugin.default_count;
                 if (total > 1) {
                     storage = block(total - 1);
                 }

@@ -200,6 +200,7 @@ constexpr hal_naming naming_extension{sizeof naming_extension, name_instance,
     Construction& c = construction_of(host);
     guarded(c, false, [&] { return c.lists.insert(argument).second; });
     c.list_length = std::max(c.list_length, static_cast<std::size_t>(instances));
+    c.declared_count = static_cast<std::size_t>(instances);
 }, [](const hal_host* host) { return construction_of(host).instance.name.c_str(); }};
 
 hal_host host_for(Construction& c) {

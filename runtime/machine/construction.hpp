@@ -44,6 +44,7 @@ struct Construction {
     std::vector<DeclaredFunction> functions;
     std::set<std::string> asked, lists;  // arguments it asked for; those that are per instance
     std::size_t list_length = 0;
+    std::size_t declared_count = 0;  ///< instances by hal_naming::count; precedes the lists
     std::vector<std::string> texts;      // keeps what argument() gave
     Failure failure;
     bool no_memory = false;

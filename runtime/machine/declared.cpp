@@ -59,8 +59,15 @@ bool take_function(const hal_host* host, const hal_function_decl* decl) {
 }
 
 const char* take_argument(const hal_host* host, const hal_argument_decl* decl) {
-    of(host).page.arguments.push_back({text(decl->name), text(decl->doc), text(decl->fallback),
-                                       (decl->flags & HAL_ARGUMENT_PER_INSTANCE) != 0});
+    auto& arguments = of(host).page.arguments;
+    const std::string name = text(decl->name);
+    // a list may be read once for the instance and once as a whole
+    const bool is_known = std::any_of(arguments.begin(), arguments.end(),
+                                      [&](const auto& one) { return one.name == name; });
+    if (!is_known) {
+        arguments.push_back({name, text(decl->doc), text(decl->fallback),
+                             (decl->flags & HAL_ARGUMENT_PER_INSTANCE) != 0});
+    }
     return decl->fallback;
 }
 
