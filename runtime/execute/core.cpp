@@ -117,13 +117,14 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
     take_over();
     if (plan_) {
         import();
-        if (live()) {
+        const bool ran = live();
+        if (ran) {
             run();
         }
         if (measure_) {
             store(*pins_.wakeup, static_cast<std::int32_t>(woke_ns - due_ns));
         }
-        end_ns = account(woke_ns);
+        end_ns = account(woke_ns, ran);
         limiter_.flush(measure_ ? woke_ns : due_ns,
                        [this](const FaultEvent& e) noexcept { faults_.push(e); });
         output();
@@ -427,19 +428,21 @@ void Core::run_timed(const plan::Function& function, const plan::Step* steps) no
 }
 
 // Returns the time at the end of the cycle's work.
-std::int64_t Core::account(std::int64_t woke_ns) noexcept {
+std::int64_t Core::account(std::int64_t woke_ns, bool ran) noexcept {
     store(*pins_.beat, pins_.beat->slot->u32 + 1);
     if (!measure_) return woke_ns;
     const std::int64_t now_ns = monotonic_ns();
     const std::int64_t busy_ns = now_ns - woke_ns;
     busy.add(busy_ns);
-    const auto took = static_cast<std::int32_t>(busy_ns < INT32_MAX ? busy_ns : INT32_MAX);
-    store(*pins_.time, took);
-    const bool more = took > pins_.tmax->slot->s32;
-    if (more) {
-        store(*pins_.tmax, took);
+    if (ran) {  // as in LinuxCNC, cycles without functions have no times
+        const auto took = static_cast<std::int32_t>(busy_ns < INT32_MAX ? busy_ns : INT32_MAX);
+        store(*pins_.time, took);
+        const bool more = took > pins_.tmax->slot->s32;
+        if (more) {
+            store(*pins_.tmax, took);
+        }
+        store(*pins_.tmax_increased, more);
     }
-    store(*pins_.tmax_increased, more);
     const std::int64_t budget = budget_ns.load(std::memory_order_relaxed);
 
     const std::int64_t limit = supervise_ns.load(std::memory_order_relaxed);

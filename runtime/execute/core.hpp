@@ -227,7 +227,7 @@ private:
     void run_timed(const plan::Function& function, const plan::Step* steps) noexcept;
     void run_rows(const plan::Row*& row, const plan::Step* first, const plan::Step* last) noexcept;
     void run_steps(const plan::Step* first, const plan::Step* last) noexcept;
-    std::int64_t account(std::int64_t woke_ns) noexcept;
+    std::int64_t account(std::int64_t woke_ns, bool ran) noexcept;
     bool tolerate_gap(std::int64_t silent_ns) noexcept;
     void note_usage() noexcept;
     bool was_preempted() const noexcept;

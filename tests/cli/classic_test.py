@@ -198,6 +198,19 @@ class Halrun(Case):
     def halrun(self, *words, **how):
         return self.run_program(*words, name="halrun", **how)
 
+    def test_a_thread_has_no_times_before_start(self):
+        look = "advance 50 cycles\ngetp servo.time\ngetp servo.tmax\n"
+        done = self.halrun(
+            "-f", self.write("a.hal", f"{SERVO}{look}show thread\nstart\n{look}stop\n{look}")
+        )
+        self.assertEqual(0, done.returncode, done.stderr)
+        lines = done.stdout.splitlines()
+        self.assertEqual(["0", "0"], lines[:2])
+        self.assertRegex(done.stdout, r"servo \( +0, +0 \)")
+        before, after = lines[-4:-2], lines[-2:]
+        self.assertGreater(int(before[1]), 0)
+        self.assertGreaterEqual(int(after[1]), int(before[1]))
+
     def test_runs_a_file_and_ends(self):
         path = self.write("a.hal", SERVO + "start\ngetp adder.in1\n")
         for words in (("-f", path), (path,)):
@@ -209,6 +222,7 @@ class Halrun(Case):
         self.assertEqual("0\n", done.stdout)
 
     def test_error_is_its_status(self):
+        self.assertEqual(1, self.halrun("missing.hal").returncode)
         done = self.halrun("-f", self.write("a.hal", "getp nothing\n"))
         self.assertEqual((1, ""), (done.returncode, done.stdout))
         self.assertIn("a.hal:1", done.stderr)
