@@ -533,6 +533,25 @@ int help(const std::vector<std::string>& about) {
     return no_such_command(about);
 }
 
+/// What to type in place of an option that is unknown. Other options of one letter are no help.
+std::string option_hint(const Subcommand& row, const std::string& unknown,
+                        const std::vector<std::string>& names) {
+    const std::string help = fmt::format("see: hal help {}", row.name);
+    const std::string option = unknown.substr(0, unknown.find('='));
+    const bool is_output = option.starts_with("-o") || option == "--output";
+    if (is_output && row.name == std::string_view("record")) {
+        return fmt::format("the file is the first word: hal {} {}", row.name, row.usage);
+    }
+    if (is_output && std::find(names.begin(), names.end(), "--record") != names.end()) {
+        return "did you mean '--record'?";
+    }
+    if (option.size() > 2) {
+        const std::string hint = did_you_mean(option, names);
+        return hint.empty() ? help : hint;
+    }
+    return help;
+}
+
 /// Reads `arguments` into `options`. Returns an exit code when the program must exit.
 std::optional<int> read(const Subcommand& row, std::vector<std::string> arguments,
                         Options& options) {
@@ -555,22 +574,17 @@ std::optional<int> read(const Subcommand& row, std::vector<std::string> argument
     if (row.verbatim) {
         if (!extra.empty() && extra.front().size() > 1 && extra.front()[0] == '-' &&
             !(extra.front() == "--")) {
-            const std::string hint = did_you_mean(extra.front(), set.names());
-            return fail(
-                options,
-                fmt::format("unknown option '{}'; {}", extra.front(),
-                            hint.empty() ? fmt::format("see: hal help {}", row.name) : hint));
+            return fail(options, fmt::format("unknown option '{}'; {}", extra.front(),
+                                             option_hint(row, extra.front(), set.names())));
         }
         options.words.assign(extra.begin() + (!extra.empty() && extra.front() == "--"),
                              extra.end());
     } else if (!extra.empty()) {
-        const std::string hint = did_you_mean(extra.front(), set.names());
-        const bool option = extra.front().starts_with('-');
-        return fail(
-            options,
-            fmt::format(
-                "{} '{}'; {}", option ? "unknown option" : "unexpected argument", extra.front(),
-                option && !hint.empty() ? hint : fmt::format("see: hal help {}", row.name)));
+        const bool is_option = extra.front().starts_with('-');
+        return fail(options, is_option ? fmt::format("unknown option '{}'; {}", extra.front(),
+                                                     option_hint(row, extra.front(), set.names()))
+                                       : fmt::format("unexpected argument '{}'; see: hal help {}",
+                                                     extra.front(), row.name));
     }
     return std::nullopt;
 }

@@ -98,6 +98,22 @@ class WrongWords(Case):
             self.bad("sim", "x.hal", "--cycle", "3"),
         )
 
+    def test_an_option_for_the_output_names_what_takes_the_file(self):
+        self.assertEqual(
+            "hal record: unknown option '-o'; the file is the first word: hal record FILE NAME… "
+            "[--last TIME] | [CHANNEL] [FILE]\n",
+            self.bad("record", "x.mcap", "a", "-o", "y.mcap"),
+        )
+        self.assertEqual(
+            "hal sim: unknown option '-o'; did you mean '--record'?\n",
+            self.bad("sim", "x.hal", "-o", "y.mcap"),
+        )
+        # other options of one letter are no help
+        self.assertEqual(
+            "hal record: unknown option '-x'; see: hal help record\n",
+            self.bad("record", "x.mcap", "a", "-x"),
+        )
+
     def test_unknown_shell_option(self):
         self.assertIn(
             "unknown option '--jsn'; did you mean '--json'?", self.bad("shell", "--jsn", "show")
