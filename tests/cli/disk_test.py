@@ -173,6 +173,43 @@ class Full(Case):
             self.assertEqual({3 if form else 2}, width)  # CSV has a column of times
             (self.disk / "seen.txt").unlink()
 
+    def test_a_recorder_on_a_full_disk_says_what_remains(self):
+        self.start(
+            "run",
+            self.write(
+                "a.hal",
+                "loadrt threads name1=servo period1=1000000\nloadrt siggen names=wave\naddf wave.update servo\n"
+                "net sine wave.sine\nstart\n",
+            ),
+        )
+        self.fill()
+        path = self.disk / "none.mcap"
+        done = self.hal("record", path, "sine", "--for", "50ms")
+        self.assertEqual(1, done.returncode, done.stdout)
+        self.assertEqual(
+            f"hal record: cannot write '{path}': No space left on device; no row was written, and the file was removed\n",
+            done.stderr,
+        )
+        self.assertEqual(["ballast"], sorted(p.name for p in self.disk.iterdir()))
+        path = self.disk / "none.csv"
+        done = self.hal("record", path, "sine", "--for", "50ms")
+        self.assertEqual(1, done.returncode, done.stdout)
+        self.assertRegex(
+            done.stderr, r"No space left on device; no row was written: '\S+/none\.csv' has none\n$"
+        )
+        path.unlink()
+        # it fills up while the recorder writes: what was written can be read
+        os.truncate(self.disk / "ballast", 4096)
+        path = self.disk / "some.mcap"
+        done = self.hal("record", path, "wave.clock")
+        self.assertEqual(1, done.returncode, done.stdout)
+        self.assertRegex(
+            done.stderr, r"No space left on device; the file is complete up to there\n$"
+        )
+        self.assertEqual(["ballast", "some.mcap"], sorted(p.name for p in self.disk.iterdir()))
+        done = self.hal("plot", path, "wave.clock", "-o", self.folder / "some.svg")
+        self.assertEqual((0, ""), (done.returncode, done.stderr), done.stdout)
+
     def test_a_flight_recorder_goes_on_and_writes_late_when_there_is_space(self):
         self.start(
             "run",

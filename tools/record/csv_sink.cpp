@@ -126,15 +126,24 @@ std::unique_ptr<Sink> make_sink(const std::string& path, const std::vector<Probe
                                   : make_mcap_sink(path, columns, origin);
 }
 
+namespace {
+
+/// After close(): where the rows are that were written, or that there are none.
+std::string what_remains(const Sink& sink, const std::string& path) {
+    const std::string where = sink.where();
+    if (sink.removed()) return "; no row was written, and the file was removed";
+    if (where.empty()) return "";
+    if (sink.rows() == 0) return "; no row was written: '" + where + "' has none";
+    if (where == path) return "; the file is complete up to there";
+    return "; what was recorded is in '" + where + "'";
+}
+
+}  // namespace
+
 std::string cannot_write(Sink& sink, const std::string& path) {
     const std::string problem = sink.problem();
     sink.close();
-    const std::string where = sink.where();
-    return fmt::format("cannot write '{}': {}{}", path, problem,
-                       where.empty()      ? ""
-                       : sink.rows() == 0 ? "; no row was written"
-                       : where == path    ? "; the file is complete up to there"
-                                          : "; what was recorded is in '" + where + "'");
+    return fmt::format("cannot write '{}': {}{}", path, problem, what_remains(sink, path));
 }
 
 std::string kept_line(const Sink& sink, const std::string& path) {

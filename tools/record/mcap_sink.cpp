@@ -149,6 +149,7 @@ public:
     }
     std::string kept() const override { return writer_.kept(); }
     std::string where() const override { return writer_.where(); }
+    bool removed() const override { return writer_.removed(); }
     std::uint64_t rows() const override {
         std::uint64_t rows = writer_.messages() - writer_.messages(events_);
         for (const std::uint16_t channel : joint_channels_) {

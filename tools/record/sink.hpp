@@ -41,6 +41,8 @@ public:
     /// rows.
     virtual std::string where() const = 0;
     virtual std::uint64_t rows() const = 0;
+    /// After close(): true when the file had nothing and was removed.
+    virtual bool removed() const { return false; }
 };
 
 /// The sink for a path, by its ending: .mcap or .csv.

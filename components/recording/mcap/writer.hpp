@@ -55,6 +55,8 @@ public:
     const std::string& kept() const { return held_.kept; }
     /// the file that has what was written; "" before there is a file
     std::string where() const;
+    /// After close(): nothing had been written, and the file is gone.
+    bool removed() const { return removed_; }
     std::uint64_t messages() const;
     std::uint64_t messages(std::uint16_t channel) const;
     const std::string& path() const { return path_; }
