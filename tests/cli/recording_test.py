@@ -201,6 +201,34 @@ setp io.fault-emcy-storm 1
             self.bad("replay", "bad.csv", "logic.hal"),
         )
 
+    def test_a_gap_in_the_recording_is_reported_before_it_is_replayed(self):
+        self.write("gap.hal", "loadrt threads name1=servo period1=1000000\nnewsig a float\n")
+        self.write("gap.csv", "time_s,a\n0,1\n0.001,2\n1000000000,3\n")
+        replay = subprocess.Popen(
+            [str(HAL), "replay", "gap.csv", "gap.hal"],
+            cwd=self.folder,
+            env=self.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.addCleanup(self.end, replay)
+        self.assertEqual(
+            "hal replay: the recording has no row between 0.001 s and 1e+09 s, and the netlist runs "
+            "all that time; to end before the gap, type: --for 0.001000s\n",
+            replay.stderr.readline(),
+        )
+        self.assertRegex(
+            replay.stderr.readline(),
+            r"^hal replay: \S+ s of 1e\+09 s replayed; Ctrl-C ends it with a report\n$",
+        )
+        replay.send_signal(signal.SIGINT)
+        out, _ = replay.communicate(timeout=60)
+        self.assertEqual(1, replay.returncode)
+        self.assertIn("interrupted after", out)
+        done = self.run_program("replay", "gap.csv", "gap.hal", "--for", "0.001000s")
+        self.assertEqual((0, ""), (done.returncode, done.stderr), done.stdout)
+
     def test_a_test_that_tests_nothing_fails(self):
         self.write(
             "control.hal",

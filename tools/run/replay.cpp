@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -12,6 +13,7 @@
 #include <map>
 #include <set>
 #include <unistd.h>
+#include <utility>
 
 #include "cli/output.hpp"
 #include "recording/mcap/recording.hpp"
@@ -52,6 +54,52 @@ struct Compared {
     double recorded = 0;
     double replayed = 0;
     std::int64_t at_ns = 0;
+};
+
+/// A time without rows, counted from the first row.
+struct Gap {
+    std::int64_t begin_ns = 0;
+    std::int64_t end_ns = 0;
+    std::int64_t length_ns() const { return end_ns - begin_ns; }
+};
+
+Gap longest_gap(const mcap::Recording& recording) {
+    std::vector<std::int64_t> times;
+    for (const mcap::Table& table : recording.tables) {
+        times.insert(times.end(), table.times_ns.begin(), table.times_ns.end());
+    }
+    std::sort(times.begin(), times.end());
+    Gap longest;
+    for (std::size_t i = 1; i < times.size(); ++i) {
+        const Gap gap{times[i - 1] - recording.begin_ns(), times[i] - recording.begin_ns()};
+        if (gap.length_ns() > longest.length_ns()) {
+            longest = gap;
+        }
+    }
+    return longest;
+}
+
+/// Prints how far a long replay is: after 5 s, then every minute.
+class Progress {
+public:
+    Progress(std::string program, std::int64_t all_ns)
+        : program_(std::move(program)), all_ns_(all_ns) {}
+    void report(std::int64_t done_ns) {
+        const auto now = std::chrono::steady_clock::now();
+        if (now < due_) return;
+        due_ = now + std::chrono::minutes(1);
+        const double all = static_cast<double>(all_ns_) * 1e-9;
+        const double done = static_cast<double>(done_ns) * 1e-9;
+        write_all(STDERR_FILENO,
+                  fmt::format("{}: {:.6g} s of {:.6g} s replayed; Ctrl-C ends it with a report\n",
+                              program_, done, all));
+    }
+
+private:
+    const std::string program_;
+    const std::int64_t all_ns_;
+    std::chrono::steady_clock::time_point due_ =
+        std::chrono::steady_clock::now() + std::chrono::seconds(5);
 };
 
 class Replay {
@@ -118,10 +166,13 @@ public:
         const std::int64_t wanted_ns =
             options_.for_ns < 0 ? all_ns : std::min(options_.for_ns, all_ns);
         constexpr std::int64_t step_ns = 200'000'000;
+        warn_of_gap(wanted_ns);
+        Progress progress(options_.program, wanted_ns);
         for (std::int64_t left_ns = wanted_ns + period_ns_;
              left_ns > 0 && !machine_.stop.requested(); left_ns -= step_ns) {
             machine_.advance(std::min(step_ns, left_ns), 0);
             replayed_ns_ = std::min(wanted_ns, wanted_ns - left_ns + step_ns);
+            progress.report(replayed_ns_);
             if (!probe) continue;
             const auto lock = machine_.session.lock();
             for (const ProbeRows& rows :
@@ -185,6 +236,20 @@ public:
     }
 
 private:
+    /// A gap is replayed like the rest: a clock that jumped makes hours of it.
+    void warn_of_gap(std::int64_t wanted_ns) const {
+        constexpr std::int64_t long_gap_ns = 600'000'000'000;
+        const Gap gap = longest_gap(recording_);
+        if (gap.length_ns() < long_gap_ns || gap.begin_ns >= wanted_ns) return;
+        const double begin = static_cast<double>(gap.begin_ns) * 1e-9;
+        write_all(
+            STDERR_FILENO,
+            fmt::format("{}: the recording has no row between {:.6g} s and {:.6g} s, and the "
+                        "netlist runs all that time; to end before the gap, type: --for "
+                        "{:.6f}s\n",
+                        options_.program, begin, static_cast<double>(gap.end_ns) * 1e-9, begin));
+    }
+
     /// States which name or pattern of --names the recording does not have; "" when it has all.
     std::string unknown_name() const {
         std::vector<std::string> names;
