@@ -43,13 +43,7 @@ struct CanopenJr3 final : NodeComponent {
     hal::Out<std::uint32_t> errors{*this, "errors", "framing errors in the stream"};
 
     void update(hal::Cycle cycle) noexcept {
-        jr3::Six wrench{fx, fy, fz, mx, my, mz};
-        for (double& value : wrench) {
-            if (!std::isfinite(value)) {
-                value = 0.0;
-            }
-        }
-        jr3_->set_wrench(wrench);
+        jr3_->set_wrench({fx, fy, fz, mx, my, mz});
         jr3_->set_supply(std::isfinite(supply.get()) ? supply.get() : 0.0);
         jr3_->set_noise(noise < 10000 ? noise.get() : 10000);
         jr3_->set_cable(cable);
@@ -86,6 +80,10 @@ of the calibration and serves forces and torques as objects of CiA 404.
 TPDO 1 and 2 carry the forces in 0.01 N, TPDO 3 and 4 the torques in 0.001 N*m: three INTEGER16 each, then a status byte and a sample
 counter. TPDO 2 and 4 are sent at each SYNC. TPDO 1 and 3 are sent when a value changes; they are disabled until a master writes their
 COB-ID without bit 31 to 1800h:1 and 1802h:1.
+
+A load beyond the range of a channel saturates it: its reading is full scale, and the node sets the bits saturated and overload in 2201h
+and sends EMCY FF01h. A force or torque that is infinite is such a load; one that is NaN saturates all channels, since each depends on
+all six.
 
     loadrt canopen_jr3 link=sim:arm id=0x50
     addf canopen-jr3.0.update servo

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "canopen/device/sensor/jr3.hpp"
@@ -271,6 +272,29 @@ TEST_F(Jr3Node, warns_of_overload_supply_and_a_lost_sensor) {
     jr3.set_cable(true);
     bench.run(20 * millisecond);
     EXPECT_EQ(bench.remote().emergency(0).code, 0);
+}
+
+TEST_F(Jr3Node, saturates_when_a_load_is_NaN_or_infinite) {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    jr3.set_noise(20);
+    bench.start();
+    bench.run(20 * millisecond);
+    EXPECT_EQ(bench.remote().emergencies(), 0U);
+    for (const double load : {nan, infinite, -infinite}) {
+        jr3.set_wrench({0, 0, load, 0, 0, 0});
+        bench.run(5 * millisecond);
+        constexpr unsigned both = jr3_status::saturated | jr3_status::overload;
+        EXPECT_EQ(bench.read<std::uint8_t>(0x2201, 0) & both, both) << load;
+        EXPECT_EQ(bench.remote().emergency(0).code, jr3_error::overload);
+        EXPECT_NE(bench.remote().emergency(0).manufacturer[0] & 0x04, 0) << load;
+        EXPECT_NE(bench.read<std::uint8_t>(0x6150, 3), 0) << load;
+        EXPECT_GT(std::abs(jr3.wrench()[2]), 190.0) << load;
+        jr3.set_wrench({0, 0, 0, 0, 0, 0});
+        bench.run(5 * millisecond);
+        EXPECT_EQ(bench.read<std::uint8_t>(0x2201, 0) & both, 0U) << load;
+        EXPECT_EQ(bench.remote().emergency(0).code, 0);
+    }
 }
 
 TEST_F(Jr3Node, is_zeroed_and_tared) {

@@ -65,7 +65,8 @@ void Jr3::drive_sensor() noexcept {
     const auto raw = settings_.calibration.raw(applied_, inverse_);
     for (unsigned n = 0; n < 6; ++n) {
         int off = 0;
-        if (noise_ != 0) {  // xorshift
+        const bool saturated = raw[n] == 32767 || raw[n] == -32768;
+        if (noise_ != 0 && !saturated) {  // xorshift
             random_ ^= random_ << 13;
             random_ ^= random_ >> 17;
             random_ ^= random_ << 5;

@@ -8,6 +8,10 @@
 
 namespace hal::canopen::jr3 {
 
+namespace {
+constexpr double largest_load = 1e12;  // keeps infinite loads finite; beyond any full scale
+}  // namespace
+
 Six Calibration::wrench(const std::array<std::int16_t, 6>& raw) const noexcept {
     Six out{};
     for (std::size_t row = 0; row < 6; ++row) {
@@ -26,12 +30,13 @@ std::array<std::int16_t, 6> Calibration::raw(const Six& wrench,
     for (std::size_t row = 0; row < 6; ++row) {
         double sum = 0;
         for (std::size_t n = 0; n < 6; ++n) {
-            sum += inverse[row][n] * wrench[n] / full_scale[n];
+            const double applied = std::clamp(wrench[n], -largest_load, largest_load);
+            sum += inverse[row][n] * applied / full_scale[n];
         }
         const double counts = sum * full_scale_counts;
         out[row] =
             std::isnan(counts)
-                ? std::int16_t{0}
+                ? std::int16_t{32767}
                 : static_cast<std::int16_t>(std::lround(std::clamp(counts, -32768.0, 32767.0)));
     }
     return out;
