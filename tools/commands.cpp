@@ -533,7 +533,7 @@ int help(const std::vector<std::string>& about) {
     return no_such_command(about);
 }
 
-/// What to type in place of an option that is unknown. Other options of one letter are no help.
+/// Returns what to type in place of an unknown option; never another option of one letter.
 std::string option_hint(const Subcommand& row, const std::string& unknown,
                         const std::vector<std::string>& names) {
     const std::string help = fmt::format("see: hal help {}", row.name);

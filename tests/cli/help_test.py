@@ -108,7 +108,7 @@ class WrongWords(Case):
             "hal sim: unknown option '-o'; did you mean '--record'?\n",
             self.bad("sim", "x.hal", "-o", "y.mcap"),
         )
-        # other options of one letter are no help
+        # another option of one letter is not suggested
         self.assertEqual(
             "hal record: unknown option '-x'; see: hal help record\n",
             self.bad("record", "x.mcap", "a", "-x"),
