@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <concepts>
+#include <cstdint>
 #include <limits>
 
 #include "hal/component.hpp"
@@ -16,8 +17,8 @@ namespace hal {
 enum class ZeroLimit { lets_nothing_pass, disables };
 
 /// A pin with a limit. While its value is NaN, the last value that was a number applies, and a
-/// fault is raised once. Before the first number the default applies if it is a limit, else nothing
-/// passes. One function of an instance reads it.
+/// fault is raised once, whose text states what applies. Before the first number the default applies
+/// if it is a limit, else nothing passes. One function of an instance reads it.
 template <class P, ZeroLimit zero = ZeroLimit::lets_nothing_pass>
 class LimitPin : public P {
 public:
@@ -25,12 +26,14 @@ public:
              PinOptions<double> options = {})
         : P(component, name, doc, options),
           valid_(first_limit(options.initial)),
+          applies_(is_limit(options.initial) ? Applies::initial_value : Applies::nothing),
           self_(&component),
           faults_(fault_record()) {}
     LimitPin(Component& component, const Function& function, const char* name, const char* doc,
              PinOptions<double> options = {})
         : P(component, function, name, doc, options),
           valid_(first_limit(options.initial)),
+          applies_(is_limit(options.initial) ? Applies::initial_value : Applies::nothing),
           self_(&component),
           faults_(fault_record()) {}
     LimitPin& operator=(double value) noexcept
@@ -46,6 +49,7 @@ public:
         if (std::isnan(value)) [[unlikely]]
             return last_valid();
         valid_ = value;
+        applies_ = Applies::last_value;
         reported_ = false;
         return value;
     }
@@ -55,17 +59,31 @@ private:
     /// Defaults beyond this mean that there is no limit.
     static constexpr double largest_limit = 1e9;
 
+    /// Where the value of `valid_` comes from.
+    enum class Applies : std::uint8_t { last_value, initial_value, nothing };
+
+    static bool is_limit(double initial) noexcept {
+        return std::fabs(initial) < largest_limit &&
+               !(zero == ZeroLimit::disables && initial == 0.0);
+    }
     static double first_limit(double initial) noexcept {
-        const bool is_limit =
-            std::fabs(initial) < largest_limit && !(zero == ZeroLimit::disables && initial == 0.0);
-        if (is_limit) return initial;
+        if (is_limit(initial)) return initial;
         return zero == ZeroLimit::disables ? std::numeric_limits<double>::denorm_min() : 0.0;
     }
     static const hal_faults* fault_record() { return extension<hal_faults>("hal.faults/1"); }
 
+    static const char* reason(Applies applies) noexcept {
+        switch (applies) {
+        case Applies::initial_value:
+            return "a limit is not a number and never was one; its default applies";
+        case Applies::nothing: return "a limit is not a number and never was one; 0 applies";
+        default: return "a limit is not a number; its last valid value applies";
+        }
+    }
+
     double last_valid() const noexcept {
         if (!reported_ && faults_ != nullptr) {
-            faults_->raise(faults_, self_, "a limit is not a number; its last valid value applies",
+            faults_->raise(faults_, self_, reason(applies_),
                            std::numeric_limits<double>::quiet_NaN());
         }
         reported_ = true;
@@ -73,6 +91,7 @@ private:
     }
 
     mutable double valid_;
+    mutable Applies applies_;
     mutable bool reported_ = false;
     const Component* self_;
     const hal_faults* faults_;

@@ -498,12 +498,14 @@ bool is_stated(const std::string& pin) {
 struct Faults {
     hal_faults record{};
     int raised = 0;
+    std::string text = {};  ///< the newest
     Faults() {
         record.size = sizeof record;
         record.raise = [](const hal_faults* of, const void*, const char* reason, double) {
-            const std::string text = reason;
-            if (text.starts_with("a limit is not a number")) {
-                ++reinterpret_cast<Faults*>(const_cast<hal_faults*>(of))->raised;
+            if (std::string_view(reason).starts_with("a limit is not a number")) {
+                Faults& faults = *reinterpret_cast<Faults*>(const_cast<hal_faults*>(of));
+                ++faults.raised;
+                faults.text = reason;
             }
         };
     }
@@ -547,6 +549,7 @@ public:
         }
     }
     int faults() const { return faults_.raised; }
+    const std::string& fault_text() const { return faults_.text; }
 
 private:
     void drive() {
@@ -607,6 +610,9 @@ TEST_P(LimitPin, Applies_with_its_last_value_while_it_is_not_a_number) {
     machine.limit(nan);
     machine.run(50, row.value);
     EXPECT_EQ(machine.faults(), row.report == Report::fault ? 2 : 0);
+    if (row.report == Report::fault) {
+        EXPECT_EQ(machine.fault_text(), "a limit is not a number; its last valid value applies");
+    }
 }
 
 TEST_P(LimitPin, Lets_nothing_beyond_its_default_pass_before_it_was_a_number) {
@@ -615,6 +621,26 @@ TEST_P(LimitPin, Lets_nothing_beyond_its_default_pass_before_it_was_a_number) {
     machine.limit(nan);
     machine.run(50, row.first);
     EXPECT_EQ(machine.faults(), row.report == Report::fault ? 1 : 0);
+    if (row.report == Report::fault) {
+        const std::string begin = "a limit is not a number and never was one; ";
+        const std::string& text = machine.fault_text();
+        if (std::string_view(row.component) == "furuta") {  // reads its default when it is made
+            EXPECT_EQ(text, "a limit is not a number; its last valid value applies");
+        } else if (row.first != 0.0) {
+            EXPECT_EQ(text, begin + "its default applies");
+        } else {
+            EXPECT_TRUE(text == begin + "its default applies" || text == begin + "0 applies")
+                << text;
+        }
+    }
+}
+
+TEST(LimitText, States_that_0_applies_when_the_default_is_not_a_limit) {
+    Faults faults;
+    Instance limit("limit1", {}, {{"hal.faults/1", &faults.record}});
+    limit.set("max", nan);
+    limit.run("");
+    EXPECT_EQ(faults.text, "a limit is not a number and never was one; 0 applies");
 }
 
 INSTANTIATE_TEST_SUITE_P(Every_limit, LimitPin, testing::ValuesIn(rows), [](const auto& row) {
