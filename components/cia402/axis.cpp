@@ -60,6 +60,19 @@ const AxisOrders& Axis::act(const AxisCommand& command, const AxisRules& rules, 
     return orders_;
 }
 
+void Axis::set_missing(Cause half) noexcept {
+    if (half == missing_) return;
+    if (failed_while_off_ && failure_.cause == missing_) {
+        failure_ = {};
+    }
+    missing_ = half;
+    failed_while_off_ = false;
+    if (half != Cause::none && !failure_) {
+        failed_while_off_ = !wanted_ && !enabled_;
+        fail(half, Request::run);
+    }
+}
+
 void Axis::interrupt() noexcept {
     wanted_ = enabled_ = active_ = following_ = false;
     home_ = Home::no;
@@ -97,8 +110,10 @@ void Axis::observe(const AxisFeedback& in, const AxisRules& rules, Time now) noe
 
 /// Decides whether the axis is to be enabled.
 void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
-    const bool enable_edge = command.enable && !was_enable_;
-    if ((command.reset && !was_reset_) || (enable_edge && rules.auto_reset)) {
+    const bool whole = missing_ == Cause::none;
+    const bool enable_edge = command.enable && !was_enable_ && whole;
+    const bool reset_edge = command.reset && !was_reset_ && whole;
+    if (reset_edge || (enable_edge && rules.auto_reset)) {
         failure_ = {};
         if (in_.operational && in_fault(state_of(in_.statusword))) {
             walk_.reset_fault();
@@ -117,7 +132,7 @@ void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
             wanted_ = true;
         }
     }
-    if (!command.enable || command.quick_stop) {
+    if (!command.enable || command.quick_stop || !whole) {
         wanted_ = false;
     }
     if (!in_.operational) {

@@ -101,6 +101,12 @@ public:
     void observe(const AxisFeedback&, const AxisRules&, Time now) noexcept;
     const AxisOrders& act(const AxisCommand&, const AxisRules&, Time now) noexcept;
 
+    /// Reports which half of step() is missing: `unwritten` (the caller of act()), `unread` (the
+    /// caller of observe()), `none`. Without one of them the axis fails, brakes with quick stop and
+    /// cannot be enabled: whoever still runs calls act(). The failure of an axis that was off ends
+    /// when both run again. [realtime]
+    void set_missing(Cause half) noexcept;
+
     /// Disables the axis after a time without cycles, in which the drive was stopped. This is not a
     /// failure; enable needs another edge. [realtime]
     void interrupt() noexcept;
@@ -156,6 +162,7 @@ private:
     HomingRun homing_run_;
     Counter counter_;
     Failure failure_;
+    Cause missing_ = Cause::none;
     AxisFeedback in_;
     AxisOrders orders_;
 
@@ -173,6 +180,7 @@ private:
     Time disable_sent_at_ = 0;
     Home home_ = Home::no;
     unsigned home_cycles_ = 0;
+    bool failed_while_off_ = false;
     bool wanted_ = false;
     bool enabled_ = false;
     bool active_ = false;

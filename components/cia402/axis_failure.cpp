@@ -47,6 +47,12 @@ std::string error_words(std::uint16_t code) {
     return print(", error 0x%04X: ", code) + error_word(code);
 }
 
+/// Returns false for causes that neither a statusword nor another number explains.
+bool has_number(Cause cause) noexcept {
+    return cause != Cause::lost && cause != Cause::not_enabled && cause != Cause::unwritten &&
+           cause != Cause::unread;
+}
+
 /// Returns a hint derived from the other bits of the statusword.
 std::string hint(const Failure& f) {
     if (f.statusword == 0) return "; check that the statusword is received";
@@ -112,6 +118,8 @@ std::string sentence(const Failure& f) {
                             ? "drive does not acknowledge the set-point"
                             : "drive does not clear its acknowledge");
     case Cause::not_enabled: return asked + "the axis is not enabled";
+    case Cause::unwritten: return asked + "function write-all does not run";
+    case Cause::unread: return asked + "function read-all does not run";
     }
     return asked + "failed";
 }
@@ -130,7 +138,7 @@ std::string text(const Failure& f) {
     if (f.cause == Cause::bad_command || f.cause == Cause::bad_factor) {
         return all + print(" (%g)", f.value);
     }
-    if (f.cause == Cause::none || f.cause == Cause::lost || f.cause == Cause::not_enabled) {
+    if (f.cause == Cause::none || !has_number(f.cause)) {
         return all;
     }
     return all + print(" (statusword 0x%04X", f.statusword) + error_words(f.error_code) + ")" +
@@ -179,7 +187,9 @@ std::string reason(const Failure& f) {
     const char* number = " (statusword {x})";
     switch (f.cause) {
     case Cause::lost:
-    case Cause::not_enabled: number = ""; break;
+    case Cause::not_enabled:
+    case Cause::unwritten:
+    case Cause::unread: number = ""; break;
     case Cause::stays:
     case Cause::mode_rejected:
     case Cause::set_point: number = " for {} s"; break;
@@ -213,8 +223,9 @@ Sentences::Sentences() {
     constexpr unsigned steps = static_cast<unsigned>(Step::fault_reset) + 1;
     for (unsigned r = 0; r <= static_cast<unsigned>(Request::go); ++r) {
         const auto request = static_cast<Request>(r);
-        for (const Cause cause : {Cause::lost, Cause::following_error, Cause::bad_command,
-                                  Cause::bad_factor, Cause::homing_timeout, Cause::not_enabled}) {
+        for (const Cause cause :
+             {Cause::lost, Cause::following_error, Cause::bad_command, Cause::bad_factor,
+              Cause::homing_timeout, Cause::not_enabled, Cause::unwritten, Cause::unread}) {
             add(cause, request);
         }
         for (unsigned step = 0; step < steps; ++step) {
@@ -278,7 +289,9 @@ double Sentences::number(const Failure& f) noexcept {
     case Cause::set_point: return seconds(f.after);
     case Cause::drive_fault: return f.error_code != 0 ? f.error_code : f.statusword;
     case Cause::lost:
-    case Cause::not_enabled: return std::numeric_limits<double>::quiet_NaN();
+    case Cause::not_enabled:
+    case Cause::unwritten:
+    case Cause::unread: return std::numeric_limits<double>::quiet_NaN();
     case Cause::following_error:
     case Cause::step_rejected:
     case Cause::bad_command:

@@ -45,8 +45,10 @@ enum class Cause : std::uint8_t {
     homing_timeout = 11,
     set_point = 12,       ///< pp: not acknowledged
     not_enabled = 13,     ///< commanded to move while not enabled
+    unwritten = 14,       ///< the function that sends the orders does not run
+    unread = 15,          ///< the function that reads the feedback does not run
 };
-inline constexpr unsigned causes = 14;
+inline constexpr unsigned causes = 16;
 
 /// A failure, as stored in the cycle.
 struct Failure {

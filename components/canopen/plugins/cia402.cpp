@@ -5,8 +5,10 @@
 
 #include "cia402/axis.hpp"
 #include "hal/component.hpp"
+#include "hal/function_monitor.hpp"
 #include "hal/lasting_fault.hpp"
 #include "hal/limit.hpp"
+#include "hal/naming.hpp"
 
 namespace {
 
@@ -195,6 +197,7 @@ struct Cia402 : hal::Component {
     void interrupt(hal::Cycle) noexcept { interrupted_.store(true, std::memory_order_release); }
 
     void read_all(hal::Cycle cycle) noexcept {
+        reads_.ran(cycle.period_ns());
         read_rules();
         AxisFeedback in;
         in.operational = operational;
@@ -217,9 +220,24 @@ struct Cia402 : hal::Component {
         remote = (in.statusword & status::remote) != 0;
         voltage = (in.statusword & status::voltage_enabled) != 0;
         limited = (in.statusword & status::internal_limit) != 0;
+        const bool unwritten = writes_.is_missing(cycle.period_ns());
+        record_missing(unwritten_record_, unwritten, unwritten_text_);
+        if (unwritten) {  // the drive must not keep the last orders
+            axis_.set_missing(Cause::unwritten);
+            act(cycle);
+        }
     }
 
     void write_all(hal::Cycle cycle) noexcept {
+        writes_.ran(cycle.period_ns());
+        const bool unread = reads_.is_missing(cycle.period_ns());
+        record_missing(unread_record_, unread, unread_text_);
+        axis_.set_missing(unread ? Cause::unread : Cause::none);
+        act(cycle);
+    }
+
+private:
+    void act(hal::Cycle cycle) noexcept {
         AxisCommand c;
         c.enable = enable;
         c.reset = reset;
@@ -248,7 +266,8 @@ struct Cia402 : hal::Component {
         active = axis_.active();
         fault = axis_.fault();
         const Failure& failure = axis_.failure();
-        if (failure && failure.cause != reported_) {
+        const bool recorded = failure.cause == Cause::unwritten || failure.cause == Cause::unread;
+        if (failure && failure.cause != reported_ && !recorded) {
             fault_record_.begin(faults_, this, made_.find(failure), Sentences::number(failure));
         } else if (!failure && fault_record_.lasts()) {
             fault_record_.end(faults_, this);
@@ -264,7 +283,18 @@ struct Cia402 : hal::Component {
         homing = axis_.homing();
     }
 
-private:
+    void record_missing(hal::LastingFault& record, bool missing, const std::string& text) noexcept {
+        if (missing && !record.lasts()) {
+            record.begin(faults_, this, text.c_str());
+        } else if (!missing && record.lasts()) {
+            record.end(faults_, this);
+        }
+    }
+    /// The fault message of a function that runs in no thread. [setup]
+    static std::string missing_text(const std::string& running, const std::string& missing) {
+        return "'" + running + "' runs, but '" + missing + "' does not; axis stopped; type: addf " +
+               missing + " THREAD";
+    }
     static Time time(double seconds) noexcept {
         return seconds > 0.0
                    ? static_cast<Time>(std::min(seconds, 1e6) * static_cast<double>(one_second))
@@ -309,12 +339,16 @@ private:
     }
 
     const hal_faults* faults_ = nullptr;
-    hal::LastingFault fault_record_;
+    hal::LastingFault fault_record_, unwritten_record_, unread_record_;
+    const std::string name_ = hal::own_name("cia402.0");
+    const std::string unwritten_text_ = missing_text(name_ + ".read-all", name_ + ".write-all");
+    const std::string unread_text_ = missing_text(name_ + ".write-all", name_ + ".read-all");
+    hal::FunctionMonitor reads_, writes_;
     const Sentences& made_ = sentences();
     Axis axis_;
     AxisRules rules_;
     Cause reported_ = Cause::none;
-    // set by interrupt() in any thread, taken by write_all()
+    // set by interrupt() in any thread, taken by act()
     std::atomic<bool> interrupted_{false};
 };
 
@@ -333,6 +367,8 @@ the state machine of the drive and steps it towards the commanded state, one tra
   with `max-step` 0, the difference is blended out over `blend-time`.
 * A fault (see the table) brakes with quick stop, disables the axis and stays until a rising edge of `reset`. After a fault, after
   `quick-stop` and after the node was lost, `enable` needs another rising edge. At start-up, `enable` waits until the node is operational.
+* When `read-all` or `write-all` has not run for 100 cycles of the other one, the axis is in fault and brakes with quick stop, and `show
+  fault` names the missing function. The fault of an axis that was off ends when both run again.
 * When the thread is stopped (`stop`, an exception, a hang, a suspended process), the axis is disabled without a fault. When the thread
   runs again, the axis stays off until `enable` has another rising edge.
 * `mode` may change at any time; the command is followed once the drive displays the new mode.
@@ -374,6 +410,8 @@ between the two.
 | 11 | homing took longer than `homing-timeout` |
 | 12 | pp: the drive did not acknowledge a set-point |
 | 13 | `home` or `go` without `enabled` |
+| 14 | `write-all` does not run |
+| 15 | `read-all` does not run |
 
 `failed-step`: 0 wait, 1 shutdown, 2 switch on, 3 enable operation, 4 disable operation, 5 disable voltage, 6 quick stop, 7 fault reset.
 `state`: 0 not ready to switch on, 1 switch on disabled, 2 ready to switch on, 3 switched on, 4 operation enabled, 5 quick stop active,
