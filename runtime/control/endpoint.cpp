@@ -41,6 +41,17 @@ bool private_folder(const std::string& folder, Diagnostics& diagnostics) {
     return false;
 }
 
+/// Locks a file that others may have locked for a moment, to see whether an instance runs.
+bool lock_unless_held(int file) {
+    constexpr int attempts = 100;
+    constexpr int apart_us = 1000;
+    for (int i = 0; i < attempts; ++i) {
+        if (flock(file, LOCK_EX | LOCK_NB) == 0) return true;
+        usleep(apart_us);
+    }
+    return false;
+}
+
 std::string content_of(int file) {
     std::array<char, 32> text{};
     const ssize_t got = pread(file, text.data(), text.size() - 1, 0);
@@ -63,9 +74,9 @@ bool Endpoint::open(std::string_view name, Diagnostics& diagnostics) {
                           "", "set XDG_RUNTIME_DIR to a shorter path");
         return false;
     }
-    if (private_folder(socket_folder(), diagnostics) && take_lock(name, diagnostics) &&
-        listen_at(diagnostics)) {
-        return true;
+    if (private_folder(socket_folder(), diagnostics)) {
+        running_instances();  // removes what killed instances left behind
+        if (take_lock(name, diagnostics) && listen_at(diagnostics)) return true;
     }
     close_all();
     return false;
@@ -80,7 +91,7 @@ bool Endpoint::take_lock(std::string_view name, Diagnostics& diagnostics) {
                               "'" + file + "' cannot be opened: " + system_reason());
             return false;
         }
-        if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+        if (!lock_unless_held(lock_)) {
             const std::string pid = content_of(lock_);
             diagnostics.error(
                 "instance-running", {},

@@ -2,11 +2,13 @@
 #include "machine/address.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 namespace hal {
@@ -21,6 +23,53 @@ bool held(const std::string& path) {
     const bool free = flock(file, LOCK_SH | LOCK_NB) == 0;
     close(file);
     return !free;
+}
+
+/// True for a real folder of this user that nobody else can write to: not one that a link in /tmp
+/// leads to.
+bool is_own_folder(const std::string& folder) {
+    struct stat about{};
+    return lstat(folder.c_str(), &about) == 0 && S_ISDIR(about.st_mode) &&
+           about.st_uid == geteuid() && (about.st_mode & 0022) == 0;
+}
+
+/// True when `file` contains a process ID or nothing (its process died before it wrote it).
+bool has_process_id(int file) {
+    std::array<char, 32> text{};
+    const ssize_t got = pread(file, text.data(), text.size(), 0);
+    if (got < 0) return false;
+    const std::string_view content(text.data(), static_cast<std::size_t>(got));
+    return content.empty() || (content.ends_with('\n') &&
+                               content.find_first_not_of("0123456789") == content.size() - 1);
+}
+
+/// True when `path` names `file` and nothing newer.
+bool is_named(int file, const std::string& path) {
+    struct stat opened{}, named{};
+    return fstat(file, &opened) == 0 && lstat(path.c_str(), &named) == 0 &&
+           S_ISREG(opened.st_mode) && opened.st_ino == named.st_ino &&
+           opened.st_dev == named.st_dev;
+}
+
+bool is_socket_or_absent(const std::string& path) {
+    struct stat about{};
+    return lstat(path.c_str(), &about) != 0 || S_ISSOCK(about.st_mode);
+}
+
+/// Removes the socket and the lock file of an instance whose process is dead. The lock is held
+/// meanwhile: an instance of this name that starts just now waits for it, finds its file removed,
+/// and makes another one.
+void remove_left_behind(const std::string& name) {
+    const std::string lock = lock_path(name);
+    const std::string socket = socket_path(name);
+    const int file = open(lock.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+    if (file < 0) return;
+    if (flock(file, LOCK_EX | LOCK_NB) == 0 && is_named(file, lock) && has_process_id(file) &&
+        is_socket_or_absent(socket)) {
+        unlink(socket.c_str());
+        unlink(lock.c_str());
+    }
+    close(file);
 }
 
 }  // namespace
@@ -62,10 +111,16 @@ std::string lock_path(std::string_view name) {
 std::vector<std::string> running_instances() {
     std::vector<std::string> names;
     std::error_code ignored;
+    const bool is_own = is_own_folder(socket_folder());
     for (const auto& entry : std::filesystem::directory_iterator(socket_folder(), ignored)) {
         const std::string file = entry.path().filename().string();
-        if (!file.ends_with(lock_ending) || !held(entry.path().string())) continue;
-        names.push_back(file.substr(0, file.size() - lock_ending.size()));
+        if (!file.ends_with(lock_ending)) continue;
+        const std::string name = file.substr(0, file.size() - lock_ending.size());
+        if (held(entry.path().string())) {
+            names.push_back(name);
+        } else if (is_own && good_instance_name(name)) {
+            remove_left_behind(name);
+        }
     }
     std::sort(names.begin(), names.end());
     return names;

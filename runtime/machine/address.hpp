@@ -23,7 +23,8 @@ std::string lock_path(std::string_view name);
 /// it, and one that runs holds its lock. Waits up to 1 s for a process that is just ending.
 bool was_killed(std::string_view name);
 
-/// Names of the instances that run now and belong to this user, sorted.
+/// Names of the instances that run now and belong to this user, sorted. Removes what killed
+/// instances left behind.
 std::vector<std::string> running_instances();
 
 /// The instance that a tool uses when its user asked for `wanted` (may be empty): that one; else

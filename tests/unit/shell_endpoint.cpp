@@ -38,19 +38,22 @@ TEST_F(ServerTest, a_second_instance_of_the_same_name_is_rejected) {
               "no instance 'fourth' is running; running: test, third (choose with --name)");
 }
 
-TEST_F(ServerTest, files_of_a_dead_process_are_replaced) {
+/// Leaves the files of a dead instance in `folder`: a socket without a listener, a free lock.
+void leave_behind(const Folder& folder, const std::string& name) {
     std::filesystem::create_directory(folder.path + "/halcyon");
     std::filesystem::permissions(folder.path + "/halcyon", std::filesystem::perms::owner_all);
-    folder.write("halcyon/test.lock", "1\n");
-    {  // a socket nobody listens on
-        const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
-        sockaddr_un address{};
-        address.sun_family = AF_UNIX;
-        (folder.path + "/halcyon/test.sock").copy(address.sun_path, sizeof address.sun_path - 1);
-        ASSERT_EQ(bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-        close(fd);
-    }
-    EXPECT_TRUE(running_instances().empty());
+    folder.write("halcyon/" + name + ".lock", "1\n");
+    const int fd = socket(AF_UNIX, SOCK_STREAM, 0);
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    (folder.path + "/halcyon/" + name + ".sock")
+        .copy(address.sun_path, sizeof address.sun_path - 1);
+    ASSERT_EQ(bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    close(fd);
+}
+
+TEST_F(ServerTest, files_of_a_dead_process_are_replaced) {
+    leave_behind(folder, "test");
     serve();
     EXPECT_TRUE(alive());
     server.reset();
@@ -59,6 +62,56 @@ TEST_F(ServerTest, files_of_a_dead_process_are_replaced) {
     std::string problem;
     EXPECT_EQ(Client::connect("test", problem), nullptr);
     EXPECT_EQ(problem, "no instance 'test' is running; start one with `hal run FILE.hal`");
+}
+
+TEST_F(ServerTest, files_of_dead_processes_are_removed_by_a_list_of_the_instances) {
+    leave_behind(folder, "sim-1");
+    leave_behind(folder, "default");
+    EXPECT_TRUE(running_instances().empty());
+    EXPECT_TRUE(std::filesystem::is_empty(folder.path + "/halcyon"));
+}
+
+TEST_F(ServerTest, files_of_dead_processes_are_removed_by_the_next_instance) {
+    leave_behind(folder, "sim-1");
+    serve();
+    EXPECT_FALSE(std::filesystem::exists(folder.path + "/halcyon/sim-1.sock"));
+    EXPECT_FALSE(std::filesystem::exists(folder.path + "/halcyon/sim-1.lock"));
+    EXPECT_EQ(running_instances(), std::vector<std::string>{"test"});
+    EXPECT_TRUE(alive());
+}
+
+TEST_F(ServerTest, files_that_no_instance_made_are_not_removed) {
+    leave_behind(folder, "sim-1");
+    folder.write("halcyon/cargo.lock", "version = 3\n");
+    folder.write("halcyon/sim-1.lock", "1\n2\n");
+    EXPECT_TRUE(running_instances().empty());
+    EXPECT_TRUE(std::filesystem::exists(folder.path + "/halcyon/cargo.lock"));
+    EXPECT_TRUE(std::filesystem::exists(folder.path + "/halcyon/sim-1.sock"));
+    // a folder that a link leads to
+    const std::string elsewhere = folder.path + "/elsewhere";
+    std::filesystem::rename(folder.path + "/halcyon", elsewhere);
+    folder.write("elsewhere/sim-1.lock", "1\n");
+    std::filesystem::create_directory_symlink(elsewhere, folder.path + "/halcyon");
+    EXPECT_TRUE(running_instances().empty());
+    EXPECT_TRUE(std::filesystem::exists(elsewhere + "/sim-1.lock"));
+}
+
+TEST_F(ServerTest, an_instance_starts_while_others_list_the_instances) {
+    std::atomic<bool> ends{false};
+    std::thread lister([&ends] {
+        while (!ends) {
+            running_instances();
+        }
+    });
+    for (int i = 0; i < 50; ++i) {
+        leave_behind(folder, "test");
+        serve();
+        EXPECT_TRUE(alive());
+        server.reset();
+        std::filesystem::remove(folder.path + "/halcyon/test.sock");
+    }
+    ends = true;
+    lister.join();
 }
 
 TEST_F(ServerTest, a_folder_of_another_user_is_rejected) {
