@@ -65,6 +65,8 @@ struct ServedClient {
     std::size_t taken = 0;         ///< bytes of `in` that are done with
     std::size_t searched = 0;      ///< up to here there is no end of line behind `taken`
     std::size_t sent = 0;          ///< bytes of `out` that have gone
+    /// it sends no more requests, but may still read replies
+    bool input_ended = false;
     bool discarding = false;       ///< in the rest of a request that was too long
     /// to be removed as soon as no worker runs and its connection is closed
     bool gone = false;
@@ -111,6 +113,11 @@ struct ServedClient {
         }
     }
     bool busy() const { return worker.joinable(); }
+    /// True when all its requests have been executed, and all replies have gone.
+    bool is_served() {
+        return !busy() && !has_turn && halting_since == 0 && waiting() == 0 &&
+               line_end() == std::string::npos;
+    }
     std::size_t waiting() const { return out.size() - sent; }
 };
 

@@ -74,7 +74,7 @@ void Server::State::serve() {
             {endpoint.fd(), static_cast<short>(monotonic_ns() >= accepts_from ? POLLIN : 0), 0});
         ready.push_back({wake, POLLIN, 0});
         for (const auto& client : clients) {
-            const int reads = listens_to(*client) ? POLLIN | POLLRDHUP : POLLRDHUP;
+            const int reads = listens_to(*client) ? POLLIN : 0;
             ready.push_back({client->gone ? -1 : client->fd,
                              static_cast<short>(reads | (client->waiting() > 0 ? POLLOUT : 0)), 0});
         }
@@ -104,8 +104,8 @@ void Server::State::serve_client(ServedClient& client, short events) {
     collect_worker(client);
     if (client.gone) return;
     if (events & POLLIN) {
-        receive(client);
-    } else if (events & (POLLHUP | POLLERR | POLLRDHUP)) {
+        receive(client, (events & POLLHUP) != 0);
+    } else if (events & (POLLHUP | POLLERR)) {
         leave(client);
     }
     if (client.gone) return;
@@ -115,6 +115,9 @@ void Server::State::serve_client(ServedClient& client, short events) {
     execute(client);
     if (!client.gone) {
         send_out(client);
+    }
+    if (!client.gone && client.input_ended && client.is_served()) {
+        leave(client);
     }
 }
 
@@ -205,14 +208,20 @@ int Server::State::sleep_ms() {
                               std::min<std::int64_t>((until - now + 999'999) / 1'000'000, 60'000));
 }
 
-void Server::State::receive(ServedClient& client) {
+/// `hung_up`: the client has closed both directions.
+void Server::State::receive(ServedClient& client, bool hung_up) {
     if (client.taken > 0) {
         client.in.erase(0, client.taken);
         client.taken = client.searched = 0;
     }
     std::array<char, read_at_once> part;
     const ssize_t got = recv(client.fd, part.data(), part.size(), 0);
-    if (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) return leave(client);
+    if (got < 0 && errno != EAGAIN && errno != EINTR) return leave(client);
+    if (got == 0 && hung_up) return leave(client);
+    if (got == 0) {
+        client.input_ended = true;
+        return;
+    }
     if (got < 0) return;
     std::string_view text(part.data(), static_cast<std::size_t>(got));
     if (client.discarding) {

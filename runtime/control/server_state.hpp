@@ -66,7 +66,7 @@ struct Server::State {
     bool close_one_idle(std::int64_t idle_ns);
     void keep_spare();
     bool make_way();
-    void receive(ServedClient& client);
+    void receive(ServedClient& client, bool hung_up);
     void execute(ServedClient& client);
     bool execute_urgent(ServedClient& client);
     void give_turn(ServedClient& client);
@@ -88,7 +88,7 @@ struct Server::State {
             [&](const auto& client) { return !client->gone && client->placed == placed; }));
     }
     bool listens_to(const ServedClient& client) const {
-        return client.waiting() <= options.queue &&
+        return !client.input_ended && client.waiting() <= options.queue &&
                client.in.size() - client.taken <= options.max_request;
     }
     void log(const std::string& sentence) const {

@@ -123,6 +123,53 @@ TEST_F(ServerTest, a_line_received_in_parts_is_one_request) {
     EXPECT_EQ(Json::parse(wire.line())["out"], "FALSE\n");
 }
 
+TEST_F(ServerTest, a_client_that_has_ended_its_requests_gets_all_replies) {
+    serve();
+    Wire wire(server->path());
+    wire.line();
+    wire.send(
+        "{\"id\":1,\"run\":\"setp a.in0 1\"}\n{\"id\":2,\"run\":\"advance 1 cycles\"}\n"
+        "{\"id\":3,\"run\":\"getp a.in0\"}\n{\"options\":{},\"id\":4}\n{\"id\":5,\"ru");
+    wire.end_requests();
+    for (int id = 1; id <= 4; ++id) {
+        EXPECT_EQ(Json::parse(wire.line(), nullptr, false)["id"], id);
+    }
+    EXPECT_EQ(wire.line(), "");
+    EXPECT_TRUE(eventually([&] { return server->counts().clients == 0; }));
+}
+
+TEST_F(ServerTest, more_replies_than_the_queue_holds_reach_a_client_that_has_ended_its_requests) {
+    ServerOptions options;
+    options.queue = 10'000;
+    serve(options);
+    Wire wire(server->path());
+    wire.line();
+    constexpr int requests = 200;
+    std::string all;
+    for (int id = 0; id < requests; ++id) {
+        all += "{\"id\":" + std::to_string(id) + ",\"run\":\"show pin\"}\n";
+    }
+    ASSERT_TRUE(wire.send(all));
+    wire.end_requests();
+    for (int id = 0; id < requests; ++id) {
+        ASSERT_EQ(Json::parse(wire.line(), nullptr, false)["id"], id);
+    }
+    EXPECT_EQ(wire.line(), "");
+}
+
+TEST_F(ServerTest, a_command_that_waits_is_answered_after_the_client_has_ended_its_requests) {
+    serve();
+    Wire wire(server->path());
+    wire.line();
+    wire.send(
+        "{\"id\":1,\"run\":\"loadusr -w sh -c 'sleep 0.1'\"}\n"
+        "{\"id\":2,\"run\":\"getp a.out\"}\n");
+    wire.end_requests();
+    EXPECT_EQ(Json::parse(wire.line(), nullptr, false)["id"], 1);
+    EXPECT_EQ(Json::parse(wire.line(), nullptr, false)["out"], "FALSE\n");
+    EXPECT_EQ(wire.line(), "");
+}
+
 TEST_F(ServerTest, a_truncated_request_is_never_executed) {
     serve();
     {

@@ -68,6 +68,8 @@ public:
         return text;
     }
     void shut() { shutdown(fd_, SHUT_RDWR); }
+    /// Sends nothing more, but still reads.
+    void end_requests() { shutdown(fd_, SHUT_WR); }
 
     bool connected = false;
 
