@@ -100,6 +100,7 @@ struct SessionState {
     void restart_replaced(Diagnostics& diagnostics);
     void retire();
     void forget_reported(const Diagnostics& found, bool whole);
+    void report_removed_functions(Diagnostics& diagnostics);
     /// As Session::offer_names().
     void offer_names(Diagnostics& diagnostics);
     /// The transaction is over: what is no longer in the model is destroyed.

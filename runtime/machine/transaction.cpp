@@ -115,7 +115,7 @@ void check_all(const Model& model, bool whole, bool complete, bool open, Diagnos
         std::any_of(model.threads.begin(), model.threads.end(),
                     [](const auto& thread) { return !thread->functions.empty(); });
     if ((complete || scheduled) && !open) {
-        check_unthreaded_functions(model, diagnostics);
+        check_unthreaded_functions(model, Unthreaded::all, diagnostics);
     }
     check_cross_thread_io(model, diagnostics);
     check_stale_reads(model, diagnostics);
@@ -192,6 +192,17 @@ void make_abandoned_safe(const Model& model, const Edit& edit) noexcept {
 
 }  // namespace
 
+/// Warns of the functions that this edit removed from their threads, also when it is a single
+/// command, and each time that they are removed.
+void SessionState::report_removed_functions(Diagnostics& diagnostics) {
+    Diagnostics removed;
+    check_unthreaded_functions(model, Unthreaded::removed, removed);
+    for (const Diagnostic& one : removed.all()) {
+        reported.insert_or_assign(one.message, true);
+        diagnostics.add(one);
+    }
+}
+
 bool SessionState::carry_out(Diagnostics& diagnostics) {
     if (!edit->structural() &&
         edit->pin_values.size() + edit->signal_values.size() <= Core::most_writes / 2) {
@@ -204,6 +215,7 @@ bool SessionState::carry_out(Diagnostics& diagnostics) {
     const bool whole = commands > 1;
     check_all(model, whole, options.check_only, edit->absences().open(), found);
     forget_reported(found, whole);
+    report_removed_functions(diagnostics);
     for (const Diagnostic& one : found.all()) {
         // a warning is printed once, not with every later edit
         if (reported.emplace(one.message, whole).second ||
@@ -313,8 +325,23 @@ void SessionState::end_conditions(const Instance& instance) {
     executor->board().end_all(first, first + size);
 }
 
+namespace {
+
+void note_functions_in_threads(Model& model) {
+    for (const auto& component : model.components) {
+        for (const auto& function : component->functions) {
+            function->was_in_thread = function->thread != nullptr;
+        }
+    }
+}
+
+}  // namespace
+
 // The transaction is over, one way or the other: what is no longer in the model goes.
 void SessionState::close_edit() {
+    if (edit->structural()) {
+        note_functions_in_threads(model);
+    }
     faults.collect();  // before the plugins whose words they use
     auto& removed = edit->removed();
     for (auto it = removed.instances.rbegin(); it != removed.instances.rend(); ++it) {

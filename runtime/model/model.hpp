@@ -100,6 +100,7 @@ struct LoadedFunction {
     std::vector<std::unique_ptr<Pin>> pins;  ///< its .time, .tmax, .tmax-increased
     std::unique_ptr<plan::FunctionTimes> times = std::make_unique<plan::FunctionTimes>();
     std::uint32_t id = 0;
+    bool was_in_thread = false;  ///< after the last commit
 };
 
 /// The delay of a pin's value on its path to or from another machine; hal/path_delay.h.

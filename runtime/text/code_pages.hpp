@@ -680,9 +680,12 @@ inline constexpr CodePage code_pages[] = {
      "\"it's\".\n\n"
      "An apostrophe in a comment is harmless."},
     {"unthreaded-function",
-     "The instance is linked, but none of its functions is in a thread, so its outputs never "
-     "change. Add a function with addf, or "
-     "unload the instance."},
+     "The function is in no thread, and pins that it reads or writes are linked, but nothing "
+     "updates them. Netlists, and transactions of several commands, are checked as a whole. An "
+     "edit "
+     "that removes a function from its thread (delf, delthread) causes the warning in any case; "
+     "other single commands do not, because the addf may follow.\n\n"
+     "Add the function with addf, or unload the instance."},
     {"writer-set",
      "A signal with a writer gets its value from the writer in every cycle, which would overwrite "
      "the value of sets.\n\n"

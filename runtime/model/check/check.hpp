@@ -17,8 +17,13 @@ void check_periods(const Model& model, Diagnostics& diagnostics);
 void check_spread_pins(const Model& model, Diagnostics& diagnostics);
 /// warning wrong-arrow
 void check_arrows(const Model& model, Diagnostics& diagnostics);
+/// Which functions the next check looks at.
+enum class Unthreaded {
+    all,
+    removed,  ///< those that were in a thread after the last commit
+};
 /// warning unthreaded-function
-void check_unthreaded_functions(const Model& model, Diagnostics& diagnostics);
+void check_unthreaded_functions(const Model& model, Unthreaded which, Diagnostics& diagnostics);
 /// note cross-thread-io
 void check_cross_thread_io(const Model& model, Diagnostics& diagnostics);
 void check_stale_reads(const Model& model, Diagnostics& diagnostics);  ///< note stale-read

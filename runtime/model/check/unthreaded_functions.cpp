@@ -20,9 +20,10 @@ const LoadedFunction* waiting_for(const LoadedFunction& function) {
 
 }  // namespace
 
-void check_unthreaded_functions(const Model& model, Diagnostics& diagnostics) {
+void check_unthreaded_functions(const Model& model, Unthreaded which, Diagnostics& diagnostics) {
     for (const auto& component : model.components) {
         for (const auto& function : component->functions) {
+            if (which == Unthreaded::removed && !function->was_in_thread) continue;
             if (function->thread) continue;
             if (const LoadedFunction* const other = waiting_for(*function)) {
                 diagnostics.warning("unthreaded-function", function->instances.front()->loaded,
