@@ -4,8 +4,11 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "hal/component.hpp"
+#include "hal/function_monitor.hpp"
+#include "hal/lasting_fault.hpp"
 #include "hal/limit.hpp"
 #include "hal/queue.hpp"
 
@@ -75,10 +78,14 @@ struct Pwmgen : hal::Component {
         }
     }
 
+    void start() { faults_ = hal::extension<hal_faults>("hal.faults/1"); }
+
     void make_pulses(hal::Cycle cycle) noexcept {
         tick_ns_.store(cycle.period_ns(), std::memory_order_relaxed);
         const Order& wanted = orders_.get();
-        if (!wanted.on) {
+        const bool abandoned = updates_.is_missing(cycle.period_ns()) && updates_.has_run();
+        record_abandoned(abandoned);
+        if (!wanted.on || abandoned) {
             tick_ = 0;
             length_rest_ = high_rest_ = density_ = 0.0;
             drive(false, false);
@@ -89,7 +96,8 @@ struct Pwmgen : hal::Component {
         drive(level, reverse_);
     }
 
-    void update(hal::Cycle) noexcept {
+    void update(hal::Cycle cycle) noexcept {
+        updates_.ran(cycle.period_ns());
         const auto tick_ns = static_cast<double>(tick_ns_.load(std::memory_order_relaxed));
         Order next;
         if (tick_ns > 0.0) {
@@ -178,6 +186,19 @@ private:
         }
     }
 
+    void record_abandoned(bool abandoned) noexcept {
+        if (abandoned && !abandoned_.lasts()) {
+            abandoned_.begin(faults_, this, abandoned_text_.c_str());
+        } else if (!abandoned && abandoned_.lasts()) {
+            abandoned_.end(faults_, this);
+        }
+    }
+
+    const hal_faults* faults_ = nullptr;
+    hal::FunctionMonitor updates_;  // make-pulses monitors update
+    hal::LastingFault abandoned_;  // make-pulses only
+    const std::string abandoned_text_ =
+        hal::missing_function_text("pwmgen.make-pulses", "pwmgen.update", "outputs off");
     hal::Mailbox<Order> orders_;  // update writes, make-pulses reads
     std::atomic<std::int64_t> tick_ns_{0};  // period of make-pulses: it writes, update reads
     // make-pulses only
@@ -209,7 +230,8 @@ HAL_COMPONENT(Pwmgen, "pwmgen", "Pulse width and pulse density modulation in sof
   The upper limit is half the rate of the fast thread. A new value begins with the next period; FALSE on `enable` acts at once.
 * **PDM** (`pwm-freq` 0): single pulses of one fast period, spread evenly; resolution is that of the average.
 
-All outputs go low on stop, unload and faults. A `min-dc` or `max-dc` that is NaN is set to its last valid value, and a fault is raised.
+All outputs go low on stop, unload and faults, and when `update`,
+which reads `enable`, has not run for 100 of its periods (a fault names it). A `min-dc` or `max-dc` that is NaN is set to its last valid value, and a fault is raised.
 
 **Differences from LinuxCNC:** the waveforms are the same except in these cases. The first PWM period starts with `enable` (LinuxCNC: the
 outputs stay low for up to a period, and all periods start one fast period earlier). `dir` changes between periods, so that

@@ -5,9 +5,12 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "hal/component.hpp"
 #include "hal/corrected.hpp"
+#include "hal/function_monitor.hpp"
+#include "hal/lasting_fault.hpp"
 #include "hal/limit.hpp"
 #include "hal/queue.hpp"
 
@@ -172,10 +175,17 @@ struct Stepgen : hal::Component {
         }
     }
 
+    void start() { faults_ = hal::extension<hal_faults>("hal.faults/1"); }
+
     void make_pulses(hal::Cycle cycle) noexcept {
         const std::int64_t tick_ns = cycle.period_ns();
         tick_ns_.store(tick_ns, std::memory_order_relaxed);
-        const Order& wanted = orders_.get();
+        Order wanted = orders_.get();
+        if (is_abandoned(tick_ns)) {
+            wanted.on = false;
+            wanted.rate = 0.0;
+            wanted.slope = 0.0;
+        }
         const double before = rate_;
         const double change = wanted.slope * cycle.seconds();
         rate_ =
@@ -207,6 +217,13 @@ struct Stepgen : hal::Component {
     }
 
     void update_freq(hal::Cycle cycle) noexcept {
+        updates_.ran(cycle.period_ns());
+        if (was_abandoned_.exchange(false, std::memory_order_relaxed)) {
+            frequency = 0.0;
+            if (position_cmd) {
+                last_command_ = *position_cmd * scale();
+            }
+        }
         if (std::fabs(position_scale) < 1e-20) {
             position_scale.correct(1.0);
         }
@@ -247,6 +264,19 @@ struct Stepgen : hal::Component {
     }
 
 private:
+    /// Returns true while update-freq, which reads enable, no longer runs; records the fault. Only
+    /// for make-pulses. [realtime]
+    bool is_abandoned(std::int64_t tick_ns) noexcept {
+        const bool abandoned = updates_.is_missing(tick_ns) && updates_.has_run();
+        if (abandoned && !abandoned_.lasts()) {
+            was_abandoned_.store(true, std::memory_order_relaxed);
+            abandoned_.begin(faults_, this, abandoned_text_.c_str());
+        } else if (!abandoned && abandoned_.lasts()) {
+            abandoned_.end(faults_, this);
+        }
+        return abandoned;
+    }
+
     /// Returns the commanded speed in steps/s at the end of this period, before limits. For a
     /// position command: the speed of the command plus a correction for the distance e. With an
     /// acceleration a the speed changes linearly over the period T; from v to w it covers (v + w) T
@@ -390,6 +420,12 @@ private:
     Sequence sequence_{0, 1, {}};
     std::array<std::optional<hal::Out<bool>>, 5> phase_;
 
+    const hal_faults* faults_ = nullptr;
+    hal::FunctionMonitor updates_;  // make-pulses monitors update-freq
+    hal::LastingFault abandoned_;  // make-pulses only
+    std::atomic<bool> was_abandoned_{false};  // make-pulses sets it, update-freq takes it
+    const std::string abandoned_text_ =
+        hal::missing_function_text("stepgen.make-pulses", "stepgen.update-freq", "motor stopped");
     hal::Mailbox<Order> orders_;  // update-freq writes, make-pulses reads
     std::atomic<std::int64_t> tick_ns_{0};  // period of make-pulses: it writes, update-freq reads
     std::atomic<std::int64_t> made_out_{0};  // make-pulses writes, capture-position reads
@@ -439,7 +475,8 @@ wait for one of the times below is delayed, never lost. A step occurs when the p
 All times are in nanoseconds; the parameters are rounded up to whole periods of the fast thread. A `steplen` of 0, and a `dirdelay` or both
 `dirhold` and `dirsetup` of 0 with step types 0 and 1, are one period. A negative `maxvel` or `maxaccel` is set to 0; one that is above what
 the pulse timing permits (for `maxaccel`: from 0 to the highest speed in one update) is set to that. With `stepspace` 0 a pulse may occur in every period,
-for ports that reset the pulse themselves.
+for ports that reset the pulse themselves. When `update-freq`, which reads `enable`, has not run for 100 of its periods, the motor stops,
+and a fault names the missing function.
 
 **Differences from LinuxCNC:** steps occur in different periods. A command with constant speed is followed with a lag of one update (LinuxCNC:
 two and a half), and braking starts as late as possible. `position-fb` is exact (LinuxCNC: fixed point with a resolution of

@@ -290,11 +290,6 @@ private:
             record.end(faults_, this);
         }
     }
-    /// The fault message of a function that runs in no thread. [setup]
-    static std::string missing_text(const std::string& running, const std::string& missing) {
-        return "'" + running + "' runs, but '" + missing + "' does not; axis stopped; type: addf " +
-               missing + " THREAD";
-    }
     static Time time(double seconds) noexcept {
         return seconds > 0.0
                    ? static_cast<Time>(std::min(seconds, 1e6) * static_cast<double>(one_second))
@@ -341,8 +336,10 @@ private:
     const hal_faults* faults_ = nullptr;
     hal::LastingFault fault_record_, unwritten_record_, unread_record_;
     const std::string name_ = hal::own_name("cia402.0");
-    const std::string unwritten_text_ = missing_text(name_ + ".read-all", name_ + ".write-all");
-    const std::string unread_text_ = missing_text(name_ + ".write-all", name_ + ".read-all");
+    const std::string unwritten_text_ =
+        hal::missing_function_text(name_ + ".read-all", name_ + ".write-all", "axis stopped");
+    const std::string unread_text_ =
+        hal::missing_function_text(name_ + ".write-all", name_ + ".read-all", "axis stopped");
     hal::FunctionMonitor reads_, writes_;
     const Sentences& made_ = sentences();
     Axis axis_;

@@ -6,8 +6,16 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdint>
+#include <string>
 
 namespace hal {
+
+/// Returns the fault message of a function in no thread; `so` is the effect. Full names. [setup]
+inline std::string missing_function_text(const std::string& running, const std::string& missing,
+                                         const std::string& so) {
+    return "'" + running + "' runs, but '" + missing + "' does not; " + so + "; type: addf " +
+           missing + " THREAD";
+}
 
 /// Monitors one function. The monitored function calls ran() in each of its cycles; exactly one
 /// other function calls is_missing() in each of its own. The two may be in different threads. Time
@@ -38,6 +46,9 @@ public:
         silent_ns_ = std::min(silent_ns_ + period_ns, limit_ns);
         return silent_ns_ >= limit_ns;
     }
+
+    /// Returns true once the monitored function has run. [realtime]
+    bool has_run() const noexcept { return runs_.load(std::memory_order_relaxed) != 0; }
 
 private:
     /// written by the monitored function
