@@ -103,7 +103,7 @@ public:
 
     /// Reports which half of step() is missing: `unwritten` (the caller of act()), `unread` (the
     /// caller of observe()), `none`. Without one of them the axis fails, brakes with quick stop and
-    /// cannot be enabled: whoever still runs calls act(). The failure of an axis that was off ends
+    /// cannot be enabled; the remaining caller calls act(). The failure of an axis that was off ends
     /// when both run again. [realtime]
     void set_missing(Cause half) noexcept;
 
