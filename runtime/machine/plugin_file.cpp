@@ -14,6 +14,7 @@
 
 #include "modules/elf_value.hpp"
 #include "paths.hpp"
+#include "text/read_all.hpp"
 
 namespace hal {
 namespace {
@@ -77,7 +78,7 @@ PluginFile read_plugin_file(const std::string& path) {
     if (!file) {
         return {std::strerror(errno), {}};
     }
-    const std::string content((std::istreambuf_iterator<char>(file)), {});
+    const std::string content = read_all(file);
     const auto header = at<ElfW(Ehdr)>(content, 0);
     if (!header || std::memcmp(header->e_ident, ELFMAG, SELFMAG) != 0) {
         return {content.empty() ? "the file is empty" : "it is not a shared library", {}};

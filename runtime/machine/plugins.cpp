@@ -7,11 +7,13 @@
 #include <cstdlib>
 #include <cstring>
 #include <dlfcn.h>
+#include <fcntl.h>
 #include <filesystem>
 #include <fstream>
 #include <set>
 #include <sstream>
 #include <sys/mman.h>
+#include <sys/sendfile.h>
 #include <unistd.h>
 
 #include "machine/module_library.hpp"
@@ -51,30 +53,31 @@ std::string problem_of(const hal_component& component) {
     return {};
 }
 
+/// Copies the file at `path` to the end of `target`, in the kernel: plugins with debugging
+/// information have tens of megabytes. Returns false when a part of it was not copied.
+bool copy_file(const std::string& path, int target) {
+    const int source = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (source < 0) return false;
+    constexpr std::size_t max_copied = 1u << 30;
+    ssize_t copied = 0;
+    do {
+        copied = sendfile(target, source, nullptr, max_copied);
+    } while (copied > 0 || (copied < 0 && errno == EINTR));
+    close(source);
+    return copied == 0;
+}
+
 // The loader knows a library by its path and would give the one that is loaded for a file that has
 // since been written anew; and who writes over a mapped file pulls the code from under a running
 // machine. So what is loaded is a copy in memory, each with a path of its own, under which
 // debuggers find it too. nullptr when there can be none; then the file itself is loaded.
 std::shared_ptr<void> open_copy(const std::string& path) {
     const std::string name = path.substr(path.rfind('/') + 1);
-    std::ifstream file(path, std::ios::binary);
-    const std::string content((std::istreambuf_iterator<char>(file)), {});
     const int copy = memfd_create(name.c_str(), MFD_CLOEXEC);
     if (copy < 0) return nullptr;
-    void* library = nullptr;
-    for (std::size_t at = 0; at < content.size();) {
-        const ssize_t wrote = write(copy, content.data() + at, content.size() - at);
-        if (wrote <= 0) {
-            close(copy);
-            return nullptr;
-        }
-        at += static_cast<std::size_t>(wrote);
-    }
     char place[64];
     std::snprintf(place, sizeof place, "/proc/%d/fd/%d", static_cast<int>(getpid()), copy);
-    if (file) {
-        library = dlopen(place, RTLD_NOW | RTLD_LOCAL);
-    }
+    void* const library = copy_file(path, copy) ? dlopen(place, RTLD_NOW | RTLD_LOCAL) : nullptr;
     if (!library) {
         close(copy);
         return nullptr;
