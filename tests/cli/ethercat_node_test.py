@@ -14,7 +14,17 @@ from own_network import VARIABLE, own_network
 MACHINE = ROOT / "halfiles/ethercat-servo"
 
 
+def prefer():
+    """Gives the emulated devices the real-time priority for want of which a busy host loses their frames. Devices of their own never wait."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(60))
+    except PermissionError:
+        pass
+
+
 class Line(Case):
+    """The cycle is ten times as long as the machine's: ten lost cycles make a slave lost, and a busy host stalls a process for 10 ms."""
+
     def setUp(self):
         super().setUp()
         if os.environ.get(VARIABLE) != "1":
@@ -29,19 +39,22 @@ class Line(Case):
         self.write("servo.line", (MACHINE / "servo.line").read_text())
         self.write(
             "servo.ethercat",
-            (MACHINE / "servo.ethercat").read_text().replace("sim:servo", "eth:m0"),
+            (MACHINE / "servo.ethercat")
+            .read_text()
+            .replace("sim:servo", "eth:m0")
+            .replace("cycle = 1ms", "cycle = 10ms"),
         )
         self.write(
             "servo.hal",
             "".join(
-                line
+                line.replace("period1=1000000", "period1=10000000")
                 for line in (MACHINE / "servo.hal").read_text().splitlines(True)
                 if "ethercat_segment" not in line and "ethercat-segment" not in line
             ),
         )
         self.logs = {}
 
-    def start(self, *words):
+    def start(self, *words, **how):
         log = self.folder / f"{len(self.logs)}.txt"
         with open(log, "w", encoding="utf-8") as out:
             process = subprocess.Popen(
@@ -53,6 +66,7 @@ class Line(Case):
                 stdout=out,
                 stderr=out,
                 text=True,
+                **how,
             )
         self.addCleanup(self.end, process)
         self.logs[process] = log
@@ -78,7 +92,9 @@ class Line(Case):
         )
 
     def node(self, *words):
-        node = self.start("node", "ethercat", "servo.line", "--link", "eth:s0", *words)
+        node = self.start(
+            "node", "ethercat", "servo.line", "--link", "eth:s0", *words, preexec_fn=prefer
+        )
         self.expect(node, "press Ctrl-C to end")
         return node
 
@@ -123,7 +139,7 @@ class Line(Case):
                 "servo.ethercat",
                 (self.folder / "servo.ethercat")
                 .read_text()
-                .replace("cycle = 1ms", "cycle = 1ms\nsync-window = 1ms"),
+                .replace("cycle = 10ms", "cycle = 10ms\nsync-window = 1ms"),
             )
             self.node()
             machine = self.machine()
@@ -197,7 +213,7 @@ class Line(Case):
 
     def test_crc_names_the_cable_with_errors(self):
         self.write("servo.line", "coupler\nservo\nservo\n")
-        self.node("--fault", "2:corrupt-every=7")
+        self.node("--fault", "2:corrupt-every=41")
         for _ in range(3):
             self.run_program("ethercat", "states", "eth:m0")
         report = self.good("ethercat", "crc", "eth:m0")
