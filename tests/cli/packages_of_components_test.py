@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """The packages that the script ./hal installs for a machine, against those whose headers the components of the machine were compiled with."""
+import functools
 import re
 import shutil
 import subprocess
@@ -50,20 +51,31 @@ def packages_of_files(paths):
     }
 
 
+@functools.cache
+def dependencies():
+    """The packages that each installed package depends on."""
+    return {
+        package: set(re.findall(r"(?:^|, )([a-z0-9.+-]+)", depends))
+        for package, depends in re.findall(
+            r"(?m)^(\S+)\t(.*)$", run("dpkg-query", "-W", "-f", "${Package}\\t${Depends}\\n")
+        )
+    }
+
+
 def with_dependencies(packages):
     """The packages and those that they depend on."""
     found, waiting = set(), set(packages)
     while waiting:
         one = waiting.pop()
         found.add(one)
-        listed = subprocess.run(
-            ["dpkg-query", "-W", "-f", "${Depends}", one],
-            capture_output=True,
-            text=True,
-            check=False,
-        ).stdout
-        waiting |= set(re.findall(r"(?:^|, )([a-z0-9.+-]+)", listed)) - found
+        waiting |= dependencies().get(one, set()) - found
     return found
+
+
+@functools.cache
+def inputs_of(component):
+    """All files that a component is built from."""
+    return run("ninja", "-t", "inputs", f"component_{component}").split("\n")
 
 
 class Packages(unittest.TestCase):
@@ -79,8 +91,7 @@ class Packages(unittest.TestCase):
 
     def compiled_with(self, component):
         """The optional packages whose headers a component or a library in it was compiled with."""
-        inputs = run("ninja", "-t", "inputs", f"component_{component}").split("\n")
-        headers = set().union(*(self.headers.get(one, set()) for one in inputs))
+        headers = set().union(*(self.headers.get(one, set()) for one in inputs_of(component)))
         return {
             self.package_of[header] for header in headers if header in self.package_of
         } & self.optional
