@@ -10,7 +10,7 @@ import sys
 import unittest
 from pathlib import Path
 
-from harness import HAL, PLUGINS, wait_until
+from harness import HAL, PLUGINS, undisturbed, wait_until
 from hung_case import MACHINE, HungCase
 
 PTRACE_SEIZE, PTRACE_INTERRUPT, PTRACE_DETACH = 0x4206, 0x4207, 17
@@ -217,7 +217,7 @@ class Supervisor(HungCase):
             self.write("a.hal", "newthread servo 1000000\nloadrt stuck\naddf stuck.0 servo\n"),
         )
         machine.send_signal(signal.SIGTERM)
-        err = machine.communicate(timeout=120)[1]
+        err = undisturbed(machine.communicate(timeout=120)[1])
         self.assertEqual(1, machine.returncode)
         self.assertEqual(
             "hal: 'stuck.0' (stuck) has not returned from stop for 2 s; the machine ends when it returns, at the latest in 13 s\n"
@@ -233,7 +233,7 @@ class Supervisor(HungCase):
             ),
         )
         machine.send_signal(signal.SIGTERM)
-        err = machine.communicate(timeout=120)[1]
+        err = undisturbed(machine.communicate(timeout=120)[1])
         self.assertEqual(0, machine.returncode)
         self.assertEqual(
             "hal: 'stuck.0' (stuck) needs up to 5 s to stop: a slow bus still sends what is queued\n",
@@ -253,7 +253,7 @@ class Supervisor(HungCase):
             machine.stderr.readline(),
         )
         machine.send_signal(signal.SIGTERM)
-        err = machine.communicate(timeout=120)[1]
+        err = undisturbed(machine.communicate(timeout=120)[1])
         self.assertEqual(1, machine.returncode)
         self.assertIn(
             "(stuck) has not returned from start for 2 s; the machine ends when it returns, at the latest in 13 s\n",
