@@ -58,7 +58,7 @@ run_tests() {
     tree=$1 log=$build/$1-tests.log
     shift
     say "testing build/$tree"
-    if ctest --test-dir "$build/$tree" --output-on-failure --no-tests=error -j "$((2 * $(nproc)))" --output-junit "$log.xml" "$@" >"$log" 2>&1 </dev/null; then
+    if ctest --test-dir "$build/$tree" --output-on-failure --no-tests=error -j "$((3 * $(nproc)))" --output-junit "$log.xml" "$@" >"$log" 2>&1 </dev/null; then
         sed -n '/tests passed/,/^Total Test time/p' "$log"
     else
         grep -vE '^ *(Start +[0-9]+:|[0-9]+/[0-9]+ .* (Passed|Skipped) )|\(Skipped\)$|\*\*\*Skipped ' "$log"
@@ -80,6 +80,7 @@ $(sed -n 's/^ *[0-9]*\/[0-9]* Test *#[0-9]*: \([^ ]*\) .*/    \1/p' "$log.again"
     reasons=$(python3 "$root/tests/skipped.py" "$log.xml")
     [ -z "$reasons" ] || say "left out, and why (which: build/$tree-tests.log):
 $reasons"
+    say "$(python3 "$root/tests/slowest.py" "$log.xml")"
 }
 
 compile_release all bench
@@ -99,6 +100,9 @@ if [ "${1-}" != quick ]; then
     ctest() { command $plain_addresses ctest "$@"; }
     run_tests tsan -R '^unit_tests'
 fi
+
+# Measures of the sources, which fail nothing.
+if [ -f "$root/tests/checks/density.py" ]; then python3 "$root/tests/checks/density.py" "$root" || :; fi
 
 # A build and a test leave no file behind that git would see.
 sh "$root/tests/checks/clean_tree.sh" "$root" "$changed_before" || failed="$failed clean-tree"

@@ -38,7 +38,7 @@ say "testing build/$tree under $qemu"
 failed=
 # shellcheck disable=SC2086
 $namespace sh "$in_board" "$qemu" ctest --test-dir "$build/$tree" --output-on-failure \
-    --no-tests=error --test-output-size-passed 1000000 -j "$((2 * $(nproc)))" -L '^(unit|netlists)$' --output-junit "$log.xml" >"$log" 2>&1 </dev/null || failed=1
+    --no-tests=error --test-output-size-passed 1000000 -j "$((3 * $(nproc)))" -L '^(unit|netlists)$' --output-junit "$log.xml" >"$log" 2>&1 </dev/null || failed=1
 grep -vE '^ *(Start +[0-9]+:|[0-9]+/[0-9]+ .* (Passed|Skipped) )|\(Skipped\)$|\*\*\*Skipped ' "$log" || :
 reasons=$(python3 "$root/tests/skipped.py" "$log.xml")
 [ -z "$reasons" ] || say "skipped, and why (which: $log):

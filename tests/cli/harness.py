@@ -30,6 +30,28 @@ SANITIZED = any(
     name in HAL.read_bytes() for name in (b"__asan_init", b"__tsan_init")
 )  # then the sanitizer takes crash signals
 
+
+def run_share(share):
+    """Makes unittest.main() run the tests of one share only, such as 2/4, for ctests that run side by side."""
+    number, count = map(int, share.split("/"))
+    load = unittest.defaultTestLoader.loadTestsFromModule
+
+    def flat(tests):
+        for test in tests:
+            if isinstance(test, unittest.TestSuite):
+                yield from flat(test)
+            else:
+                yield test
+
+    def load_share(*arguments, **how):
+        return unittest.TestSuite(list(flat(load(*arguments, **how)))[number - 1 :: count])
+
+    unittest.defaultTestLoader.loadTestsFromModule = load_share
+
+
+if share := os.environ.get("HALCYON_TEST_SHARE"):
+    run_share(share)
+
 SERVO = """loadrt threads name1=servo period1=1000000
 loadrt sum2 names=adder
 addf adder servo

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Runs netlist tests: run.py [HAL] [TEST...]
+"""Runs netlist tests: run.py [HAL] [--once] [TEST...]
 
 A test is a folder with test.hal. `hal sim test.hal` runs in it, twice; both runs must print the same bytes, and they
 must be those of `expected`. Where there is a file `expected.stderr`, standard error is compared too; where there is a
 file `status`, it holds the exit status (else 0); where there is a file `command`, it is the command line instead.
+--once leaves out the second run: under a sanitizer and under the real-time guard, which repeat tests of the release build.
 HAL is the program (default: $HAL_BIN, else the newest build); a TEST is a folder, its test.hal, or a part of its name.
 """
 import difflib
@@ -56,11 +57,12 @@ def differences(wanted, got, what):
     return lines or [f"{what}: the same lines, but other line ends"]
 
 
-def check(hal, test):
+def check(hal, test, once):
     """What is wrong with a test, as lines; empty: nothing."""
     if not (test / "expected").exists():
         return ["it has no file 'expected'"]
-    first, second = run(hal, test), run(hal, test)
+    first = run(hal, test)
+    second = first if once else run(hal, test)
     out, err, status = first
     problems = []
     wanted_status = int((test / "status").read_text()) if (test / "status").exists() else 0
@@ -84,6 +86,8 @@ def check(hal, test):
 def main():
     arguments = sys.argv[1:]
     hal = program(arguments)
+    once = "--once" in arguments
+    arguments = [argument for argument in arguments if argument != "--once"]
     tests = sorted(path.parent for path in HERE.rglob("test.hal"))
     if arguments:
         wanted = [
@@ -101,7 +105,7 @@ def main():
         ]
     failed = 0
     for test in tests:
-        if problems := check(hal, test):
+        if problems := check(hal, test, once):
             failed += 1
             print(f"FAILED {test.relative_to(HERE)}")
             print("\n".join("    " + line for line in problems))
