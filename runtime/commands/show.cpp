@@ -33,7 +33,7 @@ struct Request : TextWriter {
 };
 
 template <class Object>
-void keep_type(std::vector<const Object*>& objects, std::optional<hal_type> type) {
+void keep_objects_of_type(std::vector<const Object*>& objects, std::optional<hal_type> type) {
     if (type) {
         std::erase_if(objects, [&](const Object* object) { return object->type != *type; });
     }
@@ -65,7 +65,7 @@ void show_pins(Request& request, bool parameters) {
     request.title(parameters ? "Parameters:\n" : "Component Pins:\n");
     request.title("Owner   Type  Dir                 Value  Name\n");
     auto pins = pins_by_name(request.context.session, parameters, request.patterns);
-    keep_type(pins, request.type);
+    keep_objects_of_type(pins, request.type);
     const auto values = request.context.session.values().read_pins(pins);
     for (std::size_t i = 0; i < pins.size(); ++i) {
         if (request.context.session.ending()) return;
@@ -93,7 +93,7 @@ void show_param(Request& request) { show_pins(request, true); }
 void show_sig(Request& request) {
     request.title("Signals:\nType                  Value  Name     (linked to)\n");
     auto signals = signals_by_name(request.context.session, request.patterns);
-    keep_type(signals, request.type);
+    keep_objects_of_type(signals, request.type);
     const auto values = request.context.session.values().read_signals(signals);
     std::vector<const Pin*> pins;
     for (std::size_t i = 0; i < signals.size(); ++i) {
@@ -216,7 +216,7 @@ void show_all(Request& request) {
     show_thread(request);
 }
 
-struct Kind {
+struct ListedKind {
     std::string_view name;
     void (*show)(Request&);     ///< in LinuxCNC's format
     void (*report)(Context&);   ///< our own reports, which write for themselves
@@ -224,7 +224,7 @@ struct Kind {
     bool can_list;
 };
 
-constexpr Kind kinds[] = {
+constexpr ListedKind listed_kinds[] = {
     {"comp", show_comp, nullptr, Listed::components, true},
     {"pin", show_pin, nullptr, Listed::pins, true},
     {"sig", show_sig, nullptr, Listed::signals, true},
@@ -241,10 +241,10 @@ constexpr Kind kinds[] = {
     {"fault", nullptr, show_faults, Listed::all, false},
 };
 
-const Kind* find_kind(Context& context, bool to_list) {
+const ListedKind* find_kind(Context& context, bool to_list) {
     const std::string_view wanted = context.argument_or(0, "all");
     std::vector<std::string> names;
-    for (const Kind& kind : kinds) {
+    for (const ListedKind& kind : listed_kinds) {
         if (to_list && !kind.can_list) continue;
         if (kind.name == wanted) return &kind;
         names.emplace_back(kind.name);
@@ -283,7 +283,7 @@ bool read_patterns(Context& context, std::vector<std::string>& patterns,
 }  // namespace
 
 void command_show(Context& context) {
-    const Kind* const kind = find_kind(context, false);
+    const ListedKind* const kind = find_kind(context, false);
     Request request(context);
     std::vector<std::string> patterns;
     if (!kind || !read_patterns(context, patterns, request.type) || context.checking()) return;
@@ -299,7 +299,7 @@ void command_show(Context& context) {
 }
 
 void command_list(Context& context) {
-    const Kind* const kind = find_kind(context, true);
+    const ListedKind* const kind = find_kind(context, true);
     std::vector<std::string> patterns;
     std::optional<hal_type> no_type;
     if (!kind || !read_patterns(context, patterns, no_type) || context.checking()) return;

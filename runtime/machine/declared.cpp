@@ -24,7 +24,7 @@ struct Gathering {
 Gathering& of(const hal_host* host) { return *static_cast<Gathering*>(host->data); }
 std::string text(const char* t) { return t ? t : ""; }
 
-bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
+bool gather_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
     Gathering& g = of(host);
     memory->own = decl->initial;
     memory->slot = &memory->own;
@@ -49,7 +49,7 @@ bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
     return true;
 }
 
-bool take_function(const hal_host* host, const hal_function_decl* decl) {
+bool gather_function(const hal_host* host, const hal_function_decl* decl) {
     Gathering& g = of(host);
     if (decl->flags & HAL_FUNCTION_EMERGENCY) return true;
     g.page.functions.push_back(
@@ -58,7 +58,7 @@ bool take_function(const hal_host* host, const hal_function_decl* decl) {
     return true;
 }
 
-const char* take_argument(const hal_host* host, const hal_argument_decl* decl) {
+const char* gather_argument(const hal_host* host, const hal_argument_decl* decl) {
     auto& arguments = of(host).page.arguments;
     const std::string name = text(decl->name);
     // a list may be read once for the instance and once as a whole
@@ -71,16 +71,16 @@ const char* take_argument(const hal_host* host, const hal_argument_decl* decl) {
     return decl->fallback;
 }
 
-void* allocate(const hal_host* host, std::size_t bytes, std::size_t align) {
+void* gather_block(const hal_host* host, std::size_t bytes, std::size_t align) {
     auto& blocks = of(host).blocks;
     blocks.push_back(std::make_unique<char[]>(bytes + align));
     const auto address = reinterpret_cast<std::uintptr_t>(blocks.back().get());
     return reinterpret_cast<void*>((address + align - 1) / align * align);
 }
 
-void take_failure(const hal_host* host, const char* reason) { of(host).failure = text(reason); }
-void take_rejection(const hal_host* host, const hal_rejection* rejection) {
-    take_failure(host, rejection->text);
+void gather_failure(const hal_host* host, const char* reason) { of(host).failure = text(reason); }
+void gather_rejection(const hal_host* host, const hal_rejection* rejection) {
+    gather_failure(host, rejection->text);
 }
 const void* no_extension(const hal_host*, const char*) { return nullptr; }
 
@@ -111,8 +111,9 @@ bool gather(const hal_component& component, Declared& page, std::string& problem
         return true;
     }
     Gathering gathering{page, {}, {}, {}};
-    const hal_host host{sizeof host, &gathering,   take_pin,     take_function, take_argument,
-                        allocate,    take_failure, no_extension, take_rejection};
+    const hal_host host{sizeof host,     &gathering,      gather_pin,
+                        gather_function, gather_argument, gather_block,
+                        gather_failure,  no_extension,    gather_rejection};
     const std::align_val_t align{component.instance_align};
     const auto release = [align](void* memory) { ::operator delete(memory, align); };
     const std::unique_ptr<void, decltype(release)> memory(

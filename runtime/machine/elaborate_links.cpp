@@ -44,10 +44,10 @@ void edits::net(Elaboration& on, Args args) {
     if (!signal && unknown_type) return on.edit.absences().note(args[0].text, cause);
     if (!signal) {
         if (on.model.find_pin(args[0].text)) {
-            on.diagnostics.error("signal-named-like-pin", args[0].span,
-                                 "signal name " + quoted(args[0].text) + " is the name of a pin",
-                                 "a pin",
-                                 "write the signal's name first: net SIGNAL " + args[0].text);
+            on.diagnostics.error(
+                "signal-named-like-pin", args[0].span,
+                "signal name " + hal::quoted(args[0].text) + " is the name of a pin", "a pin",
+                "write the signal's name first: net SIGNAL " + args[0].text);
             return;
         }
         if (wanted.empty()) {
@@ -70,7 +70,8 @@ void edits::newsig(Elaboration& on, Args args) {
         for (const TypeRow& row : types) {
             all.emplace_back(row.name);
         }
-        on.diagnostics.error("no-such-type", args[1].span, "unknown type " + quoted(args[1].text),
+        on.diagnostics.error("no-such-type", args[1].span,
+                             "unknown type " + hal::quoted(args[1].text),
                              did_you_mean(args[1].text, all), "types: " + listed(all));
         return;
     }
@@ -122,13 +123,13 @@ void edits::linkpp(Elaboration& on, Args args) {
     if (!first || !second) return;
     for (const auto& [pin, at] : {std::pair(first, words[0]), std::pair(second, words[1])}) {
         if (!pin->signal) continue;
-        Diagnostic d{
-            Severity::error,
-            "pin-linked",
-            "pin " + quoted(at.text) + " is already linked to signal " + quoted(pin->signal->name),
-            {{at.span, "linked"}},
-            {"link the other pin to that signal: net " + pin->signal->name + " " +
-             (pin == first ? words[1] : words[0]).text}};
+        Diagnostic d{Severity::error,
+                     "pin-linked",
+                     "pin " + hal::quoted(at.text) + " is already linked to signal " +
+                         hal::quoted(pin->signal->name),
+                     {{at.span, "linked"}},
+                     {"link the other pin to that signal: net " + pin->signal->name + " " +
+                      (pin == first ? words[1] : words[0]).text}};
         if (pin->linked_at.known()) {
             d.labels.push_back({pin->linked_at, "linked here"});
         }
@@ -158,7 +159,7 @@ namespace {
 bool has_aliases(Elaboration& on, const Token& kind) {
     if (kind.text == "pin" || kind.text == "param" || kind.text == "parameter") return true;
     on.diagnostics.error("wrong-arguments", kind.span,
-                         quoted(kind.text) + " is not a kind of name that has aliases",
+                         hal::quoted(kind.text) + " is not a kind of name that has aliases",
                          "pin or param", to_string(on.usage));
     return false;
 }

@@ -90,7 +90,7 @@ bool read_count(Elaboration& on, const Token& token, const std::string& key,
                              range);
     } else {
         on.diagnostics.error("bad-argument", token.span,
-                             quoted(value) + " is not a number of instances", range);
+                             hal::quoted(value) + " is not a number of instances", range);
     }
     return false;
 }
@@ -108,7 +108,7 @@ bool read_request(Elaboration& on, const Token& name, Origin origin, Args args,
         const auto equals = token.text.find('=');
         if (equals == std::string::npos || equals == 0) {
             on.diagnostics.error("bad-argument", token.span,
-                                 quoted(token.text) + " is not an argument", "",
+                                 hal::quoted(token.text) + " is not an argument", "",
                                  "arguments are written NAME=VALUE, without blanks around the =");
             good = false;
             continue;
@@ -162,7 +162,7 @@ bool may_load_again(Elaboration& on, const Token& name, Origin origin,
     if (is_module(component)) {
         on.diagnostics.error(
             "name-taken", name.span,
-            quoted(name.text) +
+            hal::quoted(name.text) +
                 " is a LinuxCNC module, which is loaded once, and it is already loaded",
             "", "for other arguments: unloadrt " + component.name + ", then loadrt again");
         return false;
@@ -170,7 +170,7 @@ bool may_load_again(Elaboration& on, const Token& name, Origin origin,
     if (origin != Origin::linuxcnc) return true;
     on.diagnostics.error(
         "name-taken", name.span,
-        "the component " + quoted(name.text) + " of this runtime is already loaded", "",
+        "the component " + hal::quoted(name.text) + " of this runtime is already loaded", "",
         "unloadrt " + component.name + " first, or leave out --linuxcnc");
     return false;
 }
@@ -180,13 +180,13 @@ bool make_instances(Elaboration& on, const Token& name, Origin origin, const Loa
     LoadedComponent* component = on.model.find_component(name.text);
     if (component && !component->plugin && component->process == 0) {
         on.diagnostics.error("name-taken", name.span,
-                             quoted(name.text) + " of this runtime is already loaded", "",
+                             hal::quoted(name.text) + " of this runtime is already loaded", "",
                              "create all threads with one of them: leave out --linuxcnc");
         return false;
     }
     if (component && !component->plugin) {
         on.diagnostics.error("name-taken", name.span,
-                             quoted(name.text) + " is a program started by loadusr");
+                             hal::quoted(name.text) + " is a program started by loadusr");
         return false;
     }
     if (component && !may_load_again(on, name, origin, *component)) return false;
@@ -236,7 +236,7 @@ bool take_origin(Elaboration& on, Args& args, Origin& origin) {
     const std::string preference = origin == Origin::any ? meaningless_preference() : "";
     if (preference.empty()) return true;
     on.diagnostics.error("wrong-arguments", args[0].span,
-                         "HALCYON_MODULES is " + quoted(preference) +
+                         "HALCYON_MODULES is " + hal::quoted(preference) +
                              " in the environment of the machine; its only value is 'linuxcnc'",
                          "",
                          "unset HALCYON_MODULES, or export HALCYON_MODULES=linuxcnc to load "
@@ -267,7 +267,7 @@ bool is_used(Elaboration& on, const LoadedComponent& component, Span at) {
     if (users.empty()) return false;
     on.diagnostics.error(
         "module-in-use", at,
-        quoted(component.name) + " cannot be unloaded: its code is used by " + users, "",
+        hal::quoted(component.name) + " cannot be unloaded: its code is used by " + users, "",
         "unload what uses it first: " + commands);
     return true;
 }
@@ -280,7 +280,7 @@ LoadedComponent* loaded_component(Elaboration& on, const Token& name) {
         loaded.push_back(one->name);
     }
     on.diagnostics.error("no-such-component", name.span,
-                         "component " + quoted(name.text) + " is not loaded",
+                         "component " + hal::quoted(name.text) + " is not loaded",
                          did_you_mean(name.text, loaded),
                          loaded.empty() ? "no component is loaded" : "loaded: " + listed(loaded));
     return nullptr;
@@ -318,7 +318,7 @@ void edits::loadrt(Elaboration& on, Args args) {
     }
     if (!known && !cause) {
         cause = absences.add(
-            "component " + quoted(args[0].text), "which is missing", args[0].span,
+            "component " + hal::quoted(args[0].text), "which is missing", args[0].span,
             request.names.empty() ? Absences::Scope::component : Absences::Scope::names);
     }
     for (const std::string& name : request.names) {
@@ -359,7 +359,7 @@ void edits::unload(Elaboration& on, Args args) {
     if (!component) return;
     if (component->process != 0) {
         on.diagnostics.error("is-a-program", args[0].span,
-                             quoted(args[0].text) + " is a program's component", "",
+                             hal::quoted(args[0].text) + " is a program's component", "",
                              "unloadusr " + component->name + " ends it");
         return;
     }
@@ -378,10 +378,10 @@ void edits::reload(Elaboration& on, Args args) {
     const Token& name = args[0];
     if (const Instance* const instance = on.model.find_instance(name.text);
         instance && !on.model.find_component(name.text)) {
-        on.diagnostics.error(
-            "no-such-component", name.span,
-            quoted(name.text) + " is an instance; a component is reloaded with all its instances",
-            "", "reload " + instance->component->name);
+        on.diagnostics.error("no-such-component", name.span,
+                             hal::quoted(name.text) +
+                                 " is an instance; a component is reloaded with all its instances",
+                             "", "reload " + instance->component->name);
         return;
     }
     LoadedComponent* const component = loaded_component(on, name);
@@ -389,8 +389,8 @@ void edits::reload(Elaboration& on, Args args) {
     if (!component->plugin) {
         on.diagnostics.error("no-such-component", name.span,
                              component->process != 0
-                                 ? quoted(name.text) + " is a program, not a plugin"
-                                 : quoted(name.text) + " belongs to the runtime",
+                                 ? hal::quoted(name.text) + " is a program, not a plugin"
+                                 : hal::quoted(name.text) + " belongs to the runtime",
                              "",
                              component->process != 0 ? "unload it and start it again by loadusr"
                                                      : "its threads are removed by delthread");
@@ -399,7 +399,7 @@ void edits::reload(Elaboration& on, Args args) {
     if (is_module(*component)) {
         on.diagnostics.error(
             "reload-conflict", name.span,
-            quoted(name.text) +
+            hal::quoted(name.text) +
                 " is a LinuxCNC module, whose static variables allow one copy at a time",
             "", "unloadrt " + component->name + ", then loadrt again");
         return;

@@ -65,8 +65,9 @@ void place_function(Elaboration& on, Args args, bool init) {
         const char* const first = text.data() + (text.starts_with('+') ? 1 : 0);
         const auto [end, problem] = std::from_chars(first, text.data() + text.size(), position);
         if (problem != std::errc{} || end != text.data() + text.size()) {
-            on.diagnostics.error("bad-position", position_at, quoted(text) + " is not a position",
-                                 "", "1 is the first place, -1 the last");
+            on.diagnostics.error("bad-position", position_at,
+                                 hal::quoted(text) + " is not a position", "",
+                                 "1 is the first place, -1 the last");
             return;
         }
     }

@@ -80,7 +80,7 @@ void rename_command_line() {
     std::strncpy(first, "hal-observer", static_cast<std::size_t>(length) - 1);
 }
 
-void print(const std::string& text) {
+void print_line(const std::string& text) {
     [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());
 }
 
@@ -251,11 +251,12 @@ void ExitObserver::report(pid_t machine) const {
         running += (running.empty() ? "" : ", ") + ("thread '" + described.thread + "' ran ") +
                    (function.empty() ? std::string("a function") : "function " + function);
     }
-    print("hal: machine '" + std::string(shared_->name) + "' (process " + std::to_string(machine) +
-          ") ended without shutting down: " +
-          (running.empty() ? "it was killed outside of a cycle"
-                           : "it was killed, or a function ended it by a system call; " + running) +
-          "; its outputs were not set to their safe values\n");
+    print_line("hal: machine '" + std::string(shared_->name) + "' (process " +
+               std::to_string(machine) + ") ended without shutting down: " +
+               (running.empty()
+                    ? "it was killed outside of a cycle"
+                    : "it was killed, or a function ended it by a system call; " + running) +
+               "; its outputs were not set to their safe values\n");
 }
 
 }  // namespace hal

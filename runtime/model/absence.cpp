@@ -39,7 +39,7 @@ Absences::Cause Absences::add(std::string what, std::string why, Span at, Scope 
 }
 
 void Absences::assume(const std::string& name) {
-    const Cause cause = add(quoted(name), "which is assumed to exist", {}, Scope::names);
+    const Cause cause = add(hal::quoted(name), "which is assumed to exist", {}, Scope::names);
     assumed_.emplace(name, cause);
     note(name, cause);
     std::string dashed = name;
@@ -50,14 +50,14 @@ void Absences::assume(const std::string& name) {
 void Absences::note_program(const std::string& program, const std::vector<std::string>& names) {
     has_programs_ = true;
     const Cause cause =
-        add("program " + quoted(program), "which is not started here", {}, Scope::names);
+        add("program " + hal::quoted(program), "which is not started here", {}, Scope::names);
     for (const std::string& name : names) {
         note(name, cause);
     }
 }
 
 void Absences::note_missing_text(const std::string& path) {
-    add("file " + quoted(path), "which cannot be read", {}, Scope::file);
+    add("file " + hal::quoted(path), "which cannot be read", {}, Scope::file);
 }
 
 std::optional<Absences::Cause> Absences::assumed(const std::string& component) {

@@ -25,11 +25,11 @@ void Edit::undo() {
 
 bool Edit::name_free(std::string_view name, Span at, const char* what) {
     if (model_.find_pin(name)) {
-        return fail("name-taken", at, "pin " + quoted(name) + " already exists", what,
+        return fail("name-taken", at, "pin " + hal::quoted(name) + " already exists", what,
                     "choose other names for the new instances: names=…");
     }
     if (model_.find_signal(name)) {
-        return fail("name-taken", at, "signal " + quoted(name) + " already exists", what,
+        return fail("name-taken", at, "signal " + hal::quoted(name) + " already exists", what,
                     "signals and pins share one set of names; rename the signal or the instance");
     }
     return true;
@@ -93,12 +93,12 @@ bool Edit::add_instance(LoadedComponent& component, std::unique_ptr<Instance>& o
                         std::vector<std::unique_ptr<LoadedFunction>> functions) {
     Instance* const made = owned.get();
     if (const Instance* const there = model_.find_instance(made->name)) {
-        Diagnostic d{
-            Severity::error,
-            "name-taken",
-            "instance " + quoted(made->name) + " already exists (" + there->component->name + ")",
-            {{made->loaded, "second time"}},
-            {}};
+        Diagnostic d{Severity::error,
+                     "name-taken",
+                     "instance " + hal::quoted(made->name) + " already exists (" +
+                         there->component->name + ")",
+                     {{made->loaded, "second time"}},
+                     {}};
         if (there->loaded.known()) {
             d.labels.push_back({there->loaded, "loaded here"});
         }
@@ -148,8 +148,8 @@ bool Edit::names_free(const Instance& of, const std::vector<std::unique_ptr<Pin>
     for (const auto& function : functions) {
         if (model_.find_function(function->name)) {
             return fail("name-taken", of.loaded,
-                        "function " + quoted(function->name) + " already exists", "its function",
-                        "choose another name for the new instance: names=…");
+                        "function " + hal::quoted(function->name) + " already exists",
+                        "its function", "choose another name for the new instance: names=…");
         }
     }
     for (const auto& function : functions) {

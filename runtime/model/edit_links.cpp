@@ -54,7 +54,8 @@ bool Edit::unknown_name(Code code, Word name, const char* what, NameGroup group,
     UnknownName unknown{.name = std::string(name.text),
                         .group = static_cast<std::uint32_t>(group),
                         .before = model_.next_id};
-    diagnostics->error(code, name.span, std::string("unknown ") + what + " " + quoted(name.text),
+    diagnostics->error(code, name.span,
+                       std::string("unknown ") + what + " " + hal::quoted(name.text),
                        std::move(unknown), std::move(help));
     return false;
 }
@@ -69,7 +70,7 @@ Pin* Edit::pin(Word name) {
     if (is_absent(name.text, Absences::Kind::pin)) return nullptr;
     std::string help = pins_of_instance(model_, name.text);
     if (model_.find_signal(name.text)) {
-        help = quoted(name.text) +
+        help = hal::quoted(name.text) +
                " is a signal; gets and sets take signals, net takes one signal and then pins";
     }
     if (help.empty() && model_.pin.empty()) {
@@ -83,7 +84,7 @@ Signal* Edit::signal(Word name) {
     if (Signal* const found = model_.find_signal(name.text)) return found;
     if (is_absent(name.text, Absences::Kind::signal)) return nullptr;
     std::string help = model_.find_pin(name.text)
-                           ? quoted(name.text) + " is a pin; getp, setp and unlinkp take pins"
+                           ? hal::quoted(name.text) + " is a pin; getp, setp and unlinkp take pins"
                        : model_.signal.empty() ? nothing_yet("signal") + "; net creates signals"
                                                : "";
     unknown_name("no-such-signal", name, "signal", NameGroup::signals, std::move(help));
@@ -114,7 +115,7 @@ Thread* Edit::thread(Word name) {
         model_.threads.empty()
             ? "create one first: loadrt threads name1=servo-thread period1=1000000"
             : "threads: " + listed(names(model_.thread));
-    fail("no-such-thread", name.span, "unknown thread " + quoted(name.text),
+    fail("no-such-thread", name.span, "unknown thread " + hal::quoted(name.text),
          did_you_mean(name.text, names(model_.thread)), help);
     return nullptr;
 }
@@ -123,7 +124,7 @@ Signal* Edit::add_signal(Word name, hal_type type, Span typed_at) {
     if (const Signal* const there = model_.find_signal(name.text)) {
         Diagnostic d{Severity::error,
                      "name-taken",
-                     "signal " + quoted(name.text) + " already exists",
+                     "signal " + hal::quoted(name.text) + " already exists",
                      {{name.span, "second time"}},
                      {}};
         if (there->made.known()) {
@@ -134,7 +135,7 @@ Signal* Edit::add_signal(Word name, hal_type type, Span typed_at) {
     }
     if (model_.find_pin(name.text)) {
         fail("signal-named-like-pin", name.span,
-             "signal name " + quoted(name.text) + " is the name of a pin", "a pin",
+             "signal name " + hal::quoted(name.text) + " is the name of a pin", "a pin",
              "write the signal's name first: net SIGNAL " + std::string(name.text));
         return nullptr;
     }
@@ -209,23 +210,24 @@ bool Edit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
         return false;
     };
     if (pin.dir == HAL_DIR_PARAM) {
-        return refuse("parameter-link", quoted(word.text) + " is a parameter and cannot be linked",
-                      "parameter", {}, "", "set it: setp " + std::string(word.text) + " VALUE");
+        return refuse("parameter-link",
+                      hal::quoted(word.text) + " is a parameter and cannot be linked", "parameter",
+                      {}, "", "set it: setp " + std::string(word.text) + " VALUE");
     }
     if (pin.signal) {
-        return refuse(
-            "pin-linked",
-            "pin " + quoted(word.text) + " is already linked to signal " + quoted(pin.signal->name),
-            "second signal", pin.linked_at, "first signal",
-            "unlink it first: unlinkp " + std::string(word.text));
+        return refuse("pin-linked",
+                      "pin " + hal::quoted(word.text) + " is already linked to signal " +
+                          hal::quoted(pin.signal->name),
+                      "second signal", pin.linked_at, "first signal",
+                      "unlink it first: unlinkp " + std::string(word.text));
     }
     if (pin.type != signal.type) {
         const bool writes = pin.dir == HAL_DIR_OUT;
         const std::string convert =
             writes ? conversion(pin.type, signal.type) : conversion(signal.type, pin.type);
         return refuse("type-mismatch",
-                      "signal " + quoted(signal.name) + " carries " + name(signal.type) + ", pin " +
-                          quoted(word.text) + " is " + name(pin.type),
+                      "signal " + hal::quoted(signal.name) + " carries " + name(signal.type) +
+                          ", pin " + hal::quoted(word.text) + " is " + name(pin.type),
                       name(pin.type), signal.typed,
                       "the signal became " + std::string(name(signal.type)) + " here",
                       convert.empty() ? ""
@@ -233,30 +235,31 @@ bool Edit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
                                             " names=" + signal.name + "-conv");
     }
     if (pin.dir == HAL_DIR_OUT && signal.writer) {
-        return refuse("two-writers", "signal " + quoted(signal.name) + " already has a writer",
+        return refuse("two-writers", "signal " + hal::quoted(signal.name) + " already has a writer",
                       "second output", signal.writer->linked_at, "first output",
                       "a signal has one output pin; join two sources with sum2, or2 or mux2");
     }
     if (pin.dir == HAL_DIR_OUT && signal.ios != 0) {
         const auto io = std::find_if(signal.pins.begin(), signal.pins.end(),
                                      [](const Pin* p) { return p->dir == HAL_DIR_IO; });
-        return refuse(
-            "two-writers",
-            "signal " + quoted(signal.name) + " already has I/O pins, so it cannot have an output",
-            "output", (*io)->linked_at, "I/O pin",
-            "I/O pins can share a signal only with other I/O pins and inputs");
+        return refuse("two-writers",
+                      "signal " + hal::quoted(signal.name) +
+                          " already has I/O pins, so it cannot have an output",
+                      "output", (*io)->linked_at, "I/O pin",
+                      "I/O pins can share a signal only with other I/O pins and inputs");
     }
     if (pin.dir == HAL_DIR_IO && signal.writer) {
-        return refuse(
-            "two-writers",
-            "signal " + quoted(signal.name) + " already has a writer, so it cannot have an I/O pin",
-            "I/O pin", signal.writer->linked_at, "output",
-            "I/O pins can share a signal only with other I/O pins and inputs");
+        return refuse("two-writers",
+                      "signal " + hal::quoted(signal.name) +
+                          " already has a writer, so it cannot have an I/O pin",
+                      "I/O pin", signal.writer->linked_at, "output",
+                      "I/O pins can share a signal only with other I/O pins and inputs");
     }
     if (pin.type == HAL_TYPE_PORT && pin.dir == HAL_DIR_IN && signal.readers != 0) {
         const auto reader = std::find_if(signal.pins.begin(), signal.pins.end(),
                                          [](const Pin* p) { return p->dir == HAL_DIR_IN; });
-        return refuse("two-readers", "port signal " + quoted(signal.name) + " already has a reader",
+        return refuse("two-readers",
+                      "port signal " + hal::quoted(signal.name) + " already has a reader",
                       "second reader", (*reader)->linked_at, "first reader",
                       "a byte stream has one writer and one reader");
     }
@@ -382,19 +385,20 @@ bool Edit::set_pin(Word name, Word value) {
     const char* const kind = target->dir == HAL_DIR_PARAM ? "parameter " : "pin ";
     if (target->dir == HAL_DIR_OUT) {
         return fail("output-set", name.span,
-                    "pin " + quoted(name.text) + " is an output: only its component writes it",
+                    "pin " + hal::quoted(name.text) + " is an output: only its component writes it",
                     "output");
     }
     if (target->read_only()) {
-        return fail("output-set", name.span,
-                    "parameter " + quoted(name.text) + " is read-only: only its component sets it",
-                    "read-only");
+        return fail(
+            "output-set", name.span,
+            "parameter " + hal::quoted(name.text) + " is read-only: only its component sets it",
+            "read-only");
     }
     if (target->signal) {
         Diagnostic d{Severity::error,
                      "linked-set",
-                     "pin " + quoted(name.text) + " takes its value from signal " +
-                         quoted(target->signal->name),
+                     "pin " + hal::quoted(name.text) + " takes its value from signal " +
+                         hal::quoted(target->signal->name),
                      {{name.span, "linked"}},
                      {}};
         if (target->linked_at.known()) {
@@ -415,7 +419,7 @@ bool Edit::set_pin(Word name, Word value) {
     const Parsed parsed = parse_wrapping(target->type, value.text);
     if (!parsed.problem.empty()) {
         return fail("bad-value", value.span, parsed.problem,
-                    kind + quoted(name.text) + " is " + hal::name(target->type));
+                    kind + hal::quoted(name.text) + " is " + hal::name(target->type));
     }
     warn_of_wrap(value, target->type, parsed);
     if (target->home) {
@@ -434,13 +438,14 @@ bool Edit::set_signal(Word name, Word value) {
     if (target->type == HAL_TYPE_PORT) {
         const Parsed bytes = parse_value(HAL_TYPE_U32, value.text);
         if (!bytes.problem.empty() || bytes.value.u32 == 0 || bytes.value.u32 > (1u << 30)) {
-            return fail("bad-value", value.span,
-                        quoted(value.text) + " is not a buffer size in bytes (1 to 1073741824)",
-                        "port signal");
+            return fail(
+                "bad-value", value.span,
+                hal::quoted(value.text) + " is not a buffer size in bytes (1 to 1073741824)",
+                "port signal");
         }
         if (target->port) {
             return fail("port-sized", name.span,
-                        "port signal " + quoted(name.text) + " already has a buffer", "",
+                        "port signal " + hal::quoted(name.text) + " already has a buffer", "",
                         "its size is fixed once set");
         }
         auto room = std::make_unique<std::uint8_t[]>(bytes.value.u32);
@@ -460,12 +465,12 @@ bool Edit::set_signal(Word name, Word value) {
         return true;
     }
     if (target->writer) {
-        Diagnostic d{
-            Severity::error,
-            "writer-set",
-            "signal " + quoted(name.text) + " is written by " + quoted(target->writer->name),
-            {{name.span, "has a writer"}},
-            {}};
+        Diagnostic d{Severity::error,
+                     "writer-set",
+                     "signal " + hal::quoted(name.text) + " is written by " +
+                         hal::quoted(target->writer->name),
+                     {{name.span, "has a writer"}},
+                     {}};
         if (target->writer->linked_at.known()) {
             d.labels.push_back({target->writer->linked_at, "linked here"});
         }
@@ -477,7 +482,7 @@ bool Edit::set_signal(Word name, Word value) {
     const Parsed parsed = parse_wrapping(target->type, value.text);
     if (!parsed.problem.empty()) {
         return fail("bad-value", value.span, parsed.problem,
-                    "signal " + quoted(name.text) + " is " + hal::name(target->type));
+                    "signal " + hal::quoted(name.text) + " is " + hal::name(target->type));
     }
     warn_of_wrap(value, target->type, parsed);
     signal_values[target] = parsed.value;
@@ -511,10 +516,11 @@ bool Edit::alias(Word name, Word second) {
     if (!target) return false;
     if (model_.find_pin(second.text)) {
         return fail("name-taken", second.span,
-                    "pin or alias " + quoted(second.text) + " already exists");
+                    "pin or alias " + hal::quoted(second.text) + " already exists");
     }
     if (model_.find_signal(second.text)) {
-        return fail("name-taken", second.span, "signal " + quoted(second.text) + " already exists");
+        return fail("name-taken", second.span,
+                    "signal " + hal::quoted(second.text) + " already exists");
     }
     change_alias(*target, std::string(second.text));
     return true;

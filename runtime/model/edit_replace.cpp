@@ -228,9 +228,9 @@ struct Comparison {
     void vanished(Pin& pin, const char* why) const {
         r.gone_pins.push_back(&pin);
         if (pin.signal) {
-            return conflict("pin " + quoted(pin.name) + " " + why +
+            return conflict("pin " + hal::quoted(pin.name) + " " + why +
                                 " in the new version, but is linked to signal " +
-                                quoted(pin.signal->name),
+                                hal::quoted(pin.signal->name),
                             pin.linked_at, "linked here", "unlink it first: unlinkp " + pin.name);
         }
         const bool settable =
@@ -239,7 +239,7 @@ struct Comparison {
             __atomic_load_n(&edit.present(pin).slot->raw, __ATOMIC_RELAXED) != pin.initial.raw) {
             edit.diagnostics->warning("reload-dropped", at,
                                       (pin.dir == HAL_DIR_PARAM ? "parameter " : "pin ") +
-                                          quoted(pin.name) + " " + why +
+                                          hal::quoted(pin.name) + " " + why +
                                           " in the new version: its value is lost",
                                       "", "change any setp of it in the netlist");
         }
@@ -255,10 +255,10 @@ struct Comparison {
             Pin& pin = *pair.kept->pins[i];
             if (fresh_of[i]) {
                 if (pin.signal && fresh_of[i]->dir != pin.dir) {
-                    conflict("pin " + quoted(pin.name) + " has direction " +
+                    conflict("pin " + hal::quoted(pin.name) + " has direction " +
                                  name(fresh_of[i]->dir) + " in the new version, not " +
                                  name(pin.dir) + ", and is linked to signal " +
-                                 quoted(pin.signal->name),
+                                 hal::quoted(pin.signal->name),
                              pin.linked_at, "linked here", "unlink it first: unlinkp " + pin.name);
                 }
                 continue;
@@ -287,9 +287,9 @@ struct Comparison {
             if (stays[i]) continue;
             r.gone_functions.push_back(&function);
             if (function.thread) {
-                conflict("function " + quoted(function.name) +
+                conflict("function " + hal::quoted(function.name) +
                              " is missing in the new version, but is in thread " +
-                             quoted(function.thread->name),
+                             hal::quoted(function.thread->name),
                          function.added, "added here",
                          "remove it first: delf " + function.name + " " + function.thread->name);
             }
@@ -328,7 +328,7 @@ bool Edit::replace(LoadedComponent& component, std::unique_ptr<LoadedComponent>&
     comparison.compare_functions();
     for (const LoadedFunction* const function : r->new_functions) {
         if (model_.find_function(function->name)) {
-            fail("name-taken", at, "function " + quoted(function->name) + " already exists",
+            fail("name-taken", at, "function " + hal::quoted(function->name) + " already exists",
                  "its function");
         }
     }

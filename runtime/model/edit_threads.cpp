@@ -14,7 +14,7 @@ Thread* Edit::add_thread(Word name, const ThreadOptions& options) {
     if (const Thread* const there = model_.find_thread(name.text)) {
         Diagnostic d{Severity::error,
                      "name-taken",
-                     "thread " + quoted(name.text) + " already exists",
+                     "thread " + hal::quoted(name.text) + " already exists",
                      {{name.span, "second time"}},
                      {}};
         if (there->made.known()) {
@@ -113,8 +113,8 @@ bool Edit::add_function(Word function_name, Word thread_name, int position, Span
     if (target->thread) {
         Diagnostic d{Severity::error,
                      "function-in-thread",
-                     "function " + quoted(target->name) + " is already in thread " +
-                         quoted(target->thread->name),
+                     "function " + hal::quoted(target->name) + " is already in thread " +
+                         hal::quoted(target->thread->name),
                      {{function_name.span, "second time"}},
                      {}};
         if (target->added.known()) {
@@ -127,7 +127,7 @@ bool Edit::add_function(Word function_name, Word thread_name, int position, Span
     }
     if (init && to->init_done) {
         return fail("init-done", function_name.span,
-                    "thread " + quoted(to->name) +
+                    "thread " + hal::quoted(to->name) +
                         " has already made its first pass; the initf function would never run",
                     "too late", "add it before start, or with addf");
     }
@@ -141,7 +141,7 @@ bool Edit::add_function(Word function_name, Word thread_name, int position, Span
     const int index = position > 0 ? position - 1 : size + 1 + position;
     if (index < 0 || index > size) {
         return fail("bad-position", position_at,
-                    "thread " + quoted(to->name) + " has " + std::to_string(size) +
+                    "thread " + hal::quoted(to->name) + " has " + std::to_string(size) +
                         (size == 1 ? " function" : " functions") + ", position " +
                         std::to_string(position) + " does not exist",
                     "",
@@ -172,8 +172,9 @@ bool Edit::remove_function(Word function_name, Word thread_name) {
     if (target->thread != from) {
         return fail(
             "not-in-thread", function_name.span,
-            "function " + quoted(target->name) + " is not in thread " + quoted(from->name), "",
-            target->thread ? "it is in thread " + target->thread->name : "it is in no thread");
+            "function " + hal::quoted(target->name) + " is not in thread " +
+                hal::quoted(from->name),
+            "", target->thread ? "it is in thread " + target->thread->name : "it is in no thread");
     }
     take_from_thread(*target);
     return true;

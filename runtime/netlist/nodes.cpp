@@ -23,14 +23,15 @@ bool good_name(std::string_view name) {
 }
 
 /// Names and options of one line.
-struct Line {
+struct ParsedLine {
     std::vector<const Token*> names;
     std::int64_t rate_ns = 0;
     std::int64_t deadline_ns = 0;
     Span options_at;
 };
 
-bool read_option(const Token& token, std::size_t equals, Line& line, Diagnostics& diagnostics) {
+bool read_option(const Token& token, std::size_t equals, ParsedLine& line,
+                 Diagnostics& diagnostics) {
     const std::string key = token.text.substr(0, equals);
     const std::string value = token.text.substr(equals + 1);
     if (key != "rate" && key != "deadline") {
@@ -49,7 +50,7 @@ bool read_option(const Token& token, std::size_t equals, Line& line, Diagnostics
     return true;
 }
 
-bool read_line(const Command& command, Line& line, Diagnostics& diagnostics) {
+bool read_line(const Command& command, ParsedLine& line, Diagnostics& diagnostics) {
     bool good = true;
     for (const Token& token : command.args) {
         if (const auto equals = token.text.find('='); equals != std::string::npos) {
@@ -81,7 +82,7 @@ bool read_line(const Command& command, Line& line, Diagnostics& diagnostics) {
 }
 
 /// Sets rate= and deadline= of a node; different values in two lines are an error.
-void take_options(NodeLine& node, const Line& line, Diagnostics& diagnostics) {
+void take_options(NodeLine& node, const ParsedLine& line, Diagnostics& diagnostics) {
     const bool again =
         (line.rate_ns != 0 && node.rate_ns != 0 && line.rate_ns != node.rate_ns) ||
         (line.deadline_ns != 0 && node.deadline_ns != 0 && line.deadline_ns != node.deadline_ns);
@@ -118,7 +119,7 @@ void collect_nodes(const std::vector<Command>& commands, std::vector<NodeLine>& 
     for (const Command& written : commands) {
         if (!is_node_line(written)) continue;
         for (const Command& command : expand(written, diagnostics)) {
-            Line line;
+            ParsedLine line;
             if (!read_line(command, line, diagnostics)) continue;
             for (const Token* const token : line.names) {
                 if (token->text == "all") continue;

@@ -26,7 +26,7 @@ std::vector<std::string> environment_names() {
     return names;
 }
 
-std::string bracketed(std::string_view section, std::string_view key) {
+std::string reference_text(std::string_view section, std::string_view key) {
     return "[" + std::string(section) + "]" + std::string(key);
 }
 
@@ -264,7 +264,7 @@ private:
     }
 
     void report_key(const Reference& reference, Span at) {
-        const std::string name = bracketed(reference.section, reference.name);
+        const std::string name = reference_text(reference.section, reference.name);
         if (environment_->ini == nullptr || environment_->ini->empty()) {
             return error("unset-ini-key", at, "'" + name + "' has no value: no INI file was given",
                          "", "specify it with --ini FILE.ini (halcmd: -i FILE.ini)");
