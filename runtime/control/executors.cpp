@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "control/executors.hpp"
+#include "execute/process_setup.hpp"
 
 namespace hal {
 
@@ -31,6 +32,7 @@ void Executors::end() {
 }
 
 void Executors::work() {
+    release_unused_stack();
     for (;;) {
         ServedClient* client = nullptr;
         {

@@ -12,6 +12,7 @@
 
 #include "commands/shell.hpp"
 #include "control/server_state.hpp"
+#include "execute/process_setup.hpp"
 #include "machine/session.hpp"
 
 namespace hal {
@@ -65,6 +66,7 @@ ServerCounts Server::counts() const {
 }
 
 void Server::State::serve() {
+    release_unused_stack();
     pool.start();
     keep_spare();
     std::vector<pollfd> ready;
@@ -356,6 +358,7 @@ void Server::State::start_worker(ServedClient& client, std::string request) {
     client.connection->cancel(false);
     client.finished = false;
     client.worker = std::thread([this, &client, line = std::move(request)] {
+        release_unused_stack();
         client.connection->handle(line, client.result, true);
         ++requests;
         client.finished.store(true, std::memory_order_release);

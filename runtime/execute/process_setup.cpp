@@ -25,23 +25,7 @@ bool may_lock_memory() {
     return false;
 }
 
-}  // namespace
-
-void limit_helper_stacks() {
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // whose frames are larger
-    constexpr std::size_t most = 1 << 20;
-    pthread_attr_t attributes;
-    if (pthread_getattr_default_np(&attributes) != 0) return;
-    std::size_t size = 0;
-    if (pthread_attr_getstacksize(&attributes, &size) == 0 && size > most &&
-        pthread_attr_setstacksize(&attributes, most) == 0) {
-        pthread_setattr_default_np(&attributes);
-    }
-    pthread_attr_destroy(&attributes);
-#endif
-}
-
-std::vector<std::string> prepare_process() {
+std::vector<std::string> prepare() {
     std::vector<std::string> refused;
     // Under a small limit MCL_FUTURE would make later allocations fail, which is worse than a page
     // fault.
@@ -58,6 +42,48 @@ std::vector<std::string> prepare_process() {
         const std::int32_t none = 0;
         [[maybe_unused]] const auto written = ::write(latency, &none, sizeof none);
     }
+    return refused;
+}
+
+}  // namespace
+
+void limit_helper_stacks() {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // whose frames are larger
+    // Less than a real-time thread asks for: glibc gives the stack of an ended thread to a new one
+    // that asks for as much or less, and release_unused_stack() may have unlocked it.
+    constexpr std::size_t most = (1 << 20) - (1 << 16);
+    pthread_attr_t attributes;
+    if (pthread_getattr_default_np(&attributes) != 0) return;
+    std::size_t size = 0;
+    if (pthread_attr_getstacksize(&attributes, &size) == 0 && size > most &&
+        pthread_attr_setstacksize(&attributes, most) == 0) {
+        pthread_setattr_default_np(&attributes);
+    }
+    pthread_attr_destroy(&attributes);
+#endif
+}
+
+void release_unused_stack([[maybe_unused]] std::size_t kept_bytes) noexcept {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    pthread_attr_t attributes;
+    if (pthread_getattr_np(pthread_self(), &attributes) != 0) return;
+    void* lowest = nullptr;
+    std::size_t size = 0;
+    if (pthread_attr_getstack(&attributes, &lowest, &size) == 0) {
+        const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+        const auto begin = reinterpret_cast<std::uintptr_t>(lowest);
+        const auto frame = reinterpret_cast<std::uintptr_t>(__builtin_frame_address(0));
+        const std::uintptr_t end = (frame - kept_bytes) / page * page;
+        if (end > begin && end < begin + size && munlock(lowest, end - begin) == 0) {
+            madvise(lowest, end - begin, MADV_DONTNEED);
+        }
+    }
+    pthread_attr_destroy(&attributes);
+#endif
+}
+
+const std::vector<std::string>& prepare_process() {
+    static const std::vector<std::string> refused = prepare();
     return refused;
 }
 

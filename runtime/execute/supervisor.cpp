@@ -12,6 +12,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "execute/process_setup.hpp"
 namespace hal {
 namespace {
 
@@ -204,6 +205,8 @@ void Supervisor::settle_down() {
 }
 
 void Supervisor::work() {
+    // functions that set safe values may run here
+    release_unused_stack(1 << 18);
     raise_priority();
     const auto asleep = [] { return clock_ns(CLOCK_BOOTTIME) - clock_ns(CLOCK_MONOTONIC); };
     std::int64_t asleep_before = asleep();

@@ -9,6 +9,7 @@
 
 #include "base/types.hpp"
 #include "execute/crash_table.hpp"
+#include "execute/process_setup.hpp"
 #include "machine/crash.hpp"
 
 namespace hal {
@@ -70,6 +71,7 @@ std::string wall_time(std::int64_t ns) {
 }  // namespace
 
 void CycleGuard::work() {
+    release_unused_stack();
     std::unique_lock lock(mutex_);
     while (!over_) {
         const std::int64_t interval =

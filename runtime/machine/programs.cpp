@@ -11,6 +11,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "execute/process_setup.hpp"
 #include "machine/session.hpp"
 
 namespace hal {
@@ -187,6 +188,7 @@ void Programs::abandon(pid_t pid) {
 }
 
 void Programs::reap() {
+    release_unused_stack();
     std::vector<pollfd> waiting;
     SessionLock lock = session_.lock();
     while (!ending_) {

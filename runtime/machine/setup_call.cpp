@@ -8,13 +8,14 @@
 #include <unistd.h>
 
 #include "execute/crash_table.hpp"
+#include "execute/process_setup.hpp"
 #include "machine/crash.hpp"
 
 namespace hal {
 namespace {
 
 // The thread that is in the call may hold any lock, the allocator's among them.
-void print(const char* text) noexcept {
+void print_text(const char* text) noexcept {
     [[maybe_unused]] const auto written = write(STDERR_FILENO, text, std::strlen(text));
 }
 
@@ -27,31 +28,32 @@ void print_seconds(std::int64_t ns) noexcept {
     do {
         *--at = static_cast<char>('0' + seconds % 10);
     } while ((seconds /= 10) != 0);
-    print(at);
-    print(" s");
+    print_text(at);
+    print_text(" s");
 }
 
 void print_name(const SetupCallNow& call) noexcept {
-    print("hal: '");
-    print(call.instance);
-    print("' (");
-    print(call.component);
-    print(")");
+    print_text("hal: '");
+    print_text(call.instance);
+    print_text("' (");
+    print_text(call.component);
+    print_text(")");
 }
 
 void print_announced(const SetupCallNow& call, std::int64_t expected_ns) noexcept {
     print_name(call);
-    print(" needs up to ");
+    print_text(" needs up to ");
     print_seconds(expected_ns);
-    print(" to ");
-    print(call.what);
-    print(": ");
-    print(call.why);
-    print("\n");
+    print_text(" to ");
+    print_text(call.what);
+    print_text(": ");
+    print_text(call.why);
+    print_text("\n");
 }
 
 void watch(const SetupGuard::Flags& flags) noexcept {
-    constexpr std::int64_t patience_ns = 2'000'000'000;
+    release_unused_stack();
+    constexpr std::int64_t announce_after_ns = 2'000'000'000;
     constexpr std::int64_t end_after_ns = 13'000'000'000;
     const SetupCallNow& call = SetupCall::now;
     std::int64_t named_ns = 0;
@@ -69,8 +71,8 @@ void watch(const SetupGuard::Flags& flags) noexcept {
         const std::int64_t waited = monotonic_ns() - std::max(ending_ns, since);
 
         const std::int64_t expected = call.expected_ns.load();
-        const std::int64_t name_after_ns = patience_ns + expected;
-        if (expected > patience_ns && waited >= patience_ns && announced_ns != since) {
+        const std::int64_t name_after_ns = announce_after_ns + expected;
+        if (expected > announce_after_ns && waited >= announce_after_ns && announced_ns != since) {
             announced_ns = since;
             print_announced(call, expected);
         }
@@ -81,13 +83,13 @@ void watch(const SetupGuard::Flags& flags) noexcept {
             make_all_safe();
         }
         print_name(call);
-        print(" has not returned from ");
-        print(call.what);
-        print(" for ");
+        print_text(" has not returned from ");
+        print_text(call.what);
+        print_text(" for ");
         print_seconds(ends ? name_after_ns + end_after_ns : name_after_ns);
-        print(ends             ? "; outputs set to their safe values; the process ends\n"
-              : ending_ns != 0 ? "; the machine ends when it returns, at the latest in 13 s\n"
-                               : "; all commands wait for it\n");
+        print_text(ends             ? "; outputs set to their safe values; the process ends\n"
+                   : ending_ns != 0 ? "; the machine ends when it returns, at the latest in 13 s\n"
+                                    : "; all commands wait for it\n");
         if (ends) {
             end_process(1);
         }

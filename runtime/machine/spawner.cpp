@@ -19,6 +19,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "execute/process_setup.hpp"
 #include "machine/plugins.hpp"
 #include "machine/programs.hpp"
 #include "paths.hpp"
@@ -215,6 +216,7 @@ Spawner::~Spawner() {
 }
 
 void Spawner::work() {
+    release_unused_stack();
     std::unique_lock lock(mutex_);
     while (true) {
         changed_.wait(lock, [&] { return ending_ || (job_ && !job_->done); });

@@ -15,6 +15,7 @@
 #include <unistd.h>
 #include <utility>
 
+#include "execute/process_setup.hpp"
 #include "hal/clock.hpp"
 
 namespace hal::tools {
@@ -125,6 +126,7 @@ void StopRequest::spare(bool on) {
 }
 
 void StopRequest::serve() {
+    release_unused_stack();
     for (;;) {
         pollfd both[2] = {{signals_, POLLIN, 0}, {done_, POLLIN, 0}};
         if (::poll(both, 2, -1) < 0) continue;

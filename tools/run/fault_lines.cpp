@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "execute/core.hpp"
+#include "execute/process_setup.hpp"
 
 namespace hal::tools {
 
@@ -47,6 +48,7 @@ FaultLines::~FaultLines() {
 }
 
 void FaultLines::work() {
+    release_unused_stack();
     for (std::unique_lock lock(mutex_);
          !wake_.wait_for(lock, interval, [this] { return ending_; });) {
         look(monotonic_ns());

@@ -10,6 +10,7 @@
 
 #include "cli/output.hpp"
 #include "commands/files.hpp"
+#include "execute/process_setup.hpp"
 #include "machine/address.hpp"
 #include "machine/source_tree.hpp"
 #include "tcl/tcl.hpp"
@@ -96,6 +97,15 @@ private:
     Output& output_;
 };
 
+/// Starts the process that reports how this one ended, and prepares this one before its first
+/// thread.
+std::unique_ptr<ExitObserver> start_observer(const std::string& name, bool virtual_clock) {
+    if (virtual_clock) return nullptr;
+    auto observer = std::make_unique<ExitObserver>(name);
+    prepare_process();
+    return observer;
+}
+
 }  // namespace
 
 std::string own_name(const NetlistOptions& options) {
@@ -107,7 +117,7 @@ std::string own_name(const NetlistOptions& options) {
 
 HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& name,
                              bool virtual_clock)
-    : observer_(virtual_clock ? nullptr : std::make_unique<ExitObserver>(name)),
+    : observer_(start_observer(name, virtual_clock)),
       session(session_options(options, name, virtual_clock, observer_.get())),
       shell(session, shell_options(options)),
       options_(options) {

@@ -14,6 +14,7 @@
 #include "base/types.hpp"
 #include "cli/output.hpp"
 #include "cli/screen.hpp"
+#include "execute/process_setup.hpp"
 #include "run/canvas.hpp"
 
 namespace hal::tools {
@@ -161,6 +162,7 @@ struct Picture::State {
     }
 
     void loop() {
+        release_unused_stack();
         for (std::unique_lock lock(mutex); !ending;
              wake.wait_for(lock, std::chrono::milliseconds(50), [this] { return ending; })) {
             draw();

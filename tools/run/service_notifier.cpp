@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "run/service_notifier.hpp"
+#include "execute/process_setup.hpp"
 
 #include <cerrno>
 #include <cstdlib>
@@ -85,6 +86,7 @@ std::string ServiceNotifier::watchdog_device(std::string& problem) {
 }
 
 void ServiceNotifier::forward(int from) const {
+    release_unused_stack();
     std::int64_t sent_us = 0;
     char signs[64];
     for (ssize_t count = 0;
