@@ -47,7 +47,21 @@ if(HALCYON_LIGHTLY_OPTIMISED AND NOT HALCYON_SANITIZE)
 endif()
 set(HALCYON_TEST_OPTIONS -O0)  # for the tests' own sources: their assertions take longer to optimise than to run
 if(NOT HALCYON_SANITIZE AND NOT HALCYON_LIGHTLY_OPTIMISED)
-    set(HALCYON_TOOL_OPTIONS "$<$<CONFIG:Release>:-Os>")  # for programs and their commands, which are not real time
+    # For what is not real time: programs, their commands, and the runtime from the machine to the control socket. The model and what reads
+    # netlists keep -O2: a large machine loads a tenth faster.
+    set(HALCYON_TOOL_OPTIONS "$<$<CONFIG:Release>:-Os>")
+endif()
+# A unit of twenty sources takes up to 0.8 GB of memory, one of eight 0.5 GB. Large units need it for each processor.
+cmake_host_system_information(RESULT memory_mb QUERY TOTAL_PHYSICAL_MEMORY)
+cmake_host_system_information(RESULT processors QUERY NUMBER_OF_LOGICAL_CORES)
+math(EXPR memory_mb "${memory_mb} / ${processors}")
+set(HALCYON_UNIT_SOURCES 8)
+if(memory_mb GREATER 1200)
+    set(HALCYON_UNIT_SOURCES 20)
+    if(HALCYON_QUICK AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+        # From 128 MB on, g++ collects its garbage again and again while it reads headers: 5 % of the time.
+        add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:--param=ggc-min-heapsize=600000>")
+    endif()
 endif()
 
 # Optional packages, a file of each, and for the script `hal` the part of the tree that needs it: a build configures again when one of them
@@ -73,14 +87,17 @@ function(halcyon_needs name)
     endif()
 endfunction()
 
-# halcyon_unity(TARGET [ALONE SOURCE...]): compiles the sources of a target eight at a time: without optimisation most of the time goes into
-# reading the same headers. Two sources of such a target must not define the same name differently, not even in anonymous namespaces;
+# halcyon_unity(TARGET [BATCH NUMBER] [ALONE SOURCE...]): compiles the sources of a target eight, or BATCH, at a time: without optimisation most of
+# the time goes into reading the same headers and instantiating the same templates. Two sources of such a target must not define the same name differently, not even in anonymous namespaces;
 # ALONE lists those that do: they are compiled one by one, as are those that cmake/alone.awk finds. For sources without optimisation; for the
-# others with HALCYON_QUICK only, because a change then compiles eight of them.
+# others with HALCYON_QUICK only, because a change then compiles as many of them.
 function(halcyon_unity target)
-    cmake_parse_arguments(PARSE_ARGV 1 with "" "" ALONE)
+    cmake_parse_arguments(PARSE_ARGV 1 with "" BATCH ALONE)
+    if(NOT with_BATCH)
+        set(with_BATCH 8)
+    endif()
     if(HALCYON_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_CLANG_TIDY)
-        set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+        set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${with_BATCH})
         get_target_property(sources ${target} SOURCES)
         list(FILTER sources INCLUDE REGEX "[.]cpp$")
         list(FILTER sources EXCLUDE REGEX "^[$]<")
@@ -161,15 +178,32 @@ if(HALCYON_RTSAN_ARCHIVE)
                           "$<LINK_LIBRARY:WHOLE_ARCHIVE,${HALCYON_RTSAN_ARCHIVE}>" ${CMAKE_DL_LIBS} pthread rt m)
 endif()
 
-# halcyon_folder(NAME DEPENDENCY... [ALONE SOURCE...]): the library halcyon_NAME from all sources in runtime/NAME; ALONE as in halcyon_unity().
+# halcyon_precompiled(TARGET): for a target with HALCYON_TOOL_OPTIONS: runtime/precompiled.hpp, compiled once for all of them.
+function(halcyon_precompiled target)
+    if(NOT TARGET halcyon_precompiled_runtime)
+        file(CONFIGURE OUTPUT "${PROJECT_BINARY_DIR}/generated/precompiled.cpp" CONTENT "// Gives the precompiled header a target to belong to.\n")
+        add_library(halcyon_precompiled_runtime OBJECT "${PROJECT_BINARY_DIR}/generated/precompiled.cpp")
+        target_compile_options(halcyon_precompiled_runtime PRIVATE ${HALCYON_TOOL_OPTIONS})
+        target_link_libraries(halcyon_precompiled_runtime PRIVATE fmt::fmt nlohmann_json::nlohmann_json)
+        target_precompile_headers(halcyon_precompiled_runtime PRIVATE "${PROJECT_SOURCE_DIR}/runtime/precompiled.hpp")
+    endif()
+    target_compile_options(${target} PRIVATE ${HALCYON_TOOL_OPTIONS} -fPIC)  # a program's -fPIE would not fit the header
+    target_precompile_headers(${target} REUSE_FROM halcyon_precompiled_runtime)
+endfunction()
+
+# halcyon_folder(NAME DEPENDENCY... [NOT_REALTIME] [ALONE SOURCE...]): the library halcyon_NAME from all sources in runtime/NAME; ALONE as in
+# halcyon_unity(). NOT_REALTIME: compiled with HALCYON_TOOL_OPTIONS and the precompiled header.
 function(halcyon_folder name)
-    cmake_parse_arguments(PARSE_ARGV 1 with "" "" ALONE)
+    cmake_parse_arguments(PARSE_ARGV 1 with NOT_REALTIME "" ALONE)
     file(GLOB_RECURSE sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/runtime/${name}/*.cpp")
     if(sources)
         set(scope PUBLIC)
         add_library(halcyon_${name} STATIC ${sources})
         list(TRANSFORM with_ALONE PREPEND "${PROJECT_SOURCE_DIR}/runtime/${name}/")
-        halcyon_unity_quick(halcyon_${name} ALONE ${with_ALONE})
+        halcyon_unity_quick(halcyon_${name} BATCH ${HALCYON_UNIT_SOURCES} ALONE ${with_ALONE})
+        if(with_NOT_REALTIME)
+            halcyon_precompiled(halcyon_${name})
+        endif()
     else()
         set(scope INTERFACE)
         add_library(halcyon_${name} INTERFACE)
