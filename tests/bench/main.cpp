@@ -66,7 +66,8 @@ constexpr Section sections[] = {
     {"vision", "markers in frames of 640 x 480: error and time", vision, true},
     {"dds", "64 pins from process to process, against a bare Fast DDS writer", dds},
     {"size",
-     "of the program; with --full from a fresh clone to first motion, complete build, second start",
+     "of the program; with --full fresh clones of this commit and an earlier one: first motion, "
+     "complete build and test, memory",
      size},
     {"canopen-boot", "a CANopen network of 127 nodes, in memory and on vcan", canopen_boot},
 };

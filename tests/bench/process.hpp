@@ -39,6 +39,7 @@ public:
     ~Child();
     Child(const Child&) = delete;
     bool alive();
+    pid_t pid() const { return pid_; }
     void write(const std::string& text);
     /// The next line of its output without its end, or nothing after `most_ms`.
     std::optional<std::string> line(int most_ms = 2000);
