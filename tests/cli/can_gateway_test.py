@@ -83,6 +83,19 @@ class Gateway(Node):
         other = self.client(str(self.folder / "gate"))
         self.assertEqual("ERROR:105 #no default node set", other.ask("r 0x1018 4 u32"))
 
+    def test_a_client_that_has_ended_its_commands_gets_all_responses(self):
+        self.gateway("--listen", "127.0.0.1:0", "--state", "gate.state")
+        port = int(self.said.split("127.0.0.1:")[1].split(";")[0])
+        client = self.client(("127.0.0.1", port))
+        commands = "[1] 1 5 r 0x1018 4 u32\n[2] 1 9 r 0x1000 0\n[3] 1 5 r 0x1018 0 u8\n[4] 1 5 r"
+        client.socket.sendall(commands.encode())
+        client.socket.shutdown(socket.SHUT_WR)
+        responses = sorted(line for line in client.lines if line.startswith("["))
+        self.assertEqual(
+            ["[1] 1\n", "[2] ERROR:0x05040000 #SDO protocol timed out\n", "[3] 4\n"],
+            [line.replace("\r", "") for line in responses],
+        )
+
     def test_a_port_of_this_machine_and_kept_settings(self):
         first = self.gateway("--listen", "127.0.0.1:0", "--state", "gate.state")
         port = int(self.said.split("127.0.0.1:")[1].split(";")[0])

@@ -136,7 +136,15 @@ bool listen_on_port(const GatewayOptions& options, Listener& out) {
 
 struct Connection {
     int fd, client;
+    /// it sends no more commands, but may still read responses
+    bool input_ended = false;
 };
+
+/// Returns true when the other side has closed both directions.
+bool is_closed(int fd) {
+    pollfd state{fd, 0, 0};
+    return ::poll(&state, 1, 0) > 0 && (state.revents & (POLLHUP | POLLERR)) != 0;
+}
 
 class Server {
 public:
@@ -168,7 +176,9 @@ public:
             serve(listener);
             gateway_.poll(monotonic_ns());
             carry();
-            std::erase_if(connections_, [this](const Connection& c) { return !flush(c); });
+            std::erase_if(connections_, [this](const Connection& c) {
+                return !flush(c) || (c.input_ended && gateway_.is_served(c.client) && end(c));
+            });
         }
         return 0;
     }
@@ -187,10 +197,9 @@ private:
             all.push_back({link->descriptor(), POLLIN, 0});
         }
         for (const Connection& c : connections_) {
-            all.push_back(
-                {c.fd,
-                 static_cast<short>(POLLIN | (gateway_.output(c.client).empty() ? 0 : POLLOUT)),
-                 0});
+            const int reads = c.input_ended ? 0 : POLLIN;
+            const int writes = gateway_.output(c.client).empty() ? 0 : POLLOUT;
+            all.push_back({c.fd, static_cast<short>(reads | writes), 0});
         }
         ::poll(all.data(), all.size(), gateway_.idle() && polled ? 20 : 1);
     }
@@ -220,14 +229,26 @@ private:
             ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
             connections_.push_back({fd, gateway_.connect()});
         }
-        char bytes[65536];
-        std::erase_if(connections_, [&](const Connection& c) {
-            const ssize_t got = ::recv(c.fd, bytes, sizeof bytes, 0);
-            if (got > 0) {
-                gateway_.receive(c.client, {bytes, static_cast<std::size_t>(got)}, monotonic_ns());
+        for (auto c = connections_.begin(); c != connections_.end();) {
+            if (receive(*c)) {
+                ++c;
+            } else {
+                end(*c);
+                c = connections_.erase(c);
             }
-            return (got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR)) && end(c);
-        });
+        }
+    }
+    /// Returns false when the client has disconnected.
+    bool receive(Connection& c) {
+        if (c.input_ended) return !is_closed(c.fd);
+        char bytes[65536];
+        const ssize_t got = ::recv(c.fd, bytes, sizeof bytes, 0);
+        if (got < 0) return errno == EAGAIN || errno == EINTR;
+        c.input_ended = got == 0;
+        if (got > 0) {
+            gateway_.receive(c.client, {bytes, static_cast<std::size_t>(got)}, monotonic_ns());
+        }
+        return true;
     }
     bool end(const Connection& c) {
         gateway_.disconnect(c.client);

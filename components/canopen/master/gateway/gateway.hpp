@@ -79,6 +79,12 @@ public:
     /// exceeds most_output does not read and should be disconnected.
     std::string& output(int client) { return clients_[static_cast<std::size_t>(client)].out; }
 
+    /// Returns true when all commands of a client are done and the caller has sent the output.
+    bool is_served(int client) const {
+        const Client& c = clients_[static_cast<std::size_t>(client)];
+        return c.pending == 0 && c.out.empty();
+    }
+
     /// Returns the transmit queue of a net.
     FrameQueue& out(unsigned net) { return nets_[net - 1]->out; }
     /// Processes a received frame.
