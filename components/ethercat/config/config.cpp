@@ -318,6 +318,19 @@ const esi::File* Descriptions::get(const Word& file, Report& report) {
                         m.help);
                 }
             }
+            const auto warnings = std::count_if(
+                read.messages.begin(), read.messages.end(),
+                [](const esi::Message& m) { return m.severity == Severity::warning; });
+            if (read.good() && warnings != 0) {
+                const esi::Message& first = read.messages.front();
+                std::string sentence =
+                    "'" + path + "', line " + std::to_string(first.at.line) + ": " + first.sentence;
+                if (warnings > 1) {
+                    sentence += ", and " + std::to_string(warnings - 1) + " more";
+                }
+                report.warning(Topic::value, file.at, std::move(sentence),
+                               "correct the description where the master uses it");
+            }
             if (read.good()) {
                 at->second = std::move(read);
             }

@@ -212,7 +212,7 @@ private:
                 to.initial.assign(s.begin(), s.end());
             } else if (to.bits <= 64) {
                 const auto n = static_cast<std::uint64_t>(
-                    context_.number_of(value, "DefaultValue", value.child_value(), 0));
+                    context_.number_of<std::int64_t>(value, "DefaultValue", value.child_value()));
                 for (unsigned i = 0; i < (to.bits + 7) / 8; ++i) {
                     to.initial.push_back(static_cast<std::uint8_t>(n >> (8 * i)));
                 }

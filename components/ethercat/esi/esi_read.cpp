@@ -164,8 +164,8 @@ private:
             pdo.fixed = Context::flag(p, "Fixed");
             pdo.mandatory = Context::flag(p, "Mandatory");
             for (const Xml e : p.children("Exclude")) {
-                pdo.exclude.push_back(static_cast<std::uint16_t>(
-                    context_.number_of(e, "Exclude", e.child_value(), 0)));
+                pdo.exclude.push_back(
+                    context_.number_of<std::uint16_t>(e, "Exclude", e.child_value()));
             }
             for (const Xml e : p.children("Entry")) {
                 Entry entry;
@@ -279,8 +279,7 @@ private:
         Slot s;
         s.name = text_of(node, "Name");
         for (const Xml m : node.children("ModuleIdent")) {
-            const auto ident = static_cast<std::uint32_t>(
-                context_.number_of(m, "ModuleIdent", m.child_value(), 0));
+            const auto ident = context_.number_of<std::uint32_t>(m, "ModuleIdent", m.child_value());
             s.modules.push_back(ident);
             if (Context::flag(m, "Default")) {
                 s.default_module = ident;

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
+#include <type_traits>
 
 #include <pugixml.hpp>
 
@@ -26,6 +28,16 @@ inline text::Span span_of(const Xml& node, std::string_view text) {
     return out;
 }
 
+/// Returns whether a number can only be hexadecimal, although it has no prefix, as in 1A00.
+inline bool bare_hex(std::string_view text) {
+    return !text.empty() && text.find_first_not_of("0123456789abcdefABCDEF") == text.npos;
+}
+
+template <class T>
+constexpr std::int64_t max_number =
+    sizeof(T) < sizeof(std::int64_t) ? static_cast<std::int64_t>(std::numeric_limits<T>::max())
+                                     : std::numeric_limits<std::int64_t>::max();
+
 /// Reads the numbers and flags of one file, and reports invalid ones.
 struct Context {
     std::string_view text{};
@@ -37,25 +49,44 @@ struct Context {
         }
     }
 
-    std::int64_t number_of(const Xml& at, std::string_view name, std::string_view value,
-                           std::int64_t otherwise) {
+    void error(const Xml& at, std::string sentence, std::string help) {
+        if (report.all.size() < hal::text::most_errors) {
+            report.error(Topic::value, span_of(at, text), std::move(sentence), std::move(help));
+        }
+    }
+
+    /// Reads a number of the type T; the signed spelling of an unsigned number is an error.
+    template <class T>
+    T number_of(const Xml& at, std::string_view name, std::string_view value, T otherwise = {}) {
         if (trimmed(value).empty()) return otherwise;
-        if (const auto n = number(value)) return *n;
-        warn(at, "invalid " + std::string(name) + " '" + std::string(trimmed(value).substr(0, 60)) +
-                     "': expected a number, as in 12 or #x1F");
-        return otherwise;
+        const std::string shown =
+            std::string(name) + " '" + std::string(trimmed(value).substr(0, 60)) + "'";
+        auto n = number(value);
+        if (!n && bare_hex(trimmed(value))) {
+            n = number("#x" + std::string(trimmed(value)));
+            warn(at, shown + " has no #x; read as hexadecimal");
+        }
+        if (!n) {
+            error(at, "invalid " + shown, "write a number, as in 12 or #x1F");
+            return otherwise;
+        }
+        if (sizeof(T) < sizeof(std::int64_t) &&
+            (*n < static_cast<std::int64_t>(std::numeric_limits<T>::min()) || *n > max_number<T>)) {
+            error(at, "out of range: " + shown,
+                  "the range is " + std::to_string(std::numeric_limits<T>::min()) + ".." +
+                      std::to_string(max_number<T>));
+            return otherwise;
+        }
+        return static_cast<T>(*n);
     }
     template <class T>
     T attribute(const Xml& at, const char* name, T otherwise = {}) {
-        return static_cast<T>(
-            number_of(at, name, at.attribute(name).value(), static_cast<std::int64_t>(otherwise)));
+        return number_of<T>(at, name, at.attribute(name).value(), otherwise);
     }
     template <class T>
     T child(const Xml& at, const char* name, T otherwise = {}) {
         const Xml c = at.child(name);
-        return c ? static_cast<T>(
-                       number_of(c, name, c.child_value(), static_cast<std::int64_t>(otherwise)))
-                 : otherwise;
+        return c ? number_of<T>(c, name, c.child_value(), otherwise) : otherwise;
     }
     static bool flag(const Xml& at, const char* name, bool otherwise = false) {
         const std::string_view value = trimmed(at.attribute(name).value());
@@ -63,7 +94,7 @@ struct Context {
     }
     std::vector<std::uint8_t> bytes(const Xml& at) {
         if (auto out = hex_bytes(at.child_value())) return *out;
-        warn(at, "invalid data: expected hexadecimal bytes");
+        error(at, "invalid data: expected hexadecimal bytes", "write two digits for each byte");
         return {};
     }
 };
