@@ -382,6 +382,64 @@ class Dcf(Node):
             ),
         )
 
+    def test_an_unreliable_file_is_rejected(self):
+        self.can("sdo", "write", self.bus, "5", "1017", "5000", "--type", "u16")
+        self.can("dcf", "read", self.bus, "5", "--eds", "io.eds", "-o", "io.dcf")
+        text = (self.folder / "io.dcf").read_bytes().decode()
+        self.assertEqual(1, text.count("ParameterValue=0x1388"))
+        line = text[: text.index("ParameterValue=0x1388")].count("\n") + 1
+
+        def rejected(name, content, *words):
+            (self.folder / name).write_bytes(content.encode())
+            done = self.run_program("can", "dcf", "write", self.bus, "5", name, *words)
+            self.assertEqual(1, done.returncode)
+            return done
+
+        cut = text[: text.index("0x1388") + 4]
+        done = rejected("cut.dcf", cut)
+        self.assertEqual("", done.stdout)
+        self.assertRegex(
+            done.stderr,
+            r"^hal can dcf write: cut.dcf:\d+: object \w{4} is listed but not described; missing section \[\w{4}\]\n"
+            r"(.*\n){2}"
+            r"hal can dcf write: \d+ more; list them with: hal can eds check cut.dcf\n"
+            r"hal can dcf write: 'cut.dcf' is not reliable: no setting was written; correct the file, or create it again: hal can dcf read\n$",
+        )
+        self.assertIn(
+            f"cut.dcf:{line}:1: warning: the file ends within a line: the value of 'ParameterValue' may be cut [eds-syntax]\n",
+            self.run_program("can", "eds", "check", "cut.dcf").stderr,
+        )
+        again = "\r\n[1017]\r\nParameterValue=0x20\r\n"
+        done = rejected("twice.dcf", text + again, "--check")
+        last = (text + again).count("\n")
+        self.assertEqual(
+            f"hal can dcf write: twice.dcf:{last}: duplicate key 'ParameterValue' in [1017]; line {line} has '0x1388'; '0x20' is used\n"
+            "hal can dcf write: 'twice.dcf' is not reliable: no setting was compared; correct the file, or create it again: hal can dcf read\n",
+            done.stderr,
+        )
+        for value in ("70000", "abc", "100.5"):
+            bad = text.replace("ParameterValue=0x1388", "ParameterValue=" + value)
+            done = rejected("bad.dcf", bad)
+            self.assertRegex(
+                done.stderr,
+                r"^hal can dcf write: bad\.dcf:\d+: the value of 1017sub0 is not configured: "
+                rf".*; correct ParameterValue={value}\n"
+                r"hal can dcf write: 'bad.dcf' has invalid values: no setting was written; correct them in the file\n$",
+            )
+            self.assertEqual("", done.stdout)
+            done = rejected("bad.dcf", bad, "--check")
+            self.assertRegex(done.stdout, r"^node 5: 0 of \d+ settings differ\n$")
+        self.assertRegex(self.dcf("--check").stdout, r"^node 5: 0 of \d+ settings differ\n$")
+
+    def test_a_cut_description_has_nothing_to_read(self):
+        eds = (self.folder / "io.eds").read_bytes()[:500]
+        (self.folder / "cut.eds").write_bytes(eds)
+        for words in (("dcf", "read"), ("read-all",)):
+            self.assertRegex(
+                self.bad_can(*words, self.bus, "5", "--eds", "cut.eds"),
+                r"^(hal can .*\n)*hal can [a-z -]+: 'cut.eds' describes no object: nothing to read; give the whole EDS of the device\n$",
+            )
+
     def test_wrong_words(self):
         self.assertEqual(
             "hal can dcf read: missing --eds FILE: the description lists the objects of the node\n",

@@ -55,10 +55,10 @@ public:
     }
 
 private:
-    void leave_out(const Entry& entry, std::uint16_t index, std::string why,
-                   std::string help = "") {
+    void leave_out(const Entry& entry, std::uint16_t index, std::string why, std::string help = "",
+                   Severity severity = Severity::warning) {
         out_.messages.push_back(
-            {Severity::warning, Topic::value, entry.at,
+            {severity, Topic::value, entry.at,
              "the value of " + label(index, entry.sub) + " is not configured: " + std::move(why),
              std::move(help)});
     }
@@ -86,12 +86,14 @@ private:
             return {};
         }
         if (!value) {
-            leave_out(entry, index, value.error);
+            leave_out(entry, index, value.error,
+                      "correct ParameterValue=" + entry.parameter_value.substr(0, 60),
+                      Severity::error);
             return {};
         }
         if (value.node_id && node_ == 0) {
             leave_out(entry, index, "it depends on the node-id, and no node-id is given",
-                      "NodeID=… of [DeviceComissioning] gives one");
+                      "NodeID=… of [DeviceComissioning] gives one", Severity::error);
             return {};
         }
         return value.bytes;

@@ -23,7 +23,8 @@ struct Write {
 
 struct Configuration {
     std::vector<Write> writes;         ///< in the order in which they must be made
-    std::vector<Message> messages;     ///< omitted values and the reasons
+    std::vector<Message>
+        messages;     ///< omitted values and the reasons; an error: the value is invalid
 };
 
 /// Returns the writes that configure a node with the parameter values of `dcf`: those that differ

@@ -208,6 +208,8 @@ struct Reading {
     /// the decoded text that the spans refer to
     std::string text;
     std::size_t count(Severity severity) const;
+    /// Returns the problems that make values of the file unreliable (see `unreliable`).
+    std::vector<Message> doubts() const;
 };
 
 /// Reads the bytes of an EDS or DCF file. [any, not real time]

@@ -138,7 +138,7 @@ std::optional<std::uint64_t> Keys::parse(IniSection& section, IniKey& key, std::
         // 0007 as in a section's name, 1A00 without 0x
         const bool bare_hex = !key.value.empty() && key.value.size() <= 8 &&
                               std::all_of(key.value.begin(), key.value.end(), is_hex);
-        report(Severity::warning, Topic::value, key.value_at,
+        report(Severity::warning, Topic::number, key.value_at,
                in + " is not a number: '" + key.value.substr(0, 60) + "'",
                bare_hex ? "write 0x" + key.value : "write it as in 12 or 0x0C");
         return {};
@@ -155,7 +155,7 @@ std::optional<std::uint64_t> Keys::parse(IniSection& section, IniKey& key, std::
                "remove the 0");
     }
     if ((number->negative && number->magnitude != 0) || number->magnitude > most) {
-        report(Severity::warning, Topic::value, key.value_at,
+        report(Severity::warning, Topic::number, key.value_at,
                in + " is out of range: '" + key.value + "'",
                "the range is 0.." + std::to_string(most));
         return {};
@@ -209,7 +209,7 @@ std::map<unsigned, IniKey*> Keys::list(IniSection& section, const char* count_ke
         if (!number || number->magnitude > 0xFFFF) continue;
         const auto [at, fresh] = out.emplace(static_cast<unsigned>(number->magnitude), &key);
         if (!fresh) {
-            report(Severity::warning, Topic::count, key.at,
+            report(Severity::warning, Topic::conflict, key.at,
                    "duplicate number " + key.name + " in [" + section.name + "]",
                    "the first one is used");
         }

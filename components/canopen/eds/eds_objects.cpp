@@ -371,7 +371,7 @@ std::vector<Object> ObjectReader::read() {
         default: place = &draft.subs[means.sub];
         }
         if (*place != nullptr) {
-            keys_.report(Severity::warning, Topic::syntax, section.at,
+            keys_.report(Severity::warning, Topic::conflict, section.at,
                          "duplicate section [" + section.name + "]: line " +
                              std::to_string((*place)->at.line) + " describes the same",
                          "the first one is used, this one was kept unchanged");

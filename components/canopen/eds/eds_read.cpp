@@ -3,6 +3,7 @@
 // commissioning.
 #include <algorithm>
 #include <charconv>
+#include <iterator>
 
 #include "eds_reader.hpp"
 
@@ -252,7 +253,7 @@ private:
                 Object* object = out_.find(static_cast<std::uint16_t>(*index));
                 if (object == nullptr) {
                     keys_.report(
-                        Severity::warning, Topic::missing, key->value_at,
+                        Severity::warning, Topic::undescribed, key->value_at,
                         "object " + label(static_cast<std::uint16_t>(*index)) +
                             " is listed but not described",
                         "missing section [" + label(static_cast<std::uint16_t>(*index)) + "]");
@@ -348,6 +349,13 @@ std::size_t Reading::count(Severity severity) const {
     return static_cast<std::size_t>(
         std::count_if(messages.begin(), messages.end(),
                       [&](const Message& m) { return m.severity == severity; }));
+}
+
+std::vector<Message> Reading::doubts() const {
+    std::vector<Message> out;
+    std::copy_if(messages.begin(), messages.end(), std::back_inserter(out),
+                 [](const Message& m) { return unreliable(m.topic); });
+    return out;
 }
 
 Reading read_eds(std::string_view bytes) {

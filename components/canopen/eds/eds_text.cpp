@@ -249,10 +249,14 @@ void Ini::parse(std::string_view text, std::vector<Message>& messages) {
             return Span{number, column, static_cast<std::uint32_t>(offset),
                         static_cast<std::uint32_t>(part.size())};
         };
+        const auto report_as = [&](Severity severity, Topic topic, std::string_view part,
+                                   std::string sentence, std::string help) {
+            messages.push_back(
+                {severity, topic, place(part), std::move(sentence), std::move(help)});
+        };
         const auto report = [&](Severity severity, std::string_view part, std::string sentence,
                                 std::string help = "") {
-            messages.push_back(
-                {severity, Topic::syntax, place(part), std::move(sentence), std::move(help)});
+            report_as(severity, Topic::syntax, part, std::move(sentence), std::move(help));
         };
         const auto keep = [&](std::string comment) {
             (section != nullptr ? section->comments : preamble_).push_back(std::move(comment));
@@ -323,6 +327,12 @@ void Ini::parse(std::string_view text, std::vector<Message>& messages) {
             keep("; " + std::string(line));
             continue;
         }
+        if (stop == text.size()) {
+            report_as(
+                Severity::warning, Topic::truncated, line,
+                "the file ends within a line: the value of '" + std::string(name) + "' may be cut",
+                "copy the file again, or end its last line with a line end");
+        }
         IniKey key{std::string(name), std::string(value), place(name),
                    place(value.empty() ? line : value)};
         const auto [at, fresh] = keys.try_emplace(lower(name), section->keys.size());
@@ -331,11 +341,12 @@ void Ini::parse(std::string_view text, std::vector<Message>& messages) {
         } else {
             IniKey& old = section->keys[at->second];
             const bool same = old.value == key.value;
-            report(same ? Severity::note : Severity::warning, name,
-                   "duplicate key '" + key.name + "' in [" + section->name + "]",
-                   same ? "both have the same value"
-                        : "line " + std::to_string(old.at.line) + " has '" + old.value + "'; '" +
-                              key.value + "' is used");
+            report_as(same ? Severity::note : Severity::warning,
+                      same ? Topic::syntax : Topic::conflict, name,
+                      "duplicate key '" + key.name + "' in [" + section->name + "]",
+                      same ? "both have the same value"
+                           : "line " + std::to_string(old.at.line) + " has '" + old.value + "'; '" +
+                                 key.value + "' is used");
             old = std::move(key);
         }
     }

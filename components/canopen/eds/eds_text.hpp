@@ -28,9 +28,20 @@ enum class Topic : std::uint8_t {
     count,       ///< a list or count differs from what the file contains
     value,       ///< a number, a limit, a date
     object,      ///< an object as a whole: its type, its entries, its mapping
+    number,      ///< a number or value that cannot be read
+    conflict,    ///< two descriptions of the same object that differ
+    undescribed, ///< an object that is listed but not described
+    truncated,   ///< the file ends within a line
 };
 
 using Message = text::Message<Topic>;
+
+/// Returns whether a problem of this topic makes a value of the file unreliable: a master or tool
+/// that configures a device with the file must reject it.
+constexpr bool unreliable(Topic topic) {
+    return topic == Topic::number || topic == Topic::conflict || topic == Topic::undescribed ||
+           topic == Topic::truncated;
+}
 
 /// Formats "line 12, column 3: warning: sentence; help", for logs without a renderer.
 std::string to_string(const Message& message);

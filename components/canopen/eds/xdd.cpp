@@ -100,7 +100,7 @@ private:
         auto value = parse_number(
             hexadecimal && text.find_first_of("xX") == std::string::npos ? "0x" + text : text);
         if (!value || value->node_id || value->negative || value->magnitude > most) {
-            report(Severity::warning, Topic::value, node,
+            report(Severity::warning, Topic::number, node,
                    "'" + std::string(name) + "' is not a number of 0.." + std::to_string(most) +
                        ": '" + text.substr(0, 60) + "'");
             return {};
@@ -176,7 +176,7 @@ private:
             const std::string value = text(name);
             const auto parsed = parse_number(value);
             if (!value.empty() && (!parsed || parsed->magnitude > 0xFFFFFFFF)) {
-                report(Severity::warning, Topic::value, descendant(who, name),
+                report(Severity::warning, Topic::number, descendant(who, name),
                        "'" + std::string(name) + "' is not a 32-bit number: '" +
                            value.substr(0, 60) + "'");
             }
@@ -305,8 +305,8 @@ private:
         const std::string what = label(out.index);
         if (std::any_of(out_.objects.begin(), out_.objects.end(),
                         [&](const Object& o) { return o.index == out.index; })) {
-            report(Severity::warning, Topic::object, node, "object " + what + " is described twice",
-                   "the first counts");
+            report(Severity::warning, Topic::conflict, node,
+                   "object " + what + " is described twice", "the first counts");
             return;
         }
         Entry own = entry_of_object(node, what, out);

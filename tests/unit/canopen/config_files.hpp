@@ -99,7 +99,7 @@ AccessType=rww
 PDOMapping=1
 )";
 
-/// The same device as a DCF: a value that fits, one that does not, and two tables in files.
+/// The same device as a DCF: two values, and two tables in files.
 inline std::string dcf_text(const std::string& more = "") {
     std::string text = eds_text;
     const std::string list = "SupportedObjects=2\n1=0x2000\n2=0x2001\n";
@@ -109,7 +109,7 @@ inline std::string dcf_text(const std::string& more = "") {
     text +=
         "[2002]\nParameterName=Ramp\nDataType=0x0006\nAccessType=rw\nDefaultValue="
         "1\nParameterValue=7\n";
-    text += "[2003]\nParameterName=Limit\nDataType=0x0006\nAccessType=rw\nParameterValue=70000\n";
+    text += "[2003]\nParameterName=Limit\nDataType=0x0006\nAccessType=rw\nParameterValue=7000\n";
     text +=
         "[2004]\nParameterName=Cam\nObjectType=0x2\nDataType=0x000F\nAccessType=rw\nDownloadFile="
         "cam.bin\n";

@@ -89,6 +89,12 @@ int run_can_dcf_read(const DcfReadOptions& options) {
     std::uint8_t node = 0;
     ObjectNames names;
     if (!node_of(options, options.words[1], node) || !names.load(options, options.eds)) return 1;
+    names.print_doubts(options);
+    if (names.description()->objects.empty()) {
+        return fail(options, fmt::format("'{}' describes no object: nothing to read; give the "
+                                         "whole EDS of the device",
+                                         options.eds));
+    }
     eds::DeviceDescription description = *names.description();
     NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
@@ -277,12 +283,24 @@ int run_can_dcf_write(const DcfWriteOptions& options) {
     if (!node_of(options, options.words[1], node)) return 1;
     ObjectNames names;
     if (!names.load(options, options.words[2])) return 1;
+    if (names.print_doubts(options) != 0) {
+        return fail(options, fmt::format("'{}' is not reliable: no setting was {}; correct the "
+                                         "file, or create it again: hal can dcf read",
+                                         options.words[2], options.check ? "compared" : "written"));
+    }
     if (!fits(options, *names.description(), node, 0)) return 1;
     eds::Configuration configuration = eds::configuration_of(*names.description(), node, true);
+    bool valid = true;
     for (const eds::Message& message : configuration.messages) {
+        valid = valid && message.severity != eds::Severity::error;
         fail(options,
              fmt::format("{}:{}: {}{}", options.words[2], message.at.line, message.sentence,
                          message.help.empty() ? "" : "; " + message.help));
+    }
+    if (!valid && !options.check) {
+        return fail(options, fmt::format("'{}' has invalid values: no setting was written; correct "
+                                         "them in the file",
+                                         options.words[2]));
     }
     std::erase_if(configuration.writes, [&](const eds::Write& write) {
         if (moves(write.index)) {
@@ -296,7 +314,8 @@ int run_can_dcf_write(const DcfWriteOptions& options) {
                                          "create such a file: hal can dcf read",
                                          options.words[2]));
     }
-    return Download(options, node, names, std::move(configuration.writes)).run();
+    const int result = Download(options, node, names, std::move(configuration.writes)).run();
+    return valid ? result : 1;
 }
 
 }  // namespace hal::tools

@@ -24,6 +24,10 @@ Code code_of(eds::Topic topic) {
     case eds::Topic::missing: return "eds-missing";
     case eds::Topic::count: return "eds-count";
     case eds::Topic::value: return "eds-value";
+    case eds::Topic::number: return "eds-value";
+    case eds::Topic::conflict: return "eds-syntax";
+    case eds::Topic::undescribed: return "eds-missing";
+    case eds::Topic::truncated: return "eds-syntax";
     case eds::Topic::object: break;
     }
     return "eds-object";

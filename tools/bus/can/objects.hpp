@@ -29,6 +29,9 @@ class ObjectNames {
 public:
     /// Reads an EDS; does nothing when `file` is empty. Returns false after printing the reason.
     bool load(const Options&, const std::string& file);
+    /// Prints the problems that make values of the file unreliable, the first ones with their
+    /// lines. Returns their number.
+    std::size_t print_doubts(const Options&) const;
     /// Finds `6041`, `0x1018:1`, `Statusword`, `Identity Object/Vendor-ID`, `vendor-id`. Returns
     /// false and sets `problem`.
     bool find(const std::string& text, ObjectName&, std::string& problem) const;
@@ -43,6 +46,7 @@ private:
         ObjectName object;
     };
     std::optional<canopen::eds::DeviceDescription> description_;
+    std::vector<canopen::eds::Message> doubts_;
     std::string file_;
     std::vector<Row> rows_;
 };

@@ -91,6 +91,12 @@ int run_can_read_all(const ReadAllOptions& options) {
     std::uint8_t node = 0;
     ObjectNames names;
     if (!node_of(options, options.words[1], node) || !names.load(options, options.eds)) return 1;
+    names.print_doubts(options);
+    if (names.description()->objects.empty()) {
+        return fail(options, fmt::format("'{}' describes no object: nothing to read; give the "
+                                         "whole EDS of the device",
+                                         options.eds));
+    }
     NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
     const auto room = std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes);

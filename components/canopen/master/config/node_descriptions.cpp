@@ -34,7 +34,20 @@ const eds::DeviceDescription* Descriptions::get(const Word& file, Report& report
                      "see: hal can eds check " + path(file));
         return nullptr;
     }
-    if (const std::size_t warnings = reading.count(eds::Severity::warning); warnings != 0) {
+    const std::vector<eds::Message> doubts = reading.doubts();
+    if (!doubts.empty()) {
+        const bool dcf = reading.description->commissioning.has_value();
+        const std::string sentence =
+            (dcf ? "unreliable DCF '" : "unreliable EDS '") + file.text + "': line " +
+            std::to_string(doubts[0].at.line) + ": " + doubts[0].sentence +
+            (doubts.size() > 1 ? ", and " + counted(doubts.size() - 1, "more problem") : "");
+        const std::string help = "list them with hal can eds check " + path(file);
+        if (dcf) {
+            report.error(Topic::value, file.at, sentence, help);
+            return nullptr;
+        }
+        report.warning(Topic::value, file.at, sentence, help);
+    } else if (const std::size_t warnings = reading.count(eds::Severity::warning); warnings != 0) {
         report.note(Topic::value, file.at,
                     "'" + file.text + "' has " + counted(warnings, "warning"),
                     "list them with hal can eds check " + path(file) +

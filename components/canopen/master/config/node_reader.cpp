@@ -262,9 +262,13 @@ void NodeReader::values_of_dcf() {
     if (!dcf_fits(file)) return;
     const auto configuration = eds::configuration_of(*eds_, node_.setup.id);
     for (const auto& m : configuration.messages) {
-        report_.warning(
-            Topic::value, file.at,
-            "line " + std::to_string(m.at.line) + " of '" + file.text + "': " + m.sentence, m.help);
+        const std::string sentence =
+            "line " + std::to_string(m.at.line) + " of '" + file.text + "': " + m.sentence;
+        if (m.severity == eds::Severity::error) {
+            report_.error(Topic::value, file.at, sentence, m.help);
+        } else {
+            report_.warning(Topic::value, file.at, sentence, m.help);
+        }
     }
     for (const auto& w : configuration.writes) {
         if ((w.index < 0x1400 || w.index > 0x1bff) && w.index != 0x1016 && w.index != 0x1017) {
