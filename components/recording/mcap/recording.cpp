@@ -302,6 +302,20 @@ constexpr std::pair<std::string_view, hal_type> type_words[] = {
     {"bit", HAL_TYPE_BIT}, {"float", HAL_TYPE_FLOAT}, {"s32", HAL_TYPE_S32},
     {"u32", HAL_TYPE_U32}, {"s64", HAL_TYPE_S64},     {"u64", HAL_TYPE_U64}};
 
+/// What a reader of a table must know, though it was read; empty: nothing.
+std::string note_of_csv(std::size_t equal_times, bool ends_with_line) {
+    std::string note;
+    if (!ends_with_line) {
+        note = "the last line has no line end, so that its last value may be cut";
+    }
+    if (equal_times != 0) {
+        note += note.empty() ? "" : "; ";
+        note += std::to_string(equal_times) + (equal_times == 1 ? " row has" : " rows have") +
+                " the time of the row before";
+    }
+    return note;
+}
+
 bool load_csv(const std::string& path, Recording& to, std::string& problem,
               const LoadOptions& options) {
     const auto source = open_file(path, problem);
@@ -323,11 +337,17 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem,
     }
     Table table{"", {}, {}, {}};
     for (std::size_t i = 1; i < names.size(); ++i) {
+        const auto earlier = names.begin() + static_cast<std::ptrdiff_t>(i);
+        if (std::find(names.begin(), earlier, names[i]) != earlier) {
+            problem = "'" + path + "', line 1: column '" + names[i] + "' occurs twice";
+            return false;
+        }
         const auto type = options.types.find(names[i]);
         table.columns.push_back(
             {names[i], type == options.types.end() ? HAL_TYPE_FLOAT : type->second, ""});
     }
     std::vector<std::uint64_t> held(table.columns.size());
+    std::size_t equal_times = 0;
     for (std::size_t number = 2; std::getline(file, line); ++number) {
         const std::vector<std::string> words = csv_words(line);
         const std::string place = "'" + path + "', line " + std::to_string(number) + ": ";
@@ -354,6 +374,7 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem,
         }
         const auto time_ns = static_cast<std::int64_t>(std::llround(time_s * 1e9));
         if (time_ns < options.begin_ns || time_ns >= options.end_ns) continue;
+        equal_times += !table.times_ns.empty() && table.times_ns.back() == time_ns;
         table.times_ns.push_back(time_ns);
         table.words.insert(table.words.end(), held.begin(), held.end());
         if (table.words.size() * 8 <= options.most_bytes) continue;
@@ -362,6 +383,10 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem,
         return false;
     }
     to.tables.push_back(std::move(table));
+    to.note = note_of_csv(equal_times, text.ends_with('\n'));
+    if (!to.note.empty()) {
+        to.note = "'" + path + "': " + to.note;
+    }
     return true;
 }
 

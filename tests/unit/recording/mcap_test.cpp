@@ -410,6 +410,26 @@ TEST(Recording, A_table_has_the_types_that_are_given) {
         << problem;
 }
 
+TEST(Recording, A_table_that_is_cut_or_ambiguous_is_no_secret) {
+    const Folder folder;
+    const std::string path = folder.file("a.csv");
+    Recording recording;
+    std::string problem;
+    put_file(path, "time_s,a,b\n0.1,1,2\n0.1,1,3\n0.1,1,4\n0.2,5,-0.03");
+    ASSERT_TRUE(load(path, recording, problem)) << problem;
+    EXPECT_EQ(recording.notes(),
+              std::vector{"'" + path +
+                          "': the last line has no line end, so that its last value may be cut; "
+                          "2 rows have the time of the row before"});
+    recording = {};
+    put_file(path, "time_s,a,b\n0.1,1,2\n");
+    ASSERT_TRUE(load(path, recording, problem)) << problem;
+    EXPECT_TRUE(recording.notes().empty());
+    put_file(path, "time_s,a,b,a\n0.1,1,2,3\n");
+    EXPECT_FALSE(load(path, recording, problem));
+    EXPECT_EQ(problem, "'" + path + "', line 1: column 'a' occurs twice");
+}
+
 TEST(Recording, Crc_is_that_of_zlib) {
     EXPECT_EQ(crc32("123456789"), 0xCBF43926u);
     EXPECT_EQ(crc32("6789", crc32("12345")), 0xCBF43926u);
