@@ -46,7 +46,10 @@ int sampler_or_streamer(int argc, char** argv, const char* program, const char* 
 
 bool take_sampler_letter(int letter, std::uint64_t number, RecordOptions& options) {
     switch (letter) {
-    case 'n': options.count = number; return true;
+    case 'n':
+        options.count = number;
+        options.no_samples = number == 0;
+        return true;
     case 't': options.tag = true; return true;
     default: return false;
     }

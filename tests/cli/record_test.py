@@ -157,6 +157,28 @@ class Sim(Case):
         self.assertEqual(1002, len(lines))
         self.assertEqual([1000], [i for i, line in enumerate(lines) if line == "overrun"])
 
+    def test_lost_samples_are_counted_when_the_lines_are_csv(self):
+        commands = [
+            "start",
+            "advance 1005 cycles",
+            "loadusr -w hal record --csv -n 500",
+            "advance 1 cycles",
+            "loadusr -w hal record --csv -n 501",
+        ]
+        path = self.write("a.hal", NETLIST + "".join(c + "\n" for c in commands))
+        lossy = self.run_program("sim", "--quiet", path)
+        self.assertIn(
+            "samples between the lines were lost, because the sampler was full", lossy.stderr
+        )
+
+    def test_no_samples_are_none(self):
+        self.assertEqual("", self.sim("start", "advance 2 cycles", "loadusr -w halsampler -n 0"))
+
+    def test_a_negative_count_is_rejected(self):
+        done = self.run_program("record", "-n", "-3", "0", "out.txt")
+        self.assertEqual(1, done.returncode)
+        self.assertIn("-3 is negative; use 0 or more", done.stderr)
+
     def test_by_instance_name(self):
         self.assertEqual(
             1,

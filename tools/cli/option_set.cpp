@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fmt/core.h>
+#include <type_traits>
 
 #include "base/types.hpp"
 
@@ -65,7 +66,11 @@ void OptionSet::flag(const char* names, const std::function<void()>& given, cons
 
 template <class T>
 DeclaredOption OptionSet::value(const char* names, T& to, const char* type, const char* what) {
-    return DeclaredOption(app_->add_option(names, to, what)->type_name(type));
+    DeclaredOption option(app_->add_option(names, to, what)->type_name(type));
+    if (std::is_unsigned_v<T>) {
+        option.not_negative();  // a negative number would wrap around
+    }
+    return option;
 }
 template DeclaredOption OptionSet::value(const char*, std::string&, const char*, const char*);
 template DeclaredOption OptionSet::value(const char*, double&, const char*, const char*);

@@ -86,8 +86,8 @@ public:
     Lines(const Stream& stream, const RecordOptions& options)
         : types_(stream.types), csv_(options.csv), tag_(options.tag), timed_(stream.timed) {}
 
-    /// Writes the records of a reply as lines. A line `overrun` marks lost records; CSV shows them
-    /// by its times only.
+    /// Writes the records of a reply as lines. A line `overrun` marks lost records; CSV has no such
+    /// lines, and its losses are counted.
     bool write(const json& reply, RecordFile& file) {
         const json& records = reply.at("records");
         const json losses = reply.value("lost_before", json::array());
@@ -95,8 +95,9 @@ public:
             const auto number = reply.at("numbers").at(i).get<std::int64_t>();
             const std::uint64_t lost = i < losses.size() ? losses[i].get<std::uint64_t>() : 0;
             std::string text;
-            if (!csv_ && known_ && lost != lost_) {
-                text += "overrun\n";
+            if (known_ && lost != lost_) {
+                lost_in_all_ += lost - lost_;
+                text += csv_ ? "" : "overrun\n";
             }
             known_ = true;
             lost_ = lost;
@@ -120,10 +121,21 @@ public:
         return file.flush();
     }
 
+    /// Prints how many records are missing in a CSV, which does not show it.
+    void report_losses() const {
+        if (!csv_ || lost_in_all_ == 0) return;
+        write_all(STDERR_FILENO,
+                  fmt::format("hal: {} sample{} between the lines {} lost, because the sampler was "
+                              "full: raise its depth\n",
+                              lost_in_all_, lost_in_all_ == 1 ? "" : "s",
+                              lost_in_all_ == 1 ? "was" : "were"));
+    }
+
 private:
     const std::vector<hal_type>& types_;
     bool csv_, tag_, timed_, known_ = false;
     std::uint64_t lost_ = 0;  // before the newest record
+    std::uint64_t lost_in_all_ = 0;
 };
 
 /// Takes records until the count is reached or the command is ended. Returns the exit code.
@@ -156,6 +168,7 @@ int follow(Stream& stream, const RecordOptions& options, RecordFile& file) {
             stop.wait_ns(poll_ns);
         }
     }
+    lines.report_losses();
     return file.close() ? 0 : lost();
 }
 
@@ -180,6 +193,7 @@ int run_record(const RecordOptions& options) {
     }
     Stream stream;
     if (!stream.open(options, "sampler")) return 1;
+    if (options.no_samples) return 0;
     if (stream.file.empty()) {
         RecordFile out(STDOUT_FILENO);
         return follow(stream, options, out);

@@ -10,6 +10,7 @@ namespace hal::tools {
 
 struct RecordOptions : StreamOptions {
     std::uint64_t count = 0;  ///< 0: unlimited
+    bool no_samples = false;  ///< ends at once: halsampler -n 0
     bool csv = false;
     bool tag = false;
     Recording values;         ///< without a sampler
