@@ -190,6 +190,21 @@ int check_version(Shell& shell, const std::string& path, Output& output) {
     return 1;
 }
 
+/// An INI file that names nothing to run is no machine. Keys are case-sensitive, as in LinuxCNC.
+int reject_without_netlist(Shell& shell, const std::string& path, Output& output) {
+    Diagnostics diagnostics;
+    diagnostics.error("ini-without-netlist", Span{},
+                      path + ": names no netlist: [HAL] has neither HALFILE nor HALCMD", "",
+                      "write under [HAL]: HALFILE = FILE.hal; to use the file for its values only, "
+                      "type: hal run --ini " +
+                          path + " FILE.hal");
+    const auto lock = shell.session().lock();
+    if (shell.options.level != Level::nothing) {
+        output.err(render(diagnostics, shell.session().sources, shell.options.color));
+    }
+    return 1;
+}
+
 }  // namespace
 
 int Shell::run_file(const std::string& path, Output& output) {
@@ -359,6 +374,9 @@ int Shell::run_ini(const std::string& path, Output& output) {
     std::string commands;
     for (const std::string& command : ini.all("HAL", "HALCMD")) {
         commands += command + "\n";
+    }
+    if (status == 0 && files.empty() && commands.empty() && after_display.empty()) {
+        return reject_without_netlist(*this, path, output);
     }
     bool quit = false;
     status |= run_taken(files, quit, output);

@@ -230,6 +230,11 @@ inline constexpr CodePage code_pages[] = {
      "names of sections, keys and pins have changed since. `hal linuxcnc` rejects them, too.\n\n"
      "LinuxCNC's program converts the file and its netlists: `update_ini FILE.ini` (it keeps a "
      "copy)."},
+    {"ini-without-netlist",
+     "An INI file that is run names its netlists: `HALFILE` or `HALCMD` in the section `[HAL]`. "
+     "Keys "
+     "and sections are case-sensitive. A file that has only values for other netlists is given "
+     "with `hal run --ini FILE.ini FILE.hal`."},
     {"init-done",
      "initf functions run once, in a cycle of their own before the first cyclic pass of their "
      "thread. This thread has already made "

@@ -1,0 +1,1 @@
+hal check ini-without-netlist.ini
