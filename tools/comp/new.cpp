@@ -24,40 +24,40 @@ namespace {
 namespace fs = std::filesystem;
 
 // @NAME@ is the component's name, @TYPE@ the same as a type, @PACKAGE@ where find_package looks.
-constexpr std::string_view source =
-    R"CPP(// SPDX-License-Identifier: MIT
+// clang-format off: a template
+constexpr std::string_view source = R"CPP(// SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
 
 #include "hal/component.hpp"
 
-          namespace {
+namespace {
 
-          struct @TYPE @ : hal::Component {
-              using Component::Component;
+struct @TYPE@ : hal::Component {
+    using Component::Component;
 
-              hal::In<double> in{*this, "in", "target position of out"};
-              hal::In<bool> hold{*this, "hold", "TRUE holds out at its position"};
-              hal::Out<double> out{*this, "out", "follows in", {.finite = true}};
-              hal::Out<bool> there{*this, "there", "TRUE while out is equal to in"};
-              hal::Param<double> max_speed{
-                  *this, "max-speed", "maximum speed of out", {.initial = 1.0, .unit = "1/s"}};
-              hal::Function run { *this, "", &@TYPE @ ::update, "one step" };
+    hal::In<double> in{*this, "in", "target position of out"};
+    hal::In<bool> hold{*this, "hold", "TRUE holds out at its position"};
+    hal::Out<double> out{*this, "out", "follows in", {.finite = true}};
+    hal::Out<bool> there{*this, "there", "TRUE while out is equal to in"};
+    hal::Param<double> max_speed{
+        *this, "max-speed", "maximum speed of out", {.initial = 1.0, .unit = "1/s"}};
+    hal::Function run{*this, "", &@TYPE@::update, "one step"};
 
     // Runs in every cycle: it must not allocate, lock, block, log or throw.
-              void update(hal::Cycle cycle) noexcept {
-                  const double distance = in - out;
-                  const double step = std::fabs(max_speed) * cycle.seconds();
-                  if (!hold && std::isfinite(distance) && std::isfinite(step)) {
-                      out = out + std::clamp(distance, -step, step);
-                  }
-                  there = out == in;
-              }
-          };
+    void update(hal::Cycle cycle) noexcept {
+        const double distance = in - out;
+        const double step = std::fabs(max_speed) * cycle.seconds();
+        if (!hold && std::isfinite(distance) && std::isfinite(step)) {
+            out = out + std::clamp(distance, -step, step);
+        }
+        there = out == in;
+    }
+};
 
-          }  // namespace
+}  // namespace
 
-          HAL_COMPONENT(@TYPE @, "@NAME@", "Follows its input at a limited speed", R"(
+HAL_COMPONENT(@TYPE@, "@NAME@", "Follows its input at a limited speed", R"(
 In each cycle `out` moves towards `in`, by at most `max-speed` times the period. While `in` is not a number `out` stays.
 
     loadrt @NAME@ names=slow
@@ -66,7 +66,8 @@ In each cycle `out` moves towards `in`, by at most `max-speed` times the period.
     net wanted => slow.in
     net moved  <= slow.out
 )")
-    )CPP";
+)CPP";
+// clang-format on
 
 constexpr std::string_view project = R"CMAKE(# SPDX-License-Identifier: MIT
 cmake_minimum_required(VERSION 3.25)
