@@ -606,7 +606,10 @@ class Live(Case):
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (20, resource.RLIM_INFINITY))
 
-        for name, left in (("run.mcap", ""), ("run.csv", "; no row was written")):
+        for name, left in (
+            ("run.mcap", "; no row was written, and the file was removed"),
+            ("run.csv", "; no row was written"),
+        ):
             done = subprocess.run(
                 [str(HAL), "record", name, "sine", "--for", "1s"],
                 env=self.environment,
