@@ -190,7 +190,7 @@ int check_version(Shell& shell, const std::string& path, Output& output) {
     return 1;
 }
 
-/// An INI file that names nothing to run is no machine. Keys are case-sensitive, as in LinuxCNC.
+/// Rejects an INI file that names nothing to run.
 int reject_without_netlist(Shell& shell, const std::string& path, Output& output) {
     Diagnostics diagnostics;
     diagnostics.error("ini-without-netlist", Span{},

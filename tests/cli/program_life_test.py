@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The life of programs: names that are taken and released, waiting that reports and ends, machines that are killed, programs that hang."""
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -64,7 +65,9 @@ class LifeCase(Case):
 
     def say(self, *words):
         done = self.shell(*words)
-        self.assertEqual((0, ""), (done.returncode, done.stderr), done.stdout)
+        # on a busy host a program may take more than a second to register
+        errors = re.sub(r"(?m)^loadusr: waiting for component .*\n", "", done.stderr)
+        self.assertEqual((0, ""), (done.returncode, errors), done.stdout)
         return done.stdout
 
     def refused(self, *words):
@@ -215,6 +218,8 @@ os._exit(3)
         self.machine()
         waiter = self.background(str(HAL), "shell", "loadusr", "-Wn", "wrong", *self.slow("right"))
         line = waiter.stderr.readline()
+        while "has not registered a component" in line:  # a busy host
+            line = waiter.stderr.readline()
         self.assertRegex(
             line,
             r"^loadusr: waiting for component 'wrong': '.*python3?[0-9.]*' \(process \d+\) has registered 'right' instead \(\d+ s\)\n$",

@@ -608,7 +608,7 @@ class Live(Case):
 
         for name, left in (
             ("run.mcap", "; no row was written, and the file was removed"),
-            ("run.csv", "; no row was written"),
+            ("run.csv", "; no row was written: 'run.csv' has none"),
         ):
             done = subprocess.run(
                 [str(HAL), "record", name, "sine", "--for", "1s"],

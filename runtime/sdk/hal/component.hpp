@@ -212,9 +212,10 @@ public:
                 options.flags(), detail::run_row<B, step>);
     }
     // The compiler shows this line where something else was given.
+    // clang-format off
     template <std::derived_from<Component> C, class F>
-    Function(C&, const char*, F, const char*,
-             FunctionOptions = {}) = delete;  // must be: void NAME(hal::Cycle) noexcept
+    Function(C&, const char*, F, const char*, FunctionOptions = {}) = delete;  // must be: void NAME(hal::Cycle) noexcept
+    // clang-format on
     Function(const Function&) = delete;
     Function& operator=(const Function&) = delete;
 

@@ -62,8 +62,7 @@ bool guarded(const hal_host* host, Action action) noexcept {
 
 template <class C>
 void construct(const hal_host* host, void* memory) {
-    // "no matching function": missing line in the component: using Component::Component;
-    new (memory) C(host);
+    new (memory) C(host);  // missing line in the component: using Component::Component;
 }
 
 template <std::derived_from<Component> C>

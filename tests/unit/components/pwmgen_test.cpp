@@ -75,6 +75,9 @@ TEST(Pwmgen, Dithered_pwm_is_exact_in_the_average_and_keeps_its_frequency) {
     int rises = 0;
     bool before = true;
     for (int i = 0; i < 20'000; ++i) {
+        if (i % 50 == 0) {
+            p.update();
+        }
         p.make();
         rises += p.get<bool>("pwm") && !before ? 1 : 0;
         before = p.get<bool>("pwm");

@@ -118,7 +118,7 @@ TEST(Esi, Invalid_files_are_reported_with_their_place) {
     EXPECT_EQ(
         first("<EtherCATInfo><Descriptions><Devices><Device>\n<Type "
               "ProductCode='#xZZ'/></Device></Devices></Descriptions></EtherCATInfo>"),
-        "x.xml:2:2: warning: invalid ProductCode '#xZZ': expected a number, as in 12 or #x1F");
+        "x.xml:2:2: error: invalid ProductCode '#xZZ'; write a number, as in 12 or #x1F");
 }
 
 TEST(Esi, Any_bytes_are_read_without_harm) {
