@@ -222,6 +222,16 @@ behaviour(
     ),
 )
 behaviour(
+    "limit1",
+    "out",
+    lambda v: v.invalid("min", "max"),
+    "`min` or `max` is NaN",
+    "its last valid value applies, and a fault is raised",
+    "the limit is gone",
+    "a limit must hold",
+    witness=("limit1", {"limit1.0.in": [1.0], "limit1.0.max": [0.5, float("nan")]}, {}),
+)
+behaviour(
     "limit2",
     "out",
     lambda v: not v["maxv"] >= 0 or v.beyond(1e18, "in", "max", "min", "maxv"),
