@@ -455,7 +455,7 @@ $""",
     def test_outputs_are_safe_until_a_page_has_control(self):
         self.write(
             "jog.panel",
-            "component jog\nslider speed min=-1 max=1 initial=0.5 safe=0.25\nslider from-five min=5 max=9\ntoggle pump safe=TRUE\ntoggle lamp initial=TRUE\n",
+            "component jog\ntimeout 60s\nslider speed min=-1 max=1 initial=0.5 safe=0.25\nslider from-five min=5 max=9\ntoggle pump safe=TRUE\ntoggle lamp initial=TRUE\n",
         )
         self.begin("jog.panel", "--write")
         wait_until(
