@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """hal tdma: schedules of an Ethernet segment, and who answers on it."""
 import json
+import re
 import unittest
 import xml.etree.ElementTree
 
@@ -136,10 +137,10 @@ class Tdma(Case):
         status = self.good("tdma", "status").split("tdma.1: ")[0]
         self.assertRegex(status, r"(?m)^station +state +since +frames +late +drift  slots$")
         self.assertRegex(status, r"(?m)^away +unheard +- +0 +0 +-  0: 700 us$")
-        self.assertRegex(
-            status,
-            r"(?m)^x +online +\S+ s +\d+ +0 +[-+]0\.0 ppm  0: 300 us, 2: 500 us in 1 of 2 cycles$",
+        online = re.compile(
+            r"(?m)^x +online +\S+ s +\d+ +0 +[-+]0\.0 ppm  0: 300 us, 2: 500 us in 1 of 2 cycles$"
         )
+        wait_until(lambda: online.search(self.good("tdma", "status")), "x is heard")
 
         # It is heard no more: its thread does nothing.
         for function in ("receive", "transmit"):
