@@ -15,7 +15,7 @@ Encoding encoding_of(const std::string& name) {
     }
     throw hal::ArgumentError(
         "encoding",
-        "encoding=" + name + " is none of gray, binary, bcd, single, index, edge, counts");
+        "invalid encoding '" + name + "'; write gray, binary, bcd, single, index, edge or counts");
 }
 
 struct Carousel : hal::Component {

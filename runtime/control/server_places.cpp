@@ -29,7 +29,7 @@ void Server::State::keep_spare() {
 }
 
 /// Accepts a connection; with the descriptor in reserve when the process has no other. Returns -1
-/// when there is none, or no way to accept it.
+/// when no client waits, or it cannot be accepted.
 int Server::State::accept_one() {
     int fd = accept4(endpoint.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (fd >= 0) return fd;
@@ -45,7 +45,7 @@ int Server::State::accept_one() {
     return fd;
 }
 
-/// Closes the client that has been idle longest, for at least this time. False when there is none.
+/// Closes the client that has been idle longest, for at least this time. False without such a client.
 bool Server::State::close_one_idle(std::int64_t idle_ns) {
     const std::int64_t now = monotonic_ns();
     ServedClient* longest = nullptr;
@@ -63,7 +63,7 @@ bool Server::State::close_one_idle(std::int64_t idle_ns) {
 }
 
 /// Closes the client without a place that has been connected longest, if it had the time for an
-/// urgent request. False when there is none.
+/// urgent request. False without such a client.
 bool Server::State::make_way() {
     ServedClient* oldest = nullptr;
     for (const auto& client : clients) {

@@ -167,8 +167,10 @@ class Sim(Case):
         ]
         path = self.write("a.hal", NETLIST + "".join(c + "\n" for c in commands))
         lossy = self.run_program("sim", "--quiet", path)
-        self.assertIn(
-            "samples between the lines were lost, because the sampler was full", lossy.stderr
+        self.assertRegex(
+            lossy.stderr,
+            r"^hal: \d+ samples? between the lines (was|were) lost, because the sampler was full: "
+            r"raise its depth\n$",
         )
 
     def test_no_samples_are_none(self):

@@ -232,10 +232,14 @@ private:
             const std::string far =
                 "node " + std::to_string(node.setup.id) + " (" + node.name + ")";
             const auto report = [&](const std::string& pin) {
-                hal::report_path_delay(
-                    ((by_index() ? "" : node.name + ".") + pin).c_str(), far.c_str(),
-                    s.to_node ? delay.there_cycles : delay.back_cycles,
-                    s.to_node ? 0 : delay.round_trip, s.to_node ? delay.there_ns : delay.back_ns);
+                const std::string full = (by_index() ? "" : node.name + ".") + pin;
+                if (s.to_node) {
+                    hal::report_path_delay(full.c_str(), far.c_str(), delay.there_cycles, 0,
+                                           delay.there_ns);
+                } else {
+                    hal::report_path_delay(full.c_str(), far.c_str(), delay.back_cycles,
+                                           delay.round_trip, delay.back_ns);
+                }
             };
             if (s.object->bit_pins.empty()) {
                 report(s.object->pin);

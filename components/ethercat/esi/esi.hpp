@@ -179,9 +179,9 @@ struct File {
 
     bool good() const { return text::good(messages); }
     /// Returns the device with this product code: that of the given revision, else the one of the
-    /// highest revision; nullptr if there is none.
+    /// highest revision; nullptr without one.
     const Device* find(std::uint32_t product, std::optional<std::uint32_t> revision = {}) const;
-    /// Returns the newest device with this order code or name; nullptr if there is none.
+    /// Returns the newest device with this order code or name; nullptr without one.
     const Device* find(std::string_view name) const;
 };
 

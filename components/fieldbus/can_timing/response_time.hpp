@@ -96,7 +96,7 @@ std::optional<std::uint32_t> sufficient_bit_rate(std::span<const Message>, const
 
 /// Returns an order of the messages, highest priority first, with which each of them meets its
 /// deadline if the identifiers are assigned in this order; it is found if there is one (Audsley).
-/// Empty: there is none, or more than 256 messages, or a FIFO queue.
+/// Empty if none is found, and for more than 256 messages or a FIFO queue.
 std::vector<std::size_t> sufficient_order(std::span<const Message>, const Bus&);
 
 }  // namespace hal::can_timing

@@ -16,7 +16,7 @@ public:
         at_ += count;
         return here;
     }
-    /// A decimal number behind white space and comments; -1 when there is none, 65536 when it is
+    /// A decimal number behind white space and comments; -1 without a number, 65536 when it is
     /// larger than 65535.
     int number() {
         for (; at_ != end_; ++at_) {

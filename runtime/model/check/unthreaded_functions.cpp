@@ -7,7 +7,7 @@ namespace hal {
 
 namespace {
 
-/// Returns a function in a thread that does not work without `function`; nullptr if there is none.
+/// Returns a function in a thread that does not work without `function`; nullptr without one.
 const LoadedFunction* waiting_for(const LoadedFunction& function) {
     if (!function.required) return nullptr;
     for (const Instance* instance : function.instances) {

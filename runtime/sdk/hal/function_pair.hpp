@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "hal/function_monitor.hpp"
 #include "hal/lasting_fault.hpp"
 
 namespace hal {
@@ -102,8 +103,7 @@ private:
     };
 
     static std::string missing(const std::string& running, const std::string& absent) {
-        return "'" + running + "' runs, but '" + absent +
-               "' does not; nothing is sent; type: addf " + absent + " THREAD";
+        return missing_function_text(running, absent, "nothing is sent");
     }
     void report(LastingFault& fault, bool lasts, const std::string& reason) const noexcept {
         if (lasts && !fault.lasts()) {

@@ -162,6 +162,24 @@ void add_pdos(Description& d, void (*add_pdo)(Description&, unsigned, const PdoD
     }
 }
 
+/// The I/O functionality in bits 16 to 19 of the device type (CiA 401, 1000h).
+std::uint32_t kinds_of(const IoSettings& s) {
+    std::uint32_t kinds = 0;
+    if (s.digital_inputs != 0) {
+        kinds |= 1;
+    }
+    if (s.digital_outputs != 0) {
+        kinds |= 2;
+    }
+    if (s.analog_inputs != 0) {
+        kinds |= 4;
+    }
+    if (s.analog_outputs != 0) {
+        kinds |= 8;
+    }
+    return kinds;
+}
+
 }  // namespace
 
 Description io_description(const IoSettings& s) {
@@ -172,9 +190,7 @@ Description io_description(const IoSettings& s) {
         throw std::invalid_argument(
             "too many analogue terminals; at most 12 inputs and 12 outputs");
     }
-    const std::uint32_t kinds =
-        (s.digital_inputs != 0 ? 1U : 0U) | (s.digital_outputs != 0 ? 2U : 0U) |
-        (s.analog_inputs != 0 ? 4U : 0U) | (s.analog_outputs != 0 ? 8U : 0U);
+    const std::uint32_t kinds = kinds_of(s);
     Description d = basic_device({.device_type = kinds << 16 | 0x191,
                                   .vendor = example_vendor,
                                   .product = 0x401,

@@ -179,11 +179,14 @@ void Jr3::publish() noexcept {
     for (unsigned n = 0; n < 6; ++n) {
         const bool over = raw_[n] == 32767 || raw_[n] == -32768 ||
                           std::abs(field_[n]) > static_cast<double>(limits_[n]);
-        const auto side = field_[n] > 0 ? AnalogInputs::too_high : AnalogInputs::too_low;
-        inputs_.sample(
-            n, field_[n], raw_[n],
-            static_cast<std::uint8_t>((silent ? AnalogInputs::not_valid : 0) | (over ? side : 0)),
-            last_);
+        unsigned status = 0;
+        if (silent) {
+            status |= AnalogInputs::not_valid;
+        }
+        if (over) {
+            status |= field_[n] > 0 ? AnalogInputs::too_high : AnalogInputs::too_low;
+        }
+        inputs_.sample(n, field_[n], raw_[n], static_cast<std::uint8_t>(status), last_);
     }
     ++counter_;
 }

@@ -114,8 +114,9 @@ void check_network(const MasterConfig& config, Report& report) {
     unsigned received = 0;
     unsigned safety = 0;
     const auto called = [](const User& u) {
-        return std::string(u.pdo->to_node ? "r" : "t") + (u.pdo->safety ? "srdo" : "pdo") +
-               std::to_string(u.pdo->number) + " of '" + u.node->name + "'";
+        const std::string direction = u.pdo->to_node ? "r" : "t";
+        const std::string kind = u.pdo->safety ? "srdo" : "pdo";
+        return direction + kind + std::to_string(u.pdo->number) + " of '" + u.node->name + "'";
     };
     for (const Node& n : config.nodes) {
         for (const Pdo& p : n.pdos) {

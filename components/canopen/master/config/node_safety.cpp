@@ -79,6 +79,16 @@ void NodeReader::srdo(const PdoWish& wish) {
     }
 }
 
+namespace {
+
+Time& time_option(Safety& safety, const std::string& name) {
+    if (name == "srvt") return safety.srvt;
+    if (name == "sct") return safety.sct;
+    return safety.refresh;
+}
+
+}  // namespace
+
 void NodeReader::srdo_options(const PdoWish& wish, Pdo& pdo) {
     Safety& s = *pdo.safety;
     bool refresh_given = false;
@@ -91,7 +101,8 @@ void NodeReader::srdo_options(const PdoWish& wish, Pdo& pdo) {
                 keys_.reject(
                     *line, "whole milliseconds up to " + std::to_string(most / millisecond) + "ms");
             } else {
-                (srvt ? s.srvt : name == "sct" ? s.sct : s.refresh) = *time;
+                Time& option = time_option(s, name);
+                option = *time;
             }
             refresh_given = refresh_given || name == "refresh";
         } else if (name == "cob-id") {

@@ -57,7 +57,13 @@ public:
         d.add(filler, 0, Type::unsigned64, Access::read_write).mappable();
         for (std::size_t n = 0; n < config_.nodes.size(); ++n) {
             for (const config::Pdo& pdo : config_.nodes[n].pdos) {
-                pdo.safety ? safety(n, pdo) : pdo.to_node ? send(n, pdo) : receive(n, pdo);
+                if (pdo.safety) {
+                    safety(n, pdo);
+                } else if (pdo.to_node) {
+                    send(n, pdo);
+                } else {
+                    receive(n, pdo);
+                }
             }
         }
         for (Sent& sent : out_.sent) {

@@ -131,9 +131,14 @@ struct Reader {
         }
         return c.numbers.size() < least ? fail("a number is missing") : end();
     }
+    /// How many numbers, net and node, may stand before a command.
+    static std::size_t max_numbers(Scope scope) {
+        if (scope == Scope::gateway) return 0;
+        return scope == Scope::net ? 1 : 2;
+    }
     bool scope(Scope scope, const std::vector<std::uint32_t>& before) {
         Command& c = out.command;
-        if (before.size() > (scope == Scope::gateway ? 0U : scope == Scope::net ? 1U : 2U)) {
+        if (before.size() > max_numbers(scope)) {
             return fail("there are too many numbers before the command");
         }
         if (scope == Scope::node && !before.empty()) {

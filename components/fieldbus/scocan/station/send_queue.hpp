@@ -41,7 +41,7 @@ public:
     /// Returns the newest value of an identifier that was handed over in the call at `planned`, or
     /// nullptr. [realtime]
     Entry* handed_over(std::uint32_t id, Time planned) noexcept;
-    /// Removes the frame in flight that was echoed. Returns false when there is none; `sent` is a
+    /// Removes the frame in flight that was echoed. Returns false without such a frame; `sent` is a
     /// copy. [realtime]
     bool confirm(const can::Frame&, Entry& sent) noexcept;
     /// Ends the flight of frames whose slot is over: they wait again. Returns how many private ones
