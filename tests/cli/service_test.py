@@ -85,7 +85,10 @@ class Service(Case):
     def test_the_watchdog_ends_with_the_machine_and_belongs_to_one_process(self):
         self.listen(str(self.folder / "notify"))
         self.environment.update(WATCHDOG_USEC="400000")
-        self.end(self.start("run", self.write("a.hal", SERVO)))
+        machine = self.start("run", self.write("a.hal", SERVO))
+        while not self.receive().startswith("READY=1"):
+            pass  # signs of life may come first; a machine that is ended before sends nothing
+        self.end(machine)
         self.until("STOPPING=1")
         while self.receive(0.3) is not None:
             pass  # a last sign of life may follow
