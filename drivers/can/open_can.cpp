@@ -19,16 +19,38 @@ namespace hal::can {
 namespace {
 
 constexpr link::Driver<Opened, Options, Description> drivers[] = {
-    {"can", socketcan::open, socketcan::describe},
-    {"sim", simbus::open, simbus::describe},
-    {"udp", canudp::open, canudp::describe, nullptr, nullptr, "restart"},
-    {"slcan", slcan::open, slcan::describe, nullptr, nullptr, "own errors restart receivequeue"},
-    {"replay", replay::open, replay::describe, nullptr, nullptr,
-     "own restart sendqueue receivequeue"},
-    {"cane", cane::open, cane::describe, cane::is_own_option, cane::own_options,
+    {{"can:can0", "an interface of this machine"}, socketcan::open, socketcan::describe},
+    {{"sim:NAME", "a bus in memory", link::Reach::process}, simbus::open, simbus::describe},
+    {{"udp:239.74.163.2:43113", "a bus in UDP datagrams"},
+     canudp::open,
+     canudp::describe,
+     nullptr,
+     nullptr,
+     "restart"},
+    {{"slcan:/dev/ttyACM0", "an adapter on a serial line"},
+     slcan::open,
+     slcan::describe,
+     nullptr,
+     nullptr,
+     "own errors restart receivequeue"},
+    {{"cane:enp3s0", "CAN in Ethernet frames"},
+     cane::open,
+     cane::describe,
+     cane::is_own_option,
+     cane::own_options,
      "bitrate datarate own errors restart"},
-    {"scocan", scocan::open, scocan::describe, scocan::is_own_option, scocan::own_options,
+    {{"scocan:NODE", "the slots of a node", link::Reach::process},
+     scocan::open,
+     scocan::describe,
+     scocan::is_own_option,
+     scocan::own_options,
      "bitrate datarate fd own errors stamps restart"},
+    {{"replay:FILE", "a recorded bus", link::Reach::file},
+     replay::open,
+     replay::describe,
+     nullptr,
+     nullptr,
+     "own restart sendqueue receivequeue"},
 };
 
 using link::quoted;
@@ -102,15 +124,19 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
 }  // namespace
 
 Opened open(std::string_view address, const Options& given) {
-    return link::open_address<Opened, Options, Description>(
-        address, given, drivers, apply,
-        "a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
-        "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, "
-        "scocan:NODE for the slots of a node, or replay:FILE");
+    return link::open_address<Opened, Options, Description>(address, given, drivers, apply,
+                                                            "a CAN bus");
 }
 
 Description describe(std::string_view address) {
     return link::describe_address<Opened, Options, Description>(address, drivers);
+}
+
+std::vector<link::AddressForm> address_forms() {
+    std::vector<link::AddressForm> forms;
+    for (const auto& driver : drivers)
+        forms.push_back(driver.form);
+    return forms;
 }
 
 }  // namespace hal::can

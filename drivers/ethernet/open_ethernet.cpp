@@ -15,11 +15,15 @@ namespace hal::ethernet {
 namespace {
 
 constexpr link::Driver<Opened, Options, Description> drivers[] = {
-    {"eth", rawether::open, rawether::describe},
-    {"sim", simbus::open, simbus::describe},
-    {"udp", udp::open, udp::describe, nullptr, nullptr,
+    {{"eth:enp3s0", "an interface of this machine"}, rawether::open, rawether::describe},
+    {{"sim:NAME", "a segment in memory", link::Reach::process}, simbus::open, simbus::describe},
+    {{"udp:HOST", "UDP datagrams"},
+     udp::open,
+     udp::describe,
+     nullptr,
+     nullptr,
      "policy pacer priority cpu promiscuous txstamps speed forward noise mac sendqueue"},
-    {"replay", replay::open, replay::describe},
+    {{"replay:FILE", "a recorded segment", link::Reach::file}, replay::open, replay::describe},
 };
 
 using link::quoted;
@@ -101,14 +105,19 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
 }  // namespace
 
 Opened open(std::string_view address, const Options& given) {
-    return link::open_address<Opened, Options, Description>(
-        address, given, drivers, apply,
-        "an Ethernet segment; write eth:enp3s0 for an interface of this machine, "
-        "sim:NAME for a segment in memory, udp:HOST for UDP datagrams or replay:FILE");
+    return link::open_address<Opened, Options, Description>(address, given, drivers, apply,
+                                                            "an Ethernet segment");
 }
 
 Description describe(std::string_view address) {
     return link::describe_address<Opened, Options, Description>(address, drivers);
+}
+
+std::vector<link::AddressForm> address_forms() {
+    std::vector<link::AddressForm> forms;
+    for (const auto& driver : drivers)
+        forms.push_back(driver.form);
+    return forms;
 }
 
 }  // namespace hal::ethernet

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <utility>
 
+#include "link/address_form.hpp"
+
 namespace hal::link {
 
 /// Returns the text in single quotes.
@@ -30,13 +32,16 @@ inline std::string to_flag(std::string_view key, std::string_view value, bool ha
 /// A driver. Its own options stay behind the place, for the driver itself to parse.
 template <class Opened, class Options, class Description>
 struct Driver {
-    std::string_view name;
+    AddressForm form;
     Opened (*open)(const std::string& place, const Options&);
     Description (*describe)(const std::string& place);
     bool (*is_own_option)(std::string_view key) = nullptr;
     std::string (*own_options)() = nullptr;  ///< their names, for a message
     /// common options it does not support, separated by blanks
     std::string_view without = {};
+
+    /// The prefix of its addresses.
+    std::string_view name() const { return form.example.substr(0, form.example.find(':')); }
 
     /// Returns true for a common option that the driver does not support.
     bool ignores(std::string_view key) const {
@@ -48,18 +53,34 @@ struct Driver {
     }
 };
 
+/// Writes `can:can0 for an interface of this machine, sim:NAME for a bus in memory or ...`.
+template <class Opened, class Options, class Description>
+std::string address_forms(std::span<const Driver<Opened, Options, Description>> drivers) {
+    std::string text;
+    for (const auto& driver : drivers) {
+        if (&driver == &drivers.back()) {
+            text += " or ";
+        } else if (!text.empty()) {
+            text += ", ";
+        }
+        text.append(driver.form.example).append(" for ").append(driver.form.purpose);
+    }
+    return text;
+}
+
 /// Opens an address with the driver that it names. `apply(key, value, has_value, options)` applies
-/// an option and returns the problem, or ""; `help` completes "'x' is not the address of ".
+/// an option and returns the problem, or ""; `kind` completes "'x' is not the address of ".
 template <class Opened, class Options, class Description, class Apply>
 Opened open_address(std::string_view address, Options options,
                     std::span<const Driver<Opened, Options, Description>> drivers, Apply apply,
-                    std::string_view help) {
+                    std::string_view kind) {
     const auto colon = address.find(':');
     const auto driver = std::find_if(drivers.begin(), drivers.end(), [&](const auto& d) {
-        return d.name == address.substr(0, colon);
+        return d.name() == address.substr(0, colon);
     });
     if (colon == address.npos || driver == drivers.end()) {
-        return {nullptr, quoted(address) + " is not the address of " + std::string(help)};
+        return {nullptr, quoted(address) + " is not the address of " + std::string(kind) +
+                             "; write " + address_forms(drivers)};
     }
 
     const auto place = address.substr(colon + 1);
@@ -81,10 +102,10 @@ Opened open_address(std::string_view address, Options options,
         std::string problem = apply(key, has_value ? item.substr(equals + 1) : std::string_view{},
                                     has_value, options);
         if (problem.starts_with(no_option) && driver->own_options != nullptr) {
-            problem += ", and for " + std::string(driver->name) + ": " + driver->own_options();
+            problem += ", and for " + std::string(driver->name()) + ": " + driver->own_options();
         }
         if (problem.empty() && driver->ignores(key)) {
-            problem = std::string(driver->name) + " does not support the option " + quoted(key) +
+            problem = std::string(driver->name()) + " does not support the option " + quoted(key) +
                       "; remove it";
         }
         if (!problem.empty()) {
@@ -109,7 +130,7 @@ Description describe_address(std::string_view address,
                              std::span<const Driver<Opened, Options, Description>> drivers) {
     const auto colon = address.find(':');
     const auto driver = std::find_if(drivers.begin(), drivers.end(), [&](const auto& d) {
-        return d.name == address.substr(0, colon);
+        return d.name() == address.substr(0, colon);
     });
     if (colon == address.npos || driver == drivers.end()) {
         return Description{.address = std::string(address), .transport = {}};

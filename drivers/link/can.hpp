@@ -23,6 +23,8 @@
 #include <string_view>
 #include <vector>
 
+#include "link/address_form.hpp"
+
 namespace hal::can {
 
 #pragma GCC visibility push(default)
@@ -318,11 +320,13 @@ struct Opened {
 
 /// Opens `DRIVER:PLACE` or `DRIVER:PLACE?key=value&key=value`. Keys are those of Options
 /// (`bitrate=500000` or `500k`,
-/// `datarate=2M`, `fd`, `listen`, `restart=MS`) and take precedence over them. Drivers: can, sim, udp, slcan, cane, replay. [setup]
+/// `datarate=2M`, `fd`, `listen`, `restart=MS`) and take precedence over them. [setup]
 Opened open(std::string_view address, const Options& options = {});
 /// Describes the link that open() would return, as far as the address determines it, without
 /// opening it. `transport` is empty for an unknown driver. [setup]
 Description describe(std::string_view address);
+/// How the addresses of each driver are written. [setup]
+std::vector<link::AddressForm> address_forms();
 
 #pragma GCC visibility pop
 

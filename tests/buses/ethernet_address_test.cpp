@@ -14,7 +14,8 @@ TEST(Ethernet, open_reports_what_to_write_for_an_invalid_address) {
     EXPECT_EQ(open("net0").problem,
               "'net0' is not the address of an Ethernet segment; write eth:enp3s0 for an interface "
               "of this machine, "
-              "sim:NAME for a segment in memory, udp:HOST for UDP datagrams or replay:FILE");
+              "sim:NAME for a segment in memory, udp:HOST for UDP datagrams or replay:FILE for a "
+              "recorded segment");
     EXPECT_EQ(open("sim:").problem, "sim:: missing name of the segment; write sim:net0");
     EXPECT_EQ(open("sim:x/").problem, "sim:x/: missing name of the station; write sim:x/master");
     EXPECT_EQ(open("sim:x?policy=fast").problem,

@@ -402,9 +402,10 @@ TEST(Simbus, many_threads_lose_nothing) {
 TEST(Open, reports_what_is_wrong_and_what_to_type) {
     EXPECT_EQ(open("can0").problem,
               "'can0' is not the address of a CAN bus; write can:can0 for an interface of this "
-              "machine, sim:NAME for a bus in memory, "
-              "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, "
-              "scocan:NODE for the slots of a node, or replay:FILE");
+              "machine, sim:NAME for a bus in memory, udp:239.74.163.2:43113 for a bus in UDP "
+              "datagrams, slcan:/dev/ttyACM0 for an adapter on a serial line, cane:enp3s0 for CAN "
+              "in Ethernet frames, scocan:NODE for the slots of a node or replay:FILE for a "
+              "recorded bus");
     EXPECT_EQ(open("sim:").problem, "sim:: missing name of the bus; write sim:bus0");
     EXPECT_EQ(open("sim:x?bitrate=fast").problem,
               "sim:x?bitrate=fast: invalid bitrate 'fast'; write bits per second, as in 500000, "

@@ -79,7 +79,10 @@ BAD_INCLUDES = {
     "components/ethercat/devices/servo.hpp": SPDX,
     "components/ethercat/devices/bad.cpp": SPDX + '#include "ethercat/master/master.hpp"\n',
     "components/ethercat/master/master.hpp": SPDX,
-    "tools/bad.cpp": SPDX + 'bool b = a.starts_with("sim:");\n',
+    "tools/bad.cpp": SPDX + 'bool b = a.starts_with("scocan:");\n',
+    "drivers/README.md": "`can:can0`\n",
+    "drivers/can/open_can.cpp": SPDX + '{{"can:can0", ""}},\n{{"sim:NAME", ""}},\n',
+    "drivers/ethernet/open_ethernet.cpp": SPDX,
 }
 
 
@@ -107,6 +110,7 @@ def check_includes(root):
         "components/math/sum2.cpp:3:",
         "components/math/sum2.cpp:4:",
         "tools/bad.cpp:2: tests the prefix",
+        "drivers/README.md: the address `sim:NAME` is missing",
         "folders that include each other: components/canopen/device, components/canopen/device/drive",
         "    components/canopen/device/circle.hpp:2:",
         "    components/canopen/device/drive/bad.hpp:2:",

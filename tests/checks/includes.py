@@ -214,11 +214,43 @@ SINGLE = {
         "tools/panel",
     ]
 }  # headers that belong to no folder
-# Which transport an address names is the drivers' matter: others ask describe().
-ADDRESS_PREFIX = re.compile(
-    r'(?:\b(?:starts_with|r?find|compare)\(\s*|[=!]=\s*|\b\w+ = )"(?:can|sim|udp|slcan|cane|replay|eth):"'
-)
+# The tables of the drivers: the first text of each row is an address.
+DRIVER_TABLES = ("drivers/can/open_can.cpp", "drivers/ethernet/open_ethernet.cpp")
+DRIVER_ROW = re.compile(r'^\s*\{\{"([a-z]+:[^"]*)",', re.MULTILINE)
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
+
+
+def address_forms(root):
+    """An address of each driver."""
+    return [
+        form
+        for table in DRIVER_TABLES
+        for form in DRIVER_ROW.findall((root / table).read_text(encoding="utf-8"))
+    ]
+
+
+def prefix_test():
+    """What a test of an address's prefix looks like. Which transport an address names is the drivers'
+    matter: others ask describe()."""
+    forms = address_forms(Path(__file__).resolve().parents[2])
+    names = "|".join(sorted({form.split(":")[0] for form in forms}))
+    return re.compile(rf'(?:\b(?:starts_with|r?find|compare)\(\s*|[=!]=\s*|\b\w+ = )"(?:{names}):"')
+
+
+def missing_forms(root):
+    """Errors for drivers whose address is missing in the page of the drivers."""
+    page = root / "drivers/README.md"
+    if not page.exists():
+        return []
+    text = page.read_text(encoding="utf-8")
+    return [
+        f"drivers/README.md: the address `{form}` is missing; add it"
+        for form in address_forms(root)
+        if f"`{form}`" not in text
+    ]
+
+
+ADDRESS_PREFIX = prefix_test()
 
 
 def folder_of(path):
@@ -333,6 +365,7 @@ def main(root):
                     graph.setdefault(path.parent, {}).setdefault(
                         target.parent, f'{path}:{number}: includes "{match[2]}"'
                     )
+    errors += missing_forms(root)
     for circle in circles(graph):
         errors.append(f"folders that include each other: {', '.join(f.as_posix() for f in circle)}")
         errors += [

@@ -184,8 +184,11 @@ class Dump(Can):
             self.bad_can("dump", "replay:c.log", "--filter", "xyz"),
         )
         self.assertEqual(
-            "hal can dump: 'bus' is not the address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
-            "udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, scocan:NODE for the slots of a node, or replay:FILE\n",
+            "hal can dump: 'bus' is not the address of a CAN bus; write "
+            "can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
+            "udp:239.74.163.2:43113 for a bus in UDP datagrams, slcan:/dev/ttyACM0 for an adapter "
+            "on a serial line, cane:enp3s0 for CAN in Ethernet frames, scocan:NODE for the slots "
+            "of a node or replay:FILE for a recorded bus\n",
             self.bad_can("dump", "bus"),
         )
         self.assertEqual(

@@ -322,8 +322,11 @@ class WrongWords(Node):
                 "bus",
                 "--id",
                 "5",
-            ): "'bus' is not the address of a CAN bus; write can:can0 for an interface of this machine, sim:NAME for a bus "
-            "in memory, udp:239.74.163.2:43113, slcan:/dev/ttyACM0, cane:enp3s0 for CAN in Ethernet frames, scocan:NODE for the slots of a node, or replay:FILE",
+            ): "'bus' is not the address of a CAN bus; write "
+            "can:can0 for an interface of this machine, sim:NAME for a bus in memory, "
+            "udp:239.74.163.2:43113 for a bus in UDP datagrams, slcan:/dev/ttyACM0 for an adapter "
+            "on a serial line, cane:enp3s0 for CAN in Ethernet frames, scocan:NODE for the slots "
+            "of a node or replay:FILE for a recorded bus",
             (
                 "io",
                 "--link",

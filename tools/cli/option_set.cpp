@@ -49,7 +49,7 @@ OptionSet::OptionSet(Options& options, const char* name, const char* summary)
 
 OptionSet::~OptionSet() = default;
 
-void OptionSet::words(const char* name, const char* what, bool required) {
+void OptionSet::words(const char* name, const std::string& what, bool required) {
     CLI::Option* option = app_->add_option(name, options_.words, what);
     if (required) {
         option->required();
@@ -65,20 +65,25 @@ void OptionSet::flag(const char* names, const std::function<void()>& given, cons
 }
 
 template <class T>
-DeclaredOption OptionSet::value(const char* names, T& to, const char* type, const char* what) {
+DeclaredOption OptionSet::value(const char* names, T& to, const char* type,
+                                const std::string& what) {
     DeclaredOption option(app_->add_option(names, to, what)->type_name(type));
     if (std::is_unsigned_v<T>) {
         option.not_negative();  // a negative number would wrap around
     }
     return option;
 }
-template DeclaredOption OptionSet::value(const char*, std::string&, const char*, const char*);
-template DeclaredOption OptionSet::value(const char*, double&, const char*, const char*);
-template DeclaredOption OptionSet::value(const char*, int&, const char*, const char*);
-template DeclaredOption OptionSet::value(const char*, unsigned&, const char*, const char*);
-template DeclaredOption OptionSet::value(const char*, std::uint16_t&, const char*, const char*);
-template DeclaredOption OptionSet::value(const char*, std::uint64_t&, const char*, const char*);
-template DeclaredOption OptionSet::value(const char*, std::int64_t&, const char*, const char*);
+template DeclaredOption OptionSet::value(const char*, std::string&, const char*,
+                                         const std::string&);
+template DeclaredOption OptionSet::value(const char*, double&, const char*, const std::string&);
+template DeclaredOption OptionSet::value(const char*, int&, const char*, const std::string&);
+template DeclaredOption OptionSet::value(const char*, unsigned&, const char*, const std::string&);
+template DeclaredOption OptionSet::value(const char*, std::uint16_t&, const char*,
+                                         const std::string&);
+template DeclaredOption OptionSet::value(const char*, std::uint64_t&, const char*,
+                                         const std::string&);
+template DeclaredOption OptionSet::value(const char*, std::int64_t&, const char*,
+                                         const std::string&);
 
 void OptionSet::values(const char* names, std::vector<std::string>& to, const char* type,
                        const char* what) {

@@ -39,14 +39,14 @@ public:
     OptionSet(const OptionSet&) = delete;
 
     /// Declares the positional arguments, under the name that the help shows.
-    void words(const char* name, const char* what, bool required = true);
+    void words(const char* name, const std::string& what, bool required = true);
     void flag(const char* names, bool& to, const char* what);
     /// Declares a flag that calls `given` when it is typed.
     void flag(const char* names, const std::function<void()>& given, const char* what);
     /// Declares an option with a value; `type` is the word for it in the help. Defined for strings
     /// and the number types in use.
     template <class T>
-    DeclaredOption value(const char* names, T& to, const char* type, const char* what);
+    DeclaredOption value(const char* names, T& to, const char* type, const std::string& what);
     /// Declares an option that takes one value and may be repeated.
     void values(const char* names, std::vector<std::string>& to, const char* type,
                 const char* what);

@@ -10,9 +10,14 @@
 
 namespace hal::tools {
 
-inline constexpr const char* bus_address =
-    "can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0, cane:enp3s0 or replay:FILE; with options: "
-    "?bitrate=500k&datarate=2M&listen";
+/// Addresses of buses that every program can open, from the table of the drivers:
+/// `can:can0, udp:239.74.163.2:43113, ...`.
+std::string bus_addresses();
+
+/// For the help of a command that listens.
+inline std::string bus_address() {
+    return bus_addresses() + " or replay:FILE; with options: ?bitrate=500k&datarate=2M&listen";
+}
 
 /// Declares --filter and --count.
 inline void declare_filter(OptionSet& set, std::vector<std::string>& filters,

@@ -17,9 +17,7 @@ struct DumpOptions : Options {
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS",
-                  "one or more buses: can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0, cane:enp3s0 or "
-                  "replay:FILE; with options: ?bitrate=500k&datarate=2M&listen");
+        set.words("ADDRESS", "one or more buses: " + bus_address());
         declare_filter(set, filters, count);
         set.for_how_long(for_ns, "end after 2s, 500ms … (default: until Ctrl-C)");
         set.value("--time", time, "relative|delta|absolute",

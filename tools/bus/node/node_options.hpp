@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "bus/can/bus_options.hpp"
 #include "cli/option_set.hpp"
 
 namespace hal::tools {
@@ -22,8 +23,7 @@ struct NodeOptions : Options {
 
     void declare(OptionSet& set) override {
         set.value("--link", link, "ADDRESS",
-                  "the bus: can:can0, udp:GROUP:PORT, slcan:/dev/ttyACM0, cane:enp3s0; with "
-                  "options: ?bitrate=500k");
+                  "the bus: " + bus_addresses() + "; with options: ?bitrate=500k");
         set.value("--id", id, "N",
                   "node ID, 1..127 or 0x..; none: wait for one from an LSS master");
         set.flag("--eds", eds, "print its EDS and end");
