@@ -43,7 +43,7 @@ for one in (
     "hm2_spix",
 ):
     BEFORE[one] = ["hostmot2"]
-# What a module needs beyond its name: a parameter without which it does nothing, or crashes in LinuxCNC too.
+# What a module needs beyond its name: a parameter without which it does nothing.
 WITH = {
     "debounce": "cfg=2",
     "lcd": "fmt_strings=%d",
