@@ -214,6 +214,8 @@ endfunction()
 
 cmake_path(RELATIVE_PATH CMAKE_INSTALL_FULL_LIBDIR BASE_DIRECTORY "${CMAKE_INSTALL_FULL_BINDIR}" OUTPUT_VARIABLE HALCYON_LIBRARIES_FROM_PROGRAMS)
 cmake_path(RELATIVE_PATH CMAKE_INSTALL_FULL_INCLUDEDIR BASE_DIRECTORY "${CMAKE_INSTALL_FULL_BINDIR}" OUTPUT_VARIABLE HALCYON_INCLUDES_FROM_PROGRAMS)
+cmake_path(RELATIVE_PATH CMAKE_INSTALL_FULL_DOCDIR BASE_DIRECTORY "${CMAKE_INSTALL_FULL_BINDIR}" OUTPUT_VARIABLE HALCYON_MACHINES_FROM_PROGRAMS)
+string(APPEND HALCYON_MACHINES_FROM_PROGRAMS "/halfiles")
 # The values of runtime/paths.hpp, in the only source that depends on the path of this build tree.
 file(CONFIGURE OUTPUT "${PROJECT_BINARY_DIR}/generated/paths.cpp" @ONLY CONTENT [[
 // SPDX-License-Identifier: MIT
@@ -228,6 +230,8 @@ constinit const std::string_view install_python = "@CMAKE_INSTALL_FULL_LIBDIR@/h
 constinit const std::string_view libraries_from_programs = "@HALCYON_LIBRARIES_FROM_PROGRAMS@";
 constinit const std::string_view includes_from_programs = "@HALCYON_INCLUDES_FROM_PROGRAMS@";
 constinit const std::string_view build_includes = "@PROJECT_SOURCE_DIR@/runtime/abi:@PROJECT_SOURCE_DIR@/runtime/sdk";
+constinit const std::string_view build_machines = "@PROJECT_SOURCE_DIR@/halfiles";
+constinit const std::string_view machines_from_programs = "@HALCYON_MACHINES_FROM_PROGRAMS@";
 constinit const std::string_view install_includes = "@CMAKE_INSTALL_FULL_INCLUDEDIR@";
 }  // namespace hal::paths
 ]])

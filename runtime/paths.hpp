@@ -19,6 +19,9 @@ extern const std::string_view install_python;  ///< folder of the Python module 
 /// from the folder of programs to that of libraries, once installed: `../lib`
 extern const std::string_view libraries_from_programs;
 extern const std::string_view includes_from_programs;  ///< the same to that of headers
+extern const std::string_view build_machines;  ///< folder of the machines to start from
+/// from the folder of programs to that of these machines, once installed
+extern const std::string_view machines_from_programs;
 /// include path of the sdk in this tree, parts separated by `:`
 extern const std::string_view build_includes;
 extern const std::string_view install_includes;  ///< include path of the sdk once installed

@@ -55,6 +55,7 @@
 #include "paths.hpp"
 #include "record/plot.hpp"
 #include "run/check.hpp"
+#include "run/examples.hpp"
 #include "run/fmt.hpp"
 #include "run/replay.hpp"
 #include "run/run.hpp"
@@ -114,6 +115,9 @@ constexpr Subcommand sim_command() {
 constexpr Subcommand table[] = {
     command<RunOptions, IN_CORE(run_run)>("run", "FILE… [-- ARG…]",
                                           "load netlists and run them in real-time threads"),
+    command<ExamplesOptions, IN_CORE(run_examples)>("examples", "[NAME [OPTION of hal run…]]",
+                                                    "list the machines to start from, or run one",
+                                                    true),
     sim_command(),
     command<LinuxcncOptions, IN_TOOLS(run_linuxcnc)>(
         "linuxcnc", "FILE.ini [-- ARG…]",
@@ -374,25 +378,20 @@ constexpr Subcommand table[] = {
 /// Commands of two and more words have a first word in common.
 struct Group {
     const char* name;
-    const char* summary;
+    const char* purpose;
 };
 
 constexpr Group groups[] = {
-    {"can",
-     "CAN bus tools: dump, send, record, replay, load, scan, nodes, sniff, generate, produce, nmt, "
-     "flash, sdo, dcf, read-all, pdo, lss, drive, gateway; eds check"},
-    {"canopen", "check and plan a CANopen network"},
+    {"can", "CAN bus tools"},
+    {"canopen", "tools for the configuration of a CANopen network"},
 #ifdef HALCYON_ETHERCAT
-    {"ethercat",
-     "EtherCAT bus tools: scan, slaves, states, crc, upload, download, reg-read, reg-write, "
-     "sii-read, sii-write, alias, pdos, sdos, foe-read, foe-write, config, xml, graph, dc, dump, "
-     "check, plan"},
+    {"ethercat", "EtherCAT bus tools"},
 #endif
-    {"scocan", "time slots of a CAN bus: plan"},
-    {"tdma", "time slots of an Ethernet segment: plan, status, ping"},
+    {"scocan", "time slots of a CAN bus"},
+    {"tdma", "time slots of an Ethernet segment"},
     {"node",
-     "simulated CANopen devices as processes: drive, io, axis-io, safe-io, jr3, bootloader; "
-     "injectable faults: faults; an EtherCAT line: ethercat"},
+     "simulated CANopen devices as processes, an EtherCAT line, and the faults that can be "
+     "injected"},
 };
 
 const Group* find_group(std::string_view name) {
@@ -403,6 +402,19 @@ const Group* find_group(std::string_view name) {
 
 bool belongs(const Subcommand& row, const Group& group) {
     return std::string_view(row.name).starts_with(std::string(group.name) + " ");
+}
+
+/// The purpose, and the second words of the commands: `time slots of a CAN bus: plan`.
+std::string summary_of(const Group& group) {
+    std::vector<std::string_view> names;
+    for (const Subcommand& row : table) {
+        if (!belongs(row, group)) continue;
+        std::string_view name = row.name;
+        name.remove_prefix(std::string_view(group.name).size() + 1);
+        name = name.substr(0, name.find(' '));
+        if (names.empty() || names.back() != name) names.push_back(name);
+    }
+    return fmt::format("{}: {}", group.purpose, fmt::join(names, ", "));
 }
 
 struct Found {
@@ -436,18 +448,18 @@ std::string overview() {
         if (group == nullptr) {
             text += fmt::format("  {:11} {}\n", row.name, row.summary);
         } else if (group != last) {
-            text += fmt::format("  {:11} {}\n", group->name, group->summary);
+            text += fmt::format("  {:11} {}\n", group->name, summary_of(*group));
         }
         last = group;
     }
     return text +
-           "\nFor details: hal help COMMAND. A first try: hal run halfiles/furuta/hang.hal --for "
+           "\nFor details: hal help COMMAND. A first try: hal examples furuta/hang --for "
            "10s\n";
 }
 
 std::string help_of(const Group& group) {
     std::string text = fmt::format("hal {}: {}\n\nusage: hal {} COMMAND …\n\n", group.name,
-                                   group.summary, group.name);
+                                   group.purpose, group.name);
     for (const Subcommand& row : table) {
         if (belongs(row, group)) {
             text += fmt::format("  {:16} {}\n", row.name, row.summary);

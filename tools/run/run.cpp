@@ -11,6 +11,7 @@
 #include "cli/output.hpp"
 #include "machine/address.hpp"
 #include "run/cell_netlists.hpp"
+#include "run/examples.hpp"
 #include "run/fault_lines.hpp"
 #include "run/hosted_machine.hpp"
 #include "run/picture.hpp"
@@ -110,7 +111,10 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
 
 int run_run(const RunOptions& options) {
     if (options.words.empty() && !options.interactive && !options.classic) {
-        return fail(options, "missing netlist; type: hal run FILE.hal, or hal run -I");
+        print(list_of(find_examples()) + "\n");
+        return fail(options,
+                    "missing netlist; type: hal run FILE.hal, hal run -I, or for one of "
+                    "these machines: hal examples NAME");
     }
     if (!options.dds.empty() && options.part.empty()) {
         return fail(options,

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT
+"""hal examples: the machines to start from."""
+import os
+import re
+import shutil
+import subprocess
+import unittest
+
+from harness import HAL, ROOT, Case
+
+MACHINES = ROOT / "halfiles"
+# Machines that are not one netlist: several computers, a configuration of LinuxCNC.
+NOT_LISTED = {"cell", "linuxcnc-ethernet"}
+
+
+class Examples(Case):
+    def names(self):
+        return re.findall(r"(?m)^  (\S+/\S+)  ", self.good("examples"))
+
+    def test_lists_every_machine_by_topic(self):
+        text = self.good("examples")
+        self.assertTrue(
+            text.startswith("Machines to start from. Each runs on any computer.\n\nCANopen\n"), text
+        )
+        self.assertTrue(
+            text.endswith("\n\nTo run one: hal examples NAME [OPTION of hal run]\n"), text
+        )
+        self.assertIn("\npendulums\n", text)
+        self.assertRegex(
+            text,
+            r"(?m)^  furuta/hang +Furuta pendulum: hold the pendulum hanging while the arm keeps "
+            r"its place, against pushes$",
+        )
+        folders = {netlist.parent.name for netlist in MACHINES.glob("*/*.hal")}
+        self.assertEqual(folders - NOT_LISTED, {name.split("/")[0] for name in self.names()})
+
+    def test_every_name_is_a_netlist(self):
+        for name in self.names():
+            self.assertTrue((MACHINES / f"{name}.hal").is_file(), name)
+
+    def test_runs_one_with_the_options_of_run(self):
+        text = self.good("examples", "axis/axis", "--for", "100ms")
+        self.assertTrue(text.startswith(f"hal run {MACHINES}/axis/axis.hal --for 100ms\n"), text)
+        self.assertIn("stopped after 100 ms", text)
+
+    def test_unknown_name(self):
+        self.assertEqual(
+            "hal examples: unknown example 'furuta/hnag'; did you mean 'furuta/hang'?\n",
+            self.bad("examples", "furuta/hnag"),
+        )
+        self.assertEqual(
+            "hal examples: unknown example 'teapot'; type: hal examples\n",
+            self.bad("examples", "teapot"),
+        )
+
+    def test_run_without_a_netlist_lists_them(self):
+        done = self.run_program("run")
+        self.assertEqual(1, done.returncode)
+        self.assertIn("\npendulums\n", done.stdout)
+        self.assertEqual(
+            "hal run: missing netlist; type: hal run FILE.hal, hal run -I, or for one of these "
+            "machines: hal examples NAME\n",
+            done.stderr,
+        )
+
+
+class Installed(Case):
+    def test_finds_the_machines_beside_the_program(self):
+        shutil.copytree(MACHINES, self.folder / "share/halcyon/halfiles")
+        (self.folder / "bin").mkdir()
+        shutil.copy(HAL, self.folder / "bin/hal")
+        done = subprocess.run(
+            [self.folder / "bin/hal", "examples"],
+            capture_output=True,
+            text=True,
+            env=dict(os.environ, LD_LIBRARY_PATH=str(HAL.parent.parent / "lib")),
+        )
+        self.assertEqual((0, ""), (done.returncode, done.stderr))
+        self.assertIn("  furuta/hang ", done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()

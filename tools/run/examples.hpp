@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cli/option_set.hpp"
+
+namespace hal::tools {
+
+/// A machine to start from: a netlist of the folder `halfiles` that says in its header which topic
+/// it belongs to.
+struct Example {
+    std::string name;     ///< what follows `hal examples`: furuta/hang
+    std::string path;     ///< its netlist
+    std::string topic;    ///< from its line `# Topic: …`
+    std::string summary;  ///< the first sentence of its first comment
+};
+
+/// All examples, ordered by topic and name; none when this program was copied without them.
+/// [setup]
+std::vector<Example> find_examples();
+
+/// The examples by topic, a line each. [setup]
+std::string list_of(const std::vector<Example>&);
+
+struct ExamplesOptions : Options {
+    void declare(OptionSet& set) override {
+        set.words("NAME", "an example, and options of hal run; none: list them", false);
+    }
+};
+
+/// Runs `hal examples`. Returns the exit code, or becomes `hal run`.
+int run_examples(const ExamplesOptions&);
+
+}  // namespace hal::tools
