@@ -19,37 +19,17 @@ namespace hal::can {
 namespace {
 
 constexpr link::Driver<Opened, Options, Description> drivers[] = {
-    {{"can:can0", "an interface of this machine"}, socketcan::open, socketcan::describe},
-    {{"sim:NAME", "a bus in memory", link::Reach::process}, simbus::open, simbus::describe},
-    {{"udp:239.74.163.2:43113", "a bus in UDP datagrams"},
-     canudp::open,
-     canudp::describe,
-     nullptr,
-     nullptr,
+    {link::form_of(address_forms, "can"), socketcan::open, socketcan::describe},
+    {link::form_of(address_forms, "sim"), simbus::open, simbus::describe},
+    {link::form_of(address_forms, "udp"), canudp::open, canudp::describe, nullptr, nullptr,
      "restart"},
-    {{"slcan:/dev/ttyACM0", "an adapter on a serial line"},
-     slcan::open,
-     slcan::describe,
-     nullptr,
-     nullptr,
+    {link::form_of(address_forms, "slcan"), slcan::open, slcan::describe, nullptr, nullptr,
      "own errors restart receivequeue"},
-    {{"cane:enp3s0", "CAN in Ethernet frames"},
-     cane::open,
-     cane::describe,
-     cane::is_own_option,
-     cane::own_options,
-     "bitrate datarate own errors restart"},
-    {{"scocan:NODE", "the slots of a node", link::Reach::process},
-     scocan::open,
-     scocan::describe,
-     scocan::is_own_option,
-     scocan::own_options,
-     "bitrate datarate fd own errors stamps restart"},
-    {{"replay:FILE", "a recorded bus", link::Reach::file},
-     replay::open,
-     replay::describe,
-     nullptr,
-     nullptr,
+    {link::form_of(address_forms, "cane"), cane::open, cane::describe, cane::is_own_option,
+     cane::own_options, "bitrate datarate own errors restart"},
+    {link::form_of(address_forms, "scocan"), scocan::open, scocan::describe, scocan::is_own_option,
+     scocan::own_options, "bitrate datarate fd own errors stamps restart"},
+    {link::form_of(address_forms, "replay"), replay::open, replay::describe, nullptr, nullptr,
      "own restart sendqueue receivequeue"},
 };
 
@@ -130,13 +110,6 @@ Opened open(std::string_view address, const Options& given) {
 
 Description describe(std::string_view address) {
     return link::describe_address<Opened, Options, Description>(address, drivers);
-}
-
-std::vector<link::AddressForm> address_forms() {
-    std::vector<link::AddressForm> forms;
-    for (const auto& driver : drivers)
-        forms.push_back(driver.form);
-    return forms;
 }
 
 }  // namespace hal::can

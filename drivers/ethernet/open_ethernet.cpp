@@ -15,15 +15,11 @@ namespace hal::ethernet {
 namespace {
 
 constexpr link::Driver<Opened, Options, Description> drivers[] = {
-    {{"eth:enp3s0", "an interface of this machine"}, rawether::open, rawether::describe},
-    {{"sim:NAME", "a segment in memory", link::Reach::process}, simbus::open, simbus::describe},
-    {{"udp:HOST", "UDP datagrams"},
-     udp::open,
-     udp::describe,
-     nullptr,
-     nullptr,
+    {link::form_of(address_forms, "eth"), rawether::open, rawether::describe},
+    {link::form_of(address_forms, "sim"), simbus::open, simbus::describe},
+    {link::form_of(address_forms, "udp"), udp::open, udp::describe, nullptr, nullptr,
      "policy pacer priority cpu promiscuous txstamps speed forward noise mac sendqueue"},
-    {{"replay:FILE", "a recorded segment", link::Reach::file}, replay::open, replay::describe},
+    {link::form_of(address_forms, "replay"), replay::open, replay::describe},
 };
 
 using link::quoted;
@@ -111,13 +107,6 @@ Opened open(std::string_view address, const Options& given) {
 
 Description describe(std::string_view address) {
     return link::describe_address<Opened, Options, Description>(address, drivers);
-}
-
-std::vector<link::AddressForm> address_forms() {
-    std::vector<link::AddressForm> forms;
-    for (const auto& driver : drivers)
-        forms.push_back(driver.form);
-    return forms;
 }
 
 }  // namespace hal::ethernet

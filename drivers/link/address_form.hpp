@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <string_view>
 
 namespace hal::link {
@@ -19,4 +20,40 @@ struct AddressForm {
     Reach reach = Reach::bus;
 };
 
+/// The form of a driver in a table of forms; a driver that is not in it does not compile.
+template <std::size_t size>
+consteval AddressForm form_of(const AddressForm (&forms)[size], std::string_view driver) {
+    for (const AddressForm& form : forms) {
+        if (form.example.substr(0, form.example.find(':')) == driver) return form;
+    }
+    throw "the driver is missing in the table of address forms";
+}
+
 }  // namespace hal::link
+
+namespace hal::can {
+
+/// How the addresses of CAN buses are written.
+inline constexpr link::AddressForm address_forms[] = {
+    {"can:can0", "an interface of this machine"},
+    {"sim:NAME", "a bus in memory", link::Reach::process},
+    {"udp:239.74.163.2:43113", "a bus in UDP datagrams"},
+    {"slcan:/dev/ttyACM0", "an adapter on a serial line"},
+    {"cane:enp3s0", "CAN in Ethernet frames"},
+    {"scocan:NODE", "the slots of a node", link::Reach::process},
+    {"replay:FILE", "a recorded bus", link::Reach::file},
+};
+
+}  // namespace hal::can
+
+namespace hal::ethernet {
+
+/// How the addresses of Ethernet segments are written.
+inline constexpr link::AddressForm address_forms[] = {
+    {"eth:enp3s0", "an interface of this machine"},
+    {"sim:NAME", "a segment in memory", link::Reach::process},
+    {"udp:HOST", "UDP datagrams"},
+    {"replay:FILE", "a recorded segment", link::Reach::file},
+};
+
+}  // namespace hal::ethernet

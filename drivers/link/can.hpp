@@ -23,8 +23,6 @@
 #include <string_view>
 #include <vector>
 
-#include "link/address_form.hpp"
-
 namespace hal::can {
 
 #pragma GCC visibility push(default)
@@ -325,8 +323,6 @@ Opened open(std::string_view address, const Options& options = {});
 /// Describes the link that open() would return, as far as the address determines it, without
 /// opening it. `transport` is empty for an unknown driver. [setup]
 Description describe(std::string_view address);
-/// How the addresses of each driver are written. [setup]
-std::vector<link::AddressForm> address_forms();
 
 #pragma GCC visibility pop
 

@@ -22,8 +22,6 @@
 #include <string_view>
 #include <vector>
 
-#include "link/address_form.hpp"
-
 namespace hal::ethernet {
 
 #pragma GCC visibility push(default)
@@ -215,8 +213,6 @@ Opened open(std::string_view address, const Options& options = {});
 /// Describes the port that open() would return, as far as the address determines it, without
 /// opening it. `transport` is empty for an unknown driver. [setup]
 Description describe(std::string_view address);
-/// How the addresses of each driver are written. [setup]
-std::vector<link::AddressForm> address_forms();
 
 /// Convert an address to "02:00:00:00:00:07" and back; nullopt for an invalid text. [any]
 std::string to_string(const Address&);

@@ -81,8 +81,7 @@ BAD_INCLUDES = {
     "components/ethercat/master/master.hpp": SPDX,
     "tools/bad.cpp": SPDX + 'bool b = a.starts_with("scocan:");\n',
     "drivers/README.md": "`can:can0`\n",
-    "drivers/can/open_can.cpp": SPDX + '{{"can:can0", ""}},\n{{"sim:NAME", ""}},\n',
-    "drivers/ethernet/open_ethernet.cpp": SPDX,
+    "drivers/link/address_form.hpp": SPDX + '{"can:can0", ""},\n{"sim:NAME", ""},\n',
 }
 
 

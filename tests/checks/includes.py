@@ -214,19 +214,15 @@ SINGLE = {
         "tools/panel",
     ]
 }  # headers that belong to no folder
-# The tables of the drivers: the first text of each row is an address.
-DRIVER_TABLES = ("drivers/can/open_can.cpp", "drivers/ethernet/open_ethernet.cpp")
-DRIVER_ROW = re.compile(r'^\s*\{\{"([a-z]+:[^"]*)",', re.MULTILINE)
+# The table of addresses: the first text of each row is one.
+ADDRESS_TABLE = "drivers/link/address_form.hpp"
+ADDRESS_ROW = re.compile(r'^\s*\{"([a-z]+:[^"]*)",', re.MULTILINE)
 INCLUDE = re.compile(r'^\s*#\s*include\s*(["<])([^">]+)[">]')
 
 
 def address_forms(root):
     """An address of each driver."""
-    return [
-        form
-        for table in DRIVER_TABLES
-        for form in DRIVER_ROW.findall((root / table).read_text(encoding="utf-8"))
-    ]
+    return ADDRESS_ROW.findall((root / ADDRESS_TABLE).read_text(encoding="utf-8"))
 
 
 def prefix_test():

@@ -26,7 +26,7 @@ std::string list_of(const std::vector<Example>&);
 
 struct ExamplesOptions : Options {
     void declare(OptionSet& set) override {
-        set.words("NAME", "an example, and options of hal run; none: list them", false);
+        set.keep_rest();  // options of `hal run`
     }
 };
 

@@ -7,21 +7,10 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "bus/can/bus_options.hpp"
 #include "cli/output.hpp"
 #include "link/capture.hpp"
 
 namespace hal::tools {
-
-std::string bus_addresses() {
-    std::string text;
-    for (const auto& form : can::address_forms()) {
-        if (form.reach != link::Reach::bus) continue;
-        if (!text.empty()) text += ", ";
-        text += form.example;
-    }
-    return text;
-}
 
 std::string out_of_reach(const can::Description& bus) {
     if (!bus.simulated || bus.transport == "capture") {

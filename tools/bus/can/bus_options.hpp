@@ -7,12 +7,21 @@
 #include <vector>
 
 #include "cli/option_set.hpp"
+#include "link/address_form.hpp"
 
 namespace hal::tools {
 
 /// Addresses of buses that every program can open, from the table of the drivers:
 /// `can:can0, udp:239.74.163.2:43113, ...`.
-std::string bus_addresses();
+inline std::string bus_addresses() {
+    std::string text;
+    for (const auto& form : can::address_forms) {
+        if (form.reach != link::Reach::bus) continue;
+        if (!text.empty()) text += ", ";
+        text += form.example;
+    }
+    return text;
+}
 
 /// For the help of a command that listens.
 inline std::string bus_address() {
