@@ -2,6 +2,7 @@
 // Views, their place in the URL (#/view?state), the banner and the role.
 import {connect, on, state, tell} from './link.js';
 import {h, announce} from './dom.js';
+import {enter, isShown, parse} from './place.js';
 
 const views = {
     overview: ['Overview', () => import('./overview.js')],
@@ -13,33 +14,14 @@ const views = {
     log: ['Log', () => import('./log.js')],
 };
 
-let leave = null, shown = '';
+let leave = null;
 const main = document.getElementById('main'), nav = document.getElementById('views');
 
-/// The view of the URL and its parameters.
-function place() {
-    const [, name = 'overview', query = ''] = /^#\/(\w+)(?:\?(.*))?$/.exec(location.hash) ?? [];
-    return {name: views[name] ? name : 'overview', query: new URLSearchParams(query)};
-}
-
-/// Keeps the state of the present view in the URL.
-export function remember(values) {
-    const {name, query} = place();
-    for (const [key, value] of Object.entries(values)) {
-        if (value === '' || value === null || value === undefined)
-            query.delete(key);
-        else
-            query.set(key, value);
-    }
-    const text = query.toString();
-    shown = `#/${name}${text ? '?' + text : ''}`;
-    history.replaceState(null, '', shown);
-}
+const place = () => parse(location.hash, Object.keys(views));
 
 async function show() {
-    if (/[#&]t=/.test(location.hash) || location.hash === '#main' || location.hash === shown)
-        return;
-    shown = location.hash;
+    if (/[#&]t=/.test(location.hash) || location.hash === '#main' || isShown(location.hash)) return;
+    enter(location.hash);
     const {name, query} = place();
     if (leave) leave();
     leave = null;
@@ -63,20 +45,31 @@ function drawNav() {
                       title)));
 }
 
+/// What the banner says; empty while everything is as it should be.
+function problemOf({server, reason, machine, responding, instance}) {
+    if (server === 'connecting') return '';
+    if (server === 'lost')
+        return `No connection to hal panel${reason ? `: ${reason}` : ''}. Values are stale; ` +
+            'reconnecting …';
+    if (!machine)
+        return `Machine '${instance}' is not running. Values are stale; waiting for it. ` +
+            'Start it with: hal run FILE.hal';
+    if (!responding) return `Machine '${instance}' does not respond. Values are stale.`;
+    return '';
+}
+
+/// What this page may do.
+function roleOf({write, held, token, holder}) {
+    if (!write) return 'read-only';
+    if (held) return 'in control';
+    if (!token) return 'read-only: no token';
+    return holder ? `page ${holder} has control` : 'read-only';
+}
+
 let lastBanner = '';
 function drawState() {
     document.getElementById('machine').textContent = state.instance || 'Halcyon';
-    const problem = state.server === 'connecting' ?
-        '' :
-        state.server === 'lost' ?
-        `No connection to hal panel${
-            state.reason ? `: ${state.reason}` : ''}. Values are stale; reconnecting …` :
-        !state.machine ?
-        `Machine '${
-            state
-                .instance}' is not running. Values are stale; waiting for it. Start it with: hal run FILE.hal` :
-        !state.responding ? `Machine '${state.instance}' does not respond. Values are stale.` :
-                            '';
+    const problem = problemOf(state);
     const banner = document.getElementById('banner');
     banner.hidden = problem === '';
     banner.textContent = problem;
@@ -86,11 +79,7 @@ function drawState() {
     const button = document.getElementById('control');
     button.hidden = !(state.write && state.token);
     button.textContent = state.held ? 'Release control' : 'Take control';
-    document.getElementById('role').textContent = !state.write ? 'read-only' :
-        state.held                                             ? 'in control' :
-        !state.token                                           ? 'read-only: no token' :
-        state.holder ? `page ${state.holder} has control` :
-                       'read-only';
+    document.getElementById('role').textContent = roleOf(state);
 }
 
 document.getElementById('control').addEventListener(
@@ -116,4 +105,4 @@ addEventListener('keydown', event => {
 });
 connect();
 show();
-window.halcyon = state;  // for tests
+Object.assign(window, {halcyon: state});  // for tests

@@ -33,21 +33,28 @@ export function number(value) {
                                                         String(Number(value.toPrecision(7)));
 }
 
+const durations = [
+    {limit: 1e3, factor: 1, unit: 'ns'},
+    {limit: 1e6, factor: 1e3, unit: 'µs'},
+    {limit: 1e9, factor: 1e6, unit: 'ms'},
+    {limit: Infinity, factor: 1e9, unit: 's'},
+];
 /// A duration in ns with a unit.
 export function duration(ns) {
     if (!(ns > 0)) return '0';
-    for (const [limit, factor, unit] of [
-             [1e3, 1, 'ns'], [1e6, 1e3, 'µs'], [1e9, 1e6, 'ms'], [Infinity, 1e9, 's']])
-        if (ns < limit) return `${Number((ns / factor).toPrecision(3))} ${unit}`;
+    const {factor, unit} = durations.find(({limit}) => ns < limit);
+    return `${Number((ns / factor).toPrecision(3))} ${unit}`;
 }
 
 export const colour = name =>
     getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-export const typeColour = type => colour(
-    type === 'bit'       ? '--t-bit' :
-        type === 'float' ? '--t-float' :
-        type === 'port'  ? '--t-port' :
-                           '--t-int');
+const typeColours = {
+    bit: '--t-bit',
+    float: '--t-float',
+    port: '--t-port'
+};
+/// The colour of a type of pins.
+export const typeColour = type => colour(typeColours[type] ?? '--t-int');
 
 export const dark = matchMedia('(prefers-color-scheme: dark)');
 dark.addEventListener('change', () => {

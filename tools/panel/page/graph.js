@@ -5,7 +5,7 @@ import {on, request, subscribe} from './link.js';
 import {colour, h, number, surface, text, typeColour} from './dom.js';
 import {objects} from './objects.js';
 import {layered} from './layout.js';
-import {remember} from './app.js';
+import {remember} from './place.js';
 
 const line = 17, head = 24, font = '12px system-ui, "DejaVu Sans", sans-serif', most = 400;
 
@@ -41,7 +41,9 @@ function build(all, grouped, collapsed) {
                         writer,
                         pin,
                         from: owner(writer, grouped),
-                        to: owner(pin, grouped)
+                        to: owner(pin, grouped),
+                        out: 0,  // of the ports, from the top of their boxes
+                        in : 0
                     });
     }
     const measure = document.createElement('canvas').getContext('2d');

@@ -27,7 +27,7 @@ function drawn(node, pins, width, height, draw) {
     canvas.style.maxWidth = '100%';
     canvas.style.height = `${height}px`;
     const picture = surface(canvas, draw);
-    (pins.ends ??= []).push(picture.end);
+    pins.ends.push(picture.end);
     return {canvas, picture};
 }
 
@@ -179,14 +179,14 @@ export function makeChart(node, pins) {
             'aria-label', `${options.text ?? node.pin}: ${number(Number(value))} ${unit}`);
     });
     const clock = setInterval(picture.request, 100);
-    (pins.ends ??= []).push(() => clearInterval(clock));
+    pins.ends.push(() => clearInterval(clock));
     return h(
         'div', {class: 'w-gauge'},
         h('div', {}, `${options.text ?? node.pin}${unit ? ` (${unit})` : ''}`), canvas);
 }
 
 /// A wheel to turn by mouse, finger, wheel or keys: dial and jog wheel.
-export function knob(node, pins, {step, turn, reset, low, high}) {
+export function knob(node, pins, {step, turn, reset = undefined, low, high}) {
     const options = node.options ?? {}, size = options.size ?? (node.kind ? 130 : 200),
           perTurn = options.cpr ?? 40;
     let by = step, grip = null;

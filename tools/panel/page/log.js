@@ -2,7 +2,7 @@
 // What happened: writes and connections of this server, faults, edits and commands of the machine.
 import {on, request, state} from './link.js';
 import {h} from './dom.js';
-import {remember} from './app.js';
+import {remember} from './place.js';
 
 const kinds = ['fault', 'write', 'edit', 'command', 'message', 'client', 'panel', 'machine'];
 

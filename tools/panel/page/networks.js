@@ -4,7 +4,7 @@
 import {on, subscribe} from './link.js';
 import {h, number, text} from './dom.js';
 import {objects} from './objects.js';
-import {remember} from './app.js';
+import {remember} from './place.js';
 
 const buses = {
     canopen: 'CANopen',

@@ -3,6 +3,7 @@
 import {on, request, state} from './link.js';
 import {colour, duration, h, number, surface, text} from './dom.js';
 
+/** @type {[string, (thread: any) => string][]} */
 const figures = [
     ['period', t => duration(t.period_ns)], ['cycles', t => number(t.cycles)],
     ['missed', t => number(t.missed)], ['overruns', t => number(t.overruns)],

@@ -13,6 +13,9 @@ export class Pins {
         this.bound = new Map();
         this.sources = new Map();
         this.waiting = {};
+        this.ready = false;
+        this.release = [];  // called when the page is hidden or left
+        this.ends = [];     // called when the view is left
     }
     value(name) { return this.values.get(name); }
     /// Calls act(value) now and at each change.
@@ -41,6 +44,9 @@ export class Pins {
             queueMicrotask(() => {
                 tell({panel: {write: this.waiting}});
                 this.waiting = {};
+                this.ready = false;
+                this.release = [];  // called when the page is hidden or left
+                this.ends = [];     // called when the view is left
             });
         Object.assign(this.waiting, values);
     }
@@ -174,16 +180,16 @@ export function show(main) {
         if (state.held) tell({panel: {}});
     }, Math.max(50, panel.timeout_ms / 4));
     const release = event => {
-        if (event.type === 'blur' || document.hidden) pins.release?.forEach(act => act());
+        if (event.type === 'blur' || document.hidden) pins.release.forEach(act => act());
     };
     document.addEventListener('visibilitychange', release);
     addEventListener('blur', release);
     return () => {
-        pins.release?.forEach(act => act());
+        pins.release.forEach(act => act());
         clearInterval(beat);
         document.removeEventListener('visibilitychange', release);
         removeEventListener('blur', release);
         ends.forEach(end => end());
-        pins.ends?.forEach(end => end());
+        pins.ends.forEach(end => end());
     };
 }

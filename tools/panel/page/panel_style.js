@@ -33,13 +33,15 @@ export function cellStyle(element, row, column, rows, columns, sticky = 'ne') {
     element.style.alignSelf = axis('n', 's');
 }
 
+const beyondName = /[^\w -]/;  // characters that a name of a font does not have
+
 function font(element, value) {
     const [family, size, ...rest] = Array.isArray(value) ? value : String(value).split(/\s+/);
     if (family)
         element.style.fontFamily =
-            `${/ [^\w - ] /.test(family) ? 'sans-serif' : `"${family}", sans-serif`}`;
+            beyondName.test(family) ? 'sans-serif' : `"${family}", sans-serif`;
     const points = Number(size);
-    if (points) element.style.fontSize = points > 0 ? `${points}pt` : `${- points}px`;
+    if (points) element.style.fontSize = points > 0 ? `${points}pt` : `${Math.abs(points)}px`;
     const more = rest.join(' ');
     if (/bold/.test(more)) element.style.fontWeight = 'bold';
     if (/italic/.test(more)) element.style.fontStyle = 'italic';

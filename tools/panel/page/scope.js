@@ -6,7 +6,7 @@ import {colour, dark, h, number, surface, text} from './dom.js';
 import {objects} from './objects.js';
 import {Store, Trigger, measure, valueAt} from './scope_data.js';
 import {Picture} from './scope_picture.js';
-import {remember} from './app.js';
+import {remember} from './place.js';
 
 const most = 16, divisions = 10, rows = 8, before = .2;
 const hues = [210, 30, 130, 350, 270, 175, 60, 310];
@@ -383,7 +383,7 @@ export function show(main, query) {
                     useCursors ?
                         `, Δt ${seconds(Math.abs(cursors[1] - cursors[0]) * base * divisions)}` :
                         ''}`);
-        window.halcyonScope = {
+        const shownNow = {
             rows: store.rows,
             lost: store.lost,
             gaps: store.gaps,
@@ -395,6 +395,7 @@ export function show(main, query) {
             store,
             range: range()
         };
+        Object.assign(window, {halcyonScope: shownNow});  // for tests
     }, 500);
 
     let dragging = null;

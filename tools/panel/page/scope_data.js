@@ -39,15 +39,13 @@ class Group {
 class Columns {
     static size = 1 << 13;
     constructor(group, column, width) {
-        Object.assign(this, {
-            group,
-            column,
-            width,
-            row: group.first,
-            newest: -1,
-            last: NaN,
-            mask: Columns.size - 1
-        });  // interval i is at i & mask, if index has i there
+        this.group = group;
+        this.column = column;
+        this.width = width;
+        this.row = group.first;
+        this.newest = -1;
+        this.last = NaN;
+        this.mask = Columns.size - 1;  // interval i is at i & mask, if index has i there
         this.index = new Float64Array(Columns.size).fill(NaN);
         this.low = new Float64Array(Columns.size);
         this.high = new Float64Array(Columns.size);
@@ -154,7 +152,12 @@ export class Store {
 /// first value not below the level.
 export class Trigger {
     constructor(name, edge, level) {
-        Object.assign(this, {name, edge, level, armed: 0, row: 0, last: null});
+        this.name = name;
+        this.edge = edge;  // rising, falling or either
+        this.level = level;
+        this.armed = 0;  // bit 0: for a rising edge, bit 1: for a falling one
+        this.row = 0;    // the first row that was not scanned
+        this.range = undefined;
     }
     /// Returns the times of the edges since the last call, interpolated between two samples.
     scan(store) {

@@ -3,7 +3,7 @@
 import {on, request, state, subscribe} from './link.js';
 import {announce, colour, h, number, surface, text} from './dom.js';
 import {objects, settable} from './objects.js';
-import {remember} from './app.js';
+import {remember} from './place.js';
 
 const history = 150;  // values of a sparkline: 15 s
 

@@ -112,7 +112,7 @@ function button(node, pins) {
         if (event.key === ' ' || event.key === 'Enter') release();
     });
     element.addEventListener('contextmenu', event => event.preventDefault());
-    (pins.release ??= []).push(release);
+    pins.release.push(release);
     pins.bind(node.pin, value => element.setAttribute('aria-pressed', String(Boolean(value))));
     disabled(node, pins, element);
     return element;
@@ -199,7 +199,7 @@ function timer(node, pins) {
         text(
             element, `${two(Math.floor(s / 3600))}:${two(Math.floor(s / 60) % 60)}:${two(s % 60)}`);
     }, 200);
-    (pins.ends ??= []).push(() => clearInterval(clock));
+    pins.ends.push(() => clearInterval(clock));
     return element;
 }
 
