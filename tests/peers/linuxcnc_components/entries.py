@@ -299,6 +299,38 @@ behaviour(
     lasts=True,
     witness=("histobins", {"histobins.0.binsize": [-1.0], "histobins.0.input": [2.0]}, {}),
 )
+
+
+def beyond_last_of_200_bins(v):
+    """True for a value that is not above the upper edge, and whose bin would be the next after the last one."""
+    if v["nbins"] != 200 or not v["binsize"] > 0:
+        return False
+    names = {1: "input-s32", 2: "input-u32", 3: "input-bit"}
+    value = float(v[names.get(v["pintype"], "input")])
+    upper = v["minvalue"] + 200 * v["binsize"]
+    return value <= upper and (value - v["minvalue"]) / v["binsize"] >= 200
+
+
+behaviour(
+    "histobins",
+    ".*",
+    beyond_last_of_200_bins,
+    "`nbins` is 200, and the value is the upper edge of the last bin",
+    "in no bin",
+    "writes outside of its memory: counting starts again",
+    "a value must not damage memory",
+    lasts=True,
+    witness=(
+        "histobins",
+        {
+            "histobins.0.nbins": [200],
+            "histobins.0.binsize": [0.1],
+            "histobins.0.minvalue": [-10.0],
+            "histobins.0.input": [1.0, 2.0, 10.0, 3.0],
+        },
+        {},
+    ),
+)
 behaviour(
     "lowpass",
     "out",
@@ -325,22 +357,90 @@ behaviour(
 SATURATED = "a conversion keeps the sign of the value and its order"
 HELD = "an output must not become NaN"
 
-for component, pins in {
-    "siggen": "sine|cosine",
-    "spindle": "output|spindle-rpm|spindle-rpm-abs",
-}.items():
+behaviour(
+    "siggen",
+    "sine|cosine",
+    lambda v: True,
+    "always",
+    "double precision",
+    "2 pi has eight digits",
+    "constants have all digits",
+    ("siggen num_chan=1", "plain"),
+    within=1e-7,
+    reference=lambda v: abs(v["amplitude"]),
+)
+
+
+# The difference from 0 is 0.1 + 1e-9, which in single precision is the tolerance.
+AT_TOLERANCE = (
+    "spindle",
+    {
+        "spindle.0.actual-speed": [(0.1 + 1e-9) / 60, 0.0],
+        "spindle.0.commanded-speed": [0.0],
+        "spindle.0.enable": [True],
+        "spindle.0.decel.0": [0.01],
+        "spindle.0.speed-tolerance.0": [0.1, 0.0],
+        "spindle.0.spindle-lpf": [10.0],
+    },
+    {},
+)
+
+
+def spindle_speed(v):
+    return max(v.largest("commanded-speed", "min.0"), 60 * v.largest("actual-speed"))
+
+
+for pins, scale in (
+    ("spindle-rpm|spindle-rpm-abs", lambda v: 1.0),
+    ("output", lambda v: abs(v["scale.0"])),
+):
     behaviour(
-        component,
+        "spindle",
         pins,
         lambda v: True,
         "always",
         "double precision",
-        "differs from the eighth digit on",
-        "constants and speeds have all digits",
-        (component + (" num_chan=1" if component == "siggen" else ""), "wild"),
-        within={"siggen": 1e-4, "spindle": 1e-2}.get(component, 1e-5),
-        lasts=True,
+        "single precision: differs from the eighth digit on, more after a ramp of many cycles",
+        "speeds have all digits",
+        ("spindle", "edges"),
+        within=1.2e-7,
+        reference=lambda v, scale=scale: spindle_speed(v) * scale(v) * (v.cycle + 1),
     )
+    behaviour(
+        "spindle",
+        pins,
+        lambda v: True,
+        "a speed within the last digits of a tolerance",
+        "double precision",
+        "single precision: some cycles earlier or later",
+        "speeds have all digits",
+        AT_TOLERANCE,
+        most_cycles=60,
+        within=1.001,
+        reference=lambda v, scale=scale: v.largest("speed-tolerance.0") * scale(v),
+    )
+behaviour(
+    "spindle",
+    ".*",
+    lambda v: any(
+        0 < abs(limit) < 1e-37 for limit in v.all("min.0", "max.0", "accel.0", "decel.0")
+    ),
+    "a limit below 1e-37",
+    "applies",
+    "0 in single precision: does not apply",
+    "a limit must hold",
+    (
+        "spindle",
+        {
+            "spindle.0.commanded-speed": [0.005],
+            "spindle.0.enable": [True],
+            "spindle.0.accel.0": [1e-300],
+            "spindle.0.speed-tolerance.0": [0.0],
+        },
+        {},
+    ),
+    lasts=True,
+)
 behaviour(
     "comp",
     "equal|out",
@@ -425,28 +525,46 @@ inventory(
     "newer",
     versions=("2.9",),
 )
-behaviour(
-    "thcud",
-    "vel-status",
-    lambda v: not v["enable"],
-    "`enable` is FALSE",
-    "FALSE",
-    "keeps its value",
-    "the pin reports a state of the control, which is off",
-    ("thcud", "plain"),
-    lasts=True,
-)
-behaviour(
-    "thc",
-    "vel-status",
-    lambda v: not v["enable"],
-    "`enable` is FALSE",
-    "FALSE",
-    "keeps its value",
-    "the pin reports a state of the control, which is off",
-    ("thc", "plain"),
-    lasts=True,
-)
+
+
+def at_minimum_velocity(v):
+    """True if single precision may decide whether the torch moves at the requested velocity."""
+    requested = v["requested-vel"]
+    minimum = requested * (1 - v["velocity-tol"] * 0.01)
+    near = abs(v["current-vel"] - minimum) <= 1.2e-7 * abs(requested) + 1e-37
+    return near or abs(minimum) > 3e38
+
+
+for component in ("thc", "thcud"):
+    behaviour(
+        component,
+        "vel-status",
+        lambda v: not v["enable"],
+        "`enable` is FALSE",
+        "FALSE",
+        "keeps its value",
+        "the pin reports a state of the control, which is off",
+        (component, "plain"),
+    )
+    behaviour(
+        component,
+        "vel-status",
+        at_minimum_velocity,
+        "`current-vel` is within the last digits of the lowest velocity, or that is beyond 3e38",
+        "double precision, as in 2.10",
+        "single precision",
+        "2.10's",
+        (
+            component,
+            {
+                f"{component}.enable": [True],
+                f"{component}.current-vel": [0.1],
+                f"{component}.requested-vel": [0.1],
+            },
+            {},
+        ),
+        versions=("2.9",),
+    )
 
 behaviour(
     "biquad",
@@ -562,20 +680,22 @@ behaviour(
     lambda v: True,
     "always",
     "whole turns of `theta` are removed first, and the constants are exact",
-    "2 pi has ten digits",
+    "2 pi has ten digits, constants have fifteen",
     "an angle keeps its digits over many turns",
     ("clarkeinv", "plain"),
-    within=1e-3,
+    within=1e-9,
+    reference=lambda v: (abs(v["x"]) + abs(v["y"])) * abs(v["theta"])
+    + 1e-5 * (abs(v["x"]) + abs(v["y"]) + abs(v["h"])),
 )
 behaviour(
     "clarkeinv",
     "a|b|c",
-    lambda v: v.beyond(1e5),
-    "inputs beyond 1e5; a NaN",
-    "as above",
-    "the angle has no digits left",
+    lambda v: v.invalid("x", "y"),
+    "`x` or `y` is infinite",
+    "NaN at whole turns of `theta`: infinity times 0",
+    "infinite: its sine is not 0 there",
     "an angle keeps its digits over many turns",
-    ("clarkeinv", "wild"),
+    ("clarkeinv", {"clarkeinv.0.x": [float("inf")], "clarkeinv.0.theta": [1.0]}, {}),
 )
 for component, third in (("clarke2", {}), ("clarke3", {"clarke3.0.c": [-2147483648.0]})):
     behaviour(
@@ -898,10 +1018,10 @@ behaviour(
 )
 behaviour(
     "gearchange",
-    "speed-out|dir-out",
+    "speed-out|scale2",
     lambda v: v.invalid(),
-    "an input is NaN",
-    "0",
+    "an input, a limit or `scale2` is NaN",
+    "`min1` or `min2`; the limit's last valid value; 1",
     "NaN",
     HELD,
     (
@@ -909,12 +1029,34 @@ behaviour(
         {"gearchange.0.sel": [True], "gearchange.0.speed-in": [float("nan")]},
         {"gearchange.0.max2": -1.0},
     ),
-    lasts=True,
 )
-for component, pins, variant in (
-    ("filter_kalman", "xk-out", "filter_kalman"),
-    ("eoffset_per_angle", "eoffset-dbg|kreciprocal", "eoffset_per_angle"),
-    ("gantry", "joint.*", "gantry personality=2"),
+EOFFSET_IN_THIRDS = (
+    "eoffset_per_angle",
+    {
+        "eoffset-per-angle.0.is-on": [True],
+        "eoffset-per-angle.0.enable-in": [False, False, True],
+        "eoffset-per-angle.0.radius-ref": [20.0],
+        "eoffset-per-angle.0.k": [3],
+    },
+    {},
+)
+for component, pins, witness, within, reference in (
+    ("filter_kalman", "xk-out", ("filter_kalman", "edges"), 1e-4, lambda v: v.largest("zk")),
+    ("eoffset_per_angle", "eoffset-dbg", EOFFSET_IN_THIRDS, 1e-7, None),
+    (
+        "eoffset_per_angle",
+        "kreciprocal",
+        ("eoffset_per_angle", "edges"),
+        1e-7,
+        lambda v: 1 / (v["k"] or 10000),
+    ),
+    (
+        "gantry",
+        "joint.*|position-fb",
+        ("gantry personality=2", "edges"),
+        1.2e-7,
+        lambda v: v.largest("position-cmd") * (v.cycle + 1),
+    ),
 ):
     behaviour(
         component,
@@ -924,9 +1066,9 @@ for component, pins, variant in (
         "double precision, as in 2.10",
         "single precision",
         "2.10's",
-        (variant, "edges"),
-        lasts=True,
-        within=1e-4,
+        witness,
+        within=within,
+        reference=reference,
         versions=("2.9",),
     )
 THC_AT_WORK = (
@@ -965,6 +1107,7 @@ behaviour(
     "2.10's",
     THC_AT_WORK,
     lasts=True,
-    within=1e-4,
+    within=1.2e-7,
+    reference=lambda v: v.largest("z-pos-in") + v.largest("correction-vel") * (v.cycle + 1) ** 2,
     versions=("2.9",),
 )

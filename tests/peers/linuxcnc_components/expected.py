@@ -25,7 +25,8 @@ class Behaviour:
     why: str
     witness: tuple
     lasts: bool = False
-    within: float = math.inf  # the largest difference, relative to values above 1
+    within: float = math.inf  # the largest difference, relative to `reference`
+    reference: Callable = None  # of a View; otherwise the larger of 1 and both values
     most_cycles: int = 10**9  # of a run in which it occurs
     versions: tuple = ("2.9", "2.10")
 
@@ -41,8 +42,14 @@ class Behaviour:
             return difference
 
         def small(cycle):
+            if self.within == math.inf:
+                return True
             a, b = difference.ours[cycle], difference.theirs[cycle]
-            return self.within == math.inf or abs(a - b) <= self.within * max(1.0, abs(a), abs(b))
+            if self.reference is None:
+                reference = max(1.0, abs(a), abs(b))
+            else:
+                reference = self.reference(view.at(cycle))
+            return abs(a - b) <= self.within * reference
 
         if not self.lasts:
             return difference.without(

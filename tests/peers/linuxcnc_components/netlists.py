@@ -296,42 +296,97 @@ def normal(line):
     return " ".join(words)
 
 
+LOCATED = re.compile(r"(?:\S*/)?run\.hal:(\d+):(?:\d+: error:)?\s*(.*)")
+NO_SIGNAL = re.compile(r"^HAL: ERROR: signal '(\S+)' not found")
+
+
+def failed_deletion(signal, netlist, first, end):
+    """The number of the last `delsig` of that signal from line `first` to before `end`, or None."""
+    numbers = [n for n in range(first, end) if netlist[n - 1].split() == ["delsig", signal]]
+    return numbers[-1] if numbers else None
+
+
 def failed_lines(errors, netlist):
     """The numbers of the lines with an error, and the message of each. Both programs print warnings as well. LinuxCNC's halcmd prints the error of
-    `delsig` without a line."""
-    found = {}
+    `delsig` without a line: it is that of a `delsig` between the lines of the messages before and after it. Directly before `link failed` it is the reason
+    of that one.
+    """
+    found, last, unlocated = {}, 0, []
+
+    def locate(end):
+        for signal, message in unlocated:
+            number = failed_deletion(signal, netlist, last + 1, end)
+            if number is not None:
+                found.setdefault(number, message)
+        unlocated.clear()
+
+    previous = ""
     for line in errors.splitlines():
-        place = re.match(r"(?:\S*/)?run\.hal:(\d+):(?:\d+: error:)?\s*(.*)", line)
-        if (
-            place
-            and not re.search(r"warning:|^Warning", line[place.start(1) :])
-            and "deprecated" not in line
-        ):
-            found.setdefault(int(place.group(1)), place.group(2))
-        for signal in re.findall(r"^HAL: ERROR: signal '(\S+)' not found", line):
-            for number, command in enumerate(netlist, 1):
-                if command.split() == ["delsig", signal]:
-                    found.setdefault(number, line)
+        missing = NO_SIGNAL.match(line)
+        if missing:
+            unlocated.append((missing.group(1), line))
+        located = LOCATED.match(line)
+        if located and located.group(2) == "link failed" and NO_SIGNAL.match(previous):
+            unlocated.pop()
+        previous = line
+        if not located:
+            continue
+        number = int(located.group(1))
+        locate(number)
+        last = number
+        is_warning = re.search(r"warning:|^Warning", line[located.start(1) :])
+        if not is_warning and "deprecated" not in line:
+            found.setdefault(number, located.group(2))
+    locate(len(netlist) + 1)
     return found
 
 
-# Commands of which one side reports an error: (pattern, the side, why). docs/linuxcnc-compatibility.md has each.
+def alias_of_the_other_kind(netlist, number):
+    """True if an earlier line gives the alias of line `number` to a parameter instead of a pin, or the reverse."""
+    _, kind, _, alias = netlist[number - 1].split()
+    earlier = [line.split() for line in netlist[: number - 1]]
+    return any(
+        len(words) == 4 and words[0] == "alias" and words[1] != kind and words[3] == alias
+        for words in earlier
+    )
+
+
+def any_netlist(_netlist, _number):
+    return True
+
+
+# Commands of which one side reports an error: (pattern, the side, why, and a condition on the netlist and the line's number).
+# docs/linuxcnc-compatibility.md has each.
 ACCEPTED = [
     (
         r"setp .* -?1e400$|sets .* 1e400$|.* = 1e400$",
         "ours",
         "a number beyond the range of float is an error here, infinite there",
+        any_netlist,
     ),
     (
         r"(setp|sets) \S+ \d{20,}$|.* = \d{20,}$",
         "ours",
         "a number of more than 64 bits is an error here, the largest one there",
+        any_netlist,
     ),
-    (r"(setp|sets|.* =).* (yes|on|YES|ON|no|off)$", "LinuxCNC", "`yes` and `on` are bits here"),
+    (
+        r"(setp|sets|.* =).* (yes|on|YES|ON|no|off)$",
+        "LinuxCNC",
+        "`yes` and `on` are bits here",
+        any_netlist,
+    ),
     (
         r"(un)?alias (pin|param) ",
         "LinuxCNC",
         "`alias` and `unalias` take `pin` and `param` for either",
+        any_netlist,
+    ),
+    (
+        r"alias (pin|param) ",
+        "ours",
+        "a pin and a parameter cannot have the same alias",
+        alias_of_the_other_kind,
     ),
 ]
 
@@ -404,8 +459,10 @@ def compare(hal, linuxcnc, seed, accepted):
             reason = next(
                 (
                     why
-                    for pattern, who, why in ACCEPTED
-                    if who == side and re.match(pattern, netlist[number - 1])
+                    for pattern, who, why, condition in ACCEPTED
+                    if who == side
+                    and re.match(pattern, netlist[number - 1])
+                    and condition(netlist, number)
                 ),
                 None,
             )

@@ -15,6 +15,7 @@ class View:
             item.name: number(item.value) for item in self.given if item.type != "port"
         }
         self.cycle = 0
+        self.running_maxima = {}
 
     def at(self, cycle):
         self.cycle = cycle
@@ -38,6 +39,21 @@ class View:
 
     def has(self, ending):
         return any(name.endswith("." + ending) for name in self.defaults)
+
+    def largest(self, *endings):
+        """The largest finite magnitude of those inputs and settings in this cycle and before."""
+        if endings not in self.running_maxima:
+            self.running_maxima[endings] = self.running_maximum(endings)
+        return self.running_maxima[endings][self.cycle]
+
+    def running_maximum(self, endings):
+        now, maximum, maxima = self.cycle, 0.0, []
+        for cycle in range(self.cycles):
+            values = [abs(value) for value in self.at(cycle).all(*endings)]
+            maximum = max([maximum, *filter(math.isfinite, values)])
+            maxima.append(maximum)
+        self.at(now)
+        return maxima
 
     def changed(self, *endings):
         """True if one of them differs from its value in the first cycle."""
