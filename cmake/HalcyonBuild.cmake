@@ -87,27 +87,48 @@ function(halcyon_needs name)
     endif()
 endfunction()
 
-# halcyon_unity(TARGET [BATCH NUMBER] [ALONE SOURCE...]): compiles the sources of a target eight, or BATCH, at a time: without optimisation most of
-# the time goes into reading the same headers and instantiating the same templates. Two sources of such a target must not define the same name differently, not even in anonymous namespaces;
-# ALONE lists those that do: they are compiled one by one, as are those that cmake/alone.awk finds. For sources without optimisation; for the
-# others with HALCYON_QUICK only, because a change then compiles as many of them.
+# halcyon_unity(TARGET [BATCH NUMBER] [SECOND SOURCE...] [THIRD SOURCE...] [ALONE SOURCE...]): compiles the sources of a target eight, or BATCH, at
+# a time: without optimisation most of the time goes into reading the same headers and instantiating the same templates. Two sources that are
+# compiled together must not define the same name differently, not even in anonymous namespaces. SECOND and THIRD list sources that conflict with
+# others, but not with each other: each list is compiled together. ALONE lists those that conflict with every list; they are compiled one by one,
+# as are those that cmake/alone.awk finds. For sources without optimisation; for the others with HALCYON_QUICK only, because a change then
+# compiles as many of them.
 function(halcyon_unity target)
-    cmake_parse_arguments(PARSE_ARGV 1 with "" BATCH ALONE)
+    cmake_parse_arguments(PARSE_ARGV 1 with "" BATCH "SECOND;THIRD;ALONE")
     if(NOT with_BATCH)
         set(with_BATCH 8)
     endif()
-    if(HALCYON_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_CLANG_TIDY)
-        set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${with_BATCH})
-        get_target_property(sources ${target} SOURCES)
-        list(FILTER sources INCLUDE REGEX "[.]cpp$")
-        list(FILTER sources EXCLUDE REGEX "^[$]<")
-        execute_process(COMMAND awk -f "${PROJECT_SOURCE_DIR}/cmake/alone.awk" ${sources} WORKING_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}"
-                        OUTPUT_VARIABLE found ERROR_QUIET)
-        string(REGEX REPLACE "\n" ";" found "${found}")
-        list(APPEND with_ALONE ${found})
-        if(with_ALONE)
-            set_source_files_properties(${with_ALONE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    if(NOT HALCYON_UNITY OR NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU" OR CMAKE_CXX_CLANG_TIDY)
+        return()
+    endif()
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${with_BATCH})
+    get_target_property(sources ${target} SOURCES)
+    list(FILTER sources INCLUDE REGEX "[.]cpp$")
+    list(FILTER sources EXCLUDE REGEX "^[$]<")
+    list(TRANSFORM sources REPLACE "^${CMAKE_CURRENT_SOURCE_DIR}/" "")
+    list(REMOVE_ITEM sources ${with_SECOND} ${with_THIRD} ${with_ALONE})
+    foreach(part IN ITEMS sources with_SECOND with_THIRD)
+        if(${part})
+            execute_process(COMMAND awk -f "${PROJECT_SOURCE_DIR}/cmake/alone.awk" ${${part}} WORKING_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}"
+                            OUTPUT_VARIABLE found ERROR_QUIET)
+            string(REGEX REPLACE "\n" ";" found "${found}")
+            list(APPEND with_ALONE ${found})
         endif()
+    endforeach()
+    if(with_ALONE)
+        set_source_files_properties(${with_ALONE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    endif()
+    if(with_SECOND)
+        set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
+        set(with_FIRST ${sources})
+        foreach(part IN ITEMS FIRST SECOND THIRD)
+            set(number 0)
+            foreach(source IN LISTS with_${part})
+                math(EXPR unit "${number} / ${with_BATCH}")
+                set_source_files_properties("${source}" PROPERTIES UNITY_GROUP "${part}_${unit}")
+                math(EXPR number "${number} + 1")
+            endforeach()
+        endforeach()
     endif()
 endfunction()
 
