@@ -23,8 +23,8 @@
 #include <utility>
 
 #include "hal/abi.h"
+#include "hal/pin_type.hpp"
 #include "hal/plugin_entry.hpp"
-#include "hal/port.hpp"
 #include "hal/rejection.hpp"
 
 namespace hal {
@@ -45,12 +45,6 @@ private:
 };
 static_assert(sizeof(Cycle) == sizeof(void*) && std::is_trivially_copyable_v<Cycle>,
               "passed in a register, like the pointer");
-
-template <class T>
-concept PinType =
-    std::same_as<T, bool> || std::same_as<T, double> || std::same_as<T, std::int32_t> ||
-    std::same_as<T, std::uint32_t> || std::same_as<T, std::int64_t> ||
-    std::same_as<T, std::uint64_t> || std::same_as<T, Port>;
 
 /// What may follow a pin's documentation.
 template <PinType T>
@@ -84,37 +78,6 @@ struct ArgumentOptions {
 };
 
 namespace detail {
-template <class T>
-constexpr hal_type type_of() {
-    if constexpr (std::same_as<T, bool>) {
-        return HAL_TYPE_BIT;
-    } else if constexpr (std::same_as<T, double>) {
-        return HAL_TYPE_FLOAT;
-    } else if constexpr (std::same_as<T, std::int32_t>) {
-        return HAL_TYPE_S32;
-    } else if constexpr (std::same_as<T, std::uint32_t>) {
-        return HAL_TYPE_U32;
-    } else if constexpr (std::same_as<T, std::int64_t>) {
-        return HAL_TYPE_S64;
-    } else if constexpr (std::same_as<T, std::uint64_t>) {
-        return HAL_TYPE_U64;
-    } else {
-        return HAL_TYPE_PORT;
-    }
-}
-
-template <class T>
-hal_value to_value(T v) {
-    hal_value value{};
-    value.raw = 0;
-    if constexpr (std::same_as<T, Port>) {
-        value.port = nullptr;
-    } else {
-        std::memcpy(&value, &v, sizeof v);
-    }
-    return value;
-}
-
 // A slot is written by one thread only, and that thread's pins read it by plain moves. Stores are
 // atomic because the shell may look at a single value at any moment; loads of `Io` pins are,
 // because several threads may share their cell. On every machine we run on the instruction is the

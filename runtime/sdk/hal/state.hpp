@@ -23,7 +23,7 @@ public:
         decl.name = name;
         decl.doc = doc;
         decl.unit = unit;
-        decl.initial = detail::to_value<T>(initial);
+        decl.initial = to_value<T>(initial);
         pin_.own = decl.initial;
         pin_.slot = &pin_.own;
         if (!detail::creating->pin(detail::creating, &decl, &pin_)) {
