@@ -2,69 +2,15 @@
 // Objects as pins. Declared in the component's constructor; the cycle moves numbers only.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <deque>
-#include <limits>
 #include <string>
 
-#include "hal/component.hpp"
+#include "hal/any_pin.hpp"
+#include "hal/pin_codec.hpp"
 #include "runner.hpp"
 
 namespace hal::canopen {
-
-/// The number in an object. [realtime]
-inline double real_of(Type type, std::uint64_t raw) noexcept {
-    if (type == Type::real32) return static_cast<double>(load<float>(&raw));
-    if (type == Type::real64) return load<double>(&raw);
-    return is_signed(type) ? static_cast<double>(static_cast<std::int64_t>(raw))
-                           : static_cast<double>(raw);
-}
-
-/// What an object can hold.
-struct Range {
-    double low = 0;
-    double high = 0;                     ///< for a real pin
-    std::int64_t least = 0;                       ///< for a whole one
-    std::uint64_t most = 0;
-
-    explicit Range(const config::Object& o) {
-        const unsigned bits = o.bits == 0 || o.bits > 64 ? 64 : o.bits;
-        most = bits == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
-        if (is_signed(o.type)) {
-            most >>= 1;
-            least = -static_cast<std::int64_t>(most) - 1;
-        }
-        low = static_cast<double>(least);
-        // The greatest double that is not beyond: of 64 bits the next one below.
-        high =
-            bits < 64 ? static_cast<double>(most) : std::nextafter(static_cast<double>(most), 0.0);
-    }
-};
-
-/// A pin and the object behind it.
-template <class Pin>
-struct Bound {
-    Pin pin;
-    std::size_t slot;
-    Type type;
-    double scale, offset;
-    unsigned bit;
-    Range range;
-
-    template <class T>
-    Bound(Component& component, const Function& function, const std::string& name,
-          const std::string& about, hal::PinOptions<T> options, std::size_t at,
-          const config::Object& o, unsigned bit_)
-        : pin(component, function, name.c_str(), about.c_str(), options),
-          slot(at),
-          type(o.type),
-          scale(o.scale),
-          offset(o.offset),
-          bit(bit_),
-          range(o) {}
-};
 
 class ObjectPins {
 public:
@@ -73,37 +19,23 @@ public:
     /// Declares the pins of a slot. `prefix` ends with a dot or is empty. [setup]
     void declare(Component& component, const std::string& prefix, bool to_node,
                  const config::Object& o, std::size_t slot) {
-        if (!o.bit_pins.empty()) {
-            for (const config::BitPin& b : o.bit_pins) {
-                add<bool>(component, prefix + b.name, o.about + ", bit " + std::to_string(b.bit),
-                          to_node, o, slot, b.bit, in_bits_, out_bits_);
-            }
+        const auto add = [&](hal_type type, const std::string& name, const std::string& about,
+                             const Bound& bound) {
             if (to_node) {
-                with_bits_.push_back(slot);
+                ins_.declare(component, &takes_, type, prefix + name, about, bound,
+                             {.unit = o.unit.c_str()});
+            } else {
+                outs_.declare(component, &shows_, type, prefix + name, about, bound,
+                              {.unit = o.unit.c_str()});
             }
-            return;
+        };
+        for (const config::BitPin& b : o.bit_pins) {
+            add(HAL_TYPE_BIT, b.name, o.about + ", bit " + std::to_string(b.bit),
+                {slot, codec_of(o), std::uint64_t{1} << b.bit, std::uint64_t{1} << b.bit});
         }
-        const std::string name = prefix + o.pin;
-        switch (o.as) {
-        case config::PinType::bit:
-            add<bool>(component, name, o.about, to_node, o, slot, whole, in_bits_, out_bits_);
-            break;
-        case config::PinType::u32:
-            add<std::uint32_t>(component, name, o.about, to_node, o, slot, 0, in_u32_, out_u32_);
-            break;
-        case config::PinType::s64:
-            add<std::int64_t>(component, name, o.about, to_node, o, slot, 0, in_s64_, out_s64_);
-            break;
-        case config::PinType::u64:
-            add<std::uint64_t>(component, name, o.about, to_node, o, slot, 0, in_u64_, out_u64_);
-            break;
-        case config::PinType::real:
-            add<double>(component, name, o.about, to_node, o, slot, 0, in_real_, out_real_);
-            break;
-        case config::PinType::s32:
-        case config::PinType::none:
-            add<std::int32_t>(component, name, o.about, to_node, o, slot, 0, in_s32_, out_s32_);
-            break;
+        if (o.bit_pins.empty()) {
+            add(type_of(o.as), o.pin, o.about,
+                {slot, codec_of(o), 1, ~std::uint64_t{0}, o.scale, o.offset});
         }
     }
 
@@ -120,130 +52,69 @@ public:
 
     /// [realtime]
     void take(Runner& runner) noexcept {
-        const auto slots = runner.slots();
-        for (const std::size_t n : with_bits_) {
-            slots[n].wish = 0;
-        }
-        for (auto& b : in_bits_) {
-            if (b.bit == whole) {
-                slots[b.slot].wish = b.pin ? 1 : 0;
+        ins_.each([slots = runner.slots()]<class T>(const In<T>& pin, const Bound& b) noexcept {
+            std::uint64_t& wish = slots[b.slot].wish;
+            if constexpr (std::is_same_v<T, bool>) {
+                wish = (wish & ~b.mask) | (pin ? b.high : 0);
+            } else if constexpr (std::is_same_v<T, double>) {
+                const double value = pin * b.scale + b.offset;
+                wish = std::isnan(value) ? wish : b.codec.encode(value);
             } else {
-                slots[b.slot].wish |= std::uint64_t{b.pin.get()} << b.bit;
+                wish = b.codec.encode(pin.get());
             }
-        }
-        for (auto& b : in_real_) {
-            const double value = b.pin * b.scale + b.offset;
-            if (std::isnan(value)) {
-                continue;  // the last one stays
-            }
-            slots[b.slot].wish = whole_or_real(b, value);
-        }
-        const auto integers = [&](auto& pins) noexcept {
-            for (auto& b : pins) {
-                const auto value = b.pin.get();
-                if (is_real(b.type)) {
-                    slots[b.slot].wish = whole_or_real(b, static_cast<double>(value));
-                } else {
-                    slots[b.slot].wish = cut_to(b.range, value);
-                }
-            }
-        };
-        integers(in_s32_);
-        integers(in_u32_);
-        integers(in_s64_);
-        integers(in_u64_);
+        });
     }
 
 private:
-    static constexpr unsigned whole = 64;
+    /// A pin's part of an object.
+    struct Bound {
+        std::size_t slot;
+        PinCodec codec;
+        std::uint64_t high;  ///< of a bit: what TRUE is
+        std::uint64_t mask;  ///< of a bit: what the pin writes
+        double scale = 1.0;
+        double offset = 0.0;
+    };
 
     /// Sets the output pins; `is_safe` selects the slots that have their safe value. [realtime]
     template <class Slots, class IsSafe>
     void show(Slots slots, IsSafe is_safe) noexcept {
-        const auto raw = [&](std::size_t n) noexcept {
-            const Slot& s = slots[n];
-            return is_safe(s) ? s.safe : number_in(*s.entry);
-        };
-        for (auto& b : out_bits_) {
-            b.pin = b.bit == whole ? raw(b.slot) != 0 : (raw(b.slot) >> b.bit & 1) != 0;
-        }
-        for (auto& b : out_real_) {
-            b.pin = (real_of(b.type, raw(b.slot)) - b.offset) / b.scale;
-        }
-        const auto integers = [&](auto& pins) noexcept {
-            for (auto& b : pins) {
-                using T = decltype(b.pin.get());
-                b.pin = is_real(b.type) ? static_cast<T>(cut<T>(real_of(b.type, raw(b.slot))))
-                                        : static_cast<T>(raw(b.slot));
+        outs_.each([slots, is_safe]<class T>(Out<T>& pin, const Bound& b) noexcept {
+            const Slot& s = slots[b.slot];
+            const std::uint64_t raw = is_safe(s) ? s.safe : number_in(*s.entry);
+            if constexpr (std::is_same_v<T, bool>) {
+                pin = (raw & b.mask) != 0;
+            } else if constexpr (std::is_same_v<T, double>) {
+                pin = (b.codec.decode<T>(raw) - b.offset) / b.scale;
+            } else {
+                pin = b.codec.decode<T>(raw);
             }
-        };
-        integers(out_s32_);
-        integers(out_u32_);
-        integers(out_s64_);
-        integers(out_u64_);
+        });
     }
 
-    template <class T, class Ins, class Outs>
-    void add(Component& component, const std::string& name, const std::string& about, bool to_node,
-             const config::Object& o, std::size_t slot, unsigned bit, Ins& ins, Outs& outs) {
-        hal::PinOptions<T> options;
-        options.unit = o.unit.c_str();
-        if (to_node) {
-            ins.emplace_back(component, takes_, name, about, options, slot, o, bit);
-        } else {
-            outs.emplace_back(component, shows_, name, about, options, slot, o, bit);
-        }
+    static PinCodec codec_of(const config::Object& o) noexcept {
+        using Format = PinCodec::Format;
+        const unsigned bits = o.bits == 0 || o.bits > 64 ? 64 : o.bits;
+        if (is_real(o.type)) return {Format::real, o.type == Type::real32 ? 32U : 64U};
+        return {is_signed(o.type) ? Format::signed_integer : Format::unsigned_integer, bits};
     }
-    template <class T>
-    static double cut(double value) noexcept {
-        if (std::isnan(value)) return 0;
-        constexpr auto high = std::numeric_limits<T>::max();
-        const double most = sizeof(T) < 8 ? static_cast<double>(high)
-                                          : std::nextafter(static_cast<double>(high), 0.0);
-        return std::clamp(value, static_cast<double>(std::numeric_limits<T>::min()), most);
-    }
-    template <class T>
-    static std::uint64_t cut_to(const Range& range, T value) noexcept {
-        if constexpr (std::is_signed_v<T>) {
-            if (value < range.least) return static_cast<std::uint64_t>(range.least);
-            if (value < 0) {
-                return static_cast<std::uint64_t>(std::int64_t{value});
-            }
+    static hal_type type_of(config::PinType type) noexcept {
+        switch (type) {
+        case config::PinType::bit: return HAL_TYPE_BIT;
+        case config::PinType::u32: return HAL_TYPE_U32;
+        case config::PinType::s64: return HAL_TYPE_S64;
+        case config::PinType::u64: return HAL_TYPE_U64;
+        case config::PinType::real: return HAL_TYPE_FLOAT;
+        case config::PinType::s32:
+        case config::PinType::none: break;
         }
-        return std::min(static_cast<std::uint64_t>(value), range.most);
-    }
-    template <class B>
-    static std::uint64_t whole_or_real(const B& b, double value) noexcept {
-        std::uint64_t raw = 0;
-        if (b.type == Type::real32) {
-            store(&raw, static_cast<float>(value));
-        } else if (b.type == Type::real64) {
-            store(&raw, value);
-        } else if (value < 0) {
-            raw = static_cast<std::uint64_t>(
-                static_cast<std::int64_t>(std::nearbyint(std::max(value, b.range.low))));
-        } else {
-            raw = static_cast<std::uint64_t>(std::nearbyint(std::min(value, b.range.high)));
-        }
-        return raw;
+        return HAL_TYPE_S32;
     }
 
     const Function& shows_;
     const Function& takes_;
-    // Deques: a pin may not move once it is declared.
-    std::deque<Bound<hal::In<bool>>> in_bits_;
-    std::deque<Bound<hal::In<double>>> in_real_;
-    std::deque<Bound<hal::In<std::int32_t>>> in_s32_;
-    std::deque<Bound<hal::In<std::uint32_t>>> in_u32_;
-    std::deque<Bound<hal::In<std::int64_t>>> in_s64_;
-    std::deque<Bound<hal::In<std::uint64_t>>> in_u64_;
-    std::deque<Bound<hal::Out<bool>>> out_bits_;
-    std::deque<Bound<hal::Out<double>>> out_real_;
-    std::deque<Bound<hal::Out<std::int32_t>>> out_s32_;
-    std::deque<Bound<hal::Out<std::uint32_t>>> out_u32_;
-    std::deque<Bound<hal::Out<std::int64_t>>> out_s64_;
-    std::deque<Bound<hal::Out<std::uint64_t>>> out_u64_;
-    std::vector<std::size_t> with_bits_;
+    AnyIns<Bound> ins_;
+    AnyOuts<Bound> outs_;
 };
 
 /// What is known of a node.
