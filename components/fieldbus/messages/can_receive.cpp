@@ -50,7 +50,7 @@ struct CanReceive : hal::Component {
     hal::Out<std::uint64_t> malformed{*this, "malformed", "messages of another length, ignored"};
 
     Layout layout{fields.get()};
-    FieldPins<hal::Out> pins{*this, layout, "field of the newest message"};
+    LayoutPins<HAL_DIR_OUT> pins{*this, layout, "field of the newest message"};
     hal::Function run{*this, "update", &CanReceive::update,
                       "reads the messages received since the last cycle"};
 
@@ -99,7 +99,7 @@ private:
             malformed = malformed + 1;
             return false;
         }
-        pins.load(frame.data.data());
+        pins.load(frame.data);
         id_offset = frame.id - first_;
         newest_ = frame.time_ns;
         received = received + 1;

@@ -48,7 +48,7 @@ struct CanSend : hal::Component {
                                     "messages of this instance waiting for the bus"};
 
     Layout layout{fields.get()};
-    FieldPins<hal::In> pins{*this, layout, "field of the message"};
+    LayoutPins<HAL_DIR_IN> pins{*this, layout, "field of the message"};
     hal::Function run{*this, "update", &CanSend::update, "sends the message when it is due"};
 
     void start() {
@@ -71,7 +71,7 @@ struct CanSend : hal::Component {
         const std::int64_t now = cycle.start_ns();
         hal::can::Frame frame;
         frame.length = layout.bytes();
-        pins.store(frame.data.data());
+        pins.store(frame.data);
         const bool is_new = on_change && frame.data != last_data_;
         if (due(cycle) || trigger || is_new) {
             frame.id =

@@ -4,14 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <cmath>
-#include <cstring>
 #include <string>
-#include <variant>
 
-#include "field_values.hpp"
-#include "hal/component.hpp"
+#include "field_pins.hpp"
 
 namespace hal::messages {
 
@@ -104,93 +99,37 @@ inline std::uint32_t identifier(std::int64_t id, std::int64_t last) {
     return static_cast<std::uint32_t>(id);
 }
 
-/// One pin per field; `P` is hal::In or hal::Out.
-template <template <class> class P>
-class FieldPins {
+/// The pins of a layout.
+template <hal_dir direction>
+class LayoutPins : public FieldPins<direction> {
 public:
-    FieldPins(hal::Component& component, const Layout& layout, const char* doc) {
+    LayoutPins(hal::Component& component, const Layout& layout, const char* doc) {
         for (const Field& f : layout) {
-            Slot& slot = slots_[count_++];
-            slot.field = f;
-            const std::string text = std::string(doc) + " (" + type_name(f.kind) + ")";
-            switch (f.kind) {
-            case Kind::bit:
-                slot.pin.template emplace<P<bool>>(component, f.name.c_str(), text.c_str());
-                break;
-            case Kind::u8:
-            case Kind::u16:
-            case Kind::u32:
-                slot.pin.template emplace<P<std::uint32_t>>(component, f.name.c_str(),
-                                                            text.c_str());
-                break;
-            case Kind::s8:
-            case Kind::s16:
-            case Kind::s32:
-                slot.pin.template emplace<P<std::int32_t>>(component, f.name.c_str(), text.c_str());
-                break;
-            default:
-                slot.pin.template emplace<P<double>>(component, f.name.c_str(), text.c_str());
-                break;
-            }
-        }
-    }
-    /// Stores the values; those out of a field's range are limited to it. [realtime]
-    void store(std::uint8_t* to) const noexcept {
-        for (std::size_t i = 0; i < count_; ++i) {
-            const Field& f = slots_[i].field;
-            std::uint64_t raw = 0;
-            if (const auto* b = std::get_if<P<bool>>(&slots_[i].pin)) {
-                raw = b->get() ? 1 : 0;
-            } else if (const auto* u = std::get_if<P<std::uint32_t>>(&slots_[i].pin)) {
-                raw = unsigned_bits(u->get(), f.bytes);
-            } else if (const auto* s = std::get_if<P<std::int32_t>>(&slots_[i].pin)) {
-                raw = signed_bits(s->get(), f.bytes);
-            } else if (const auto* r = std::get_if<P<double>>(&slots_[i].pin)) {
-                raw = f.kind == Kind::f64 ? std::bit_cast<std::uint64_t>(r->get())
-                                          : single_bits(r->get());
-            }
-            for (unsigned n = 0; n < f.bytes; ++n) {
-                to[f.offset + n] = static_cast<std::uint8_t>(raw >> (8 * n));
-            }
-        }
-    }
-    /// Sets the pins from data that is long enough. [realtime]
-    void load(const std::uint8_t* from) noexcept {
-        for (std::size_t i = 0; i < count_; ++i) {
-            const Field& f = slots_[i].field;
-            std::uint64_t raw = 0;
-            for (unsigned n = 0; n < f.bytes; ++n) {
-                raw |= std::uint64_t{from[f.offset + n]} << (8 * n);
-            }
-            if (auto* b = std::get_if<P<bool>>(&slots_[i].pin)) {
-                *b = (raw & 1) != 0;
-            } else if (auto* u = std::get_if<P<std::uint32_t>>(&slots_[i].pin)) {
-                *u = static_cast<std::uint32_t>(raw);
-            } else if (auto* s = std::get_if<P<std::int32_t>>(&slots_[i].pin)) {
-                const unsigned unused = 64 - 8 * f.bytes;
-                *s = static_cast<std::int32_t>(static_cast<std::int64_t>(raw << unused) >> unused);
-            } else if (auto* r = std::get_if<P<double>>(&slots_[i].pin)) {
-                *r = f.kind == Kind::f64
-                         ? std::bit_cast<double>(raw)
-                         : double{std::bit_cast<float>(static_cast<std::uint32_t>(raw))};
-            }
+            this->declare(component, nullptr, f.name,
+                          std::string(doc) + " (" + type_name(f.kind) + ")", f.offset, codec_of(f));
         }
     }
 
 private:
-    struct Slot {
-        Field field;
-        std::variant<std::monostate, P<bool>, P<std::uint32_t>, P<std::int32_t>, P<double>> pin;
-    };
     static const char* type_name(Kind kind) noexcept {
         for (const KindRow& row : kinds) {
             if (row.kind == kind) return row.name;
         }
         return "";
     }
-
-    std::array<Slot, 8> slots_;
-    std::size_t count_ = 0;
+    static PinCodec codec_of(const Field& field) noexcept {
+        using Format = PinCodec::Format;
+        const unsigned bits = 8U * field.bytes;
+        switch (field.kind) {
+        case Kind::bit: return {Format::unsigned_integer, 1};
+        case Kind::s8:
+        case Kind::s16:
+        case Kind::s32: return {Format::signed_integer, bits};
+        case Kind::f32:
+        case Kind::f64: return {Format::real, bits};
+        default: return {Format::unsigned_integer, bits};
+        }
+    }
 };
 
 }  // namespace hal::messages

@@ -3,92 +3,39 @@
 // see it.
 #pragma once
 
-#include <bit>
-#include <deque>
+#include <algorithm>
 #include <memory>
-#include <optional>
 
-#include "fieldbus/messages/field_values.hpp"
+#include "fieldbus/messages/field_pins.hpp"
 #include "fieldbus/scocan/station/station.hpp"
 #include "hal/component.hpp"
 
 namespace hal::scocan {
 
-/// Returns the first 8 bytes of the data, little endian. [realtime]
-inline std::uint64_t data_of(const can::Frame& frame) noexcept {
-    std::uint64_t bits = 0;
-    for (std::size_t i = 0; i < 8; ++i) {
-        bits |= std::uint64_t{frame.data[i]} << 8 * i;
+/// Returns how a field is coded. [any]
+inline PinCodec codec_of(FieldType type) noexcept {
+    using Format = PinCodec::Format;
+    const unsigned bits = 8 * size_of(type);
+    switch (type) {
+    case FieldType::s8:
+    case FieldType::s16:
+    case FieldType::s32: return {Format::signed_integer, bits};
+    case FieldType::f32:
+    case FieldType::f64: return {Format::real, bits};
+    default: return {Format::unsigned_integer, bits};
     }
-    return bits;
 }
 
-/// The pin of one field, an input of the sender or an output of a receiver.
-template <template <hal::PinType> class Pin>
-class FieldPin {
-public:
-    FieldPin(hal::Component& c, const hal::Function& f, const std::string& name, const Field& field)
-        : field_(field) {
-        const std::string doc = std::string("field ") + field.name + ", " + to_string(field.type);
-        switch (field.type) {
-        case FieldType::u8:
-        case FieldType::u16:
-        case FieldType::u32:
-            u32_ = std::make_unique<Pin<std::uint32_t>>(c, f, name.c_str(), doc.c_str());
-            break;
-        case FieldType::s8:
-        case FieldType::s16:
-        case FieldType::s32:
-            s32_ = std::make_unique<Pin<std::int32_t>>(c, f, name.c_str(), doc.c_str());
-            break;
-        case FieldType::f32:
-        case FieldType::f64:
-            real_ = std::make_unique<Pin<double>>(c, f, name.c_str(), doc.c_str());
-            break;
-        }
+/// Declares the pins of the fields of a message. [setup]
+template <hal_dir direction>
+void declare_fields(messages::FieldPins<direction>& pins, hal::Component& c, const hal::Function& f,
+                    const Message& m) {
+    for (const Field& field : m.fields) {
+        pins.declare(c, &f, m.name + "." + field.name,
+                     std::string("field ") + field.name + ", " + to_string(field.type), field.at,
+                     codec_of(field.type));
     }
-    /// Writes the value of the pin, limited to the range of the field, into the data. [realtime]
-    void encode(can::Frame& frame) const noexcept {
-        std::uint64_t bits = 0;
-        if (u32_) {
-            bits = messages::unsigned_bits(u32_->get(), size_of(field_.type));
-        } else if (s32_) {
-            bits = messages::signed_bits(s32_->get(), size_of(field_.type));
-        } else if (field_.type == FieldType::f64) {
-            bits = std::bit_cast<std::uint64_t>(real_->get());
-        } else {
-            bits = messages::single_bits(real_->get());
-        }
-        for (std::uint32_t i = 0; i < size_of(field_.type); ++i) {
-            frame.data[field_.at + i] = static_cast<std::uint8_t>(bits >> 8 * i);
-        }
-    }
-    /// Writes the value in the data to the pin. [realtime]
-    void decode(std::uint64_t data) noexcept
-        requires requires(Pin<double>& p) { p = 1.0; }
-    {
-        const std::uint64_t bits = data >> 8 * field_.at;
-        if (u32_) {
-            *u32_ = static_cast<std::uint32_t>(bits) & mask_;
-        } else if (s32_) {
-            *s32_ = field_.type == FieldType::s8    ? static_cast<std::int8_t>(bits)
-                    : field_.type == FieldType::s16 ? static_cast<std::int16_t>(bits)
-                                                    : static_cast<std::int32_t>(bits);
-        } else {
-            *real_ = field_.type == FieldType::f64
-                         ? std::bit_cast<double>(bits)
-                         : std::bit_cast<float>(static_cast<std::uint32_t>(bits));
-        }
-    }
-
-private:
-    const Field field_;
-    const std::uint32_t mask_ =
-        size_of(field_.type) >= 4 ? UINT32_MAX : (1U << 8 * size_of(field_.type)) - 1;
-    std::unique_ptr<Pin<std::uint32_t>> u32_;
-    std::unique_ptr<Pin<std::int32_t>> s32_;
-    std::unique_ptr<Pin<double>> real_;
-};
+}
 
 /// A message that this node sends.
 class SentMessage {
@@ -100,9 +47,7 @@ public:
                 m.event ? "rising edge: queues the message" : "the message is sent in its turn",
                 {.initial = !m.event}),
           sent_(c, receive, (m.name + ".sent").c_str(), "frames of this message sent") {
-        for (const Field& field : m.fields) {
-            fields_.emplace_back(c, f, m.name + "." + field.name, field);
-        }
+        declare_fields(fields_, c, f, m);
         if (m.fields.empty() && m.bytes > 0) {
             data_ = std::make_unique<hal::In<std::uint64_t>>(c, f, (m.name + ".data").c_str(),
                                                              "data, little endian");
@@ -147,9 +92,7 @@ private:
         can::Frame f;
         f.id = message_.id;
         f.length = static_cast<std::uint8_t>(message_.bytes);
-        for (const auto& field : fields_) {
-            field.encode(f);
-        }
+        fields_.store(f.data);
         if (data_) {
             for (std::uint32_t i = 0; i < message_.bytes; ++i) {
                 f.data[i] = static_cast<std::uint8_t>(data_->get() >> 8 * i);
@@ -160,7 +103,7 @@ private:
     const Message& message_;
     hal::In<bool> send_;
     hal::Out<std::uint32_t> sent_;
-    std::deque<FieldPin<hal::In>> fields_;
+    messages::FieldPins<HAL_DIR_IN> fields_;
     std::unique_ptr<hal::In<std::uint64_t>> data_;
     Time next_ = INT64_MIN;
     bool was_sending_ = false;
@@ -178,9 +121,7 @@ public:
                "time since the message was sent; 0: never received", {.unit = "s"}),
           interval_(c, f, (m.name + ".interval").c_str(),
                     "time between the begins of the last two frames", {.unit = "us"}) {
-        for (const Field& field : m.fields) {
-            fields_.emplace_back(c, f, m.name + "." + field.name, field);
-        }
+        declare_fields(fields_, c, f, m);
         if (m.fields.empty() && m.bytes > 0) {
             data_ = std::make_unique<hal::Out<std::uint64_t>>(c, f, (m.name + ".data").c_str(),
                                                               "data, little endian");
@@ -193,13 +134,9 @@ public:
 
     void arrived(const can::Frame& frame, Time begin) noexcept {
         if (frame.length < message_.bytes || frame.remote) return;
-        const std::uint64_t data = data_of(frame);
-        for (auto& field : fields_) {
-            field.decode(data);
-        }
+        fields_.load(frame.data);
         if (data_) {
-            *data_ =
-                message_.bytes >= 8 ? data : data & ((std::uint64_t{1} << 8 * message_.bytes) - 1);
+            *data_ = read_bits(frame.data, 0, 8 * std::min(message_.bytes, 8U));
         }
         if (last_ != INT64_MIN) {
             interval_ = static_cast<double>(begin - last_) * 1e-3;
@@ -222,7 +159,7 @@ private:
     hal::Out<bool> fresh_;
     hal::Out<std::uint32_t> received_;
     hal::Out<double> age_, interval_;
-    std::deque<FieldPin<hal::Out>> fields_;
+    messages::FieldPins<HAL_DIR_OUT> fields_;
     std::unique_ptr<hal::Out<std::uint64_t>> data_;
     Time last_ = INT64_MIN;
     bool is_fresh_ = false;
