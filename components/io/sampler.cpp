@@ -19,7 +19,7 @@ struct Sampler : hal::Component {
                         {.per_instance = true, .min = 2, .max = 1 << 26}};
 
     stream::ChannelCount channels{*this};
-    stream::Columns<stream::AnyIn> columns{*this, cfg.get(), depth, false, "value to record"};
+    stream::Columns<HAL_DIR_IN> columns{*this, cfg.get(), depth, false, "value to record"};
     hal::In<bool> enable{*this, "enable", "FALSE pauses the recording", {.initial = true}};
     hal::Out<std::int32_t> waiting{
         *this, "curr-depth", "records in the FIFO; depth if the record of this cycle is lost"};
@@ -66,16 +66,10 @@ private:
     }
 
     void write(hal_value* to, std::int32_t number) noexcept {
-        for (const auto& pin : columns.pins()) {
-            to->raw = 0;
-            std::visit([to](const auto& p) {
-                if constexpr (requires { p.get(); }) {
-                    *to = hal::detail::to_value(p.get());
-                }
-            }, pin);
-            ++to;
-        }
-        to->s64 = number;
+        columns.pins().each([to](const auto& pin, std::size_t column) {
+            to[column] = hal::to_value(pin.get());
+        });
+        to[columns.fifo().columns].s64 = number;
     }
 };
 

@@ -5,29 +5,22 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
-#include <deque>
 #include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <variant>
 #include <vector>
 
-#include "hal/component.hpp"
+#include "hal/any_pin.hpp"
 #include "hal/naming.h"
 #include "hal/stream_times.h"
 
 namespace stream {
 
-// of the types below, as cfg= and hal_stream::types have them
+// in the order of hal_type, as cfg= and hal_stream::types have them
 constexpr std::string_view letters = "bfsulk";
-
-/// A pin of any type; the alternatives are in the order of `letters`.
-using AnyIn = std::variant<std::monostate, hal::In<bool>, hal::In<double>, hal::In<std::int32_t>,
-                           hal::In<std::uint32_t>, hal::In<std::int64_t>, hal::In<std::uint64_t>>;
-using AnyOut =
-    std::variant<std::monostate, hal::Out<bool>, hal::Out<double>, hal::Out<std::int32_t>,
-                 hal::Out<std::uint32_t>, hal::Out<std::int64_t>, hal::Out<std::uint64_t>>;
+static_assert(HAL_TYPE_BIT == 0 && HAL_TYPE_FLOAT == 1 && HAL_TYPE_S32 == 2 && HAL_TYPE_U32 == 3 &&
+              HAL_TYPE_S64 == 4 && HAL_TYPE_U64 == 5);
 
 /// Sets the number of instances as LinuxCNC counts channels: up to the first one without letters in
 /// cfg= or without a depth above 0. An argument that is not given has its default for all of them.
@@ -65,7 +58,7 @@ private:
 
 /// The pins `pin.0`, `pin.1` … one per letter of cfg, and the memory of the FIFO. As in LinuxCNC, a
 /// FIFO of depth N holds N - 1 records.
-template <class AnyPin>
+template <hal_dir direction>
 class Columns {
 public:
     /// Throws when cfg has another letter than b f s u l k (either case) or the FIFO would be too
@@ -114,7 +107,8 @@ public:
     }
 
     hal_stream& fifo() noexcept { return fifo_; }
-    std::deque<AnyPin>& pins() noexcept { return pins_; }
+    /// The pins, each with its column in a record. [realtime]
+    const hal::AnyPins<direction, std::size_t>& pins() const noexcept { return pins_; }
     /// Notes when a record was made and how many records had been lost by then. [realtime]
     void stamp(std::uint64_t number, std::int64_t time_ns) noexcept {
         times_[number % fifo_.depth] = time_ns;
@@ -129,23 +123,18 @@ private:
     void add(hal::Component& component, char letter, const char* doc) {
         const char lower =
             letter >= 'A' && letter <= 'Z' ? static_cast<char>(letter - 'A' + 'a') : letter;
-        const std::string name = "pin." + std::to_string(pins_.size());
-        AnyPin& pin = pins_.emplace_back();
-        switch (letters.find(lower)) {
-        case 0: pin.template emplace<1>(component, name.c_str(), doc); break;
-        case 1: pin.template emplace<2>(component, name.c_str(), doc); break;
-        case 2: pin.template emplace<3>(component, name.c_str(), doc); break;
-        case 3: pin.template emplace<4>(component, name.c_str(), doc); break;
-        case 4: pin.template emplace<5>(component, name.c_str(), doc); break;
-        case 5: pin.template emplace<6>(component, name.c_str(), doc); break;
-        default:
+        const std::size_t type = letters.find(lower);
+        if (type == letters.npos) {
             throw std::invalid_argument(std::string("cfg has the letter '") + letter +
                                         "'; valid letters are b f s u l k");
         }
+        const std::size_t column = types_.size();
+        pins_.declare(component, nullptr, static_cast<hal_type>(type),
+                      "pin." + std::to_string(column), doc, column);
         types_ += lower;
     }
 
-    std::deque<AnyPin> pins_;
+    hal::AnyPins<direction, std::size_t> pins_;
     std::string types_;
     std::vector<hal_value> values_;
     std::vector<std::int64_t> times_;

@@ -20,8 +20,8 @@ struct Streamer : hal::Component {
                         {.per_instance = true, .min = 2, .max = 1 << 26}};
 
     stream::ChannelCount channels{*this};
-    stream::Columns<stream::AnyOut> columns{*this, cfg.get(), depth, true,
-                                            "value of the newest record"};
+    stream::Columns<HAL_DIR_OUT> columns{*this, cfg.get(), depth, true,
+                                         "value of the newest record"};
     hal::In<bool> enable{*this, "enable", "FALSE holds the pins", {.initial = true}};
     hal::In<bool> clock{*this, "clock", "clock for the next record; see clock-mode"};
     hal::In<std::int32_t> clock_mode{
@@ -72,14 +72,9 @@ private:
     }
 
     void read(const hal_value* from) noexcept {
-        for (auto& pin : columns.pins()) {
-            std::visit([from](auto& p) {
-                if constexpr (requires { p.get(); }) {
-                    p = hal::detail::load<decltype(p.get()), false>(from);
-                }
-            }, pin);
-            ++from;
-        }
+        columns.pins().each([from]<class T>(hal::Out<T>& pin, std::size_t column) {
+            pin = hal::value_as<T>(from[column]);
+        });
     }
 
     bool was_clock_ = false;
