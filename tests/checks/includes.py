@@ -82,6 +82,7 @@ ROWS = {
     "components/dds": ["components", "components/dds/links"],
     "components/dds/links": [],  # what cells gives the components, as data
     "components": ["runtime/sdk", "runtime/text"],
+    "components/bus/component": ["runtime/sdk", "drivers/link"],
     "components/cia402": ["runtime/sdk"],
     "components/canopen/protocol": [
         "runtime/sdk",
@@ -113,9 +114,14 @@ ROWS = {
     "components/ethercat/plugins": [
         "components/ethercat/config",
         "components/ethercat/devices",
+        "components/bus/component",
         "drivers/tap",
     ],
-    "components/canopen/plugins": ["components/canopen/master", "components/canopen/device"],
+    "components/canopen/plugins": [
+        "components/canopen/master",
+        "components/canopen/device",
+        "components/bus/component",
+    ],
     "components/fieldbus/can_timing": ["drivers/link"],
     "components/fieldbus/segment": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/fieldbus/scocan/table": ["runtime/text", "drivers/link"],

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <array>
-#include <atomic>
 #include <deque>
 #include <memory>
 #include <optional>
 #include <utility>
 
+#include "bus/component/bit_rate.hpp"
+#include "bus/component/bus_component.hpp"
 #include "canopen/master/config/master_config.hpp"
 #include "canopen/master/cycle/master_reporter.hpp"
 #include "canopen/master/cycle/node_pins.hpp"
@@ -16,10 +16,6 @@
 #include "canopen/master/cycle/sync_follower.hpp"
 #include "canopen_arguments.hpp"
 #include "fault_messages.hpp"
-#include "hal/component.hpp"
-#include "hal/function_pair.hpp"
-#include "hal/lasting_fault.hpp"
-#include "hal/naming.hpp"
 #include "hal/path_delay.hpp"
 #include "hal/setup_time.hpp"
 
@@ -27,9 +23,9 @@ namespace {
 
 using namespace hal::canopen;
 
-class Canopen : public hal::Component, private RunnerEvents {
+class Canopen : public hal::bus::BusComponent, private RunnerEvents {
 public:
-    explicit Canopen(const hal_host* host) : Component(host), name_(name_of(host)) {
+    explicit Canopen(const hal_host* host) : BusComponent(host, "canopen.0") {
         std::string file;
         config_ = arguments_.read(file);
         if (by_index()) {
@@ -79,7 +75,6 @@ public:
     }
 
     void start() {
-        faults_ = hal::extension<hal_faults>("hal.faults/1");
         setup_time_.start();
         hal::can::Options options;
         const hal::can::Description bus = hal::can::describe(config_.link);
@@ -89,27 +84,14 @@ public:
         std::string problem;
         auto opened = SharedLink::open(config_.link, options, problem);
         if (!opened) throw std::runtime_error(problem);
-        const auto& description = opened->description();
-        if (description.bit_rate != 0 && description.bit_rate != config_.bit_rate &&
-            description.bit_rate != hal::can::unlimited) {
-            const std::string wanted = std::to_string(config_.bit_rate);
-
-            const std::string is = std::to_string(description.bit_rate);
-            const std::string& interface = description.interface;
-            throw std::runtime_error(
-                config_.link + " runs at " + is + " bit/s, the configuration has " + wanted +
-                "; change one of them: bitrate = " + is + " in [bus], or " +
-                (interface.empty()
-                     ? "bitrate=" + wanted + " in the address"
-                     : "sudo ip link set " + interface + " down && sudo ip link set " + interface +
-                           " up type can bitrate " + wanted));
-        }
+        hal::bus::check_bit_rate(opened->description(), config_.link, config_.bit_rate,
+                                 "bitrate = ", " in [bus]");
         if (follower_) {
             follower_->start();
         }
         link_ = std::move(opened);
         period_ = 0;
-        functions_.start(faults_, this);
+        begin_cycles();
         reported_notes_.assign(nodes_.size(), 0);
         reporter_->start();
         runner_->open(*link_);
@@ -132,21 +114,21 @@ public:
             if (config_.sync == config::SyncMode::cycle) {
                 reporter_->cycle(period_);
             }
-            period_fault_.end(faults_, this);
+            end(period_fault_);
             if (config_.sync == config::SyncMode::timed && config_.sync_period % period_ != 0) {
-                period_fault_.begin(faults_, this,
-                                    "the SYNC period is not a multiple of the thread's period; "
-                                    "SYNCs are up to half a period early or late");
+                begin(period_fault_,
+                      "the SYNC period is not a multiple of the thread's period; SYNCs are up to "
+                      "half a period early or late");
             }
         }
         now_ = now;
-        if (!by_index() && !functions_.receive()) {
+        const hal::bus::Turn turn = receive_turn(!by_index());
+        if (is_offline(turn)) {
             show_offline(cycle);
             return;
         }
-        const bool interrupted = interrupted_.exchange(false, std::memory_order_acquire);
         runner_->receive(now);
-        if (follower_ && interrupted) {
+        if (follower_ && begins_anew(turn)) {
             follower_->restart();
         }
         if (follower_) {
@@ -183,17 +165,11 @@ public:
     }
 
     void make_safe(hal::Cycle) noexcept {
-        interrupted_.store(true, std::memory_order_release);
+        interrupt();
         runner_->make_safe();
     }
 
 private:
-    static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
-
-    static std::string name_of(const hal_host* host) {
-        const auto* naming = hal::extension<hal_naming>(HAL_NAMING);
-        return naming != nullptr ? naming->name(host) : "canopen.0";
-    }
     bool by_index() const { return arguments_.by_index(); }
     /// Sends the safe values, and shows the network as offline while nothing is sent. It is booted
     /// again when transmit() runs. [realtime]
@@ -253,24 +229,23 @@ private:
     void follow(Time now) noexcept {
         switch (follower_->cycle(*runner_, now, period_)) {
         case SyncFollower::Notice::lost:
-            sync_fault_.begin(
-                faults_, this,
-                "followed SYNC missing for {} s; threads run on their own clock until it returns",
-                follower_->silence(now));
+            begin(sync_fault_,
+                  "followed SYNC missing for {} s; threads run on their own clock until it returns",
+                  follower_->silence(now));
             break;
         case SyncFollower::Notice::in_vain:
-            sync_fault_.begin(faults_, this,
-                              "SYNC feedback loop: this machine produces the SYNC its own threads "
-                              "follow; write clock = own in the configuration");
+            begin(sync_fault_,
+                  "SYNC feedback loop: this machine produces the SYNC its own threads "
+                  "follow; write clock = own in the configuration");
             break;
         case SyncFollower::Notice::unequal:
-            sync_fault_.begin(faults_, this,
-                              "cannot follow the SYNC: its period is not a multiple of the "
-                              "thread's; change the thread's period, or write clock = own");
+            begin(sync_fault_,
+                  "cannot follow the SYNC: its period is not a multiple of the "
+                  "thread's; change the thread's period, or write clock = own");
             break;
         case SyncFollower::Notice::nothing:
             if (sync_fault_.lasts() && follower_->locked()) {
-                sync_fault_.end(faults_, this);
+                end(sync_fault_);
             }
             break;
         }
@@ -281,27 +256,21 @@ private:
     void end_faults(Time now) noexcept {
         constexpr Time repeated_within = 2 * second;
         if (foreign_fault_.lasts() && now - foreign_seen_ > repeated_within) {
-            foreign_fault_.end(faults_, this);
+            end(foreign_fault_);
         }
         if (own_id_fault_.lasts() && now - own_id_seen_ > repeated_within) {
-            own_id_fault_.end(faults_, this);
+            end(own_id_fault_);
         }
         for (std::size_t n = 0; n < late_faults_.size(); ++n) {
             if (late_faults_[n].lasts() &&
                 !runner_->device().pdos().rpdo(runner_->own().received[n].number).late) {
-                late_faults_[n].end(faults_, this);
+                end(late_faults_[n]);
             }
         }
         for (std::size_t n = 0; n < srdo_faults_.size(); ++n) {
             if (srdo_faults_[n].lasts() && runner_->srdo(n).valid) {
-                srdo_faults_[n].end(faults_, this);
+                end(srdo_faults_[n]);
             }
-        }
-    }
-
-    void raise(const char* reason, double detail) noexcept {
-        if (faults_ != nullptr) {
-            faults_->raise(faults_, this, reason, detail);
         }
     }
 
@@ -357,18 +326,18 @@ private:
             reporter_->node(s);
         }
         if (s.step != Step::running) return;
-        node_faults_[place].end(faults_, this);
+        end(node_faults_[place]);
         tell_notes(place, s);
         for (std::size_t n = 0; n < pdo_messages_.size(); ++n) {
             if (runner_->own().received[n].node != place) continue;
             pdo_messages_[n].short_raised = false;
-            short_faults_[n].end(faults_, this);
+            end(short_faults_[n]);
         }
     }
     /// A fault of a node lasts until it runs again. [realtime]
     void node_fault(std::size_t place, const std::string& reason,
                     double detail = not_a_number) noexcept {
-        node_faults_[place].begin(faults_, this, reason.c_str(), detail);
+        begin(node_faults_[place], reason, detail);
     }
     /// Reports each note about a node once, a suspected duplicate node ID after each boot.
     void tell_notes(std::size_t place, const NodeStatus& s) noexcept {
@@ -381,7 +350,7 @@ private:
             }
         }
         if ((fresh & note_duplicate_id) != 0) {
-            raise(messages_[place].suspected.c_str(), not_a_number);
+            raise(messages_[place].suspected.c_str());
         }
     }
     void on_network(const NetworkStatus& n) noexcept override {
@@ -400,12 +369,11 @@ private:
     void on_late(std::size_t place) noexcept override {
         const double timeout_s =
             static_cast<double>(runner_->own().received[place].pdo->limit) * 1e-9;
-        late_faults_[place].begin(faults_, this, pdo_messages_[place].late.c_str(), timeout_s);
+        begin(late_faults_[place], pdo_messages_[place].late, timeout_s);
     }
     void on_short(std::size_t place, unsigned bytes) noexcept override {
         if (!std::exchange(pdo_messages_[place].short_raised, true)) {
-            short_faults_[place].begin(faults_, this, pdo_messages_[place].short_pdo.c_str(),
-                                       bytes);
+            begin(short_faults_[place], pdo_messages_[place].short_pdo, bytes);
         }
     }
     void on_foreign(const Foreign& f) noexcept override {
@@ -413,32 +381,30 @@ private:
             foreign_seen_ = now_;
         }
         if (f.begins && f.sync) {
-            foreign_fault_.begin(faults_, this,
-                                 "another device also produces SYNC; nodes act on both");
+            begin(foreign_fault_, "another device also produces SYNC; nodes act on both");
         }
         if (f.begins && f.rpdo) {
-            foreign_fault_.begin(faults_, this,
-                                 "another device also sends RPDO {x} of a node of this master; the "
-                                 "node follows both",
-                                 f.id);
+            begin(foreign_fault_,
+                  "another device also sends RPDO {x} of a node of this master; the "
+                  "node follows both",
+                  f.id);
         }
         reporter_->foreign(f);
     }
     void on_own_id_collision() noexcept override {
         own_id_seen_ = now_;
-        own_id_fault_.begin(faults_, this, own_id_message_.c_str());
+        begin(own_id_fault_, own_id_message_);
     }
     void on_srdo_fault(std::size_t place, SrdoFault fault) noexcept override {
-        srdo_faults_[place].begin(faults_, this, safety_->words(place, fault));
+        begin(srdo_faults_[place], safety_->words(place, fault));
     }
     void on_bus_state(hal::can::State state) noexcept override {
         if (state == hal::can::State::bus_off) {
-            bus_fault_.begin(faults_, this, "bus off: too many errors; the master retries");
+            begin(bus_fault_, "bus off: too many errors; the master retries");
         } else if (state == hal::can::State::down && runner_->had_bus()) {
-            bus_fault_.begin(faults_, this,
-                             "bus down: the interface is off or was removed; the master retries");
+            begin(bus_fault_, "bus down: the interface is off or was removed; the master retries");
         } else if (state != hal::can::State::down) {
-            bus_fault_.end(faults_, this);
+            end(bus_fault_);
         }
         reporter_->bus(state, runner_->had_bus());
     }
@@ -451,12 +417,10 @@ private:
             overran_ = true;
             raise(
                 "SYNC overrun: frames of the last SYNC were still queued when the next was due; to "
-                "see what fits: hal canopen plan",
-                not_a_number);
+                "see what fits: hal canopen plan");
         }
     }
 
-    const std::string name_;
     ConfigurationArguments arguments_{*this};
     config::MasterConfig config_;
     std::optional<hal::Function> receive_, transmit_, update_;
@@ -475,7 +439,6 @@ private:
     std::optional<SafetyPins> safety_;
     std::unique_ptr<Reporter> reporter_;
     std::unique_ptr<SharedLink> link_;
-    const hal_faults* faults_ = nullptr;
     hal::SetupTime setup_time_;
     // as nodes, received PDOs and SRDOs
     std::vector<hal::LastingFault> node_faults_, late_faults_, short_faults_, srdo_faults_;
@@ -485,10 +448,7 @@ private:
     std::vector<std::uint8_t> reported_notes_;  // bits of NodeStatus::notes, by node
     Time period_ = 0;
     Time now_ = 0;
-    hal::FunctionPair functions_{name_ + ".receive", name_ + ".transmit"};
     bool overran_ = false;
-    // set by make_safe() in any thread, taken by receive()
-    std::atomic<bool> interrupted_{false};
 };
 
 }  // namespace

@@ -5,15 +5,14 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <ctime>
 #include <deque>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "bus/component/bus_component.hpp"
 #include "ethercat/config/event_filter.hpp"
 #include "ethercat/config/event_words.hpp"
 #include "ethercat/master/gateway.hpp"
@@ -25,11 +24,6 @@
 #include "ethercat/plugins/ethercat_arguments.hpp"
 #include "ethercat/wire/registers.hpp"
 #include "hal/clock.hpp"
-#include "hal/component.hpp"
-#include "hal/discipline.hpp"
-#include "hal/function_pair.hpp"
-#include "hal/lasting_fault.hpp"
-#include "hal/naming.hpp"
 #include "hal/reporter.hpp"
 
 namespace hal::ethercat {
@@ -38,12 +32,13 @@ namespace hal::ethercat {
 constexpr std::size_t spare_slaves = 64;
 
 template <class Names>
-class MasterComponent : public hal::Component, private master::Events {
+class MasterComponent : public hal::bus::BusComponent, private master::Events {
     using Event = master::Event;
     using Master = master::Master;
 
 public:
-    explicit MasterComponent(const hal_host* host) : Component(host) {
+    explicit MasterComponent(const hal_host* host)
+        : BusComponent(host, Names::own, Names::receive, Names::transmit, Names::function) {
         for (std::size_t s = 0; s < bus_.setup.slaves.size(); ++s) {
             const master::Slave& slave = bus_.setup.slaves[s];
             slaves_.emplace_back(*this, receive_, slave.name);
@@ -84,7 +79,6 @@ public:
     }
 
     void start() {
-        faults_ = hal::extension<hal_faults>("hal.faults/1");
         hal::ethernet::Options options;
         options.types = {ethertype};
         auto primary = open(bus_.link, options);
@@ -93,7 +87,7 @@ public:
             backup = open(bus_.backup, options);
         }
         if (bus_.setup.lead == master::ClockLead::reference && has_clocks()) {
-            clock_.emplace().claim();
+            clock_.claim();
         }
         primary_ = std::move(primary);
         backup_ = std::move(backup);
@@ -135,10 +129,8 @@ public:
         failed_.assign(bus_.setup.slaves.size(), Event::slave_operational);
         slave_faults_.resize(bus_.setup.slaves.size());
         clock_faults_.resize(bus_.setup.slaves.size());
-        functions_.start(faults_, this);
-        interrupted_.store(false);
         filter_ = config::EventFilter(bus_.setup.slaves.size());
-        discipline_.lose();
+        begin_cycles();
         reporter_.start();
         if (!bus_.gateway.empty()) {
             open_gateway();
@@ -159,7 +151,6 @@ public:
         server_.reset();
         mailboxes_.reset();
         emergencies_.reset();
-        clock_.reset();
         reporter_.stop();
         primary_.reset();
         backup_.reset();
@@ -171,13 +162,14 @@ public:
             show_offline(cycle);
             return;
         }
-        if (!functions_.receive()) {
+        const hal::bus::Turn turn = receive_turn();
+        if (is_offline(turn)) {
             show_offline(cycle);
             return;
         }
         now_ns_ = cycle.start_ns();
         master_->receive(cycle.start_ns());
-        if (interrupted_.exchange(false, std::memory_order_acquire)) {
+        if (begins_anew(turn)) {
             resume();
         }
         end_faults();
@@ -197,13 +189,13 @@ public:
     void transmit(hal::Cycle cycle) noexcept {
         if (!master_ || !fits(cycle)) return;
         if (!functions_.transmit()) {
-            if (functions_.receive_is_missing() && !interrupted_.load(std::memory_order_relaxed)) {
+            if (functions_.receive_is_missing() && !interrupted()) {
                 make_safe(cycle);
             }
             return;
         }
         // The thread was declared hung, but its cycle goes on.
-        if (interrupted_.load(std::memory_order_acquire)) return;
+        if (interrupted()) return;
         entries_.take(areas_);
         if (eoe_) {
             eoe_->step(*master_);
@@ -213,7 +205,7 @@ public:
     }
 
     void make_safe(hal::Cycle) noexcept {
-        interrupted_.store(true, std::memory_order_release);
+        interrupt();
         if (master_) {
             master_->shut_down();
         }
@@ -222,7 +214,6 @@ public:
 private:
     /// a mailbox whose state is not in the process data is looked at
     static constexpr std::int64_t emergencies_every_ns = 100'000'000;
-    static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
     struct Place {
         std::size_t slave = 0;
         std::size_t sync_manager = 0;
@@ -273,9 +264,7 @@ private:
     /// exchanged. [realtime]
     bool fits(hal::Cycle cycle) noexcept {
         if (cycle.period_ns() == bus_.setup.cycle_ns) {
-            if (period_fault_.lasts()) {
-                period_fault_.end(faults_, this);
-            }
+            end(period_fault_);
             period_reported_ = false;
             return true;
         }
@@ -287,9 +276,9 @@ private:
     /// Takes the slaves to SAFE-OP once, and shows them as offline while no process data is
     /// exchanged. They are started again by the next exchange. [realtime]
     void show_offline(hal::Cycle cycle) noexcept {
-        if (!interrupted_.load(std::memory_order_relaxed)) {
+        if (!interrupted()) {
             make_safe(cycle);
-            if (clock_ && was_fresh_) {
+            if (was_fresh_) {
                 discipline_.lose();
             }
             was_fresh_ = false;
@@ -329,7 +318,7 @@ private:
     void follow(hal::Cycle cycle) noexcept {
         const Master::Phase phase = master_->dc_phase();
         if (!phase.fresh) {
-            if (clock_ && was_fresh_) {
+            if (was_fresh_) {
                 discipline_.lose();
             }
             was_fresh_ = false;
@@ -337,9 +326,8 @@ private:
         }
         was_fresh_ = true;
         bus_pins_.phase = static_cast<std::int32_t>(phase.error_ns);
-        if (clock_) {
-            clock_->step(
-                discipline_.follow(-phase.error_ns, cycle.period_ns(), clock_->limit_ns()));
+        if (clock_.claimed()) {
+            follow_reference(-phase.error_ns, cycle.period_ns());
         }
     }
 
@@ -355,11 +343,6 @@ private:
                        simulated_ ? hal::ethernet::unclocked : hal::monotonic_ns());
     }
 
-    void begin(hal::LastingFault& fault, const std::string& reason,
-               double detail = not_a_number) noexcept {
-        fault.begin(faults_, this, reason.c_str(), detail);
-    }
-
     /// Raises and ends the faults of a slave, which last until it is operational. [realtime]
     void slave_event(Event event, std::uint32_t slave, std::int64_t first,
                      std::int64_t second) noexcept {
@@ -373,7 +356,7 @@ private:
             begin(clock_faults_[slave], clock_words_[slave], static_cast<double>(first) * 1e-3);
         }
         if (event == Event::dc_recovered) {
-            clock_faults_[slave].end(faults_, this);
+            end(clock_faults_[slave]);
         }
         const std::string* const reason = start_words(event, slave);
         if (reason != nullptr && failed_[slave] != event) {  // not at each try
@@ -385,8 +368,8 @@ private:
         }
         if (event != Event::slave_operational) return;
         failed_[slave] = event;
-        slave_faults_[slave].end(faults_, this);
-        clock_faults_[slave].end(faults_, this);
+        end(slave_faults_[slave]);
+        end(clock_faults_[slave]);
     }
 
     /// Raises and ends the faults of the bus. [realtime]
@@ -401,13 +384,13 @@ private:
             begin(nobody_fault_, nobody_words_);
         }
         if (event == Event::scanned && first > 0) {
-            nobody_fault_.end(faults_, this);
+            end(nobody_fault_);
         }
         if (event == Event::link_lost && first == 0) {
             begin(link_fault_, link_words_);
         }
         if (event == Event::link_restored && first == 0) {
-            link_fault_.end(faults_, this);
+            end(link_fault_);
         }
         if (event == Event::other_master) {
             begin(other_fault_, other_words_);
@@ -419,7 +402,7 @@ private:
     void end_faults() noexcept {
         constexpr std::int64_t repeated_within_ns = 3'000'000'000;
         if (other_fault_.lasts() && now_ns_ - other_seen_ns_ > repeated_within_ns) {
-            other_fault_.end(faults_, this);
+            end(other_fault_);
         }
     }
 
@@ -454,7 +437,6 @@ private:
         bus_event(event, first);
     }
 
-    const std::string name_ = hal::own_name(Names::own);
     EthercatArguments arguments_{*this, Names::file, Names::shared};
     config::Bus bus_ = arguments_.read();
     hal::Function receive_{
@@ -483,10 +465,6 @@ private:
     std::vector<Event> failed_;  // why a slave is not started, or slave_operational
     std::string unknown_words_, nobody_words_, link_words_, period_words_, other_words_;
     config::EventFilter filter_{0};
-    hal::FunctionPair functions_{Names::function(name_, Names::receive),
-                                 Names::function(name_, Names::transmit)};
-    /// set by make_safe() in any thread, taken by receive()
-    std::atomic<bool> interrupted_{false};
 
     std::unique_ptr<hal::ethernet::Port> primary_, backup_;
     std::unique_ptr<master::Mailboxes> mailboxes_;
@@ -497,13 +475,10 @@ private:
     std::unique_ptr<master::GatewaySlaves> gateway_slaves_;
     std::unique_ptr<master::Gateway> gateway_;
     bool slaves_changed_ = false;
-    std::optional<hal::DisciplinedClock> clock_;
-    hal::Discipline discipline_;
     hal::Reporter<config::Happened> reporter_{name_, [this](const config::Happened& h) {
         return config::event_words(h, bus_.setup, bus_.link, bus_.backup,
                                    bus_.lcec ? config::Format::lcec : config::Format::ethercat);
     }, 256, [](const config::Happened& h, const std::string&) { return config::subject(h); }};
-    const hal_faults* faults_ = nullptr;
     std::vector<hal::LastingFault> slave_faults_, clock_faults_;  // by slave
     hal::LastingFault period_fault_, unknown_fault_, nobody_fault_, link_fault_, other_fault_;
     std::int64_t now_ns_ = 0;

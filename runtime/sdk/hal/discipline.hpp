@@ -35,6 +35,8 @@ public:
             detail::rejected();
         }
     }
+    /// Returns true once claim() succeeded. [any]
+    bool claimed() const noexcept { return clock_ != nullptr; }
     /// Delays all later deadlines of all threads by `ns` (negative: advances them), limited to
     /// limit_ns() per cycle. [realtime]
     void step(std::int64_t ns) const noexcept {
