@@ -57,12 +57,22 @@ behaviour(
         {"watchdog.timeout-0": 0.01, "watchdog.timeout-1": 0.01},
     ),
 )
+LAST_COUNTS = {2147483647, -2147483648}
+
+
+def reaches_the_last_count(v):
+    """True if the limits let `count` be the largest or the smallest number of an s32."""
+    if v["wrap"]:
+        return bool({v["max"], v["min"]} & LAST_COUNTS)
+    return v["clamp"] and (v["min"] == 2147483647 or v["max"] == -2147483648)
+
+
 behaviour(
     "updown",
     "count",
-    lambda v: (v["clamp"] or v["wrap"]) and v["max"] == 2147483647,
-    "counting up at a `max` of 2147483647",
-    "continues at `min`, or stays",
+    reaches_the_last_count,
+    "counting beyond 2147483647 or -2147483648 with `wrap` or `clamp`",
+    "continues at `min` or `max`, or stays",
     "overflows",
     "an overflow that the limits should prevent",
     lasts=True,
@@ -452,17 +462,17 @@ behaviour(
     ("comp", "wild"),
     lasts=True,
 )
-for component, pins in {"scaled_s32_sums": "out-s", "mux16": "out-s"}.items():
+for component, held in (("scaled_s32_sums", False), ("mux16", True)):
     behaviour(
         component,
-        pins,
+        "out-s",
         lambda v: v.beyond(1e6),
         "the value is beyond the range of s32, or NaN",
         "limited to the range; 0 for NaN",
         "-2147483648",
         SATURATED,
         (component, "wild"),
-        lasts=True,
+        lasts=held,
     )
 behaviour(
     "hypot",
@@ -738,7 +748,17 @@ behaviour(
 )
 behaviour(
     "conv_float_s32",
-    "out|out-of-range",
+    "out",
+    lambda v: v.beyond(2147483647),
+    "beyond the range of s32; a NaN",
+    "wraps around, as documented; 0 for NaN",
+    "-2147483648",
+    SATURATED,
+    ("conv_float_s32", "wild"),
+)
+behaviour(
+    "conv_float_s32",
+    "out-of-range",
     lambda v: v.beyond(2147483647),
     "beyond the range of s32; a NaN",
     "wraps around, as documented; 0 for NaN",
@@ -749,7 +769,17 @@ behaviour(
 )
 behaviour(
     "conv_float_u32",
-    "out|out-of-range",
+    "out",
+    lambda v: v.beyond(2147483647) or v["in"] < 0,
+    "beyond 2147483647; a NaN; negative",
+    "wraps around, or with `clamp` is limited to the range",
+    "0, or 2147483647 with `clamp`",
+    SATURATED,
+    ("conv_float_u32", "wild"),
+)
+behaviour(
+    "conv_float_u32",
+    "out-of-range",
     lambda v: v.beyond(2147483647) or v["in"] < 0,
     "beyond 2147483647; a NaN; negative",
     "wraps around, or with `clamp` is limited to the range",
