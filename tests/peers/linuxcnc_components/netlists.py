@@ -351,6 +351,12 @@ def alias_of_the_other_kind(netlist, number):
     )
 
 
+def names_a_pin_twice(netlist, number):
+    """True if the `net` of line `number` has the same pin more than once."""
+    pins = [word for word in netlist[number - 1].split()[2:] if word not in ARROWS]
+    return len(set(pins)) < len(pins)
+
+
 def any_netlist(_netlist, _number):
     return True
 
@@ -358,6 +364,12 @@ def any_netlist(_netlist, _number):
 # Commands of which one side reports an error: (pattern, the side, why, and a condition on the netlist and the line's number).
 # docs/linuxcnc-compatibility.md has each.
 ACCEPTED = [
+    (
+        r"net ",
+        "LinuxCNC",
+        "a pin that `net` names twice is linked once",
+        names_a_pin_twice,
+    ),
     (
         r"setp .* -?1e400$|sets .* 1e400$|.* = 1e400$",
         "ours",
