@@ -8,8 +8,7 @@
 
 namespace hal::tools {
 
-/// A machine to start from: a netlist of the folder `halfiles` that says in its header which topic
-/// it belongs to.
+/// A machine to start from: a netlist of the folder `halfiles` whose header states its topic.
 struct Example {
     std::string name;     ///< what follows `hal examples`: furuta/hang
     std::string path;     ///< its netlist
