@@ -83,6 +83,7 @@ ROWS = {
     "components/dds/links": [],  # what cells gives the components, as data
     "components": ["runtime/sdk", "runtime/text"],
     "components/bus/component": ["runtime/sdk", "drivers/link"],
+    "components/bus/config": ["runtime/text"],
     "components/cia402": ["runtime/sdk"],
     "components/canopen/protocol": [
         "runtime/sdk",
@@ -91,7 +92,11 @@ ROWS = {
         "components/cia402",
     ],  # cia402: the error codes
     "components/canopen/eds": ["components/canopen/protocol"],
-    "components/canopen/master": ["components/canopen/eds", "components/fieldbus/can_timing"],
+    "components/canopen/master": [
+        "components/canopen/eds",
+        "components/fieldbus/can_timing",
+        "components/bus/config",
+    ],
     "components/canopen/device": [
         "components/canopen/eds",
         "components/sim",
@@ -110,6 +115,7 @@ ROWS = {
         "components/ethercat/master",
         "components/ethercat/esi",
         "components/cia402",
+        "components/bus/config",
     ],
     "components/ethercat/plugins": [
         "components/ethercat/config",
@@ -124,7 +130,11 @@ ROWS = {
     ],
     "components/fieldbus/can_timing": ["drivers/link"],
     "components/fieldbus/segment": ["runtime/sdk", "runtime/text", "drivers/link"],
-    "components/fieldbus/scocan/table": ["runtime/text", "drivers/link"],
+    "components/fieldbus/scocan/table": [
+        "runtime/text",
+        "drivers/link",
+        "components/bus/config",
+    ],
     "components/fieldbus/scocan/wire": ["components/fieldbus/scocan/table"],
     "components/fieldbus/scocan/station": ["components/fieldbus/scocan/wire"],
     "components/fieldbus/scocan/plan": [
@@ -140,7 +150,10 @@ ROWS = {
     "components/fieldbus/messages": ["runtime/sdk", "drivers/link"],
     "components/fieldbus/tdma/wire": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/fieldbus/tdma/station": ["components/fieldbus/tdma/wire", "drivers/discipline"],
-    "components/fieldbus/tdma/config": ["components/fieldbus/tdma/station"],
+    "components/fieldbus/tdma/config": [
+        "components/fieldbus/tdma/station",
+        "components/bus/config",
+    ],
     "components/fieldbus/tdma/rtcfg": ["components/fieldbus/tdma/config"],
     "components/fieldbus/tdma/tunnel": ["components/fieldbus/tdma/config", "drivers/tap"],
     "components/fieldbus/tdma/plugins": [
