@@ -110,7 +110,7 @@ TEST(Message, that_contradicts_itself_or_the_pins_of_its_components_is_rejected)
         "t:8:35: error: period and event are both given; delete one of them; event T is the "
         "shortest interval of an event",
         errors(table + "message m 0x011 node ir event 1ms period 2ms\n"));
-    EXPECT_EQ("t:8:33: error: duplicate key 'bytes'; delete one of them",
+    EXPECT_EQ("t:8:33: error: duplicate key 'bytes'; first in line 8; delete one of them",
               errors(table + "message m 0x011 node ir bytes 1 bytes 2\n"));
 }
 

@@ -181,6 +181,9 @@ struct Reading {
 
 /// Reads and checks a table.
 Reading read(std::string_view text);
+/// Return the keys of a table, and those of a message, as tables in Markdown.
+std::string reference();
+std::string message_reference();
 /// Checks a table and reports every conflict with its calculation and a fix. read() includes it.
 void check(const Table&, text::Messages<Topic>&);
 /// Returns the normalised form of a table; reading it gives the same table.
