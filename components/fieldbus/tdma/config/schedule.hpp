@@ -78,6 +78,9 @@ struct Reading {
 
 /// Reads and checks a schedule.
 Reading read(std::string_view text);
+/// Return the keys of a segment, and those of a station, as tables in Markdown.
+std::string segment_reference();
+std::string station_reference();
 /// Checks a schedule and reports every conflict with its calculation and a fix. read() includes it.
 void check(const Schedule&, text::Messages<Topic>&);
 

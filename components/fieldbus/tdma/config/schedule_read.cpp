@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 
+#include "bus/config/key_table.hpp"
 #include "schedule_plan.hpp"
 #include "text/numbers.hpp"
 #include "text/suggest.hpp"
@@ -12,10 +13,17 @@ namespace hal::tdma::config {
 
 namespace {
 
+using bus::Entry;
 using text::Word;
+
+constexpr Time us = 1'000;
+constexpr Time second = 1'000'000 * us;
 
 class Reader {
 public:
+    static const bus::KeyTable<Reader>& segment_keys();
+    static const bus::KeyTable<Reader>& station_keys();
+
     Reading read(std::string_view file) {
         text::Lines lines(file);
         while (const auto one = lines.next()) {
@@ -27,86 +35,39 @@ public:
         return std::move(out_);
     }
 
+    Schedule& schedule() { return out_.schedule; }
+    StationEntry& station() { return *station_; }
+
 private:
-    using Take = void (Reader::*)(const std::vector<Word>&);
-    struct Key {
-        Take take;
-        const char* usage;
-        bool of_station;  // else of the segment: anywhere
-    };
-
-    static const std::map<std::string, Key>& keys() {
-        static const std::map<std::string, Key> all{
-            {"cycle", {&Reader::take_cycle, "cycle MICROSECONDS", false}},
-            {"speed", {&Reader::take_speed, "speed MBIT/S", false}},
-            {"guard", {&Reader::take_guard, "guard MICROSECONDS", false}},
-            {"forward", {&Reader::take_forward, "forward MICROSECONDS", false}},
-            {"lost", {&Reader::take_lost, "lost CYCLES", false}},
-            {"rounds", {&Reader::take_rounds, "rounds NUMBER", false}},
-            {"heartbeat", {&Reader::take_heartbeat, "heartbeat MILLISECONDS", false}},
-            {"name", {&Reader::take_name, "name NAME", true}},
-            {"ip", {&Reader::take_ip, "ip ADDRESS", true}},
-            {"mac", {&Reader::take_mac, "mac ADDRESS", true}},
-            {"slot", {&Reader::take_slot, "slot ID OFFSET [PHASING/PERIOD [SIZE]]", true}},
-            {"backup-offset", {&Reader::take_backup, "backup-offset MICROSECONDS", true}},
-            {"backup-slot",
-             {&Reader::take_backup, "backup-offset MICROSECONDS",
-              true}},  // as one page of RTnet has it
-            {"phase", {&Reader::take_phase, "phase MICROSECONDS", true}},
-            {"lead", {&Reader::take_lead, "lead MICROSECONDS", true}},
-            {"stage2", {&Reader::take_stage_2, "stage2 FILE", true}},
-        };
-        return all;
-    }
-
     void error(Topic topic, const Span& at, std::string sentence, std::string help = {}) {
         report_.error(topic, at, std::move(sentence), std::move(help));
     }
 
     void line(const std::vector<Word>& words) {
         const Word& first = words.front();
-        if (first.text.back() == ':') {
-            head(words);
-            return;
+        if (first.text.back() == ':') return head(words);
+        if (const auto* key = segment_keys().find(first.text)) {
+            return segment_keys().read_line(*key, words, *this, given_in_file_, key_report_);
         }
-        const auto key = keys().find(first.text);
-        if (key == keys().end()) {
+        const auto* key = station_keys().find(first.text);
+        if (key == nullptr) {
             std::vector<std::string> names{"master:", "backup-master:", "slave:"};
-            for (const auto& [name, of] : keys()) {
-                names.push_back(name);
+            for (const auto* table : {&segment_keys(), &station_keys()}) {
+                const auto of_table = table->names();
+                names.insert(names.end(), of_table.begin(), of_table.end());
             }
-            error(Topic::line, first.at, "unknown key '" + first.text + "'",
-                  suggestion(first.text, names, "blocks and keys are"));
-            return;
+            return error(Topic::line, first.at, "unknown key '" + first.text + "'",
+                         suggestion(first.text, names, "blocks and keys are"));
         }
-        if (key->second.of_station && station_ == nullptr) {
-            error(Topic::line, first.at, "'" + first.text + "' outside a station block",
-                  "write it below master:, backup-master: or slave:");
-            return;
+        if (station_ == nullptr) {
+            return error(Topic::line, first.at, "'" + first.text + "' outside a station block",
+                         "write it below master:, backup-master: or slave:");
         }
-        const std::size_t most = first.text == "slot" ? 5 : 2;
-        const std::size_t least = first.text == "slot" ? 3 : 2;
-        if (words.size() < least || words.size() > most) {
-            const Span& at = words.size() > most ? words[most].at : first.at;
-            error(Topic::line, at,
-                  words.size() > most ? "unexpected text" : "'" + first.text + "' has no value",
-                  std::string("write ") + key->second.usage);
-            return;
-        }
-        if (first.text != "slot" && first.text != "cycle") {
-            const auto [before, is_new] = (key->second.of_station ? given_ : given_to_all_)
-                                              .emplace(first.text, first.at.line);
-            if (!is_new) {
-                error(Topic::line, first.at, "duplicate key '" + first.text + "'",
-                      "first in line " + std::to_string(before->second) + "; delete one of them");
-                return;
-            }
-        }
-        (this->*key->second.take)(words);
+        station_keys().read_line(*key, words, *this, given_in_block_, key_report_);
     }
 
     void head(const std::vector<Word>& words) {
-        given_.clear();
+        given_in_block_.clear();
         const Word& first = words.front();
         constexpr std::pair<std::string_view, Role> blocks[] = {
             {"master:", Role::master}, {"backup-master:", Role::backup}, {"slave:", Role::slave}};
@@ -142,164 +103,177 @@ private:
         station_->at = first.at;
     }
 
-    bool time(const Word& w, Time& out, Time least, Time most, const char* example) {
+    bool time(const Word& w, Time& out, Time min, Time max) {
         const auto value = parse_duration_ns(w.text, 1e3);
-        if (!value) {
+        if (!value || *value < min || *value > max) {
             error(Topic::value, w.at, "invalid time '" + w.text + "'",
-                  std::string("write microseconds, or a number with a unit: ") + example);
-        } else if (*value < least || *value > most) {
-            error(Topic::value, w.at,
-                  "'" + w.text + "' is out of range (" + microseconds(least) + ".." +
-                      microseconds(most) + ")");
-        } else {
-            out = *value;
+                  "write " + bus::time_form(min, max, false, true).expected);
+            return false;
         }
-        return value && *value >= least && *value <= most;
+        out = *value;
+        return true;
     }
     template <class T>
-    bool number(const Word& w, T& out, std::uint64_t least, std::uint64_t most) {
+    bool number(const Word& w, T& out, std::uint64_t min, std::uint64_t max) {
         const auto value = parse_natural(w.text);
-        const bool good = value && *value >= least && *value <= most;
+        const bool good = value && *value >= min && *value <= max;
         if (good) {
             out = static_cast<T>(*value);
         } else {
             error(Topic::value, w.at,
-                  "invalid number '" + w.text + "': expected " + std::to_string(least) + ".." +
-                      std::to_string(most));
+                  "invalid number '" + w.text + "': expected " + std::to_string(min) + ".." +
+                      std::to_string(max));
         }
         return good;
     }
 
-    void take_cycle(const std::vector<Word>& w) {
-        if (out_.schedule.cycle != 0) {
-            error(Topic::line, w[0].at, "duplicate key 'cycle'",
-                  "all stations of a segment share one cycle");
-        }
-        time(w[1], out_.schedule.cycle, 20'000, 1'000'000'000, "cycle 1000");
-    }
-    void take_speed(const std::vector<Word>& w) { number(w[1], out_.schedule.speed, 10, 100'000); }
-    void take_guard(const std::vector<Word>& w) {
-        time(w[1], out_.schedule.guard, 0, 10'000'000, "guard 10");
-    }
-    void take_forward(const std::vector<Word>& w) {
-        time(w[1], out_.schedule.forward, 0, 10'000'000, "forward 2");
-    }
-    void take_lost(const std::vector<Word>& w) { number(w[1], out_.schedule.lost, 1, 100'000); }
-    void take_rounds(const std::vector<Word>& w) { number(w[1], out_.schedule.rounds, 1, 250); }
-    void take_heartbeat(const std::vector<Word>& w) {
-        number(w[1], out_.schedule.heartbeat_ms, 0, 60'000);
-    }
-    void take_phase(const std::vector<Word>& w) {
-        time(w[1], station_->phase, 0, 1'000'000'000, "phase 100");
-    }
-    void take_lead(const std::vector<Word>& w) {
-        time(w[1], station_->lead, 0, 1'000'000'000, "lead 100");
-    }
-    void take_stage_2(const std::vector<Word>& w) { station_->stage_2 = w[1].text; }
-    void take_name(const std::vector<Word>& w) {
-        const auto good = [](char c) {
-            return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                   c == '-' || c == '_' || c == '.';
-        };
-        if (!std::all_of(w[1].text.begin(), w[1].text.end(), good) || w[1].text.size() > 40) {
-            error(Topic::value, w[1].at, "invalid name '" + w[1].text + "'",
+    bool read_name(const Entry& entry) {
+        const Word& name = entry.value;
+        if (!bus::is_name(name.text, ".")) {
+            error(Topic::value, name.at, "invalid name '" + name.text + "'",
                   "use at most 40 letters, digits, '-', '_' and '.'");
-            return;
+            return true;
         }
-        if (w[1].text == "auto") {
-            error(Topic::value, w[1].at, "reserved name 'auto'",
+        if (name.text == "auto") {
+            error(Topic::value, name.at, "reserved name 'auto'",
                   "station=auto selects a station that gets its block from the master; choose "
                   "another name");
-            return;
+            return true;
         }
-        for (const StationEntry& s : out_.schedule.stations) {
-            if (&s != station_ && s.name == w[1].text) {
-                error(
-                    Topic::value, w[1].at,
-                    "duplicate name: the station in line " + std::to_string(s.at.line) + " has it");
-                break;
-            }
-        }
-        station_->name = w[1].text;
+        report_other("duplicate name", name,
+                     [&](const StationEntry& s) { return s.name == name.text; });
+        station_->name = name.text;
+        return true;
     }
-    void take_ip(const std::vector<Word>& w) {
-        station_->ip = parse_ip(w[1].text);
+    bool read_ip(const Entry& entry) {
+        station_->ip = parse_ip(entry.value.text);
         if (!station_->ip) {
-            error(Topic::value, w[1].at, "invalid IPv4 address '" + w[1].text + "'",
+            error(Topic::value, entry.value.at, "invalid IPv4 address '" + entry.value.text + "'",
                   "write it as in 10.0.0.2");
+            return true;
         }
-        for (const StationEntry& s : out_.schedule.stations) {
-            if (&s != station_ && station_->ip && s.ip == station_->ip) {
-                error(Topic::value, w[1].at,
-                      "duplicate address: the station in line " + std::to_string(s.at.line) +
-                          " has it");
-                break;
-            }
-        }
+        report_other("duplicate address", entry.value,
+                     [&](const StationEntry& s) { return s.ip == station_->ip; });
+        return true;
     }
-    void take_mac(const std::vector<Word>& w) {
-        station_->mac = ethernet::parse_address(w[1].text);
+    bool read_mac(const Entry& entry) {
+        station_->mac = ethernet::parse_address(entry.value.text);
         if (!station_->mac) {
-            error(Topic::value, w[1].at, "invalid MAC address '" + w[1].text + "'",
+            error(Topic::value, entry.value.at, "invalid MAC address '" + entry.value.text + "'",
                   "write it as in 02:00:00:00:00:07");
+            return true;
         }
-        for (const StationEntry& s : out_.schedule.stations) {
-            if (&s != station_ && station_->mac && s.mac == station_->mac) {
-                error(Topic::value, w[1].at,
-                      "duplicate address: the station in line " + std::to_string(s.at.line) +
-                          " has it");
-                break;
-            }
-        }
+        report_other("duplicate address", entry.value,
+                     [&](const StationEntry& s) { return s.mac == station_->mac; });
+        return true;
     }
-    void take_backup(const std::vector<Word>& w) {
+    /// Reports the first other station that has a property of this one.
+    template <class Has>
+    void report_other(const std::string& what, const Word& value, Has has) {
+        const auto& all = out_.schedule.stations;
+        const auto other = std::find_if(all.begin(), all.end(), [&](const StationEntry& s) {
+            return &s != station_ && has(s);
+        });
+        if (other == all.end()) return;
+        error(Topic::value, value.at,
+              what + ": the station in line " + std::to_string(other->at.line) + " has it");
+    }
+
+    bool read_backup(const Entry& entry) {
         if (station_->role != Role::backup && station_ != &ignored_) {
-            error(Topic::line, w[0].at, "only a backup-master: has a backup offset",
+            error(Topic::line, entry.key.at, "only a backup-master: has a backup offset",
                   "delete the line");
-            return;
+            return true;
         }
-        station_->backup_at = w[1].at;
-        time(w[1], station_->backup_offset, 1'000, 1'000'000'000, "backup-offset 200");
+        station_->backup_at = entry.value.at;
+        return bus::time(&StationEntry::backup_offset, us, second)
+            .bare_microseconds()
+            .parse(*station_, entry);
     }
-    void take_slot(const std::vector<Word>& w) {
+
+    bool read_slot(const Entry& entry) {
+        const std::vector<Word>& w = entry.words;
         SlotEntry slot;
         slot.at = {w[0].at.line, w[0].at.column, w[0].at.offset,
                    w.back().at.offset + w.back().at.length - w[0].at.offset};
         const bool numbered = number(w[1], slot.setup.id, 0, 31);
-        time(w[2], slot.setup.offset, 0, 1'000'000'000, "slot 0 200");
+        time(w[2], slot.setup.offset, 0, second);
         if (w.size() > 3) {
-            const std::string& text = w[3].text;
-            const auto slash = text.find('/');
-            const auto phasing = parse_natural(text.substr(0, slash));
-            const auto period =
-                slash == std::string::npos ? std::nullopt : parse_natural(text.substr(slash + 1));
-            if (!phasing || !period || *period == 0 || *period > 1'000'000 || *phasing == 0 ||
-                *phasing > *period) {
-                error(Topic::value, w[3].at, "invalid PHASING/PERIOD '" + text + "'",
-                      "1/2 is the first of every two cycles, 2/2 the second; phasing is 1..PERIOD");
-            } else {
-                slot.setup.period = static_cast<std::uint32_t>(*period);
-
-                slot.setup.phasing = static_cast<std::uint32_t>(*phasing - 1);
-            }
+            read_phasing(w[3], slot);
         }
         if (w.size() > 4) {
             slot.sized = true;
             number(w[4], slot.setup.size, 46, 1500);
         }
-        for (const SlotEntry& other : station_->slots) {
-            if (numbered && other.setup.id == slot.setup.id) {
-                return error(
-                    Topic::line, w[1].at, "duplicate slot " + w[1].text,
-                    "first in line " + std::to_string(other.at.line) + "; use another number");
+        if (is_new_slot(w, slot, numbered)) {
+            station_->slots.push_back(slot);
+        }
+        return true;
+    }
+
+    /// Reads PHASING/PERIOD.
+    void read_phasing(const Word& w, SlotEntry& slot) {
+        constexpr std::uint64_t max_period = 1'000'000;
+        const auto slash = std::min(w.text.find('/'), w.text.size());
+        const auto phasing = parse_natural(text::part(w, 0, slash).text);
+        const auto period = parse_natural(w.text.substr(std::min(slash + 1, w.text.size())));
+        if (!phasing || !period || *period == 0 || *period > max_period || *phasing == 0 ||
+            *phasing > *period) {
+            return error(
+                Topic::value, w.at, "invalid PHASING/PERIOD '" + w.text + "'",
+                "1/2 is the first of every two cycles, 2/2 the second; phasing is 1..PERIOD");
+        }
+        slot.setup.period = static_cast<std::uint32_t>(*period);
+        slot.setup.phasing = static_cast<std::uint32_t>(*phasing - 1);
+    }
+
+    bool is_new_slot(const std::vector<Word>& w, const SlotEntry& slot, bool numbered) {
+        const auto& slots = station_->slots;
+        const auto other = std::find_if(slots.begin(), slots.end(), [&](const SlotEntry& one) {
+            return one.setup.id == slot.setup.id;
+        });
+        if (numbered && other != slots.end()) {
+            error(Topic::line, w[1].at, "duplicate slot " + w[1].text,
+                  "first in line " + std::to_string(other->at.line) + "; use another number");
+            return false;
+        }
+        if (slots.size() < most_slots) return true;
+        error(Topic::line, w[0].at,
+              "more than " + std::to_string(most_slots) + " slots in one station", "delete some");
+        return false;
+    }
+
+    /// Gives stations without a name one by their role and number: master, backup-1, slave-1.
+    void name_stations() {
+        std::map<Role, unsigned> numbers;
+        for (StationEntry& e : out_.schedule.stations) {
+            const unsigned number = ++numbers[e.role];
+            if (!e.name.empty()) continue;
+            e.name = role_name(e.role);
+            if (e.role != Role::master) {
+                e.name += "-" + std::to_string(number);
             }
         }
-        if (station_->slots.size() >= most_slots) {
-            return error(Topic::line, w[0].at,
-                         "more than " + std::to_string(most_slots) + " slots in one station",
-                         "delete some");
+    }
+    static const char* role_name(Role role) {
+        switch (role) {
+        case Role::master: return "master";
+        case Role::backup: return "backup";
+        default: return "slave";
         }
-        station_->slots.push_back(slot);
+    }
+
+    /// Sets the times of a station that are not given.
+    void complete(StationEntry& e) {
+        const bool is_backup = e.role == Role::backup;
+        if (is_backup && e.backup_offset == 0) {
+            error(Topic::line, e.at, "missing backup-offset", "write backup-offset 200 below it");
+        }
+        if (e.phase < 0) {
+            const Time before = std::min<Time>(e.backup_offset / 2, 100 * us);
+            e.phase = is_backup ? e.backup_offset - before : 0;
+        }
+        e.lead = std::max<Time>(e.lead, 0);
     }
 
     void finish() {
@@ -315,29 +289,9 @@ private:
             return error(Topic::line, m != nullptr ? m->at : s.stations.front().at, "missing cycle",
                          "write cycle 1000 below master:");
         }
-        unsigned backups = 0;
-        unsigned slaves = 0;
+        name_stations();
         for (StationEntry& e : s.stations) {
-            const unsigned which = e.role == Role::backup  ? ++backups
-                                   : e.role == Role::slave ? ++slaves
-                                                           : 0;
-            if (e.name.empty()) {
-                e.name = e.role == Role::master ? "master"
-                                                : (e.role == Role::backup ? "backup-" : "slave-") +
-                                                      std::to_string(which);
-            }
-            if (e.role == Role::backup && e.backup_offset == 0) {
-                error(Topic::line, e.at, "missing backup-offset",
-                      "write backup-offset 200 below it");
-            }
-            if (e.phase < 0) {
-                e.phase = e.role == Role::backup
-                              ? e.backup_offset - std::min<Time>(e.backup_offset / 2, 100'000)
-                              : 0;
-            }
-            if (e.lead < 0) {
-                e.lead = 0;
-            }
+            complete(e);
         }
         if (report_.failed()) return;
         sizes();
@@ -376,14 +330,90 @@ private:
 
     Reading out_;
     text::Messages<Topic> report_;
+    bus::TopicReport<Topic> key_report_{report_};
     StationEntry ignored_;
     StationEntry* station_ = nullptr;
-    // lines of the keys that may occur once: in a block, in the file
-    std::map<std::string, std::uint32_t> given_, given_to_all_;
+    bus::GivenKeys given_in_block_, given_in_file_;
 };
+
+template <class T>
+auto of_segment(T Schedule::* member) {
+    return [member](Reader& reader) -> T& { return reader.schedule().*member; };
+}
+template <class T>
+auto of_station(T StationEntry::* member) {
+    return [member](Reader& reader) -> T& { return reader.station().*member; };
+}
+template <class Get>
+auto time_in_us(Get get, Time min, Time max) {
+    return bus::time(get, min, max).bare_microseconds();
+}
+
+const bus::KeyTable<Reader>& Reader::segment_keys() {
+    static const bus::KeyTable<Reader> table{{
+        {"cycle", time_in_us(of_segment(&Schedule::cycle), 20 * us, second), "required",
+         "The cycle of all stations."},
+        {"speed", bus::number(of_segment(&Schedule::speed), 10, 100'000), "`100`",
+         "The line speed in Mbit/s."},
+        {"guard", time_in_us(of_segment(&Schedule::guard), 0, 10'000 * us), "`10`",
+         "The gap between two frames. A frame that would be later than this is dropped and "
+         "counted."},
+        {"forward", time_in_us(of_segment(&Schedule::forward), 0, 10'000 * us), "`2`",
+         "The forwarding delay of the switch; `0`: no switch."},
+        {"lost", bus::number(of_segment(&Schedule::lost), 1, 100'000), "`4`",
+         "The cycles without a sync until the station stops sending and its outputs are safe."},
+        {"rounds", bus::number(of_segment(&Schedule::rounds), 1, 250), "`100`",
+         "The rounds of a calibration."},
+        {"heartbeat", bus::number(of_segment(&Schedule::heartbeat_ms), 0, 60'000), "`1000`",
+         "The heartbeat in ms of stations that the master configured; `0`: none. A station "
+         "without a heartbeat for twice this time is dead."},
+    }};
+    return table;
+}
+
+const bus::KeyTable<Reader>& Reader::station_keys() {
+    static const bus::KeyTable<Reader> table{{
+        bus::Key<Reader>{"slot",
+                         bus::own("", "0..31, a time, 1/1..n/n, 46..1500", &Reader::read_slot), "",
+                         "The station may send OFFSET after the sync, in the PHASING-th of PERIOD "
+                         "cycles (`1/1`). SIZE is the payload in bytes; by default as many as fit "
+                         "before the next frame of any station."}
+            .words(2, 4, "ID OFFSET [PHASING/PERIOD [SIZE]]")
+            .repeated(),
+        {"backup-offset",
+         bus::own("a time of 1us..1s, in microseconds or with a unit", "1us..1s",
+                  &Reader::read_backup, "TIME"),
+         "required",
+         "Of a backup: the offset at which this station sends a missing sync. The smallest one "
+         "wins. One page of RTnet names it `backup-slot`, which is accepted as well."},
+        {"name", bus::own("", "a name", &Reader::read_name, "NAME"), "by its role, as in `slave-1`",
+         "A value for `station=`."},
+        {"ip", bus::own("", "an IPv4 address", &Reader::read_ip, "ADDRESS"), "none",
+         "A value for `station=`."},
+        {"mac", bus::own("", "a MAC address", &Reader::read_mac, "ADDRESS"), "none",
+         "A value for `station=`. It must equal that of the interface."},
+        {"phase", time_in_us(of_station(&StationEntry::phase), 0, second),
+         "`0`; of a backup 100 us before its offset, or half of it",
+         "The beginning of its thread's cycle after the sync."},
+        {"lead", time_in_us(of_station(&StationEntry::lead), 0, second), "`0`",
+         "The longest time of its functions until `transmit`. Earlier slots are filled a cycle "
+         "ahead."},
+        {"stage2", bus::text_value(of_station(&StationEntry::stage_2), "FILE"), "none",
+         "A file that the master sends to the station, [with its "
+         "schedule](#stations-without-a-file). It has at most 64 KiB."},
+        {"backup-slot",
+         bus::own("a time of 1us..1s, in microseconds or with a unit", "1us..1s",
+                  &Reader::read_backup, "TIME"),
+         "", ""},
+    }};
+    return table;
+}
 
 }  // namespace
 
 Reading read(std::string_view text) { return Reader().read(text); }
+
+std::string segment_reference() { return Reader::segment_keys().reference(); }
+std::string station_reference() { return Reader::station_keys().reference(); }
 
 }  // namespace hal::tdma::config
