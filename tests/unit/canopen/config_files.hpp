@@ -9,7 +9,7 @@
 #include <map>
 
 #include "canopen/master/config/bus_schedule.hpp"
-#include "canopen/master/config/node_reader.hpp"
+#include "canopen/master/config/node_objects.hpp"
 
 namespace hal::canopen::config {
 namespace {

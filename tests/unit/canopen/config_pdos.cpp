@@ -30,7 +30,8 @@ TEST(CanopenConfig, a_TPDO_can_be_requested) {
     EXPECT_EQ(said(node + "rpdo1 = controlword\nrpdo1.request = 10ms\n"),
               "arm:6:1: error: only a tpdo can be requested; the master sends an rpdo by itself");
     EXPECT_EQ(said(node + "tpdo1 = statusword\ntpdo1.request = often\n"),
-              "arm:6:17: error: invalid tpdo1.request 'often'; write a time of 1ms..3600s");
+              "arm:6:17: error: invalid tpdo1.request 'often'; write a time of 1ms..3600s, as in "
+              "10ms or 0.5s");
 }
 
 TEST(CanopenConfig, a_multiplexed_PDO_carries_its_objects_one_at_a_time) {

@@ -110,7 +110,7 @@ TEST(CanopenConfig, axes_of_one_node_have_names_of_their_own) {
 TEST(CanopenConfig, writes_are_encoded_by_the_type_of_the_object) {
     const auto c = good(
         "[bus]\n[node 1]\ndevice = cia402\ntpdo1 = statusword\nwrite modes-of-operation = 8\nwrite "
-        "0x6099:1 = 1000\nwrite 0x2001:3 i16 = "
+        "0x6099:1 = 1000\nwrite 0x2001:3 s16 = "
         "-2\n");
     std::vector<std::pair<std::uint16_t, std::size_t>> seen;
     for (const auto& w : c.nodes[0].setup.writes) {

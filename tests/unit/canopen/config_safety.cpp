@@ -104,7 +104,7 @@ TEST(ConfigSafety, Says_what_is_wrong) {
         {"tsrdo1 = " + pair + "\ntsrdo1.srvt = 256ms\n",
          "5: invalid tsrdo1.srvt '256ms'; write whole milliseconds up to 255ms"},
         {"tsrdo1 = " + pair + "\ntsrdo1.inhibit = 1ms\n",
-         "5: unknown SRDO option 'inhibit'; the options are refresh, sct, srvt, cob-id"},
+         "5: unknown SRDO option 'inhibit'; the options are: refresh, sct, srvt, cob-id"},
         {"tsrdo65 = " + pair + "\n", "4: invalid SRDO number 65; SRDOs are numbered 1..64"},
         {"tsrdo1.sct = 20ms\n",
          "4: tsrdo1 has options but no objects; name its objects: tsrdo1 = OBJECT / INVERTED, "

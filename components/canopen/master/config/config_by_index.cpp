@@ -53,7 +53,7 @@ Reading read(const ByIndex& wish, const ReadFile& read_file) {
                 known != nullptr && bits_of(known->type) >= 8 ? bits_of(known->type) : 32;
             const unsigned length = bits ? static_cast<unsigned>(*bits) : usual;
             const std::string pdo = (to_node ? "rpdo" : "tpdo") + std::to_string(++number);
-            const std::string label = lower(object_label(i, s));
+            const std::string label = lower(object_text(i, s));
             text += pdo + " = " + label +
                     (wish.eds.empty() || bits ? (is_natural ? " u" : " i") + std::to_string(length)
                                               : "") +

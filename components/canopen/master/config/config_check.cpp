@@ -6,7 +6,7 @@
 
 #include "canopen/protocol/srdo_description.hpp"
 #include "config_sections.hpp"
-#include "node_reader.hpp"
+#include "node_pdos.hpp"
 
 namespace hal::canopen::config {
 
@@ -135,11 +135,11 @@ void check_network(const MasterConfig& config, Report& report) {
             for (auto u = first; u != last; ++u) {
                 const std::string why = why_not_shared(*u->second.pdo, p);
                 if (why.empty()) continue;
-                report.error(
-                    Topic::node, p.at,
-                    called({&n, &p}) + " and " + called(u->second) + " have the same identifier " +
-                        lower(object_label(static_cast<std::uint16_t>(cob_id(p.cob)), 0, true)),
-                    why);
+                report.error(Topic::node, p.at,
+                             called({&n, &p}) + " and " + called(u->second) +
+                                 " have the same identifier " +
+                                 lower(index_text(static_cast<std::uint16_t>(cob_id(p.cob)))),
+                             why);
                 break;
             }
             users.emplace(cob, User{&n, &p});

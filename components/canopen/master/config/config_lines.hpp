@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The text below a configuration: sections and keys, each with its span, and how values are
-// spelled.
+// How values are written in a configuration.
 #pragma once
 
-#include <deque>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "bus/config/key_table.hpp"
+#include "bus/config/old_forms.hpp"
+#include "bus/config/section_file.hpp"
 #include "master_config.hpp"
 #include "text/characters.hpp"
 #include "text/numbers.hpp"
@@ -16,39 +17,27 @@
 
 namespace hal::canopen::config {
 
+using bus::index_text;
+using bus::object_text;
+using bus::ObjectAddress;
+using bus::value_type_names;
 using text::list_of;
 using text::Word;
 using text::words_of;
 using Report = text::Messages<Topic>;
 
-struct Line {
-    Word key, value;  ///< key: lower case, dashes; value: as written
-    std::string written{};   ///< the key as written
-    bool used = false;
-};
-
-struct Section {
-    std::vector<Word> words;  ///< of its header
-    Span at;
-    std::deque<Line> lines;
-};
-
-/// Splits a configuration into its sections. [setup]
-std::vector<Section> split(std::string_view text, Report&);
+using Line = bus::Entry;
+using bus::Keys;
+using bus::Section;
 
 /// Parses a bit rate of 5 kbit/s to 20 Mbit/s: 1M, 500k, 125000. [setup]
 std::optional<std::uint32_t> rate(std::string_view text);
 /// Parses a time with a unit, or 0: 1ms, 250us, 2s, 0.5s. [setup]
 std::optional<Time> duration(std::string_view text);
-std::optional<bool> yes_or_no(std::string_view text);
-/// Returns the data type of u8, i16, real32, text and the like. [setup]
-std::optional<Type> type_named(std::string_view word);
-inline constexpr const char* type_words =
-    "u8, u16, u32, u64, i8, i16, i32, i64, real32, real64 or bool";
-/// Parses INDEX or INDEX:SUB with a hexadecimal index. [setup]
-std::optional<std::pair<std::uint16_t, std::uint8_t>> address(std::string_view text, bool& has_sub);
-/// Formats an object's address: "0x6040:0", "0x6099:1"; a `single` one has no sub-index: "0x6040".
-/// [setup]
-std::string object_label(std::uint16_t index, unsigned sub, bool single = false);
+/// Returns the data type that a word names, `u8`, `s16`, `f32`, `text` and the like, and warns about
+/// the name of an earlier version. [setup]
+std::optional<Type> parse_type(const Word& word, Report&);
+/// Parses INDEX or INDEX:SUB and warns about a form of an earlier version. [setup]
+std::optional<ObjectAddress> parse_address(const Word& word, Report&);
 
 }  // namespace hal::canopen::config

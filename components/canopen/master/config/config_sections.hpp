@@ -3,12 +3,12 @@
 // config_reader.cpp. [setup]
 #pragma once
 
-#include "config_keys.hpp"
+#include "config_lines.hpp"
 
 namespace hal::canopen::config {
 
 /// Reads [bus].
-void read_bus(Keys& keys, MasterConfig& to);
+void read_bus(Keys& keys, MasterConfig& to, Report& report);
 /// Reads a line of [messages].
 void read_foreign(const Line& line, MasterConfig& to, Report& report);
 /// Assigns an identifier to each PDO above 4 that has none: the lowest one that no node uses by the

@@ -170,6 +170,14 @@ struct Reading {
 /// Reads a configuration. Relative paths in it start at the folder of `path`.
 Reading read(std::string_view text, const std::string& path, const ReadFile& = read_from_disk);
 
+/// Return the keys of [bus], of a node, and the options of a PDO, an SRDO and an object, as tables
+/// in Markdown.
+std::string bus_reference();
+std::string node_reference();
+std::string pdo_reference();
+std::string srdo_reference();
+std::string object_reference();
+
 /// Formats each error as "file:12:7: error: sentence; help", for hosts without a renderer.
 std::string to_string(const Reading&, const std::string& path);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
+#include "node_descriptions.hpp"
+
 #include "canopen/eds/xdd.hpp"
-#include "node_reader.hpp"
 
 namespace hal::canopen::config {
 

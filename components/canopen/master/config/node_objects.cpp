@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT
-// How objects become pins: OBJECT.scale, .offset, .unit, .type, .bits, .name, .safe.
+#include "node_objects.hpp"
+
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <set>
-
-#include "node_reader.hpp"
 
 namespace hal::canopen::config {
 
@@ -18,10 +16,9 @@ constexpr const char* node_pins[] = {
     "error-register",   "emcy",        "emcy-count", "retries", "boot-result",
     "heartbeat-age-ms", "restart"};
 constexpr const char* feedback = "-feedback";
-constexpr const char* properties[] = {"scale", "offset", "unit", "type", "bits", "name", "safe"};
-constexpr Choice<PinType> pin_types[] = {{"bit", PinType::bit}, {"s32", PinType::s32},
-                                         {"u32", PinType::u32}, {"s64", PinType::s64},
-                                         {"u64", PinType::u64}, {"float", PinType::real}};
+constexpr bus::Choice<PinType> pin_types[] = {{"bit", PinType::bit}, {"s32", PinType::s32},
+                                              {"u32", PinType::u32}, {"s64", PinType::s64},
+                                              {"u64", PinType::u64}, {"float", PinType::real}};
 
 std::optional<double> real(std::string_view text) {
     const std::size_t slash = text.find('/');
@@ -39,9 +36,8 @@ PinType usual(Type type) {
     if (type == Type::boolean) return PinType::bit;
     if (is_real(type)) return PinType::real;
     const bool wide = bits_of(type) > 32;
-    return is_signed(type) ? wide ? PinType::s64 : PinType::s32
-           : wide          ? PinType::u64
-                           : PinType::u32;
+    if (is_signed(type)) return wide ? PinType::s64 : PinType::s32;
+    return wide ? PinType::u64 : PinType::u32;
 }
 
 /// Inputs and outputs of CiA 401 whose bits are lines of their own.
@@ -93,139 +89,231 @@ std::uint64_t raw_of(const Object& o, double pin_value) {
     const double rounded = std::nearbyint(value);
     if (is_signed(o.type)) {
         const auto top = static_cast<std::int64_t>(ones >> 1);
-        const std::int64_t whole = rounded >= static_cast<double>(top) ? top
-                                   : rounded <= -static_cast<double>(top) - 1
-                                       ? -top - 1
-                                       : static_cast<std::int64_t>(rounded);
-        return static_cast<std::uint64_t>(whole);
+        if (rounded >= static_cast<double>(top)) return static_cast<std::uint64_t>(top);
+        if (rounded <= -static_cast<double>(top) - 1) return static_cast<std::uint64_t>(-top - 1);
+        return static_cast<std::uint64_t>(static_cast<std::int64_t>(rounded));
     }
     if (rounded >= static_cast<double>(ones)) return ones;
     if (rounded <= 0) return 0;
     return static_cast<std::uint64_t>(rounded) & ones;
 }
 
-void NodeReader::object_options() {
-    // The types first: a safe value is in the pin's unit.
-    std::vector<Line*> lines = keys_.rest();
-    std::vector<std::pair<Object*, std::pair<std::string, const Line*>>> wishes;
-    for (Line* line : lines) {
-        const std::size_t dot = line->key.text.rfind('.');
-        if (dot == line->key.text.npos) continue;
-        const std::string object = line->key.text.substr(0, dot);
+namespace {
 
-        const std::string property = line->key.text.substr(dot + 1);
-        if (std::find_if(std::begin(properties), std::end(properties),
-                         [&](const char* p) { return property == p; }) == std::end(properties)) {
-            line->used = true;
-            report_.error(Topic::line, line->key.at, "unknown object option '" + property + "'",
-                          suggestion(property, {std::begin(properties), std::end(properties)},
-                                     "the options are"));
-            continue;
-        }
-        line->used = true;
-        bool found = false;
-        for (Pdo& pdo : node_.pdos) {
-            for (Object& o : pdo.objects) {
-                const bool named =
-                    !o.filler &&
-                    (dashed(object_label(o.index, o.sub)) == dashed(object) || o.about == object ||
-                     (o.sub == 0 && lower(object_label(o.index, 0, true)) == object));
-                const Known* known = named || o.filler ? nullptr : catalog_->find(o.index, o.sub);
-                if (!named && (known == nullptr || known->name != object)) continue;
-                found = true;
-                wishes.push_back({&o, {property, line}});
-            }
-        }
-        if (found || undescribed_) continue;
-        std::vector<std::string> mapped;
-        for (const Pdo& pdo : node_.pdos) {
-            for (const Object& o : pdo.objects) {
-                if (!o.filler && std::find(mapped.begin(), mapped.end(), o.pin) == mapped.end()) {
-                    mapped.push_back(o.pin);
-                }
-            }
-        }
-        std::string near = did_you_mean(object, mapped);
-        report_.error(Topic::object, line->key.at, "no PDO of this node carries '" + object + "'",
-                      near.empty() ? "its PDOs carry " + listed(mapped) : near);
-    }
-    for (const bool types : {true, false}) {
-        for (const auto& [o, wish] : wishes) {
-            if ((wish.first != "safe") == types) {
-                option(*o, wish.first, *wish.second);
-            }
-        }
-    }
-}
+/// What an option of an object is read into.
+struct ObjectTarget {
+    Object& object;
+    Keys& keys;
+    Report& report;
+};
 
-void NodeReader::option(Object& o, const std::string& property, const Line& line) {
-    const std::string& text = line.value.text;
-    if (property == "scale" || property == "offset") {
-        const auto value = real(text);
-        if (!value || (property == "scale" && *value == 0)) {
-            return keys_.reject(line,
-                                property == "scale"
-                                    ? "the object units per pin unit, as in 10000 or 65536/360"
-                                    : "a number");
-        }
-        (property == "scale" ? o.scale : o.offset) = *value;
-        o.as = PinType::real;
-    } else if (property == "unit") {
-        o.unit = text;
-        if (keys_.find(line.key.text.substr(0, line.key.text.rfind('.')) + ".type") == nullptr) {
-            o.as = PinType::real;
-        }
-    } else if (property == "name") {
-        const auto usable = [](char c) {
-            return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                   c == '-' || c == '.' || c == '_' || c == '#';
-        };
-        if (!std::all_of(text.begin(), text.end(), usable)) {
-            return keys_.reject(line, "letters, digits, - and .");
-        }
-        o.pin = text;
-    } else if (property == "type") {
-        keys_.take_choice(line.key.text.c_str(), o.as, pin_types);
-    } else if (property == "bits") {
-        o.bit_pins.clear();
-        if (const auto yes = yes_or_no(text)) {
-            o.bits_wanted = *yes ? 1 : -1;
-            return;
-        }
-        const auto names = list_of(line.value);
-        if (names.size() > o.bits) {
-            report_.error(
-                Topic::value, line.value.at,
-                std::to_string(names.size()) + " names for " + std::to_string(o.bits) + " bits",
-                "the first name is that of bit 0; - skips a bit");
-            return;
-        }
-        for (unsigned bit = 0; bit < names.size(); ++bit) {
-            if (!names[bit].empty() && names[bit].text != "-") {
-                o.bit_pins.push_back({bit, dashed(names[bit].text)});
-            }
-        }
-        o.bits_wanted = 1;
-    } else if (!set_safe(o, line)) {
-        keys_.reject(line, "a value of the pin, or hold");
-    }
-}
-
-bool NodeReader::set_safe(Object& o, const Line& line) {
-    o.safe_given = true;
-    if (lower(line.value.text) == "hold") {
-        o.safe.reset();
-        return true;
-    }
+bool read_scale(ObjectTarget& to, const Line& line) {
     const auto value = real(line.value.text);
-    const auto flag = yes_or_no(line.value.text);
-    if (!value && !flag) return false;
-    o.safe = raw_of(o, value ? *value : *flag ? 1.0 : 0.0);
+    if (!value || *value == 0) return false;
+    to.object.scale = *value;
+    to.object.as = PinType::real;
     return true;
 }
 
+bool read_offset(ObjectTarget& to, const Line& line) {
+    const auto value = real(line.value.text);
+    if (!value) return false;
+    to.object.offset = *value;
+    to.object.as = PinType::real;
+    return true;
+}
+
+/// A unit makes the pin a float, unless its type is given.
+bool read_unit(ObjectTarget& to, const Line& line) {
+    to.object.unit = line.value.text;
+    const std::string object = line.key.text.substr(0, line.key.text.rfind('.'));
+    if (to.keys.find(object + ".type") == nullptr) {
+        to.object.as = PinType::real;
+    }
+    return true;
+}
+
+bool read_name(ObjectTarget& to, const Line& line) {
+    const std::string& text = line.value.text;
+    const auto usable = [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+               c == '-' || c == '.' || c == '_' || c == '#';
+    };
+    if (!std::all_of(text.begin(), text.end(), usable)) return false;
+    to.object.pin = text;
+    return true;
+}
+
+/// Reads yes, no, or the names of the bits.
+bool read_bits(ObjectTarget& to, const Line& line) {
+    Object& o = to.object;
+    o.bit_pins.clear();
+    if (const auto yes = bus::parse_flag(line.value.text)) {
+        o.bits_wanted = *yes ? 1 : -1;
+        return true;
+    }
+    const auto names = list_of(line.value);
+    if (names.size() > o.bits) {
+        to.report.error(
+            Topic::value, line.value.at,
+            std::to_string(names.size()) + " names for " + std::to_string(o.bits) + " bits",
+            "the first name is that of bit 0; - skips a bit");
+        return true;
+    }
+    for (unsigned bit = 0; bit < names.size(); ++bit) {
+        if (!names[bit].empty() && names[bit].text != "-") {
+            o.bit_pins.push_back({bit, dashed(names[bit].text)});
+        }
+    }
+    o.bits_wanted = 1;
+    return true;
+}
+
+bool read_safe(ObjectTarget& to, const Line& line) {
+    Object& o = to.object;
+    o.safe_given = true;
+    if (same_word(line.value.text, "hold")) {
+        o.safe.reset();
+        return true;
+    }
+    if (const auto value = real(line.value.text)) {
+        o.safe = raw_of(o, *value);
+        return true;
+    }
+    const auto flag = bus::parse_flag(line.value.text);
+    if (!flag) return false;
+    o.safe = raw_of(o, *flag ? 1.0 : 0.0);
+    return true;
+}
+
+/// `safe` is the last row: its value is in the unit of the pin, which the others define.
+const bus::KeyTable<ObjectTarget>& option_keys() {
+    const auto type = [](ObjectTarget& to) -> PinType& { return to.object.as; };
+    static const bus::KeyTable<ObjectTarget> table{{
+        {"scale",
+         bus::own("the object units per pin unit, as in 10000 or 65536/360", "a number, a fraction",
+                  &read_scale),
+         "1", "scale factor: object = pin · scale + offset; may be a fraction, `65536/360`"},
+        {"offset", bus::own("a number", "a number, a fraction", &read_offset), "0",
+         "offset of the scaling"},
+        {"unit", bus::own("", "a text", &read_unit), "none",
+         "unit of the pin, which is then a float unless its type is given"},
+        {"type", bus::choice(type, pin_types), "by the object", "type of the pin"},
+        {"bits", bus::own("", "yes, no, names", &read_bits),
+         "`yes` for digital inputs and outputs of CiA 401, else `no`",
+         "`yes`: one pin per bit, `NAME-0` and so on; a list names the pins: `home, limit-min, -, "
+         "limit-max`; `no`: one pin"},
+        {"name", bus::own("letters, digits, - and .", "a name", &read_name), "that of the object",
+         "name of the pin"},
+        {"safe", bus::own("a value of the pin, or hold", "a value, hold", &read_safe), "see below",
+         "safe value. The master sends it for an output while the node is not operational and when "
+         "the machine stops; the pin of an input shows it while the node is not operational. "
+         "`hold`: the last value"},
+    }};
+    return table;
+}
+
+}  // namespace
+
+std::string object_reference() { return option_keys().reference("OBJECT."); }
+
+void NodeObjects::read() {
+    const std::vector<Option> all = options();
+    bus::TopicReport<Topic> key_report(report_);
+    for (const bool is_safe : {false, true}) {
+        for (const Option& option : all) {
+            if ((option.property == "safe") != is_safe) continue;
+            ObjectTarget target{*option.object, keys_, report_};
+            option_keys().read(*option_keys().find(option.property), *option.line, target,
+                               key_report);
+        }
+    }
+    complete();
+    name_feedback();
+    check_pins();
+}
+
+std::vector<NodeObjects::Option> NodeObjects::options() {
+    std::vector<Option> out;
+    for (Line* line : keys_.rest()) {
+        const std::size_t dot = line->key.text.rfind('.');
+        if (dot == line->key.text.npos) continue;
+        line->used = true;
+        const std::string property = line->key.text.substr(dot + 1);
+        if (option_keys().find(property) == nullptr) {
+            report_.error(Topic::line, line->key.at, "unknown object option '" + property + "'",
+                          suggestion(property, option_keys().names(), "the options are"));
+            continue;
+        }
+        const Word word = text::part(line->key, 0, dot);
+        const auto objects = objects_named(word.text, word);
+        for (Object* object : objects) {
+            out.push_back({object, property, line});
+        }
+        if (objects.empty() && !in_.undescribed) {
+            report_unmapped(word.text, *line);
+        }
+    }
+    return out;
+}
+
+/// Finds the objects of all PDOs that a key names: by address, or by a name of the description.
+std::vector<Object*> NodeObjects::objects_named(const std::string& name, const Word& word) {
+    const Known* known = in_.catalog.find(name);
+    const auto address = known == nullptr ? parse_address(word, report_) : std::nullopt;
+    const auto is_named = [&](const Object& o) {
+        if (o.filler) return false;
+        if (address) return o.index == address->index && o.sub == address->sub;
+        if (known != nullptr && o.index == known->index && o.sub == known->sub) return true;
+        return o.about == name || dashed(object_text(o.index, o.sub)) == dashed(name);
+    };
+    std::vector<Object*> out;
+    for (Pdo& pdo : node_.pdos) {
+        for (Object& o : pdo.objects) {
+            if (is_named(o)) {
+                out.push_back(&o);
+            }
+        }
+    }
+    return out;
+}
+
+void NodeObjects::report_unmapped(const std::string& name, const Line& line) {
+    std::vector<std::string> mapped;
+    for (const Pdo& pdo : node_.pdos) {
+        for (const Object& o : pdo.objects) {
+            if (!o.filler && std::find(mapped.begin(), mapped.end(), o.pin) == mapped.end()) {
+                mapped.push_back(o.pin);
+            }
+        }
+    }
+    const std::string near = did_you_mean(name, mapped);
+    report_.error(Topic::object, line.key.at, "no PDO of this node carries '" + name + "'",
+                  near.empty() ? "its PDOs carry " + listed(mapped) : near);
+}
+
+/// Sets the type, the safe value and the pins of bits that are not given.
+void NodeObjects::complete() {
+    for (Pdo& pdo : node_.pdos) {
+        for (Object& o : pdo.objects) {
+            if (o.filler) continue;
+            if (!o.safe_given) {
+                o.safe = pdo.safety ? std::optional<std::uint64_t>(0) : usual_safe(o, pdo.to_node);
+            }
+            if (o.as == PinType::none) {
+                o.as = usual(o.type);
+            }
+            const bool lines = o.bits_wanted > 0 ||
+                               (o.bits_wanted == 0 && is_lines(o.index) && o.as != PinType::real);
+            if (lines && o.bit_pins.empty()) {
+                name_bits(o);
+            }
+        }
+    }
+}
+
 /// An object that the node both receives and sends has two pins: the input keeps the name.
-void NodeReader::name_feedback() {
+void NodeObjects::name_feedback() {
     for (const Pdo& sent : node_.pdos) {
         if (!sent.to_node) continue;
         for (const Object& o : sent.objects) {
@@ -243,117 +331,64 @@ void NodeReader::name_feedback() {
     }
 }
 
-void NodeReader::finish_objects() {
-    std::set<std::string> pins(std::begin(node_pins), std::end(node_pins));
+namespace {
+
+/// The pins of a node, to find those that two objects have.
+class PinNames {
+public:
+    PinNames(Report& report) : report_(report) {}
+
+    void claim(const Object& o, const std::string& name, Span at) {
+        const std::string rename = object_text(o.index, o.sub) + ".name = NAME";
+        if (std::find(std::begin(node_pins), std::end(node_pins), name) != std::end(node_pins)) {
+            report_.error(Topic::object, at, "pin '" + name + "' exists on every node",
+                          "rename the object: " + rename);
+        } else if (!names_.insert(name).second) {
+            report_.error(Topic::object, at,
+                          "duplicate pin '" + name + "': two objects have this name",
+                          "rename one of them: " + rename);
+        }
+    }
+
+private:
+    Report& report_;
+    std::set<std::string> names_;
+};
+
+}  // namespace
+
+void NodeObjects::check_pins() {
     struct Seen {
         const Object* object;
         bool to_node;
     };
+    PinNames pins(report_);
     std::vector<Seen> seen;
-    std::vector<std::string> multiplexed_pins;  // by multiplexed PDOs
-    for (Pdo& pdo : node_.pdos) {
-        for (Object& o : pdo.objects) {
-            if (o.filler) continue;
-            if (!o.safe_given) {
-                o.safe = pdo.safety ? std::optional<std::uint64_t>(0) : usual_safe(o, pdo.to_node);
-            }
-            if (o.as == PinType::none) {
-                o.as = usual(o.type);
-            }
-            const bool lines = o.bits_wanted > 0 ||
-                               (o.bits_wanted == 0 && is_lines(o.index) && o.as != PinType::real);
-            if (lines && o.bit_pins.empty()) {
-                name_bits(o);
-            }
-        }
-    }
-    name_feedback();
-    for (Pdo& pdo : node_.pdos) {
-        for (Object& o : pdo.objects) {
+    std::set<std::string> multiplexed;  // pins of multiplexed PDOs
+    for (const Pdo& pdo : node_.pdos) {
+        for (const Object& o : pdo.objects) {
             if (o.filler) continue;
             // A second PDO with the same object shares its pins.
             const bool again = std::any_of(seen.begin(), seen.end(), [&](const Seen& s) {
                 return s.to_node == pdo.to_node && s.object->same(o);
             });
-            if (again &&
-                (pdo.multiplexed() || std::find(multiplexed_pins.begin(), multiplexed_pins.end(),
-                                                o.pin) != multiplexed_pins.end())) {
+            if (again && (pdo.multiplexed() || multiplexed.contains(o.pin))) {
                 report_.error(Topic::object, pdo.at,
                               "object '" + o.pin + "' is in two PDOs, one of them multiplexed",
                               "remove it from one of them");
             }
             if (pdo.multiplexed()) {
-                multiplexed_pins.push_back(o.pin);
+                multiplexed.insert(o.pin);
             }
             if (again) continue;
             seen.push_back({&o, pdo.to_node});
-            const auto claim = [&](const std::string& name) {
-                if (std::find(std::begin(node_pins), std::end(node_pins), name) !=
-                    std::end(node_pins)) {
-                    report_.error(
-                        Topic::object, pdo.at, "pin '" + name + "' exists on every node",
-                        "rename the object: " + object_label(o.index, o.sub) + ".name = NAME");
-                } else if (!pins.insert(name).second) {
-                    report_.error(
-                        Topic::object, pdo.at,
-                        "duplicate pin '" + name + "': two objects have this name",
-                        "rename one of them: " + object_label(o.index, o.sub) + ".name = NAME");
-                }
-            };
             if (o.bit_pins.empty()) {
-                claim(o.pin);
+                pins.claim(o, o.pin, pdo.at);
             }
             for (const BitPin& b : o.bit_pins) {
-                claim(b.name);
+                pins.claim(o, b.name, pdo.at);
             }
         }
-    }
-}
-
-void NodeReader::leftover() {
-    const std::vector<std::string> all{"type",
-                                       "eds",
-                                       "device",
-                                       "axes",
-                                       "device-type",
-                                       "vendor",
-                                       "product",
-                                       "revision",
-                                       "serial",
-                                       "mandatory",
-                                       "configure",
-                                       "keep-alive",
-                                       "start",
-                                       "start-order",
-                                       "restore",
-                                       "save",
-                                       "boot-time",
-                                       "retry",
-                                       "retry-most",
-                                       "on-failure",
-                                       "on-loss",
-                                       "heartbeat",
-                                       "silence",
-                                       "guarding",
-                                       "watch-master",
-                                       "firmware",
-                                       "firmware-number",
-                                       "firmware-id",
-                                       "firmware-version",
-                                       "firmware-time",
-                                       "tpdo1",
-                                       "rpdo1",
-                                       "tsrdo1",
-                                       "rsrdo2",
-                                       "sdo-timeout",
-                                       "sdo-retries",
-                                       "configured",
-                                       "write OBJECT",
-                                       "command OBJECT"};
-    for (Line* line : keys_.rest()) {
-        line->used = true;
-        report_.error(Topic::line, line->key.at, "unknown key '" + line->key.text + "' of a node",
-                      suggestion(line->key.text, all, "the keys are"));
     }
 }
 

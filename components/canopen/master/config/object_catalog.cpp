@@ -284,7 +284,9 @@ void Catalog::finish() {
         if (k.name.empty() || k.index < 0x1000) continue;
         // two of one name
         if (by_name_.contains(k.name)) {
-            k.name += "-" + dashed(object_label(k.index, k.sub, k.single)).substr(2);
+            k.name +=
+                "-" +
+                dashed(k.single ? index_text(k.index) : object_text(k.index, k.sub)).substr(2);
         }
         by_name_.emplace(k.name, i);
     }
