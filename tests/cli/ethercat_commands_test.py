@@ -347,7 +347,7 @@ class Configuration(Ethercat):
             "device  = cia402\naxes    = 2\noutputs = 6040, 6060, 607A, 60FF, 6071, 6840, 6860, 687A, 68FF, 6871\n",
             text,
         )
-        self.assertIn("outputs = 7000:1..10 bit\n", text)
+        self.assertIn("outputs = 7000:1..0x10 bit\n", text)
         (self.folder / "turn.hal").write_text(
             "source drives.hal\nadvance 1s\nsetp servo-axis-2.velocity-cmd 5000\nsetp servo-axis-1.enable TRUE\n"
             "setp servo-axis-2.enable TRUE\nsetp servo-1.enable TRUE\nadvance 2s\ngetp servo-axis-1.active\n"

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <set>
 
 #include "ethercat/config/config_text.hpp"
 #include "hal/read_file.hpp"
@@ -13,41 +12,137 @@ namespace hal::ethercat::config {
 
 namespace {
 
+constexpr bus::SectionKind kinds[] = {
+    {"bus", "[bus]", bus::SectionUse::once},
+    {"domain", "[domain NAME]", bus::SectionUse::named},
+    {"slave", "[slave POSITION NAME]", bus::SectionUse::any},
+};
+
+constexpr std::int64_t us = 1'000;
+constexpr std::int64_t second = 1'000'000'000;
+
+/// What the keys of [bus] are read into.
+struct BusTarget {
+    Bus& bus;
+    Report& report;
+};
+
+constexpr bus::Choice<master::ClockLead> clocks[] = {{"reference", master::ClockLead::reference},
+                                                     {"thread", master::ClockLead::thread},
+                                                     {"none", master::ClockLead::none}};
+constexpr bus::Choice<master::DcLoss> losses[] = {{"report", master::DcLoss::report},
+                                                  {"safeop", master::DcLoss::safeop}};
+constexpr bus::Choice<bool> others[] = {{"fault", false}, {"accept", true}};
+
+template <class T>
+auto of_bus(T Bus::* member) {
+    return [member](BusTarget& to) -> T& { return to.bus.*member; };
+}
+template <class T>
+auto of_setup(T master::Setup::* member) {
+    return [member](BusTarget& to) -> T& { return to.bus.setup.*member; };
+}
+
+bool read_gateway_key(BusTarget& to, const Line& line) {
+    if (!read_gateway(line.value.text, to.bus)) return false;
+    if (!to.bus.gateway.empty() && !to.bus.gateway.starts_with("127.")) {
+        to.report.warning(Topic::value, line.value.at,
+                          "programs on other computers can read and write the objects of the "
+                          "slaves through the gateway",
+                          "its protocol has no password; write 127.0.0.1 to allow only programs on "
+                          "this computer");
+    }
+    return true;
+}
+
+bool read_switch_key(BusTarget& to, const Line& line) { return read_eoe_switch(to.bus, line); }
+
+const bus::KeyTable<BusTarget>& bus_keys() {
+    using S = master::Setup;
+    static const bus::KeyTable<BusTarget> table{{
+        {"link", bus::text_value(of_bus(&Bus::link), "ADDRESS"), "`sim:ethercat`",
+         "address of the link: `eth:enp3s0`, `sim:NAME` or `udp:HOST`; see [the "
+         "addresses](ethernet.md#raw-ethernet)"},
+        {"backup", bus::text_value(of_bus(&Bus::backup), "ADDRESS"), "none",
+         "address of a second link, which closes a ring; a broken cable then costs no cycle"},
+        {"cycle", bus::time(of_setup(&S::cycle_ns), 10 * us, second), "`1ms`",
+         "cycle time, which is the period of the thread that runs the functions of the master. "
+         "`loadrt ethercat cycle=250000` (in ns) overrides it"},
+        {"clock", bus::choice(of_setup(&S::lead), clocks), "`reference`",
+         "`reference`: the threads follow the reference clock. `thread`: the reference clock "
+         "follows the thread. `none`: neither follows the other; only the clocks of the slaves "
+         "agree with each other"},
+        {"reference", "the name of a slave", "first slave with a 64-bit clock",
+         "name of the slave with the reference clock"},
+        {"frame-timeout", bus::time(of_setup(&S::frame_timeout_ns), 10 * us, second), "next cycle",
+         "time after which a frame counts as lost. Requests to slaves wait for 2 ms, for two "
+         "cycles "
+         "or for this time, whichever is longest"},
+        {"sync-window", bus::time(of_setup(&S::sync_window_ns), 10, second), "`1us`",
+         "clock deviation below which a slave counts as synchronised"},
+        {"dc-loss", bus::choice(of_setup(&S::dc_loss), losses), "`report`",
+         "reaction to a slave in OP whose clock deviates by more than `sync-window`, or by more "
+         "than "
+         "10 us if `sync-window` is smaller, for longer than `dc-loss-time`; see [Distributed "
+         "clocks](#distributed-clocks)"},
+        {"dc-loss-time", bus::time(of_setup(&S::dc_loss_ns), 1'000 * us, 60 * second), "`500ms`",
+         "duration for which a clock may deviate. The deviation is checked every 100 ms"},
+        {"eoe-switch", bus::own(expected_eoe_switch, "an interface, an address", &read_switch_key),
+         "none",
+         "network interface of this computer that is shared by all slaves with `eoe`, as by a "
+         "switch. An address may follow the name: `eoe0 192.168.2.1/24`. Without this key, each of "
+         "these slaves has an interface of its own"},
+        {"gateway",
+         bus::own("none, or an IPv4 address and perhaps a port: 127.0.0.1:34980",
+                  "none, an address", &read_gateway_key),
+         "`none`",
+         "address of the mailbox gateway (ETG.8200), `127.0.0.1` or `127.0.0.1:34980`. While the "
+         "machine runs, other programs reach the mailboxes of the slaves at this address by UDP "
+         "and "
+         "TCP. The protocol has no password: with any other address, everyone in that network can "
+         "write the objects of the drives. `loadrt ethercat gateway=127.0.0.1` overrides this key"},
+        {"other-slaves", bus::choice(of_setup(&S::accept_other_slaves), others), "`fault`",
+         "reaction to slaves that the file does not name: `fault` reports a fault, `accept` does "
+         "not"},
+    }};
+    return table;
+}
+
+const bus::KeyTable<master::Domain>& domain_keys() {
+    static const bus::KeyTable<master::Domain> table{{
+        {"every", bus::number(&master::Domain::every, 1, 1000), "`1`",
+         "the process data is exchanged in every so many cycles"},
+    }};
+    return table;
+}
+
 class ConfigFile {
 public:
     ConfigFile(std::string_view text, const std::string& path, const ReadFile& read)
-        : sections_(split(text, report_)), descriptions_(read, path) {
+        : sections_(text, kinds, "[slave 0 NAME]", key_report_), descriptions_(read, path) {
         out_.buses.resize(1);
     }
 
     Reading read() {
-        for (Section& s : sections_) {
-            sort(s);
-        }
-        if (bus_ == nullptr) {
+        Section* const bus = sections_.one("bus");
+        if (bus == nullptr) {
             report_.error(Topic::line, {1, 1, 0, 0}, "missing section [bus]",
                           "write [bus] and below it link = eth:enp3s0 and cycle = 1ms");
         } else {
-            read_bus();
+            read_bus(*bus);
         }
-        for (Section* s : domains_) {
+        for (Section* s : sections_.all("domain")) {
             domain(*s);
         }
-        for (Section* s : slaves_) {
+        for (Section* s : sections_.all("slave")) {
             slave(*s);
         }
         if (reference_ != nullptr) {
             reference();
         }
-        for (const auto& [name, s] : types_) {
-            if (!used_types_.contains(name)) {
-                report_.warning(
-                    Topic::line, s->at, "unused type '" + name + "'",
-                    "write type = " + name + " below a [slave …], or delete the section");
-            }
-        }
-        if (slaves_.empty() && bus_ != nullptr) {
-            report_.error(Topic::line, bus_->at, "the configuration has no slave",
+        sections_.warn_unused_types("[slave …]");
+        if (sections_.all("slave").empty() && bus != nullptr) {
+            report_.error(Topic::line, bus->at, "the configuration has no slave",
                           "write [slave 0 NAME] and below it esi = FILE");
         }
         check_bus(out_.buses[0], report_);
@@ -58,141 +153,43 @@ public:
     }
 
 private:
-    void sort(Section& s) {
-        const std::string kind = s.words.empty() ? "" : lower(s.words[0].text);
-        const auto expect = [&](std::size_t words, const char* form) {
-            if (s.words.size() == words) return true;
-            report_.error(Topic::line, s.at, "invalid section name: expected " + std::string(form));
-            return false;
-        };
-        const auto once = [&](Section*& to, const char* form) {
-            if (!expect(1, form)) return;
-            if (to != nullptr) {
-                report_.error(Topic::line, s.at, "duplicate section " + std::string(form),
-                              "first in line " + std::to_string(to->at.line), "duplicate");
-            } else {
-                to = &s;
-            }
-        };
-        if (kind == "bus") {
-            once(bus_, "[bus]");
-        } else if (kind == "defaults") {
-            once(defaults_, "[defaults]");
-        } else if (kind == "type") {
-            if (expect(2, "[type NAME]") && !types_.emplace(s.words[1].text, &s).second) {
-                report_.error(Topic::line, s.words[1].at,
-                              "duplicate type '" + s.words[1].text + "'",
-                              "rename or delete one of them", "duplicate");
-            }
-        } else if (kind == "domain") {
-            if (expect(2, "[domain NAME]")) {
-                domains_.push_back(&s);
-            }
-        } else if (kind == "slave") {
-            slaves_.push_back(&s);
-        } else {
-            const std::string near =
-                did_you_mean(kind, {"bus", "defaults", "type", "domain", "slave"});
-            report_.error(Topic::line, s.at,
-                          "unknown section '" + (s.words.empty() ? "" : s.words[0].text) + "'",
-                          near.empty() ? "the sections are [bus], [defaults], [type NAME], [domain "
-                                         "NAME], [slave POSITION NAME]"
-                                       : near);
-        }
-    }
-
-    void unknown_keys(const Keys& keys, const char* where, const std::vector<std::string>& all) {
-        for (const Line* line : keys.all()) {
-            if (!line->used) {
-                report_.error(Topic::line, line->key.at,
-                              "unknown key '" + line->key.text + "' in " + where,
-                              suggestion(line->key.text, all, "the keys are"));
-            }
-        }
-    }
-
-    void read_bus() {
+    void read_bus(Section& section) {
         Bus& bus = out_.buses[0];
-        bus.at = bus_->at;
-        Keys keys(report_);
-        keys.take(*bus_);
-        keys.take_text("link", bus.link);
-        keys.take_text("backup", bus.backup);
-        bus.cycle_given = keys.take_time("cycle", bus.setup.cycle_ns, 10'000, 1'000'000'000);
-        if (Line* line = keys.find("clock")) {
-            if (same_word(line->value.text, "reference")) {
-                bus.setup.lead = master::ClockLead::reference;
-            } else if (same_word(line->value.text, "thread")) {
-                bus.setup.lead = master::ClockLead::thread;
-            } else if (same_word(line->value.text, "none")) {
-                bus.setup.lead = master::ClockLead::none;
-            } else {
-                keys.reject(*line, "reference, thread or none");
-            }
-        }
+        bus.at = section.at;
+        Keys keys(key_report_);
+        keys.add(section);
+        BusTarget target{bus, report_};
+        bus_keys().apply(keys, target, key_report_);
+        bus.cycle_given = keys.find("cycle") != nullptr;
         reference_ = keys.find("reference");
-        keys.take_time("frame-timeout", bus.setup.frame_timeout_ns, 10'000, 1'000'000'000);
-        keys.take_time("sync-window", bus.setup.sync_window_ns, 10, 1'000'000'000);
-        if (Line* line = keys.find("gateway")) {
-            if (!read_gateway(line->value.text, bus)) {
-                keys.reject(*line, "none, or an IPv4 address and perhaps a port: 127.0.0.1:34980");
-            } else if (!bus.gateway.empty() && !bus.gateway.starts_with("127.")) {
-                report_.warning(Topic::value, line->value.at,
-                                "programs on other computers can read and write the objects of the "
-                                "slaves through the gateway",
-                                "its protocol has no password; write 127.0.0.1 to allow only "
-                                "programs on this computer");
-            }
-        }
-        if (Line* line = keys.find("dc-loss")) {
-            if (same_word(line->value.text, "safeop")) {
-                bus.setup.dc_loss = master::DcLoss::safeop;
-            } else if (!same_word(line->value.text, "report")) {
-                keys.reject(*line, "report or safeop");
-            }
-        }
-        keys.take_time("dc-loss-time", bus.setup.dc_loss_ns, 1'000'000, 60'000'000'000);
-        read_eoe_switch(keys, bus);
-        if (Line* line = keys.find("other-slaves")) {
-            if (same_word(line->value.text, "accept")) {
-                bus.setup.accept_other_slaves = true;
-            } else if (!same_word(line->value.text, "fault")) {
-                keys.reject(*line, "fault or accept");
-            }
-        }
         if (!bus.backup.empty() && bus.backup == bus.link) {
             report_.error(Topic::value, keys.find("backup")->value.at,
                           "the backup is the link itself: '" + bus.link + "'",
                           "write the address of the second port, which closes the ring");
         }
-        unknown_keys(
-            keys, "[bus]",
-            {"link", "backup", "cycle", "clock", "reference", "frame-timeout", "sync-window",
-             "dc-loss", "dc-loss-time", "other-slaves", "gateway", "eoe-switch"});
+        keys.report_rest("in [bus]", bus_keys().names());
     }
 
     void domain(Section& s) {
         auto& domains = out_.buses[0].setup.domains;
         master::Domain d;
         d.name = s.words[1].text;
-        Keys keys(report_);
-        keys.take(s);
-        std::uint64_t every = 1;
-        keys.take_number("every", every, 1, 1000);
-        d.every = static_cast<unsigned>(every);
-        unknown_keys(keys, "[domain]", {"every"});
-        for (std::size_t i = 0; i < domains.size(); ++i) {
-            if (domains[i].name != d.name) continue;
-            if (i != 0 || default_given_) {
-                return report_.error(Topic::line, s.words[1].at,
-                                     "duplicate domain '" + d.name + "'",
-                                     "rename or delete one of them", "duplicate");
-            }
+        Keys keys(key_report_);
+        keys.add(s);
+        domain_keys().apply(keys, d, key_report_);
+        keys.report_rest("in [domain]", domain_keys().names());
+        const auto other =
+            std::find_if(domains.begin(), domains.end(),
+                         [&](const master::Domain& one) { return one.name == d.name; });
+        if (other == domains.end()) {
+            domains.push_back(std::move(d));
+        } else if (other != domains.begin() || default_given_) {
+            report_.error(Topic::line, s.words[1].at, "duplicate domain '" + d.name + "'",
+                          "rename or delete one of them", "duplicate");
+        } else {
             default_given_ = true;
             domains[0] = d;
-            return;
         }
-        domains.push_back(std::move(d));
     }
 
     void slave(Section& s) {
@@ -201,66 +198,46 @@ private:
         SlaveInfo info;
         info.at = s.at;
         slave.line = s.at.line;
+        if (!read_header(s, slave)) return;
+        Keys keys(key_report_);
+        if (!sections_.add_keys(s, keys)) return;
+        read_slave({keys, report_, descriptions_, bus, slave, info});
+        bus.setup.slaves.push_back(std::move(slave));
+        bus.slaves.push_back(std::move(info));
+    }
+
+    /// Reads [slave 0 NAME], [slave alias=5 NAME] or [slave id=5 NAME].
+    bool read_header(const Section& s, master::Slave& slave) {
         const Word where = s.words.size() >= 2 ? s.words[1] : Word{"", s.at};
         const std::size_t equals = where.text.find('=');
-        const std::string by = equals == std::string::npos
-                                   ? ""
-                                   : lower(std::string_view(where.text).substr(0, equals));
-        const auto number = parse_natural(equals == std::string::npos
-                                              ? std::string_view(where.text)
-                                              : std::string_view(where.text).substr(equals + 1));
-        if (!number || *number > 65535 || s.words.size() > 3 ||
-            (!by.empty() && by != "alias" && by != "id")) {
-            return report_.error(
-                Topic::line, where.at,
-                "invalid slave section: expected a position of 0..65535 and a name",
-                "write [slave 0 NAME], [slave alias=5 NAME] or [slave id=5 NAME]");
+        const bool has_kind = equals != std::string::npos;
+        const std::string kind = has_kind ? lower(where.text.substr(0, equals)) : "";
+        const auto number = parse_natural(has_kind ? where.text.substr(equals + 1) : where.text);
+        const bool is_known = !has_kind || kind == "alias" || kind == "id";
+        if (!number || *number > 65535 || s.words.size() > 3 || !is_known) {
+            report_.error(Topic::line, where.at,
+                          "invalid slave section: expected a position of 0..65535 and a name",
+                          "write [slave 0 NAME], [slave alias=5 NAME] or [slave id=5 NAME]");
+            return false;
         }
         const auto value = static_cast<std::uint16_t>(*number);
-        if (by == "alias" && value == 0) {
-            return report_.error(Topic::line, where.at, "alias 0 means that a slave has none",
-                                 "write its position, as in [slave 0 NAME]");
+        if (kind == "alias" && value == 0) {
+            report_.error(Topic::line, where.at, "alias 0 means that a slave has none",
+                          "write its position, as in [slave 0 NAME]");
+            return false;
         }
-        if (by == "alias") {
+        if (kind == "alias") {
             slave.identity.alias = value;
-        } else if (by == "id") {
+        } else if (kind == "id") {
             slave.identity.device_id = value;
         } else {
             slave.position = value;
         }
-        slave.name = s.words.size() == 3
-                         ? dashed(s.words[2].text)
-                         : (by.empty() ? "slave" : by) + "-" + std::to_string(*number);
-        Keys keys(report_);
-        if (defaults_ != nullptr) {
-            keys.take(*defaults_);
+        slave.name = (has_kind ? kind : "slave") + "-" + std::to_string(*number);
+        if (s.words.size() == 3) {
+            slave.name = dashed(s.words[2].text);
         }
-        std::string type;
-        for (Line& line : s.lines) {
-            if (line.key.text == "type") {
-                type = line.value.text;
-                const auto at = types_.find(type);
-                if (at != types_.end()) {
-                    used_types_.insert(type);
-                    keys.take(*at->second);
-                    continue;
-                }
-                std::vector<std::string> names;
-                for (const auto& t : types_) {
-                    names.push_back(t.first);
-                }
-                const std::string near = did_you_mean(type, names);
-                report_.error(Topic::line, line.value.at, "unknown type '" + type + "'",
-                              !near.empty()   ? near
-                              : names.empty() ? "write [type " + type + "]"
-                                              : "the types are: " + listed(names));
-                return;
-            }
-        }
-        keys.take(s);
-        read_slave({keys, descriptions_, bus, slave, info});
-        bus.setup.slaves.push_back(std::move(slave));
-        bus.slaves.push_back(std::move(info));
+        return true;
     }
 
     void reference() {
@@ -280,18 +257,17 @@ private:
     }
 
     Report report_;
-    std::vector<Section> sections_;
+    bus::TopicReport<Topic> key_report_{report_};
+    bus::SectionFile sections_;
     Descriptions descriptions_;
-    Section *bus_ = nullptr, *defaults_ = nullptr;
-    std::map<std::string, Section*> types_;
-    std::set<std::string> used_types_;
-    std::vector<Section*> slaves_, domains_;
     const Line* reference_ = nullptr;
     bool default_given_ = false;
     Reading out_;
 };
 
 }  // namespace
+
+std::string bus_reference() { return bus_keys().reference(); }
 
 const PinInfo* SlaveInfo::find(std::string_view pin) const {
     for (const auto& [name, about] : pins) {
@@ -303,40 +279,40 @@ const PinInfo* SlaveInfo::find(std::string_view pin) const {
 const esi::File* Descriptions::get(const Word& file, Report& report) {
     auto [at, fresh] = known_.try_emplace(file.text);
     if (fresh) {
-        std::string bytes;
-        const std::string path = file.text.starts_with('/') ? file.text : folder_ + file.text;
-        if (!read_(path, bytes)) {
-            report.error(Topic::value, file.at, "cannot read '" + path + "': " + bytes,
-                         "write the path of an ESI file, relative to this file");
-        } else {
-            esi::File read = esi::read(bytes);
-            for (const esi::Message& m : read.messages) {
-                if (m.severity == Severity::error) {
-                    report.error(
-                        Topic::value, file.at,
-                        "'" + path + "', line " + std::to_string(m.at.line) + ": " + m.sentence,
-                        m.help);
-                }
-            }
-            const auto warnings = std::count_if(
-                read.messages.begin(), read.messages.end(),
-                [](const esi::Message& m) { return m.severity == Severity::warning; });
-            if (read.good() && warnings != 0) {
-                const esi::Message& first = read.messages.front();
-                std::string sentence =
-                    "'" + path + "', line " + std::to_string(first.at.line) + ": " + first.sentence;
-                if (warnings > 1) {
-                    sentence += ", and " + std::to_string(warnings - 1) + " more";
-                }
-                report.warning(Topic::value, file.at, std::move(sentence),
-                               "correct the description where the master uses it");
-            }
-            if (read.good()) {
-                at->second = std::move(read);
-            }
-        }
+        at->second = read(file, report);
     }
     return at->second ? &*at->second : nullptr;
+}
+
+std::optional<esi::File> Descriptions::read(const Word& file, Report& report) {
+    std::string bytes;
+    const std::string path = file.text.starts_with('/') ? file.text : folder_ + file.text;
+    if (!read_(path, bytes)) {
+        report.error(Topic::value, file.at, "cannot read '" + path + "': " + bytes,
+                     "write the path of an ESI file, relative to this file");
+        return std::nullopt;
+    }
+    esi::File description = esi::read(bytes);
+    const auto sentence_of = [&](const esi::Message& m) {
+        return "'" + path + "', line " + std::to_string(m.at.line) + ": " + m.sentence;
+    };
+    std::size_t warnings = 0;
+    for (const esi::Message& m : description.messages) {
+        if (m.severity == Severity::error) {
+            report.error(Topic::value, file.at, sentence_of(m), m.help);
+        }
+        warnings += m.severity == Severity::warning;
+    }
+    if (!description.good()) return std::nullopt;
+    if (warnings != 0) {
+        std::string sentence = sentence_of(description.messages.front());
+        if (warnings > 1) {
+            sentence += ", and " + std::to_string(warnings - 1) + " more";
+        }
+        report.warning(Topic::value, file.at, std::move(sentence),
+                       "correct the description where the master uses it");
+    }
+    return description;
 }
 
 namespace {

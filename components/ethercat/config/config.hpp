@@ -95,6 +95,13 @@ bool read_from_disk(const std::string& path, std::string& bytes);
 /// start at the folder of `path`.
 Reading read(std::string_view text, const std::string& path, const ReadFile& = read_from_disk);
 
+/// Return the keys of [bus], of a slave, of its clocks and of its objects, as tables in Markdown.
+std::string bus_reference();
+std::string slave_reference();
+std::string process_data_reference();
+std::string clock_reference();
+std::string object_reference();
+
 /// Sets the mailbox gateway of a bus: "none", ADDRESS or ADDRESS:PORT. Returns false for anything
 /// else.
 bool read_gateway(std::string_view text, Bus&);

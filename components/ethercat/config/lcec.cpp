@@ -500,7 +500,7 @@ private:
                 error(Topic::slave, node, "duplicate pin '" + pin + "' of this slave",
                       "choose another halPin");
             }
-            info_.pins.push_back({pin, {"", address_text(e.index, e.sub)}});
+            info_.pins.push_back({pin, {"", object_text(e.index, e.sub)}});
             return void(to.entries.push_back(std::move(e)));
         }
         for (unsigned i = 0; i < bits; ++i) {
@@ -510,7 +510,7 @@ private:
             if (i < 32) {
                 bit.name = pin + "-" + std::to_string(i);
 
-                info_.pins.push_back({bit.name, {"", address_text(e.index, e.sub)}});
+                info_.pins.push_back({bit.name, {"", object_text(e.index, e.sub)}});
             }
             if (i < 32 && !pins_.insert(bit.name).second) {
                 error(Topic::slave, node, "duplicate pin '" + bit.name + "' of this slave",

@@ -163,7 +163,7 @@ private:
         }
         for (const auto& made : list) {
             if (!made.name.empty()) {
-                info_.pins.push_back({made.name, {"", address_text(made.index, made.sub)}});
+                info_.pins.push_back({made.name, {"", object_text(made.index, made.sub)}});
             }
         }
         return list;

@@ -3,6 +3,7 @@
 // are left.
 #include <set>
 
+#include "bus/config/object_address.hpp"
 #include "ethercat/config/config.hpp"
 
 namespace hal::ethercat::config {
@@ -123,8 +124,7 @@ private:
 }  // namespace
 
 std::string pin_line(const Entry& e, bool output, const std::string& slave) {
-    char object[16];
-    std::snprintf(object, sizeof object, "%04X:%X", e.index + 0U, e.sub + 0U);
+    const std::string object = bus::object_text(e.index, e.sub).substr(2);
     return padded(output ? "in" : "out", 4) + padded(type_of_pin(e), 6) + slave + "." + e.name +
            "  " + object + "\n";
 }

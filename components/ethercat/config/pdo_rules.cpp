@@ -64,7 +64,7 @@ std::string too_long(const esi::Device& device, const std::string& type,
 
 }  // namespace
 
-std::string pdo_text(std::uint16_t index) { return address_text(index, 0).substr(0, 4); }
+std::string pdo_text(std::uint16_t index) { return bus::index_text(index).substr(2); }
 
 bool exclude_each_other(const esi::Pdo& a, const esi::Pdo& b) {
     return names(a, b.index) || names(b, a.index);

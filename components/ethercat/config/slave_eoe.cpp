@@ -18,8 +18,6 @@ constexpr const char* expected =
     "yes, dhcp, or an address with its prefix, as in 192.168.2.10/24; gateway ADDRESS, dns "
     "ADDRESS, mac ADDRESS, interface NAME and host "
     "ADDRESS may follow";
-constexpr const char* expected_switch =
-    "an interface name and perhaps an address with its prefix, as in eoe0 192.168.2.1/24";
 
 std::optional<std::uint32_t> ip_address(const std::string& text) {
     in_addr parsed{};
@@ -152,67 +150,84 @@ void read_eoe(SlaveInput in) {
     EoeReader(in, *line).read();
 }
 
-void read_eoe_switch(Keys& keys, Bus& bus) {
-    const Line* line = keys.find("eoe-switch");
-    if (line == nullptr) return;
-    const auto words = words_of(line->value);
-    if (words.empty() || words.size() > 2 || !is_interface(words[0].text)) {
-        return keys.reject(*line, expected_switch);
-    }
+const char* const expected_eoe_switch =
+    "an interface name and perhaps an address with its prefix, as in eoe0 192.168.2.1/24";
+
+bool read_eoe_switch(Bus& bus, const Line& line) {
+    const auto words = words_of(line.value);
+    if (words.empty() || words.size() > 2 || !is_interface(words[0].text)) return false;
     bus.eoe_switch.name = words[0].text;
-    if (words.size() == 1) return;
+    if (words.size() == 1) return true;
     const auto network = ip_network(words[1].text);
-    if (!network) return keys.reject(*line, expected_switch);
+    if (!network) return false;
     bus.eoe_switch.ip = network->first;
     bus.eoe_switch.prefix = network->second;
+    return true;
 }
 
+namespace {
+
+/// Completes the interface of a slave, and checks that it is one.
+void complete_eoe(Bus& bus, std::size_t n, Report& report) {
+    master::Slave& slave = bus.setup.slaves[n];
+    HostInterface& host = bus.slaves[n].eoe;
+    const Span at = bus.slaves[n].at;
+    const bool switched = !bus.eoe_switch.name.empty();
+    if (switched && (!host.name.empty() || host.ip != 0)) {
+        report.error(Topic::slave, at,
+                     "`interface` and `host` of '" + slave.name +
+                         "' do not apply: all slaves are at " + bus.eoe_switch.name,
+                     "delete them from `eoe`, or delete `eoe-switch` in [bus]");
+    }
+    if (!switched && host.name.empty()) {
+        host.name = "eoe-" + slave.name;
+        if (!is_interface(host.name)) {
+            report.error(
+                Topic::slave, at,
+                "'" + host.name +
+                    "' is too long for the name of an interface: at most 15 characters",
+                "write a shorter one at the end of `eoe`: interface eoe" + std::to_string(n));
+        }
+    }
+    if (auto& ip = slave.eoe_ip; ip && ip->mac == std::array<std::uint8_t, 6>{}) {
+        ip->mac = usual_mac(bus, n);
+    }
+}
+
+/// Reports what slave `n` has in common with the earlier slave `m`.
+void compare_eoe(const Bus& bus, std::size_t n, std::size_t m, Report& report) {
+    const std::string first = "first in line " + std::to_string(bus.slaves[m].at.line);
+    const auto duplicate = [&](const std::string& what, const std::string& more = {}) {
+        report.error(Topic::slave, bus.slaves[n].at, "duplicate " + what, first + more,
+                     "duplicate");
+    };
+    const std::string& name = bus.slaves[n].eoe.name;
+    if (bus.eoe_switch.name.empty() && name == bus.slaves[m].eoe.name) {
+        duplicate("interface '" + name + "'",
+                  "; for one interface of all, write eoe-switch = " + name + " in [bus]");
+    }
+    const auto& a = bus.setup.slaves[n].eoe_ip;
+    const auto& b = bus.setup.slaves[m].eoe_ip;
+    if (a && b && a->address != 0 && a->address == b->address) {
+        duplicate("IP address " + ip_text(a->address));
+    }
+    if (a && b && a->mac == b->mac) {
+        duplicate("MAC address " + ethernet::to_string(a->mac));
+    }
+}
+
+}  // namespace
+
 void check_eoe(Bus& bus, Report& report) {
-    auto& slaves = bus.setup.slaves;
+    const auto& slaves = bus.setup.slaves;
     bool any = false;
     for (std::size_t n = 0; n < slaves.size(); ++n) {
         if (!slaves[n].eoe) continue;
         any = true;
-        const Span at = bus.slaves[n].at;
-        auto& host = bus.slaves[n].eoe;
-        const bool switched = !bus.eoe_switch.name.empty();
-        if (switched && (!host.name.empty() || host.ip != 0)) {
-            report.error(Topic::slave, at,
-                         "`interface` and `host` of '" + slaves[n].name +
-                             "' do not apply: all slaves are at " + bus.eoe_switch.name,
-                         "delete them from `eoe`, or delete `eoe-switch` in [bus]");
-        }
-        if (!switched && host.name.empty()) {
-            host.name = "eoe-" + slaves[n].name;
-            if (!is_interface(host.name)) {
-                report.error(
-                    Topic::slave, at,
-                    "'" + host.name +
-                        "' is too long for the name of an interface: at most 15 characters",
-                    "write a shorter one at the end of `eoe`: interface eoe" + std::to_string(n));
-            }
-        }
-        if (auto& ip = slaves[n].eoe_ip; ip && ip->mac == std::array<std::uint8_t, 6>{}) {
-            ip->mac = usual_mac(bus, n);
-        }
+        complete_eoe(bus, n, report);
         for (std::size_t m = 0; m < n; ++m) {
-            if (!slaves[m].eoe) continue;
-            const std::string first = "first in line " + std::to_string(bus.slaves[m].at.line);
-            if (!switched && host.name == bus.slaves[m].eoe.name) {
-                report.error(Topic::slave, at, "duplicate interface '" + host.name + "'",
-                             first + "; for one interface of all, write eoe-switch = " + host.name +
-                                 " in [bus]",
-                             "duplicate");
-            }
-            const auto &a = slaves[n].eoe_ip, &b = slaves[m].eoe_ip;
-            if (a && b && a->address != 0 && a->address == b->address) {
-                report.error(Topic::slave, at, "duplicate IP address " + ip_text(a->address), first,
-                             "duplicate");
-            }
-            if (a && b && a->mac == b->mac) {
-                report.error(Topic::slave, at,
-                             "duplicate MAC address " + ethernet::to_string(a->mac), first,
-                             "duplicate");
+            if (slaves[m].eoe) {
+                compare_eoe(bus, n, m, report);
             }
         }
     }

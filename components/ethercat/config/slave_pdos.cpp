@@ -2,51 +2,64 @@
 #include "ethercat/config/slave_pdos.hpp"
 
 #include <algorithm>
+#include <iterator>
 
+#include "ethercat/config/pdo_mapping.hpp"
 #include "ethercat/config/pdo_rules.hpp"
+#include "ethercat/config/slave_pins.hpp"
 
 namespace hal::ethercat::config {
 
 using master::Type;
 
+namespace {
+
+/// Returns an object of the dictionary in a description; bits 0: it has none.
+Known dictionary_object(const esi::Device& device, std::uint16_t index, std::uint8_t sub) {
+    const esi::Object* object = device.find(index);
+    const esi::Value* value = object != nullptr ? object->find(sub) : nullptr;
+    if (value == nullptr || value->bits == 0) return {};
+    std::string name = object->name;
+    if (object->values.size() > 1) {
+        const bool nameless = value->name.empty() || value->name.starts_with("SubIndex");
+        name += " " + (nameless ? std::to_string(sub) : value->name);
+    }
+    return {dashed(name), described_type(value->type, value->bits), value->bits};
+}
+
+/// Returns an object that a PDO of a description maps; bits 0: none does.
+Known mapped_object(const std::vector<esi::Pdo>& pdos, std::uint16_t index, std::uint8_t sub) {
+    for (const esi::Pdo& p : pdos) {
+        for (const esi::Entry& e : p.entries) {
+            if (e.index == index && e.sub == sub) {
+                return {dashed(e.name), described_type(e.type, e.bits), e.bits};
+            }
+        }
+    }
+    return {};
+}
+
+/// Returns the pin of an object without a name: "2000-0a", in hexadecimal.
+std::string unnamed_pin(const ObjectAddress& address) {
+    const std::string sub = bus::hex_text(address.sub, 2).substr(2);
+    return lower(bus::index_text(address.index).substr(2) + "-" + sub);
+}
+
+bool is_pdo(std::uint16_t index) {
+    return (index >= 0x1600 && index <= 0x17ff) || (index >= 0x1a00 && index <= 0x1bff);
+}
+
+}  // namespace
+
 Known SlavePdos::known(std::uint16_t index, std::uint8_t sub) const {
-    if (device_ != nullptr) {
-        if (const esi::Object* o = device_->find(index)) {
-            if (const esi::Value* v = o->find(sub); v != nullptr && v->bits != 0) {
-                const TypeWord* type = type_named(v->type);
-                std::string name = o->name;
-                if (o->values.size() > 1) {
-                    name += v->name.empty() || v->name.starts_with("SubIndex")
-                                ? " " + std::to_string(sub)
-                                : " " + v->name;
-                }
-                return {dashed(name),
-                        type != nullptr ? type->type : type_of(v->bits, v->type.starts_with("INT")),
-                        v->bits};
-            }
-        }
-        for (const auto* pdos : {&device_->rx, &device_->tx}) {
-            for (const esi::Pdo& p : *pdos) {
-                for (const esi::Entry& e : p.entries) {
-                    if (e.index == index && e.sub == sub) {
-                        const TypeWord* type = type_named(e.type);
-                        return {dashed(e.name),
-                                type != nullptr && type->bits == e.bits
-                                    ? type->type
-                                    : type_of(e.bits, e.type.starts_with("INT")),
-                                e.bits};
-                    }
-                }
-            }
-        }
+    if (device_ == nullptr) return profile_object(index, sub, std::max(in_.info.cia402_axes, 1U));
+    if (const Known found = dictionary_object(*device_, index, sub); found.bits != 0) return found;
+    for (const auto* pdos : {&device_->rx, &device_->tx}) {
+        if (const Known found = mapped_object(*pdos, index, sub); found.bits != 0) return found;
     }
     // a description with a dictionary has all objects
-    if (device_ != nullptr && !device_->objects.empty()) {
-        return {};
-    }
-    return profile_object(
-        index, sub,
-        device_ != nullptr && in_.info.cia402_axes == 0 ? 0 : std::max(in_.info.cia402_axes, 1U));
+    if (!device_->objects.empty()) return {};
+    return profile_object(index, sub, in_.info.cia402_axes);
 }
 
 const std::vector<esi::Pdo>& SlavePdos::described(bool output) const {
@@ -59,99 +72,136 @@ const std::vector<esi::Pdo>& SlavePdos::described(bool output) const {
 void SlavePdos::read() {
     direction(true);
     direction(false);
-    name_pins();
-    pin_options();
+    SlavePins(in_).read();
 }
 
-void SlavePdos::direction(bool output) {
-    const std::string key = output ? "outputs" : "inputs";
-    Keys& keys = in_.keys;
-    const std::size_t before = keys.report().all.size();
-    master::SyncManager sm;
-    sm.output = output;
-    std::uint64_t number = output ? 2 : 3;
-    const sii::SmType type = output ? sii::SmType::outputs : sii::SmType::inputs;
+namespace {
+
+/// The keys of a direction, which begin with `outputs` or `inputs`.
+constexpr bus::Choice<bool> orders[] = {{"assignment-first", true}, {"mapping-first", false}};
+
+const bus::KeyTable<master::SyncManager>& process_data_keys() {
+    using S = master::SyncManager;
+    static const bus::KeyTable<master::SyncManager> table{{
+        {"outputs", "objects, PDOs, default, none", "`default`",
+         "the process data: objects in the order of the PDO, or PDOs of the ESI as in `1600 1602`. "
+         "`default`: the PDOs that the ESI assigns. `none`: no process data"},
+        {"inputs", "objects, PDOs, default, none", "`default`", "the same for inputs"},
+        {"outputs.pdo", "an index", "the first PDO that is not fixed",
+         "PDO that receives the mapping; also `inputs.pdo`"},
+        {"outputs.sync-manager", "0..15", "from the ESI; otherwise 2, 3",
+         "number of the sync manager; also `inputs.sync-manager`"},
+        {"outputs.watchdog", bus::flag(&S::watchdog), "from the ESI; otherwise `yes`",
+         "`yes`: the outputs trigger the watchdog"},
+        {"pdo-order", bus::choice(&S::assignment_first, orders), "`assignment-first`",
+         "order in which the master writes the assignment and the mapping; `mapping-first` is for "
+         "slaves that accept only this order"},
+    }};
+    return table;
+}
+
+}  // namespace
+
+std::string process_data_reference() { return process_data_keys().reference(); }
+
+std::vector<std::string> SlavePdos::key_names() { return process_data_keys().names(); }
+
+std::uint8_t SlavePdos::manager_number(bool output) {
+    std::uint8_t number = output ? 2 : 3;
     if (device_ != nullptr) {
+        const sii::SmType type = output ? sii::SmType::outputs : sii::SmType::inputs;
         const auto& list = device_->sync_managers;
         const auto at = std::find_if(list.begin(), list.end(),
                                      [&](const esi::SyncManager& s) { return s.type == type; });
         if (at != list.end()) {
-            number = static_cast<std::uint64_t>(at - list.begin());
+            number = static_cast<std::uint8_t>(at - list.begin());
         }
     }
-    keys.take_number((key + ".sync-manager").c_str(), number, 0, 15);
-    sm.number = static_cast<std::uint8_t>(number);
-    if (device_ != nullptr && number < device_->sync_managers.size()) {
-        const esi::SyncManager& s = device_->sync_managers[number];
+    const auto get = [&](SlaveInput&) -> std::uint8_t& { return number; };
+    const std::string key = output ? "outputs.sync-manager" : "inputs.sync-manager";
+    in_.keys.read(key, bus::number(get, 0, 15), in_);
+    return number;
+}
+
+/// Returns a sync manager without PDOs, as the description and the keys have it.
+master::SyncManager SlavePdos::manager(bool output) {
+    master::SyncManager sm;
+    sm.output = output;
+    sm.number = manager_number(output);
+    const bool has_coe = device_ != nullptr && device_->mailbox && device_->mailbox->coe;
+    if (device_ != nullptr && sm.number < device_->sync_managers.size()) {
+        const esi::SyncManager& s = device_->sync_managers[sm.number];
         sm.start = s.start;
         sm.control = s.control;
         sm.watchdog = (s.control & 0x40) != 0;
-        sm.write_assignment =
-            device_->mailbox && device_->mailbox->coe && device_->mailbox->pdo_assign;
+        sm.write_assignment = has_coe && device_->mailbox->pdo_assign;
     } else {
-        sm.write_assignment = device_ == nullptr || (device_->mailbox && device_->mailbox->coe);
+        sm.write_assignment = device_ == nullptr || has_coe;
     }
     if (output) {
-        keys.take_flag("outputs.watchdog", sm.watchdog);
-    }
-    if (output && !sm.watchdog && sm.control != 0) {
-        sm.control &= static_cast<std::uint8_t>(~0x40U);
-    }
-    keys.find(key + ".pdo");
-    if (Line* line = keys.find("pdo-order")) {
-        if (same_word(line->value.text, "mapping-first")) {
-            sm.assignment_first = false;
-        } else if (!same_word(line->value.text, "assignment-first")) {
-            keys.reject(*line, "assignment-first or mapping-first");
+        in_.keys.read("outputs.watchdog", bus::flag(&master::SyncManager::watchdog), sm);
+        if (!sm.watchdog && sm.control != 0) {
+            sm.control &= static_cast<std::uint8_t>(~0x40U);
         }
     }
-    const Line* line = keys.find(key);
-    std::vector<master::SyncManager> more;  // of a default that uses several
+    in_.keys.read("pdo-order", bus::choice(&master::SyncManager::assignment_first, orders), sm);
+    return sm;
+}
+
+void SlavePdos::direction(bool output) {
+    const std::string key = output ? "outputs" : "inputs";
+    const std::size_t before = in_.report.all.size();
+    const Line* line = in_.keys.find(key);
+    in_.keys.find(key + ".pdo");
+    std::vector<master::SyncManager> managers{manager(output)};
     if (line != nullptr && !same_word(line->value.text, "default")) {
         if (!same_word(line->value.text, "none")) {
-            list(*line, sm);
+            list(*line, managers.front());
         }
     } else {
         if (line != nullptr && device_ == nullptr) {
-            keys.report().error(Topic::object, line->value.at,
-                                "'" + key + " = default' needs a description of the device",
-                                "write esi = FILE, or list the objects");
+            in_.report.error(Topic::object, line->value.at,
+                             "'" + key + " = default' needs a description of the device",
+                             "write esi = FILE, or list the objects");
         }
-        for (const esi::Pdo& p : described(output)) {
-            if (!p.sync_manager) continue;
-            if (*p.sync_manager == number) {
-                assign(p, sm);
-                continue;
-            }
-            auto at = std::find_if(more.begin(), more.end(),
-                                   [&](const auto& s) { return s.number == *p.sync_manager; });
-            if (at == more.end()) {
-                master::SyncManager other = sm;
-                other.pdos.clear();
-                other.number = *p.sync_manager;
-                other.start = 0;
+        assign_default(managers);
+    }
+    if (managers.front().pdos.empty()) {
+        managers.erase(managers.begin());
+    }
+    if (device_ != nullptr && in_.report.all.size() == before) {
+        check_pdos(*device_, in_.info.type, managers, output, key,
+                   line != nullptr ? line->value.at : in_.info.at, in_.report);
+    }
+    std::move(managers.begin(), managers.end(), std::back_inserter(in_.slave.sync_managers));
+}
 
-                other.control = 0;
-                if (other.number < device_->sync_managers.size()) {
-                    other.start = device_->sync_managers[other.number].start;
-
-                    other.control = device_->sync_managers[other.number].control;
-                }
-                at = more.insert(more.end(), other);
-            }
-            assign(p, *at);
+/// Assigns the PDOs of the description; those of further sync managers, to further ones.
+void SlavePdos::assign_default(std::vector<master::SyncManager>& managers) {
+    for (const esi::Pdo& p : described(managers.front().output)) {
+        if (!p.sync_manager) continue;
+        auto at = std::find_if(managers.begin(), managers.end(),
+                               [&](const auto& sm) { return sm.number == *p.sync_manager; });
+        if (at == managers.end()) {
+            at =
+                managers.insert(managers.end(), further_manager(managers.front(), *p.sync_manager));
         }
+        assign(p, *at);
     }
-    if (!sm.pdos.empty()) {
-        more.insert(more.begin(), std::move(sm));
+}
+
+master::SyncManager SlavePdos::further_manager(const master::SyncManager& first,
+                                               unsigned number) const {
+    master::SyncManager sm = first;
+    sm.pdos.clear();
+    sm.number = static_cast<std::uint8_t>(number);
+    sm.start = 0;
+    sm.control = 0;
+    if (number < device_->sync_managers.size()) {
+        sm.start = device_->sync_managers[number].start;
+        sm.control = device_->sync_managers[number].control;
     }
-    if (device_ != nullptr && keys.report().all.size() == before) {
-        check_pdos(*device_, in_.info.type, more, output, key,
-                   line != nullptr ? line->value.at : in_.info.at, keys.report());
-    }
-    for (auto& s : more) {
-        in_.slave.sync_managers.push_back(std::move(s));
-    }
+    return sm;
 }
 
 void SlavePdos::assign(const esi::Pdo& from, master::SyncManager& to) {
@@ -163,11 +213,7 @@ void SlavePdos::assign(const esi::Pdo& from, master::SyncManager& to) {
         entry.sub = e.sub;
         entry.bits = e.bits;
         if (e.index != 0) {
-            const TypeWord* type = type_named(e.type);
-            entry.type =
-                type != nullptr && type->bits == e.bits
-                    ? type->type
-                    : type_of(e.bits, e.type.starts_with("INT") || e.type.starts_with("DINT"));
+            entry.type = described_type(e.type, e.bits);
             entry.is_signed = is_signed(entry.type);
             entry.name = dashed(e.name);
             if (entry.name.empty()) {
@@ -182,359 +228,145 @@ void SlavePdos::assign(const esi::Pdo& from, master::SyncManager& to) {
     to.pdos.push_back(std::move(p));
 }
 
-void SlavePdos::list(const Line& line, master::SyncManager& sm) {
-    std::vector<master::Entry> entries;
-    const text::Word spaced = line.value;
-    // Objects are separated by commas or blanks; a type or a number of bits follows its object.
-    std::vector<Word> items;
-    for (const Word& word : words_of(spaced, ",")) {
-        const bool follows =
-            !items.empty() && (type_named(word.text) != nullptr ||
-                               (items.back().text == "gap" && parse_natural(word.text)));
+std::vector<SlavePdos::Item> SlavePdos::items_of(const Word& value) {
+    std::vector<Item> items;
+    for (const Word& word : words_of(value, ",")) {
+        const bool is_gap = !items.empty() && items.back().object.text == "gap";
+        const bool follows = !items.empty() && items.back().type.empty() &&
+                             (is_type(word.text) || (is_gap && parse_natural(word.text)));
         if (follows) {
-            items.back().text += " " + word.text;
+            items.back().type = word;
         } else {
-            items.push_back(word);
+            items.push_back({word, {}});
         }
     }
-    for (const Word& item : items) {
-        const auto at = address(item.text);
-        if (at && !at->has_sub &&
-            ((at->index >= 0x1600 && at->index <= 0x17ff) ||
-             (at->index >= 0x1a00 && at->index <= 0x1bff))) {
-            const auto& pdos = described(sm.output);
-            const auto found = std::find_if(
-                pdos.begin(), pdos.end(), [&](const esi::Pdo& p) { return p.index == at->index; });
-            if (found != pdos.end()) {
-                assign(*found, sm);
-                continue;
-            }
-            std::vector<std::string> names;
-            for (const esi::Pdo& p : pdos) {
-                names.push_back(address_text(p.index, 0).substr(0, 4));
-            }
-            in_.keys.report().error(Topic::object, item.at, "unknown PDO '" + item.text + "'",
-                                    device_ == nullptr ? "write esi = FILE, or list the objects"
-                                    : names.empty() ? "the description has none in this direction"
-                                                    : "the PDOs are: " + listed(names));
+    return items;
+}
+
+void SlavePdos::list(const Line& line, master::SyncManager& sm) {
+    std::vector<master::Entry> entries;
+    for (const Item& item : items_of(line.value)) {
+        if (item.object.text == "gap") {
+            add_gap(item, entries);
             continue;
         }
-        for (const Word& one : range(item)) {
-            master::Entry e;
-            if (!entry(one, sm, e)) break;
-            entries.push_back(std::move(e));
+        for (const ObjectAddress& address : addresses_of(item.object)) {
+            if (item.type.empty() && !address.has_sub && is_pdo(address.index)) {
+                assign(address.index, item.object, sm);
+            } else if (!add_entry(item, address, sm, entries)) {
+                break;
+            }
         }
     }
     if (!entries.empty()) {
-        place(line, sm, entries);
+        PdoMapping(in_, device_, limit_).place(line, sm, entries);
     }
 }
 
-std::vector<Word> SlavePdos::range(const Word& item) {
-    const std::size_t dots = item.text.find("..");
-    const std::size_t colon = item.text.rfind(':', dots);
-
-    const std::size_t blank = std::min(item.text.find(' '), item.text.size());
-    if (dots > blank || colon == std::string::npos) {
-        return {item};
+void SlavePdos::assign(std::uint16_t index, const Word& item, master::SyncManager& sm) {
+    const auto& pdos = described(sm.output);
+    const auto found =
+        std::find_if(pdos.begin(), pdos.end(), [&](const esi::Pdo& p) { return p.index == index; });
+    if (found != pdos.end()) return assign(*found, sm);
+    std::vector<std::string> names;
+    for (const esi::Pdo& p : pdos) {
+        names.push_back(pdo_text(p.index));
     }
-    const auto first = address(item.text.substr(0, dots));
+    std::string help = "the PDOs are: " + listed(names);
+    if (device_ == nullptr) {
+        help = "write esi = FILE, or list the objects";
+    } else if (names.empty()) {
+        help = "the description has none in this direction";
+    }
+    in_.report.error(Topic::object, item.at, "unknown PDO '" + item.text + "'", help);
+}
 
-    const auto last =
-        address(item.text.substr(0, colon + 1) + item.text.substr(dots + 2, blank - dots - 2));
-    if (!first || !last || first->sub > last->sub) {
-        in_.keys.report().error(
-            Topic::object, item.at, "invalid range '" + item.text.substr(0, blank) + "'",
-            "write the first and the last sub-index in hexadecimal, as in 6000:1..10 bit");
+std::vector<ObjectAddress> SlavePdos::addresses_of(const Word& item) {
+    Report& report = in_.report;
+    const std::size_t dots = item.text.find("..");
+    const std::size_t colon = item.text.find(':');
+    if (dots == item.text.npos || colon > dots) {
+        if (const auto one = parse_address(item, report)) return {*one};
+        report.error(Topic::value, item.at, "invalid object '" + item.text + "'",
+                     "write it in hexadecimal, as in 6040 or 60FE:1, or with its type: 2000:1 u16");
         return {};
     }
-    std::vector<Word> all;
+    const Word last_item{item.text.substr(0, colon + 1) + item.text.substr(dots + 2), item.at};
+    const auto first = parse_address(text::part(item, 0, dots), report);
+    const auto last = parse_address(last_item, report);
+    if (!first || !last || first->sub > last->sub) {
+        report.error(Topic::object, item.at, "invalid range '" + item.text + "'",
+                     "write the first and the last sub-index, as in 6000:1..8 bit");
+        return {};
+    }
+    std::vector<ObjectAddress> all;
     for (unsigned sub = first->sub; sub <= last->sub; ++sub) {
-        all.push_back(
-            {address_text(first->index, static_cast<std::uint8_t>(sub)) + item.text.substr(blank),
-             item.at});
+        all.push_back(*first);
+        all.back().sub = static_cast<std::uint8_t>(sub);
     }
     return all;
 }
 
-bool SlavePdos::entry(const Word& item, master::SyncManager& sm, master::Entry& e) {
-    Report& report = in_.keys.report();
-    const auto words = words_of(item);
-    if (words[0].text == "gap") {
-        const auto bits = words.size() == 2 ? parse_natural(words[1].text) : std::nullopt;
-        if (!bits || *bits < 1 || *bits > 255) {
-            report.error(Topic::value, item.at, "invalid gap",
+void SlavePdos::add_gap(const Item& item, std::vector<master::Entry>& entries) {
+    const auto bits = parse_natural(item.type.text);
+    if (!bits || *bits < 1 || *bits > 255) {
+        in_.report.error(Topic::value, item.object.at, "invalid gap",
                          "write gap 8 for 8 bits, at most 255");
-
-            return false;
-        }
-        e.bits = static_cast<std::uint16_t>(*bits);
-        return true;
+        return;
     }
-    const auto at = address(words[0].text);
-    if (!at) {
-        report.error(Topic::value, item.at, "invalid object '" + words[0].text + "'",
-                     "write it in hexadecimal, as in 6040 or 60FE:1, or with its type: 2000:1 u16");
+    master::Entry gap;
+    gap.bits = static_cast<std::uint16_t>(*bits);
+    entries.push_back(std::move(gap));
+}
 
-        return false;
-    }
-    e.index = at->index;
-    e.sub = at->sub;
-    Known k = known(at->index, at->sub);
-    if (words.size() > 1) {
-        const TypeWord* type = type_named(words[1].text);
+bool SlavePdos::is_mapped(const ObjectAddress& address, const master::SyncManager& sm) {
+    return std::any_of(sm.pdos.begin(), sm.pdos.end(), [&](const master::Pdo& p) {
+        return std::any_of(p.entries.begin(), p.entries.end(), [&](const master::Entry& e) {
+            return e.index == address.index && e.sub == address.sub;
+        });
+    });
+}
+
+bool SlavePdos::add_entry(const Item& item, const ObjectAddress& address,
+                          const master::SyncManager& sm, std::vector<master::Entry>& entries) {
+    Report& report = in_.report;
+    const Span at = item.object.at;
+    const std::string label = object_text(address.index, address.sub);
+    Known k = known(address.index, address.sub);
+    if (const auto type = parse_type(item.type, report)) {
         if (k.bits != 0 && k.bits != type->bits && device_ != nullptr) {
-            report.error(Topic::object, item.at,
-                         "object " + address_text(e.index, e.sub) + " of '" + in_.info.type +
-                             "' has " + std::to_string(k.bits) + " bits, not " +
-                             std::to_string(type->bits),
+            report.error(Topic::object, at,
+                         "object " + label + " of '" + in_.info.type + "' has " +
+                             std::to_string(k.bits) + " bits, not " + std::to_string(type->bits),
                          "leave out the type");
         }
         k.type = type->type;
         k.bits = type->bits;
     }
     if (k.bits == 0) {
-        const std::string label = address_text(e.index, e.sub);
-        report.error(Topic::object, item.at,
+        report.error(Topic::object, at,
                      device_ != nullptr ? "object " + label + " is not in the description of '" +
                                               in_.info.type + "'"
                                         : "object " + label + " has no known type",
-                     "write its type, as in " + words[0].text + " u16; the types are " +
-                         std::string(type_words));
-
+                     "write its type, as in " + item.object.text + " u16; the types are " +
+                         value_type_names);
         return false;
     }
-    for (const auto& p : sm.pdos) {
-        for (const auto& other : p.entries) {
-            if (other.index == e.index && other.sub == e.sub) {
-                report.error(Topic::object, item.at,
-                             "duplicate object " + address_text(e.index, e.sub),
-                             "delete one of them");
-
-                return false;
-            }
-        }
+    if (is_mapped(address, sm)) {
+        report.error(Topic::object, at, "duplicate object " + label, "delete one of them");
+        return false;
     }
+    master::Entry e;
+    e.index = address.index;
+    e.sub = address.sub;
     e.bits = static_cast<std::uint16_t>(std::min(k.bits, 65535U));
     e.type = k.type;
-
     e.is_signed = is_signed(k.type);
-    e.name = k.bits > 64 ? "" : k.name;
-    if (e.name.empty() && k.bits <= 64) {
-        e.name = lower(address_text(e.index, e.sub));
-        std::replace(e.name.begin(), e.name.end(), ':', '-');
+    if (k.bits <= 64) {
+        e.name = k.name.empty() ? unnamed_pin(address) : k.name;
     }
+    entries.push_back(std::move(e));
     return true;
-}
-
-void SlavePdos::place(const Line& line, master::SyncManager& sm,
-                      std::vector<master::Entry>& entries) {
-    Keys& keys = in_.keys;
-    const auto& pdos = described(sm.output);
-    for (const esi::Pdo& p : pdos) {  // exactly one of the description: nothing has to be written
-        const bool same = p.entries.size() == entries.size() &&
-                          std::equal(entries.begin(), entries.end(), p.entries.begin(),
-                                     [](const auto& a, const auto& b) {
-            return a.index == b.index && a.sub == b.sub && a.bits == b.bits;
-        });
-        if (same && sm.pdos.empty()) {
-            sm.pdos.push_back({p.index, std::move(entries), false});
-            return;
-        }
-    }
-    std::vector<std::string> names;
-    for (const esi::Pdo& p : pdos) {
-        names.push_back(pdo_text(p.index));
-    }
-    const std::string instead =
-        names.empty() ? "delete the line" : "delete the line, or assign PDOs: " + listed(names);
-    if (device_ != nullptr && !(device_->mailbox && device_->mailbox->coe)) {
-        return keys.report().error(Topic::object, line.value.at,
-                                   "the PDOs of '" + in_.info.type +
-                                       "' are fixed: it has no CoE mailbox to map objects with",
-                                   instead);
-    }
-    if (device_ != nullptr && !device_->mailbox->pdo_config) {
-        return keys.report().error(
-            Topic::object, line.value.at,
-            "the PDOs of '" + in_.info.type + "' are fixed: its description has no PdoConfig",
-            instead);
-    }
-    std::vector<std::uint16_t> free =
-        device_ != nullptr ? mappable(*device_, sm.output) : std::vector<std::uint16_t>{};
-    std::erase_if(free, [&](std::uint16_t f) {  // with PDOs that the line names
-        return std::any_of(sm.pdos.begin(), sm.pdos.end(), [&](const master::Pdo& p) {
-            const esi::Pdo *a = device_->find_pdo(p.index), *b = device_->find_pdo(f);
-            return p.index == f || (a != nullptr && b != nullptr && exclude_each_other(*a, *b));
-        });
-    });
-    if (!pdos.empty() && free.empty()) {
-        return keys.report().error(
-            Topic::object, line.value.at,
-            "all PDOs of '" + in_.info.type + "' in this direction are fixed",
-            "assign one of them, as in " + line.key.text + " = " + pdo_text(pdos[0].index));
-    }
-    const std::string key = line.key.text + ".pdo";
-    if (Line* chosen = keys.find(key)) {
-        const auto at = address(chosen->value.text);
-        if (!at || at->has_sub) return keys.reject(*chosen, "the index of a PDO, as in 1601");
-        if (device_ != nullptr && std::find(free.begin(), free.end(), at->index) == free.end()) {
-            return keys.report().error(
-                Topic::object, chosen->value.at,
-                "PDO " + pdo_text(at->index) + " of '" + in_.info.type + "' cannot be mapped",
-                "write " + key + " = " + pdo_text(free[0]) + ", or delete the line");
-        }
-        free.assign(1, at->index);
-    }
-    const auto first =
-        static_cast<std::uint16_t>(free.empty() ? (sm.output ? 0x1600 : 0x1a00) : free[0]);
-    const auto all = entries.size();
-    std::string taken;  // of the PDOs, for a message
-    for (std::size_t i = 0, used = 0; i < all; ++used) {
-        if (!pdos.empty() && used == free.size()) {
-            return keys.report().error(Topic::object, line.value.at,
-                                       counted(static_cast<unsigned>(all), "object") +
-                                           " do not fit in the PDOs of '" + in_.info.type +
-                                           "': " + taken,
-                                       "leave out " + std::to_string(all - i) + " of them" +
-                                           (limit_ != 0 ? ", or raise entries-per-pdo" : ""));
-        }
-        master::Pdo p;
-        p.index = used < free.size() ? free[used] : static_cast<std::uint16_t>(first + used);
-        p.write_mapping = true;
-        const std::uint64_t described_limit =
-            device_ != nullptr ? most_entries(*device_, p.index) : 0;
-        const std::uint64_t limit = limit_ == 0            ? described_limit
-                                    : described_limit == 0 ? limit_
-                                                           : std::min(limit_, described_limit);
-        for (; i < all && (limit == 0 || p.entries.size() < limit); ++i) {
-            p.entries.push_back(std::move(entries[i]));
-        }
-        taken +=
-            (taken.empty() ? "" : ", ") + pdo_text(p.index) + " takes " + std::to_string(limit);
-        sm.pdos.push_back(std::move(p));
-    }
-}
-
-void SlavePdos::name_pins() {
-    std::set<std::string> names;
-    for (auto& sm : in_.slave.sync_managers) {
-        for (auto& p : sm.pdos) {
-            for (auto& e : p.entries) {
-                if (e.name.empty()) continue;
-                std::string name = e.name;
-                if (names.contains(name) && !sm.output) {
-                    name += "-feedback";
-                }
-                for (unsigned n = 2; !names.insert(name).second; ++n) {
-                    name = e.name + "-" + std::to_string(n);
-                }
-                e.name = name;
-            }
-        }
-    }
-}
-
-void SlavePdos::pin_options() {
-    for (Line* line : in_.keys.all()) {
-        const std::size_t dot = line->key.text.rfind('.');
-        if (line->used || dot == std::string::npos || line->key.text.starts_with("sdo ")) continue;
-        line->used = true;
-        option(*line);
-    }
-    for (auto& sm : in_.slave.sync_managers) {
-        for (auto& p : sm.pdos) {
-            for (auto& e : p.entries) {
-                if (!e.name.empty() && in_.info.find(e.name) == nullptr) {
-                    in_.info.pins.push_back({e.name, {"", address_text(e.index, e.sub)}});
-                }
-            }
-        }
-    }
-}
-
-void SlavePdos::option(const Line& line) {
-    Report& report = in_.keys.report();
-    const std::size_t dot = line.key.text.rfind('.');
-    const std::string object = line.key.text.substr(0, dot);
-
-    const std::string property = line.key.text.substr(dot + 1);
-    const auto at = address(object);
-    master::Entry* entry = nullptr;
-    std::vector<std::string> names;
-    for (auto& sm : in_.slave.sync_managers) {
-        for (auto& p : sm.pdos) {
-            for (auto& e : p.entries) {
-                if (e.index != 0 && !e.name.empty()) {
-                    names.push_back(e.name);
-                }
-                if (e.index != 0 &&
-                    ((at && e.index == at->index && e.sub == at->sub) || e.name == object)) {
-                    entry = &e;
-                }
-            }
-        }
-    }
-    if (entry == nullptr) {
-        return report.error(Topic::object, line.key.at,
-                            "no PDO of this slave has an object '" + object + "'",
-                            suggestion(object, names, "the objects are"));
-    }
-    auto info = std::find_if(in_.info.pins.begin(), in_.info.pins.end(),
-                             [&](const auto& p) { return p.first == entry->name; });
-    if (info == in_.info.pins.end()) {
-        info =
-            in_.info.pins.insert(info, {entry->name, {"", address_text(entry->index, entry->sub)}});
-    }
-    const std::string& value = line.value.text;
-    const auto reject = [&](const std::string& instead) { in_.keys.reject(line, instead); };
-    // object = pin * scale + offset; the setup has the inverse
-    if (property == "scale" || property == "offset") {
-        const std::size_t slash = std::min(value.find('/'), value.size());
-        const auto over = parse_real(trimmed(std::string_view(value).substr(0, slash)));
-        const auto below = slash < value.size()
-                               ? parse_real(trimmed(std::string_view(value).substr(slash + 1)))
-                               : std::optional<double>(1.0);
-        if (!over || !below || *below == 0 || (property == "scale" && *over == 0)) {
-            return reject("a number other than 0, or a fraction such as 65536/360");
-        }
-        const double object_scale = property == "scale" ? *over / *below : 1 / entry->scale;
-        const double object_offset =
-            property == "offset" ? *over / *below : -entry->offset / entry->scale;
-        entry->scale = 1 / object_scale;
-        entry->offset = -object_offset / object_scale;
-
-        entry->scaled = true;
-    } else if (property == "name") {
-        const std::string name = dashed(value) == value ? value : "";
-        if (name.empty()) return reject("a name of lower-case letters, digits and dashes");
-        if (std::find(names.begin(), names.end(), name) != names.end() && name != entry->name) {
-            return report.error(Topic::slave, line.value.at, "duplicate pin name '" + name + "'",
-                                "choose another one");
-        }
-        entry->name = name;
-        info->first = name;
-    } else if (property == "unit") {
-        info->second.unit = value;
-        entry->scaled = true;
-    } else if (property == "type") {
-        if (same_word(value, "float")) {
-            entry->scaled = true;
-            return;
-        }
-        const TypeWord* type = type_named(value);
-        if (type == nullptr || type->bits < entry->bits ||
-            (type->type == Type::bit && entry->bits != 1)) {
-            return reject("float, or one of " + std::string(type_words) + " with at least " +
-                          counted(entry->bits, "bit"));
-        }
-        entry->type = type->type;
-        entry->is_signed = is_signed(type->type);
-    } else {
-        report.error(Topic::line, line.key.at, "unknown property '" + property + "' of an object",
-                     suggestion(property, {"scale", "offset", "name", "unit", "type"},
-                                "the properties are"));
-    }
 }
 
 }  // namespace hal::ethercat::config

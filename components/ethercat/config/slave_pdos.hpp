@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The process data of a slave in a `.ethercat` file: which objects are in which PDO, and what their
-// pins are. Everything here is [setup].
+// The process data of a slave in a `.ethercat` file: which objects and PDOs it has. Everything here is [setup].
 #pragma once
-
-#include <set>
 
 #include "ethercat/config/config_text.hpp"
 
@@ -24,21 +21,35 @@ public:
     SlavePdos(SlaveInput in, const esi::Device* device, std::uint64_t entries_per_pdo)
         : in_(in), device_(device), limit_(entries_per_pdo) {}
     void read();
+    /// Returns the keys of the process data, for messages.
+    static std::vector<std::string> key_names();
     /// Finds an object in the description, or else in the profile.
     Known known(std::uint16_t index, std::uint8_t sub) const;
 
 private:
+    std::uint8_t manager_number(bool output);
+    master::SyncManager manager(bool output);
+    master::SyncManager further_manager(const master::SyncManager& first, unsigned number) const;
     void direction(bool output);
+    void assign_default(std::vector<master::SyncManager>& managers);
+    /// An object, a range of them, a PDO or a gap, as `outputs` and `inputs` list them.
+    struct Item {
+        Word object;
+        Word type;  ///< or the bits of a gap; empty: none
+    };
+    /// Splits a list at commas or blanks; a type or a number of bits follows its object.
+    static std::vector<Item> items_of(const Word& value);
     void list(const Line&, master::SyncManager&);
-    /// `6000:1..10 bit` as single objects; an error: none
-    std::vector<Word> range(const Word&);
-    bool entry(const Word&, master::SyncManager&, master::Entry&);
-    void place(const Line&, master::SyncManager&, std::vector<master::Entry>&);
+    /// Returns the objects of `6040` or of `6000:1..8`; none after reporting an error.
+    std::vector<ObjectAddress> addresses_of(const Word& item);
+    void add_gap(const Item&, std::vector<master::Entry>&);
+    static bool is_mapped(const ObjectAddress&, const master::SyncManager&);
+    /// Adds an object. Returns false after reporting that it cannot be in a PDO.
+    bool add_entry(const Item&, const ObjectAddress&, const master::SyncManager&,
+                   std::vector<master::Entry>&);
+    void assign(std::uint16_t pdo, const Word& item, master::SyncManager&);
     const std::vector<esi::Pdo>& described(bool output) const;
     void assign(const esi::Pdo&, master::SyncManager&);
-    void name_pins();
-    void pin_options();
-    void option(const Line&);
 
     SlaveInput in_;
     const esi::Device* device_;

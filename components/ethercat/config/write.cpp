@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <set>
 
+#include "ethercat/config/pdo_rules.hpp"
 #include "ethercat/config/slave_pdos.hpp"
 
 namespace hal::ethercat::config {
@@ -62,8 +63,8 @@ public:
         if (known.bits == e.bits) return append(address(e.index, e.sub));
         if (range_ && e.index == last_.index && e.sub == last_.sub + 1 && word == word_) {
             last_ = e;
-            items_.back() = address(first_.index, first_.sub) + ".." +
-                            address(0, last_.sub).substr(5) + " " + word_;
+            items_.back() =
+                address(first_.index, first_.sub) + ".." + sub_text(last_.sub) + " " + word_;
             return;
         }
         append(address(e.index, e.sub) + " " + word);
@@ -80,16 +81,19 @@ public:
     }
 
 private:
+    /// Two digits would mean another sub-index to earlier versions.
+    static std::string sub_text(unsigned sub) {
+        return sub < 10 ? std::to_string(sub) : bus::hex_text(sub);
+    }
     static std::string address(std::uint16_t index, unsigned sub) {
-        char out[16];
-        std::snprintf(out, sizeof out, sub == 0 ? "%04X" : "%04X:%X", index + 0U, sub);
-        return out;
+        const std::string object = bus::index_text(index).substr(2);
+        return sub == 0 ? object : object + ":" + sub_text(sub);
     }
     /// Returns the type as it is written in the file; empty: one that has no pin.
     static std::string type_of(const sii::Entry& e) {
-        if (const TypeWord* type = type_named(sii::type_name(e.type));
-            type != nullptr && type->bits == e.bits) {
-            return type->word;
+        if (const bus::TypeName type = bus::parse_esi_type(sii::type_name(e.type));
+            type.name != nullptr && type.bits == e.bits) {
+            return type.name;
         }
         if (e.bits == 1) return "bit";
         return e.bits == 8 || e.bits == 16 || e.bits == 32 || e.bits == 64
@@ -128,7 +132,7 @@ std::string objects(const std::string& key, const std::vector<sii::Pdo>& pdos, u
         return {};
     }
     options += key + ".sync-manager = " + std::to_string(first->sync_manager) + "\n" + key +
-               ".pdo = " + address_text(first->index, 0).substr(0, 4) + "\n";
+               ".pdo = " + pdo_text(first->index) + "\n";
     return key + (key == "inputs" ? "  = " : " = ") + list.text() + "\n";
 }
 

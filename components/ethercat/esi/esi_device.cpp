@@ -114,7 +114,7 @@ std::string longer_entry(const Device& device, const Pdo& pdo) {
         const Value* value = e.index == 0 ? nullptr : device.find(e.index, e.sub);
         if (value == nullptr || value->bits == 0 || e.bits <= value->bits) continue;
         char text[96];
-        std::snprintf(text, sizeof text, "PDO %04X maps %u bits of object %04X:%X, which has %u",
+        std::snprintf(text, sizeof text, "PDO %04X maps %u bits of object %04X:%u, which has %u",
                       pdo.index, e.bits, e.index, e.sub, value->bits);
         return text;
     }

@@ -118,7 +118,7 @@ TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
               "below it esi = FILE");
     EXPECT_EQ(
         errors("[bus]\ncycle = 3\nclock = me\n[slave 0]\nesi = none.xml\n"),
-        "m.ethercat:2:9: error: invalid cycle '3'; write a time of 10us..1s, as in 1ms or 250us\n"
+        "m.ethercat:2:9: error: invalid cycle '3'; write a time of 10us..1s, as in 10ms or 0.5s\n"
         "m.ethercat:3:9: error: invalid clock 'me'; write reference, thread or none\n"
         "m.ethercat:5:7: error: cannot read 'none.xml': No such file or directory; write the path "
         "of an ESI file, relative to this file");
@@ -133,12 +133,12 @@ TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
               "SERVO-1, DIO-8");
     const std::string a = "[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = SERVO-1\n";
     EXPECT_EQ(errors(a + "outputs = 6040 6072\n"),
-              "m.ethercat:5:16: error: object 6072:00 is not in the description of 'SERVO-1'; "
+              "m.ethercat:5:16: error: object 0x6072:0 is not in the description of 'SERVO-1'; "
               "write its type, as in 6072 u16; the types "
               "are bit, u8, u16, u32, u64, "
-              "s8, s16, s32, s64, real32 or real64");
+              "s8, s16, s32, s64, f32 or f64");
     EXPECT_EQ(errors(a + "outputs = 6040 u32\n"),
-              "m.ethercat:5:11: error: object 6040:00 of 'SERVO-1' has 16 bits, not 32; leave out "
+              "m.ethercat:5:11: error: object 0x6040:0 of 'SERVO-1' has 16 bits, not 32; leave out "
               "the type");
     EXPECT_EQ(errors(a + "outputs = 1602\n"),
               "m.ethercat:5:11: error: unknown PDO '1602'; the PDOs are: 1600, 1601");
@@ -146,7 +146,7 @@ TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
               "m.ethercat:5:11: error: PDOs 1600 and 1601 of 'SERVO-1' exclude each other; assign "
               "only one of them");
     EXPECT_EQ(errors(a + "sdo 6060 = 200\n"),
-              "m.ethercat:5:12: error: invalid value '200' of object 6060:00; write a number of "
+              "m.ethercat:5:12: error: invalid value '200' of object 0x6060:0; write a number of "
               "-128..127, decimal or with 0x");
     EXPECT_EQ(errors(a + "607b.scale = 2\noutput = 6040\n"),
               "m.ethercat:5:1: error: no PDO of this slave has an object '607b'; the objects are: "
@@ -166,7 +166,7 @@ TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
               "the cycle");
     EXPECT_EQ(errors("[bus]\ncycle = 1ms\nsync-window = 1ns\n[slave alias=0 a]\ndevice = cia402\n"),
               "m.ethercat:3:15: error: invalid sync-window '1ns'; write a time of 10ns..1s, as in "
-              "1ms or 250us\n"
+              "10ms or 0.5s\n"
               "m.ethercat:4:8: error: alias 0 means that a slave has none; write its position, as "
               "in [slave 0 NAME]");
     EXPECT_EQ(errors("[bus]\n[domain slow]\nevery = 100\n[slave 0 a]\ndevice = cia402\ndomain = "

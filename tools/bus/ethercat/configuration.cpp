@@ -113,7 +113,7 @@ int run_ethercat_pdos(const EthercatOptions& options) {
                     const auto& e = pdo.entries[i];
                     text += e.index == 0
                                 ? fmt::format("    gap, {} bit\n", e.bits)
-                                : fmt::format("    {:04X}:{:X} {}, {} bit  {}\n", e.index, e.sub,
+                                : fmt::format("    {:04X}:{} {}, {} bit  {}\n", e.index, e.sub,
                                               ethercat::sii::type_name(e.type), e.bits, e.name);
                     json +=
                         fmt::format(R"({}{{"index":{},"sub":{},"bits":{},"name":{}}})",
