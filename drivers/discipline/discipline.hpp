@@ -28,7 +28,7 @@ public:
     /// Queues a frame for slot `slot` (RTnet's slot ID; 0 is the default one), `priority` 0
     /// (highest) to 31. It leaves in the slot's next turn. On `full` that turn is taken by frames
     /// of the same or a higher priority, and the caller keeps the frame. `finisher` is that of
-    /// Launch. [realtime] the thread of the discipline's transmit function
+    /// Launch. [any, realtime]
     virtual Sent send(std::span<const std::uint8_t> frame, unsigned slot, unsigned priority,
                       Finisher* finisher = nullptr) noexcept = 0;
     /// Returns the payload bytes that a frame in this slot may have; 0: no such slot. [any]
@@ -44,7 +44,8 @@ public:
         unknown_station,  ///< an address that is not in the configuration
         out_of_slot,  ///< not in a slot of that station
     };
-    /// Checks a received frame of `length` bytes. [realtime] the thread of the discipline
+    /// Checks a received frame of `length` bytes; its slot only in the thread of the discipline.
+    /// [any, realtime]
     virtual Origin origin(const Address& /*from*/, std::int64_t /*arrived_ns*/,
                           std::size_t /*length*/) const noexcept {
         return Origin::plausible;

@@ -1,8 +1,18 @@
 // SPDX-License-Identifier: MIT
 // The slots of a station and their transmit queues. Memory is allocated in the constructor.
+//
+// Any thread may push frames; everything else is of the thread of the station. A place passes from
+// one to the other by its state:
+//
+//     free --push()--> filling --push()--> ready --pop(), clear()--> free
+//
+// push() claims a free place by an exchange of the state, so two threads never fill the same one.
+// The station's thread reads a place only while it is ready. Two threads that push at the same time
+// may both find space in the next turn: then one of the frames leaves in the turn after it.
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <memory>
 #include <span>
 
@@ -19,49 +29,66 @@ public:
     explicit Slot(const SlotSetup& setup, std::size_t queue);
 
     const SlotSetup& setup() const noexcept { return setup_; }
+    unsigned id() const noexcept { return id_.load(std::memory_order_relaxed); }  ///< [any]
     /// Changes the slot and empties its queue. [realtime]
     void change(const SlotSetup& setup) noexcept {
         setup_ = setup;
+        id_.store(setup.id, std::memory_order_relaxed);
+        size_.store(setup.size, std::memory_order_relaxed);
         clear();
     }
     /// Returns true when the slot is used in this cycle.
     bool used_in(std::uint32_t cycle) const noexcept {
         return setup_.id != unused_slot && cycle % setup_.period == setup_.phasing;
     }
-    std::size_t room() const noexcept { return setup_.size; }  ///< bytes behind the Ethernet header
-    /// Bytes on the line that all frames of one turn may take together.
+    /// bytes behind the Ethernet header [any]
+    std::size_t room() const noexcept { return size_.load(std::memory_order_relaxed); }
+    /// Bytes on the line that all frames of one turn may take together. [any]
     std::size_t turn_bytes() const noexcept {
-        return ethernet::wire_bytes(ethernet::header_bytes + setup_.size);
+        return ethernet::wire_bytes(ethernet::header_bytes + room());
     }
 
     /// Queues a copy of the frame. Returns false when it is too long, or when frames of at least
     /// its priority already fill the next turn: a longer queue would delay everything by a cycle
-    /// after each missed turn. [realtime]
+    /// after each missed turn. [any, realtime]
     bool push(std::span<const std::uint8_t> frame, unsigned priority,
               ethernet::Finisher* finisher = nullptr) noexcept;
-    /// Returns the oldest frame of the highest priority; empty: none. Valid until the next push().
-    /// [realtime]
-    std::span<const std::uint8_t> front() const noexcept;
-    ethernet::Finisher* finisher() const noexcept;  ///< of front(). [realtime]
-    void pop() noexcept;  ///< removes front(). [realtime]
+    /// Returns the oldest frame of the highest priority; empty: none. Valid until the next pop() or
+    /// clear(). [realtime]
+    std::span<const std::uint8_t> front() noexcept;
+    /// Of the frame that front() has returned last. [realtime]
+    ethernet::Finisher* finisher() const noexcept;
+    /// Removes the frame that front() has returned last, also when a more urgent one has been
+    /// pushed meanwhile. [realtime]
+    void pop() noexcept;
     void clear() noexcept;  ///< empties the queue. [realtime]
-    std::size_t waiting() const noexcept { return waiting_; }
+    std::size_t waiting() const noexcept { return waiting_.load(std::memory_order_relaxed); }
 
 private:
+    enum class State : std::uint8_t { free, filling, ready };
     struct Place {
-        std::uint32_t length = 0;  // 0: free
-        std::uint32_t priority = 0;
+        std::atomic<State> state{State::free};
+        // other threads that push read these two at any time
+        std::atomic<std::uint32_t> length{0}, priority{0};
         std::uint64_t order = 0;
         ethernet::Finisher* finisher = nullptr;
         std::array<std::uint8_t, ethernet::largest_frame> bytes;
+
+        bool is_ready() const noexcept {
+            return state.load(std::memory_order_acquire) == State::ready;
+        }
     };
     std::size_t most_urgent() const noexcept;
     std::size_t ahead_of(unsigned priority) const noexcept;  // bytes on the line
+    bool release(Place& place) noexcept;
 
-    SlotSetup setup_;
+    SlotSetup setup_;  // of the station's thread
+    std::atomic<unsigned> id_;
+    std::atomic<std::uint32_t> size_;
     std::size_t count_ = 0;
-    std::size_t waiting_ = 0;
-    std::uint64_t order_ = 0;
+    std::size_t front_ = 0;  // what front() has returned; count_: none
+    std::atomic<std::size_t> waiting_{0};  // frames that are ready
+    std::atomic<std::uint64_t> order_{0};
     std::unique_ptr<Place[]> places_;
 };
 

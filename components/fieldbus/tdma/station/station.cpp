@@ -51,7 +51,6 @@ Station::Station(const StationSetup& setup, Events* events) : events_(events) {
     setup_.slots.reserve(most_slots);
     roster_ = Roster(setup_.others.size());
     pings_ = Pings(setup_.others.size() + (setup_.asks_master ? 1 : 0));
-    slots_.reserve(most_slots);
     for (const SlotSetup& s : setup.slots) {
         slots_.emplace_back(s, setup.queue);
     }
@@ -161,7 +160,7 @@ void Station::become(State state, Time) noexcept {
 
 const Slot* Station::find(unsigned id) const noexcept {
     for (const Slot& s : slots_) {
-        if (s.setup().id == id) return &s;
+        if (s.id() == id) return &s;
     }
     if (id == tunnel_slot) return find(default_slot);
     return nullptr;
@@ -191,7 +190,8 @@ ethernet::Sent Station::send(std::span<const std::uint8_t> frame, unsigned slot,
         result = full;
     }
     if (result != queued && result != full) {
-        ++status_.count.dropped;  // full: the sender keeps it
+        // full: the sender keeps it
+        rejected_.fetch_add(1, std::memory_order_relaxed);
     }
     return result;
 }

@@ -13,9 +13,12 @@
 // `now` is the deadline of the cycle on the port's clock, ns.
 #pragma once
 
+#include <pthread.h>
+
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <deque>
 #include <vector>
 
 #include "babble_monitor.hpp"
@@ -197,7 +200,7 @@ private:
 
     StationSetup setup_;
     // in the order of the setup: calibration uses the first
-    std::vector<Slot> slots_;
+    std::deque<Slot> slots_;
     Events* events_;
     ethernet::Port* port_ = nullptr;
     Companion *rtcfg_ = nullptr, *tunnel_ = nullptr;
@@ -210,6 +213,9 @@ private:
     Pings pings_;
     Status status_;
     std::atomic<bool> ready_{false};
+    /// that send() rejected, in any thread; transmit() counts them
+    std::atomic<std::uint64_t> rejected_{0};
+    std::atomic<pthread_t> thread_{};  ///< that of receive()
     std::array<Pending, most_pending> pending_{};
 
     bool based_ = false;  // number_ and start_ are known

@@ -108,22 +108,26 @@ void Station::withdraw(Event why, const Address& who) noexcept {
     report(why, who);
 }
 
-/// With a schedule from RTcfg a station knows its own block only, and accepts all senders.
+/// With a schedule from RTcfg a station knows its own block only, and accepts all senders. In
+/// another thread than that of the station only the address is checked: the state belongs to the
+/// station's.
 ethernet::Discipline::Origin Station::origin(const Address& from, std::int64_t arrived,
                                              std::size_t length) const noexcept {
     if (setup_.others.empty()) return Origin::plausible;
+    const bool own_thread = thread_.load(std::memory_order_relaxed) == pthread_self();
     const bool named = std::any_of(setup_.others.begin(), setup_.others.end(),
                                    [&](const Other& o) { return o.mac == from; });
     // A block without an address may belong to any station without a block; the sender of the syncs
     // has a block of a master.
     const auto may_be = [&](const Other& o) {
         return named ? o.mac == from
-                     : o.mac == Address{} && (o.role != Role::slave || from != status_.master);
+                     : o.mac == Address{} &&
+                           (o.role != Role::slave || !own_thread || from != status_.master);
     };
     if (std::none_of(setup_.others.begin(), setup_.others.end(), may_be)) {
         return Origin::unknown_station;
     }
-    if (status_.state != State::running || !based_) return Origin::plausible;
+    if (!own_thread || status_.state != State::running || !based_) return Origin::plausible;
     std::uint32_t cycle = 0;
     const Time at = left_at(arrived, length, cycle);
     for (const Other& o : setup_.others) {

@@ -23,6 +23,7 @@ constexpr Time too_long_out = 5'000'000'000;
 }  // namespace
 
 void Station::receive(Time now) noexcept {
+    thread_.store(pthread_self(), std::memory_order_relaxed);
     if (port_ == nullptr) return;
     const Time absence = now - std::exchange(last_cycle_, now);
     const Time max_pause = std::max<Time>(max_absence, setup_.lost_limit * setup_.cycle);

@@ -63,6 +63,11 @@ void Station::send_slot(std::size_t index, std::uint32_t cycle) noexcept {
     std::size_t used = 0;
     for (auto frame = slot.front(); !frame.empty(); frame = slot.front()) {
         const std::size_t takes = ethernet::wire_bytes(frame.size());
+        if (takes > slot.turn_bytes()) {  // queued while the slot was changed
+            ++status_.count.dropped;
+            slot.pop();
+            continue;
+        }
         if (used + takes > slot.turn_bytes()) break;
         if (launch(frame, {.at_ns = at + wire_time(used),
                            .guard_ns = setup_.guard,
@@ -140,6 +145,7 @@ void Station::send_replies() noexcept {
 }
 
 void Station::transmit(Time now) noexcept {
+    status_.count.dropped += rejected_.exchange(0, std::memory_order_relaxed);
     if (port_ == nullptr || !based_ || !clock_.settled()) return;
     const State state = status_.state;
     if (state != State::calibrating && state != State::running) return;

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+// The queue of a slot: order, space, and frames of several threads.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <thread>
+#include <vector>
+
+#include "components/fieldbus/tdma/station/slots.hpp"
+
+namespace tdma_tests {
+namespace {
+
+using hal::tdma::Slot;
+using hal::tdma::SlotSetup;
+
+constexpr std::size_t header = hal::ethernet::header_bytes;
+
+/// A frame of `length` bytes, each `mark`.
+std::vector<std::uint8_t> frame_of(std::size_t length, std::uint8_t mark) {
+    return std::vector<std::uint8_t>(length, mark);
+}
+
+std::uint8_t popped(Slot& slot) {
+    const std::uint8_t mark = slot.front().empty() ? 0 : slot.front()[0];
+    slot.pop();
+    return mark;
+}
+
+TEST(TdmaSlot, frames_leave_by_priority_and_then_in_order) {
+    Slot slot(SlotSetup{.id = 1, .size = 1000}, 8);
+    EXPECT_TRUE(slot.push(frame_of(header + 46, 1), 8));
+    EXPECT_TRUE(slot.push(frame_of(header + 46, 2), 4));
+    EXPECT_TRUE(slot.push(frame_of(header + 46, 3), 8));
+    EXPECT_TRUE(slot.push(frame_of(header + 46, 4), 4));
+    EXPECT_EQ(slot.waiting(), 4U);
+    EXPECT_EQ(popped(slot), 2);
+    EXPECT_EQ(popped(slot), 4);
+    EXPECT_EQ(popped(slot), 1);
+    EXPECT_EQ(popped(slot), 3);
+    EXPECT_TRUE(slot.front().empty());
+    EXPECT_EQ(slot.waiting(), 0U);
+}
+
+TEST(TdmaSlot, a_turn_that_is_full_rejects_frames_of_the_same_priority_only) {
+    Slot slot(SlotSetup{.id = 1, .size = 200}, 8);
+    EXPECT_TRUE(slot.push(frame_of(header + 200, 1), 8));
+    EXPECT_FALSE(slot.push(frame_of(header + 46, 2), 8));
+    EXPECT_TRUE(slot.push(frame_of(header + 46, 3), 4));
+    EXPECT_FALSE(slot.push(frame_of(header + 201, 4), 0)) << "longer than the slot";
+    EXPECT_EQ(popped(slot), 3);
+    slot.clear();
+    EXPECT_TRUE(slot.push(frame_of(header + 46, 2), 8));
+}
+
+TEST(TdmaSlot, frames_of_several_threads_arrive_whole) {
+    constexpr unsigned senders = 3;
+    constexpr unsigned each = 2'000;
+    Slot slot(SlotSetup{.id = 1, .size = 1000}, 8);
+    std::vector<std::thread> threads;
+    for (unsigned n = 1; n <= senders; ++n) {
+        threads.emplace_back([&slot, n] {
+            for (unsigned sent = 0; sent < each;) {
+                const std::size_t length = header + 46 + (sent % 50) * n;
+                if (slot.push(frame_of(length, static_cast<std::uint8_t>(n)), n % 2)) {
+                    ++sent;
+                } else {
+                    std::this_thread::yield();
+                }
+            }
+        });
+    }
+    unsigned arrived[senders + 1] = {};
+    for (unsigned count = 0; count < senders * each;) {
+        const auto frame = slot.front();
+        if (frame.empty()) {
+            std::this_thread::yield();
+            continue;
+        }
+        const std::uint8_t mark = frame[0];
+        ASSERT_TRUE(mark >= 1 && mark <= senders);
+        const std::size_t length = header + 46 + (arrived[mark] % 50) * mark;
+        ASSERT_EQ(frame.size(), length) << "in the order in which its thread sent it";
+        ASSERT_TRUE(std::all_of(frame.begin(), frame.end(),
+                                [mark](std::uint8_t byte) { return byte == mark; }));
+        ++arrived[mark];
+        ++count;
+        slot.pop();
+    }
+    for (std::thread& thread : threads) {
+        thread.join();
+    }
+    EXPECT_TRUE(slot.front().empty());
+}
+
+}  // namespace
+}  // namespace tdma_tests
