@@ -285,7 +285,7 @@ private:
     plan::Plan* plan_ = nullptr;  // the rest is the thread's own
     plan::ProbeSet* probes_ = nullptr;
     TraceRing* tracing_ = nullptr;  // trace_ during a cycle
-    hal_cycle info_{};
+    hal_cycle info_{};  // its address identifies the thread, FunctionPair
     std::int64_t grid_ns_ = 0;  // position of the cycle that runs
     CycleMark own_mark_;
     CycleMark* const mark_;  // own_mark_, or one in shared memory

@@ -62,8 +62,8 @@ protected:
         discipline_.lose();
     }
     /// First in receive(). `paired` is false for an instance with one function. [realtime]
-    Turn receive_turn(bool paired = true) noexcept {
-        const bool was_offline = std::exchange(offline_, paired && !functions_.receive());
+    Turn receive_turn(hal::Cycle cycle, bool paired = true) noexcept {
+        const bool was_offline = std::exchange(offline_, paired && !functions_.receive(cycle));
         if (offline_) return was_offline ? Turn::offline : Turn::leaves;
         const bool interrupted = interrupted_.exchange(false, std::memory_order_acquire);
         if (was_offline) return Turn::returns;

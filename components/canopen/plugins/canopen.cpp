@@ -122,7 +122,7 @@ public:
             }
         }
         now_ = now;
-        const hal::bus::Turn turn = receive_turn(!by_index());
+        const hal::bus::Turn turn = receive_turn(cycle, !by_index());
         if (is_offline(turn)) {
             show_offline(cycle);
             return;
@@ -147,7 +147,7 @@ public:
     }
 
     void transmit(hal::Cycle cycle) noexcept {
-        if (!by_index() && !functions_.transmit()) {
+        if (!by_index() && !functions_.transmit(cycle)) {
             if (functions_.receive_is_missing()) {
                 make_safe(cycle);
             }

@@ -162,7 +162,7 @@ public:
             show_offline(cycle);
             return;
         }
-        const hal::bus::Turn turn = receive_turn();
+        const hal::bus::Turn turn = receive_turn(cycle);
         if (is_offline(turn)) {
             show_offline(cycle);
             return;
@@ -188,7 +188,7 @@ public:
 
     void transmit(hal::Cycle cycle) noexcept {
         if (!master_ || !fits(cycle)) return;
-        if (!functions_.transmit()) {
+        if (!functions_.transmit(cycle)) {
             if (functions_.receive_is_missing() && !interrupted()) {
                 make_safe(cycle);
             }

@@ -47,8 +47,18 @@ public:
         return silent_ns_ >= limit_ns;
     }
 
+    /// Returns true when the monitored function has not run between the last two calls of
+    /// is_missing(). [realtime] as is_missing()
+    bool is_late() const noexcept { return silent_ns_ > 0; }
+
     /// Returns true once the monitored function has run. [realtime]
     bool has_run() const noexcept { return runs_.load(std::memory_order_relaxed) != 0; }
+
+    /// Forgets how long the monitored function has been missing. [setup]
+    void restart() noexcept {
+        seen_ = runs_.load(std::memory_order_relaxed);
+        silent_ns_ = 0;
+    }
 
 private:
     /// written by the monitored function

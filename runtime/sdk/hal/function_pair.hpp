@@ -2,13 +2,13 @@
 // The two functions of a bus, `receive` and `transmit`: one without the other is a fault.
 #pragma once
 
-#include <pthread.h>
-
 #include <atomic>
+#include <bit>
 #include <cstdint>
 #include <string>
 #include <utility>
 
+#include "hal/component.hpp"
 #include "hal/function_monitor.hpp"
 #include "hal/lasting_fault.hpp"
 
@@ -16,7 +16,7 @@ namespace hal {
 
 /// Monitors that both functions of an instance run, in the same thread. Each function calls its
 /// member below first in every cycle. A function that misses the other one for `tolerated_cycles`
-/// of its own cycles raises a fault, once; the fault ends when the other one runs again. A single
+/// of the slower one raises a fault, once; the fault ends when the other one runs again. A single
 /// missing cycle is not a fault: functions are moved with `delf` and `addf` while the machine runs.
 ///
 /// Members with the suffix `_` are written by the function named in their comment only; what the
@@ -24,7 +24,7 @@ namespace hal {
 class FunctionPair {
 public:
     /// cycles without the other function until the fault is raised
-    static constexpr unsigned tolerated_cycles = 100;
+    static constexpr unsigned tolerated_cycles = FunctionMonitor::tolerated_cycles;
 
     /// The full names of both functions. [setup]
     FunctionPair(const std::string& receive, const std::string& transmit)
@@ -38,69 +38,59 @@ public:
     void start(const hal_faults* record, const void* self) noexcept {
         record_ = record;
         self_ = self;
-        receiving_ = {};
-        transmitting_ = {};
-        exchanging_ = {};
+        receives_.restart();
+        transmits_.restart();
+        exchanges_.restart();
+        receive_is_missing_ = transmit_is_missing_ = false;
         apart_ = 0;
     }
 
     /// First in receive(). Returns false while nothing is sent: transmit() has not passed for
     /// `tolerated_cycles`. The bus is then shown as offline. [realtime]
-    bool receive() noexcept {
-        receives_.fetch_add(1, std::memory_order_relaxed);
-        receiver_.store(pthread_self(), std::memory_order_relaxed);
-        const bool alone = receiving_.misses(transmits_) >= tolerated_cycles;
-        report(unsent_fault_, alone, no_transmit_);
-        return exchanging_.misses(exchanges_) <= tolerated_cycles;
+    bool receive(Cycle cycle) noexcept {
+        receives_.ran(cycle.period_ns());
+        receiver_.store(thread_of(cycle), std::memory_order_relaxed);
+        transmit_is_missing_ = transmits_.is_missing(cycle.period_ns());
+        report(unsent_fault_, transmit_is_missing_, no_transmit_);
+        return !exchanges_.is_missing(cycle.period_ns());
     }
 
     /// First in transmit(). Returns false when nothing may be sent: receive() has not run since the
     /// last cycle, or runs in another thread. Outputs must not move without their inputs, and slots
     /// are unknown without them. [realtime]
-    bool transmit() noexcept {
-        transmits_.fetch_add(1, std::memory_order_relaxed);
-        const unsigned missed = transmitting_.misses(receives_);
-        report(unreceived_fault_, missed >= tolerated_cycles, no_receive_);
-        const bool together = receiver_.load(std::memory_order_relaxed) == pthread_self();
+    bool transmit(Cycle cycle) noexcept {
+        transmits_.ran(cycle.period_ns());
+        receive_is_missing_ = receives_.is_missing(cycle.period_ns());
+        report(unreceived_fault_, receive_is_missing_, no_receive_);
+        const bool together = receiver_.load(std::memory_order_relaxed) == thread_of(cycle);
         if (together) {
             apart_ = 0;
         } else if (apart_ < tolerated_cycles) {
             ++apart_;
         }
-        report(apart_fault_, apart_ >= tolerated_cycles && missed < tolerated_cycles, apart_text_);
-        if (missed > 0 || apart_ > tolerated_apart) return false;
-        exchanges_.fetch_add(1, std::memory_order_relaxed);
+        report(apart_fault_, apart_ >= tolerated_cycles && !receive_is_missing_, apart_text_);
+        if (receives_.is_late() || apart_ > tolerated_apart) return false;
+        exchanges_.ran(cycle.period_ns());
         return true;
     }
 
-    /// Returns true while receive() has not run for `tolerated_cycles` of transmit(): outputs are
-    /// to be made safe. Only for transmit(). [realtime]
-    bool receive_is_missing() const noexcept { return transmitting_.missed >= tolerated_cycles; }
+    /// Returns true while receive() has not run for `tolerated_cycles`: outputs are to be made safe.
+    /// Only for transmit(). [realtime]
+    bool receive_is_missing() const noexcept { return receive_is_missing_; }
 
-    /// Returns true while transmit() has not run for `tolerated_cycles` of receive(). Only for
-    /// receive(). [realtime]
-    bool transmit_is_missing() const noexcept { return receiving_.missed >= tolerated_cycles; }
+    /// Returns true while transmit() has not run for `tolerated_cycles`. Only for receive().
+    /// [realtime]
+    bool transmit_is_missing() const noexcept { return transmit_is_missing_; }
 
 private:
     /// transmit() runs before receive() in the first cycle, or the thread was replaced
     static constexpr unsigned tolerated_apart = 2;
 
-    /// Counts cycles in which a counter of the other function stays the same.
-    struct Misses {
-        std::uint64_t seen = 0;
-        unsigned missed = 0;
-
-        unsigned misses(const std::atomic<std::uint64_t>& counter) noexcept {
-            const std::uint64_t now = counter.load(std::memory_order_relaxed);
-            if (now != seen) {
-                missed = 0;
-            } else if (missed <= tolerated_cycles) {
-                ++missed;
-            }
-            seen = now;
-            return missed;
-        }
-    };
+    /// Identifies the thread: the host gives all functions of a thread the same hal_cycle, and each
+    /// thread another one.
+    static const void* thread_of(Cycle cycle) noexcept {
+        return std::bit_cast<const hal_cycle*>(cycle);
+    }
 
     static std::string missing(const std::string& running, const std::string& absent) {
         return missing_function_text(running, absent, "nothing is sent");
@@ -116,13 +106,12 @@ private:
     const std::string no_transmit_, no_receive_, apart_text_;
     const hal_faults* record_ = nullptr;
     const void* self_ = nullptr;
-    /// written by the function of the name, read by the other one
-    std::atomic<std::uint64_t> receives_{0}, transmits_{0};
-    /// cycles of transmit() that passed; written by transmit()
-    std::atomic<std::uint64_t> exchanges_{0};
-    std::atomic<pthread_t> receiver_{};  ///< written by receive()
-    Misses receiving_, exchanging_;  ///< of receive()
-    Misses transmitting_;  ///< of transmit()
+    FunctionMonitor receives_;  ///< transmit() monitors receive()
+    FunctionMonitor transmits_;  ///< receive() monitors transmit()
+    FunctionMonitor exchanges_;  ///< receive() monitors the cycles of transmit() that passed
+    std::atomic<const void*> receiver_{};  ///< its thread; written by receive()
+    bool transmit_is_missing_ = false;  ///< of receive()
+    bool receive_is_missing_ = false;  ///< of transmit()
     unsigned apart_ = 0;  ///< of transmit()
     LastingFault unsent_fault_;  ///< of receive()
     LastingFault unreceived_fault_, apart_fault_;  ///< of transmit()

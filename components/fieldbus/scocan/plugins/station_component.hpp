@@ -127,7 +127,7 @@ public:
             recover();
         }
         was_reset_ = pins_.reset;
-        const bool sends = functions_.receive();
+        const bool sends = functions_.receive(cycle);
         if (sends == silent_) {
             set_silent(!sends);
         }
@@ -159,7 +159,7 @@ public:
 
     void transmit(hal::Cycle cycle) noexcept {
         if (!link_) return;
-        if (!functions_.transmit()) {
+        if (!functions_.transmit(cycle)) {
             if (functions_.receive_is_missing()) {
                 interrupted_.store(true, std::memory_order_release);
                 exchange_->state.store(can::State::down, std::memory_order_relaxed);

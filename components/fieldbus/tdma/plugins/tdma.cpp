@@ -161,7 +161,7 @@ public:
             raise(words_->period, static_cast<double>(cycle.period_ns()) * 1e-3);
             reporter_->event(Event::wrong_period, {}, cycle.period_ns());
         }
-        const bool sends = functions_.receive();
+        const bool sends = functions_.receive(cycle);
         if (sends == silent_) {
             set_silent(!sends);
         }
@@ -192,7 +192,7 @@ public:
     }
 
     void transmit(hal::Cycle cycle) noexcept {
-        const bool receives = functions_.transmit();
+        const bool receives = functions_.transmit(cycle);
         if (functions_.receive_is_missing()) {
             interrupted_.store(true, std::memory_order_release);
         }
