@@ -51,6 +51,11 @@ struct CanReceive : hal::Component {
 
     Layout layout{fields.get()};
     LayoutPins<HAL_DIR_OUT> pins{*this, layout, "field of the newest message"};
+    std::unique_ptr<hal::Out<std::uint64_t>> invalid =
+        pins.has_reals()
+            ? std::make_unique<hal::Out<std::uint64_t>>(
+                  *this, "invalid", "messages with a field that was not finite: its pin was kept")
+            : nullptr;
     hal::Function run{*this, "update", &CanReceive::update,
                       "reads the messages received since the last cycle"};
 
@@ -99,7 +104,9 @@ private:
             malformed = malformed + 1;
             return false;
         }
-        pins.load(frame.data);
+        if (!pins.load(frame.data)) {
+            *invalid = *invalid + 1;
+        }
         id_offset = frame.id - first_;
         newest_ = frame.time_ns;
         received = received + 1;
@@ -122,6 +129,7 @@ HAL_COMPONENT(CanReceive, "can_receive", "Receives one CAN message whose data be
 The counterpart of `can_send`: `fields=` names the data of the message in order, little endian. The pins keep the values of the newest message;
 `new` is TRUE for the cycle in which it arrived, `age` is the time since its last bit. If several messages arrive within a cycle, the last one
 remains and the others are counted in `overwritten`; with `one-by-one` they wait for the next cycles instead. A message of another length is ignored and counted in `malformed`.
+NaN and infinity are ignored: the pin keeps its value, and `invalid` counts these messages.
 
 With `ids=8` eight consecutive identifiers are received; `id-offset` is that of the newest message.
 

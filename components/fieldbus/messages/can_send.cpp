@@ -49,6 +49,11 @@ struct CanSend : hal::Component {
 
     Layout layout{fields.get()};
     LayoutPins<HAL_DIR_IN> pins{*this, layout, "field of the message"};
+    std::unique_ptr<hal::Out<std::uint64_t>> invalid =
+        pins.has_reals() ? std::make_unique<hal::Out<std::uint64_t>>(
+                               *this, "invalid",
+                               "messages with a field that was not finite: its last value was sent")
+                         : nullptr;
     hal::Function run{*this, "update", &CanSend::update, "sends the message when it is due"};
 
     void start() {
@@ -71,7 +76,7 @@ struct CanSend : hal::Component {
         const std::int64_t now = cycle.start_ns();
         hal::can::Frame frame;
         frame.length = layout.bytes();
-        pins.store(frame.data);
+        const bool is_valid = pins.store(frame.data);
         const bool is_new = on_change && frame.data != last_data_;
         if (due(cycle) || trigger || is_new) {
             frame.id =
@@ -80,6 +85,9 @@ struct CanSend : hal::Component {
             last_data_ = frame.data;
             if (link_->send(frame, now) == hal::can::Sent::queued) {
                 sent = sent + 1;
+                if (!is_valid) {
+                    *invalid = *invalid + 1;
+                }
             } else {
                 dropped = dropped + 1;
             }
@@ -125,7 +133,7 @@ private:
 HAL_COMPONENT(CanSend, "can_send", "Sends one CAN message whose data are pins", R"(
 For nodes without a protocol: one instance is one message. `fields=` names its data in order, little endian, at most 8 bytes; each field is a pin
 (`u8`, `u16` and `u32` are u32 pins, `s8`, `s16`, `s32` are s32 pins, `f32` and `f64` are float pins). Values out of the range of a field are limited
-to it. Without `fields=` the message has no data.
+to it. NaN and infinity are not sent: the last valid value is, and `invalid` counts these messages. Without `fields=` the message has no data.
 
 A message leaves in each cycle in which `trigger` is TRUE, at multiples of `period`, counted from the first cycle, and with `on-change` when its data
 are not those sent last (at the start: zeros). Each instance is a node of its

@@ -2,6 +2,7 @@
 // The fields of a CAN message as pins.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -18,27 +19,55 @@ public:
     /// Declares the pin of a field that begins with a byte of the message. [setup]
     void declare(Component& component, const Function* function, const std::string& name,
                  const std::string& doc, std::size_t byte, PinCodec codec) {
-        pins_.declare(component, function, codec.pin_type(), name, doc, {8 * byte, codec});
+        pins_.declare(component, function, codec.pin_type(), name, doc, {8 * byte, codec, 0.0});
+        has_reals_ = has_reals_ || codec.pin_type() == HAL_TYPE_FLOAT;
     }
-    /// Stores the values; those out of a field's range are limited to it. [realtime]
-    void store(std::span<std::uint8_t> data) const noexcept {
-        pins_.each([data](const auto& pin, const Place& p) noexcept {
-            write_bits(data, p.at, p.codec.bits(), p.codec.encode(pin.get()));
+    /// Whether a field can be NaN or infinite. [setup]
+    bool has_reals() const noexcept { return has_reals_; }
+    /// Stores the values; those out of a field's range are limited to it. Returns false when one is
+    /// NaN or infinite: then the last finite one is stored, 0 before there is one. [realtime]
+    bool store(std::span<std::uint8_t> data) noexcept {
+        bool valid = true;
+        pins_.each([data, &valid](const auto& pin, Place& p) noexcept {
+            const auto value = pin.get();
+            if constexpr (std::same_as<std::remove_const_t<decltype(value)>, double>) {
+                if (std::isfinite(value)) {
+                    p.last = value;
+                } else {
+                    valid = false;
+                }
+                write_bits(data, p.at, p.codec.bits(), p.codec.encode(p.last));
+            } else {
+                write_bits(data, p.at, p.codec.bits(), p.codec.encode(value));
+            }
         });
+        return valid;
     }
-    /// Sets the pins from data that are long enough. [realtime]
-    void load(std::span<const std::uint8_t> data) noexcept {
-        pins_.each([data]<class T>(Out<T>& pin, const Place& p) noexcept {
-            pin = p.codec.template decode<T>(read_bits(data, p.at, p.codec.bits()));
+    /// Sets the pins from data that are long enough. Returns false when a value is NaN or infinite:
+    /// then its pin keeps the one before. [realtime]
+    bool load(std::span<const std::uint8_t> data) noexcept {
+        bool valid = true;
+        pins_.each([data, &valid]<class T>(Out<T>& pin, const Place& p) noexcept {
+            const T value = p.codec.template decode<T>(read_bits(data, p.at, p.codec.bits()));
+            if constexpr (std::same_as<T, double>) {
+                if (!std::isfinite(value)) {
+                    valid = false;
+                    return;
+                }
+            }
+            pin = value;
         });
+        return valid;
     }
 
 private:
     struct Place {
         std::size_t at;  ///< in bits
         PinCodec codec;
+        double last;  ///< the last finite value of a real field that was stored
     };
     AnyPins<direction, Place> pins_;
+    bool has_reals_ = false;
 };
 
 }  // namespace hal::messages

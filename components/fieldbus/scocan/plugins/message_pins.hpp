@@ -37,6 +37,15 @@ void declare_fields(messages::FieldPins<direction>& pins, hal::Component& c, con
     }
 }
 
+/// Returns the counter of a message that has real fields, else nullptr. [setup]
+template <hal_dir direction>
+std::unique_ptr<hal::Out<std::uint32_t>> invalid_counter(
+    hal::Component& c, const hal::Function& f, const Message& m,
+    const messages::FieldPins<direction>& fields, const char* doc) {
+    if (!fields.has_reals()) return nullptr;
+    return std::make_unique<hal::Out<std::uint32_t>>(c, f, (m.name + ".invalid").c_str(), doc);
+}
+
 /// A message that this node sends.
 class SentMessage {
 public:
@@ -48,6 +57,8 @@ public:
                 {.initial = !m.event}),
           sent_(c, receive, (m.name + ".sent").c_str(), "frames of this message sent") {
         declare_fields(fields_, c, f, m);
+        invalid_ = invalid_counter(
+            c, f, m, fields_, "cycles in which a field was not finite: its last value is sent");
         if (m.fields.empty() && m.bytes > 0) {
             data_ = std::make_unique<hal::In<std::uint64_t>>(c, f, (m.name + ".data").c_str(),
                                                              "data, little endian");
@@ -88,11 +99,13 @@ public:
     }
 
 private:
-    can::Frame frame() const noexcept {
+    can::Frame frame() noexcept {
         can::Frame f;
         f.id = message_.id;
         f.length = static_cast<std::uint8_t>(message_.bytes);
-        fields_.store(f.data);
+        if (!fields_.store(f.data)) {
+            *invalid_ = *invalid_ + 1;
+        }
         if (data_) {
             for (std::uint32_t i = 0; i < message_.bytes; ++i) {
                 f.data[i] = static_cast<std::uint8_t>(data_->get() >> 8 * i);
@@ -104,6 +117,7 @@ private:
     hal::In<bool> send_;
     hal::Out<std::uint32_t> sent_;
     messages::FieldPins<HAL_DIR_IN> fields_;
+    std::unique_ptr<hal::Out<std::uint32_t>> invalid_;
     std::unique_ptr<hal::In<std::uint64_t>> data_;
     Time next_ = INT64_MIN;
     bool was_sending_ = false;
@@ -122,6 +136,8 @@ public:
           interval_(c, f, (m.name + ".interval").c_str(),
                     "time between the begins of the last two frames", {.unit = "us"}) {
         declare_fields(fields_, c, f, m);
+        invalid_ = invalid_counter(c, f, m, fields_,
+                                   "frames in which a field was not finite: its pin is kept");
         if (m.fields.empty() && m.bytes > 0) {
             data_ = std::make_unique<hal::Out<std::uint64_t>>(c, f, (m.name + ".data").c_str(),
                                                               "data, little endian");
@@ -134,7 +150,9 @@ public:
 
     void arrived(const can::Frame& frame, Time begin) noexcept {
         if (frame.length < message_.bytes || frame.remote) return;
-        fields_.load(frame.data);
+        if (!fields_.load(frame.data)) {
+            *invalid_ = *invalid_ + 1;
+        }
         if (data_) {
             *data_ = read_bits(frame.data, 0, 8 * std::min(message_.bytes, 8U));
         }
@@ -160,6 +178,7 @@ private:
     hal::Out<std::uint32_t> received_;
     hal::Out<double> age_, interval_;
     messages::FieldPins<HAL_DIR_OUT> fields_;
+    std::unique_ptr<hal::Out<std::uint32_t>> invalid_;
     std::unique_ptr<hal::Out<std::uint64_t>> data_;
     Time last_ = INT64_MIN;
     bool is_fresh_ = false;

@@ -42,7 +42,7 @@ A complete bus in memory, also on the virtual clock:
     addf scocan.0.transmit bus
     addf scocan.1.transmit bus
 
-The sender of a message sets its fields, `scocan.0.position.a`; a value out of the range of its field is limited to it. Receivers have pins of the same names, `scocan.1.position.a`. While `send` is true, a
+The sender of a message sets its fields, `scocan.0.position.a`; a value out of the range of its field is limited to it. NaN and infinity keep the last valid value, which `scocan.0.position.invalid` counts. Receivers have pins of the same names, `scocan.1.position.a`. While `send` is true, a
 message with a private slot is sent in each turn of its slot, one with a period in shared slots at that period; an event message is sent at a rising edge of
 `send`. Other components send through the slots of a node by a link: `link = scocan:motor`, or `scocan:motor?slot=3` for a certain private slot.
 
