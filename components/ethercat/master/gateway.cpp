@@ -56,6 +56,7 @@ struct Gateway::Sender {
 struct Gateway::Client {
     int fd = -1;
     std::uint32_t id = 0;
+    bool input_ended = false;  ///< it sends no more requests, but may still read replies
     std::size_t used = 0;
     std::array<std::uint8_t, largest_message> bytes{};
 };
@@ -121,15 +122,21 @@ void Gateway::run() {
         polled.assign(1, {udp_, POLLIN, 0});
         polled.push_back({tcp_, POLLIN, 0});  // a negative one is ignored
         for (const auto& client : clients_) {
-            polled.push_back({client->fd, POLLIN, 0});
+            polled.push_back({client->fd, static_cast<short>(client->input_ended ? 0 : POLLIN), 0});
         }
         ::poll(polled.data(), polled.size(), pending_.empty() ? 50 : 1);
         if (polled[0].revents != 0) {
             read_udp();
         }
         for (std::size_t i = 2; i < polled.size(); ++i) {
-            if (polled[i].revents != 0) {
-                read_tcp(*clients_[i - 2]);
+            Client& client = *clients_[i - 2];
+            if ((polled[i].revents & POLLIN) != 0) {
+                read_tcp(client);
+            } else if (polled[i].revents != 0) {
+                close(std::exchange(client.fd, -1));
+            }
+            if (client.input_ended && client.fd >= 0 && !is_waiting(client)) {
+                close(std::exchange(client.fd, -1));
             }
         }
         std::erase_if(clients_, [](const auto& client) { return client->fd < 0; });
@@ -159,10 +166,19 @@ void Gateway::read_udp() {
     }
 }
 
+bool Gateway::is_waiting(const Client& client) const {
+    return std::any_of(pending_.begin(), pending_.end(),
+                       [&](const auto& pending) { return pending->sender.client == client.id; });
+}
+
 void Gateway::read_tcp(Client& client) {
     const auto got =
         recv(client.fd, client.bytes.data() + client.used, client.bytes.size() - client.used, 0);
     if (got < 0 && (errno == EAGAIN || errno == EINTR)) return;
+    if (got == 0) {
+        client.input_ended = true;
+        return;
+    }
     bool valid = got > 0;
     client.used += valid ? static_cast<std::size_t>(got) : 0;
     while (valid && client.used >= ecat_header_bytes) {

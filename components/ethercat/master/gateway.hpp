@@ -108,6 +108,8 @@ private:
     void read_udp();
     void read_tcp(Client& client);
     void collect();
+    /// A reply to the client is pending.
+    bool is_waiting(const Client& client) const;
 
     RequestPort& requests_;
     GatewaySetup setup_;

@@ -96,6 +96,26 @@ TEST(EthercatGateway, Passes_requests_to_the_slave_by_UDP_and_TCP) {
     }
 }
 
+TEST(EthercatGateway, Answers_a_client_that_has_closed_its_sending_direction) {
+    GatewayLine line(SOCK_STREAM);
+    line.send(line.upload(0x1001, 0x1018, 1));
+    line.send(line.upload(0x1001, 0x1018, 2));
+    EXPECT_EQ(shutdown(line.fd, SHUT_WR), 0);
+    // the sub-indices of both answers, then the end of the connection
+    Bytes both;
+    while (both.size() < 36) {
+        const Bytes part = line.receive();
+        ASSERT_FALSE(part.empty());
+        both.insert(both.end(), part.begin(), part.end());
+    }
+    ASSERT_EQ(both.size(), 36U);
+    EXPECT_EQ(both[13], 1);
+    EXPECT_EQ(both[31], 2);
+    char more = 0;
+    EXPECT_EQ(recv(line.fd, &more, 1, 0), 0);
+    EXPECT_EQ(line.gateway->answered(), 2U);
+}
+
 TEST(EthercatGateway, Invalid_requests_are_dropped) {
     GatewayLine f(SOCK_DGRAM);
     std::mt19937 random(3);
