@@ -249,8 +249,26 @@ class Configuration(Ethercat):
             "machine.ethercat: sim:machine, cycle 1000 us, 7 slaves\n  in  u32   servo.axis-1-controlword  6040:0\n",
             self.good("ethercat", "check", "machine.ethercat"),
         )
+        checked = json.loads(self.good("ethercat", "check", "machine.ethercat", "--json"))[0]
+        self.assertEqual(7, checked["slaves"])
         self.assertEqual(
-            7, json.loads(self.good("ethercat", "check", "machine.ethercat", "--json"))[0]["slaves"]
+            {
+                "name": "servo.axis-1-controlword",
+                "type": "u32",
+                "direction": "in",
+                "owner": "servo",
+                "index": 0x6040,
+                "sub": 0,
+            },
+            checked["pins"][0],
+        )
+        lines = self.good("ethercat", "check", "machine.ethercat").splitlines()[1:]
+        self.assertEqual(
+            lines,
+            [
+                f"  {pin['direction']:4}{pin['type']:6}{pin['name']}  {pin['index']:04X}:{pin['sub']:X}"
+                for pin in checked["pins"]
+            ],
         )
 
     def test_config_from_descriptions_runs_on_emulated_devices(self):

@@ -132,6 +132,9 @@ std::string write(const std::string& link, std::int64_t cycle_ns, const std::vec
 /// `segment`: devices of ethercat_segment, or empty for a real bus.
 std::string netlist(const Bus&, const std::string& file, const std::string& segment);
 
+/// Returns the HAL type of the pin of an entry: "u32".
+const char* pin_type(const master::Entry&);
+
 /// Returns "out u32   SLAVE.NAME  6041:0" with a line end, seen from the netlist: an output of the bus is an input there.
 std::string pin_line(const master::Entry&, bool output, const std::string& slave);
 

@@ -25,12 +25,6 @@ constexpr const char* drive_outputs[] = {
     "target-torque",        "velocity-offset",     "torque-offset",   "profile-velocity",
     "profile-acceleration", "profile-deceleration"};
 
-const char* type_of_pin(const Entry& e) {
-    if (e.scaled || e.type == Type::real32 || e.type == Type::real64) return "float";
-    constexpr const char* names[] = {"bit", "u32", "u32", "u32", "u64", "s32", "s32", "s32", "s64"};
-    return names[static_cast<std::size_t>(e.type)];
-}
-
 /// Calls `use(output, entry)` for each entry with a pin.
 template <class Use>
 void for_each_pin(const master::Slave& slave, Use use) {
@@ -123,9 +117,15 @@ private:
 
 }  // namespace
 
+const char* pin_type(const Entry& e) {
+    if (e.scaled || e.type == Type::real32 || e.type == Type::real64) return "float";
+    constexpr const char* names[] = {"bit", "u32", "u32", "u32", "u64", "s32", "s32", "s32", "s64"};
+    return names[static_cast<std::size_t>(e.type)];
+}
+
 std::string pin_line(const Entry& e, bool output, const std::string& slave) {
     const std::string object = bus::object_text(e.index, e.sub).substr(2);
-    return padded(output ? "in" : "out", 4) + padded(type_of_pin(e), 6) + slave + "." + e.name +
+    return padded(output ? "in" : "out", 4) + padded(pin_type(e), 6) + slave + "." + e.name +
            "  " + object + "\n";
 }
 

@@ -52,20 +52,39 @@ std::string plan_json(const config::Plan& p) {
                p.input_to_output_ns, p.load, p.fits, p.period, cyclic, slots, trips);
 }
 
-/// Returns a line per pin, each behind `lead`.
-std::string pin_lines(const config::Bus& bus, const std::string& lead) {
-    std::string text;
+/// Calls `visit(entry, output, slave)` for each entry that has a pin.
+template <class Visit>
+void for_each_pin(const config::Bus& bus, Visit visit) {
     for (const auto& s : bus.setup.slaves) {
         for (const auto& sm : s.sync_managers) {
             for (const auto& pdo : sm.pdos) {
                 for (const auto& e : pdo.entries) {
                     if (!e.name.empty()) {
-                        text += lead + config::pin_line(e, sm.output, s.name);
+                        visit(e, sm.output, s.name);
                     }
                 }
             }
         }
     }
+}
+
+/// Returns a line per pin, each behind `lead`.
+std::string pin_lines(const config::Bus& bus, const std::string& lead) {
+    std::string text;
+    for_each_pin(bus, [&](const auto& entry, bool output, const std::string& slave) {
+        text += lead + config::pin_line(entry, output, slave);
+    });
+    return text;
+}
+
+std::string pins_json(const config::Bus& bus) {
+    std::string text;
+    for_each_pin(bus, [&](const auto& entry, bool output, const std::string& slave) {
+        text += fmt::format(
+            R"({}{{"name":{},"type":"{}","direction":"{}","owner":{},"index":{},"sub":{}}})",
+            text.empty() ? "" : ",", json_string(slave + "." + entry.name), config::pin_type(entry),
+            output ? "in" : "out", json_string(slave), entry.index, entry.sub);
+    });
     return text;
 }
 
@@ -172,9 +191,10 @@ int run_ethercat_check(const EthercatCheckOptions& options) {
         for (const config::Bus& bus : reading.buses) {
             const std::size_t slaves = bus.setup.slaves.size();
             if (options.json) {
-                json += fmt::format(R"({}{{"file":{},"link":{},"cycle_ns":{},"slaves":{}}})",
-                                    json.empty() ? "[" : ",\n ", json_string(file),
-                                    json_string(bus.link), bus.setup.cycle_ns, slaves);
+                json += fmt::format(
+                    R"({}{{"file":{},"link":{},"cycle_ns":{},"slaves":{},"pins":[{}]}})",
+                    json.empty() ? "[" : ",\n ", json_string(file), json_string(bus.link),
+                    bus.setup.cycle_ns, slaves, pins_json(bus));
             } else if (!print(fmt::format("{}: {}, cycle {} us, {} slave{}\n{}", file, bus.link,
                                           static_cast<double>(bus.setup.cycle_ns) / 1000, slaves,
                                           slaves == 1 ? "" : "s", pin_lines(bus, "  ")))) {
