@@ -382,6 +382,27 @@ class Dcf(Node):
             ),
         )
 
+    def test_every_command_prints_what_makes_its_description_unreliable(self):
+        eds = (self.folder / "io.eds").read_bytes().decode()
+        self.assertIn("SubNumber=", eds)
+        place = eds.index("SubNumber=")
+        line = eds[:place].count("\n") + 1
+        damaged = eds[:place] + "SubNumber=2O" + eds[eds.index("\r", place) :]
+        (self.folder / "damaged.eds").write_bytes(damaged.encode())
+        for words in (
+            ["sdo", "read", self.bus, "5", "1000"],
+            ["sdo", "write", self.bus, "5", "1017", "0", "--type", "u16"],
+            ["pdo", "show", self.bus, "5"],
+            ["read-all", self.bus, "5"],
+        ):
+            done = self.run_program("can", *words, "--eds", "damaged.eds")
+            self.assertRegex(
+                done.stderr,
+                rf"(?m)^hal can [a-z -]+: damaged\.eds:{line}: 'SubNumber' of \[\w+\] is not a number: '2O'; ",
+                words,
+            )
+            self.assertEqual(1, done.stderr.count("'2O'"), words)
+
     def test_an_unreliable_file_is_rejected(self):
         self.can("sdo", "write", self.bus, "5", "1017", "5000", "--type", "u16")
         self.can("dcf", "read", self.bus, "5", "--eds", "io.eds", "-o", "io.dcf")

@@ -35,7 +35,7 @@ def ours(hal, path):
     took = 1000 * (time.monotonic() - start)
     lines = done.stderr.decode().splitlines()
     found = SUMMARY.search(lines[-1]) if lines else None
-    if done.returncode == 0 and found:
+    if done.returncode in (0, 1) and found:
         return (*map(int, found.groups()), took)
     if done.returncode == 1 and lines and "rejected" in lines[-1]:
         return next((line for line in lines if " error: " in line), "rejected without a reason")

@@ -89,7 +89,6 @@ int run_can_dcf_read(const DcfReadOptions& options) {
     std::uint8_t node = 0;
     ObjectNames names;
     if (!node_of(options, options.words[1], node) || !names.load(options, options.eds)) return 1;
-    names.print_doubts(options);
     if (names.description()->objects.empty()) {
         return fail(options, fmt::format("'{}' describes no object: nothing to read; give the "
                                          "whole EDS of the device",
@@ -283,7 +282,7 @@ int run_can_dcf_write(const DcfWriteOptions& options) {
     if (!node_of(options, options.words[1], node)) return 1;
     ObjectNames names;
     if (!names.load(options, options.words[2])) return 1;
-    if (names.print_doubts(options) != 0) {
+    if (!names.reliable()) {
         return fail(options, fmt::format("'{}' is not reliable: no setting was {}; correct the "
                                          "file, or create it again: hal can dcf read",
                                          options.words[2], options.check ? "compared" : "written"));

@@ -49,7 +49,7 @@ std::string counted(std::size_t n, const char* what) {
     return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s");
 }
 
-/// "motor.eds: Motor by Maker; 52 objects, 238 entries, 4 RPDOs, 4 TPDOs; 1 warning, 0 notes"
+/// "motor.eds: not reliable (2 problems); Motor by Maker; 52 objects, 238 entries, 4 RPDOs, 4 TPDOs; 1 warning, 0 notes"
 std::string summary(const std::string& path, const eds::Reading& reading) {
     const eds::DeviceDescription& d = *reading.description;
     std::size_t receive = 0;
@@ -59,6 +59,9 @@ std::string summary(const std::string& path, const eds::Reading& reading) {
         send += object.index >= 0x1800 && object.index < 0x1A00;
     }
     std::string text = path + ": ";
+    if (const std::size_t doubts = reading.doubts().size(); doubts != 0) {
+        text += fmt::format("not reliable ({}); ", counted(doubts, "problem"));
+    }
     if (d.commissioning) {
         text += fmt::format("configuration of node {}; ", d.commissioning->node_id);
     }
@@ -96,7 +99,7 @@ int check(const Options& options, const std::string& path) {
                 ? printable(summary(path, reading)) + "\n"
                 : fmt::format("{}: rejected, not a usable device description\n", printable(path));
     write_all(STDERR_FILENO, text);
-    return reading.description ? 0 : 1;
+    return reading.description && reading.doubts().empty() ? 0 : 1;
 }
 
 }  // namespace

@@ -112,6 +112,7 @@ bool ObjectNames::load(const Options& options, const std::string& file) {
     }
     file_ = file;
     doubts_ = reading.doubts();
+    print_doubts(options);
     description_ = std::move(reading.description);
     for (const eds::Object& object : description_->objects) {
         for (const eds::Entry& entry : object.entries) {
@@ -127,7 +128,7 @@ bool ObjectNames::load(const Options& options, const std::string& file) {
     return true;
 }
 
-std::size_t ObjectNames::print_doubts(const Options& options) const {
+void ObjectNames::print_doubts(const Options& options) const {
     constexpr std::size_t max_printed = 3;
     for (std::size_t n = 0; n < doubts_.size() && n < max_printed; ++n) {
         const eds::Message& doubt = doubts_[n];
@@ -138,7 +139,6 @@ std::size_t ObjectNames::print_doubts(const Options& options) const {
         fail(options, fmt::format("{} more; list them with: hal can eds check {}",
                                   doubts_.size() - max_printed, file_));
     }
-    return doubts_.size();
 }
 
 ObjectName ObjectNames::named(std::uint16_t index, std::uint8_t sub) const {

@@ -27,11 +27,11 @@ struct ObjectName {
 /// The object names of a device; empty without a file.
 class ObjectNames {
 public:
-    /// Reads an EDS; does nothing when `file` is empty. Returns false after printing the reason.
+    /// Reads an EDS; does nothing when `file` is empty. Prints the problems that make values of the
+    /// file unreliable, the first ones with their lines. Returns false after printing the reason.
     bool load(const Options&, const std::string& file);
-    /// Prints the problems that make values of the file unreliable, the first ones with their
-    /// lines. Returns their number.
-    std::size_t print_doubts(const Options&) const;
+    /// False when load() has printed such problems.
+    bool reliable() const { return doubts_.empty(); }
     /// Finds `6041`, `0x1018:1`, `Statusword`, `Identity Object/Vendor-ID`, `vendor-id`. Returns
     /// false and sets `problem`.
     bool find(const std::string& text, ObjectName&, std::string& problem) const;
@@ -41,6 +41,7 @@ public:
     }
 
 private:
+    void print_doubts(const Options&) const;
     struct Row {
         std::string words;  ///< as returned by `plain`
         ObjectName object;

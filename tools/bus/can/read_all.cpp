@@ -91,7 +91,6 @@ int run_can_read_all(const ReadAllOptions& options) {
     std::uint8_t node = 0;
     ObjectNames names;
     if (!node_of(options, options.words[1], node) || !names.load(options, options.eds)) return 1;
-    names.print_doubts(options);
     if (names.description()->objects.empty()) {
         return fail(options, fmt::format("'{}' describes no object: nothing to read; give the "
                                          "whole EDS of the device",
