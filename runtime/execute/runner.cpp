@@ -8,7 +8,6 @@
 #include <cstring>
 #include <ctime>
 #include <fstream>
-#include <iterator>
 #include <sched.h>
 #include <stdexcept>
 #include <sys/prctl.h>
@@ -16,6 +15,8 @@
 #include <sys/syscall.h>
 #include <thread>
 #include <unistd.h>
+
+#include "hal/read_file.hpp"
 
 namespace hal {
 namespace {
@@ -253,8 +254,11 @@ void Runner::loop() noexcept {
 std::uint64_t Runner::page_faults() const {
     const std::uint64_t before = faults_before_.load(std::memory_order_acquire);
     if (before == 0) return 0;
-    std::ifstream file("/proc/self/task/" + std::to_string(tid.load()) + "/stat");
-    std::string text((std::istreambuf_iterator<char>(file)), {});
+    constexpr std::size_t most = 4096;
+    std::string text;
+    if (!read_regular_file("/proc/self/task/" + std::to_string(tid.load()) + "/stat", most, text)) {
+        return 0;
+    }
     const auto name_end = text.rfind(')');
     if (name_end == std::string::npos) return 0;
     unsigned long long minor = 0;

@@ -4,12 +4,14 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <sched.h>
 #include <sstream>
 #include <unistd.h>
 #include <vector>
+
+#include "hal/read_file.hpp"
+#include "text/folder_entries.hpp"
 
 namespace hal {
 namespace {
@@ -31,8 +33,9 @@ struct TaskStat {
 };
 
 bool read_stat(const fs::path& path, TaskStat& stat) {
-    std::ifstream file(path);
-    const std::string text((std::istreambuf_iterator<char>(file)), {});
+    constexpr std::size_t most = 4096;
+    std::string text;
+    if (!read_regular_file(path.string(), most, text)) return false;
     const auto begin = text.find('(');
     const auto end = text.rfind(')');
     if (begin == std::string::npos || end == std::string::npos) return false;
@@ -66,14 +69,12 @@ bool is_number(const std::string& name) {
 
 std::string cpu_occupant(int cpu) {
     const std::string own = std::to_string(::getpid());
-    std::error_code unreadable;
-    for (const auto& process : fs::directory_iterator("/proc", unreadable)) {
-        const std::string pid = process.path().filename().string();
+    for (const fs::path& process : folder_entries("/proc")) {
+        const std::string pid = process.filename().string();
         if (!is_number(pid) || pid == own) continue;
-        std::error_code ended;
-        for (const auto& task : fs::directory_iterator(process.path() / "task", ended)) {
+        for (const fs::path& task : folder_entries(process / "task")) {
             TaskStat stat;
-            if (read_stat(task.path() / "stat", stat) && occupies(stat, cpu)) {
+            if (read_stat(task / "stat", stat) && occupies(stat, cpu)) {
                 return description(pid, stat);
             }
         }

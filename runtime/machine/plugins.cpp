@@ -20,6 +20,7 @@
 #include "machine/plugin_file.hpp"
 #include "machine/source_tree.hpp"
 #include "paths.hpp"
+#include "text/folder_entries.hpp"
 
 namespace hal {
 namespace {
@@ -267,10 +268,9 @@ std::optional<Plugin> open_component(const Plugins& plugins, std::string_view na
 std::vector<std::string> Plugins::available() const {
     std::set<std::string> names;
     for (const std::string& folder : path_) {
-        std::error_code none;
-        for (const auto& entry : fs::directory_iterator(folder, none)) {
-            if (entry.path().extension() == ".so") {
-                names.insert(entry.path().stem().string());
+        for (const fs::path& path : folder_entries(folder)) {
+            if (path.extension() == ".so") {
+                names.insert(path.stem().string());
             }
         }
     }

@@ -16,6 +16,7 @@
 #include "machine/plugins.hpp"
 #include "netlist/netlist.hpp"
 #include "text/diagnostic.hpp"
+#include "text/folder_entries.hpp"
 
 namespace hal::tools {
 
@@ -204,9 +205,8 @@ std::string formatted(std::string text) {
 bool has_package(const fs::path& prefix) {
     std::error_code none;
     if (fs::exists(prefix / "lib/cmake/Halcyon/HalcyonConfig.cmake", none)) return true;
-    for (const auto& folder :
-         fs::directory_iterator(prefix / "lib", none)) {  // lib/x86_64-linux-gnu
-        if (fs::exists(folder.path() / "cmake/Halcyon/HalcyonConfig.cmake", none)) return true;
+    for (const fs::path& folder : folder_entries(prefix / "lib")) {  // lib/x86_64-linux-gnu
+        if (fs::exists(folder / "cmake/Halcyon/HalcyonConfig.cmake", none)) return true;
     }
     return false;
 }

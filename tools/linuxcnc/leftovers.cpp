@@ -21,6 +21,7 @@
 #include <unistd.h>
 
 #include "cli/output.hpp"
+#include "text/folder_entries.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::tools {
@@ -39,13 +40,12 @@ struct Process {
 
 std::vector<Process> processes() {
     std::vector<Process> all;
-    std::error_code none;
-    for (const auto& entry : fs::directory_iterator("/proc", none)) {
-        const auto number = parse_natural(entry.path().filename().string());
+    for (const fs::path& path : folder_entries("/proc")) {
+        const auto number = parse_natural(path.filename().string());
         if (!number) continue;
         // not a stream: reading of a process that has just ended fails, which a stream throws
         char content[1024];
-        const int file = ::open((entry.path() / "stat").c_str(), O_RDONLY | O_CLOEXEC);
+        const int file = ::open((path / "stat").c_str(), O_RDONLY | O_CLOEXEC);
         const ssize_t length = file < 0 ? 0 : ::read(file, content, sizeof content);
         if (file >= 0) {
             ::close(file);

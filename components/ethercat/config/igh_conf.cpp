@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cctype>
-#include <filesystem>
 
 #include "ethercat/config/config.hpp"
 #include "text/characters.hpp"
+#include "text/folder_entries.hpp"
 
 namespace hal::ethercat::config {
 
@@ -49,12 +49,11 @@ std::string link_of_device(std::string_view device, const std::string& interface
     if (!is_mac(device)) {
         return (device.find(':') == device.npos ? "eth:" : "") + std::string(device);
     }
-    std::error_code none;
-    for (const auto& entry : std::filesystem::directory_iterator(interfaces, none)) {
+    for (const auto& path : folder_entries(interfaces)) {
         std::string address;
-        if (read_from_disk(entry.path().string() + "/address", address) &&
+        if (read_from_disk(path.string() + "/address", address) &&
             same_word(trimmed(address), device)) {
-            return "eth:" + entry.path().filename().string();
+            return "eth:" + path.filename().string();
         }
     }
     return {};

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
 // `hal ethercat sdos`, `foe-read` and `foe-write`: the object dictionary and the files of one slave.
-#include <fstream>
-#include <iterator>
 #include <unistd.h>
 
 #include "bus/ethercat/session.hpp"
@@ -9,6 +7,7 @@
 #include "cli/output.hpp"
 #include "ethercat/wire/foe.hpp"
 #include "ethercat/wire/sii.hpp"
+#include "hal/read_file.hpp"
 
 namespace hal::tools {
 
@@ -164,18 +163,19 @@ int run_ethercat_foe_read(const EthercatFileOptions& options) {
                                                                                               : 1;
 }
 
+constexpr std::size_t max_file = std::size_t{256} << 20;
+
 int run_ethercat_foe_write(const EthercatFileOptions& options) {
     const std::size_t first = options.emulate.empty() ? 1 : 0;
     const std::size_t count = options.words.size();
     if (count != first + 1 && count != first + 2) {
         return fail(options, "type: hal ethercat foe-write ADDRESS -p N FILE [NAME]");
     }
-    std::ifstream file(options.words[first], std::ios::binary);
-    if (!file) {
-        return fail(options, fmt::format("cannot read '{}'", options.words[first]));
+    std::string content;
+    if (!read_regular_file(options.words[first], max_file, content)) {
+        return fail(options, fmt::format("cannot read '{}': {}", options.words[first], content));
     }
-    std::vector<std::uint8_t> bytes((std::istreambuf_iterator<char>(file)),
-                                    std::istreambuf_iterator<char>());
+    std::vector<std::uint8_t> bytes(content.begin(), content.end());
     const std::string path = options.words[first];
     const std::string name =
         count == first + 2 ? options.words.back() : path.substr(path.rfind('/') + 1);

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: MIT
 // `hal ethercat reg-read`, `reg-write`, `sii-read`, `sii-write` and `alias`: registers and EEPROM of one slave.
 #include <fmt/core.h>
-#include <fstream>
-#include <iterator>
 #include <unistd.h>
 
 #include "bus/ethercat/wire.hpp"
 #include "bus/ethercat/words.hpp"
 #include "cli/output.hpp"
+#include "hal/read_file.hpp"
 
 namespace hal::tools {
 
@@ -142,14 +141,14 @@ int run_ethercat_sii_write(const EthercatPositionOptions& options) {
     if (options.words.size() != address_words + 1) {
         return fail(options, "type: hal ethercat sii-write ADDRESS -p N FILE");
     }
-    std::ifstream file(options.words.back(), std::ios::binary);
-    if (!file) {
-        return fail(options, fmt::format("cannot read '{}'", options.words.back()));
-    }
-    const std::vector<std::uint8_t> image((std::istreambuf_iterator<char>(file)),
-                                          std::istreambuf_iterator<char>());
     constexpr std::size_t least = 128;
     constexpr std::size_t most = 128 * 1024;
+    constexpr std::size_t max_file = std::size_t{16} << 20;
+    std::string content;
+    if (!read_regular_file(options.words.back(), max_file, content)) {
+        return fail(options, fmt::format("cannot read '{}': {}", options.words.back(), content));
+    }
+    const std::vector<std::uint8_t> image(content.begin(), content.end());
     if (image.size() < least || image.size() > most || image.size() % 2 != 0) {
         return fail(
             options,
