@@ -41,6 +41,7 @@ struct Client::State {
     std::size_t payload_left = 0;  ///< bytes still to come of the newest event
     std::function<void(std::string_view)> notice;
     static constexpr std::size_t most_payload = std::size_t{256} << 20;
+    InstanceWitness witness;
     std::string reason;       ///< that the other side gave for closing the connection
 
     ~State() { lose(); }
@@ -215,6 +216,7 @@ std::unique_ptr<Client> Client::connect(std::string_view instance, std::string& 
     }
     s.version = hello.value("version", "");
     s.pid = hello.value("pid", std::int64_t{0});
+    s.witness.watch(instance, s.pid);
     return client;
 }
 
@@ -229,6 +231,7 @@ bool Client::look() {
     return connected();
 }
 const std::string& Client::closed_because() const { return state_->reason; }
+InstanceEnd Client::instance_end() const { return state_->witness.end(); }
 void Client::on_notice(std::function<void(std::string_view)> take) {
     state_->notice = std::move(take);
 }
@@ -290,6 +293,7 @@ Client::Answer answer_of(const Json& reply) {
         answer.err = reply.value("error", "no answer") + "\n";
         return answer;
     }
+    answer.executed = true;
     answer.status = reply.value("status", 0);
     answer.out = reply.value("out", "");
     answer.err = reply.value("err", "");

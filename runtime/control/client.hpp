@@ -33,6 +33,9 @@ public:
     /// Looks whether the other side is still there, without waiting; events that have come are
     /// kept.
     bool look();
+    /// How the instance ended, once the connection is lost. Waits up to 1 s for a process that is
+    /// just ending.
+    InstanceEnd instance_end() const;
     /// The reason the server gave for closing the connection; "" when it gave none.
     const std::string& closed_because() const;
     /// Receives what a waiting command reports meanwhile; without it these reports are dropped.
@@ -63,6 +66,8 @@ public:
 
     struct Answer {
         int status = 1;
+        /// False: the instance did not execute it, or the connection was lost; `err` has the reason.
+        bool executed = false;
         std::string out, err;
         bool quit = false;  ///< the command was quit or exit
         bool collecting = false;  ///< between begin and commit

@@ -114,7 +114,7 @@ bool Endpoint::take_lock(std::string_view name, Diagnostics& diagnostics) {
         close(lock_);
     }
     lock_file_ = file;
-    const std::string pid = std::to_string(getpid()) + "\n";
+    const std::string pid = lock_content(getpid());
     if (ftruncate(lock_, 0) != 0 || pwrite(lock_, pid.data(), pid.size(), 0) < 0) {
         diagnostics.error("no-socket", {}, "'" + file + "' cannot be written: " + system_reason());
         return false;
@@ -142,6 +142,8 @@ bool Endpoint::listen_at(Diagnostics& diagnostics) {
 
 void Endpoint::stop_listening() {
     if (socket_ < 0) return;
+    // whoever watches the file sees that this instance ends in order
+    [[maybe_unused]] const int emptied = ftruncate(lock_, 0);
     unlink(path_.c_str());
     close(std::exchange(socket_, -1));
 }

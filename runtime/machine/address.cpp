@@ -4,25 +4,40 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
-#include <filesystem>
 
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "text/folder_entries.hpp"
+
 namespace hal {
 namespace {
 
 constexpr std::string_view lock_ending = ".lock";
 
+/// True when no living process holds the lock of this file.
+bool is_free(int file) {
+    if (flock(file, LOCK_SH | LOCK_NB) != 0) return false;
+    flock(file, LOCK_UN);
+    return true;
+}
+
 /// True when a living process holds the lock of this file.
 bool held(const std::string& path) {
     const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
     if (file < 0) return false;
-    const bool free = flock(file, LOCK_SH | LOCK_NB) == 0;
+    const bool free = is_free(file);
     close(file);
     return !free;
+}
+
+/// Returns what a lock file contains; nothing when it cannot be read.
+std::string read_lock(int file) {
+    std::array<char, 32> text{};
+    const ssize_t got = pread(file, text.data(), text.size(), 0);
+    return {text.data(), static_cast<std::size_t>(std::max<ssize_t>(got, 0))};
 }
 
 /// True for a real folder of this user that nobody else can write to: not one that a link in /tmp
@@ -93,30 +108,45 @@ std::string socket_path(std::string_view name) {
     return socket_folder() + "/" + std::string(name) + ".sock";
 }
 
-bool was_killed(std::string_view name) {
-    constexpr int looks = 100;
+std::string lock_content(std::int64_t pid) { return std::to_string(pid) + "\n"; }
 
-    constexpr int apart_us =
-        10'000;  // the kernel closes the connections of a killed process a little before its lock
-    for (int i = 0; i < looks && access(socket_path(name).c_str(), F_OK) == 0; ++i) {
-        if (!held(lock_path(name))) return true;
+InstanceWitness::~InstanceWitness() {
+    if (file_ >= 0) {
+        close(file_);
+    }
+}
+
+void InstanceWitness::watch(std::string_view name, std::int64_t pid) {
+    file_ = open(lock_path(name).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+    content_ = lock_content(pid);
+}
+
+InstanceEnd InstanceWitness::end() const {
+    // the kernel closes the connections of a killed process a little before its lock
+    constexpr int looks = 100;
+    constexpr int apart_us = 10'000;
+    for (int i = 0; i < looks; ++i) {
+        const std::string content = read_lock(file_);
+        if (content.empty()) return InstanceEnd::ended;
+        // else another instance has it by now
+        if (content != content_ || is_free(file_)) return InstanceEnd::killed;
         usleep(apart_us);
     }
-    return false;
+    return InstanceEnd::running;
 }
+
 std::string lock_path(std::string_view name) {
     return socket_folder() + "/" + std::string(name) + std::string(lock_ending);
 }
 
 std::vector<std::string> running_instances() {
     std::vector<std::string> names;
-    std::error_code ignored;
     const bool is_own = is_own_folder(socket_folder());
-    for (const auto& entry : std::filesystem::directory_iterator(socket_folder(), ignored)) {
-        const std::string file = entry.path().filename().string();
+    for (const auto& path : folder_entries(socket_folder())) {
+        const std::string file = path.filename().string();
         if (!file.ends_with(lock_ending)) continue;
         const std::string name = file.substr(0, file.size() - lock_ending.size());
-        if (held(entry.path().string())) {
+        if (held(path.string())) {
             names.push_back(name);
         } else if (is_own && good_instance_name(name)) {
             remove_left_behind(name);

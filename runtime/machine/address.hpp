@@ -3,6 +3,7 @@
 // /tmp/halcyon-UID/NAME.sock.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,9 +20,31 @@ std::string socket_path(std::string_view name);
 /// The file beside the socket that a running instance keeps locked; it contains the process id.
 std::string lock_path(std::string_view name);
 
-/// Returns whether the instance of this name left its socket behind: one that ends in order removes
-/// it, and one that runs holds its lock. Waits up to 1 s for a process that is just ending.
-bool was_killed(std::string_view name);
+enum class InstanceEnd {
+    ended,   ///< in order
+    killed,  ///< without removing its socket
+    running  ///< it has not ended
+};
+
+/// The lock file of an instance, opened while it runs: whoever removes the file or starts another
+/// instance of this name meanwhile, it shows how this one ended.
+class InstanceWitness {
+public:
+    InstanceWitness() = default;
+    ~InstanceWitness();
+    InstanceWitness(const InstanceWitness&) = delete;
+
+    void watch(std::string_view name, std::int64_t pid);
+    /// Waits up to 1 s for a process that is just ending.
+    InstanceEnd end() const;
+
+private:
+    int file_ = -1;
+    std::string content_;
+};
+/// What the lock file of the running process `pid` contains. One that ends in order empties it
+/// before it closes its connections.
+std::string lock_content(std::int64_t pid);
 
 /// Names of the instances that run now and belong to this user, sorted. Removes what killed
 /// instances left behind.

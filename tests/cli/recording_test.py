@@ -581,6 +581,20 @@ class Live(Case):
         )
         self.assertRegex(out, r"^run\.mcap: \d+ rows? of 1 value")
 
+    def test_the_machine_is_killed_and_another_program_removes_its_socket(self):
+        process = self.recorder("run.mcap", "sine")
+        wait_until((self.folder / "run.mcap.part").exists, "the file is begun")
+        process.send_signal(signal.SIGSTOP)
+        self.machine.kill()
+        self.machine.wait(60)
+        self.assertEqual(1, self.run_program("shell", "getp", "sine").returncode)
+        self.assertFalse((self.folder / "halcyon" / "default.sock").exists())
+        process.send_signal(signal.SIGCONT)
+        self.assertEqual(
+            (1, "hal record: instance 'default' was killed; the file is complete up to there\n"),
+            (process.wait(60), process.stderr.read()),
+        )
+
     def test_a_trigger_that_never_fires_is_told(self):
         self.shell("newsig", "crash", "bit")
         self.assertEqual(

@@ -89,7 +89,8 @@ public:
                 memory.prune(now_ns_, std::min(backlog.needed_from_ns(),
                                                trigger.pending() ? trigger.begin_ns() : INT64_MAX));
             }
-            if (got == ProbeClient::Got::disconnected && was_killed(client_.instance())) {
+            if (got == ProbeClient::Got::disconnected &&
+                client_.instance_end() == InstanceEnd::killed) {
                 trigger.event(now_ns_, "end-of-machine");
             }
             if (trigger.pending() && (over || now_ns_ >= trigger.end_ns())) {
@@ -198,12 +199,13 @@ private:
     int lost_machine() {
         const int status = finish();
         if (status != 0) return status;
-        if (was_killed(client_.instance())) {
+        const InstanceEnd end = client_.instance_end();
+        if (end == InstanceEnd::killed) {
             return fail(options_,
                         fmt::format("instance '{}' was killed; the file is complete up to there",
                                     client_.instance()));
         }
-        if (std::filesystem::exists(socket_path(client_.instance()))) {
+        if (end == InstanceEnd::running) {
             return fail(options_, fmt::format("instance '{}' closed the connection, and runs on; "
                                               "the file is complete up to there",
                                               client_.instance()));

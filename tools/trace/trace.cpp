@@ -9,7 +9,6 @@
 #include <ctime>
 #include <deque>
 #include <fcntl.h>
-#include <filesystem>
 #include <fmt/core.h>
 #include <map>
 #include <memory>
@@ -323,8 +322,9 @@ int Tracer::finish() {
     int status = 0;
     if (!client_->connected()) {
         const std::string& why = client_->closed_because();
-        const bool killed = was_killed(client_->instance());
-        const bool runs = !killed && std::filesystem::exists(socket_path(client_->instance()));
+        const InstanceEnd end = client_->instance_end();
+        const bool killed = end == InstanceEnd::killed;
+        const bool runs = end == InstanceEnd::running;
         const std::string ended =
             !why.empty()
                 ? fmt::format("instance '{}' closed the connection: {}", client_->instance(), why)
