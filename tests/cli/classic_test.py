@@ -104,6 +104,24 @@ class Halcmd(Case):
         self.assertEqual((0, 2), (done.returncode, done.stderr.count("HALCMD MSG: hello")))
         self.assertIn("loadrt sum2", (self.folder / "two words.hal").read_text())
 
+    def test_source_prefers_the_working_directory_to_the_folder_of_the_file(self):
+        folders = ("library", "machine")
+        for folder in folders:
+            (self.folder / folder).mkdir()
+        path = self.write("machine/main.hal", "source more.hal\n")
+        self.write("machine/more.hal", "print machine\n")
+        self.environment["HALLIB_PATH"] = "library"
+        self.assertIn("HALCMD MSG: machine", self.good_text(path))
+        self.write("library/more.hal", "print library\n")
+        self.assertIn("HALCMD MSG: library", self.good_text(path))
+        self.write("more.hal", "print working directory\n")
+        self.assertIn("HALCMD MSG: working directory", self.good_text(path))
+
+    def good_text(self, path):
+        done = self.run_program("sim", path)
+        self.assertEqual(0, done.returncode, done.stderr)
+        return done.stderr
+
     def test_an_argument_with_blanks_is_saved_with_quotes(self):
         self.assertEqual(0, self.halcmd("loadrt", "sum2", "names=x y").returncode)
         saved = self.halcmd("save", "comp").stdout

@@ -90,6 +90,21 @@ class OneShot(Case):
     def test_silence(self):
         done = self.run_program("shell", "-Q", "getp", "nothing")
         self.assertEqual((1, "", ""), (done.returncode, done.stdout, done.stderr))
+        silent = [
+            ["shell", "-Q", "--name", "nobody", "getp", "adder.in0"],
+            ["shell", "-Q", "--name", "not a name", "getp", "adder.in0"],
+            ["shell", "-Q", "-i", "missing.ini", "-f", "missing.hal"],
+            ["shell", "-Q", "-f", "missing.hal"],
+            ["shell", "-Q", "-e", "begin"],
+        ]
+        for words in silent:
+            done = self.run_program(*words)
+            self.assertEqual((1, "", ""), (done.returncode, done.stdout, done.stderr), words)
+        done = self.run_program("shell", "--name", "nobody", "getp", "adder.in0")
+        self.assertEqual(
+            (1, "hal shell: no instance 'nobody' is running; running: default\n"),
+            (done.returncode, done.stderr),
+        )
 
     def test_json(self):
         self.assertEqual(2, json.loads(self.good("shell", "--json", "getp", "adder.in0"))["value"])

@@ -25,10 +25,17 @@ namespace hal::tools {
 
 namespace {
 
+/// Prints an error, with -Q nothing. Returns 1.
+int complain(const RemoteShellOptions& options, std::string_view sentence) {
+    return options.loudness == Loudness::nothing ? 1 : fail(options, sentence);
+}
+
 /// Prints a command's output. Returns its exit status.
-int show(const Client::Answer& answer) {
+int show(const RemoteShellOptions& options, const Client::Answer& answer) {
     const bool good = print(answer.out);
-    write_all(STDERR_FILENO, answer.err);
+    if (answer.executed || options.loudness != Loudness::nothing) {
+        write_all(STDERR_FILENO, answer.err);
+    }
     return good ? answer.status : 1;
 }
 
@@ -52,7 +59,7 @@ std::optional<int> run_own(const RemoteShellOptions& options, const Client& clie
     for (std::string name; words >> name;) {
         arguments.push_back(name);
     }
-    if (arguments.size() == own) return fail(options, "missing name; type: watch NAME");
+    if (arguments.size() == own) return complain(options, "missing name; type: watch NAME");
     return run_tool(std::move(arguments));
 }
 
@@ -64,7 +71,7 @@ public:
     int execute(std::string_view line, std::uint32_t number) {
         if (const auto status = run_own(options_, client_, line)) return *status;
         last_ = client_.run(line, name_, number);
-        const int status = show(last_);
+        const int status = show(options_, last_);
         if (!options_.classic && line == "help") {
             print(watch_help);
         }
@@ -117,9 +124,9 @@ int follow_input(Client& client, const RemoteShellOptions& options) {
     if (::fstat(STDIN_FILENO, &about) == 0 && S_ISREG(about.st_mode)) {
         std::string text;
         if (!read_file("-", text)) {
-            return fail(options, fmt::format("cannot read standard input: {}", text));
+            return complain(options, fmt::format("cannot read standard input: {}", text));
         }
-        return show(client.run_text("<stdin>", text));
+        return show(options, client.run_text("<stdin>", text));
     }
     RemoteShell executor(client, options, "<stdin>");
     LineReader input(STDIN_FILENO);
@@ -143,7 +150,6 @@ int follow_input(Client& client, const RemoteShellOptions& options) {
             begin = 0;
         }
     }
-    if (options.loudness == Loudness::nothing) return executor.collecting() ? 1 : status;
     if (status != 0 && !options.keep_going && first > 1) {
         const std::uint32_t last = (begin != 0 ? begin : first) - 1;  // that took effect
         std::string sentence = "a pipe is read line by line: ";
@@ -158,9 +164,9 @@ int follow_input(Client& client, const RemoteShellOptions& options) {
         if (begin != 0) {
             sentence += fmt::format("the edits collected from line {} on had no effect", begin);
         }
-        fail(options, sentence);
+        complain(options, sentence);
     } else if (executor.collecting()) {
-        return fail(
+        return complain(
             options,
             fmt::format("'begin' in line {} without 'commit': the collected edits had no effect",
                         begin));
@@ -170,12 +176,11 @@ int follow_input(Client& client, const RemoteShellOptions& options) {
 
 /// The end of a connection after `begin` discards the collected edits.
 int without_commit(const RemoteShellOptions& options, const Client::Answer& last, int status) {
-    if (!last.collecting || options.loudness == Loudness::nothing) {
-        return last.collecting ? 1 : status;
-    }
-    return fail(options,
-                "'begin' without 'commit' had no effect; write the transaction to a file, or type: "
-                "hal shell");
+    if (!last.collecting) return status;
+    return complain(
+        options,
+        "'begin' without 'commit' had no effect; write the transaction to a file, or type: "
+        "hal shell");
 }
 
 /// Reads the user's INI file, which the instance has not read. Returns false after printing an
@@ -184,7 +189,9 @@ bool read_ini(const RemoteShellOptions& options, Client::Options& how) {
     Sources sources;
     Diagnostics diagnostics;
     const Ini ini = Ini::read(sources, options.ini, diagnostics);
-    write_all(STDERR_FILENO, render(diagnostics, sources, colours(STDERR_FILENO)));
+    if (options.loudness != Loudness::nothing) {
+        write_all(STDERR_FILENO, render(diagnostics, sources, colours(STDERR_FILENO)));
+    }
     for (const Ini::Entry& entry : ini.entries()) {
         how.ini.push_back(
             {entry.section, entry.key, entry.value, sources.location(entry.at, false)});
@@ -218,10 +225,10 @@ int follow_file(Client& client, const RemoteShellOptions& options) {
     const std::string& path = options.words.front();
     std::string text;
     if (!read_file(path, text)) {
-        fail(options, fmt::format("cannot read '{}': {}", path, text));
+        complain(options, fmt::format("cannot read '{}': {}", path, text));
         return options.classic ? 255 : 1;
     }
-    return show(client.run_text(path, text));
+    return show(options, client.run_text(path, text));
 }
 
 }  // namespace
@@ -229,18 +236,18 @@ int follow_file(Client& client, const RemoteShellOptions& options) {
 int run_shell(const RemoteShellOptions& options) {
     if (options.from_file && !options.words.empty() && !options.classic &&
         options.words.size() > 1) {
-        return fail(options,
-                    fmt::format("unexpected argument '{}' after the file; options go before -f",
-                                options.words[1]));
+        return complain(options,
+                        fmt::format("unexpected argument '{}' after the file; options go before -f",
+                                    options.words[1]));
     }
     std::string problem;
     const auto client = Client::connect(instance_wanted(options.name), problem);
-    if (!client) return fail(options, problem);
+    if (!client) return complain(options, problem);
     client->on_notice([](std::string_view text) { write_all(STDERR_FILENO, text); });
     Client::Options how = client_options(options);
     if (!options.ini.empty() && !read_ini(options, how)) return 1;
     if (!client->set_options(how) && !client->connected()) {
-        return fail(options, fmt::format("instance '{}' does not respond", client->instance()));
+        return complain(options, fmt::format("instance '{}' does not respond", client->instance()));
     }
     if (options.from_file && !options.words.empty()) return follow_file(*client, options);
     if (!options.execute.empty()) {
@@ -249,8 +256,8 @@ int run_shell(const RemoteShellOptions& options) {
         for (const std::string& command : options.execute) {
             if (status != 0 && !options.keep_going) break;
             const auto own = run_own(options, *client, command);
-            status =
-                std::max(status, own ? *own : show(last = client->run(command, "<commandline>")));
+            status = std::max(
+                status, own ? *own : show(options, last = client->run(command, "<commandline>")));
         }
         return without_commit(options, last, status);
     }
@@ -264,7 +271,7 @@ int run_shell(const RemoteShellOptions& options) {
             options.words.size() == 1 && options.words[0].find_first_of(" \t") != std::string::npos;
         const Client::Answer answer =
             line ? client->run(options.words[0], "<commandline>") : client->run(options.words);
-        return without_commit(options, answer, show(answer));
+        return without_commit(options, answer, show(options, answer));
     }
     if (!::isatty(STDIN_FILENO)) return follow_input(*client, options);
     if (!options.classic) {
@@ -280,9 +287,10 @@ int run_shell(const RemoteShellOptions& options) {
     const int status = run_prompt_loop(executor, prompt);
     if (client->connected()) return status;
     const std::string& why = client->closed_because();
-    return fail(options, why.empty() ? fmt::format("instance '{}' has ended", client->instance())
-                                     : fmt::format("instance '{}' closed the connection: {}",
-                                                   client->instance(), why));
+    return complain(options, why.empty()
+                                 ? fmt::format("instance '{}' has ended", client->instance())
+                                 : fmt::format("instance '{}' closed the connection: {}",
+                                               client->instance(), why));
 }
 
 }  // namespace hal::tools
