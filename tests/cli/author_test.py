@@ -82,7 +82,7 @@ class Author(Case):
                     line for line in done.stderr.splitlines() if line.startswith("hal compile")
                 ]  # the compiler may warn
                 self.assertEqual(
-                    [f"hal compile: {message}; nothing was installed"], own, done.stderr
+                    [f"hal compile: {message}; it was not installed"], own, done.stderr
                 )
                 self.assertFalse((self.folder / "plugins/mine.so").exists())
 

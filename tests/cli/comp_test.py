@@ -294,7 +294,7 @@ FUNCTION(_) {
         for place in ("wrong.comp:4:", "wrong.comp:9:", "wrong.comp:10:"):
             self.assertIn(place, said)
         self.assertIn("assignment of read-only location", said)
-        self.assertIn("'wrong.comp' does not compile; nothing was installed", said)
+        self.assertIn("'wrong.comp' does not compile; it was not installed", said)
 
     def test_mistakes_in_declarations_are_all_reported(self):
         said = self.refused(
@@ -306,7 +306,7 @@ FUNCTION(_) {
             said,
         )
         self.assertIn("did you mean 'bit'?", said)
-        self.assertIn("'wrong.comp' has 2 errors; nothing was installed", said)
+        self.assertIn("'wrong.comp' has 2 errors; it was not installed", said)
 
 
 if __name__ == "__main__":

@@ -71,7 +71,7 @@ class Compile(harness.Case):
         self.assertIn("missing line in the component: using Component::Component;", done.stderr)
         self.assertTrue(
             done.stderr.endswith(
-                "hal compile: 'lag.cpp' does not compile; nothing was installed\n"
+                "hal compile: 'lag.cpp' does not compile; it was not installed\n"
             ),
             done.stderr,
         )
@@ -82,7 +82,23 @@ class Compile(harness.Case):
         self.assertEqual(
             done.stderr,
             "hal compile: 'none.cpp' compiles, but is not a component: it exports no symbol hal_plugin, "
-            'which HAL_COMPONENT(Type, "name", "summary") makes; nothing was installed\n',
+            'which HAL_COMPONENT(Type, "name", "summary") makes; it was not installed\n',
+        )
+
+    def test_reports_each_of_several_files_by_itself(self):
+        self.write("lag.cpp", LAG)
+        self.write("none.cpp", "int x;\n")
+        self.write("wrong.comp", "component wrong;\npin inn bit a;\n;;\n")
+        done = self.compile("lag.cpp", "none.cpp", "wrong.comp")
+        self.assertEqual(1, done.returncode)
+        self.assertIn("lag: 3 pins, 1 function; installed as ", done.stdout)
+        self.assertEqual(
+            [
+                "hal compile: 'none.cpp' compiles, but is not a component: it exports no symbol "
+                'hal_plugin, which HAL_COMPONENT(Type, "name", "summary") makes; it was not installed',
+                "hal compile: 'wrong.comp' has 1 error; it was not installed",
+            ],
+            [line for line in done.stderr.splitlines() if line.startswith("hal compile: ")],
         )
 
     def test_reports_a_missing_compiler_in_one_sentence(self):

@@ -331,7 +331,7 @@ private:
             return fail(
                 fmt::format("{} failed with status {} and no message", words.front(), status));
         }
-        return fail(fmt::format("'{}' does not compile; nothing was installed", source_.path));
+        return fail(fmt::format("'{}' does not compile; it was not installed", source_.path));
     }
 
     bool try_out() {
@@ -339,16 +339,16 @@ private:
         const bool is_loaded = options_.load && !source_.program;
         if (is_loaded && !try_plugin(temporary_.path(), source_.name, source_, built_)) {
             if (built_.loads) {
-                return fail(fmt::format("{}; nothing was installed", built_.problem));
+                return fail(fmt::format("{}; it was not installed", built_.problem));
             }
             return fail(
-                fmt::format("'{}' compiles, but is not a component: {}; nothing was installed",
+                fmt::format("'{}' compiles, but is not a component: {}; it was not installed",
                             source_.path, built_.problem));
         }
         if (built_.name.empty() || built_.name.find('/') != std::string::npos) {
             return fail(
                 fmt::format("'{}' names its component '{}', which cannot be a file's name; "
-                            "nothing was installed",
+                            "it was not installed",
                             source_.path, built_.name));
         }
         built_.path = library_;

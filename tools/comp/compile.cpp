@@ -57,7 +57,7 @@ bool prepare_comp(const Options& options, const std::string& path, PluginSource&
     auto made = comp::translate(sources, sources.add(path, std::move(text)), diagnostics);
     write_all(STDERR_FILENO, render(diagnostics, sources, colours(STDERR_FILENO)));
     if (!made) {
-        fail(options, fmt::format("'{}' has {}; nothing was installed", path,
+        fail(options, fmt::format("'{}' has {}; it was not installed", path,
                                   counted(diagnostics.errors(), "error")));
 
         return false;
