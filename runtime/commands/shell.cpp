@@ -375,7 +375,7 @@ int Shell::run_ini(const std::string& path, Output& output) {
     for (const std::string& command : ini.all("HAL", "HALCMD")) {
         commands += command + "\n";
     }
-    if (status == 0 && files.empty() && commands.empty() && after_display.empty()) {
+    if (status == 0 && files.empty() && commands.empty()) {
         return reject_without_netlist(*this, path, output);
     }
     bool quit = false;

@@ -233,7 +233,8 @@ inline constexpr CodePage code_pages[] = {
     {"ini-without-netlist",
      "An INI file that is run names its netlists: `HALFILE` or `HALCMD` in the section `[HAL]`. "
      "Keys "
-     "and sections are case-sensitive. A file that has only values for other netlists is given "
+     "and sections are case-sensitive. `POSTGUI_HALFILE` alone is not enough: only a display loads "
+     "it. A file that has only values for other netlists is given "
      "with `hal run --ini FILE.ini FILE.hal`."},
     {"init-done",
      "initf functions run once, in a cycle of their own before the first cyclic pass of their "
