@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Compares two recordings of the same component and stimulus."""
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 RELATIVE = 1e-9
 ABSOLUTE = 1e-12
@@ -15,6 +15,7 @@ class Difference:
     cycles: list
     ours: dict  # of each of the cycles
     theirs: dict
+    absolute: float = ABSOLUTE  # what both recordings may differ by, because of their digits
 
     @property
     def first(self):
@@ -23,7 +24,7 @@ class Difference:
     def without(self, explained):
         """The same in the cycles for which `explained(cycle)` is false; None if there are none."""
         left = [cycle for cycle in self.cycles if not explained(cycle)]
-        return Difference(self.name, left, self.ours, self.theirs) if left else None
+        return replace(self, cycles=left) if left else None
 
 
 def equal(a, b, absolute=ABSOLUTE):
@@ -52,7 +53,7 @@ def differences(ours, theirs, absolute=ABSOLUTE):
         other = theirs.columns[name]
         cycles = [i for i, (a, b) in enumerate(zip(column, other)) if not equal(a, b, absolute)]
         if cycles:
-            found.append(Difference(name, cycles, column, other))
+            found.append(Difference(name, cycles, column, other, absolute))
     for name, texts in ours.parameters.items():
         if name not in theirs.parameters:
             continue  # LinuxCNC's halrun

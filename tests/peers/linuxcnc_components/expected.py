@@ -49,7 +49,7 @@ class Behaviour:
                 reference = max(1.0, abs(a), abs(b))
             else:
                 reference = self.reference(view.at(cycle))
-            return abs(a - b) <= self.within * reference
+            return abs(a - b) <= self.within * reference + difference.absolute
 
         if not self.lasts:
             return difference.without(

@@ -7,6 +7,7 @@ threads start, and outputs go to its sampler, so a cycle that comes late changes
 import os
 import pwd
 import shutil
+import signal
 import subprocess
 import tempfile
 from pathlib import Path
@@ -43,25 +44,31 @@ class HalrunRunner:
                 if self.user
                 else {}
             )
-            environment = {"HOME": name, "PATH": "/usr/bin:/bin", "LANG": "C", "TMPDIR": name}
-            done = subprocess.run(
-                ["/usr/bin/halrun", *options, "-f", "run.hal"],
-                cwd=folder,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=timeout,
-                check=False,
+            settings = {
+                "cwd": folder,
+                "env": {"HOME": name, "PATH": "/usr/bin:/bin", "LANG": "C", "TMPDIR": name},
+                "stdin": subprocess.DEVNULL,
+                "stdout": subprocess.PIPE,
+                "stderr": subprocess.PIPE,
+                "text": True,
+                "errors": "replace",
                 **who,
-            )
+            }
+            halrun = ["/usr/bin/halrun", *options, "-f", "run.hal"]
+            done = subprocess.Popen(halrun, start_new_session=True, **settings)
+            try:
+                output, errors = done.communicate(timeout=timeout)
+            except subprocess.TimeoutExpired as error:
+                os.killpg(done.pid, signal.SIGKILL)
+                done.communicate()
+                subprocess.run(["/usr/bin/halrun", "-U"], timeout=timeout, check=False, **settings)
+                raise RunError(f"LinuxCNC's halrun hangs: {error}") from error
             left = {
                 path.name: path.read_text(errors="replace")
                 for path in folder.iterdir()
                 if path.is_file()
             }
-            return done.stdout, done.stderr, done.returncode, left
+            return output, errors, done.returncode, left
 
     def inventory(self, variant):
         text, errors, status, _ = self.halrun(

@@ -8,6 +8,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+from .runners import RunError
+
 # Components of a netlist: (line of loadrt, pins as (name, type, direction), parameters as (name, type, writable), functions).
 PARTS = [
     (
@@ -165,6 +167,25 @@ VALUES = {
     ],
 }
 TYPES = ["bit", "float", "s32", "u32"]
+# Commands at the end of a netlist. What `show funct`, `list comp` and `status` print of addresses, threads and memory differs.
+SHOWN = """list sig
+list thread
+list funct
+show sig
+show sig sig-a
+show alias
+show thread
+status lock
+save alias
+save signal
+save link
+save linka
+save net
+save neta
+save netl
+save netla
+save param
+save thread""".splitlines()
 ARROWS = ["", "", "", "=>", "<=", "<=>"]
 
 
@@ -273,7 +294,13 @@ class Generator:
 
     def text(self, commands=30):
         lines = self.lines + [self.command() for _ in range(commands)]
-        lines += ["save"]
+        lines += ["save", *SHOWN]
+        for prefix in sorted({pin[0].split(".")[0] for pin in self.pins}):
+            lines += [
+                f"{command} {kind} {prefix}*"
+                for command in ("list", "show")
+                for kind in ("pin", "param")
+            ]
         lines += [f"getp {pin[0]}" for pin in self.pins] + [
             f"getp {parameter[0]}" for parameter in self.parameters
         ]
@@ -404,12 +431,13 @@ ACCEPTED = [
 
 
 def comparable(text):
-    """The lines of stdout, without times and the order of what `save` sorts differently."""
+    """The lines of stdout, without times, numbers of components, and the order of what `save` sorts differently."""
     lines = [
         re.sub(r"(\.\S*)-sig(?= |$)", r"\1", normal(line))
         for line in text.splitlines()
         if line.strip()
     ]  # the signal of linkpp
+    lines = [re.sub(r"^\d+ (bit|float|s32|u32) ", r"\1 ", line) for line in lines]
     return [
         line
         for line in lines
@@ -442,6 +470,8 @@ def both(hal, linuxcnc, netlist):
         output, errors, status, _ = linuxcnc.halrun(text, options=["-k"])
         if "# components" in output:  # of `save`; otherwise rtapi_app did not start
             break
+    else:
+        raise RunError(errors.strip() or f"status {status}")
     theirs = (output, failed_lines(errors, netlist), status)
     with tempfile.TemporaryDirectory() as folder:
         output, errors, status = run_ours(hal, text, Path(folder))
@@ -464,7 +494,10 @@ def compare(hal, linuxcnc, seed, accepted):
     """
     netlist, lines = Generator(seed).text().splitlines(), []
     for _ in range(60):
-        ours, theirs = both(hal, linuxcnc, netlist)
+        try:
+            ours, theirs = both(hal, linuxcnc, netlist)
+        except RunError as error:
+            return [f"netlist {seed}: LinuxCNC's halrun does not run: {error}"]
         failed = judged(netlist, set(ours[1]) | set(theirs[1]))
         for number in sorted((set(ours[1]) ^ set(theirs[1])) & failed):
             side = "ours" if number in ours[1] else "LinuxCNC"
