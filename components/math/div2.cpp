@@ -16,7 +16,7 @@ struct Div2 : hal::Component {
 
     void update(hal::Cycle) noexcept {
         constexpr double min_deadband = 1e-12;
-        if (deadband < min_deadband) {
+        if (!(deadband >= min_deadband)) {  // also for NaN
             deadband.correct(min_deadband);
         }
         const double smallest = in1 < 0.0 ? -deadband : deadband;
@@ -28,8 +28,8 @@ struct Div2 : hal::Component {
 
 HAL_COMPONENT(Div2, "div2", "Quotient of two numbers", R"(
 A divisor between -`deadband` and +`deadband` counts as -`deadband` below 0 and as +`deadband` from 0 on, which limits `out`.
-(LinuxCNC's manual page documents an `out` of 0 there; its component behaves as described here.) A `deadband` below 1e-12
-is set to 1e-12. LinuxCNC prints a message at a divisor within the deadband.
+(LinuxCNC's manual page documents an `out` of 0 there; its component behaves as described here.) A `deadband` below 1e-12, or
+NaN, is set to 1e-12 (LinuxCNC: NaN remains, and a divisor of 0 gives infinity). LinuxCNC prints a message at a divisor within the deadband.
 
     loadrt div2 names=power-factor
     addf power-factor servo

@@ -15,7 +15,7 @@ struct Invert : hal::Component {
 
     void update(hal::Cycle) noexcept {
         constexpr double min_deadband = 1e-12;
-        if (deadband < min_deadband) {
+        if (!(deadband >= min_deadband)) {  // also for NaN
             deadband.correct(min_deadband);
         }
         const double value = in;
@@ -28,7 +28,8 @@ struct Invert : hal::Component {
 
 HAL_COMPONENT(Invert, "invert", "Reciprocal", R"(
 `out = 1 / in`. An input between -`deadband` and +`deadband` counts as -`deadband` below 0 and as +`deadband` from 0 on, which limits `out`:
-an input of 0 gives 1e12 with the default. A `deadband` below 1e-12 is set to 1e-12. (LinuxCNC's manual page documents an `out` of 0 within
+an input of 0 gives 1e12 with the default. A `deadband` below 1e-12, or NaN, is set to 1e-12 (LinuxCNC:
+NaN remains, and an input of 0 gives infinity). (LinuxCNC's manual page documents an `out` of 0 within
 the deadband; its component behaves as described here.)
 
     loadrt invert names=period

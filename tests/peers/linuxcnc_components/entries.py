@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The intended differences; see expected.py."""
+import math
+
 from .expected import behaviour, inventory
 
 LINKABLE = "as a read-only parameter it could not be linked; `getp` reads both"
@@ -484,6 +486,20 @@ behaviour(
     "no overflow within",
     ("hypot", "wild"),
 )
+for component, divisor, streams in (
+    ("invert", "in", {"invert.0.in": [0.0]}),
+    ("div2", "in1", {"div2.0.in0": [1.0], "div2.0.in1": [0.0]}),
+):
+    behaviour(
+        component,
+        "out|deadband",
+        lambda v: math.isnan(v["deadband"]),
+        "`deadband` is NaN",
+        "1e-12",
+        f"NaN: an `{divisor}` of 0 gives infinity",
+        "an output must not become infinite",
+        (component, streams, {f"{component}.0.deadband": float("nan")}),
+    )
 behaviour(
     "minmax",
     "max|min",
