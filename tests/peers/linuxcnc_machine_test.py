@@ -56,7 +56,7 @@ class Machine(Case):
             self.assertEqual(set(), missing, printed)
             self.assertTrue((self.folder / "path.png").exists())
             return
-        self.assertEqual({f"the path is drawn in {self.folder}/path.png"}, missing, printed)
+        self.assertEqual(lines(f"the path is drawn in {self.folder}/path.png"), missing, printed)
         self.assertIn(
             "no picture: it needs matplotlib (sudo apt-get install python3-matplotlib)\n", printed
         )
