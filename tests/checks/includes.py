@@ -84,6 +84,7 @@ ROWS = {
     "components": ["runtime/sdk", "runtime/text"],
     "components/bus/component": ["runtime/sdk", "drivers/link"],
     "components/bus/config": ["runtime/text"],
+    "components/bus/events": [],
     "components/cia402": ["runtime/sdk"],
     "components/canopen/protocol": [
         "runtime/sdk",
