@@ -145,6 +145,8 @@ ROWS = {
     "components/fieldbus/scocan/plugins": [
         "components/fieldbus/scocan/station",
         "components/fieldbus/messages",
+        "components/bus/component",
+        "components/bus/events",
         "runtime/sdk",
         "drivers/discipline",
     ],
@@ -154,12 +156,14 @@ ROWS = {
     "components/fieldbus/tdma/config": [
         "components/fieldbus/tdma/station",
         "components/bus/config",
+        "components/bus/events",
     ],
     "components/fieldbus/tdma/rtcfg": ["components/fieldbus/tdma/config"],
     "components/fieldbus/tdma/tunnel": ["components/fieldbus/tdma/config", "drivers/tap"],
     "components/fieldbus/tdma/plugins": [
         "components/fieldbus/tdma/rtcfg",
         "components/fieldbus/tdma/tunnel",
+        "components/bus/component",
     ],
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The SYNC: lost, late, doubled, sent by two; backups; mode changes.
 #include "bus.hpp"
-#include "components/fieldbus/scocan/plugins/event_words.hpp"
+#include "components/fieldbus/scocan/plugins/event_texts.hpp"
 
 namespace {
 
@@ -309,15 +309,20 @@ TEST(Babbler, is_reported_once_and_the_private_slots_survive) {
 TEST(Foreign_frame, has_a_sender_only_where_the_table_knows_one) {
     Bus bus;
     Member& ir = bus.add("ir");
-    const EventWords words(bus.table, static_cast<std::size_t>(ir.station.node()), "reset");
-    EXPECT_EQ(words.foreign(sync_id, no_node, "3"),
+    const EventTexts texts(bus.table, static_cast<std::size_t>(ir.station.node()), "reset");
+    EXPECT_EQ(texts.line({Event::foreign_frame, no_node, sync_id, 3}),
               "frame 0x000 in slot 3, outside of its own; a SYNC, of node clock or a backup");
-    EXPECT_EQ(words.foreign(announce_id, no_node, "3"),
+    EXPECT_EQ(texts.line({Event::foreign_frame, no_node, announce_id, 3}),
               "frame 0x001 in slot 3, outside of its own; an idle slot announced by the monitor");
-    EXPECT_EQ(words.foreign(answer_id, no_node, "3"),
+    EXPECT_EQ(texts.line({Event::foreign_frame, no_node, answer_id, 3}),
               "frame 0x781 in slot 3, outside of its own; reserved for the bus itself");
-    EXPECT_EQ(words.foreign(0x555, no_node, "3"),
+    EXPECT_EQ(texts.line({Event::foreign_frame, no_node, 0x555, 3}),
               "frame 0x555 in slot 3, outside of its own; its sender is not in the table");
+    EXPECT_EQ(texts.fault(Event::foreign_frame, sync_id)->text,
+              "frame 0x000 in slot {}, outside of its own; a SYNC, of node clock or a backup");
+    EXPECT_EQ(texts.fault(Event::foreign_frame, 0x555)->text,
+              "frame with an unknown identifier in slot {}, outside of its own; its sender is not "
+              "in the table");
 }
 
 TEST(Bus_off, is_reported_and_recovers) {

@@ -217,7 +217,7 @@ void TdmaStation::look() noexcept {
         applicant_->work(now);
     }
     for (tdma::Happened h; reported_.pop(h);) {
-        if (const std::string sentence = words_(h); !sentence.empty()) {
+        if (const std::string sentence = texts_.line(h); !sentence.empty()) {
             log_.print(tdma::subject(h), sentence, now);
         }
     }

@@ -10,7 +10,7 @@
 
 #include "bus/node/node_options.hpp"
 #include "bus/node/skewed_port.hpp"
-#include "fieldbus/tdma/config/event_words.hpp"
+#include "fieldbus/tdma/config/event_texts.hpp"
 #include "fieldbus/tdma/config/schedule.hpp"
 #include "fieldbus/tdma/rtcfg/rtcfg_applicant.hpp"
 #include "fieldbus/tdma/station/station.hpp"
@@ -50,7 +50,7 @@ private:
     }
 
     const tdma::config::Schedule schedule_;  // empty if received from the master
-    const tdma::EventWords words_{schedule_, "start this node again"};
+    const tdma::EventTexts texts_{schedule_, "start this node again"};
     hal::Queue<tdma::Happened> reported_{64};  // filled by the loop
     hal::MessageLog log_{"hal node"};
     std::optional<unsigned> slot_;  // slot of its frames, if chosen by the station

@@ -3,20 +3,15 @@
 #pragma once
 
 #include <array>
-#include <atomic>
-#include <cstring>
 #include <deque>
 #include <limits>
 #include <memory>
 #include <optional>
 
+#include "bus/component/bit_rate.hpp"
+#include "bus/component/bus_component.hpp"
 #include "discipline/slot_exchange.hpp"
-#include "event_words.hpp"
-#include "hal/component.hpp"
-#include "hal/discipline.hpp"
-#include "hal/function_pair.hpp"
-#include "hal/lasting_fault.hpp"
-#include "hal/naming.hpp"
+#include "event_texts.hpp"
 #include "hal/reporter.hpp"
 #include "message_pins.hpp"
 #include "station_pins.hpp"
@@ -24,20 +19,20 @@
 
 namespace hal::scocan {
 
-class StationComponent : public hal::Component, protected Sink {
+class StationComponent : public hal::bus::BusComponent, protected Sink {
 public:
     StationComponent(const hal_host* host, const char* fallback_name,
                      std::initializer_list<Role> roles)
-        : Component(host), name_(hal::own_name(fallback_name)) {
+        : BusComponent(host, fallback_name) {
         arguments_.load(roles);
         if (!arguments_.loaded) return;
         const Table& t = arguments_.table;
-        words_.emplace(t, arguments_.own, "setp " + name_ + ".reset TRUE");
-        faults_text_.emplace(t, *words_);
+        texts_.emplace(t, arguments_.own, "setp " + name_ + ".reset TRUE");
         station_ = std::make_unique<Station>(t, arguments_.own, arguments_.options(),
                                              static_cast<Sink&>(*this));
-        reporter_ = std::make_unique<hal::Reporter<Happened>>(
-            name_, [this](const Happened& h) { return (*words_)(h); }, 256, &EventWords::subject);
+        reporter_ = std::make_unique<hal::Reporter<Happened>>(name_, [this](const Happened& h) {
+            return texts_->line(h);
+        }, 256, &EventTexts::subject);
         for (const Message& m : t.messages) {
             const bool is_own = m.node == arguments_.own;
             if (is_own && t.nodes[m.node].role != Role::bridge) {
@@ -54,7 +49,6 @@ public:
             throw std::runtime_error(
                 "missing table: write link=sim:NAME config=FILE.scocan node=NAME");
         }
-        faults_ = hal::extension<hal_faults>("hal.faults/1");
         const can::Description bus = can::describe(arguments_.link.get());
         can::Options options{.own_frames = true, .stamps = bus.has_stamps};
         if (bus.in_memory && bus.has_bit_rate) {
@@ -66,34 +60,22 @@ public:
         auto opened = can::open(arguments_.link.get(), options);
         if (!opened) throw std::runtime_error(opened.problem);
         const can::Description& d = opened.link->description();
-        if (d.bit_rate != 0 && d.bit_rate != arguments_.table.bit_rate) {
-            throw std::runtime_error(arguments_.link.get() + " runs at " +
-                                     std::to_string(d.bit_rate) + " bit/s, the table is for " +
-                                     std::to_string(arguments_.table.bit_rate) +
-                                     "; correct one of them");
-        }
+        hal::bus::check_bit_rate(d, arguments_.link.get(), arguments_.table.bit_rate, "bitrate ");
         if ((arguments_.ppm != 0.0 || arguments_.tick_ns != 0) && !d.in_memory) {
             throw std::runtime_error("ppm= and tick_ns= are for simulated nodes; " +
                                      arguments_.link.get() + " has clocks of its own");
+        }
+        if (arguments_.follow != 0) {
+            clock_.claim();
         }
         exchange_ = can::offer_slots(arguments_.node.get(), d);
         if (!exchange_) {
             throw std::runtime_error("node " + arguments_.node.get() +
                                      " is in this process already; load each node once");
         }
-        try {
-            if (arguments_.follow != 0) {
-                clock_.claim();
-            }
-        } catch (...) {
-            can::withdraw_slots(*exchange_);
-            throw;
-        }
         link_ = std::move(opened.link);
         station_->attach(*link_);
-        discipline_.lose();
-        functions_.start(faults_, this);
-        silent_ = false;
+        begin_cycles();
         followed_ = 0;
         raised_.fill(std::numeric_limits<Time>::min());
         for (auto& m : sent_) {
@@ -127,11 +109,14 @@ public:
             recover();
         }
         was_reset_ = pins_.reset;
-        const bool sends = functions_.receive(cycle);
-        if (sends == silent_) {
-            set_silent(!sends);
+        const hal::bus::Turn turn = receive_turn(cycle);
+        if (turn == hal::bus::Turn::leaves || begins_anew(turn)) {
+            restart();  // it listens before it sends
         }
-        if (silent_) {
+        if (turn == hal::bus::Turn::leaves || turn == hal::bus::Turn::returns) {
+            pins_.fault = is_offline(turn) || fault_.lasts();
+        }
+        if (is_offline(turn)) {
             exchange_->state.store(can::State::down, std::memory_order_relaxed);
             for (auto& m : received_) {
                 m.show(now_);
@@ -139,9 +124,6 @@ public:
             pins_.show(*station_);
             received();
             return;
-        }
-        if (interrupted_.exchange(false, std::memory_order_acquire)) {
-            restart();
         }
         station_->receive(now_);
         exchange_->state.store(
@@ -161,7 +143,7 @@ public:
         if (!link_) return;
         if (!functions_.transmit(cycle)) {
             if (functions_.receive_is_missing()) {
-                interrupted_.store(true, std::memory_order_release);
+                interrupt();
                 exchange_->state.store(can::State::down, std::memory_order_relaxed);
             }
             return;
@@ -186,7 +168,7 @@ public:
         station_->transmit(now_, cycle.period_ns());
     }
 
-    void interrupt(hal::Cycle) noexcept { interrupted_.store(true, std::memory_order_release); }
+    void make_safe(hal::Cycle) noexcept { interrupt(); }
 
 protected:
     virtual void received() noexcept {}      ///< behind receive(). [realtime]
@@ -215,12 +197,11 @@ protected:
     }
     void on_event(Event e, std::uint32_t who, std::uint32_t id, Time value) noexcept override {
         reporter_->tell({e, who, id, value});
-        if (e == Event::running || e == Event::table_agrees || e == Event::bus_on ||
-            e == Event::monitor_found) {
+        if (event_rows[static_cast<std::size_t>(e)].effect == bus::Effect::ends) {
             recover();
         }
-        const char* text = faults_text_->of(e, id);
-        if (text == nullptr) return;
+        const bus::FaultTexts::Fault* const fault = texts_->fault(e, id);
+        if (fault == nullptr) return;
         pins_.fault = true;
         Time& last = raised_[static_cast<std::size_t>(e)];
         if (last != std::numeric_limits<Time>::min() && now_ - last < 1'000'000'000 &&
@@ -228,24 +209,13 @@ protected:
             return;  // one a second of each kind
         }
         last = now_;
-        const bool counts = std::strstr(text, "{}") != nullptr;
-        fault_.begin(
-            faults_, this, text,
-            counts ? static_cast<double>(value) : std::numeric_limits<double>::quiet_NaN());
-    }
-
-    /// transmit() is missing, or runs again: the node begins anew, and listens before it sends.
-    /// [realtime]
-    void set_silent(bool silent) noexcept {
-        silent_ = silent;
-        restart();
-        pins_.fault = silent || fault_.lasts();
+        begin(fault_, fault->text, fault->detail(value));
     }
 
     /// The fault is over. [realtime]
     void recover() noexcept {
         pins_.fault = false;
-        fault_.end(faults_, this);
+        end(fault_);
     }
 
     /// Begins anew after the thread was stopped. [realtime]
@@ -274,10 +244,9 @@ protected:
         if (error < -period / 2) {
             error += period;
         }
-        clock_.step(discipline_.follow(error, arguments_.table.cycle, clock_.limit_ns()));
+        follow_reference(error, arguments_.table.cycle);
     }
 
-    const std::string name_;
     TableArguments arguments_{*this};
     hal::Function receive_{*this,
                            "receive",
@@ -289,30 +258,22 @@ protected:
                             &StationComponent::transmit,
                             "sends in the slots until the next cycle; last in the thread",
                             {.required = true}};
-    hal::Emergency interruption_{*this, &StationComponent::interrupt,
+    hal::Emergency interruption_{*this, &StationComponent::make_safe,
                                  "when the thread runs again, the node listens before it sends"};
     StationPins pins_{*this, receive_};
     std::deque<SentMessage> sent_;
     std::deque<ReceivedMessage> received_;
     std::vector<ReceivedMessage*> by_id_ = std::vector<ReceivedMessage*>(identifiers, nullptr);
-    std::optional<EventWords> words_;
-    std::optional<FaultWords> faults_text_;
+    std::optional<EventTexts> texts_;
     std::unique_ptr<Station> station_;
-    std::unique_ptr<hal::Reporter<Happened>> reporter_;  // behind the words that its thread uses
+    std::unique_ptr<hal::Reporter<Happened>> reporter_;  // behind the texts that its thread uses
     std::shared_ptr<can::SlotExchange> exchange_;
     std::unique_ptr<can::Link> link_;
-    hal::DisciplinedClock clock_;
-    hal::Discipline discipline_;
-    const hal_faults* faults_ = nullptr;
     hal::LastingFault fault_;
     std::array<Time, 32> raised_{};
     std::uint64_t followed_ = 0;
     Time now_ = 0;
-    hal::FunctionPair functions_{name_ + ".receive", name_ + ".transmit"};
     bool was_reset_ = false;
-    bool silent_ = false;  // transmit() is missing
-    // set by interrupt(), taken by receive()
-    std::atomic<bool> interrupted_{false};
 };
 
 }  // namespace hal::scocan

@@ -5,18 +5,18 @@
 #include <string>
 #include <utility>
 
-#include "event_words.hpp"
+#include "event_texts.hpp"
 #include "hal/reporter.hpp"
 
 namespace hal::tdma {
 
 class Reporter {
 public:
-    /// The schedule outlives it; `known_as` as of EventWords. [setup]
+    /// The schedule outlives it; `known_as` as of EventTexts. [setup]
     Reporter(const std::string& instance, const config::Schedule& schedule,
              std::string known_as = {})
-        : words_(schedule, "setp " + instance + ".reset TRUE", std::move(known_as)),
-          reported_(instance, [this](const Happened& h) { return words_(h); }, 256,
+        : texts_(schedule, "setp " + instance + ".reset TRUE", std::move(known_as)),
+          reported_(instance, [this](const Happened& h) { return texts_.line(h); }, 256,
                     [](const Happened& h, const std::string&) { return subject(h); }) {}
 
     void start() { reported_.start(); }  // [setup]
@@ -27,8 +27,8 @@ public:
     }
 
 private:
-    const EventWords words_;
-    hal::Reporter<Happened> reported_;  // the last: its thread uses the words
+    const EventTexts texts_;
+    hal::Reporter<Happened> reported_;  // the last: its thread uses the texts
 };
 
 }  // namespace hal::tdma

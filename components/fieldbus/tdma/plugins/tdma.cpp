@@ -3,10 +3,10 @@
 #include <array>
 #include <atomic>
 #include <deque>
-#include <limits>
 #include <memory>
 #include <optional>
 
+#include "bus/component/bus_component.hpp"
 #include "discipline/discipline.hpp"
 #include "fieldbus/tdma/config/schedule.hpp"
 #include "fieldbus/tdma/config/schedule_plan.hpp"
@@ -19,11 +19,6 @@
 #include "fieldbus/tdma/station/station.hpp"
 #include "fieldbus/tdma/tunnel/tap.hpp"
 #include "hal/background.hpp"
-#include "hal/component.hpp"
-#include "hal/discipline.hpp"
-#include "hal/function_pair.hpp"
-#include "hal/lasting_fault.hpp"
-#include "hal/naming.hpp"
 #include "hal/texts.hpp"
 
 namespace {
@@ -35,12 +30,12 @@ namespace ethernet = hal::ethernet;
 /// share these threads.
 std::atomic<const void*> leading_instance{nullptr};  // written in start and stop
 
-class Tdma : public hal::Component, private Events {
+class Tdma : public hal::bus::BusComponent, private Events {
 public:
-    explicit Tdma(const hal_host* host) : Component(host) {
+    explicit Tdma(const hal_host* host) : BusComponent(host, "tdma.0") {
         arguments_.load();
         station_ = std::make_unique<Station>(arguments_.setup, static_cast<Events*>(this));
-        own_words_ = std::make_unique<FaultWords>(arguments_.setup);
+        own_faults_ = std::make_unique<SegmentFaults>(arguments_.schedule, arguments_.setup);
         join_rtcfg();
         waiting_.emplace(*this, transmit_, "slot-#.waiting",
                          static_cast<std::int64_t>(arguments_.setup.slots.size()),
@@ -63,7 +58,6 @@ public:
     }
 
     void start() {
-        faults_ = hal::extension<hal_faults>("hal.faults/1");
         ethernet::Options options;
         options.types.assign(Station::types.begin(), Station::types.end());
         const ethernet::Description line = ethernet::describe(arguments_.link.get());
@@ -113,11 +107,10 @@ public:
         if (!remark.empty()) {
             hal::MessageLog(name_).print(remark);
         }
-        discipline_.lose();
-        functions_.start(faults_, this);
-        period_reported_ = was_reset_ = silent_ = false;
+        begin_cycles();
+        period_reported_ = was_reset_ = false;
         had_carrier_ = true;
-        words_ = own_words_.get();
+        segment_faults_ = own_faults_.get();
         if (service_) {
             service_->begin();
         }
@@ -158,21 +151,20 @@ public:
         const bool fits = is_cycle(cycle);
         if (!fits && !period_reported_) {
             period_reported_ = true;
-            raise(words_->period, static_cast<double>(cycle.period_ns()) * 1e-3);
-            reporter_->event(Event::wrong_period, {}, cycle.period_ns());
+            on_event(Event::wrong_period, {}, cycle.period_ns());
         }
-        const bool sends = functions_.receive(cycle);
-        if (sends == silent_) {
-            set_silent(!sends);
+        const hal::bus::Turn turn = receive_turn(cycle);
+        if (turn == hal::bus::Turn::leaves || turn == hal::bus::Turn::returns) {
+            station_->restart();  // it listens before it sends
+            pins_.fault = is_offline(turn) || fault_.lasts();
         }
-        if (silent_) {
+        if (is_offline(turn)) {
             follow(cycle.period_ns());
             show();
             return;
         }
-        const bool interrupted = interrupted_.exchange(false, std::memory_order_acquire);
         if (fits) {
-            if (interrupted) {
+            if (turn == hal::bus::Turn::restarts) {
                 station_->restart();
             }
             if (pins_.reset && !was_reset_) {
@@ -194,7 +186,7 @@ public:
     void transmit(hal::Cycle cycle) noexcept {
         const bool receives = functions_.transmit(cycle);
         if (functions_.receive_is_missing()) {
-            interrupted_.store(true, std::memory_order_release);
+            interrupt();
         }
         if (receives && is_cycle(cycle)) {
             station_->transmit(cycle.start_ns());
@@ -205,7 +197,7 @@ public:
         }
     }
 
-    void interrupt(hal::Cycle) noexcept { interrupted_.store(true, std::memory_order_release); }
+    void make_safe(hal::Cycle) noexcept { interrupt(); }
 
 private:
     /// Returns the latency of values that pass through this station's slots. [setup]
@@ -225,17 +217,9 @@ private:
         return times;
     }
 
-    /// transmit() is missing, or runs again: the station begins anew, and listens before it sends.
-    /// [realtime]
-    void set_silent(bool silent) noexcept {
-        silent_ = silent;
-        station_->restart();
-        pins_.fault = silent || fault_.lasts();
-    }
-
     /// Uses a schedule received by RTcfg. [realtime]
     void use_schedule(const rtcfg::Accepted& accepted) noexcept {
-        words_ = &accepted.words;
+        segment_faults_ = &accepted.faults;
         period_reported_ = false;
         if (tap_) {
             tap_->scheduled(accepted.schedule.stations.front().ip, tunnel_mtu(accepted.setup));
@@ -250,8 +234,6 @@ private:
         if (applicant_) return &applicant_->client();
         return nullptr;
     }
-
-    static constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
     /// Creates the RTcfg service of a master, or the applicant of a station without a schedule.
     /// [setup]
@@ -314,7 +296,7 @@ private:
                 discipline_.lose();
             }
         } else {
-            clock_.step(discipline_.follow(s.error, period, clock_.limit_ns()));
+            follow_reference(s.error, period);
         }
         was_synchronised_ = synchronised;
     }
@@ -355,74 +337,36 @@ private:
         return heard_;
     }
 
-    /// Raises a fault that lasts until recover(). [realtime]
-    void raise(const std::string& reason, double detail) noexcept {
-        pins_.fault = true;
-        fault_.begin(faults_, this, reason.c_str(), detail);
-    }
+    /// The fault is over. [realtime]
     void recover() noexcept {
         pins_.fault = false;
-        fault_.end(faults_, this);
+        end(fault_);
+    }
+
+    /// Returns whether an event of a row that ends the fault does so now: `running` after a loss,
+    /// the others while the slots may be used. [realtime]
+    bool ends(Event e) const noexcept {
+        if (e != Event::running) return station_->ready();
+        return withdrawn_ ||
+               station_->status().count.losses + station_->status().count.unanswered != 0;
     }
 
     // Events of the station. [realtime]
     void on_event(Event e, const Address& who, Time value) noexcept override {
-        switch (e) {
-        case Event::sync_lost: raise(words_->sync_lost, static_cast<double>(value) * 1e-9); break;
-        case Event::other_master: raise(words_->other_master, not_a_number); break;
-        case Event::other_master_gone:
-            if (station_->ready()) {
-                recover();
-            }
-            break;
-        case Event::master_there:
+        if (e == Event::master_there || e == Event::withdrew) {
             withdrawn_ = true;
-            raise(words_->master_there, not_a_number);
-            break;
-        case Event::other_schedule:
-            raise(words_->other_schedule, static_cast<double>(value) * 1e-3);
-            break;
-        case Event::out_of_step:
-            raise(words_->out_of_step, static_cast<double>(value) * 1e-3);
-            break;
-        case Event::withdrew:
-            withdrawn_ = true;
-            raise(words_->withdrew, not_a_number);
-            break;
-        case Event::foreign_frame:
+        }
+        if (event_rows[static_cast<std::size_t>(e)].effect == hal::bus::Effect::ends && ends(e)) {
+            withdrawn_ = withdrawn_ && e != Event::running;
+            recover();
+        }
+        if (const auto* const fault = segment_faults_->of(e, who)) {
             pins_.fault = true;
-            for (const auto& [id, words] : words_->foreign) {
-                if (static_cast<Time>(id) == value) {
-                    raise(words, not_a_number);
-                }
-            }
-            break;
-        case Event::duplicate_slot:
-            pins_.fault = true;
-            raise(words_->duplicate_slot, not_a_number);
-            break;
-        case Event::babbling: raise(words_->babbling, static_cast<double>(value)); break;
-        case Event::uncalibrated: raise(words_->uncalibrated, static_cast<double>(value)); break;
-        case Event::no_carrier: raise(words_->no_carrier, not_a_number); break;
-        case Event::carrier:
-            if (station_->ready()) {
-                recover();
-            }
-            break;
-        case Event::running:
-            if (station_->status().count.losses + station_->status().count.unanswered == 0 &&
-                !withdrawn_) {
-                break;
-            }
-            withdrawn_ = false;
-            recover();  // by itself
-            break;
-        default: break;
+            begin(fault_, fault->text, fault->detail(value));
         }
         reporter_->event(e, who, value);
     }
 
-    const std::string name_ = hal::own_name("tdma.0");
     StationArguments arguments_{*this};
 
     hal::Function receive_{*this,
@@ -438,7 +382,7 @@ private:
                             "sync; last in the thread",
                             {.required = true}};
 
-    hal::Emergency interruption_{*this, &Tdma::interrupt,
+    hal::Emergency interruption_{*this, &Tdma::make_safe,
                                  "when the thread runs again, the station listens before it sends"};
 
     StationPins pins_{*this, receive_};
@@ -447,8 +391,8 @@ private:
     std::deque<OtherPins> others_;
     Heard heard_;  // of the master
     std::optional<hal::Outs<std::uint32_t>> waiting_;
-    std::unique_ptr<FaultWords> own_words_;
-    const FaultWords* words_ = nullptr;  // or those of the received schedule
+    std::unique_ptr<SegmentFaults> own_faults_;
+    const SegmentFaults* segment_faults_ = nullptr;  // or those of the received schedule
     std::unique_ptr<Station> station_;
     std::unique_ptr<rtcfg::Service> service_;  // of the master
     std::unique_ptr<rtcfg::Applicant> applicant_;  // of a station without a schedule
@@ -457,20 +401,13 @@ private:
     std::unique_ptr<ethernet::Port> port_;
     std::unique_ptr<Tunnel> tunnel_;  // before tap_, which uses it
     std::unique_ptr<Tap> tap_;
-    hal::DisciplinedClock clock_;
-    hal::Discipline discipline_;
-    const hal_faults* faults_ = nullptr;
     hal::LastingFault fault_;
-    hal::FunctionPair functions_{name_ + ".receive", name_ + ".transmit"};
     bool leads_ = false;
-    bool silent_ = false;  // transmit() is missing
     bool period_reported_ = false;
     bool was_reset_ = false;
     bool was_synchronised_ = false;
     bool withdrawn_ = false;
     bool had_carrier_ = true;
-    // set by interrupt(), taken by receive()
-    std::atomic<bool> interrupted_{false};
 };
 
 }  // namespace

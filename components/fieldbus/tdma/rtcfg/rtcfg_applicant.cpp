@@ -153,10 +153,10 @@ void Applicant::check(const Offer& offer) {
         std::to_string(setup.slots.size()) + (setup.slots.size() == 1 ? " slot" : " slots");
     log("configured by " + server + " as station " + entry.name + ": " + count + ", cycle " +
         config::microseconds(reading.schedule.cycle));
-    FaultWords words(setup);
+    SegmentFaults faults(reading.schedule, setup);
     all_.push_back(std::make_unique<Accepted>(Accepted{offer.server, std::move(text),
                                                        std::move(reading.schedule),
-                                                       std::move(setup), std::move(words)}));
+                                                       std::move(setup), std::move(faults)}));
     answers_.push(all_.back().get());
 }
 

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "fieldbus/tdma/config/fault_words.hpp"
+#include "fieldbus/tdma/config/event_texts.hpp"
 #include "hal/message_log.hpp"
 #include "hal/queue.hpp"
 #include "rtcfg_client.hpp"
@@ -26,7 +26,7 @@ struct Accepted {
     std::string text;
     config::Schedule schedule;  ///< of one station
     StationSetup setup;
-    FaultWords words;
+    SegmentFaults faults;
 };
 
 class Applicant final : private ClientEvents {
