@@ -117,6 +117,7 @@ ROWS = {
         "components/ethercat/esi",
         "components/cia402",
         "components/bus/config",
+        "components/bus/events",
     ],
     "components/ethercat/plugins": [
         "components/ethercat/config",

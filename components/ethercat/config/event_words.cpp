@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
+#include <string_view>
 
 #include "cia402/error_words.hpp"
 #include "ethercat/wire/al_status_codes.hpp"
@@ -181,6 +183,13 @@ std::string identity_words(const char* what, std::int64_t found, std::int64_t ex
     return text + "`" + key + " = " + hex(found, 8) + "` or the `esi` of this device";
 }
 
+/// Why a link has no carrier, and what to do; it follows "has no link".
+std::string no_listener_words(const std::string& link) {
+    if (!ethernet::describe(link).datagrams) return "; check the cable to the first slave";
+    return ": no program listens there; emulate a line, as in: hal node ethercat FILE --link " +
+           link;
+}
+
 /// A cable, seen from one of the two slaves that it connects.
 std::string cable_words(std::int64_t port_and_neighbour, const master::Setup& setup,
                         const std::string& link) {
@@ -204,198 +213,279 @@ std::string emergency_words(std::int64_t first, std::int64_t bytes) {
            "; see the manual of the device";
 }
 
-/// What happened to one slave; it follows the slave's name.
-std::string of_slave(const Happened& w, const master::Setup& setup, const std::string& link,
-                     bool lcec) {
-    static const master::Slave unnamed;
-    const master::Slave& slave = w.slave < setup.slaves.size() ? setup.slaves[w.slave] : unnamed;
-    const auto first = w.first;
-    const auto second = w.second;
-    switch (w.event) {
-    case Event::slave_missing:
-        return std::string("is not on the bus; check its supply and cable, or ") +
-               (lcec ? "delete its <slave>" : "write `optional = yes` in its section");
-    case Event::unknown_slave:
-        if (lcec) {
-            return "is not in the configuration (vendor " + hex(first, 8) + ", product " +
-                   hex(second, 8) + "); add <slave idx=\"" +
-                   std::to_string(w.slave - Events::of_position) + "\" type=\"generic\" vid=\"" +
-                   hex(first, 8).substr(2) + "\" pid=\"" + hex(second, 8).substr(2) + "\"/>";
-        }
-        return "is not in the configuration (vendor " + hex(first, 8) + ", product " +
-               hex(second, 8) + "); add [slave " + std::to_string(w.slave - Events::of_position) +
-               " NAME], or write `other-slaves = accept` in [bus]";
-    case Event::wrong_vendor:
-        return identity_words("vendor", first, second, "vendor", lcec ? "vid" : nullptr);
-    case Event::wrong_product:
-        return identity_words("product code", first, second, "product", lcec ? "pid" : nullptr);
-    case Event::wrong_revision: return identity_words("revision", first, second, "revision");
-    case Event::wrong_serial: return identity_words("serial number", first, second, "serial");
-    case Event::duplicate_alias:
-        return "is not unique: the slave at position " + std::to_string(second) + " has the " +
-               (slave.identity.device_id ? "device ID " : "alias ") + std::to_string(first) +
-               " too; neither is started: give each its own, power-cycle both and load the master "
-               "again";
-    case Event::sii_failed:
-        if ((first & 0x1800) != 0 && second == 7) {
-            return "has an EEPROM with a wrong checksum (status " + hex(first, 4) +
-                   "), so that its application does not run; write the contents anew with a tool "
-                   "of its maker, then power-cycle it";
-        }
-        return "has an unreadable EEPROM (status " + hex(first, 4) + " at word " + hex(second, 2) +
-               "); power-cycle it";
-    case Event::no_mailbox:
-        return "has no mailbox, but the configuration writes " + object_words(first) +
-               " at start; delete its " +
-               (lcec ? "<sdoConfig>, <idnConfig> and <initCmds>" : "`sdo` and `idn` lines");
-    case Event::too_few_fmmus:
-        return "has " + std::to_string(first) + " FMMUs, its process data needs " +
-               std::to_string(second) + "; use fewer sync managers";
-    case Event::too_few_sync_managers:
-        return "has " + std::to_string(first) + (first == 1 ? " sync manager" : " sync managers") +
-               ", the configuration needs " + std::to_string(second) + "; correct " +
-               (lcec ? "idx of its <syncManager>"
-                     : "`outputs.sync-manager` or `inputs.sync-manager` in its section") +
-               ", which count from 0";
-    case Event::state_refused:
-        return "rejects " + state_words(first) + " with " + al_words(second) +
-               configured_words(second, slave);
-    case Event::state_timeout:
-        return "did not reach " + state_words(first) + " in time; it is in " + state_words(second) +
-               ": raise its time-out, or power-cycle it";
-    case Event::fell_back:
-        return "left its state and is in " + state_words(first) + ", " + al_words(second);
-    case Event::startup_write_failed: return write_words(first, second, slave);
-    case Event::no_eoe:
-        return "has no Ethernet over EtherCAT, but the configuration has `eoe`; delete that line";
-    case Event::eoe_failed:
-        if (first == 0) {
-            return "does not answer its IP settings; power-cycle it, or write `eoe = yes` to leave "
-                   "them as they are";
-        }
-        return "rejects its IP settings with EoE result " + hex(first, 4) + " (" +
-               eoe::to_string(static_cast<eoe::Result>(first)) +
-               "); write `eoe = yes` to leave them as they are";
-    case Event::mapping_failed: return rejected_mapping_words(first, second, lcec);
-    case Event::mapping_differs:
-        return "did not keep the PDO mapping: " + object_words(first) + " is " + hex(second, 8) +
-               " instead of " + hex(first >> 24, 8) + "; this PDO is fixed: list its own entries";
-    case Event::too_many_entries:
-        return "does not take " + std::to_string(second) + " entries in PDO " + hex(first, 4) +
-               "; spread them over several PDOs";
-    case Event::fixed_size:
-        return "has no mailbox to change its PDO mapping: sync manager " +
-               std::to_string(first >> 16) + " has " + std::to_string(second) +
-               (second == 1 ? " byte" : " bytes") + ", the configuration needs " +
-               std::to_string(first & 0xffff) + "; list all of its own objects";
-    case Event::slave_lost: return "does not answer; check its supply and the cable to it";
-    case Event::slave_returned: return "answers again";
-    case Event::slave_operational: return "is operational after " + std::to_string(second) + " ms";
-    case Event::slave_settled:
-        return "is in " + state_words(first) + ", the state of its configuration, after " +
-               std::to_string(second) + " ms";
-    case Event::dc_unsupported:
-        return std::string("has no distributed clock, but the configuration has ") +
-               (lcec ? "<dcConf>; delete it" : "`dc`; remove that line");
-    case Event::dc_not_set:
-        return "has a clock that could not be set within " + std::to_string(first) +
-               " ms: its receive times were not readable, or the ring is broken; it is not "
-               "started: check its cables, or " +
-               (lcec ? "delete its <dcConf>" : "remove `dc`");
-    case Event::dc_timeout:
-        return "deviates by " + microseconds(first) +
-               " from the reference clock, more than the window of " + microseconds(second) +
-               "; it is not started: check the cycle of the thread" +
-               (lcec ? "" : ", or raise `sync-window`");
-    case Event::dc_recovered:
-        return "has a clock within the window again, after " + std::to_string(second) + " ms";
-    case Event::dc_lost:
-        if (setup.dc_loss == master::DcLoss::safeop) {
-            return "has a clock that deviates by " + microseconds(first) +
-                   " from the reference clock, more than " + microseconds(second) +
-                   "; it is taken to SAFE-OP until its clock is within the window again: check "
-                   "that the thread misses no cycles";
-        }
-        return "is operational, but its clock deviates by " + microseconds(first) +
-               " from the reference clock, more than " + microseconds(second) +
-               "; check that the thread misses no cycles, and its manual for what it does without "
-               "synchronisation";
-    case Event::ring_broken:
-        if (w.slave == Events::bus) {
-            return {};
-        }
-        return "is the last that the primary port reaches: the ring is broken behind it; all "
-               "slaves still exchange data, repair the cable";
-    case Event::start_up_failed:
-        return "could not be started; it was in " + state_words(first) +
-               " and is started again in " + std::to_string(second) + " s";
-    case Event::damaged_frames:
-        return "received " + std::to_string(second) +
-               (second == 1 ? " damaged frame" : " damaged frames") + " at " +
-               cable_words(first, setup, link);
-    case Event::emergency: return emergency_words(first, second);
-    case Event::reference_clock:
-        return first != 0 ? "has the reference clock" : "has the reference clock (32 bits)";
-    default: return {};
+using bus::Effect;
+
+/// The slave's name is at the beginning of its lines.
+constexpr bus::EventRow<Event> event_rows[] = {
+    {Event::link_lost, Effect::raises, "{port} has no link[{listener}]",
+     "; no process data is exchanged"},
+    {Event::link_restored, Effect::ends, "{port} has a link again"},
+    {Event::no_slaves, Effect::raises, "no slave answers on {link}[; check {supply}]"},
+    {Event::scanned, Effect::none, "found {slaves} on {link}"},
+    {Event::too_many_slaves, Effect::none,
+     "found {slaves} on {link}, more than the {second} this master has space for; add the others "
+     "to the configuration"},
+    {Event::slave_missing, Effect::raises,
+     "{who} is not on the bus[; check its supply and cable, or {optional}]"},
+    {Event::unknown_slave, Effect::raises,
+     "{who} is not in the configuration[ (vendor {first8}, product {second8}); add {unknown}]"},
+    {Event::wrong_vendor, Effect::raises, "{who} {identity}"},
+    {Event::wrong_product, Effect::raises, "{who} {identity}"},
+    {Event::wrong_revision, Effect::raises, "{who} {identity}"},
+    {Event::wrong_serial, Effect::raises, "{who} {identity}"},
+    {Event::duplicate_alias, Effect::raises,
+     "{who} is not unique[: the slave at position {second} has the {alias} {first} too; neither is "
+     "started: give each its own, power-cycle both and load the master again]",
+     "; no slave with its number is started"},
+    {Event::sii_failed, Effect::none, "{who} has an {eeprom}"},
+    {Event::no_mailbox, Effect::none,
+     "{who} has no mailbox, but the configuration writes {object} at start; delete its {writes}"},
+    {Event::too_few_fmmus, Effect::none,
+     "{who} has {first} FMMUs, its process data needs {second}; use fewer sync managers"},
+    {Event::too_few_sync_managers, Effect::none,
+     "{who} has {sync_managers}, the configuration needs {second}; correct {numbers}, which count "
+     "from 0"},
+    {Event::state_reached, Effect::none, ""},
+    {Event::state_refused, Effect::none, "{who} rejects {state} with {al_status}{configured}"},
+    {Event::state_timeout, Effect::none,
+     "{who} did not reach {state} in time; it is in {other_state}: raise its time-out, or "
+     "power-cycle it"},
+    {Event::fell_back, Effect::raises, "{who} left its state[ and is in {state}, {al_status}]",
+     " with AL status code {x}; its outputs are off"},
+    {Event::startup_write_failed, Effect::none, "{who} {write}"},
+    {Event::no_eoe, Effect::none,
+     "{who} has no Ethernet over EtherCAT, but the configuration has `eoe`; delete that line"},
+    {Event::eoe_failed, Effect::none,
+     "{who} {eoe}; {power_cycle}write `eoe = yes` to leave them as they are"},
+    {Event::mapping_failed, Effect::none, "{who} {mapping}"},
+    {Event::mapping_differs, Effect::none,
+     "{who} did not keep the PDO mapping: {object} is {second8} instead of {written}; this PDO is "
+     "fixed: list its own entries"},
+    {Event::too_many_entries, Effect::none,
+     "{who} does not take {second} entries in PDO {first4}; spread them over several PDOs"},
+    {Event::fixed_size, Effect::none,
+     "{who} has no mailbox to change its PDO mapping: sync manager {sync_manager} has {bytes}, the "
+     "configuration needs {needed}; list all of its own objects"},
+    {Event::slave_lost, Effect::raises,
+     "{who} does not answer[; check its supply and the cable to it]",
+     "; its inputs keep their last values"},
+    {Event::slave_returned, Effect::none, "{who} answers again"},
+    {Event::slave_operational, Effect::ends, "{who} is operational after {second} ms"},
+    {Event::wkc_incomplete, Effect::none,
+     "domain '{domain}': working counter {counter} instead of {second}: {difference}"},
+    {Event::wkc_complete, Effect::none,
+     "domain '{domain}': every slave that is started exchanges process data"},
+    {Event::reference_clock, Effect::none, "{who} has the reference clock{width}"},
+    {Event::dc_unsupported, Effect::none,
+     "{who} has no distributed clock, but the configuration has {dc}"},
+    {Event::dc_timeout, Effect::none,
+     "{who} deviates by {deviation} from the reference clock, more than the window of {window}; it "
+     "is not started: check the cycle of the thread{sync_window}"},
+    {Event::dc_not_set, Effect::none,
+     "{who} has a clock that could not be set within {first} ms: its receive times were not "
+     "readable, or the ring is broken; it is not started: check its cables, or {no_dc}"},
+    {Event::dc_lost, Effect::raises, "{who}[ {clock}]",
+     " is out of step, its clock deviates by {us}{outputs_off}"},
+    {Event::dc_recovered, Effect::ends,
+     "{who} has a clock within the window again, after {second} ms"},
+    {Event::dc_synchronised, Effect::none,
+     "all clocks are synchronised, largest deviation {deviation}"},
+    {Event::ring_broken, Effect::none,
+     "{break}: the ring is broken {there}; all slaves still exchange data, repair the cable"},
+    {Event::ring_closed, Effect::none, "the ring is closed again"},
+    {Event::topology_changed, Effect::none,
+     "the number of slaves on {link} changed from {first} to {second}"},
+    {Event::other_master, Effect::raises,
+     "another EtherCAT master sends on {link}[ ({first} of its frames in a second): stop it, or "
+     "give each master its own link]",
+     "; the slaves obey both"},
+    {Event::damaged_frames, Effect::none, "{who} received {frames} at {cable}"},
+    {Event::emergency, Effect::none, "{who} {emergency}"},
+    {Event::start_up_failed, Effect::raises,
+     "{who} did not start[; it was in {state} and is started again in {second} s]",
+     "; it is tried again"},
+    {Event::slave_settled, Effect::none,
+     "{who} is in {state}, the state of its configuration, after {second} ms"},
+};
+static_assert(bus::in_order(event_rows));
+
+/// What the values of a row are taken from.
+struct Source {
+    const Happened& what;
+    const master::Setup& setup;
+    const std::string& link;
+    const std::string& backup;
+    bool lcec;
+
+    std::int64_t first() const { return what.first; }
+    std::int64_t second() const { return what.second; }
+    const master::Slave& slave() const {
+        static const master::Slave unnamed;
+        return what.slave < setup.slaves.size() ? setup.slaves[what.slave] : unnamed;
+    }
+    const std::string& port() const { return what.first == 0 ? link : backup; }
+    /// Returns the text for the configuration that the user has.
+    std::string by_format(const char* of_lcec, const char* own) const {
+        return lcec ? of_lcec : own;
+    }
+};
+
+std::string counted(std::int64_t number, const char* noun) {
+    return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
+}
+
+std::string identity(const Source& s) {
+    const auto of = [&](const char* what, const char* key, const char* attribute) {
+        return identity_words(what, s.first(), s.second(), key, s.lcec ? attribute : nullptr);
+    };
+    switch (s.what.event) {
+    case Event::wrong_vendor: return of("vendor", "vendor", "vid");
+    case Event::wrong_product: return of("product code", "product", "pid");
+    case Event::wrong_revision: return of("revision", "revision", nullptr);
+    default: return of("serial number", "serial", nullptr);
     }
 }
 
-/// What happened to the bus.
-std::string of_bus(const Happened& w, const master::Setup& setup, const std::string& link,
-                   const std::string& backup) {
-    const auto first = w.first;
-    const auto second = w.second;
-    switch (w.event) {
-    case Event::link_lost: return no_link_words(first == 0 ? link : backup);
-    case Event::link_restored: return (first == 0 ? link : backup) + " has a link again";
-    case Event::no_slaves:
-        return "no slave answers on " + link + "; check " +
-               (ethernet::describe(link).datagrams
-                    ? "the address, and that a line of slaves is served there"
-                    : "cable and supply of the first slave");
-    case Event::scanned:
-        // others name what is missing
-        return "found " + std::to_string(first) + (first == 1 ? " slave" : " slaves") + " on " +
-               link;
-    case Event::too_many_slaves:
-        return "found " + std::to_string(first) + " slaves on " + link + ", more than the " +
-               std::to_string(second) +
-               " this master has space for; add the others to the configuration";
-    case Event::wkc_incomplete: {
-        const auto domain = static_cast<std::size_t>(first >> 16);
-        return "domain '" +
-               (domain < setup.domains.size() ? setup.domains[domain].name
-                                              : std::to_string(domain)) +
-               "': working counter " + std::to_string(first & 0xffff) + " instead of " +
-               std::to_string(second) +
-               ((first & 0xffff) < second ? ": some slaves do not exchange process data"
-                                          : ": a slave answers that is not started yet");
+std::string unknown_slave(const Source& s) {
+    const std::string position = std::to_string(s.what.slave - Events::of_position);
+    if (!s.lcec) return "[slave " + position + " NAME], or write `other-slaves = accept` in [bus]";
+    return "<slave idx=\"" + position + "\" type=\"generic\" vid=\"" + hex(s.first(), 8).substr(2) +
+           "\" pid=\"" + hex(s.second(), 8).substr(2) + "\"/>";
+}
+
+std::string unreadable_eeprom(const Source& s) {
+    const std::string status = hex(s.first(), 4);
+    if ((s.first() & 0x1800) != 0 && s.second() == 7) {
+        return "EEPROM with a wrong checksum (status " + status +
+               "), so that its application does not run; write the contents anew with a tool of "
+               "its maker, then power-cycle it";
     }
-    case Event::wkc_complete: {
-        const auto domain = static_cast<std::size_t>(first >> 16);
-        return "domain '" +
-               (domain < setup.domains.size() ? setup.domains[domain].name
-                                              : std::to_string(domain)) +
-               "': every slave that is started exchanges process data";
+    return "unreadable EEPROM (status " + status + " at word " + hex(s.second(), 2) +
+           "); power-cycle it";
+}
+
+std::string eoe_result(const Source& s) {
+    if (s.first() == 0) return "does not answer its IP settings";
+    return "rejects its IP settings with EoE result " + hex(s.first(), 4) + " (" +
+           eoe::to_string(static_cast<eoe::Result>(s.first())) + ")";
+}
+
+std::string domain(const Source& s) {
+    const auto number = static_cast<std::size_t>(s.first() >> 16);
+    return number < s.setup.domains.size() ? s.setup.domains[number].name : std::to_string(number);
+}
+
+std::string lost_clock(const Source& s) {
+    const std::string distance = microseconds(s.first()) + " from the reference clock, more than " +
+                                 microseconds(s.second());
+    if (s.setup.dc_loss == master::DcLoss::safeop) {
+        return "has a clock that deviates by " + distance +
+               "; it is taken to SAFE-OP until its clock is within the window again: check that "
+               "the thread misses no cycles";
     }
-    case Event::dc_synchronised:
-        return "all clocks are synchronised, largest deviation " + microseconds(first);
-    case Event::ring_broken:
-        if (w.slave != Events::bus) {
-            return {};
-        }
-        return link +
-               " reaches no slave: the ring is broken there; all slaves still exchange data, "
-               "repair the cable";
-    case Event::ring_closed: return "the ring is closed again";
-    case Event::other_master:
-        return "another EtherCAT master sends on " + link + " (" + std::to_string(first) +
-               " of its frames in a second): stop it, or give each master its own link";
-    case Event::topology_changed:
-        return "the number of slaves on " + link + " changed from " + std::to_string(first) +
-               " to " + std::to_string(second);
-    default: return {};
-    }
+    return "is operational, but its clock deviates by " + distance +
+           "; check that the thread misses no cycles, and its manual for what it does without "
+           "synchronisation";
+}
+
+struct Value {
+    std::string_view name;
+    std::string (*of)(const Source&);
+};
+constexpr Value values[] = {
+    {"who", [](const Source& s) { return slave_words(s.what.slave, s.setup); }},
+    {"link", [](const Source& s) { return s.link; }},
+    {"port", [](const Source& s) { return s.port(); }},
+    {"listener", [](const Source& s) { return no_listener_words(s.port()); }},
+    {"supply",
+     [](const Source& s) {
+    return std::string(ethernet::describe(s.link).datagrams
+                           ? "the address, and that a line of slaves is served there"
+                           : "cable and supply of the first slave");
+}},
+    {"first", [](const Source& s) { return std::to_string(s.first()); }},
+    {"second", [](const Source& s) { return std::to_string(s.second()); }},
+    {"first4", [](const Source& s) { return hex(s.first(), 4); }},
+    {"first8", [](const Source& s) { return hex(s.first(), 8); }},
+    {"second8", [](const Source& s) { return hex(s.second(), 8); }},
+    {"object", [](const Source& s) { return object_words(s.first()); }},
+    {"written", [](const Source& s) { return hex(s.first() >> 24, 8); }},
+    {"slaves", [](const Source& s) { return counted(s.first(), "slave"); }},
+    {"sync_managers", [](const Source& s) { return counted(s.first(), "sync manager"); }},
+    {"frames", [](const Source& s) { return counted(s.second(), "damaged frame"); }},
+    {"bytes", [](const Source& s) { return counted(s.second(), "byte"); }},
+    {"needed", [](const Source& s) { return std::to_string(s.first() & 0xffff); }},
+    {"sync_manager", [](const Source& s) { return std::to_string(s.first() >> 16); }},
+    {"state", [](const Source& s) { return state_words(s.first()); }},
+    {"other_state", [](const Source& s) { return state_words(s.second()); }},
+    {"al_status", [](const Source& s) { return al_words(s.second()); }},
+    {"configured", [](const Source& s) { return configured_words(s.second(), s.slave()); }},
+    {"deviation", [](const Source& s) { return microseconds(s.first()); }},
+    {"window", [](const Source& s) { return microseconds(s.second()); }},
+    {"domain", domain},
+    {"counter", [](const Source& s) { return std::to_string(s.first() & 0xffff); }},
+    {"difference",
+     [](const Source& s) {
+    return std::string((s.first() & 0xffff) < s.second()
+                           ? "some slaves do not exchange process data"
+                           : "a slave answers that is not started yet");
+}},
+    {"width", [](const Source& s) { return std::string(s.first() != 0 ? "" : " (32 bits)"); }},
+    {"alias",
+     [](const Source& s) {
+    return std::string(s.slave().identity.device_id ? "device ID" : "alias");
+}},
+    {"identity", identity},
+    {"unknown", unknown_slave},
+    {"eeprom", unreadable_eeprom},
+    {"eoe", eoe_result},
+    {"power_cycle",
+     [](const Source& s) { return std::string(s.first() == 0 ? "power-cycle it, or " : ""); }},
+    {"write", [](const Source& s) { return write_words(s.first(), s.second(), s.slave()); }},
+    {"mapping",
+     [](const Source& s) { return rejected_mapping_words(s.first(), s.second(), s.lcec); }},
+    {"cable", [](const Source& s) { return cable_words(s.first(), s.setup, s.link); }},
+    {"emergency", [](const Source& s) { return emergency_words(s.first(), s.second()); }},
+    {"clock", lost_clock},
+    {"break",
+     [](const Source& s) {
+    return s.what.slave == Events::bus
+               ? s.link + " reaches no slave"
+               : slave_words(s.what.slave, s.setup) + " is the last that the primary port reaches";
+}},
+    {"there",
+     [](const Source& s) {
+    return std::string(s.what.slave == Events::bus ? "there" : "behind it");
+}},
+    {"optional",
+     [](const Source& s) {
+    return s.by_format("delete its <slave>", "write `optional = yes` in its section");
+}},
+    {"writes",
+     [](const Source& s) {
+    return s.by_format("<sdoConfig>, <idnConfig> and <initCmds>", "`sdo` and `idn` lines");
+}},
+    {"numbers",
+     [](const Source& s) {
+    return s.by_format("idx of its <syncManager>",
+                       "`outputs.sync-manager` or `inputs.sync-manager` in its section");
+}},
+    {"dc",
+     [](const Source& s) { return s.by_format("<dcConf>; delete it", "`dc`; remove that line"); }},
+    {"no_dc", [](const Source& s) { return s.by_format("delete its <dcConf>", "remove `dc`"); }},
+    {"sync_window", [](const Source& s) { return s.by_format("", ", or raise `sync-window`"); }},
+    {"outputs_off",
+     [](const Source& s) {
+    return std::string(s.setup.dc_loss == master::DcLoss::safeop
+                           ? "; its outputs are off until it is in step again"
+                           : "");
+}},
+};
+
+std::string value_of(std::string_view name, const Source& source) {
+    const auto* const value = std::find_if(std::begin(values), std::end(values),
+                                           [name](const Value& v) { return v.name == name; });
+    return value == std::end(values) ? std::string(name) : value->of(source);
 }
 
 }  // namespace
@@ -419,13 +509,7 @@ MessageSubject subject(const Happened& what) {
 }
 
 std::string no_link_words(const std::string& link) {
-    if (!ethernet::describe(link).datagrams) {
-        return link + " has no link; check the cable to the first slave";
-    }
-    return link +
-           " has no link: no program listens there; emulate a line, as in: hal node ethercat FILE "
-           "--link " +
-           link;
+    return link + " has no link" + no_listener_words(link);
 }
 
 std::string recorded_words(const std::string& link) {
@@ -448,10 +532,20 @@ std::string slave_words(std::uint32_t slave, const master::Setup& setup) {
 
 std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link,
                         const std::string& backup, Format format) {
-    const std::string bus = of_bus(what, setup, link, backup);
-    if (!bus.empty()) return bus;
-    const std::string text = of_slave(what, setup, link, format == Format::lcec);
-    return text.empty() ? text : slave_words(what.slave, setup) + " " + text;
+    const Source source{what, setup, link, backup, format == Format::lcec};
+    return bus::format(event_rows[static_cast<std::size_t>(what.event)].text, bus::Text::line,
+                       [&](std::string_view name) { return value_of(name, source); });
+}
+
+bus::FaultTexts fault_texts(const master::Setup& setup, const std::string& link) {
+    return {event_rows, setup.slaves.size(),
+            [&](Event event, std::size_t slave, std::string_view name) -> std::string {
+        const bool known = slave < setup.slaves.size();
+        if (name == "who" && !known) return "a slave on " + link;
+        if (name == "identity") return "is not the device of the configuration; it stays in INIT";
+        const Happened what{event, known ? static_cast<std::uint32_t>(slave) : Events::bus};
+        return value_of(name, {what, setup, link, link, false});
+    }};
 }
 
 }  // namespace hal::ethercat::config

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 
+#include "bus/events/event_rows.hpp"
 #include "ethercat/master/events.hpp"
 #include "ethercat/master/setup.hpp"
 #include "hal/message_log.hpp"
@@ -27,6 +28,10 @@ enum class Format : std::uint8_t { ethercat, lcec };
 /// and `backup` are the addresses of the ports. [setup]
 std::string event_words(const Happened& what, const master::Setup& setup, const std::string& link,
                         const std::string& backup = {}, Format = Format::ethercat);
+
+/// Returns the texts of the faults of a bus, of the same table as the sentences; the subjects are
+/// the slaves of the setup. [setup]
+bus::FaultTexts fault_texts(const master::Setup& setup, const std::string& link);
 
 /// Returns the subject of an event for rate limiting: an event of one slave is a kind, the code
 /// that a device chooses is the detail. [setup]

@@ -53,29 +53,12 @@ public:
                 }
                 places_.push_back({s, n});
             }
-            const std::string who = config::slave_words(static_cast<std::uint32_t>(s), bus_.setup);
-            lost_words_.push_back(who + " does not answer; its inputs keep their last values");
-            identity_words_.push_back(who +
-                                      " is not the device of the configuration; it stays in INIT");
-            missing_words_.push_back(who + " is not on the bus");
-            ambiguous_words_.push_back(who + " is not unique; no slave with its number is started");
-            failed_words_.push_back(who + " did not start; it is tried again");
-            const bool stops = bus_.setup.dc_loss == master::DcLoss::safeop;
-            clock_words_.push_back(
-                who + " is out of step, its clock deviates by {} us" +
-                (stops ? "; its outputs are off until it is in step again" : ""));
-            left_words_.push_back(who +
-                                  " left its state with AL status code {x}; its outputs are off");
         }
         areas_.resize(places_.size());
-        period_words_ = "the period of the thread is {} us, the cycle of the configuration " +
-                        std::to_string(bus_.setup.cycle_ns / 1000) + " us; change one of them: " +
-                        (bus_.lcec ? "appTimePeriod of <master>" : "cycle in [bus]") +
-                        "; nothing is exchanged";
-        unknown_words_ = "a slave on " + bus_.link + " is not in the configuration";
-        nobody_words_ = "no slave answers on " + bus_.link;
-        link_words_ = bus_.link + " has no link; no process data is exchanged";
-        other_words_ = "another EtherCAT master sends on " + bus_.link + "; the slaves obey both";
+        period_text_ = "the period of the thread is {} us, the cycle of the configuration " +
+                       std::to_string(bus_.setup.cycle_ns / 1000) + " us; change one of them: " +
+                       (bus_.lcec ? "appTimePeriod of <master>" : "cycle in [bus]") +
+                       "; nothing is exchanged";
     }
 
     void start() {
@@ -269,7 +252,7 @@ private:
             return true;
         }
         if (!std::exchange(period_reported_, true)) {
-            begin(period_fault_, period_words_, static_cast<double>(cycle.period_ns()) * 1e-3);
+            begin(period_fault_, period_text_, static_cast<double>(cycle.period_ns()) * 1e-3);
         }
         return false;
     }
@@ -343,24 +326,32 @@ private:
                        simulated_ ? hal::ethernet::unclocked : hal::monotonic_ns());
     }
 
+    using BusComponent::begin;
+    /// Raises the fault of an event. [realtime]
+    void begin(hal::LastingFault& fault, Event event, std::uint32_t slave = master::Events::bus,
+               std::int64_t value = 0) noexcept {
+        if (const auto* const text = fault_texts_.of(event, slave)) {
+            begin(fault, text->text, text->detail(value));
+        }
+    }
+
     /// Raises and ends the faults of a slave, which last until it is operational. [realtime]
     void slave_event(Event event, std::uint32_t slave, std::int64_t first,
                      std::int64_t second) noexcept {
         if (event == Event::slave_lost) {
-            begin(slave_faults_[slave], lost_words_[slave]);
+            begin(slave_faults_[slave], event, slave);
         }
         if (event == Event::fell_back) {
-            begin(slave_faults_[slave], left_words_[slave], static_cast<double>(second));
+            begin(slave_faults_[slave], event, slave, second);
         }
         if (event == Event::dc_lost) {
-            begin(clock_faults_[slave], clock_words_[slave], static_cast<double>(first) * 1e-3);
+            begin(clock_faults_[slave], event, slave, first);
         }
         if (event == Event::dc_recovered) {
             end(clock_faults_[slave]);
         }
-        const std::string* const reason = start_words(event, slave);
-        if (reason != nullptr && failed_[slave] != event) {  // not at each try
-            begin(slave_faults_[slave], *reason);
+        if (prevents_start(event) && failed_[slave] != event) {  // not at each try
+            begin(slave_faults_[slave], event, slave);
             failed_[slave] = event;
         }
         if (event == Event::slave_settled) {
@@ -375,25 +366,25 @@ private:
     /// Raises and ends the faults of the bus. [realtime]
     void bus_event(Event event, std::int64_t first) noexcept {
         if (event == Event::unknown_slave && !std::exchange(unknown_raised_, true)) {
-            begin(unknown_fault_, unknown_words_);
+            begin(unknown_fault_, event);
         }
         if (event == Event::scanned) {
             unknown_raised_ = false;
         }
         if (event == Event::no_slaves) {
-            begin(nobody_fault_, nobody_words_);
+            begin(nobody_fault_, event);
         }
         if (event == Event::scanned && first > 0) {
             end(nobody_fault_);
         }
         if (event == Event::link_lost && first == 0) {
-            begin(link_fault_, link_words_);
+            begin(link_fault_, event);
         }
         if (event == Event::link_restored && first == 0) {
             end(link_fault_);
         }
         if (event == Event::other_master) {
-            begin(other_fault_, other_words_);
+            begin(other_fault_, event);
             other_seen_ns_ = now_ns_;
         }
     }
@@ -406,17 +397,17 @@ private:
         }
     }
 
-    /// Returns why a slave is not started; nullptr: the event is another one. [realtime]
-    const std::string* start_words(Event event, std::uint32_t slave) const noexcept {
+    /// Returns whether a slave is not started because of an event. [realtime]
+    static bool prevents_start(Event event) noexcept {
         switch (event) {
         case Event::wrong_vendor:
         case Event::wrong_product:
         case Event::wrong_revision:
-        case Event::wrong_serial: return &identity_words_[slave];
-        case Event::slave_missing: return &missing_words_[slave];
-        case Event::duplicate_alias: return &ambiguous_words_[slave];
-        case Event::start_up_failed: return &failed_words_[slave];
-        default: return nullptr;
+        case Event::wrong_serial:
+        case Event::slave_missing:
+        case Event::duplicate_alias:
+        case Event::start_up_failed: return true;
+        default: return false;
         }
     }
 
@@ -460,10 +451,9 @@ private:
     EntryPins entries_{*this, receive_, transmit_};
     std::vector<Place> places_;  // of the process data, in the order of areas_
     std::vector<std::span<std::uint8_t>> areas_;
-    std::vector<std::string> lost_words_, left_words_, clock_words_, identity_words_,
-        missing_words_, ambiguous_words_, failed_words_;
     std::vector<Event> failed_;  // why a slave is not started, or slave_operational
-    std::string unknown_words_, nobody_words_, link_words_, period_words_, other_words_;
+    std::string period_text_;
+    const hal::bus::FaultTexts fault_texts_ = config::fault_texts(bus_.setup, bus_.link);
     config::EventFilter filter_{0};
 
     std::unique_ptr<hal::ethernet::Port> primary_, backup_;

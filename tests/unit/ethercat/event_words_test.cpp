@@ -150,12 +150,43 @@ TEST(EthercatEventWords, One_cause_is_news_once_until_the_slave_is_operational) 
 }
 
 TEST(EthercatEventWords, Every_event_but_a_reached_state_has_a_sentence) {
-    for (int n = 0; n <= static_cast<int>(Event::start_up_failed); ++n) {
+    for (int n = 0; n <= static_cast<int>(Event::slave_settled); ++n) {
         const auto event = static_cast<Event>(n);
         const bool needs_none = event == Event::state_reached;
         EXPECT_EQ(words(event, 1, 1, 1).empty(), needs_none) << n;
         EXPECT_EQ(words(event, 1, 1, 1).find("  "), std::string::npos) << words(event, 1, 1, 1);
     }
+}
+
+TEST(EthercatEventWords, Faults_are_of_the_rows_of_the_sentences) {
+    master::Setup setup;
+    setup.slaves.resize(2);
+    setup.slaves[1].name = "y";
+    setup.slaves[1].position = 1;
+    const auto faults = config::fault_texts(setup, "eth:enp3s0");
+    const auto text = [&](Event event, std::uint32_t slave) {
+        const auto* const fault = faults.of(event, slave);
+        return fault != nullptr ? fault->text : std::string();
+    };
+    EXPECT_EQ(text(Event::slave_lost, 1),
+              "slave 1 (y) does not answer; its inputs keep their last values");
+    EXPECT_EQ(text(Event::wrong_serial, 1),
+              "slave 1 (y) is not the device of the configuration; it stays in INIT");
+    EXPECT_EQ(text(Event::start_up_failed, 1), "slave 1 (y) did not start; it is tried again");
+    EXPECT_EQ(text(Event::fell_back, 1),
+              "slave 1 (y) left its state with AL status code {x}; its outputs are off");
+    EXPECT_EQ(text(Event::dc_lost, 1), "slave 1 (y) is out of step, its clock deviates by {} us");
+    EXPECT_EQ(text(Event::unknown_slave, Events::of_position + 3),
+              "a slave on eth:enp3s0 is not in the configuration");
+    EXPECT_EQ(text(Event::link_lost, Events::bus),
+              "eth:enp3s0 has no link; no process data is exchanged");
+    EXPECT_EQ(text(Event::slave_operational, 1), "");
+    EXPECT_EQ(faults.of(Event::fell_back, 1)->detail(0x1b), 0x1b);
+    EXPECT_DOUBLE_EQ(faults.of(Event::dc_lost, 1)->detail(348'974), 348.974);
+    setup.dc_loss = master::DcLoss::safeop;
+    EXPECT_EQ(config::fault_texts(setup, "eth:enp3s0").of(Event::dc_lost, 1)->text,
+              "slave 1 (y) is out of step, its clock deviates by {} us; its outputs are off until "
+              "it is in step again");
 }
 
 TEST(EthercatAlStatus, Every_code_has_a_cause_and_a_remedy_and_they_are_in_order) {
