@@ -1,27 +1,20 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <bit>
-#include <deque>
 #include <map>
-#include <memory>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include <fnmatch.h>
 
-#include "hal/component.hpp"
+#include "hal/any_pin.hpp"
 #include "hal/texts.hpp"
 #include "recording/mcap/recording.hpp"
 
 namespace {
-
-using AnyOut =
-    std::variant<std::monostate, hal::Out<bool>, hal::Out<double>, hal::Out<std::int32_t>,
-                 hal::Out<std::uint32_t>, hal::Out<std::int64_t>, hal::Out<std::uint64_t>>;
 
 struct Playback : hal::Component {
     explicit Playback(const hal_host* host)
@@ -65,10 +58,11 @@ struct Playback : hal::Component {
                 ++track.next;
             }
             if (track.next != before) {
-                show(track, track.next - 1);
+                collect(track, track.next - 1);
             }
             more = more || track.next < times.size();
         }
+        show();
         time = static_cast<double>(elapsed_ns_) * 1e-9;
         done = !more;
     }
@@ -77,7 +71,12 @@ private:
     struct Track {
         hal::mcap::Table table;
         std::size_t next = 0;
-        std::vector<std::pair<std::size_t, AnyOut*>> pins = {};  // column and pin
+        std::vector<std::pair<std::size_t, std::size_t>> pins = {};  // column and number of a pin
+    };
+    /// What a pin shows next.
+    struct Value {
+        std::uint64_t word = 0;
+        bool fresh = false;
     };
 
     bool wanted(const std::string& name) const {
@@ -146,47 +145,33 @@ private:
                              column.name == "loop" || column.name == "time" ||
                              column.name == "done";
             const std::string name = own ? "value-" + column.name : column.name;
-            const auto [at, made] = by_name_.try_emplace(name, nullptr);
+            const auto [at, made] = by_name_.try_emplace(name, values_.size());
             if (made) {
-                AnyOut& pin = pins_.emplace_back();
-                at->second = &pin;
-                emplace(pin, column.type, units_.emplace_back(name).c_str(),
-                        units_.emplace_back(column.unit).c_str());
+                values_.emplace_back();
+                pins_.declare(*this, nullptr, column.type, name, "value of the recording",
+                              at->second, {.unit = column.unit.c_str()});
             }
             track.pins.emplace_back(c, at->second);
         }
     }
 
-    void emplace(AnyOut& pin, hal_type type, const char* name, const char* unit) {
-        const char* const doc = "value of the recording";
-        switch (type) {
-        case HAL_TYPE_BIT: pin.emplace<1>(*this, name, doc); break;
-        case HAL_TYPE_FLOAT:
-            pin.emplace<2>(*this, name, doc, hal::PinOptions<double>{.unit = unit});
-            break;
-        case HAL_TYPE_S32: pin.emplace<3>(*this, name, doc); break;
-        case HAL_TYPE_U32: pin.emplace<4>(*this, name, doc); break;
-        case HAL_TYPE_S64: pin.emplace<5>(*this, name, doc); break;
-        default: pin.emplace<6>(*this, name, doc); break;
+    void collect(const Track& track, std::size_t row) noexcept {
+        for (const auto& [column, pin] : track.pins) {
+            values_[pin] = {track.table.word(row, column), true};
         }
     }
 
-    static void show(Track& track, std::size_t row) noexcept {
-        for (const auto& [column, pin] : track.pins) {
-            const std::uint64_t word = track.table.word(row, column);
-            std::visit([word](auto& out) {
-                if constexpr (requires { out.get(); }) {
-                    using T = std::remove_cvref_t<decltype(out.get())>;
-                    if constexpr (std::is_same_v<T, double>) {
-                        out = std::bit_cast<double>(word);
-                    } else if constexpr (std::is_same_v<T, bool>) {
-                        out = word != 0;
-                    } else {
-                        out = static_cast<T>(word);
-                    }
-                }
-            }, *pin);
-        }
+    void show() noexcept {
+        pins_.each([this]<class T>(hal::Out<T>& pin, std::size_t number) noexcept {
+            Value& value = values_[number];
+            if (!value.fresh) return;
+            value.fresh = false;
+            if constexpr (std::is_same_v<T, double>) {
+                pin = std::bit_cast<double>(value.word);
+            } else {
+                pin = static_cast<T>(value.word);
+            }
+        });
     }
 
     void rewind() noexcept {
@@ -198,9 +183,9 @@ private:
     }
 
     std::vector<Track> tracks_;
-    std::deque<AnyOut> pins_;
-    std::deque<std::string> units_;
-    std::map<std::string, AnyOut*> by_name_;
+    hal::AnyOuts<std::size_t> pins_;  // with the number of the pin
+    std::vector<Value> values_;
+    std::map<std::string, std::size_t> by_name_;
     std::int64_t begin_ns_ = 0;
     std::int64_t elapsed_ns_ = 0;
     bool begun_ = false;

@@ -76,7 +76,7 @@ ROWS = {
     "components/sim": ["components"],
     "components/estimation": ["components"],
     "components/recording": ["components", "components/recording/mcap"],
-    "components/recording/mcap": ["runtime/abi"],
+    "components/recording/mcap": ["runtime/sdk"],
     "components/mobile": ["components"],
     "components/vision": ["components"],
     "components/dds": ["components", "components/dds/links"],

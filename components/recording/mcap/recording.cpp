@@ -13,6 +13,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "hal/pin_type.hpp"
 #include "recording/mcap/bytes.hpp"
 #include "recording/mcap/reader.hpp"
 
@@ -280,22 +281,20 @@ bool whole_number(const std::string& text, std::uint64_t& word) {
 /// Reads a value of that type into `word`. Returns false, and keeps `word`, when the text is
 /// invalid.
 bool word_of(const std::string& text, hal_type type, std::uint64_t& word) {
-    double real = 0;
-    std::uint64_t bit = 0;
-    switch (type) {
-    case HAL_TYPE_BIT:
-        if (!whole_number<std::uint8_t>(text, bit) || bit > 1) return false;
-        word = bit;
+    return visit_type(type, [&]<class T>(std::type_identity<T>) {
+        if constexpr (std::is_same_v<T, bool>) {
+            std::uint64_t bit = 0;
+            if (!whole_number<std::uint8_t>(text, bit) || bit > 1) return false;
+            word = bit;
+        } else if constexpr (std::is_same_v<T, double>) {
+            double real = 0;
+            if (!number_of(text, real)) return false;
+            word = std::bit_cast<std::uint64_t>(real);
+        } else {
+            return whole_number<T>(text, word);
+        }
         return true;
-    case HAL_TYPE_S32: return whole_number<std::int32_t>(text, word);
-    case HAL_TYPE_U32: return whole_number<std::uint32_t>(text, word);
-    case HAL_TYPE_S64: return whole_number<std::int64_t>(text, word);
-    case HAL_TYPE_U64: return whole_number<std::uint64_t>(text, word);
-    default:
-        if (!number_of(text, real)) return false;
-        word = std::bit_cast<std::uint64_t>(real);
-        return true;
-    }
+    });
 }
 
 constexpr std::pair<std::string_view, hal_type> type_words[] = {
@@ -401,12 +400,10 @@ std::optional<hal_type> type_of_word(std::string_view word) {
 
 double Table::real(std::size_t row, std::size_t column) const {
     const std::uint64_t value = word(row, column);
-    switch (columns[column].type) {
-    case HAL_TYPE_FLOAT: return std::bit_cast<double>(value);
-    case HAL_TYPE_S32:
-    case HAL_TYPE_S64: return static_cast<double>(static_cast<std::int64_t>(value));
-    default: return static_cast<double>(value);
-    }
+    return visit_type(columns[column].type, [value]<class T>(std::type_identity<T>) {
+        if constexpr (std::is_same_v<T, double>) return std::bit_cast<double>(value);
+        return static_cast<double>(static_cast<T>(value));
+    });
 }
 
 std::int64_t Recording::begin_ns() const {
