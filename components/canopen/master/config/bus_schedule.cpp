@@ -33,115 +33,161 @@ std::string ms(Time t) {
 
 }  // namespace
 
-Schedule schedule_of(const MasterConfig& config, Time cycle) {
-    Schedule out;
-    out.bus = {config.bit_rate, config.data_rate, {}};
-    const Time sync = config.sync == SyncMode::none ? 0
-                      : config.sync_period != 0     ? config.sync_period
-                                                    : cycle;
-    out.sync = sync;
-    const auto add = [&](std::uint32_t cob, unsigned bytes, Time period, std::string name, Span at,
-                         bool of_sync) {
+namespace {
+
+/// Collects the messages of a bus.
+class ScheduleBuilder {
+public:
+    ScheduleBuilder(const MasterConfig& config, Time cycle) : config_(config), cycle_(cycle) {
+        out_.bus = {config.bit_rate, config.data_rate, {}};
+        if (config.sync != SyncMode::none) {
+            out_.sync = config.sync_period != 0 ? config.sync_period : cycle;
+        }
+    }
+
+    Schedule build() {
+        services();
+        for (const Node& n : config_.nodes) {
+            for (const Pdo& p : n.pdos) {
+                pdo(n, p);
+            }
+        }
+        for (const Node& n : config_.nodes) {
+            error_control(n);
+        }
+        if (config_.heartbeat_ms != 0) {
+            add(0x700U + config_.node_id, 1, config_.heartbeat_ms * millisecond, "master heartbeat",
+                config_.at);
+        }
+        foreign();
+        share_of_sync();
+        return std::move(out_);
+    }
+
+private:
+    can_timing::Message& add(std::uint32_t cob, unsigned bytes, Time period, std::string name,
+                             Span at) {
         can_timing::Message m;
         m.id = cob_id(cob);
         m.extended = (cob & cob_extended) != 0;
-
         m.bytes = static_cast<std::uint8_t>(bytes);
         m.period = period;
+        return add(m, std::move(name), at);
+    }
+    can_timing::Message& add(const can_timing::Message& m, std::string name, Span at) {
+        out_.messages.push_back(m);
+        out_.names.push_back(std::move(name));
+        out_.spans.push_back(at);
+        out_.assumed.push_back(false);
+        return out_.messages.back();
+    }
+    void belongs_to_sync(can_timing::Message& m) {
+        m.deadline = out_.sync;
+        ++out_.per_sync;
+    }
+
+    void services() {
+        if (out_.sync != 0) {
+            belongs_to_sync(add(config_.sync_cob, config_.sync_counter != 0 ? 1 : 0, out_.sync,
+                                "SYNC", config_.at));
+        }
+        if (config_.time_period != 0) {
+            add(0x100, 6, config_.time_period, "TIME", config_.at);
+        }
+        // while there is an active master; a negotiation is over by then
+        if (const FlyingSetup& f = config_.flying; f.enabled) {
+            add(0x71, 2, f.search_interval(), "who is the NMT master", config_.at);
+            add(0x73, 0, f.search_interval(), "NMT master wanted", config_.at);
+        }
+    }
+
+    void pdo(const Node& n, const Pdo& p) {
+        const std::string number = std::to_string(p.number);
+        if (p.safety) {
+            const std::string name = n.name + (p.to_node ? " rsrdo" : " tsrdo") + number;
+            add(p.cob, p.bytes(), p.safety->refresh, name, p.at);
+            add(p.cob + 1, p.bytes(), p.safety->refresh, name + " inverted", p.at);
+            return;
+        }
+        const std::string name = n.name + (p.to_node ? " rpdo" : " tpdo") + number;
+        if (std::string* shared = p.to_node ? shared_name(p) : nullptr) {
+            *shared += ", " + name;  // several nodes take their parts of it
+            return;
+        }
+        if (p.request != 0) {
+            add(p.cob, 0, p.request, name + " request", p.at).remote = true;
+        }
+        const bool of_sync = p.synchronous() && out_.sync != 0;
+        can_timing::Message& m = add(p.cob, p.bytes(), period_of(p, of_sync), name, p.at);
         if (of_sync) {
-            m.deadline = sync;
-            ++out.per_sync;
+            belongs_to_sync(m);
         }
-        out.messages.push_back(m);
-        out.names.push_back(std::move(name));
-        out.spans.push_back(at);
-        out.assumed.push_back(false);
-    };
-    if (sync != 0) {
-        add(config.sync_cob, config.sync_counter != 0 ? 1 : 0, sync, "SYNC", config.at, true);
+        out_.assumed.back() = !of_sync && p.inhibit_100us == 0 && p.request == 0;
     }
-    if (config.time_period != 0) {
-        add(0x100, 6, config.time_period, "TIME", config.at, false);
+
+    /// Returns the name of the message with the identifier of an RPDO; nullptr: there is none.
+    std::string* shared_name(const Pdo& p) {
+        const bool extended = (p.cob & cob_extended) != 0;
+        const auto same = std::find_if(out_.messages.begin(), out_.messages.end(),
+                                       [&](const can_timing::Message& m) {
+            return !m.remote && m.id == cob_id(p.cob) && m.extended == extended;
+        });
+        if (same == out_.messages.end()) return nullptr;
+        return &out_.names[static_cast<std::size_t>(same - out_.messages.begin())];
     }
-    // while there is an active master; a negotiation is over by then
-    if (const FlyingSetup& f = config.flying; f.enabled) {
-        add(0x71, 2, f.search_interval(), "who is the NMT master", config.at, false);
-        add(0x73, 0, f.search_interval(), "NMT master wanted", config.at, false);
+
+    Time period_of(const Pdo& p, bool of_sync) const {
+        if (p.request != 0 && !event_driven(p)) return p.request;
+        if (of_sync) return out_.sync * std::max<Time>(p.transmission, 1);
+        return event_period(p, cycle_);
     }
-    for (const Node& n : config.nodes) {
-        for (const Pdo& p : n.pdos) {
-            if (p.safety) {
-                const std::string name =
-                    n.name + (p.to_node ? " rsrdo" : " tsrdo") + std::to_string(p.number);
-                add(p.cob, p.bytes(), p.safety->refresh, name, p.at, false);
-                add(p.cob + 1, p.bytes(), p.safety->refresh, name + " inverted", p.at, false);
-                continue;
-            }
-            const auto same = std::find_if(out.messages.begin(), out.messages.end(),
-                                           [&](const can_timing::Message& m) {
-                return p.to_node && !m.remote && m.id == cob_id(p.cob) &&
-                       m.extended == ((p.cob & cob_extended) != 0);
-            });
-            if (same != out.messages.end()) {  // several nodes take their parts of it
-                out.names[static_cast<std::size_t>(same - out.messages.begin())] +=
-                    ", " + n.name + " rpdo" + std::to_string(p.number);
-                continue;
-            }
-            std::string name = n.name + (p.to_node ? " rpdo" : " tpdo") + std::to_string(p.number);
-            const bool of_sync = p.synchronous() && sync != 0;
-            if (p.request != 0) {
-                add(p.cob, 0, p.request, name + " request", p.at, false);
-                out.messages.back().remote = true;
-            }
-            const Time every = p.request != 0 && !event_driven(p) ? p.request
-                               : of_sync ? sync * std::max<Time>(p.transmission, 1)
-                                         : event_period(p, cycle);
-            add(p.cob, p.bytes(), every, std::move(name), p.at, of_sync);
-            out.assumed.back() = !of_sync && p.inhibit_100us == 0 && p.request == 0;
-        }
-    }
-    for (const Node& n : config.nodes) {
+
+    void error_control(const Node& n) {
+        const std::uint32_t cob = 0x700U + n.setup.id;
         if (n.setup.heartbeat_ms != 0) {
-            add(0x700U + n.setup.id, 1, n.setup.heartbeat_ms * millisecond, n.name + " heartbeat",
-                n.at, false);
+            add(cob, 1, n.setup.heartbeat_ms * millisecond, n.name + " heartbeat", n.at);
         }
-        if (n.setup.guard_ms != 0) {
-            add(0x700U + n.setup.id, 1, n.setup.guard_ms * millisecond, n.name + " guarding", n.at,
-                false);
-            add(0x700U + n.setup.id, 1, n.setup.guard_ms * millisecond,
-                n.name + " guarding request", n.at, false);
-            out.messages.back().remote = true;
-            out.messages.back().bytes = 0;
-        }
+        if (n.setup.guard_ms == 0) return;
+        const Time period = n.setup.guard_ms * millisecond;
+        add(cob, 1, period, n.name + " guarding", n.at);
+        add(cob, 0, period, n.name + " guarding request", n.at).remote = true;
     }
-    if (config.heartbeat_ms != 0) {
-        add(0x700U + config.node_id, 1, config.heartbeat_ms * millisecond, "master heartbeat",
-            config.at, false);
-    }
-    std::map<std::string, std::uint32_t> queues;
-    for (const Foreign& f : config.foreign) {
-        can_timing::Message m{f.id,    f.extended, f.remote,   f.fd,    f.bit_rate_switch,
-                              f.bytes, f.period,   f.deadline, f.jitter};
-        if (!f.queue.empty()) {
-            m.fifo = queues.try_emplace(f.queue, static_cast<std::uint32_t>(queues.size() + 1))
-                         .first->second;
-        }
-        out.messages.push_back(m);
-        out.names.push_back(f.name);
-        out.spans.push_back(f.at);
-        out.assumed.push_back(false);
-    }
-    const auto analysis = can_timing::analyse(out.messages, out.bus);
-    Time together = 0;
-    for (std::size_t i = 0; i < out.messages.size(); ++i) {
-        if (sync != 0 && out.messages[i].deadline == sync && i < out.names.size()) {
-            together += analysis.responses[i].frame;
+
+    void foreign() {
+        std::map<std::string, std::uint32_t> queues;
+        for (const Foreign& f : config_.foreign) {
+            can_timing::Message m{f.id,    f.extended, f.remote,   f.fd,    f.bit_rate_switch,
+                                  f.bytes, f.period,   f.deadline, f.jitter};
+            if (!f.queue.empty()) {
+                const auto next = static_cast<std::uint32_t>(queues.size() + 1);
+                m.fifo = queues.try_emplace(f.queue, next).first->second;
+            }
+            add(m, f.name, f.at);
         }
     }
-    if (sync != 0) {
-        out.sync_share = static_cast<double>(together) / static_cast<double>(sync);
+
+    /// Computes how much of the SYNC's period its frames take.
+    void share_of_sync() {
+        if (out_.sync == 0) return;
+        const auto analysis = can_timing::analyse(out_.messages, out_.bus);
+        Time together = 0;
+        for (std::size_t i = 0; i < out_.messages.size(); ++i) {
+            if (out_.messages[i].deadline == out_.sync) {
+                together += analysis.responses[i].frame;
+            }
+        }
+        out_.sync_share = static_cast<double>(together) / static_cast<double>(out_.sync);
     }
-    return out;
+
+    const MasterConfig& config_;
+    Time cycle_;
+    Schedule out_;
+};
+
+}  // namespace
+
+Schedule schedule_of(const MasterConfig& config, Time cycle) {
+    return ScheduleBuilder(config, cycle).build();
 }
 
 std::vector<Message> load_messages(const MasterConfig& config, Time cycle,
