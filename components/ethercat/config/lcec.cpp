@@ -426,95 +426,116 @@ private:
     /// Adds an entry, or `bits` single bits if it is a `bit` of several.
     void typed(const Xml& node, const master::SyncManager& sm, master::Entry e, std::uint16_t bits,
                master::Pdo& to) {
-        const std::string type = node.attribute("halType").value();
-
         const std::string pin = node.attribute("halPin").value();
         e.bits = bits;
-        const auto real = [&](const char* name, double otherwise) {
-            const auto value = node.attribute(name)
-                                   ? parse_real(trimmed(node.attribute(name).value()))
-                                   : std::optional<double>(otherwise);
-            if (value && (std::string_view(name) != "scale" || *value != 0)) return *value;
-            error(Topic::value, node,
-                  "invalid " + std::string(name) + " '" + node.attribute(name).value() + "'",
-                  "write a number other than 0");
-            return otherwise;
-        };
-        const bool is_float = type == "float" || type == "float-unsigned" || type == "float-ieee" ||
-                              type == "float-double-ieee";
-        if ((node.attribute("scale") || node.attribute("offset")) && !is_float) {
+        const HalType type = hal_type(node);
+        e.type = type.real != Type::bit ? type.real : type_for(type, bits);
+        e.is_signed = is_signed(e.type);
+        if (type.is_float) {
+            scale(node, sm.output, e);
+            check_width(node, e);
+        } else if (node.attribute("scale") || node.attribute("offset")) {
             error(Topic::value, node, "scale and offset apply only to the float types",
                   "write halType=\"float\"");
         }
-        if (type == "bit") {
-            e.type = Type::bit;
-        } else if (type == "s32") {
-            e.type = type_of(std::max<unsigned>(bits, 2), true);
-        } else if (type == "u32" || type.empty()) {
-            e.type = type_of(std::max<unsigned>(bits, 2), false);
-        } else if (is_float) {
-            if (type == "float-ieee") {
-                e.type = Type::real32;
-            } else if (type == "float-double-ieee") {
-                e.type = Type::real64;
-            } else {
-                e.type = type_of(std::max<unsigned>(bits, 2), type == "float");
-            }
-            e.scaled = true;
-            e.scale = real("scale", 1);
-            e.offset = real("offset", 0);
-            // Written values are (pin + offset) * scale.
-            if (sm.output) {
-                e.scale = 1 / e.scale;
-                e.offset = -e.offset;
-            }
-            const unsigned width = type == "float-ieee"          ? 32
-                                   : type == "float-double-ieee" ? 64
-                                                                 : bits;
-            if (bits != width) {
-                error(Topic::value, node,
-                      "halType " + type + " has " + std::to_string(width) + " bits, not " +
-                          std::to_string(bits),
-                      "correct bitLen");
-            }
-        } else {
-            error(Topic::value, node, "unknown halType '" + type + "'",
-                  suggestion(type,
-                             {"bit", "s32", "u32", "float", "float-unsigned", "float-ieee",
-                              "float-double-ieee", "complex"},
-                             "the types are"));
+        if (pin.empty() || e.index == 0) {
+            to.entries.push_back(std::move(e));
+            return;
         }
-        e.is_signed = is_signed(e.type);
-        if (pin.empty() || e.index == 0) return void(to.entries.push_back(std::move(e)));
-        if (type.empty()) {
+        if (!node.attribute("halType")) {
             error(Topic::value, node, "pin '" + pin + "' has no halType", "write halType=\"u32\"");
         }
-        if (e.type != Type::bit || bits == 1) {
-            if (bits > 32 && e.type != Type::real64) {
-                error(Topic::value, node,
-                      "pin '" + pin + "' has " + std::to_string(bits) + " bits; 32 are possible",
-                      "delete halPin");
-            }
-            e.name = pin;
-            if (!pins_.insert(pin).second) {
-                error(Topic::slave, node, "duplicate pin '" + pin + "' of this slave",
-                      "choose another halPin");
-            }
-            info_.pins.push_back({pin, {"", object_text(e.index, e.sub)}});
-            return void(to.entries.push_back(std::move(e)));
+        if (e.type == Type::bit && bits > 1) return add_bits(node, e, pin, to);
+        if (bits > 32 && e.type != Type::real64) {
+            error(Topic::value, node,
+                  "pin '" + pin + "' has " + std::to_string(bits) + " bits; 32 are possible",
+                  "delete halPin");
         }
-        for (unsigned i = 0; i < bits; ++i) {
+        add_pin(node, e, pin);
+        to.entries.push_back(std::move(e));
+    }
+
+    /// A halType: an integer of as many bits as the entry, or a real type.
+    struct HalType {
+        const char* name;
+        bool is_float;
+        bool is_signed;
+        Type real = Type::bit;  ///< a real type; bit: none
+        bool is_bit = false;
+    };
+    HalType hal_type(const Xml& node) {
+        static constexpr HalType types[] = {{"bit", false, false, Type::bit, true},
+                                            {"s32", false, true},
+                                            {"u32", false, false},
+                                            {"", false, false},
+                                            {"float", true, true},
+                                            {"float-unsigned", true, false},
+                                            {"float-ieee", true, true, Type::real32},
+                                            {"float-double-ieee", true, true, Type::real64}};
+        const std::string name = node.attribute("halType").value();
+        for (const HalType& type : types) {
+            if (name == type.name) return type;
+        }
+        error(Topic::value, node, "unknown halType '" + name + "'",
+              suggestion(name,
+                         {"bit", "s32", "u32", "float", "float-unsigned", "float-ieee",
+                          "float-double-ieee", "complex"},
+                         "the types are"));
+        return types[2];
+    }
+    static Type type_for(const HalType& type, unsigned bits) {
+        return type.is_bit ? Type::bit : type_of(std::max(bits, 2U), type.is_signed);
+    }
+
+    double real(const Xml& node, const char* name, double otherwise) {
+        if (!node.attribute(name)) return otherwise;
+        const auto value = parse_real(trimmed(node.attribute(name).value()));
+        if (value && (std::string_view(name) != "scale" || *value != 0)) return *value;
+        error(Topic::value, node,
+              "invalid " + std::string(name) + " '" + node.attribute(name).value() + "'",
+              "write a number other than 0");
+        return otherwise;
+    }
+
+    /// Written values are (pin + offset) * scale.
+    void scale(const Xml& node, bool output, master::Entry& e) {
+        e.scaled = true;
+        e.scale = real(node, "scale", 1);
+        e.offset = real(node, "offset", 0);
+        if (output) {
+            e.scale = 1 / e.scale;
+            e.offset = -e.offset;
+        }
+    }
+
+    void check_width(const Xml& node, const master::Entry& e) {
+        if (!is_real(e.type)) return;
+        const unsigned width = e.type == Type::real32 ? 32 : 64;
+        if (e.bits == width) return;
+        error(Topic::value, node,
+              std::string("halType ") + node.attribute("halType").value() + " has " +
+                  std::to_string(width) + " bits, not " + std::to_string(e.bits),
+              "correct bitLen");
+    }
+
+    void add_pin(const Xml& node, master::Entry& e, const std::string& pin) {
+        e.name = pin;
+        if (!pins_.insert(pin).second) {
+            error(Topic::slave, node, "duplicate pin '" + pin + "' of this slave",
+                  "choose another halPin");
+        }
+        info_.pins.push_back({pin, {"", object_text(e.index, e.sub)}});
+    }
+
+    /// Adds each bit as an entry; the first 32 are pins.
+    void add_bits(const Xml& node, const master::Entry& e, const std::string& pin,
+                  master::Pdo& to) {
+        for (unsigned i = 0; i < e.bits; ++i) {
             master::Entry bit = e;
             bit.bits = 1;
             bit.part = i != 0;
             if (i < 32) {
-                bit.name = pin + "-" + std::to_string(i);
-
-                info_.pins.push_back({bit.name, {"", object_text(e.index, e.sub)}});
-            }
-            if (i < 32 && !pins_.insert(bit.name).second) {
-                error(Topic::slave, node, "duplicate pin '" + bit.name + "' of this slave",
-                      "choose another halPin");
+                add_pin(node, bit, pin + "-" + std::to_string(i));
             }
             to.entries.push_back(std::move(bit));
         }
