@@ -8,6 +8,7 @@
 #include <fnmatch.h>
 
 #include "machine/session.hpp"
+#include "text/sort_in_steps.hpp"
 
 namespace hal {
 
@@ -30,32 +31,6 @@ const char* direction_text(const Pin& pin) {
                                                                               : name(pin.dir);
 }
 
-namespace {
-
-/// Sorts in short steps, between which the end of the machine interrupts it; then `row` is empty.
-template <class T, class Less>
-void sort_until_end(std::vector<T>& row, const Session& session, Less less) {
-    constexpr std::size_t step = 4096;
-    const auto begin = row.begin();
-    const std::size_t size = row.size();
-    for (std::size_t first = 0; first < size; first += step) {
-        if (session.ending()) return row.clear();
-        std::sort(begin + static_cast<std::ptrdiff_t>(first),
-                  begin + static_cast<std::ptrdiff_t>(std::min(first + step, size)), less);
-    }
-    for (std::size_t width = step; width < size; width *= 2) {
-        for (std::size_t first = 0; first + width < size; first += 2 * width) {
-            if (session.ending()) return row.clear();
-            std::inplace_merge(
-                begin + static_cast<std::ptrdiff_t>(first),
-                begin + static_cast<std::ptrdiff_t>(first + width),
-                begin + static_cast<std::ptrdiff_t>(std::min(first + 2 * width, size)), less);
-        }
-    }
-}
-
-}  // namespace
-
 std::vector<const Pin*> pins_by_name(const Session& session, bool parameters,
                                      const Patterns& patterns) {
     std::vector<const Pin*> chosen;
@@ -66,8 +41,9 @@ std::vector<const Pin*> pins_by_name(const Session& session, bool parameters,
             chosen.push_back(pin);
         }
     }
-    sort_until_end(chosen, session,
-                   [](const Pin* a, const Pin* b) { return shown_name(*a) < shown_name(*b); });
+    sort_in_steps(chosen, [](const Pin* a, const Pin* b) {
+        return shown_name(*a) < shown_name(*b);
+    }, [&] { return session.ending(); });
     return chosen;
 }
 
@@ -79,8 +55,8 @@ std::vector<const Signal*> signals_by_name(const Session& session, const Pattern
             chosen.push_back(signal.get());
         }
     }
-    sort_until_end(chosen, session,
-                   [](const Signal* a, const Signal* b) { return a->name < b->name; });
+    sort_in_steps(chosen, [](const Signal* a, const Signal* b) { return a->name < b->name; },
+                  [&] { return session.ending(); });
     return chosen;
 }
 

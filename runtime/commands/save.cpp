@@ -318,7 +318,7 @@ void command_save(Context& context) {
         known = true;
         if (context.checking()) continue;
         section.save(context, text);
-        if (context.session.ending()) return;
+        if (context.interrupted()) return;
     }
     if (!known) {
         std::vector<std::string> names{"all", "allu"};

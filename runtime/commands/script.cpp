@@ -314,6 +314,9 @@ void Script::act(const Command& command, const CommandRow& row) {
                         one,   pending_, lock_};
         row.function.act(context);
     }
+    if (only_looks(row, command) && !pending_.failed() && session_.ending()) {
+        report_end(command);  // what it has printed may be incomplete
+    }
     // its component remembers the place
     if (row.function.act == command_loadusr) {
         text_is_kept_ = true;

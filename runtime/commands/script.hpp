@@ -83,6 +83,8 @@ private:
     /// True after Session::interrupt(); then the transaction is rolled back, and `command` and
     /// those after it are not executed.
     bool ended(const Command& command);
+    /// Adds the error that the end of the machine has interrupted `command`.
+    void report_end(const Command& command);
     void report(Diagnostics& found, std::size_t edits, bool took_effect);
     /// The diagnostic with the places in the INI file of the values that the words at its main
     /// place have.

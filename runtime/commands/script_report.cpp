@@ -199,7 +199,7 @@ Diagnostics looked_up(const Diagnostics& found, const Session& session) {
         if (session.ending()) {
             single = without_names(one);
         } else if (all.all().size() < max_count) {
-            single.look_up();
+            single.look_up(session.end_token());
         }
         all.take(single);
     }
@@ -266,12 +266,16 @@ std::string Script::outcome(bool edited) const {
 bool Script::ended(const Command& command) {
     if (!session_.ending()) return false;
     if (!pending_.failed()) {
-        pending_.error("interrupted", command.span,
-                       "'" + command.name.text + "' was interrupted: the machine ends");
+        report_end(command);
     }
     finish();
     stopped_ = true;
     return true;
+}
+
+void Script::report_end(const Command& command) {
+    pending_.error("interrupted", command.span,
+                   "'" + command.name.text + "' was interrupted: the machine ends");
 }
 
 bool Script::interrupted(Context& context) {

@@ -172,6 +172,10 @@ Connection::Handled Connection::handle(std::string_view line, std::string& repli
         (given.is_string() && given.get_ref<const std::string&>().size() <= 200)) {
         id = dumped(given);
     }
+    const auto refuse_at_end = [&] {
+        state.told_end = true;
+        return refuse("the machine ends");
+    };
     const std::size_t before = replies.size();
     try {
         const Verb& verb = verb_of(body);
@@ -181,7 +185,7 @@ Connection::Handled Connection::handle(std::string_view line, std::string& repli
             &State::end, &State::exchange, &State::exit, &State::port, &State::stream};
         const bool answered = std::find(std::begin(until_closed), std::end(until_closed),
                                         verb.handle) != std::end(until_closed);
-        if (state.session.ending() && !answered) return refuse("the machine ends");
+        if (state.session.ending() && !answered) return refuse_at_end();
         const bool script = verb.handle == &State::script;
         if (!may_wait && (verb.handle == &State::run || script)) {
             const Json& text = body[script ? "script" : "run"];
@@ -196,6 +200,11 @@ Connection::Handled Connection::handle(std::string_view line, std::string& repli
         ++state.requests;
         replies += "{\"id\":" + id + ",\"ok\":true";
         (state.*verb.handle)(body, replies);
+        const bool looks = verb.handle == &State::describe_kind || verb.handle == &State::list;
+        if (looks && state.session.ending()) {  // it may have been abandoned halfway
+            replies.resize(before);
+            return refuse_at_end();
+        }
         replies += "}\n";
     } catch (const RequestError& refusal) {
         replies.resize(before);
@@ -222,6 +231,8 @@ bool is_stop(const Json& command) {
 }
 
 }  // namespace
+
+bool Connection::told_end() const { return state_->told_end; }
 
 Connection::Urgent Connection::execute_urgent(std::string_view line, std::string& reply) {
     State& state = *state_;

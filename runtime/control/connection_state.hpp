@@ -45,6 +45,8 @@ struct Connection::State {
     /// what $NAME is in the request being executed
     std::map<std::string, std::string> environment;
     bool stop = false;
+    /// a request was rejected because the machine ends
+    bool told_end = false;
     std::uint64_t halt_ticket = 0;
     std::function<void(std::string)> event;
 

@@ -70,6 +70,7 @@ void Executors::carry_out(ServedClient& client) {
             turn.waiting = line;
         }
     }
+    turn.told_end = connection.told_end();
     turn.lines.erase(0, taken);
     turn.requests = connection.requests() - requests;
     turn.rubbish = connection.rubbish() - rubbish;

@@ -37,6 +37,7 @@ struct Turn {
     std::size_t capacity = 0;
     bool congested = false;        ///< subscriptions are skipped
     bool stop = false;             ///< a request asked the instance to end
+    bool told_end = false;         ///< a request was rejected because the machine ends
     /// the client is gone: the connection is closed, which may take long
     bool closes = false;
     std::uint64_t requests = 0;
@@ -74,20 +75,23 @@ struct ServedClient {
     /// it counts among the places; others have urgent requests executed only
     bool placed = false;
     bool not_urgent = false;       ///< the next request has been looked at
-    std::int64_t stalled_since = 0; ///< since when a full queue has not moved; 0: it moves
+    /// it knows that the machine ends, and is not listened to: a hundred clients that go on asking
+    /// would take the CPU time that the end needs
+    bool told_end = false;
+    std::int64_t stalled_since = 0;  ///< since when a full queue has not moved; 0: it moves
     /// since when its next request, a `stop`, waits for the threads; 0: it does not
     std::int64_t halting_since = 0;
     /// runs a command that waits; until it has finished no other request is executed
     std::thread worker;
-    std::string result;            ///< of the worker
+    std::string result;  ///< of the worker
     std::atomic<bool> finished{false};
     Turn turn;
     std::atomic<bool> turn_over{false};
     std::int64_t came_ns = monotonic_ns();
     std::int64_t active_ns = came_ns;  ///< when it connected or made its last request
-    bool reserved = false;         ///< came when all places were taken
+    bool reserved = false;  ///< came when all places were taken
     std::mutex events_mutex;
-    std::string events;            ///< that the worker has for the client meanwhile
+    std::string events;  ///< that the worker has for the client meanwhile
 
     /// The place of the next end of line, or npos. Every byte is looked at once, however slowly a
     /// long line comes.

@@ -10,9 +10,11 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "base/keep.hpp"
 #include "commands/shell.hpp"
 #include "control/server_state.hpp"
 #include "execute/process_setup.hpp"
+#include "machine/programs.hpp"
 #include "machine/session.hpp"
 
 namespace hal {
@@ -136,6 +138,15 @@ void Server::State::remove_gone() {
     });
 }
 
+/// True when the process ends and closes the connections with itself: a hundred clients that are
+/// woken before that would take CPU time from the end. The machine's programs are told: it waits for
+/// them.
+bool Server::State::clients_wait_for_end() const {
+    Session& session = shell.session();
+    const auto lock = session.lock();
+    return session.ending() && session.programs().idle();
+}
+
 void Server::State::end_all() {
     for (const auto& client : clients) {
         const bool is_being_closed = client->turn.closes;  // an executor has the connection
@@ -157,6 +168,9 @@ void Server::State::end_all() {
         }
     }
     endpoint.stop_listening();
+    if (clients_wait_for_end()) {
+        keep_for_good(std::make_unique<decltype(clients)>(std::move(clients)));
+    }
     clients.clear();
     if (spare >= 0) {
         close(std::exchange(spare, -1));
@@ -173,8 +187,8 @@ std::int64_t Server::State::next_due_ns(ServedClient& client) {
 
 /// True when the client's next request can be executed now.
 bool Server::State::has_work(ServedClient& client) {
-    if (client.gone || client.busy() || client.has_turn || client.halting_since != 0 ||
-        client.waiting() > options.queue) {
+    if (client.gone || client.busy() || client.has_turn || client.told_end ||
+        client.halting_since != 0 || client.waiting() > options.queue) {
         return false;
     }
     return client.line_end() != std::string::npos && (client.placed || !client.not_urgent);
@@ -324,6 +338,7 @@ void Server::State::collect_turn(ServedClient& client) {
     client.has_turn = false;
     Turn& turn = client.turn;
     if (turn.closes) return;
+    client.told_end = client.told_end || turn.told_end;
     if (turn.requests + turn.rubbish > 0) {
         client.active_ns = monotonic_ns();
     }

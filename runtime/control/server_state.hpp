@@ -57,6 +57,7 @@ struct Server::State {
     void serve();
     void serve_client(ServedClient& client, short events);
     void end_all();
+    bool clients_wait_for_end() const;
     int sleep_ms();
     bool has_work(ServedClient& client);
     std::int64_t next_due_ns(ServedClient& client);
@@ -88,7 +89,7 @@ struct Server::State {
             [&](const auto& client) { return !client->gone && client->placed == placed; }));
     }
     bool listens_to(const ServedClient& client) const {
-        return !client.input_ended && client.waiting() <= options.queue &&
+        return !client.input_ended && !client.told_end && client.waiting() <= options.queue &&
                client.in.size() - client.taken <= options.max_request;
     }
     void log(const std::string& sentence) const {

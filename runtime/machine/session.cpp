@@ -55,6 +55,7 @@ Session::Session(SessionOptions options)
       programs_(std::make_unique<Programs>(*this, *state_)) {
     state_->status.text = status_for_plugins;
     state_->status.data = this;
+    state_->ending = end_token();
     if (state_->options.check_only) {
         watch_for_exits();
     } else {

@@ -18,6 +18,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -96,9 +97,12 @@ public:
     void sweep_texts() noexcept;
     /// Interrupts what other threads do with this session: the commands of a text end at the next
     /// line, and queries end early. Used before shut_down(), which would wait for them. [any]
-    void interrupt() noexcept { ending_.store(true, std::memory_order_release); }
+    void interrupt() noexcept { ending_.request_stop(); }
     /// after interrupt() [any]
-    bool ending() const noexcept { return ending_.load(std::memory_order_acquire); }
+    bool ending() const noexcept { return ending_.stop_requested(); }
+    /// The same for long work that does not know the session: it is requested to stop by
+    /// interrupt(). [any]
+    std::stop_token end_token() const noexcept { return ending_.get_token(); }
     /// Rolls back an open transaction, stops the threads with safe outputs, and stops and destroys
     /// all instances. Idempotent.
     void shut_down();
@@ -128,7 +132,7 @@ public:
 private:
     friend class Transaction;
     mutable std::mutex mutex_;
-    std::atomic<bool> ending_{false};
+    std::stop_source ending_;
     std::unique_ptr<SessionState> state_;
     ThreadControl threads_;
     LiveValues values_;

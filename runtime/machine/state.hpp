@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <stop_token>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -72,6 +73,7 @@ struct SessionState {
     std::vector<std::string> refused;  ///< by the system: "memory locking"
     bool shut = false;
     bool abandoned = false;  ///< a thread hangs and may go on using everything here
+    std::stop_token ending;  ///< Session::end_token()
 
     Core* core(const Thread* thread) const;
     /// Adds threads that have no core yet. False after reporting.

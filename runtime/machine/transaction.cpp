@@ -77,7 +77,7 @@ void Transaction::apply(const EditForm& form, const Command& command, Diagnostic
 void SessionState::offer_names(Diagnostics& diagnostics) {
     try {
         diagnostics.offer([this](std::uint32_t group) {
-            return names.get(model, static_cast<NameGroup>(group));
+            return names.get(model, static_cast<NameGroup>(group), ending);
         });
     } catch (const std::bad_alloc&) {  // then no names are offered
     }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <stop_token>
 
 #include "text/suggest.hpp"
 
@@ -19,7 +20,9 @@ enum class NameGroup : std::uint32_t { pins, signals, functions };
 /// removed. [setup]
 class ModelNames {
 public:
-    std::shared_ptr<const NameIndex> get(const Model& model, NameGroup group);
+    /// Returns nullptr once `stop` is requested: indexing a large model takes long.
+    std::shared_ptr<const NameIndex> get(const Model& model, NameGroup group,
+                                         const std::stop_token& stop = {});
 
 private:
     struct Taken {

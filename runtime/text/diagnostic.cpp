@@ -63,12 +63,12 @@ void Diagnostics::offer(
     }
 }
 
-void Diagnostics::look_up() {
+void Diagnostics::look_up(const std::stop_token& stop) {
     for (const std::size_t i : rendered_order(*this)) {
         Diagnostic& one = all_[i];
         if (!one.unknown || !one.unknown->among) continue;
         one.labels[0].text =
-            did_you_mean(one.unknown->name, *one.unknown->among, one.unknown->before);
+            did_you_mean(one.unknown->name, *one.unknown->among, one.unknown->before, stop);
         one.unknown.reset();
     }
 }

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -57,11 +58,12 @@ public:
     /// An error about a name for which similar ones are looked up later.
     void error(Code code, Span at, std::string message, UnknownName unknown, std::string help = "");
     /// Offers names to the diagnostics whose unknown name has none yet; `names` is called once for
-    /// each group among them.
+    /// each group among them, and may return nullptr.
     void offer(const std::function<std::shared_ptr<const NameIndex>(std::uint32_t group)>& names);
     /// Looks up similar names for what render() prints. Takes time, but uses nothing but this
-    /// object and the names that were offered.
-    void look_up();
+    /// object and the names that were offered. Once `stop` is requested no more are looked up, and
+    /// render() looks up none either.
+    void look_up(const std::stop_token& stop = {});
     std::size_t errors() const { return errors_; }
     std::size_t warnings() const { return warnings_; }
     std::size_t notes() const { return all_.size() - errors_ - warnings_; }

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "text/characters.hpp"
+#include "text/sort_in_steps.hpp"
 
 namespace hal {
 
@@ -118,13 +119,13 @@ void NameIndex::add(std::string_view name, std::uint32_t number) {
 
 std::uint64_t NameIndex::steps() const { return steps_.load(std::memory_order_relaxed); }
 
-void NameIndex::sort() const {
+void NameIndex::sort(const std::stop_token& stop) const {
     const std::string_view folded_texts = folded_;
     const auto folded_of = [&](const Name& name) {
         return folded_texts.substr(name.begin, name.size);
     };
-    std::sort(names_.begin(), names_.end(),
-              [&](const Name& a, const Name& b) { return folded_of(a) < folded_of(b); });
+    sort_in_steps(names_, [&](const Name& a, const Name& b) { return folded_of(a) < folded_of(b); },
+                  [&] { return stop.stop_requested(); });
     common_.assign(names_.size(), 0);
     for (std::size_t i = 1; i < names_.size(); ++i) {
         const std::string_view before = folded_of(names_[i - 1]);
@@ -138,7 +139,8 @@ void NameIndex::sort() const {
 // beginnings, so the rows of a shared beginning are computed once; and where a beginning is already
 // too different, so are all names that have it.
 std::vector<NameIndex::Found> NameIndex::within(std::string_view name, int limit,
-                                                std::uint32_t before) const {
+                                                std::uint32_t before,
+                                                const std::stop_token& stop) const {
     using Row = std::array<int, 2 * most_edits + 3>;
     const int far = limit + 1;
     const int m = static_cast<int>(name.size());
@@ -154,7 +156,7 @@ std::vector<NameIndex::Found> NameIndex::within(std::string_view name, int limit
     std::size_t valid = 0;
     std::size_t hopeless = std::string_view::npos;  // length of a beginning that is too different
     std::uint64_t steps = 0;
-    for (std::uint32_t i = 0; i < names_.size(); ++i) {
+    for (std::uint32_t i = 0; i < names_.size() && !stop.stop_requested(); ++i) {
         ++steps;
         const std::size_t common = i == 0 ? 0 : common_[i];
         if (common >= hopeless) continue;
@@ -232,13 +234,17 @@ void NameIndex::add_longer(std::string_view name, std::uint32_t before,
 }
 
 std::vector<std::string> NameIndex::similar(std::string_view name, std::size_t max_count,
-                                            std::uint32_t before) const {
-    std::call_once(sorted_, [this] { sort(); });
+                                            std::uint32_t before,
+                                            const std::stop_token& stop) const {
+    std::call_once(sorted_, [&] { sort(stop); });
     std::string folded_name;
     for (const char c : name) {
         folded_name += hal::folded(c);
     }
-    std::vector<Found> found = within(folded_name, edit_limit(name), before);
+    std::vector<Found> found = within(folded_name, edit_limit(name), before, stop);
+    if (stop.stop_requested()) {
+        return {};
+    }
     std::erase_if(found, [&](const Found& one) { return text(one.name) == name; });
     if (name.size() >= 3 && found.size() < max_count) {
         add_longer(folded_name, before, found);
@@ -276,8 +282,9 @@ std::string did_you_mean(std::string_view name, const std::vector<std::string>& 
     return question(similar(name, candidates));
 }
 
-std::string did_you_mean(std::string_view name, const NameIndex& candidates, std::uint32_t before) {
-    return question(candidates.similar(name, 3, before));
+std::string did_you_mean(std::string_view name, const NameIndex& candidates, std::uint32_t before,
+                         const std::stop_token& stop) {
+    return question(candidates.similar(name, 3, before, stop));
 }
 
 std::string listed(const std::vector<std::string>& names, std::size_t most) {

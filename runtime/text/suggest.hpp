@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <mutex>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,7 +19,8 @@ std::vector<std::string> similar(std::string_view name, const std::vector<std::s
                                  std::size_t most = 3);
 
 /// Many names, indexed for many searches. Once all are added, any thread may search; the first
-/// search sorts them.
+/// search sorts them. Sorting and searching end early once their `stop` is requested; an index that
+/// was not sorted to the end offers nothing.
 class NameIndex {
 public:
     static constexpr std::uint32_t all = 0xFFFF'FFFF;
@@ -26,9 +28,11 @@ public:
     /// `number` increases with the age of the name: a search can be limited to names that were there at some time.
     void add(std::string_view name, std::uint32_t number = 0);
     std::size_t size() const { return names_.size(); }
-    /// Returns what the function similar() returns for the names with a number below `before`.
+    /// Returns what the function similar() returns for the names with a number below `before`;
+    /// nothing once `stop` is requested.
     std::vector<std::string> similar(std::string_view name, std::size_t max_count = 3,
-                                     std::uint32_t before = all) const;
+                                     std::uint32_t before = all,
+                                     const std::stop_token& stop = {}) const;
     /// The number of names and parts of names that all searches so far have compared: what a search
     /// costs, for tests. [any]
     std::uint64_t steps() const;
@@ -42,14 +46,15 @@ private:
         int distance;
         std::uint32_t name;
     };
-    void sort() const;
+    void sort(const std::stop_token& stop) const;
     std::string_view text(std::uint32_t i) const {
         return std::string_view(texts_).substr(names_[i].begin, names_[i].size);
     }
     std::string_view folded(std::uint32_t i) const {
         return std::string_view(folded_).substr(names_[i].begin, names_[i].size);
     }
-    std::vector<Found> within(std::string_view folded_name, int limit, std::uint32_t before) const;
+    std::vector<Found> within(std::string_view folded_name, int limit, std::uint32_t before,
+                              const std::stop_token& stop) const;
     void add_longer(std::string_view folded_name, std::uint32_t before,
                     std::vector<Found>& found) const;
 
@@ -65,7 +70,7 @@ private:
 /// Returns "did you mean 'x'?" or "did you mean 'x' or 'y'?", or nothing if no candidate is close.
 std::string did_you_mean(std::string_view name, const std::vector<std::string>& candidates);
 std::string did_you_mean(std::string_view name, const NameIndex& candidates,
-                         std::uint32_t before = NameIndex::all);
+                         std::uint32_t before = NameIndex::all, const std::stop_token& stop = {});
 
 /// Joins names with commas, cut to the width of a line: "a, b, c, … (17 more)".
 std::string listed(const std::vector<std::string>& names, std::size_t most = 12);

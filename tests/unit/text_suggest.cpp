@@ -3,10 +3,14 @@
 // its cost.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <functional>
 #include <random>
+#include <stop_token>
 #include <string>
 #include <vector>
 
+#include "text/sort_in_steps.hpp"
 #include "text/suggest.hpp"
 
 namespace hal::test {
@@ -79,6 +83,52 @@ TEST(NameIndex, a_search_can_be_limited_to_older_names) {
     EXPECT_EQ(index.similar("x.out"), (std::vector<std::string>{"a.out", "b.out"}));
     EXPECT_EQ(index.similar("x.out", 3, 7), (std::vector<std::string>{"a.out"}));
     EXPECT_TRUE(index.similar("x.out", 3, 1).empty());
+}
+
+TEST(NameIndex, a_search_that_is_stopped_offers_nothing_and_compares_nothing) {
+    NameIndex index;
+    for (int i = 0; i < 20'000; ++i) {
+        index.add("pid." + std::to_string(i) + ".output");
+    }
+    std::stop_source stop;
+    EXPECT_EQ(index.similar("pid.7.outputt", 1, NameIndex::all, stop.get_token()),
+              (std::vector<std::string>{"pid.7.output"}));
+    const std::uint64_t steps = index.steps();
+    stop.request_stop();
+    EXPECT_TRUE(index.similar("pid.7.outputt", 1, NameIndex::all, stop.get_token()).empty());
+    EXPECT_EQ(index.steps(), steps);
+    EXPECT_EQ(did_you_mean("pid.7.outputt", index, NameIndex::all, stop.get_token()), "");
+}
+
+TEST(NameIndex, an_index_whose_sorting_was_stopped_is_empty) {
+    NameIndex index;
+    for (int i = 0; i < 20'000; ++i) {
+        index.add("pid." + std::to_string(i) + ".output");
+    }
+    std::stop_source stop;
+    stop.request_stop();
+    EXPECT_TRUE(index.similar("pid.7.outputt", 1, NameIndex::all, stop.get_token()).empty());
+    EXPECT_TRUE(index.similar("pid.7.outputt").empty());
+    EXPECT_EQ(index.size(), 0U);
+}
+
+TEST(SortInSteps, sorts_rows_of_any_length_unless_it_is_stopped) {
+    std::mt19937 random(7);
+    for (const std::size_t size : {0U, 1U, 4095U, 4096U, 4097U, 12'289U, 50'000U}) {
+        std::vector<unsigned> row(size);
+        std::generate(row.begin(), row.end(), [&] { return static_cast<unsigned>(random()); });
+        std::vector<unsigned> sorted = row;
+        std::sort(sorted.begin(), sorted.end());
+        sort_in_steps(row, std::less<>(), [] { return false; });
+        EXPECT_EQ(row, sorted);
+    }
+    for (int after = 0; after < 20; ++after) {
+        std::vector<unsigned> row(50'000);
+        int asked = 0;
+        sort_in_steps(row, std::less<>(), [&] { return asked++ == after; });
+        EXPECT_TRUE(row.empty());
+        EXPECT_EQ(asked, after + 1) << "and nothing is sorted afterwards";
+    }
 }
 
 }  // namespace
