@@ -102,7 +102,10 @@ class OneShot(Case):
             self.assertEqual((1, "", ""), (done.returncode, done.stdout, done.stderr), words)
         done = self.run_program("shell", "--name", "nobody", "getp", "adder.in0")
         self.assertEqual(
-            (1, "hal shell: no instance 'nobody' is running; running: default\n"),
+            (
+                1,
+                "hal shell: no instance 'nobody' is running; running: default (choose with --name)\n",
+            ),
             (done.returncode, done.stderr),
         )
 
