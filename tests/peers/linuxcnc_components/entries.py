@@ -366,6 +366,34 @@ behaviour(
     witness=("ilowpass", {"ilowpass.0.in": [5]}, [{}, {"ilowpass.0.gain": float("nan")}]),
 )
 
+
+def has_reached_infinity(v):
+    """True if gains outside of 0 to 2 have multiplied the filter's state beyond the range of float."""
+    now, exponent, reached = v.cycle, 0.0, False
+    for cycle in range(now + 1):
+        factor = abs(1 - v.at(cycle)["gain"])
+        exponent = max(0.0, exponent + math.log10(factor)) if factor > 0 else 0.0
+        reached = reached or exponent > 290
+    v.at(now)
+    return reached
+
+
+behaviour(
+    "ilowpass",
+    "out",
+    has_reached_infinity,
+    "a `gain` outside of 0 to 2 lets the state become infinite",
+    "the cycle is skipped",
+    "0 for ever",
+    "the filter recovers",
+    lasts=True,
+    witness=(
+        "ilowpass",
+        {"ilowpass.0.in": [5]},
+        [{"ilowpass.0.gain": 100.0}, {}, {}, {}, {"ilowpass.0.gain": 1.0}, {}, {}, {}],
+    ),
+)
+
 SATURATED = "a conversion keeps the sign of the value and its order"
 HELD = "an output must not become NaN"
 
