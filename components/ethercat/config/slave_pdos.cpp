@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "ethercat/config/pdo_mapping.hpp"
+#include "ethercat/config/pdo_placement.hpp"
 #include "ethercat/config/pdo_rules.hpp"
 #include "ethercat/config/slave_pins.hpp"
 
@@ -259,7 +259,7 @@ void SlavePdos::list(const Line& line, master::SyncManager& sm) {
         }
     }
     if (!entries.empty()) {
-        PdoMapping(in_, device_, limit_).place(line, sm, entries);
+        PdoPlacement(in_, device_, limit_).place(line, sm, entries);
     }
 }
 

@@ -49,9 +49,13 @@ bool read_offset(PinTarget& to, const Line& line) {
     return true;
 }
 
+/// A unit makes the pin a float, unless its type is given.
 bool read_unit(PinTarget& to, const Line& line) {
     to.info.unit = line.value.text;
-    to.entry.scaled = true;
+    const std::string object = line.key.text.substr(0, line.key.text.rfind('.'));
+    if (to.in.keys.find(object + ".type") == nullptr) {
+        to.entry.scaled = true;
+    }
     return true;
 }
 
@@ -111,7 +115,7 @@ const bus::KeyTable<PinTarget>& option_keys() {
         {"name", bus::own("a name of lower-case letters, digits and dashes", "a name", &read_name),
          "that of the object", "name of the pin"},
         {"unit", bus::own("", "a text", &read_unit), "none",
-         "unit of the pin; a pin with a unit is a float"},
+         "unit of the pin, which is then a float unless its type is given"},
         {"type", bus::own("", "a type, float", &read_type), "by the object",
          "type of the value; `float` makes the pin a float"},
     }};

@@ -51,6 +51,19 @@ TEST(EthercatForms, Old_types_and_sub_indices_are_read_and_reported) {
     EXPECT_EQ(entries[2].type, master::Type::s8);
 }
 
+TEST(EthercatForms, Unit_leaves_a_type_that_is_given_as_in_canopen) {
+    const Reading reading = read(
+        "[bus]\n[slave 0 a]\ndevice = cia402\noutputs = 2000:1 s32 2000:2 s32\n"
+        "2000:1.unit = mm\n2000:1.type = s32\n2000:2.unit = mm\n",
+        "m.ethercat");
+    EXPECT_EQ(messages(reading), "");
+    const auto& entries = reading.buses[0].setup.slaves[0].sync_managers[0].pdos[0].entries;
+    ASSERT_EQ(entries.size(), 2U);
+    EXPECT_FALSE(entries[0].scaled);
+    EXPECT_TRUE(entries[1].scaled);
+    EXPECT_EQ(reading.buses[0].slaves[0].find("2000-01")->unit, "mm");
+}
+
 TEST(EthercatForms, Generated_ranges_keep_their_meaning_in_earlier_versions) {
     Found io;
     io.name = "io";

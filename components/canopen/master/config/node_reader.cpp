@@ -207,7 +207,7 @@ const bus::KeyTable<Settings>& node_keys() {
          "boot timeout of a mandatory node, after which a fault is raised"},
         {"retry", bus::time(of_setup(&S::retry), millisecond, 3600 * second), "`1s`",
          "initial interval between boot attempts. It doubles while they fail, and returns to this "
-         "value once the node has been operational for that interval"},
+         "value once the node has been operational for this time"},
         {"retry-most", bus::time(of_setup(&S::retry_most), millisecond, 3600 * second), "`10s`",
          "maximum interval between boot attempts"},
         {"tpdoN", "objects, default, none", "from the EDS", "[TPDO](#pdos) N of the node"},

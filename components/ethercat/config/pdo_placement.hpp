@@ -6,10 +6,10 @@
 
 namespace hal::ethercat::config {
 
-class PdoMapping {
+class PdoPlacement {
 public:
     /// `device`: the description, or nullptr; `max_entries`: of a PDO, 0: unlimited.
-    PdoMapping(SlaveInput in, const esi::Device* device, std::uint64_t max_entries)
+    PdoPlacement(SlaveInput in, const esi::Device* device, std::uint64_t max_entries)
         : in_(in), device_(device), max_entries_(max_entries) {}
 
     /// Adds PDOs with the entries to a sync manager, or reports that none can take them.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "ethercat/config/pdo_mapping.hpp"
+#include "ethercat/config/pdo_placement.hpp"
 
 #include <algorithm>
 
@@ -27,14 +27,14 @@ std::vector<std::string> pdo_texts(const std::vector<esi::Pdo>& pdos) {
 
 }  // namespace
 
-const std::vector<esi::Pdo>& PdoMapping::described() const {
+const std::vector<esi::Pdo>& PdoPlacement::described() const {
     static const std::vector<esi::Pdo> none;
     if (device_ == nullptr) return none;
     return output_ ? device_->rx : device_->tx;
 }
 
-void PdoMapping::place(const Line& line, master::SyncManager& sm,
-                       std::vector<master::Entry>& entries) {
+void PdoPlacement::place(const Line& line, master::SyncManager& sm,
+                         std::vector<master::Entry>& entries) {
     output_ = sm.output;
     const auto& pdos = described();
     const auto same = std::find_if(pdos.begin(), pdos.end(),
@@ -63,7 +63,7 @@ void PdoMapping::place(const Line& line, master::SyncManager& sm,
 }
 
 /// Returns why the PDOs of the device cannot be mapped, or an empty text.
-std::string PdoMapping::fixed_reason() const {
+std::string PdoPlacement::fixed_reason() const {
     if (device_ == nullptr) return {};
     const std::string fixed = "the PDOs of '" + in_.info.type + "' are fixed: ";
     if (!device_->mailbox || !device_->mailbox->coe) {
@@ -73,7 +73,7 @@ std::string PdoMapping::fixed_reason() const {
 }
 
 /// Returns the PDOs that can be mapped together with those that the line names.
-std::vector<std::uint16_t> PdoMapping::free_pdos(const master::SyncManager& sm) const {
+std::vector<std::uint16_t> PdoPlacement::free_pdos(const master::SyncManager& sm) const {
     if (device_ == nullptr) return {};
     std::vector<std::uint16_t> free = mappable(*device_, output_);
     const auto excludes = [&](const master::Pdo& assigned, std::uint16_t other) {
@@ -90,7 +90,7 @@ std::vector<std::uint16_t> PdoMapping::free_pdos(const master::SyncManager& sm) 
 }
 
 /// Reads `outputs.pdo`. Returns false after reporting a PDO that cannot be mapped.
-bool PdoMapping::choose(const Line& line, std::vector<std::uint16_t>& free) {
+bool PdoPlacement::choose(const Line& line, std::vector<std::uint16_t>& free) {
     const std::string key = line.key.text + ".pdo";
     const Line* chosen = in_.keys.find(key);
     if (chosen == nullptr) return true;
@@ -111,14 +111,14 @@ bool PdoMapping::choose(const Line& line, std::vector<std::uint16_t>& free) {
 }
 
 /// Returns how many entries a PDO takes; 0: any number.
-std::uint64_t PdoMapping::limit_of(std::uint16_t pdo) const {
+std::uint64_t PdoPlacement::limit_of(std::uint16_t pdo) const {
     const std::uint64_t described = device_ != nullptr ? most_entries(*device_, pdo) : 0;
     if (described == 0) return max_entries_;
     return max_entries_ == 0 ? described : std::min(max_entries_, described);
 }
 
-void PdoMapping::fill(const Line& line, const std::vector<std::uint16_t>& free,
-                      master::SyncManager& sm, std::vector<master::Entry>& entries) {
+void PdoPlacement::fill(const Line& line, const std::vector<std::uint16_t>& free,
+                        master::SyncManager& sm, std::vector<master::Entry>& entries) {
     const unsigned usual = output_ ? 0x1600 : 0x1a00;
     const unsigned first = free.empty() ? usual : free[0];
     std::string taken;  // of the PDOs, for a message
