@@ -9,6 +9,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "hal/pin_type.hpp"
 #include "hal/rejection.hpp"
 
 namespace hal::dds {
@@ -68,24 +69,19 @@ private:
 
 hal_value value_of(std::string_view text, hal_type type, const std::string& whole) {
     hal_value value{};
-    value.raw = 0;
     const char *first = text.data(), *last = first + text.size();
     std::from_chars_result got{first, std::errc{}};
-    switch (type) {
-    case HAL_TYPE_BIT:
-        if (text == "1" || text == "true" || text == "TRUE") {
-            value.bit = true;
-        } else if (text != "0" && text != "false" && text != "FALSE") {
-            got.ec = std::errc::invalid_argument;
+    visit_type(type, [&]<class T>(std::type_identity<T>) {
+        T parsed{};
+        if constexpr (std::is_same_v<T, bool>) {
+            parsed = text == "1" || text == "true" || text == "TRUE";
+            const bool valid = parsed || text == "0" || text == "false" || text == "FALSE";
+            got = {last, valid ? std::errc{} : std::errc::invalid_argument};
+        } else {
+            got = std::from_chars(first, last, parsed);
         }
-        got.ptr = last;
-        break;
-    case HAL_TYPE_FLOAT: got = std::from_chars(first, last, value.real); break;
-    case HAL_TYPE_S32: got = std::from_chars(first, last, value.s32); break;
-    case HAL_TYPE_U32: got = std::from_chars(first, last, value.u32); break;
-    case HAL_TYPE_S64: got = std::from_chars(first, last, value.s64); break;
-    default: got = std::from_chars(first, last, value.u64); break;
-    }
+        value = to_value(parsed);
+    });
     if (got.ec != std::errc{} || got.ptr != last || text.empty()) {
         reject("fields", "fields: '" + whole + "': '" + std::string(text) + "' is not a " +
                              std::string(row(type).name));

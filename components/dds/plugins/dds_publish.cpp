@@ -140,7 +140,7 @@ private:
     const Quality quality_ = arguments_.quality();
     const Settings settings_ = arguments_.participant.settings();
 
-    FieldPins<hal::In> fields_{*this, publish_, schema_, "field of the topic"};
+    FieldPins<HAL_DIR_IN> fields_{*this, publish_, schema_, "field of the topic"};
     hal::In<bool> enable{
         *this, publish_, "enable", "TRUE: samples are published", {.initial = true}};
 

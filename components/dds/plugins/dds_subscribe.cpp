@@ -277,7 +277,7 @@ private:
     const Quality quality_ = arguments_.quality();
     const Settings settings_ = arguments_.participant.settings();
 
-    FieldPins<hal::Out> fields_{*this, take_, schema_, "field of the topic"};
+    FieldPins<HAL_DIR_OUT> fields_{*this, take_, schema_, "field of the topic"};
     hal::Out<std::uint64_t> seq{*this, take_, "seq",
                                 "sequence number of the sample, counted by its publisher"};
     hal::Out<double> age{
