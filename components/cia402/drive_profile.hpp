@@ -217,6 +217,34 @@ inline constexpr std::uint16_t quick_stop = 0x0002;
 inline constexpr std::uint16_t fault_reset = 0x0080;
 }  // namespace command
 
+/// Commands of the controlword, without fault reset; switch_on is disable_operation as well.
+enum class Command : std::uint8_t {
+    disable_voltage,
+    quick_stop,
+    shutdown,
+    switch_on,
+    enable_operation
+};
+/// Coding of a command in the controlword.
+struct CommandRow {
+    Command command;
+    std::uint16_t mask, value;  ///< controlword & mask == value
+};
+inline constexpr std::array<CommandRow, 5> commands{{
+    {Command::disable_voltage, 0x0002, 0x0000},
+    {Command::quick_stop, 0x0006, 0x0002},
+    {Command::shutdown, 0x0007, 0x0006},
+    {Command::switch_on, 0x000f, 0x0007},
+    {Command::enable_operation, 0x000f, 0x000f},
+}};
+/// Returns the command coded in a controlword. [any]
+constexpr Command command_of(std::uint16_t controlword) noexcept {
+    for (const auto& row : commands) {
+        if ((controlword & row.mask) == row.value) return row.command;
+    }
+    return Command::disable_voltage;
+}
+
 /// Bits of the statusword (6041h).
 namespace status {
 inline constexpr std::uint16_t ready_to_switch_on = 0x0001;

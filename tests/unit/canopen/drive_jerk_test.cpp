@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Ramps with limited jerk: 6086h = 3 and 60A4h.
-#include "canopen/device/drive/drive_trajectory.hpp"
+#include "cia402/drive/trajectory.hpp"
 #include "drive_bench.hpp"
 
 namespace hal::canopen::test {

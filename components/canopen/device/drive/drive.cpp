@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "drive_axis.hpp"
+#include "axis_binding.hpp"
 
 namespace hal::canopen::cia402 {
 
 namespace {
 Events nobody;
-constexpr double longest_step = 0.001;
+constexpr double max_step = 0.001;
 constexpr Time pause = 100 * millisecond;
 }  // namespace
 
@@ -21,9 +21,9 @@ Drive::Drive(const Description& description, const DriveSettings& settings,
              const DeviceSettings& device, Events* also)
     : also_(also != nullptr ? *also : nobody), device_(description, device, *this) {
     for (unsigned n = 0; n < std::clamp(settings.axes, 1U, most_axes); ++n) {
-        axes_.push_back(std::make_unique<DriveAxis>(n, settings.axis[n]));
+        axes_.push_back(std::make_unique<AxisBinding>(n, settings.axis[n]));
         axes_[n]->attach(device_);
-        axes_[n]->power_up();
+        axes_[n]->axis().power_up();
     }
     // Event-driven TPDOs of a drive are sent when what they carry changed.
     for (unsigned n = 1; n <= Pdos::max_pdos; ++n) {
@@ -36,7 +36,7 @@ Drive::~Drive() = default;
 void Drive::start(Time now) noexcept {
     last_ = now;
     for (auto& a : axes_) {
-        a->power_up();
+        a->axis().power_up();
     }
     device_.start(now);
 }
@@ -46,35 +46,35 @@ void Drive::step(Time now) noexcept {
     last_ = now;
     if (passed <= 0) return;
     const double dt = static_cast<double>(std::min(passed, pause)) / static_cast<double>(second);
-    const int steps = std::max(1, static_cast<int>(std::ceil(dt / longest_step * (1 - 1e-9))));
+    const int steps = std::max(1, static_cast<int>(std::ceil(dt / max_step * (1 - 1e-9))));
     for (int n = 0; n < steps; ++n) {
         for (auto& a : axes_) {
-            a->step(dt / steps);
+            a->axis().step(dt / steps);
         }
     }
 }
 
 AxisStatus Drive::status(unsigned axis) const noexcept {
-    return axis < axes_.size() ? axes_[axis]->status() : AxisStatus{};
+    return axis < axes_.size() ? axes_[axis]->axis().status() : AxisStatus{};
 }
 void Drive::set_load_torque(unsigned axis, double torque) noexcept {
     if (axis < axes_.size()) {
-        axes_[axis]->set_load_torque(torque);
+        axes_[axis]->axis().set_load_torque(torque);
     }
 }
 void Drive::set_inputs(unsigned axis, std::uint32_t bits) noexcept {
     if (axis < axes_.size()) {
-        axes_[axis]->set_inputs(bits);
+        axes_[axis]->axis().set_inputs(bits);
     }
 }
 void Drive::set_dc_link(unsigned axis, double volts) noexcept {
     if (axis < axes_.size()) {
-        axes_[axis]->set_dc_link(volts);
+        axes_[axis]->axis().set_dc_link(volts);
     }
 }
 void Drive::set_encoder_broken(unsigned axis, bool broken) noexcept {
     if (axis < axes_.size()) {
-        axes_[axis]->set_encoder_broken(broken);
+        axes_[axis]->axis().set_encoder_broken(broken);
     }
 }
 
@@ -84,20 +84,20 @@ void Drive::set_encoder_broken(unsigned axis, bool broken) noexcept {
 void Drive::on_state(NmtState state) noexcept {
     if (state == NmtState::stopped) {
         for (auto& a : axes_) {
-            a->lose_connection();
+            a->axis().lose_connection();
         }
     }
     also_.on_state(state);
 }
 void Drive::on_reset(bool application) noexcept {
     for (auto& a : axes_) {
-        application ? a->power_up() : a->lose_connection();
+        application ? a->axis().power_up() : a->axis().lose_connection();
     }
     also_.on_reset(application);
 }
 void Drive::on_communication_error(Time now) noexcept {
     for (auto& a : axes_) {
-        a->lose_connection();
+        a->axis().lose_connection();
     }
     also_.on_communication_error(now);
 }

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-#include "drive_homing.hpp"
+#include "cia402/drive/homing_search.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "drive_objects.hpp"
+#include "cia402/drive/axis_values.hpp"
 
 namespace hal::canopen::cia402 {
 
@@ -37,8 +37,9 @@ Range HomingSearch::range(const Plant& plant, Switch which) noexcept {
 }
 
 HomingSearch::Region HomingSearch::before_edge() const noexcept {
-    return rule_.edge == Edge::left ? (rule_.last > 0 ? left : inside)
-                                    : (rule_.last > 0 ? inside : right);
+    const bool forward = rule_.last > 0;
+    if (rule_.edge == Edge::left) return forward ? left : inside;
+    return forward ? inside : right;
 }
 
 bool HomingSearch::begin(int method, const Plant& plant) noexcept {
@@ -90,17 +91,17 @@ void HomingSearch::track(const Plant& plant, double speed, double slow) noexcept
     const auto r = range(plant, rule_.which);
     const int direction = plant.place() > plant.before() ? 1 : -1;
     // In the order in which they are passed: in at one edge, out at the other.
-    const Edge first = direction > 0 ? Edge::left : Edge::right;
-    for (const auto edge : {first, first == Edge::left ? Edge::right : Edge::left}) {
-        const bool rising = edge == first;
-        const auto place = r.edge(plant.before(), plant.place(), rising);
-        if (!place || found_ || searching_index_) continue;
-        pass(*place,
-             rising          ? inside
-             : direction > 0 ? right
-                             : left,
-             edge == rule_.edge, speed, slow, direction);
-    }
+    const bool forward = direction > 0;
+    const Edge entry = forward ? Edge::left : Edge::right;
+    const Edge exit = forward ? Edge::right : Edge::left;
+    const Region beyond = forward ? right : left;
+    const auto pass_edge = [&](Edge edge, Region to) {
+        const auto place = r.edge(plant.before(), plant.place(), edge == entry);
+        if (!place || found_ || searching_index_) return;
+        pass(*place, to, edge == rule_.edge, speed, slow, direction);
+    };
+    pass_edge(entry, inside);
+    pass_edge(exit, beyond);
 }
 
 HomingSearch::Order HomingSearch::step(const Plant& plant, double speed, double slow) noexcept {
@@ -120,34 +121,43 @@ HomingSearch::Order HomingSearch::order(const Plant& plant) noexcept {
     if (found_) {
         return {Act::stop_at_home, 0};
     }
-    const bool negative = plant.negative_limit().holds(plant.place());
-
-    const bool positive = plant.positive_limit().holds(plant.place());
-    const auto blocked = [&](int direction) { return direction < 0 ? negative : positive; };
-    if (searching_index_) {
-        // a full revolution without a pulse
-        const bool gone = std::abs(plant.place() - edge_) > 1.05 * plant.motor().resolution;
-        return gone || blocked(direction_) ? Order{Act::failed, 0} : Order{Act::slow, direction_};
-    }
-    if (region_ == unknown && blocked(rule_.first)) {
-        if (blocked(-rule_.first)) {
+    if (searching_index_) return search_index(plant);
+    if (region_ == unknown && blocked(plant, rule_.first)) {
+        if (blocked(plant, -rule_.first)) {
             return {Act::failed, 0};
         }
         region_ = rule_.first > 0 ? right : left;
     }
-    const auto start = before_edge();
-    const int direction = region_ == unknown ? rule_.first
-                          : region_ == start ? rule_.last
-                          : region_ < start  ? 1
-                                             : -1;
+    const int direction = next_direction();
     // A limit switch in the path is an error, unless it is the one searched for.
     const bool own = rule_.which == (direction < 0 ? Switch::negative : Switch::positive);
-    if (blocked(direction) && !own) {
+    if (blocked(plant, direction) && !own) {
         return {Act::failed, 0};
     }
-    return {
-        edge_found_ && region_ != unknown && std::abs(region_ - start) <= 1 ? Act::slow : Act::fast,
-        direction};
+    const bool near = region_ != unknown && std::abs(region_ - before_edge()) <= 1;
+    return {edge_found_ && near ? Act::slow : Act::fast, direction};
+}
+
+HomingSearch::Order HomingSearch::search_index(const Plant& plant) const noexcept {
+    // a full revolution without a pulse
+    const bool gone = std::abs(plant.place() - edge_) > 1.05 * plant.motor().resolution;
+    if (gone || blocked(plant, direction_)) {
+        return {Act::failed, 0};
+    }
+    return {Act::slow, direction_};
+}
+
+/// Returns the direction to the region before the edge, then that of the last passage.
+int HomingSearch::next_direction() const noexcept {
+    const Region start = before_edge();
+    if (region_ == unknown) return rule_.first;
+    if (region_ == start) return rule_.last;
+    return region_ < start ? 1 : -1;
+}
+
+bool HomingSearch::blocked(const Plant& plant, int direction) noexcept {
+    const Range limit = direction < 0 ? plant.negative_limit() : plant.positive_limit();
+    return limit.holds(plant.place());
 }
 
 }  // namespace hal::canopen::cia402

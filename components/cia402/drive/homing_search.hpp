@@ -13,7 +13,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "drive_plant.hpp"
+#include "cia402/drive/plant.hpp"
 
 namespace hal::canopen::cia402 {
 
@@ -53,6 +53,9 @@ private:
     void pass(double place, Region to, bool wanted, double speed, double slow,
               int direction) noexcept;
     Order order(const Plant&) noexcept;
+    Order search_index(const Plant&) const noexcept;
+    int next_direction() const noexcept;
+    static bool blocked(const Plant&, int direction) noexcept;
 
     Rule rule_{};
     Region region_ = unknown;

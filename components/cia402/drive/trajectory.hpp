@@ -56,7 +56,7 @@ private:
 /// `time` later, and exceeds no velocity or acceleration.
 class Smoother {
 public:
-    static constexpr double longest = 1.0;  ///< s
+    static constexpr double max_time = 1.0;  ///< s
     /// Starts from `now`, as if the motion had always had its velocity. [realtime]
     void begin(const Motion& now, double time) noexcept;
     /// Returns the motion before smoothing; the caller advances it, then calls step(). [realtime]
@@ -73,12 +73,12 @@ public:
     double time() const noexcept { return time_; }
 
 private:
-    struct Piece {
+    struct Segment {
         double time, from, to, velocity_from, velocity_to, area;
     };
-    static constexpr unsigned room = 1024;
-    static constexpr double shortest = 0.00105;  // shorter segments are merged
-    std::array<Piece, room> pieces_{};
+    static constexpr unsigned capacity = 1024;
+    static constexpr double min_segment = 0.00105;  // shorter segments are merged
+    std::array<Segment, capacity> segments_{};
     unsigned head_ = 0;
     unsigned count_ = 0;
     double time_ = 0;
@@ -111,14 +111,8 @@ public:
 
 private:
     double from_ = 0;
-
-private:
     double to_ = 0;
-
-private:
     double period_ = 0;
-
-private:
     double left_ = 0;
 };
 

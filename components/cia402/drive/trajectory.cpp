@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "drive_trajectory.hpp"
+#include "cia402/drive/trajectory.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -115,17 +115,17 @@ double Profile::step(Motion& m, double dt) noexcept {
 }
 
 void Smoother::begin(const Motion& now, double time) noexcept {
-    time_ = std::clamp(time, 0.0, longest);
+    time_ = std::clamp(time, 0.0, max_time);
     raw_ = {now.position + now.velocity * time_ / 2, now.velocity, 0};
     before_ = raw_;
     given_ = now;
     origin_ = raw_.position;
     const double from = -now.velocity * time_;
-    pieces_[0] = {time_, from, 0, now.velocity, now.velocity, from / 2 * time_};
+    segments_[0] = {time_, from, 0, now.velocity, now.velocity, from / 2 * time_};
     head_ = 0;
     count_ = 1;
     held_ = time_;
-    area_ = pieces_[0].area;
+    area_ = segments_[0].area;
     steady_ = time_;
 }
 
@@ -142,25 +142,26 @@ Motion Smoother::step(double dt) noexcept {
     const double to = raw_.position - origin_;
 
     const double area = (from + to) / 2 * dt;
-    auto& last = pieces_[(head_ + count_ - 1) % room];
-    if ((count_ > 1 && last.time + dt <= shortest) || count_ == room) {
+    auto& last = segments_[(head_ + count_ - 1) % capacity];
+    if ((count_ > 1 && last.time + dt <= min_segment) || count_ == capacity) {
         last.time += dt;
         last.to = to;
         last.velocity_to = raw_.velocity;
         last.area += area;
     } else {
-        pieces_[(head_ + count_++) % room] = {dt, from, to, before_.velocity, raw_.velocity, area};
+        segments_[(head_ + count_++) % capacity] = {dt,  from, to, before_.velocity, raw_.velocity,
+                                                    area};
     }
     held_ += dt;
     area_ += area;
-    while (count_ > 1 && held_ - pieces_[head_].time >= time_) {
-        held_ -= pieces_[head_].time;
-        area_ -= pieces_[head_].area;
-        head_ = (head_ + 1) % room;
+    while (count_ > 1 && held_ - segments_[head_].time >= time_) {
+        held_ -= segments_[head_].time;
+        area_ -= segments_[head_].area;
+        head_ = (head_ + 1) % capacity;
         --count_;
     }
     // Only the end of the oldest segment belongs to the last `time_`.
-    const Piece& oldest = pieces_[head_];
+    const Segment& oldest = segments_[head_];
     const double out = std::max(held_ - time_, 0.0),
                  share = oldest.time > 0 ? out / oldest.time : 0;
     const double position = oldest.from + (oldest.to - oldest.from) * share;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "drive_plant.hpp"
+#include "cia402/drive/plant.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 namespace hal::canopen::cia402 {
 
 namespace {
-constexpr double longest_step = 0.00025;
+constexpr double max_step = 0.00025;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 double towards(double value, double goal, double dt, double time_constant) noexcept {
     return time_constant > 0 ? goal + (value - goal) * std::exp(-dt / time_constant) : goal;
@@ -35,7 +35,7 @@ Range Plant::positive_limit() const noexcept { return {motor_.positive_limit, in
 
 void Plant::step(double dt, double demand, double load, bool brake_closed) noexcept {
     before_ = place_;
-    const int steps = std::max(1, static_cast<int>(std::ceil(dt / longest_step)));
+    const int steps = std::max(1, static_cast<int>(std::ceil(dt / max_step)));
     const double h = dt / steps;
     const double still =
         (motor_.coulomb_friction + (brake_closed ? motor_.brake_torque : 0)) * h / motor_.inertia;

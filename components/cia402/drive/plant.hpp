@@ -13,7 +13,7 @@
 
 #include <optional>
 
-#include "drive.hpp"
+#include "cia402/drive/axis_settings.hpp"
 
 namespace hal::canopen::cia402 {
 
