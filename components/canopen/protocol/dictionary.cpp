@@ -2,6 +2,7 @@
 #include "dictionary.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 
 namespace hal::canopen {
@@ -44,45 +45,48 @@ public:
 };
 Memory own_memory;
 
+namespace standard {
+using enum Type;
+/// The types of the sub-indices of an object: of the first ones, and of all others.
+struct Layout {
+    std::array<Type, 6> first;
+    Type others;
+};
+constexpr Layout one_u8{{}, unsigned8};
+constexpr Layout one_u16{{}, unsigned16};
+constexpr Layout one_u32{{}, unsigned32};
+constexpr Layout list_of_u32{{unsigned8}, unsigned32};
+constexpr Layout sdo_parameter{{unsigned8, unsigned32, unsigned32}, unsigned8};
+constexpr Layout pdo_parameter{
+    {unsigned8, unsigned32, unsigned8, unsigned16, unsigned8, unsigned16}, unsigned8};
+
+/// The objects of this library whose type CiA 301 prescribes.
+struct Row {
+    std::uint16_t from, to;
+    const Layout& layout;
+};
+constexpr Row rows[] = {
+    {0x1000, 0x1000, one_u32},       {0x1001, 0x1001, one_u8},      {0x1002, 0x1002, one_u32},
+    {0x1003, 0x1003, list_of_u32},   {0x1005, 0x1007, one_u32},     {0x100c, 0x100c, one_u16},
+    {0x100d, 0x100d, one_u8},        {0x1010, 0x1011, list_of_u32}, {0x1012, 0x1012, one_u32},
+    {0x1014, 0x1014, one_u32},       {0x1015, 0x1015, one_u16},     {0x1016, 0x1016, list_of_u32},
+    {0x1017, 0x1017, one_u16},       {0x1018, 0x1018, list_of_u32}, {0x1019, 0x1019, one_u8},
+    {0x1028, 0x1028, list_of_u32},   {0x1029, 0x1029, one_u8},      {0x1200, 0x12ff, sdo_parameter},
+    {0x1400, 0x15ff, pdo_parameter}, {0x1600, 0x17ff, list_of_u32}, {0x1800, 0x19ff, pdo_parameter},
+    {0x1a00, 0x1bff, list_of_u32},   {0x1f80, 0x1f80, one_u32},
+};
+
+}  // namespace standard
+
 /// Returns the type that CiA 301 prescribes for an object of this library; none: any type. A
 /// description with another type is invalid.
 Type standard_type(std::uint16_t index, std::uint8_t sub) noexcept {
-    using enum Type;
-    const bool count = sub == 0;
-    switch (index) {
-    case 0x1000:
-    case 0x1002:
-    case 0x1005:
-    case 0x1006:
-    case 0x1007:
-    case 0x1012:
-    case 0x1014:
-    case 0x1f80: return unsigned32;
-    case 0x100c:
-    case 0x1015:
-    case 0x1017: return unsigned16;
-    case 0x1001:
-    case 0x100d:
-    case 0x1019:
-    case 0x1029: return unsigned8;
-    case 0x1003:
-    case 0x1010:
-    case 0x1011:
-    case 0x1016:
-    case 0x1018:
-    case 0x1028: return count ? unsigned8 : unsigned32;
-    default: break;
+    for (const auto& row : standard::rows) {
+        if (index < row.from || index > row.to) continue;
+        const auto& [first, others] = row.layout;
+        return sub < first.size() && first[sub] != Type::none ? first[sub] : others;
     }
-    if (index >= 0x1200 && index <= 0x12ff) return sub == 1 || sub == 2 ? unsigned32 : unsigned8;
-    if ((index >= 0x1400 && index <= 0x15ff) || (index >= 0x1800 && index <= 0x19ff)) {
-        if (sub == 1) return unsigned32;
-        if (sub == 3 || sub == 5) return unsigned16;
-        return unsigned8;
-    }
-    if ((index >= 0x1600 && index <= 0x17ff) || (index >= 0x1a00 && index <= 0x1bff)) {
-        return count ? unsigned8 : unsigned32;
-    }
-    return none;
+    return Type::none;
 }
 
 std::int64_t integer(const Entry& e, std::span<const std::uint8_t> bytes) noexcept {
@@ -120,61 +124,27 @@ Abort check_range(const Entry& e, std::span<const std::uint8_t> bytes) noexcept 
 }  // namespace
 
 Dictionary::Dictionary(const Description& description, std::uint8_t node_id) : node_id_(node_id) {
+    const auto key = [](const EntryDescription* e) {
+        return std::uint32_t{e->index} << 8 | e->sub;
+    };
     std::vector<const EntryDescription*> order;
     for (const auto& e : description.entries) {
         order.push_back(&e);
     }
-    const auto key = [](const EntryDescription* e) {
-        return std::uint32_t{e->index} << 8 | e->sub;
-    };
     std::stable_sort(order.begin(), order.end(), [&](auto* a, auto* b) { return key(a) < key(b); });
-    const auto report = [&](const EntryDescription& e, const char* what) {
-        char text[120];
-        std::snprintf(text, sizeof text, "object %04X sub-index %02X: %s", e.index, e.sub, what);
-        problems_.emplace_back(text);
-    };
-
+    std::vector<const EntryDescription*> accepted;
     std::uint32_t total = 0;
-    std::vector<const EntryDescription*> taken;
     for (const auto* from : order) {
         if (!keys_.empty() && keys_.back() == key(from)) {
             report(*from, "duplicate description; the first one applies");
             continue;
         }
-        Entry e;
-        e.index = from->index;
-        e.sub = from->sub;
-        e.access = from->access;
-        e.type = from->type;
-        if (const auto standard = standard_type(e.index, e.sub);
-            standard != Type::none && standard != e.type) {
-            report(*from, (std::string("its type must be ") + to_string(standard)).c_str());
-            e.type = standard;
-        }
-        e.bits = static_cast<std::uint8_t>(bits_of(e.type));
-        e.rpdo = from->rpdo;
-        e.tpdo = from->tpdo;
-        e.plus_node_id = from->plus_node_id;
-        e.ranged = from->ranged && e.bits != 0;
-        e.low = from->low;
-        e.high = from->high;
-        if (e.bits != 0) {
-            e.capacity = e.size = bytes_of(e.type);
-            if (!from->value.empty() && from->value.size() != e.size) {
-                report(*from, "the length of the value does not match its type");
-            }
-        } else {
-            e.capacity = std::max(from->capacity, static_cast<std::uint32_t>(from->value.size()));
-            e.size = static_cast<std::uint32_t>(from->value.size());
-            if (e.type == Type::domain) {
-                e.stream = &own_memory;
-            }
-        }
+        const Entry e = make_entry(*from);
         if (e.type != Type::domain) {
             longest_ = std::max<std::size_t>(longest_, e.capacity);
         }
         keys_.push_back(key(from));
-        taken.push_back(from);
+        accepted.push_back(from);
         entries_.push_back(e);
         images_.push_back({total, e.size, e.size});
         total += (e.capacity + 7U) & ~7U;
@@ -183,7 +153,7 @@ Dictionary::Dictionary(const Description& description, std::uint8_t node_id) : n
     for (std::size_t n = 0; n < entries_.size(); ++n) {
         Entry& e = entries_[n];
         e.data = memory_.data() + images_[n].offset;
-        const auto& value = taken[n]->value;
+        const auto& value = accepted[n]->value;
         if (!value.empty()) {
             std::memcpy(e.data, value.data(), std::min<std::size_t>(value.size(), e.capacity));
         }
@@ -192,6 +162,46 @@ Dictionary::Dictionary(const Description& description, std::uint8_t node_id) : n
     for (auto& e : entries_) {
         apply_node_id(e);
     }
+}
+
+void Dictionary::report(const EntryDescription& e, const std::string& problem) {
+    char address[40];
+    std::snprintf(address, sizeof address, "object %04X sub-index %02X: ", e.index, e.sub);
+    problems_.push_back(address + problem);
+}
+
+/// Returns the entry of a description, without its memory.
+Entry Dictionary::make_entry(const EntryDescription& from) {
+    Entry e;
+    e.index = from.index;
+    e.sub = from.sub;
+    e.access = from.access;
+    e.type = from.type;
+    const auto standard = standard_type(e.index, e.sub);
+    if (standard != Type::none && standard != e.type) {
+        report(from, std::string("its type must be ") + to_string(standard));
+        e.type = standard;
+    }
+    e.bits = static_cast<std::uint8_t>(bits_of(e.type));
+    e.rpdo = from.rpdo;
+    e.tpdo = from.tpdo;
+    e.plus_node_id = from.plus_node_id;
+    e.ranged = from.ranged && e.bits != 0;
+    e.low = from.low;
+    e.high = from.high;
+    if (e.bits != 0) {
+        e.capacity = e.size = bytes_of(e.type);
+        if (!from.value.empty() && from.value.size() != e.size) {
+            report(from, "the length of the value does not match its type");
+        }
+        return e;
+    }
+    e.size = static_cast<std::uint32_t>(from.value.size());
+    e.capacity = std::max(from.capacity, e.size);
+    if (e.type == Type::domain) {
+        e.stream = &own_memory;
+    }
+    return e;
 }
 
 Entry* Dictionary::find(std::uint16_t index, std::uint8_t sub) noexcept {

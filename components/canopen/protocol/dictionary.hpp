@@ -178,6 +178,8 @@ private:
         std::uint32_t size = 0;
         std::uint32_t default_size = 0;
     };
+    Entry make_entry(const EntryDescription&);
+    void report(const EntryDescription&, const std::string& problem);
     void apply_node_id(Entry&) noexcept;
 
     std::vector<std::uint32_t> keys_;  // sorted, parallel to entries_

@@ -5,77 +5,52 @@
 
 namespace hal::canopen {
 
-const char* to_string(Type type) noexcept {
-    switch (type) {
-    case Type::none: return "";
-    case Type::boolean: return "BOOLEAN";
-    case Type::integer8: return "INTEGER8";
-    case Type::integer16: return "INTEGER16";
-    case Type::integer32: return "INTEGER32";
-    case Type::unsigned8: return "UNSIGNED8";
-    case Type::unsigned16: return "UNSIGNED16";
-    case Type::unsigned32: return "UNSIGNED32";
-    case Type::real32: return "REAL32";
-    case Type::visible_string: return "VISIBLE_STRING";
-    case Type::octet_string: return "OCTET_STRING";
-    case Type::unicode_string: return "UNICODE_STRING";
-    case Type::time_of_day: return "TIME_OF_DAY";
-    case Type::time_difference: return "TIME_DIFFERENCE";
-    case Type::domain: return "DOMAIN";
-    case Type::integer24: return "INTEGER24";
-    case Type::real64: return "REAL64";
-    case Type::integer40: return "INTEGER40";
-    case Type::integer48: return "INTEGER48";
-    case Type::integer56: return "INTEGER56";
-    case Type::integer64: return "INTEGER64";
-    case Type::unsigned24: return "UNSIGNED24";
-    case Type::unsigned40: return "UNSIGNED40";
-    case Type::unsigned48: return "UNSIGNED48";
-    case Type::unsigned56: return "UNSIGNED56";
-    case Type::unsigned64: return "UNSIGNED64";
-    }
-    return "";
-}
+namespace {
+struct AbortRow {
+    Abort code;
+    const char* text;
+};
+constexpr AbortRow abort_rows[] = {
+    {Abort::none, "no error"},
+    {Abort::toggle, "toggle bit not alternated"},
+    {Abort::timeout, "SDO protocol timed out"},
+    {Abort::command, "command specifier not valid or unknown"},
+    {Abort::block_size, "invalid block size"},
+    {Abort::sequence, "invalid sequence number"},
+    {Abort::crc, "CRC error"},
+    {Abort::memory, "out of memory"},
+    {Abort::access, "unsupported access to an object"},
+    {Abort::write_only, "attempt to read a write-only object"},
+    {Abort::read_only, "attempt to write a read-only object"},
+    {Abort::no_object, "object does not exist in the object dictionary"},
+    {Abort::not_mappable, "object cannot be mapped to a PDO"},
+    {Abort::pdo_length,
+     "number and length of the objects to be mapped would exceed the PDO length"},
+    {Abort::incompatible, "general parameter incompatibility"},
+    {Abort::internal_incompatible, "general internal incompatibility in the device"},
+    {Abort::hardware, "access failed due to a hardware error"},
+    {Abort::length, "data type does not match, length of service parameter does not match"},
+    {Abort::too_long, "data type does not match, length of service parameter too high"},
+    {Abort::too_short, "data type does not match, length of service parameter too low"},
+    {Abort::no_sub, "sub-index does not exist"},
+    {Abort::value, "invalid value for the parameter"},
+    {Abort::too_high, "value of the parameter written too high"},
+    {Abort::too_low, "value of the parameter written too low"},
+    {Abort::range_reversed, "maximum value is less than minimum value"},
+    {Abort::no_resource, "resource not available: SDO connection"},
+    {Abort::general, "general error"},
+    {Abort::cannot_store, "data cannot be transferred or stored to the application"},
+    {Abort::local_control, "data cannot be transferred or stored because of local control"},
+    {Abort::device_state,
+     "data cannot be transferred or stored because of the present device state"},
+    {Abort::no_dictionary, "no object dictionary is present, or it could not be generated"},
+    {Abort::no_data, "no data available"},
+};
+}  // namespace
 
 const char* to_string(Abort code) noexcept {
-    switch (code) {
-    case Abort::none: return "no error";
-    case Abort::toggle: return "toggle bit not alternated";
-    case Abort::timeout: return "SDO protocol timed out";
-    case Abort::command: return "command specifier not valid or unknown";
-    case Abort::block_size: return "invalid block size";
-    case Abort::sequence: return "invalid sequence number";
-    case Abort::crc: return "CRC error";
-    case Abort::memory: return "out of memory";
-    case Abort::access: return "unsupported access to an object";
-    case Abort::write_only: return "attempt to read a write-only object";
-    case Abort::read_only: return "attempt to write a read-only object";
-    case Abort::no_object: return "object does not exist in the object dictionary";
-    case Abort::not_mappable: return "object cannot be mapped to a PDO";
-    case Abort::pdo_length:
-        return "number and length of the objects to be mapped would exceed the PDO length";
-    case Abort::incompatible: return "general parameter incompatibility";
-    case Abort::internal_incompatible: return "general internal incompatibility in the device";
-    case Abort::hardware: return "access failed due to a hardware error";
-    case Abort::length:
-        return "data type does not match, length of service parameter does not match";
-    case Abort::too_long: return "data type does not match, length of service parameter too high";
-    case Abort::too_short: return "data type does not match, length of service parameter too low";
-    case Abort::no_sub: return "sub-index does not exist";
-    case Abort::value: return "invalid value for the parameter";
-    case Abort::too_high: return "value of the parameter written too high";
-    case Abort::too_low: return "value of the parameter written too low";
-    case Abort::range_reversed: return "maximum value is less than minimum value";
-    case Abort::no_resource: return "resource not available: SDO connection";
-    case Abort::general: return "general error";
-    case Abort::cannot_store: return "data cannot be transferred or stored to the application";
-    case Abort::local_control:
-        return "data cannot be transferred or stored because of local control";
-    case Abort::device_state:
-        return "data cannot be transferred or stored because of the present device state";
-    case Abort::no_dictionary:
-        return "no object dictionary is present, or it could not be generated";
-    case Abort::no_data: return "no data available";
+    for (const auto& row : abort_rows) {
+        if (row.code == code) return row.text;
     }
     return "unknown abort code";
 }

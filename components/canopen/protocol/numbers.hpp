@@ -3,6 +3,7 @@
 // and the byte order of values.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -52,53 +53,58 @@ enum class Type : std::uint16_t {
     unsigned64 = 0x1b,
 };
 
-/// Returns the length in bits; 0 for types of variable length. [any]
-constexpr unsigned bits_of(Type type) noexcept {
-    switch (type) {
-    case Type::boolean: return 1;
-    case Type::integer8:
-    case Type::unsigned8: return 8;
-    case Type::integer16:
-    case Type::unsigned16: return 16;
-    case Type::integer24:
-    case Type::unsigned24: return 24;
-    case Type::integer32:
-    case Type::unsigned32:
-    case Type::real32: return 32;
-    case Type::integer40:
-    case Type::unsigned40: return 40;
-    case Type::integer48:
-    case Type::unsigned48:
-    case Type::time_of_day:
-    case Type::time_difference: return 48;
-    case Type::integer56:
-    case Type::unsigned56: return 56;
-    case Type::integer64:
-    case Type::unsigned64:
-    case Type::real64: return 64;
-    default: return 0;
-    }
+/// Properties of a data type.
+struct TypeRow {
+    const char* name = "";
+    std::uint8_t bits = 0;  ///< 0: of variable length
+    bool is_signed = false;
+};
+/// By the index of the type in the object dictionary.
+inline constexpr std::array<TypeRow, 0x1c> type_rows{{
+    {},
+    {"BOOLEAN", 1},
+    {"INTEGER8", 8, true},
+    {"INTEGER16", 16, true},
+    {"INTEGER32", 32, true},
+    {"UNSIGNED8", 8},
+    {"UNSIGNED16", 16},
+    {"UNSIGNED32", 32},
+    {"REAL32", 32},
+    {"VISIBLE_STRING"},
+    {"OCTET_STRING"},
+    {"UNICODE_STRING"},
+    {"TIME_OF_DAY", 48},
+    {"TIME_DIFFERENCE", 48},
+    {},
+    {"DOMAIN"},
+    {"INTEGER24", 24, true},
+    {"REAL64", 64},
+    {"INTEGER40", 40, true},
+    {"INTEGER48", 48, true},
+    {"INTEGER56", 56, true},
+    {"INTEGER64", 64, true},
+    {"UNSIGNED24", 24},
+    {},
+    {"UNSIGNED40", 40},
+    {"UNSIGNED48", 48},
+    {"UNSIGNED56", 56},
+    {"UNSIGNED64", 64},
+}};
+/// Returns the properties of a type; empty for an unknown one. [any]
+constexpr const TypeRow& row_of(Type type) noexcept {
+    const auto number = static_cast<std::size_t>(type);
+    return type_rows[number < type_rows.size() ? number : 0];
 }
+/// Returns the length in bits; 0 for types of variable length. [any]
+constexpr unsigned bits_of(Type type) noexcept { return row_of(type).bits; }
 /// Returns the length in bytes; 0 for types of variable length. [any]
 constexpr unsigned bytes_of(Type type) noexcept { return (bits_of(type) + 7) / 8; }
 /// Returns true for INTEGER8 to INTEGER64. [any]
-constexpr bool is_signed(Type type) noexcept {
-    switch (type) {
-    case Type::integer8:
-    case Type::integer16:
-    case Type::integer24:
-    case Type::integer32:
-    case Type::integer40:
-    case Type::integer48:
-    case Type::integer56:
-    case Type::integer64: return true;
-    default: return false;
-    }
-}
+constexpr bool is_signed(Type type) noexcept { return row_of(type).is_signed; }
 /// Returns true for REAL32 and REAL64. [any]
 constexpr bool is_real(Type type) noexcept { return type == Type::real32 || type == Type::real64; }
 /// Returns the name in CiA 301, such as "UNSIGNED16"; "" for an unknown type. [any]
-const char* to_string(Type) noexcept;
+constexpr const char* to_string(Type type) noexcept { return row_of(type).name; }
 
 /// Access rights of an object: what an SDO client may do with it.
 enum class Access : std::uint8_t { read_write, read_only, write_only, constant };

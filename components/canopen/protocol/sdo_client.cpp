@@ -89,18 +89,12 @@ void SdoClient::abort(Abort why) noexcept {
 /// Restarts a transfer that failed for a transient reason. It continues by segments unless the
 /// request demanded blocks, because some servers offer block transfer and fail to carry it out.
 void SdoClient::restart_or_fail(Abort why, bool by_server) noexcept {
-    if (restarts_left_ == 0) {
-        if (!by_server) {
-            send_initiate(0x80, static_cast<std::uint32_t>(why));
-        }
-        return finish(why, by_server);
-    }
     if (!by_server) {
         send_initiate(0x80, static_cast<std::uint32_t>(why));
     }
+    if (restarts_left_ == 0) return finish(why, by_server);
     --restarts_left_;
-    ++retries_;
-    ++first_->retries;
+    count_retry();
     begin_mode(in_block_ && first_->mode == SdoMode::block);
 }
 
@@ -133,34 +127,33 @@ void SdoClient::begin() noexcept {
         return finish(Abort::no_resource);
     }
     const bool many = !r.upload && r.data.size() >= settings_.block_from;
-    begin_mode(!block_refused_ &&
-               (r.mode == SdoMode::block || (r.mode == SdoMode::automatic && many)));
+    const bool wants_block = r.mode == SdoMode::block || (r.mode == SdoMode::automatic && many);
+    begin_mode(wants_block && !block_refused_);
 }
 
 void SdoClient::begin_mode(bool block) noexcept {
-    auto& r = *first_;
     in_block_ = block;
     toggle_ = 0;
     offset_ = 0;
-    crc_ = 0;
-    crc_until_ = 0;
-    sequence_ = 0;
-    held_count_ = 0;
     stalls_ = 0;
-
-    acknowledged_ = 0;
-    last_acknowledgement_ = 0;
-    size_ = r.upload ? 0 : static_cast<std::uint32_t>(r.data.size());
-    size_known_ = crc_used_ = block_sent_ = last_seen_ = segment_received_ = block_any_ = gap_ =
-        acknowledged_early_ = false;
+    size_known_ = false;
     last_error_ = Abort::none;
     progress();
-    if (r.upload) {
-        block_size_ = std::clamp<std::uint8_t>(settings_.block_size, 1, 127);
-        state_ = block ? State::block_upload_start : State::upload_start;
-        // pst = 21: the server may answer values of up to three segments by segmented transfer.
-        return block ? send_initiate(0xa4, block_size_ | 21U << 8) : send_initiate(0x40, 0);
-    }
+    if (first_->upload) return begin_upload(block);
+    begin_download(block);
+}
+
+void SdoClient::begin_upload(bool block) noexcept {
+    size_ = 0;
+    state_ = block ? State::block_upload_start : State::upload_start;
+    if (!block) return send_initiate(0x40, 0);
+    receiver_.begin(std::clamp<std::uint8_t>(settings_.block_size, 1, 127));
+    // pst = 21: the server may answer values of up to three segments by segmented transfer.
+    send_initiate(0xa4, receiver_.size() | 21U << 8);
+}
+
+void SdoClient::begin_download(bool block) noexcept {
+    size_ = static_cast<std::uint32_t>(first_->data.size());
     if (block && size_ != 0) {
         state_ = State::block_download_start;
         return send_initiate(0xc6, size_);
@@ -168,72 +161,49 @@ void SdoClient::begin_mode(bool block) noexcept {
     state_ = State::download_start;
     if (size_ == 0 || size_ > 4) return send_initiate(0x21, size_);
     std::uint32_t value = 0;
-    std::memcpy(&value, r.data.data(), size_);
+    std::memcpy(&value, first_->data.data(), size_);
     send_initiate(static_cast<std::uint8_t>(0x23 | (4 - size_) << 2), value);
 }
 
 void SdoClient::handle(const Frame& f, Time now) noexcept {
     now_ = now;
     if (f.length != 8) return;
-    take(f);
+    dispatch(f);
     if (state_ == State::idle && first_ != nullptr) {
         begin();
     }
 }
 
-void SdoClient::take(const Frame& f) noexcept {
+void SdoClient::dispatch(const Frame& f) noexcept {
     if (state_ == State::idle) {
         ++unexpected_;
         return;
     }
-    const auto command = f.data[0];
-    if (command == 0x80) return on_abort(f);
+    if (f.data[0] == 0x80) return on_abort(f);
     switch (state_) {
-    case State::download_start:
-        if (command >> 5 != 3 || !concerns_request(f)) return unexpected(Abort::command);
-        progress();
-        if (size_ > 0 && size_ <= 4) {
-            offset_ = size_;
-            return finish(Abort::none);
-        }
-        state_ = State::download;
-        return send_segment();
-    case State::download:
-        if (command >> 5 != 1) return unexpected(Abort::command);
-        if ((command & 0x10) != toggle_) return unexpected(Abort::toggle);
-        progress();
-        offset_ += segment_;
-        toggle_ ^= 0x10;
-        return offset_ == size_ ? finish(Abort::none) : send_segment();
+    case State::download_start: return on_download_start(f);
+    case State::download: return on_download_segment(f);
     case State::upload_start: return on_upload_start(f);
     case State::upload: return on_upload_segment(f);
-    case State::block_download_start:
-        if ((command & 0xe3) != 0xa0 || !concerns_request(f)) return unexpected(Abort::command);
-        if (f.data[4] < 1 || f.data[4] > 127) return abort(Abort::block_size);
-        progress();
-        crc_used_ = (command & 4) != 0;
-        block_size_ = f.data[4];
-        state_ = State::block_download;
-        return send_block();
+    case State::block_download_start: return on_block_download_start(f);
     case State::block_download: return on_block_acknowledge(f);
     case State::block_download_end:
-        if (command != 0xa1) return unexpected(Abort::command);
-        return finish(Abort::none);
-    case State::block_upload_start: {
-        if (!concerns_request(f)) return unexpected(Abort::command);
-        if (command >> 5 == 2) return on_upload_start(f);
-        if ((command & 0xe1) != 0xc0) return unexpected(Abort::command);
-        crc_used_ = (command & 4) != 0;
-        size_known_ = (command & 2) != 0;
-        size_ = size_known_ ? load<std::uint32_t>(f.data.data() + 4) : 0;
-        if (size_ > first_->buffer.size()) return abort(Abort::memory);
-        progress();
-        state_ = State::block_upload;
-        return send({0xa3});
-    }
+        return f.data[0] == 0xa1 ? finish(Abort::none) : unexpected(Abort::command);
+    case State::block_upload_start: return on_block_upload_start(f);
     case State::block_upload: return on_block_segment(f);
     case State::block_upload_end: return on_block_end(f);
     case State::idle: return;
+    }
+}
+
+/// Returns true until the server has accepted the transfer.
+bool SdoClient::starting() const noexcept {
+    switch (state_) {
+    case State::upload_start:
+    case State::download_start:
+    case State::block_upload_start:
+    case State::block_download_start: return true;
+    default: return false;
     }
 }
 
@@ -241,10 +211,7 @@ void SdoClient::on_abort(const Frame& f) noexcept {
     const auto why = static_cast<Abort>(load<std::uint32_t>(f.data.data() + 4));
     // of an earlier transfer: some servers send their abort late
     if (!concerns_request(f)) return unexpected(why);
-    const bool starting = state_ == State::upload_start || state_ == State::download_start ||
-                          state_ == State::block_upload_start ||
-                          state_ == State::block_download_start;
-    if (starting) {
+    if (starting()) {
         // The abort codes with which servers without block transfer reject it.
         if (in_block_ && (why == Abort::command || why == Abort::access || why == Abort::general)) {
             block_refused_ = why == Abort::command;
@@ -260,6 +227,27 @@ void SdoClient::on_abort(const Frame& f) noexcept {
     case Abort::crc: return restart_or_fail(why, true);
     default: return finish(why, true);
     }
+}
+
+void SdoClient::on_download_start(const Frame& f) noexcept {
+    if (f.data[0] >> 5 != 3 || !concerns_request(f)) return unexpected(Abort::command);
+    progress();
+    if (size_ > 0 && size_ <= 4) {
+        offset_ = size_;
+        return finish(Abort::none);
+    }
+    state_ = State::download;
+    send_segment();
+}
+
+void SdoClient::on_download_segment(const Frame& f) noexcept {
+    if (f.data[0] >> 5 != 1) return unexpected(Abort::command);
+    if ((f.data[0] & 0x10) != toggle_) return unexpected(Abort::toggle);
+    progress();
+    offset_ += segment_;
+    toggle_ ^= 0x10;
+    if (offset_ == size_) return finish(Abort::none);
+    send_segment();
 }
 
 void SdoClient::send_segment() noexcept {
@@ -294,10 +282,10 @@ void SdoClient::on_upload_start(const Frame& f) noexcept {
     progress();
     size_known_ = (command & 1) != 0;
     if ((command & 2) != 0) {
-        size_ = size_known_ ? 4U - (command >> 2 & 3) : 4U;
-        if (!size_known_) {
-            size_ = static_cast<std::uint32_t>(std::min<std::size_t>(4, first_->buffer.size()));
-        }
+        // without a size, as much as the caller wants
+        const auto wanted =
+            static_cast<std::uint32_t>(std::min<std::size_t>(4, first_->buffer.size()));
+        size_ = size_known_ ? 4U - (command >> 2 & 3) : wanted;
         size_known_ = true;
         if (store_received({f.data.data() + 4, size_})) {
             finish(Abort::none);
@@ -326,26 +314,19 @@ void SdoClient::on_upload_segment(const Frame& f) noexcept {
 
 /// On timeout: repeats the last frame, then restarts the transfer, then fails.
 void SdoClient::on_timeout() noexcept {
-    heard_ = now_;
+    last_received_ = now_;
     if (resends_left_ == 0) {
-        const bool starting = state_ == State::upload_start || state_ == State::download_start ||
-                              state_ == State::block_upload_start ||
-                              state_ == State::block_download_start;
         const auto why = last_error_ != Abort::none ? last_error_ : Abort::timeout;
-        return starting ? abort(why) : restart_or_fail(why, false);
+        return starting() ? abort(why) : restart_or_fail(why, false);
     }
     --resends_left_;
-    ++retries_;
-    ++first_->retries;
-    if (state_ == State::block_upload && segment_received_) {
-        if (!block_any_) {
-            return send({0xa2, acknowledged_, block_size_});
-        }
-        acknowledge_block(gap_ ? BlockChange::smaller : BlockChange::same);
-        acknowledged_early_ = first_ != nullptr && state_ == State::block_upload;
-        return;
+    count_retry();
+    if (state_ != State::block_upload || !receiver_.holds()) return send_again();
+    if (!receiver_.any()) return send({0xa2, receiver_.acknowledged(), receiver_.size()});
+    acknowledge_block(receiver_.change(BlockChange::same));
+    if (first_ != nullptr && state_ == State::block_upload) {
+        receiver_.ignore_rest();
     }
-    send_again();
 }
 
 void SdoClient::poll(Time now) noexcept {
@@ -359,20 +340,20 @@ void SdoClient::poll(Time now) noexcept {
         }
         return;
     }
-    if (state_ == State::block_download && !block_sent_ && !pending_) {
-        const auto before = sequence_;
+    if (state_ == State::block_download && !sender_.complete() && !pending_) {
+        const auto before = sender_.sequence();
         send_block();
         // other clients may have used the space
-        const bool moves = sequence_ != before || out_.popped() != popped_;
+        const bool moves = sender_.sequence() != before || out_.popped() != popped_;
         popped_ = out_.popped();
-        if (!block_sent_ && !moves) return queue_full();
-        if (!block_sent_) {
-            heard_ = now;
+        if (!sender_.complete()) {
+            if (!moves) return queue_full();
+            last_received_ = now;
         }
     }
     if (pending_) return queue_full();
     queue_full_since_ = -1;
-    if (now - heard_ >= settings_.timeout) {
+    if (now - last_received_ >= settings_.timeout) {
         on_timeout();
     }
 }
@@ -381,7 +362,7 @@ void SdoClient::poll(Time now) noexcept {
 /// stays full for as long as an unresponsive server would be waited for, the request fails, without
 /// an abort frame because that could not be sent either.
 void SdoClient::queue_full() noexcept {
-    heard_ = now_;
+    last_received_ = now_;
     if (queue_full_since_ < 0) {
         queue_full_since_ = now_;
     }
@@ -389,6 +370,133 @@ void SdoClient::queue_full() noexcept {
     queue_full_since_ = -1;
     first_->not_sent = true;
     finish(Abort::timeout);
+}
+
+// Block download.
+
+void SdoClient::on_block_download_start(const Frame& f) noexcept {
+    const auto command = f.data[0];
+    if ((command & 0xe3) != 0xa0 || !concerns_request(f)) return unexpected(Abort::command);
+    if (!is_block_size(f.data[4])) return abort(Abort::block_size);
+    progress();
+    sender_.begin(f.data[4], (command & 4) != 0);
+    state_ = State::block_download;
+    send_block();
+}
+
+void SdoClient::send_block() noexcept {
+    const auto before = sender_.sequence();
+    sender_.send(out_, request_cob_, size_,
+                 [&](std::uint32_t offset, std::span<std::uint8_t> bytes) {
+        std::memcpy(bytes.data(), first_->data.data() + offset, bytes.size());
+        return true;
+    });
+    if (sender_.sequence() == before) return;
+    std::copy_n(sender_.last().data.begin(), sent_.size(), sent_.begin());
+    pending_ = false;
+    last_received_ = now_;
+}
+
+void SdoClient::on_block_acknowledge(const Frame& f) noexcept {
+    if ((f.data[0] & 0xe3) != 0xa2) return unexpected(Abort::command);
+    const auto good = f.data[1];
+    const auto next = f.data[2];
+    const auto sent = sender_.sequence();
+    switch (sender_.evaluate(good, next, out_, now_, settings_.timeout / 10)) {
+    case Acknowledgement::duplicate: return unexpected(Abort::sequence);
+    case Acknowledgement::beyond: return restart_or_fail(Abort::sequence, false);
+    case Acknowledgement::stalled:
+        if (!tolerates_stall()) return restart_or_fail(Abort::sequence, false);
+        sender_.repeat(now_);
+        return send_block();
+    case Acknowledgement::advances: break;
+    }
+    if (!is_block_size(next)) return abort(Abort::block_size);
+    if (good != 0) {
+        stalls_ = 0;
+    } else if (!tolerates_stall()) {
+        return restart_or_fail(Abort::sequence, false);
+    }
+    if (good < sent) {
+        count_retry();
+    }
+    progress();
+    sender_.advance(good, next, size_, now_);
+    offset_ = sender_.offset();
+    if (offset_ != size_) return send_block();
+    state_ = State::block_download_end;
+    send_block_end();
+}
+
+void SdoClient::send_block_end() noexcept {
+    Bytes b{static_cast<std::uint8_t>(0xc1 | sender_.unused() << 2)};
+    store(b.data() + 1, sender_.crc());
+    send(b);
+}
+
+// Block upload.
+
+void SdoClient::on_block_upload_start(const Frame& f) noexcept {
+    const auto command = f.data[0];
+    if (!concerns_request(f)) return unexpected(Abort::command);
+    if (command >> 5 == 2) return on_upload_start(f);
+    if ((command & 0xe1) != 0xc0) return unexpected(Abort::command);
+    receiver_.use_crc((command & 4) != 0);
+    size_known_ = (command & 2) != 0;
+    size_ = size_known_ ? load<std::uint32_t>(f.data.data() + 4) : 0;
+    if (size_ > first_->buffer.size()) return abort(Abort::memory);
+    progress();
+    state_ = State::block_upload;
+    send({0xa3});
+}
+
+void SdoClient::on_block_segment(const Frame& f) noexcept {
+    const auto arrived = receiver_.accept(
+        f, [&](std::span<const std::uint8_t> bytes) { return store_received(bytes); });
+    switch (arrived) {
+    case BlockReceiver::Arrived::failed:
+    case BlockReceiver::Arrived::ignored: return;
+    case BlockReceiver::Arrived::repeated:  // or the server missed the acknowledgement, which the
+    case BlockReceiver::Arrived::duplicate:  // timeout repeats
+        ++unexpected_;
+        return;
+    case BlockReceiver::Arrived::out_of_order: ++unexpected_; break;
+    case BlockReceiver::Arrived::in_order: progress(); break;
+    }
+    if (receiver_.ends_with(f)) {
+        acknowledge_block(receiver_.change(BlockChange::larger));
+    }
+}
+
+void SdoClient::acknowledge_block(BlockChange change) noexcept {
+    const std::uint8_t good = receiver_.acknowledge(change, settings_.block_size);
+    if (good != 0) {
+        stalls_ = 0;
+    } else if (!tolerates_stall()) {
+        return restart_or_fail(Abort::sequence, false);
+    }
+    send({0xa2, good, receiver_.size()});
+    if (receiver_.last_seen()) {
+        state_ = State::block_upload_end;
+    }
+}
+
+void SdoClient::on_block_end(const Frame& f) noexcept {
+    if ((f.data[0] & 0xe3) != 0xc1) return unexpected(Abort::command);
+    const bool valid = receiver_.crc_matches(f);
+    // a repeated last segment, which can look like an end frame
+    if (receiver_.repeats_last(f) && !(receiver_.crc_used() && valid)) {
+        return unexpected(Abort::command);
+    }
+    if (receiver_.crc_used() && !valid) return restart_or_fail(Abort::crc, false);
+    if (!store_received(receiver_.rest(f))) return;
+    if (size_known_ && offset_ != size_) return restart_or_fail(Abort::too_short, false);
+    send({0xa1});
+    const bool lost = pending_;
+    finish(Abort::none);
+    if (lost) {
+        send_again();
+    }
 }
 
 }  // namespace hal::canopen

@@ -132,9 +132,11 @@ private:
     };
     using Bytes = std::array<std::uint8_t, 8>;
 
-    void take(const Frame&) noexcept;
+    void dispatch(const Frame&) noexcept;
     void begin() noexcept;
     void begin_mode(bool block) noexcept;
+    void begin_upload(bool block) noexcept;
+    void begin_download(bool block) noexcept;
     void send(const Bytes&) noexcept;
     void send_again() noexcept;
     void send_initiate(std::uint8_t command, std::uint32_t value) noexcept;
@@ -146,16 +148,27 @@ private:
     void abort(Abort) noexcept;
     void restart_or_fail(Abort, bool by_server) noexcept;
     void on_abort(const Frame&) noexcept;
+    void on_download_start(const Frame&) noexcept;
+    void on_download_segment(const Frame&) noexcept;
     void on_upload_start(const Frame&) noexcept;
     void on_upload_segment(const Frame&) noexcept;
-    void on_block_segment(const Frame&) noexcept;
+    void on_block_download_start(const Frame&) noexcept;
     void on_block_acknowledge(const Frame&) noexcept;
+    void on_block_upload_start(const Frame&) noexcept;
+    void on_block_segment(const Frame&) noexcept;
     void on_block_end(const Frame&) noexcept;
     void on_timeout() noexcept;
     void queue_full() noexcept;
     bool store_received(std::span<const std::uint8_t>) noexcept;
+    bool starting() const noexcept;
+    /// Counts a block without progress. Returns false when there were too many.
+    bool tolerates_stall() noexcept { return ++stalls_ <= 4 + settings_.resends; }
+    void count_retry() noexcept {
+        ++retries_;
+        ++first_->retries;
+    }
     void progress() noexcept {
-        heard_ = now_;
+        last_received_ = now_;
         resends_left_ = settings_.resends;
     }
     void unexpected(Abort why) noexcept {
@@ -173,32 +186,14 @@ private:
     SdoRequest* first_ = nullptr;
     SdoRequest* last_ = nullptr;
     State state_ = State::idle;
+    BlockSender sender_;
+    BlockReceiver receiver_;
     std::uint8_t toggle_ = 0;
-    std::uint8_t block_size_ = 0;
-    std::uint8_t sequence_ = 0;
-    std::uint8_t acknowledged_ = 0;
-    std::uint8_t held_count_ = 0;
-
-    std::uint8_t last_command_ = 0;
-    bool crc_used_ = false;
-    bool block_sent_ = false;
-    bool last_seen_ = false;
-    bool block_refused_ = false;
-
     bool in_block_ = false;
+    bool block_refused_ = false;
     bool size_known_ = false;
-    bool pending_ = false;
-    bool segment_received_ = false;
-    bool block_any_ = false;
-    bool gap_ = false;  // a segment of this block is missing
-    // the block was acknowledged before its end: ignore the rest until a new block begins
-    bool acknowledged_early_ = false;
-    std::size_t block_end_ = 0;  // FrameQueue::popped() once the whole block has left the queue
-    std::array<std::uint8_t, 7> held_{};
-    std::uint16_t crc_ = 0;
-    std::uint16_t last_acknowledgement_ = 0;
-    std::uint32_t crc_until_ = 0;
-    std::uint32_t offset_ = 0;
+    bool pending_ = false;  // sent_ did not fit into the queue
+    std::uint32_t offset_ = 0;  // bytes that were confirmed or received
     std::uint32_t size_ = 0;
     std::uint32_t segment_ = 0;  // bytes of the segment that awaits its confirmation
     unsigned resends_left_ = 0;
@@ -206,8 +201,7 @@ private:
     unsigned stalls_ = 0;
     Abort last_error_ = Abort::none;  // of the responses dropped since the last valid one
     Bytes sent_{};
-    Time heard_ = 0;
-    Time acknowledged_at_ = 0;
+    Time last_received_ = 0;
     Time now_ = 0;
     Time queue_full_since_ = -1;  // -1: the queue has space
     std::size_t popped_ = 0;  // of out_ at the last poll

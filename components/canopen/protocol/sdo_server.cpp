@@ -6,11 +6,7 @@
 namespace hal::canopen {
 
 SdoServer::SdoServer(Dictionary& dictionary, FrameQueue& out, const SdoServerSettings& settings)
-    : dictionary_(dictionary),
-      out_(out),
-      settings_(settings),
-      scratch_(std::make_unique<std::uint8_t[]>(dictionary.longest())),
-      scratch_size_(dictionary.longest()) {}
+    : out_(out), settings_(settings), object_(dictionary) {}
 
 void SdoServer::configure(std::uint32_t request_cob, std::uint32_t answer_cob) noexcept {
     reset();
@@ -22,10 +18,8 @@ void SdoServer::configure(std::uint32_t request_cob, std::uint32_t answer_cob) n
 }
 
 void SdoServer::reset() noexcept {
-    if (stream_open_) {
-        entry_->stream->close(*entry_, writing_, false);
-    }
-    stream_open_ = pending_ = repeatable_ = false;
+    object_.close(false);
+    pending_ = repeatable_ = false;
     state_ = ended_ = State::idle;
 }
 
@@ -44,10 +38,8 @@ void SdoServer::answer_initiate(std::uint8_t command, std::uint32_t value) noexc
 }
 
 void SdoServer::abort(Abort why, bool notify) noexcept {
-    if (stream_open_) {
-        entry_->stream->close(*entry_, writing_, false);
-    }
-    stream_open_ = repeatable_ = false;
+    object_.close(false);
+    repeatable_ = false;
     state_ = ended_ = State::idle;
     last_abort_ = why;
     ++aborted_;
@@ -62,31 +54,21 @@ void SdoServer::finish() noexcept {
     ++transfers_;
 }
 
-Entry* SdoServer::select(const Frame& f) noexcept {
-    if (stream_open_) {
-        entry_->stream->close(*entry_, writing_, false);
-    }
-    stream_open_ = repeatable_ = false;
-    state_ = ended_ = State::idle;
+/// Keeps index and sub-index of a request, for the answer.
+void SdoServer::address(const Frame& f) noexcept {
     index_ = load<std::uint16_t>(f.data.data() + 1);
     sub_ = f.data[3];
-    toggle_ = 0;
-    offset_ = 0;
-    size_ = 0;
-    crc_ = 0;
-    crc_until_ = 0;
-    sequence_ = 0;
-    held_count_ = 0;
-    last_seen_ = block_sent_ = block_any_ = gap_ = acknowledged_early_ = false;
-    last_acknowledgement_ = 0;
-    acknowledged_ = 0;
-    Abort why;
-    entry_ = dictionary_.find(index_, sub_, why);
-    if (entry_ == nullptr) {
-        abort(why);
-    }
-    return entry_;
 }
+
+bool SdoServer::select(const Frame& f) noexcept {
+    repeatable_ = false;
+    state_ = ended_ = State::idle;
+    toggle_ = 0;
+    address(f);
+    return proceed(object_.select(index_, sub_));
+}
+
+bool SdoServer::open_read() noexcept { return proceed(object_.open_read()); }
 
 void SdoServer::handle(const Frame& f, Time now) noexcept {
     if (f.length != 8) return;
@@ -106,142 +88,54 @@ void SdoServer::handle(const Frame& f, Time now) noexcept {
     if (state_ == State::block_download) {
         // The response was lost, or the abort of the client: it repeats the request. Only a segment
         // out of sequence can look like this.
-        if (bytes == block_request_ && (command & 0x7f) != sequence_ + 1) {
-            return start_block_download(f);
-        }
+        if (bytes == block_request_ && !receiver_.expects(f)) return start_block_download(f);
         return block_segment(f);
     }
-    if (state_ == State::block_download_end && repeated) {
-        return answer(
-            last_answer_);  // the last segment repeated: the client missed the acknowledgement
-    }
-    if (repeated && repeatable_ && settings_.tolerate_repeats &&
-        (command >> 5 == 0 || command >> 5 == 3)) {
-        return answer(last_answer_);
-    }
+    // the last segment repeated: the client missed the acknowledgement
+    const bool ended = state_ == State::block_download_end;
+    const bool segment = command >> 5 == 0 || command >> 5 == 3;
+    const bool tolerated = repeatable_ && settings_.tolerate_repeats && segment;
+    if (repeated && (ended || tolerated)) return answer(last_answer_);
+    dispatch(f);
+}
+
+void SdoServer::dispatch(const Frame& f) noexcept {
+    const std::uint8_t command = f.data[0];
     switch (command >> 5) {
     case 0: return download_segment(f);
     case 1: return start_download(f);
     case 2: return start_upload(f);
     case 3: return upload_segment(f);
-    case 5:
-        if ((command & 3) == 0) return start_block_upload(f);
-        return block_upload_command(f);
-    case 6:
-        if ((command & 1) == 0) return start_block_download(f);
-        return end_block_download(f);
+    case 5: return (command & 3) == 0 ? start_block_upload(f) : block_upload_command(f);
+    case 6: return (command & 1) == 0 ? start_block_download(f) : end_block_download(f);
     default: break;
     }
     if (state_ == State::idle) {
-        index_ = load<std::uint16_t>(f.data.data() + 1);
-        sub_ = f.data[3];
+        address(f);
     }
     abort(Abort::command);
 }
 
-bool SdoServer::open_read() noexcept {
-    if (const auto why = dictionary_.prepare_read(*entry_); why != Abort::none) {
-        abort(why);
-        return false;
-    }
-    writing_ = false;
-    if (entry_->stream != nullptr) {
-        size_ = 0;
-        if (const auto why = entry_->stream->open_read(*entry_, size_); why != Abort::none) {
-            abort(why);
-            return false;
-        }
-        stream_open_ = true;
-    } else {
-        size_ = std::min(entry_->size, static_cast<std::uint32_t>(scratch_size_));
-        if (size_ != 0) {
-            std::memcpy(scratch_.get(), entry_->data, size_);
-        }
-    }
-    return true;
-}
-
-Abort SdoServer::read_object(std::uint32_t offset, std::span<std::uint8_t> buffer) noexcept {
-    if (buffer.empty()) return Abort::none;
-    if (entry_->stream != nullptr) return entry_->stream->read(*entry_, offset, buffer);
-    std::memcpy(buffer.data(), scratch_.get() + offset, buffer.size());
-    return Abort::none;
-}
-
-Abort SdoServer::open_write(std::uint32_t size) noexcept {
-    if (!writable(entry_->access)) return Abort::read_only;
-    writing_ = true;
-    if (entry_->stream != nullptr) {
-        if (const auto why = entry_->stream->open_write(*entry_, size); why != Abort::none) {
-            return why;
-        }
-        stream_open_ = true;
-        return Abort::none;
-    }
-    return size_known_ ? Dictionary::check_length(*entry_, size) : Abort::none;
-}
-
-Abort SdoServer::write_object(std::span<const std::uint8_t> bytes) noexcept {
-    if (size_known_ && bytes.size() > size_ - offset_) return Abort::too_long;
-    if (entry_->stream != nullptr) {
-        if (const auto why = entry_->stream->write(*entry_, offset_, bytes); why != Abort::none) {
-            return why;
-        }
-    } else {
-        const auto capacity = std::min<std::size_t>(scratch_size_, entry_->capacity);
-        if (bytes.size() > capacity - offset_) return Abort::too_long;
-        if (!bytes.empty()) {
-            std::memcpy(scratch_.get() + offset_, bytes.data(), bytes.size());
-        }
-    }
-    offset_ += static_cast<std::uint32_t>(bytes.size());
-    return Abort::none;
-}
-
-Abort SdoServer::commit() noexcept {
-    if (size_known_ && offset_ != size_) return Abort::too_short;
-    if (entry_->stream == nullptr) {
-        return dictionary_.write(*entry_, {scratch_.get(), offset_});
-    }
-    stream_open_ = false;
-    const auto why = entry_->stream->close(*entry_, true, true);
-    if (why == Abort::none && entry_->handler != nullptr) {
-        entry_->handler->written(*entry_);
-    }
-    return why;
-}
-
 void SdoServer::start_download(const Frame& f) noexcept {
-    if (select(f) == nullptr) return;
-    const bool expedited = (f.data[0] & 2) != 0;
-    size_known_ = (f.data[0] & 1) != 0;
-    if (expedited) {
-        std::uint32_t size = 4 - (f.data[0] >> 2 & 3);
-        if (!size_known_) {
-            size = entry_->bits != 0 && entry_->capacity <= 4 ? entry_->capacity : 4;
-        }
-        size_ = size;
-        size_known_ = true;
-        Abort why = Abort::none;
-        if (entry_->stream == nullptr) {
-            why = dictionary_.write(*entry_, {f.data.data() + 4, size});
-        } else {
-            why = open_write(size);
-            if (why == Abort::none) {
-                why = write_object({f.data.data() + 4, size});
-            }
-            if (why == Abort::none) {
-                why = commit();
-            }
-        }
-        if (why != Abort::none) return abort(why);
-        ++transfers_;
-        return answer_initiate(0x60, 0);
-    }
-    size_ = size_known_ ? load<std::uint32_t>(f.data.data() + 4) : 0;
-    if (const auto why = open_write(size_); why != Abort::none) return abort(why);
+    if (!select(f)) return;
+    if ((f.data[0] & 2) != 0) return expedited_download(f);
+    const bool known = (f.data[0] & 1) != 0;
+    const auto size = known ? load<std::uint32_t>(f.data.data() + 4) : 0;
+    if (!proceed(object_.open_write(known, size))) return;
     state_ = State::download;
-    repeatable_ = false;
+    answer_initiate(0x60, 0);
+}
+
+void SdoServer::expedited_download(const Frame& f) noexcept {
+    const Entry& entry = object_.entry();
+    std::uint32_t size = 4;
+    if ((f.data[0] & 1) != 0) {
+        size = 4 - (f.data[0] >> 2 & 3);
+    } else if (entry.bits != 0) {
+        size = std::min<std::uint32_t>(size, entry.capacity);
+    }
+    if (!proceed(object_.write_at_once({f.data.data() + 4, size}))) return;
+    ++transfers_;
     answer_initiate(0x60, 0);
 }
 
@@ -249,13 +143,9 @@ void SdoServer::download_segment(const Frame& f) noexcept {
     if (state_ != State::download) return abort(Abort::command);
     if ((f.data[0] & 0x10) != toggle_) return abort(Abort::toggle);
     const std::uint32_t count = 7 - (f.data[0] >> 1 & 7);
-    if (const auto why = write_object({f.data.data() + 1, count}); why != Abort::none) {
-        return abort(why);
-    }
+    if (!proceed(object_.write({f.data.data() + 1, count}))) return;
     const bool last = (f.data[0] & 1) != 0;
-    if (last) {
-        if (const auto why = commit(); why != Abort::none) return abort(why);
-    }
+    if (last && !proceed(object_.commit())) return;
     answer({static_cast<std::uint8_t>(0x20 | toggle_)});
     toggle_ ^= 0x10;
     repeatable_ = true;
@@ -265,43 +155,32 @@ void SdoServer::download_segment(const Frame& f) noexcept {
 }
 
 void SdoServer::start_upload(const Frame& f) noexcept {
-    if (select(f) == nullptr || !open_read()) return;
-    if (size_ > 0 && size_ <= 4) {
-        std::uint32_t value = 0;
-        if (const auto why = read_object(0, {reinterpret_cast<std::uint8_t*>(&value), size_});
-            why != Abort::none) {
-            return abort(why);
-        }
-        if (stream_open_) {
-            entry_->stream->close(*entry_, false, true);
-        }
-        stream_open_ = false;
-        ++transfers_;
-        return answer_initiate(static_cast<std::uint8_t>(0x43 | (4 - size_) << 2), value);
+    if (!select(f) || !open_read()) return;
+    const std::uint32_t size = object_.size();
+    if (size == 0 || size > 4) {
+        state_ = State::upload;
+        return answer_initiate(0x41, size);
     }
-    state_ = State::upload;
-    answer_initiate(0x41, size_);
+    std::uint32_t value = 0;
+    if (!proceed(object_.read(0, {reinterpret_cast<std::uint8_t*>(&value), size}))) return;
+    object_.close(true);
+    ++transfers_;
+    answer_initiate(static_cast<std::uint8_t>(0x43 | (4 - size) << 2), value);
 }
 
 void SdoServer::upload_segment(const Frame& f) noexcept {
     if (state_ != State::upload) return abort(Abort::command);
     if ((f.data[0] & 0x10) != toggle_) return abort(Abort::toggle);
-    const auto count = std::min<std::uint32_t>(7, size_ - offset_);
+    const auto count = std::min<std::uint32_t>(7, object_.left());
     Bytes b{};
-    if (const auto why = read_object(offset_, {b.data() + 1, count}); why != Abort::none) {
-        return abort(why);
-    }
-    offset_ += count;
-    const bool last = offset_ == size_;
+    if (!proceed(object_.read_next({b.data() + 1, count}))) return;
+    const bool last = object_.left() == 0;
     b[0] = static_cast<std::uint8_t>(toggle_ | (7 - count) << 1 | (last ? 1 : 0));
     answer(b);
     toggle_ ^= 0x10;
     repeatable_ = true;
     if (!last) return;
-    if (stream_open_) {
-        entry_->stream->close(*entry_, false, true);
-    }
-    stream_open_ = false;
+    object_.close(true);
     finish();
 }
 
@@ -314,21 +193,172 @@ void SdoServer::poll(Time now) noexcept {
     if (state_ == State::block_upload) {
         send_block();
     }
-    if (state_ == State::block_download && now - reminded_ >= acknowledge_after() &&
-        now - heard_ < settings_.timeout && (block_any_ || offset_ != 0 || held_count_ != 0)) {
+    const bool waits = now - heard_ < settings_.timeout;
+    if (state_ == State::block_download && now - reminded_ >= acknowledge_after() && waits &&
+        (receiver_.any() || receiver_.holds())) {
         reminded_ = now;
         on_block_timeout();
     }
     if (now - heard_ < settings_.timeout) return;
     // all data was sent; only the final confirmation of the client is missing
-    if (state_ == State::block_upload_end) {
-        if (stream_open_) {
-            entry_->stream->close(*entry_, false, true);
-        }
-        stream_open_ = false;
-        return finish();
-    }
+    if (state_ == State::block_upload_end) return confirm_block_upload();
     abort(Abort::timeout);
+}
+
+// Block download.
+
+void SdoServer::start_block_download(const Frame& f) noexcept {
+    if (!select(f)) return;
+    const bool known = (f.data[0] & 2) != 0;
+    const auto size = known ? load<std::uint32_t>(f.data.data() + 4) : 0;
+    if (!proceed(object_.open_write(known, size))) return;
+    receiver_.begin(std::clamp<std::uint8_t>(settings_.block_size, 1, 127));
+    receiver_.use_crc((f.data[0] & 4) != 0);
+    state_ = State::block_download;
+    block_request_ = last_request_;
+    reminded_ = now_;
+    answer_initiate(0xa4, receiver_.size());
+}
+
+void SdoServer::block_segment(const Frame& f) noexcept {
+    reminded_ = now_;
+    Abort why = Abort::none;
+    const auto arrived = receiver_.accept(f, [&](std::span<const std::uint8_t> bytes) {
+        why = object_.write(bytes);
+        return why == Abort::none;
+    });
+    switch (arrived) {
+    case BlockReceiver::Arrived::failed: return abort(why);
+    case BlockReceiver::Arrived::ignored:
+    case BlockReceiver::Arrived::duplicate: return;
+    case BlockReceiver::Arrived::repeated:
+        if (now_ - acknowledged_at_ < acknowledge_after() / 4) return;
+        acknowledged_at_ = now_;
+        return answer({0xa2, receiver_.acknowledged(), receiver_.size()});
+    case BlockReceiver::Arrived::out_of_order:
+    case BlockReceiver::Arrived::in_order: break;
+    }
+    if (receiver_.ends_with(f)) {
+        acknowledge_block(receiver_.change(BlockChange::larger));
+    }
+}
+
+void SdoServer::acknowledge_block(BlockChange change) noexcept {
+    const std::uint8_t good = receiver_.acknowledge(change, settings_.block_size);
+    acknowledged_at_ = now_;
+    answer({0xa2, good, receiver_.size()});
+    if (receiver_.last_seen()) {
+        state_ = State::block_download_end;
+    }
+}
+
+/// The end of the block was lost, or the client is slow: acknowledges what arrived, and the client
+/// continues from there with a new block. If nothing of this block arrived, the last
+/// acknowledgement or the whole block was lost; the client then sees an invalid segment number, or
+/// the CRC fails.
+void SdoServer::on_block_timeout() noexcept {
+    if (!receiver_.any()) return answer({0xa2, receiver_.acknowledged(), receiver_.size()});
+    acknowledge_block(receiver_.change(BlockChange::same));
+    if (state_ == State::block_download) {
+        receiver_.ignore_rest();
+    }
+}
+
+void SdoServer::end_block_download(const Frame& f) noexcept {
+    // the confirmation was lost
+    if (state_ == State::idle && ended_ == State::block_download_end) return answer({0xa1});
+    if (state_ != State::block_download_end) return abort(Abort::command);
+    if (receiver_.crc_used() && !receiver_.crc_matches(f)) return abort(Abort::crc);
+    if (!proceed(object_.write(receiver_.rest(f))) || !proceed(object_.commit())) return;
+    answer({0xa1});
+    finish();
+}
+
+// Block upload.
+
+void SdoServer::start_block_upload(const Frame& f) noexcept {
+    const std::uint8_t block_size = f.data[4];
+    const std::uint8_t protocol_switch = f.data[5];
+    if (!is_block_size(block_size)) {
+        address(f);
+        return abort(Abort::block_size);
+    }
+    if (!select(f) || !open_read()) return;
+    // segments are cheaper
+    if (object_.size() == 0 || (protocol_switch != 0 && object_.size() <= protocol_switch)) {
+        object_.close(true);
+        return start_upload(f);
+    }
+    sender_.begin(block_size, (f.data[0] & 4) != 0);
+    state_ = State::block_upload_start;
+    answer_initiate(0xc6, object_.size());
+}
+
+/// A frame that repeats one of a step that is over is ignored, except that the end is sent again.
+void SdoServer::block_upload_command(const Frame& f) noexcept {
+    const bool over = state_ == State::idle && ended_ == State::block_upload_end;
+    switch (f.data[0] & 3) {
+    case 3: return start_blocks();
+    case 2:
+        if (over) return;
+        if (state_ == State::block_upload_end) return end_block_upload();
+        if (state_ == State::block_upload) return on_acknowledgement(f);
+        break;
+    case 1:
+        if (over) return;
+        if (state_ == State::block_upload_end) return confirm_block_upload();
+        break;
+    default: break;
+    }
+    abort(Abort::command);
+}
+
+void SdoServer::start_blocks() noexcept {
+    if (state_ == State::block_upload) return;
+    if (state_ != State::block_upload_start) return abort(Abort::command);
+    state_ = State::block_upload;
+    send_block();
+}
+
+void SdoServer::on_acknowledgement(const Frame& f) noexcept {
+    const std::uint8_t good = f.data[1];
+    const std::uint8_t next = f.data[2];
+    if (!is_block_size(next)) return abort(Abort::block_size);
+    if (good > 127) return abort(Abort::sequence);
+    switch (sender_.evaluate(good, next, out_, now_, acknowledge_after() / 4)) {
+    case Acknowledgement::duplicate: return;
+    case Acknowledgement::beyond: return abort(Abort::sequence);
+    case Acknowledgement::stalled: sender_.repeat(now_); break;
+    case Acknowledgement::advances: sender_.advance(good, next, object_.size(), now_); break;
+    }
+    if (sender_.offset() != object_.size()) return send_block();
+    state_ = State::block_upload_end;
+    end_block_upload();
+}
+
+void SdoServer::send_block() noexcept {
+    const auto before = sender_.sequence();
+    Abort why = Abort::none;
+    sender_.send(out_, answer_cob_, object_.size(),
+                 [&](std::uint32_t offset, std::span<std::uint8_t> bytes) {
+        why = object_.read(offset, bytes);
+        return why == Abort::none;
+    });
+    if (sender_.sequence() != before) {
+        heard_ = now_;
+    }
+    proceed(why);
+}
+
+void SdoServer::end_block_upload() noexcept {
+    Bytes b{static_cast<std::uint8_t>(0xc1 | sender_.unused() << 2)};
+    store(b.data() + 1, sender_.crc());
+    answer(b);
+}
+
+void SdoServer::confirm_block_upload() noexcept {
+    object_.close(true);
+    finish();
 }
 
 }  // namespace hal::canopen

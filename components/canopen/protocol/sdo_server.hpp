@@ -4,10 +4,10 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
 
 #include "dictionary.hpp"
 #include "frames.hpp"
+#include "object_transfer.hpp"
 #include "sdo_block.hpp"
 
 namespace hal::canopen {
@@ -70,78 +70,64 @@ private:
     void answer_initiate(std::uint8_t command, std::uint32_t value) noexcept;
     void abort(Abort, bool notify = true) noexcept;
     void finish() noexcept;
-    Entry* select(const Frame&) noexcept;
+    void address(const Frame&) noexcept;
+    bool select(const Frame&) noexcept;
+    bool open_read() noexcept;
+    /// Aborts unless a step of the transfer succeeded; returns true when it did.
+    bool proceed(Abort why) noexcept {
+        if (why != Abort::none) {
+            abort(why);
+        }
+        return why == Abort::none;
+    }
 
+    void dispatch(const Frame&) noexcept;
     void start_download(const Frame&) noexcept;
+    void expedited_download(const Frame&) noexcept;
     void download_segment(const Frame&) noexcept;
     void start_upload(const Frame&) noexcept;
     void upload_segment(const Frame&) noexcept;
+    // Block download: a gap invalidates the rest of the block; the acknowledgement names the last
+    // good segment, after which the client continues.
     void start_block_download(const Frame&) noexcept;
     void block_segment(const Frame&) noexcept;
-    void end_block_download(const Frame&) noexcept;
-    void start_block_upload(const Frame&) noexcept;
-    void block_upload_command(const Frame&) noexcept;
-    void send_block() noexcept;
     void acknowledge_block(BlockChange) noexcept;
     void on_block_timeout() noexcept;
+    void end_block_download(const Frame&) noexcept;
+    // block upload
+    void start_block_upload(const Frame&) noexcept;
+    void block_upload_command(const Frame&) noexcept;
+    void start_blocks() noexcept;
+    void on_acknowledgement(const Frame&) noexcept;
+    void send_block() noexcept;
+    void end_block_upload() noexcept;
+    void confirm_block_upload() noexcept;
     Time acknowledge_after() const noexcept {
         return settings_.acknowledge_after > 0 ? settings_.acknowledge_after
                                                : settings_.timeout / 2;
     }
-    void end_block_upload() noexcept;
 
-    bool open_read() noexcept;
-    Abort open_write(std::uint32_t size) noexcept;
-    Abort write_object(std::span<const std::uint8_t>) noexcept;
-    Abort read_object(std::uint32_t offset, std::span<std::uint8_t>) noexcept;
-    Abort commit() noexcept;
-
-    Dictionary& dictionary_;
     FrameQueue& out_;
     const SdoServerSettings settings_;
-    std::unique_ptr<std::uint8_t[]> scratch_;  // holds values other than domains during a transfer
-    const std::size_t scratch_size_;
+    ObjectTransfer object_;
+    BlockReceiver receiver_;
+    BlockSender sender_;
 
     bool on_ = false;
     bool request_extended_ = false;
     std::uint32_t request_id_ = 0;
     std::uint32_t answer_cob_ = 0;
     State state_ = State::idle;
-    Entry* entry_ = nullptr;
+    // state in which the last transfer ended, while its last frame may be repeated
+    State ended_ = State::idle;
     std::uint16_t index_ = 0;
     std::uint8_t sub_ = 0;
-    bool writing_ = false;
-    bool stream_open_ = false;
     std::uint8_t toggle_ = 0;
-    bool crc_used_ = false;
-    bool size_known_ = false;
-    std::uint32_t size_ = 0;  // as announced, or of the value that is sent
-    std::uint32_t offset_ = 0;  // bytes transferred; block upload: where the block begins
-    // block transfer
-    std::uint8_t block_size_ = 0;
-    std::uint8_t sequence_ = 0;
-    std::uint8_t held_count_ = 0;
-    std::uint8_t unused_ = 0;
-    bool last_seen_ = false;
-    bool block_sent_ = false;
-    bool block_any_ = false;
-    bool gap_ = false;  // a segment of this block is missing
-    // the block was acknowledged before its end: ignore the rest until a new block begins
-    bool acknowledged_early_ = false;
-    std::size_t block_end_ = 0;  // FrameQueue::popped() once the whole block has left the queue
-    // the end frame carries the number of valid bytes in the last segment
-    std::array<std::uint8_t, 7> held_{};
-    std::uint8_t acknowledged_ = 0;
-    std::uint16_t crc_ = 0;
-    std::uint16_t last_acknowledgement_ = 0;
-    std::uint32_t crc_until_ = 0;
 
     Bytes last_request_{};
     Bytes last_answer_{};
     Bytes block_request_{};
     bool repeatable_ = false;
-    // state in which the last transfer ended, while its last frame may be repeated
-    State ended_ = State::idle;
     bool pending_ = false;  // last_answer_ did not fit into the queue
     Time heard_ = 0;
     Time reminded_ = 0;
