@@ -104,7 +104,7 @@ TEST(Clock_estimate, holds_over_within_a_microsecond_for_a_tenth_of_a_second) {
         const auto local = [&] { return sent + sent / 20'000 + way; };  // 50 ppm fast
         for (int n = 0; n < 3000; ++n) {
             sent += ms;
-            clock.take(sent, local() + std::llround(noise(random)), way);
+            clock.accept(sent, local() + std::llround(noise(random)), way);
         }
         clock.lead(local());
         const Time begin = clock.global(local()) - sent - way;
@@ -126,7 +126,7 @@ TEST(Clock_estimate, leads_at_its_own_crystal_when_the_slope_is_not_known_yet) {
     Time sent = 0;
     for (int n = 0; n < 60; ++n) {
         sent += ms;
-        clock.take(sent, sent + 5'000 + std::llround(noise(random)), 5'000);
+        clock.accept(sent, sent + 5'000 + std::llround(noise(random)), 5'000);
     }
     EXPECT_GT(clock.uncertainty(), 2 * ppm);
     clock.lead(sent);

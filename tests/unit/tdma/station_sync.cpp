@@ -32,7 +32,7 @@ TEST(Clock_estimate, ignores_delayed_syncs_and_follows_a_clock_step) {
     const auto error = [&] { return std::abs(clock.global(local()) - sent - way); };
     const auto sync = [&](Time late) {
         sent += ms;
-        return clock.take(sent, local() + late, way);
+        return clock.accept(sent, local() + late, way);
     };
     for (int i = 0; i < 300; ++i) {
         sync(i % 3 * 300);

@@ -13,7 +13,7 @@ void BabbleMonitor::heard(const Address& address, Time arrived, Time cycle) noex
             p.since = arrived;
             p.frames = 0;
         }
-        p.most = std::max(p.most, ++p.frames);
+        p.max_frames = std::max(p.max_frames, ++p.frames);
         return;
     }
     if (used_ < peers_.size()) {
@@ -25,8 +25,8 @@ const Address* BabbleMonitor::babbler(std::uint32_t limit, std::uint32_t& frames
     const Address* worst = nullptr;
     frames = limit;
     for (std::size_t i = 0; i < used_; ++i) {
-        if (peers_[i].most > frames) {
-            frames = peers_[i].most;
+        if (peers_[i].max_frames > frames) {
+            frames = peers_[i].max_frames;
             found_ = peers_[i].address;
             worst = &found_;
         }

@@ -11,7 +11,7 @@ namespace hal::tdma {
 
 class BabbleMonitor {
 public:
-    static constexpr std::size_t most_stations = 64;
+    static constexpr std::size_t max_stations = 64;
 
     /// Counts a frame that arrived at `arrived` (local ns). [realtime]
     void heard(const Address&, Time arrived, Time cycle) noexcept;
@@ -26,9 +26,9 @@ private:
         Address address{};
         Time since = 0;  // local; a cycle begins with a frame
         std::uint32_t frames = 0;
-        std::uint32_t most = 0;  // in this cycle, and in the fullest one
+        std::uint32_t max_frames = 0;  // in this cycle, and in the fullest one
     };
-    std::array<Peer, most_stations> peers_{};
+    std::array<Peer, max_stations> peers_{};
     std::size_t used_ = 0;
     Address found_{};
 };

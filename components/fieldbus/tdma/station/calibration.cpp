@@ -8,13 +8,13 @@ namespace hal::tdma {
 
 namespace {
 
-constexpr Time longest_delay = 5'000'000;  // a slower switch is unusable for cyclic traffic
-constexpr Time longest_round = 10'000'000'000;
+constexpr Time max_delay = 5'000'000;  // a slower switch is unusable for cyclic traffic
+constexpr Time max_round_time = 10'000'000'000;
 
 }  // namespace
 
 void Calibration::begin(std::uint32_t rounds) noexcept {
-    rounds_ = std::clamp(rounds, 1U, most_rounds);
+    rounds_ = std::clamp(rounds, 1U, max_rounds);
     active_ = true;
     waiting_ = false;
     done_ = 0;
@@ -44,20 +44,20 @@ void Calibration::sent(std::uint32_t reply_cycle, Time not_before, Time reply_at
     reply_at_ = reply_at;
 }
 
-bool Calibration::take(const Reply& r, Time arrived, double drift, Time tolerance) noexcept {
+bool Calibration::accept(const Reply& r, Time arrived, double drift, Time tolerance) noexcept {
     if (!active_ || !waiting_) return false;
     // The driver stamps the request when it leaves. Ignores replies to an earlier request and
     // forged ones.
     if (r.request_stamp < not_before_ - 1'000 || arrived - reply_at_ > tolerance ||
-        r.request_stamp >= arrived || arrived - r.request_stamp > longest_round) {
+        r.request_stamp >= arrived || arrived - r.request_stamp > max_round_time) {
         return false;
     }
-    if (r.stamp < r.received || r.stamp - r.received > longest_round) return false;
+    if (r.stamp < r.received || r.stamp - r.received > max_round_time) return false;
     waiting_ = false;
     unanswered_row_ = 0;
     const auto here = static_cast<double>(arrived - r.request_stamp) * (1.0 + drift);
     const Time delay = std::llround((here - static_cast<double>(r.stamp - r.received)) / 2.0);
-    if (delay < -longest_delay || delay > longest_delay) return false;
+    if (delay < -max_delay || delay > max_delay) return false;
     measured_[done_++] = delay;
     if (done_ < rounds_) return false;
     const auto middle = measured_.begin() + rounds_ / 2;

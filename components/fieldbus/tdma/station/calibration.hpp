@@ -14,7 +14,7 @@ namespace hal::tdma {
 
 class Calibration {
 public:
-    static constexpr std::uint32_t most_rounds = 250;
+    static constexpr std::uint32_t max_rounds = 250;
 
     /// Starts a calibration of 1..250 rounds. [realtime]
     void begin(std::uint32_t rounds) noexcept;
@@ -30,7 +30,7 @@ public:
     bool reserved(std::uint32_t cycle) const noexcept { return waiting_ && cycle == reply_cycle_; }
     /// Evaluates a reply. Returns true when it completed the last round; delay() is the result.
     /// Ignores a reply later than `tolerance` (ns) after its slot. [realtime]
-    bool take(const Reply&, Time arrived, double drift, Time tolerance) noexcept;
+    bool accept(const Reply&, Time arrived, double drift, Time tolerance) noexcept;
     /// Drops the pending round, after a change of the master. [realtime]
     void forget() noexcept { waiting_ = false; }
 
@@ -43,8 +43,6 @@ public:
 
 private:
     bool active_ = false;
-
-private:
     bool waiting_ = false;
     std::uint32_t rounds_ = 0;
     std::uint32_t done_ = 0;
@@ -54,7 +52,7 @@ private:
     Time not_before_ = 0;  // local; the request left no earlier
     Time reply_at_ = 0;  // local time of the reply's slot
     Time delay_ = 0;
-    std::array<Time, most_rounds> measured_{};
+    std::array<Time, max_rounds> measured_{};
 };
 
 }  // namespace hal::tdma

@@ -73,18 +73,18 @@ void ClockEstimate::another_master() noexcept {
         held_ = long_drift_;
         holds_ = true;
     }
-    long_taken_ = 0;
+    long_accepted_ = 0;
 }
 
 bool ClockEstimate::is_certain() const noexcept {
-    return long_taken_ >= least_taken && uncertainty() <= certain;
+    return long_accepted_ >= least_taken && uncertainty() <= certain;
 }
 
 double ClockEstimate::uncertainty() const noexcept {
-    if (long_taken_ < 3 || interval_ <= 0.0) return largest_drift;
+    if (long_accepted_ < 3 || interval_ <= 0.0) return largest_drift;
     // Of the slope of a line through n points; with the final gains n is what they remember.
     const double n = std::min<double>(
-        long_taken_, std::max(static_cast<double>(least_taken), 2.0 * long_ns / interval_));
+        long_accepted_, std::max(static_cast<double>(least_taken), 2.0 * long_ns / interval_));
     return std::sqrt(12.0) * std::max(jitter(), smallest_noise_ns) / (interval_ * n * std::sqrt(n));
 }
 
@@ -96,17 +96,17 @@ double ClockEstimate::drift() const noexcept {
 }
 
 /// Updates the long average.
-void ClockEstimate::take_long(double measured, double dt) noexcept {
-    if (long_taken_ == 0) {
+void ClockEstimate::accept_long(double measured, double dt) noexcept {
+    if (long_accepted_ == 0) {
         long_offset_ = measured;
         long_drift_ = 0.0;
-        long_taken_ = 1;
+        long_accepted_ = 1;
         return;
     }
-    ++long_taken_;
+    ++long_accepted_;
     const double predicted = long_offset_ + long_drift_ * dt;
     const double e = measured - predicted;
-    const Gains gains(long_taken_, std::min(alpha_end, 2.0 * dt / long_ns));
+    const Gains gains(long_accepted_, std::min(alpha_end, 2.0 * dt / long_ns));
     long_offset_ = predicted + gains.alpha * e;
     long_drift_ = std::clamp(long_drift_ + gains.beta * e / dt, -largest_drift, largest_drift);
     if (is_certain()) {
@@ -115,24 +115,24 @@ void ClockEstimate::take_long(double measured, double dt) noexcept {
     }
 }
 
-bool ClockEstimate::take(Time sent, Time arrived, Time delay) noexcept {
+bool ClockEstimate::accept(Time sent, Time arrived, Time delay) noexcept {
     if (leading_) {
         leading_ = false;
-        long_taken_ = 0;
+        long_accepted_ = 0;
     }
     const Time measured = sent + delay - arrived;
-    if (taken_ == 0) {
+    if (accepted_ == 0) {
         base_ = measured;
         at_ = arrived;
         offset_ = long_offset_ = 0.0;
-        taken_ = long_taken_ = 1;
+        accepted_ = long_accepted_ = 1;
         return true;
     }
     const auto dt = static_cast<double>(arrived - at_);
     if (dt <= 0.0) return false;
     const double predicted = offset_ + drift_ * dt;
     const double e = static_cast<double>(measured - base_) - predicted;
-    if (taken_ >= 8) {
+    if (accepted_ >= 8) {
         const double limit = std::max(outlier_sigmas * std::sqrt(square_), smallest_outlier_ns);
         if (std::abs(e) > limit) {
             const bool early = e > 0.0;
@@ -140,24 +140,24 @@ bool ClockEstimate::take(Time sent, Time arrived, Time delay) noexcept {
             early_ = early;
             if (outliers_ <= (early ? most_early : most_late)) return false;
             clear();
-            return take(sent, arrived, delay);
+            return accept(sent, arrived, delay);
         }
     } else if (std::abs(e) > largest_drift * dt + 1e6) {  // begins with the times of another clock
         clear();
-        return take(sent, arrived, delay);
+        return accept(sent, arrived, delay);
     }
     outliers_ = 0;
-    ++taken_;
-    const double n = taken_;
+    ++accepted_;
+    const double n = accepted_;
     const Gains gains(n, alpha_end);
     offset_ = predicted + gains.alpha * e;
     drift_ = std::clamp(drift_ + gains.beta * e / dt, -largest_drift, largest_drift);
     at_ = arrived;
     interval_ = interval_ == 0.0 ? dt : interval_ + (dt - interval_) * std::max(0.01, 1.0 / n);
-    if (taken_ > 4) {
+    if (accepted_ > 4) {
         square_ += (e * e - square_) * std::max(0.01, 1.0 / (n - 4.0));
     }
-    take_long(static_cast<double>(measured - base_), dt);
+    accept_long(static_cast<double>(measured - base_), dt);
     return true;
 }
 

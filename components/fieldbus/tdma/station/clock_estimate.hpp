@@ -31,9 +31,9 @@ public:
 
     /// Uses a sync, sent at `sent` (global ns), arrived at `arrived` (local ns), with a path delay
     /// of `delay` (ns). Returns false for an outlier. [realtime]
-    bool take(Time sent, Time arrived, Time delay) noexcept;
+    bool accept(Time sent, Time arrived, Time delay) noexcept;
     /// Corrects the offset after a calibration: the delay is `by` ns longer than that given to
-    /// take() so far. [realtime]
+    /// accept() so far. [realtime]
     void delay_changed(Time by) noexcept {
         offset_ += static_cast<double>(by);
         long_offset_ += static_cast<double>(by);
@@ -41,8 +41,8 @@ public:
     /// Measures the rate of a new master; the last rate is used until that is known. [realtime]
     void another_master() noexcept;
 
-    bool known() const noexcept { return leading_ || taken_ >= 2; }
-    bool settled() const noexcept { return leading_ || taken_ >= 8; }
+    bool known() const noexcept { return leading_ || accepted_ >= 2; }
+    bool settled() const noexcept { return leading_ || accepted_ >= 8; }
     Time global(Time local) const noexcept;
     Time local(Time global) const noexcept;
     Time offset(Time local) const noexcept { return global(local) - local; }
@@ -53,7 +53,7 @@ public:
 
 private:
     bool is_certain() const noexcept;
-    void take_long(double measured, double dt) noexcept;
+    void accept_long(double measured, double dt) noexcept;
 
     Time base_ = 0;  // integer part of the offset, because a double has 53 bits
     Time at_ = 0;  // local time of `offset_` and `long_offset_`
@@ -64,9 +64,9 @@ private:
     double long_drift_ = 0.0;
     double held_ = 0.0;  // the last certain drift
     double interval_ = 0.0;  // mean time between syncs, ns
-    std::uint32_t taken_ = 0;
+    std::uint32_t accepted_ = 0;
     std::uint32_t outliers_ = 0;  // outliers: consecutive, all early or all late
-    std::uint32_t long_taken_ = 0;
+    std::uint32_t long_accepted_ = 0;
     bool early_ = false;
     bool leading_ = false;
     bool holds_ = false;

@@ -12,7 +12,7 @@ namespace hal::tdma {
 
 class Followers {
 public:
-    static constexpr std::size_t most = 64;
+    static constexpr std::size_t max_count = 64;
 
     /// Notes a calibration request. [realtime]
     void calibrated(const Address& who, Time now) noexcept { heard(who, now); }
@@ -42,17 +42,18 @@ private:
         const auto end = list_.begin() + static_cast<std::ptrdiff_t>(used_);
         auto f = std::find_if(list_.begin(), end, [&](const Follower& x) { return x.who == who; });
         if (f == end) {
-            f = used_ < most ? list_.begin() + static_cast<std::ptrdiff_t>(used_++)
-                             : std::min_element(
-                                   list_.begin(), list_.end(),
-                                   [](const auto& a, const auto& b) { return a.heard < b.heard; });
+            f = used_ < max_count ? list_.begin() + static_cast<std::ptrdiff_t>(used_++)
+                                  : std::min_element(list_.begin(), list_.end(),
+                                                     [](const auto& a, const auto& b) {
+                return a.heard < b.heard;
+            });
             *f = {who, now, false};
         }
         f->heard = now;
         return &*f;
     }
 
-    std::array<Follower, most> list_{};
+    std::array<Follower, max_count> list_{};
     std::size_t used_ = 0;
 };
 

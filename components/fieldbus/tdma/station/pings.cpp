@@ -26,7 +26,7 @@ void Pings::sent(std::size_t n, const Address& to, Time not_before) noexcept {
     e.not_before = not_before;
 }
 
-bool Pings::take(std::size_t n, const Address& from, const Echo& echo, Time arrived) noexcept {
+bool Pings::accept(std::size_t n, const Address& from, const Echo& echo, Time arrived) noexcept {
     if (n >= list_.size()) return false;
     Entry& e = list_[n];
     if (e.step != Step::sent || from != e.to || echo.number != e.asked.number) return false;

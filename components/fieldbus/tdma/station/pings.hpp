@@ -53,7 +53,7 @@ public:
     /// Ends the ping without an answer. [realtime]
     void fail(std::size_t n, Outcome why) noexcept { end(list_[n], why); }
     /// Evaluates an answer. Returns true when it answers the pending ping. [realtime]
-    bool take(std::size_t n, const Address& from, const Echo& echo, Time arrived) noexcept;
+    bool accept(std::size_t n, const Address& from, const Echo& echo, Time arrived) noexcept;
     /// Ends pings older than `timeout_ns`; called once a cycle. [realtime]
     void expire(Time now, Time timeout_ns, bool running) noexcept;
 

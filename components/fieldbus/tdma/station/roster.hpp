@@ -48,8 +48,8 @@ public:
         if (n >= list_.size()) return;
         Entry& e = list_[n];
         constexpr Time span = 300'000'000;
-        constexpr Time longest = 10'000'000'000;
-        if (e.stamped != 0 && global > e.stamped && global - e.stamped <= longest) {
+        constexpr Time max_span = 10'000'000'000;
+        if (e.stamped != 0 && global > e.stamped && global - e.stamped <= max_span) {
             if (global - e.stamped < span) return;
             const double passed = static_cast<double>(its) - static_cast<double>(e.stamp);
             const double drift = passed / static_cast<double>(global - e.stamped) - 1.0;

@@ -42,10 +42,10 @@ public:
         return setup_.id != unused_slot && cycle % setup_.period == setup_.phasing;
     }
     /// bytes behind the Ethernet header [any]
-    std::size_t room() const noexcept { return size_.load(std::memory_order_relaxed); }
+    std::size_t capacity() const noexcept { return size_.load(std::memory_order_relaxed); }
     /// Bytes on the line that all frames of one turn may take together. [any]
     std::size_t turn_bytes() const noexcept {
-        return ethernet::wire_bytes(ethernet::header_bytes + room());
+        return ethernet::wire_bytes(ethernet::header_bytes + capacity());
     }
 
     /// Queues a copy of the frame. Returns false when it is too long, or when frames of at least
@@ -66,7 +66,7 @@ public:
 
 private:
     enum class State : std::uint8_t { free, filling, ready };
-    struct Place {
+    struct Entry {
         std::atomic<State> state{State::free};
         // other threads that push read these two at any time
         std::atomic<std::uint32_t> length{0}, priority{0};
@@ -80,7 +80,7 @@ private:
     };
     std::size_t most_urgent() const noexcept;
     std::size_t ahead_of(unsigned priority) const noexcept;  // bytes on the line
-    bool release(Place& place) noexcept;
+    bool release(Entry& entry) noexcept;
 
     SlotSetup setup_;  // of the station's thread
     std::atomic<unsigned> id_;
@@ -89,7 +89,7 @@ private:
     std::size_t front_ = 0;  // what front() has returned; count_: none
     std::atomic<std::size_t> waiting_{0};  // frames that are ready
     std::atomic<std::uint64_t> order_{0};
-    std::unique_ptr<Place[]> places_;
+    std::unique_ptr<Entry[]> entries_;
 };
 
 }  // namespace hal::tdma

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+#include "other_masters.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace hal::tdma {
+
+void OtherMasters::restart() noexcept {
+    claimants_ = {};
+    heard_ = 0;
+    reported_ = false;
+    established_ = false;
+}
+
+void OtherMasters::tick() noexcept {
+    other_gate_.tick();
+    unknown_gate_.tick();
+}
+
+void OtherMasters::expire(Time now) noexcept {
+    if (heard_ == 0 || now - heard_ <= gone_after) return;
+    heard_ = 0;
+    if (reported_) {
+        core_.report(Event::other_master_gone, other_);
+    }
+    reported_ = false;
+}
+
+bool OtherMasters::allows(const Address& master) noexcept {
+    const auto& masters = core_.setup.masters;
+    if (masters.empty()) return true;
+    if (std::find(masters.begin(), masters.end(), master) != masters.end()) return true;
+    ++core_.status.count.foreign;
+    if (unknown_gate_.pass()) {
+        core_.report(Event::unknown_master, master);
+    }
+    return false;
+}
+
+/// Returns the last entry of a sender, or nullptr.
+Claimant* OtherMasters::find(const Address& who) noexcept {
+    Claimant* found = nullptr;
+    for (Claimant& known : claimants_) {
+        if (known.row != 0 && known.who == who) {
+            found = &known;
+        }
+    }
+    return found;
+}
+
+const Claimant& OtherMasters::claim(const Decoded& d) noexcept {
+    const Sync& s = d.sync;
+    Claimant* c = find(d.from);
+    if (c == nullptr) {
+        c = &claimants_[next_claimant_++ % claimants_.size()];
+        *c = {d.from, s.cycle, 1, s.scheduled, 0};
+        return *c;
+    }
+    const auto cycles = static_cast<std::int32_t>(s.cycle - c->cycle);
+    const Time every = cycles > 0 && cycles < 1000 ? (s.scheduled - c->scheduled) / cycles : 0;
+    const bool consistent =
+        every > 0 && (c->row == 1 || std::abs(every - c->every) <= core_.setup.guard);
+    *c = {d.from, s.cycle, consistent ? c->row + 1 : 1, s.scheduled, every};
+    return *c;
+}
+
+void OtherMasters::confirm(const Address& who, const Followers& followers, Time now) noexcept {
+    const bool first = heard_ == 0;
+    other_ = who;
+    heard_ = now;
+    if (first) {
+        established_ = followers.any(now, gone_after);
+    }
+    if (reported_ && !other_gate_.open()) return;
+    other_gate_.close();
+    reported_ = true;
+    core_.report(Event::other_master, who);
+}
+
+void OtherMasters::refresh(const Address& from, Time now) noexcept {
+    if (heard_ != 0 && from == other_) {
+        heard_ = now;
+    }
+}
+
+}  // namespace hal::tdma

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// The senders of syncs that are not this station's master: what is known of their schedules, and the
+// second master that was confirmed.
+#pragma once
+
+#include <array>
+
+#include "followers.hpp"
+#include "station_core.hpp"
+
+namespace hal::tdma {
+
+/// A sender of syncs of another schedule, and that schedule.
+struct Claimant {
+    Address who{};
+    std::uint32_t cycle = 0;
+    std::uint32_t row = 0;  ///< consecutive consistent syncs
+    Time scheduled = 0;
+    Time every = 0;  ///< its cycle, ns
+    bool confirmed() const noexcept { return row >= confirmations; }
+};
+
+/// The other masters. [realtime]
+class OtherMasters {
+public:
+    /// The core must outlive it. [setup]
+    explicit OtherMasters(StationCore& core) noexcept : core_(core) {}
+    void restart() noexcept;
+    /// Counts a cycle; reports a second master that is lost.
+    void tick() noexcept;
+    void expire(Time now) noexcept;
+
+    /// Returns true for a station that may send syncs: the addresses of the master and its backups
+    /// in the schedule are an allow list. Counts and reports others.
+    bool allows(const Address& master) noexcept;
+    /// Updates and returns what is known of the sender's schedule.
+    const Claimant& claim(const Decoded&) noexcept;
+    /// Notes a confirmed second master, and reports it.
+    void confirm(const Address&, const Followers&, Time now) noexcept;
+    /// Notes another sync of the second master, if it is from that.
+    void refresh(const Address& from, Time now) noexcept;
+
+    /// Returns true for the last second master.
+    bool is(const Address& address) const noexcept { return address == other_; }
+    /// Returns true when there were followers as the second master was first heard: the own
+    /// schedule is kept.
+    bool established() const noexcept { return established_; }
+
+private:
+    Claimant* find(const Address&) noexcept;
+
+    StationCore& core_;
+    std::array<Claimant, 4> claimants_{};
+    std::size_t next_claimant_ = 0;
+    Address other_{};
+    Time heard_ = 0;  // its last sync, local; 0: none, or lost
+    bool reported_ = false;
+    bool established_ = false;
+    EventGate other_gate_;
+    EventGate unknown_gate_;
+};
+
+}  // namespace hal::tdma
