@@ -23,24 +23,24 @@ public:
 
     /// off_rate: the interval of two SYNCs differs by more than 1000 ppm from the cycle; the
     /// estimate begins anew.
-    enum class Taken : std::uint8_t { first, good, rejected, duplicate, jumped, off_rate };
+    enum class Accepted : std::uint8_t { first, good, rejected, duplicate, jumped, off_rate };
 
     void clear() noexcept;  ///< Discards the estimate. [realtime]
     /// Begins a cycle of the nominal period at `begin`, without a SYNC of others. [realtime]
     void lead(Time begin) noexcept;
     /// Uses the stamp of a SYNC: the begin of its cycle. [realtime]
-    Taken take(Time stamp) noexcept;
+    Accepted accept(Time stamp) noexcept;
     /// Lets the next SYNC have any phase, after a time in which the prediction has become too
     /// inaccurate. [realtime]
-    void accept_any_phase() noexcept { rejected_ = most_rejected; }
+    void accept_any_phase() noexcept { rejected_ = max_rejected; }
     /// Notes that the SYNC of this cycle was sent by this node: it keeps its time. [realtime]
     void own(Time stamp) noexcept;
     /// Begins the cycles whose SYNC is `wait` overdue at `now`. Returns how many. [realtime]
     std::uint32_t pass(Time now, Time wait) noexcept;
 
-    bool known() const noexcept { return taken_ >= 2; }
+    bool known() const noexcept { return accepted_ >= 2; }
     /// a first SYNC has arrived: start()
-    bool heard() const noexcept { return taken_ >= 1; }
+    bool heard() const noexcept { return accepted_ >= 1; }
     std::uint32_t lost() const noexcept { return lost_; }  ///< SYNCs lost in a row
     /// the SYNC of the current cycle has arrived
     bool seen() const noexcept { return seen_; }
@@ -59,7 +59,7 @@ public:
 private:
     void advance(std::uint32_t cycles) noexcept;
 
-    static constexpr std::uint32_t most_rejected = 2;  // in a row; the next one is a new phase
+    static constexpr std::uint32_t max_rejected = 2;  // in a row; the next one is a new phase
 
     const double nominal_, per_nominal_, floor_;
     Time epoch_ = 0;  // p_ counts from here, so that it keeps fractions of a nanosecond
@@ -68,7 +68,7 @@ private:
     double error_ = 0;
     double square_ = 0;
     double off_ = 0;
-    std::uint32_t taken_ = 0;
+    std::uint32_t accepted_ = 0;
     std::uint32_t lost_ = 0;
     std::uint32_t rejected_ = 0;
     bool seen_ = false;

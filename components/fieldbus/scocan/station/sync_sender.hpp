@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+// The SYNC: its primary sender listens before it leads; backup k sends k offsets behind the begin of
+// a cycle in which no SYNC came.
+#pragma once
+
+#include "fieldbus/scocan/station/mode_control.hpp"
+
+namespace hal::scocan {
+
+/// The sender of SYNCs, in all nodes; those of other roles never lead. [realtime]
+class SyncSender {
+public:
+    /// Both outlive it. [setup]
+    SyncSender(StationCore& core, ModeControl& modes) noexcept : core_(core), modes_(modes) {}
+    /// Forgets what came from the bus.
+    void forget() noexcept;
+    /// Ends standby behind a second SYNC node.
+    void reset() noexcept { standby_ = false; }
+
+    /// Decides whether this node begins to send the SYNC. Returns true when it makes a cycle of its
+    /// own.
+    bool lead(Time now) noexcept;
+    /// Sends the SYNC of a cycle, if this node does.
+    void plan(std::uint64_t cycle) noexcept;
+    /// Handles the echo of an own SYNC. Returns the number of cycles that began with it.
+    std::uint64_t sent(Time begin) noexcept;
+    /// Handles the SYNC of another node, if this one may send it too.
+    void other_sent(const Sync&) noexcept;
+    /// Notes the sender of an accepted SYNC.
+    void follow(std::uint32_t sender) noexcept { leader_ = sender; }
+    /// Sends the CRC of the table to all nodes.
+    void announce_table() noexcept;
+
+private:
+    bool listened_long_enough(Time now) const noexcept;
+    void set_leading(bool) noexcept;
+    bool takes_over(std::uint64_t cycle) noexcept;
+    can::Frame frame_of(std::uint64_t cycle) const noexcept;
+    void send_at_once(std::uint64_t cycle, Time begin, Time at) noexcept;
+
+    StationCore& core_;
+    ModeControl& modes_;
+    bool standby_ = false;  // another primary sends
+    std::uint32_t leader_ = no_node;  // sender field of the last SYNC
+};
+
+}  // namespace hal::scocan
