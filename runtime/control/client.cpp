@@ -235,6 +235,7 @@ InstanceEnd Client::instance_end() const { return state_->witness.end(); }
 void Client::on_notice(std::function<void(std::string_view)> take) {
     state_->notice = std::move(take);
 }
+void Client::close_in_child() { state_->lose(); }
 int Client::fd() const { return state_->fd; }
 void Client::cancel_on(int descriptor) { state_->cancel = descriptor; }
 

@@ -40,6 +40,9 @@ public:
     const std::string& closed_because() const;
     /// Receives what a waiting command reports meanwhile; without it these reports are dropped.
     void on_notice(std::function<void(std::string_view)> take);
+    /// After fork(), in the child: closes its copy of the socket, so that the end of the parent ends
+    /// the connection. No lock is taken.
+    void close_in_child();
     int fd() const;  ///< for poll(); readable when next_event() may have something
     /// A non-blocking descriptor (for example a signalfd) that becomes readable when the user wants
     /// no more of the command that runs: then it is emptied and the command cancelled; a second

@@ -48,8 +48,8 @@ struct Turn {
 /// `events` while a worker runs, and `turn` and
 /// `connection` while the client has a turn.
 struct ServedClient {
-    ServedClient(int f, Shell& shell, pid_t peer)
-        : fd(f), connection(std::make_unique<Connection>(shell, peer)) {}
+    ServedClient(int f, Shell& shell, pid_t client)
+        : fd(f), peer(client), connection(std::make_unique<Connection>(shell, client)) {}
     ~ServedClient() {
         if (worker.joinable()) {
             worker.join();
@@ -57,10 +57,18 @@ struct ServedClient {
         if (fd >= 0) {
             close(fd);
         }
+        if (process >= 0) {
+            close(process);
+        }
     }
     ServedClient(const ServedClient&) = delete;
 
     int fd;                        ///< -1 once it is gone
+    const pid_t peer;              ///< the process that connected; 0: in no PID namespace of ours
+    /// pidfd of the process that connected; -1: it has ended, or cannot be watched
+    int process = -1;
+    /// the process has ended; a child may hold a copy of its socket
+    bool process_ended = false;
     std::unique_ptr<Connection> connection;
     std::string in, out;
     std::size_t taken = 0;         ///< bytes of `in` that are done with

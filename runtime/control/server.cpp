@@ -81,6 +81,7 @@ void Server::State::serve() {
             const int reads = listens_to(*client) ? POLLIN : 0;
             ready.push_back({client->gone ? -1 : client->fd,
                              static_cast<short>(reads | (client->waiting() > 0 ? POLLOUT : 0)), 0});
+            ready.push_back({client->process, POLLIN, 0});
         }
         const int timeout = sleep_ms();
         poll(ready.data(), ready.size(), timeout);
@@ -92,7 +93,10 @@ void Server::State::serve() {
             accept_clients();
         }
         for (std::size_t i = 0; i < before; ++i) {
-            serve_client(*clients[i], ready[i + 2].revents);
+            if (ready[2 * i + 3].revents != 0) {
+                note_process_end(*clients[i]);
+            }
+            serve_client(*clients[i], ready[2 * i + 2].revents);
         }
         remove_gone();
         reclaim();
@@ -108,8 +112,10 @@ void Server::State::serve_client(ServedClient& client, short events) {
     collect_worker(client);
     if (client.gone) return;
     if (events & POLLIN) {
-        receive(client, (events & POLLHUP) != 0);
+        receive(client, (events & POLLHUP) != 0 || client.process_ended);
     } else if (events & (POLLHUP | POLLERR)) {
+        leave(client);
+    } else if (client.process_ended && !listens_to(client)) {
         leave(client);
     }
     if (client.gone) return;
@@ -264,6 +270,9 @@ void Server::State::leave(ServedClient& client) {
     client.gone = true;
     client.connection->cancel();
     close(std::exchange(client.fd, -1));
+    if (client.process >= 0) {
+        close(std::exchange(client.process, -1));
+    }
 }
 
 void Server::State::execute(ServedClient& client) {

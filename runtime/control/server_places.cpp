@@ -3,6 +3,7 @@
 #include <cerrno>
 
 #include <sys/socket.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include "control/server_state.hpp"
@@ -16,7 +17,42 @@ constexpr std::int64_t no_files_ns = 5'000'000;
 constexpr std::int64_t urgent_ns = 20'000'000;
 constexpr std::size_t max_waiting = 64;                    // clients without a place
 
+/// Opens a pidfd of the process at the other end of a socket; -1 with errno when it cannot be opened.
+int pidfd_of_peer(int fd, pid_t pid) {
+#ifdef SO_PEERPIDFD
+    constexpr int peer_pidfd = SO_PEERPIDFD;
+#else
+    constexpr int peer_pidfd = 77;  // Linux 6.5
+#endif
+    int process = -1;
+    socklen_t size = sizeof process;
+    if (getsockopt(fd, SOL_SOCKET, peer_pidfd, &process, &size) == 0) return process;
+    return static_cast<int>(syscall(SYS_pidfd_open, pid, 0));
+}
+
 }  // namespace
+
+/// Watches the process that connected: a component must not outlive its process because a forked
+/// child holds a copy of the socket. A process outside of the PID namespace, and one for which no
+/// descriptor is left, cannot be watched.
+void Server::State::watch_process(ServedClient& client) {
+    if (client.process >= 0 || client.process_ended || client.peer <= 0 || spare < 0) return;
+    client.process = pidfd_of_peer(client.fd, client.peer);
+    if (client.process < 0 && errno == ESRCH) {
+        note_process_end(client);
+    }
+}
+
+/// The process that connected has ended: what it has sent is still read, then follows the end of
+/// the connection, also for a child that holds a copy of the socket.
+void Server::State::note_process_end(ServedClient& client) {
+    if (client.process >= 0) {
+        close(std::exchange(client.process, -1));
+    }
+    if (client.gone) return;
+    client.process_ended = true;
+    shutdown(client.fd, SHUT_RD);
+}
 
 /// Opens the descriptor in reserve again, once no client uses it.
 void Server::State::keep_spare() {
@@ -113,6 +149,9 @@ void Server::State::add_client(int fd) {
     });
     client.out = client.connection->hello();
     send_out(client);
+    if (!client.gone) {
+        watch_process(client);
+    }
 }
 
 /// Gives free places to those who wait for one, in the order in which they came, and closes the
@@ -124,6 +163,7 @@ void Server::State::place_clients() {
         if (spare >= 0 && count(true) < places()) {
             client->placed = true;
             client->reserved = count(true) > options.max_clients;
+            watch_process(*client);
         } else if (now - client->came_ns >= give_up_ns) {
             ++refused;
             close_client(*client, spare < 0

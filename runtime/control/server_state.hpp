@@ -56,6 +56,8 @@ struct Server::State {
 
     void serve();
     void serve_client(ServedClient& client, short events);
+    void watch_process(ServedClient& client);
+    void note_process_end(ServedClient& client);
     void end_all();
     bool clients_wait_for_end() const;
     int sleep_ms();

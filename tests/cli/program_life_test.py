@@ -315,6 +315,109 @@ os._exit(3)
 
 
 @unittest.skipUnless(list(MODULE.glob("hal/_core*.so")), "the module is not built")
+class Forked(LifeCase):
+    """A dead program is dead at once, even while a child of it holds a copy of its socket."""
+
+    OUTPUT = "c.newpin('on', hal.HAL_BIT, hal.HAL_OUT, safe=False)\nc.ready()\nc['on'] = True\n"
+
+    def kill_and_see(self, pid):
+        wait_until(lambda: self.value("camera.on") == "TRUE", "its output is on")
+        self.say("net", "lamp", "camera.on")
+        os.kill(pid, signal.SIGKILL)
+        wait_until(lambda: self.state("camera").startswith("dead since "), "it is dead")
+        wait_until(lambda: self.shell("gets", "lamp").stdout == "FALSE\n", "its output is off")
+
+    def child_of(self, program):
+        child = int(program.stdout.readline())
+        self.addCleanup(os.kill, child, signal.SIGKILL)
+        return child
+
+    def test_a_child_of_multiprocessing(self):
+        self.machine()
+        self.write(
+            "camera.py",
+            "import hal, multiprocessing, time\nc = hal.component('camera', timeout=0.1)\n"
+            + self.OUTPUT
+            + "child = multiprocessing.get_context('fork').Process(target=time.sleep, args=(600,))\n"
+            "child.start()\nprint(child.pid, flush=True)\ntime.sleep(600)\n",
+        )
+        program = self.background(sys.executable, "camera.py")
+        child = self.child_of(program)
+        self.kill_and_see(program.pid)
+        self.assertTrue(lives(child))
+        second = self.background(sys.executable, "camera.py")
+        self.child_of(second)
+        wait_until(lambda: self.state("camera") == "ready", "a successor takes its place")
+        self.assertEqual(second.pid, self.pid("camera"))
+
+    @staticmethod
+    def watched(files):
+        """The descriptors of processes that the machine has open."""
+        links = []
+        for file in files.iterdir():
+            try:
+                links.append(os.readlink(file))
+            except FileNotFoundError:
+                pass  # closed in the meantime
+        return [link for link in links if "pidfd" in link]
+
+    def test_a_child_that_holds_the_socket(self):
+        machine = self.machine()
+        files = Path(f"/proc/{machine.pid}/fd")
+        self.write(
+            "camera.py",
+            "import json, os, socket, sys, time\ns = socket.socket(socket.AF_UNIX)\n"
+            "s.connect(os.environ['XDG_RUNTIME_DIR'] + '/halcyon/default.sock')\nlines = s.makefile('rw')\n"
+            "def ask(body):\n lines.write(json.dumps(body) + '\\n')\n lines.flush()\n return lines.readline()\n"
+            "lines.readline()\n"
+            "ask({'component': 'camera', 'timeout_ms': 100, 'pins': [{'name': 'on', 'type': 'bit', 'dir': 'out', 'safe': False}]})\n"
+            "ask({'exchange': 'camera', 'write': [0, True]})\n"
+            "child = os.fork()\n"
+            "if child:\n print(child, flush=True)\n time.sleep(600)\n"
+            "lines.readline()\n"
+            'try: s.sendall(b\'{"component":"camera"}\\n\')\n'
+            "except OSError as error: print(error, flush=True)\n"
+            "time.sleep(600)\n",
+        )
+        program = self.background(sys.executable, "camera.py")
+        child = self.child_of(program)
+        self.kill_and_see(program.pid)
+        self.assertTrue(lives(child))
+        self.assertEqual("[Errno 32] Broken pipe\n", program.stdout.readline())
+        wait_until(lambda: not self.watched(files), "no descriptor of a process is left open")
+
+    def test_a_program_behind_a_shell(self):
+        self.machine()
+        self.write(
+            "camera.py",
+            "import hal, os, time\nc = hal.component('camera', timeout=0.1)\n"
+            + self.OUTPUT
+            + "if os.fork() == 0: open('child', 'w').write(str(os.getpid()))\ntime.sleep(600)\n",
+        )
+        self.say("loadusr", "-Wn", "camera", "sh", "-c", f"{sys.executable} camera.py; sleep 600")
+        child = wait_until(
+            lambda: (self.folder / "child").exists() and (self.folder / "child").read_text(),
+            "it has a child",
+        )
+        self.addCleanup(os.kill, int(child), signal.SIGKILL)
+        self.kill_and_see(self.pid("camera"))
+
+    def test_the_functions_of_the_module_in_a_child(self):
+        self.machine()
+        self.write(
+            "both.py",
+            "import hal, os\nhal.new_sig('a', hal.HAL_S32)\nchild = os.fork()\n"
+            "for i in range(300):\n hal.set_s('a', i)\n"
+            " assert hal.component_exists('threads')\n"
+            " assert isinstance(hal.get_value('a'), int)\n"
+            "if child: assert os.waitpid(child, 0)[1] == 0\n",
+        )
+        program = self.background(sys.executable, "both.py")
+        self.assertEqual("", program.communicate(timeout=120)[1])
+        self.assertEqual(0, program.returncode)
+
+
+@unittest.skipUnless(list(MODULE.glob("hal/_core*.so")), "the module is not built")
 class KilledMachine(LifeCase):
     def kill(self, machine):
         machine.kill()

@@ -245,6 +245,13 @@ void Component::leave(bool clean) {
     flusher_.join();
 }
 
+void Component::forget() {
+    forked_ = true;
+    if (client_) {
+        client_->close_in_child();
+    }
+}
+
 bool Component::is_connected() {
     if (forked_) return false;
     const py::gil_scoped_release release_gil;

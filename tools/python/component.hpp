@@ -75,7 +75,7 @@ public:
     /// the death of this process.
     void leave(bool clean);
     /// Marks the component as belonging to the parent process, after fork().
-    void forget() { forked_ = true; }
+    void forget();
     bool is_connected();
 
     const Item& item(std::size_t i) const { return items_.at(i); }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <pybind11/stl.h>
+#include <unistd.h>
 
 #include "component.hpp"
 #include "probe.hpp"
@@ -23,12 +24,16 @@ public:
         const py::gil_scoped_release release_gil;
         const std::scoped_lock lock(mutex_);
         const Json body = Json::parse(text);
+        if (client_ && process_ != getpid()) {
+            client_->close_in_child();  // the parent goes on using the connection
+        }
         if (client_ && !client_->connected()) {
             client_.reset();
         }
         if (!client_) {
             client_ = connect_to_instance();
         }
+        process_ = getpid();
         Json reply = client_->request(body);
         if (!client_->connected()) {  // the instance was restarted in the meantime
             client_ = connect_to_instance();
@@ -40,6 +45,7 @@ public:
 private:
     std::mutex mutex_;
     std::unique_ptr<hal::Client> client_;
+    pid_t process_ = 0;  // that made the connection
 };
 
 /// Returns the index of a pin or parameter. Throws AttributeError for an unknown name.
