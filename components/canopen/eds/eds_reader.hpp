@@ -59,6 +59,17 @@ private:
     std::vector<Message>& messages_;
 };
 
+/// What a reader of any format reports about a value.
+struct ValueRemark {
+    Severity severity;
+    std::string sentence;
+    std::string help;
+};
+/// Returns what is invalid or doubtful about the value `text` of the data type `type`. `it` names the
+/// value: "'DefaultValue' of 6207:1".
+std::optional<ValueRemark> remark_on_value(const std::string& it, const std::string& text,
+                                           std::uint16_t type);
+
 /// Objects of the main part or of a module, in its section-name prefix.
 class ObjectReader {
 public:

@@ -164,6 +164,48 @@ Access ObjectReader::access_of(IniSection& section, const std::string& what, boo
     return Access::rw;
 }
 
+std::optional<ValueRemark> remark_on_value(const std::string& it, const std::string& text,
+                                           std::uint16_t type) {
+    const DataType* known = data_type(type);
+    if (known == nullptr) return {};
+    const Encoded encoded = encode(text, type, 1);
+    if (!encoded) {
+        const bool bare_hex = known->kind < Kind::text && !parse_number(text) && text.size() <= 8 &&
+                              text.find_first_not_of("0123456789abcdefABCDEF") == std::string::npos;
+        return ValueRemark{Severity::warning, it + ": " + encoded.error,
+                           bare_hex ? "write 0x" + text : "the value was ignored"};
+    }
+    const std::string read_as = spell(encoded.bytes, type);
+    switch (encoded.spelling) {
+    case Spelling::octal:
+        return ValueRemark{Severity::warning,
+                           it + " begins with 0 and is read as octal: " + read_as,
+                           "remove the 0 if it is decimal, write 0x if it is hexadecimal"};
+    case Spelling::decimal_with_zero:
+        return ValueRemark{Severity::warning,
+                           it + " begins with 0 but is not octal; read as decimal", "remove the 0"};
+    case Spelling::unsigned_for_negative:
+        if (known->kind == Kind::integer) {
+            return ValueRemark{Severity::note,
+                               it + " is the bit pattern of a negative number: " + read_as,
+                               "write " + read_as};
+        }
+        return ValueRemark{Severity::warning,
+                           it + " is negative, but its type is " + std::string(known->name) +
+                               "; read as " + read_as,
+                           "write " + read_as};
+    case Spelling::number_as_real:
+        return ValueRemark{Severity::warning, it + " is written as a fraction", "write " + read_as};
+    case Spelling::real_as_bits:
+        return ValueRemark{Severity::warning, it + " is read as the bit pattern of " + read_as,
+                           "other tools read it as a number; write " + read_as};
+    case Spelling::words:
+        return ValueRemark{Severity::warning, it + " is a word, not a number", "write " + read_as};
+    case Spelling::plain: break;
+    }
+    return {};
+}
+
 void ObjectReader::value(IniSection& section, const char* name, std::string& out,
                          std::uint16_t type, const std::string& what) {
     IniKey* key = section.find(name);
@@ -179,55 +221,9 @@ void ObjectReader::value(IniSection& section, const char* name, std::string& out
         known->kind == Kind::domain) {
         return;
     }
-    const Encoded encoded = encode(out, type, 1);
-    const std::string it = "'" + key->name + "' of " + what;
-    if (!encoded) {
-        const auto parsed = parse_number(out);
-        const bool bare_hex = number && !parsed && out.size() <= 8 &&
-                              out.find_first_not_of("0123456789abcdefABCDEF") == std::string::npos;
-        keys_.report(Severity::warning, Topic::value, key->value_at, it + ": " + encoded.error,
-                     bare_hex ? "write 0x" + out : "the value was ignored");
-        return;
-    }
-    const auto odd = [&](Severity severity, std::string sentence, std::string help) {
-        keys_.report(severity, Topic::value, key->value_at, std::move(sentence), std::move(help));
-    };
-    switch (encoded.spelling) {
-    case Spelling::octal:
-        odd(Severity::warning,
-            it + " begins with 0 and is read as octal: " + spell(encoded.bytes, type),
-            "remove the 0 if it is decimal, write 0x if it is hexadecimal");
-        break;
-    case Spelling::decimal_with_zero:
-        odd(Severity::warning, it + " begins with 0 but is not octal; read as decimal",
-            "remove the 0");
-        break;
-    case Spelling::unsigned_for_negative:
-        if (known->kind == Kind::integer) {
-            odd(Severity::note,
-                it + " is the bit pattern of a negative number: " + spell(encoded.bytes, type),
-                "write " + spell(encoded.bytes, type));
-        } else {
-            odd(Severity::warning,
-                it + " is negative, but its type is " + std::string(known->name) + "; read as " +
-                    spell(encoded.bytes, type),
-                "write " + spell(encoded.bytes, type));
-        }
-        break;
-    case Spelling::number_as_real:
-        odd(Severity::warning, it + " is written as a fraction",
-            "write " + spell(encoded.bytes, type));
-        break;
-    case Spelling::real_as_bits:
-        odd(Severity::warning, it + " is read as the bit pattern of " + spell(encoded.bytes, type),
-            "other tools read it as a number; write " + spell(encoded.bytes, type));
-        break;
-    case Spelling::words:
-        odd(Severity::warning, it + " is a word, not a number",
-            "write " + spell(encoded.bytes, type));
-        break;
-    case Spelling::plain: break;
-    }
+    const auto remark = remark_on_value("'" + key->name + "' of " + what, out, type);
+    if (!remark) return;
+    keys_.report(remark->severity, Topic::value, key->value_at, remark->sentence, remark->help);
 }
 
 }  // namespace hal::canopen::eds

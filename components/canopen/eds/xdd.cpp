@@ -97,15 +97,31 @@ private:
         if (text.empty()) {
             return {};
         }
-        auto value = parse_number(
+        const auto value = parse_number(
             hexadecimal && text.find_first_of("xX") == std::string::npos ? "0x" + text : text);
-        if (!value || value->node_id || value->negative || value->magnitude > most) {
+        const bool negative = value && value->negative && value->magnitude != 0;
+        if (!value || value->node_id || negative || value->magnitude > most) {
             report(Severity::warning, Topic::number, node,
                    "'" + std::string(name) + "' is not a number of 0.." + std::to_string(most) +
                        ": '" + text.substr(0, 60) + "'");
             return {};
         }
+        report_leading_zero(node, name, *value);
         return value->magnitude;
+    }
+    void report_leading_zero(const Node& node, const char* name, const Number& value) {
+        const std::string it = "'" + std::string(name) + "'";
+        const std::string magnitude = std::to_string(value.magnitude);
+        if (value.spelling == Spelling::octal) {
+            report(Severity::warning, Topic::value, node,
+                   it + " begins with 0 and is read as octal: " + magnitude,
+                   "write " + hex(value.magnitude, 1) + ", or remove the 0");
+        }
+        if (value.spelling == Spelling::decimal_with_zero) {
+            report(Severity::warning, Topic::value, node,
+                   it + " begins with 0 but is not octal; read as decimal " + magnitude,
+                   "remove the 0");
+        }
     }
     bool flag(const Node& node, const char* name) {
         const std::string text = lower(attribute(node, name));
@@ -174,15 +190,18 @@ private:
         };
         const auto id = [&](const char* name) -> std::optional<std::uint32_t> {
             const std::string value = text(name);
+            if (value.empty()) return {};
             const auto parsed = parse_number(value);
-            if (!value.empty() && (!parsed || parsed->magnitude > 0xFFFFFFFF)) {
+            const bool valid = parsed && !parsed->node_id && parsed->magnitude <= 0xFFFFFFFF &&
+                               (!parsed->negative || parsed->magnitude == 0);
+            if (!valid) {
                 report(Severity::warning, Topic::number, descendant(who, name),
                        "'" + std::string(name) + "' is not a 32-bit number: '" +
                            value.substr(0, 60) + "'");
+                return {};
             }
-            return parsed && parsed->magnitude <= 0xFFFFFFFF
-                       ? std::optional<std::uint32_t>(static_cast<std::uint32_t>(parsed->magnitude))
-                       : std::nullopt;
+            report_leading_zero(descendant(who, name), name, *parsed);
+            return static_cast<std::uint32_t>(parsed->magnitude);
         };
         DeviceInfo& d = out_.device;
         d.vendor_name = text("vendorName");
@@ -280,15 +299,15 @@ private:
             return out;
         }
         for (const auto& [name, text] :
-             {std::pair<const char*, const std::string*>{"default value", &out.default_value},
-              {"actual value", &out.parameter_value},
-              {"lower limit", &out.low_limit},
-              {"upper limit", &out.high_limit}}) {
-            if (const Encoded encoded = encode(*text, out.data_type, 1); !encoded) {
-                report(Severity::warning, Topic::value, node,
-                       std::string(name) + " of " + what + ": " + encoded.error,
-                       "the value was ignored");
-            }
+             {std::pair<const char*, const std::string*>{"defaultValue", &out.default_value},
+              {"actualValue", &out.parameter_value},
+              {"lowLimit", &out.low_limit},
+              {"highLimit", &out.high_limit}}) {
+            if (text->empty()) continue;
+            const auto remark =
+                remark_on_value("'" + std::string(name) + "' of " + what, *text, out.data_type);
+            if (!remark) continue;
+            report(remark->severity, Topic::value, node, remark->sentence, remark->help);
         }
         return out;
     }

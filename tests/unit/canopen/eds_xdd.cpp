@@ -132,6 +132,73 @@ TEST_F(Xdd, Defects_are_named_with_their_line) {
     }
 }
 
+/// Messages of severity note and above, without their places, keys in the spelling of the EDS.
+std::string without_places(const Reading& reading) {
+    std::string all;
+    for (const Message& message : reading.messages) {
+        std::string text = message.sentence + "; " + message.help + "\n";
+        for (const auto& [xml, ini] : {std::pair{"'defaultValue'", "'DefaultValue'"},
+                                       {"'actualValue'", "'ParameterValue'"},
+                                       {"'lowLimit'", "'LowLimit'"},
+                                       {"'highLimit'", "'HighLimit'"}}) {
+            if (const std::size_t at = text.find(xml); at != std::string::npos) {
+                text.replace(at, std::string_view(xml).size(), ini);
+            }
+        }
+        if (text.find("' of 2000") != std::string::npos) {
+            all += text;
+        }
+    }
+    return all;
+}
+
+// A number that is read in another way than written, or not at all, gets the same message in an EDS
+// or DCF as in an XDD or XDC, for each of the four values of an object.
+TEST_F(Xdd, A_doubtful_number_gets_the_message_of_an_eds) {
+    const std::pair<const char*, const char*> keys[] = {{"DefaultValue", "defaultValue"},
+                                                        {"ParameterValue", "actualValue"},
+                                                        {"LowLimit", "lowLimit"},
+                                                        {"HighLimit", "highLimit"}};
+    std::size_t warned = 0;
+    for (const char* type : {"0002", "0005", "0006", "0007", "0008", "0001", "0009"}) {
+        for (const char* text : {"-1", "0377", "010", "09", "1.0", "1A", "70000", "true", "0xFF",
+                                 "-300", "0x3F800000", "5", "abc"}) {
+            for (const auto& [ini, xml] : keys) {
+                const Reading eds = read_eds(
+                    std::string("[OptionalObjects]\nSupportedObjects=1\n1=0x2000\n[2000]\n"
+                                "ParameterName=x\nObjectType=7\nAccessType=rw\nDataType=0x") +
+                    type + "\n" + ini + "=" + text + "\n");
+                const Reading xdd_reading = read_xdd(
+                    xdd(std::string("<CANopenObject index=\"2000\" name=\"x\" objectType=\"7\" "
+                                    "accessType=\"rw\" dataType=\"") +
+                        type + "\" " + xml + "=\"" + text + "\"/>\n"));
+                EXPECT_EQ(without_places(eds), without_places(xdd_reading)) << type << " " << text;
+                warned += !without_places(xdd_reading).empty();
+            }
+        }
+    }
+    EXPECT_GT(warned, 100u);
+    const Reading read =
+        read_xdd(xdd("<CANopenObject index=\"2000\" name=\"x\" objectType=\"7\" dataType=\"0005\" "
+                     "accessType=\"rw\" actualValue=\"-1\" defaultValue=\"0377\"/>\n"));
+    EXPECT_EQ(
+        without_places(read),
+        "'DefaultValue' of 2000 begins with 0 and is read as octal: 0xFF; remove the 0 if it "
+        "is decimal, write 0x if it is hexadecimal\n"
+        "'ParameterValue' of 2000 is negative, but its type is UNSIGNED8; read as 0xFF; write "
+        "0xFF\n");
+}
+
+TEST_F(Xdd, A_number_of_the_device_with_a_leading_zero_or_a_sign_is_named) {
+    std::string text =
+        xdd("", "<deviceCommissioning nodeID=\"011\" nodeName=\"left\" networkNumber=\"08\"/>");
+    text.replace(text.find("0x360</"), 5, "-1");
+    const std::string all = complaints(read_xdd(text));
+    EXPECT_NE(all.find("'nodeID' begins with 0 and is read as octal: 9"), std::string::npos) << all;
+    EXPECT_NE(all.find("'networkNumber' begins with 0 but is not octal"), std::string::npos) << all;
+    EXPECT_NE(all.find("'vendorID' is not a 32-bit number: '-1'"), std::string::npos) << all;
+}
+
 TEST_F(Xdd, Broken_xml_and_other_xml_are_refused_with_the_reason) {
     const Reading broken = read_description(xdd("<CANopenObject index=\"2000\">\n"));
     EXPECT_FALSE(broken.description);
