@@ -94,7 +94,7 @@ bool Cell::load(const std::vector<std::string>& files, const std::string& ini, O
         {
             const auto lock = machine.session->lock();
             Transaction transaction = machine.session->begin();
-            machine.session->programs().add_component(transaction, watch, ::getpid(), {});
+            machine.session->programs().model().add_component(transaction, watch, ::getpid(), {});
             for (const NodeLine& other : nodes_) {
                 if (other.name == nodes_[i].name) continue;
                 std::string problem;
@@ -102,12 +102,13 @@ bool Cell::load(const std::vector<std::string>& files, const std::string& ini, O
                 ProgramPin incompatible{"node." + other.name + ".incompatible", HAL_TYPE_BIT,
                                         HAL_DIR_OUT};
                 ProgramPin age{"node." + other.name + ".age-ms", HAL_TYPE_FLOAT, HAL_DIR_OUT};
-                machine.pins[other.name + ".online"] =
-                    machine.session->programs().add_pin(transaction, watch, online, problem);
+                machine.pins[other.name + ".online"] = machine.session->programs().model().add_pin(
+                    transaction, watch, online, problem);
                 machine.pins[other.name + ".incompatible"] =
-                    machine.session->programs().add_pin(transaction, watch, incompatible, problem);
+                    machine.session->programs().model().add_pin(transaction, watch, incompatible,
+                                                                problem);
                 machine.pins[other.name + ".age-ms"] =
-                    machine.session->programs().add_pin(transaction, watch, age, problem);
+                    machine.session->programs().model().add_pin(transaction, watch, age, problem);
             }
             Diagnostics none;
             transaction.commit(none);
@@ -164,7 +165,7 @@ bool Cell::start(Output& output) {
                 pin.initial = reader.safe;
                 Transaction transaction = machine.session->begin();
                 machine.pins[from + "." + field.signal] =
-                    machine.session->programs().add_pin(transaction, watch, pin, problem);
+                    machine.session->programs().model().add_pin(transaction, watch, pin, problem);
                 Diagnostics none;
                 transaction.commit(none);
                 links[reader.node].push_back({"net", field.signal, pin.name});

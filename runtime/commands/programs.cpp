@@ -267,13 +267,10 @@ bool is_name_of_component(Context& context, const std::string& name) {
 bool wait_for_name(Context& context, const Plan& plan, Timeout& timeout) {
     while (true) {
         const auto* const entry = context.programs.find(plan.name);
-        const bool dead = entry && entry->dead();
-        const bool runs = entry && entry->child && !entry->ended;
-        const bool comes_back =
-            dead && (entry->restart_ns != 0 || (runs && entry->restart.when != Restart::no));
-        if (dead && !comes_back && !runs) return true;
         if (!entry && !is_name_of_component(context, plan.name)) return true;
-        if (!entry || !(entry->stopping || (dead && !comes_back))) {
+        const bool leaves_name = entry && entry->dead() && !entry->comes_back();
+        if (leaves_name && !entry->running()) return true;
+        if (!leaves_name && !(entry && entry->stopping)) {
             name_in_use(context, plan, entry);
             return false;
         }
@@ -322,10 +319,11 @@ void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64
             last = progress(context, plan, pid);
         }
         auto* const entry = context.programs.find_number(number);
-        if (entry && entry->ready) return;
+        if (entry && entry->ready()) return;
         const auto* const named = plan.any_name ? nullptr : context.programs.find(plan.name);
-        if (named && named->ready) return;
-        if (!child && !(entry && entry->dead() && (entry->restart_ns != 0 || !entry->ended))) {
+        if (named && named->ready()) return;
+        if (!child &&
+            !(entry && entry->dead() && (entry->restarts.due_ns != 0 || !entry->ended()))) {
             const bool registered = last == initializing || (fresh && entry && entry->dead());
             context.diagnostics.error(
                 "program-ended", context.span(plan.program),
@@ -360,7 +358,7 @@ void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipe
                       const Timeout& timeout) {
     while (true) {
         const auto* const entry = context.programs.find(pid);
-        if (entry->ended) break;
+        if (entry->ended()) break;
         if (timeout.over()) {
             timed_out(context, plan.timeout_ns,
                       "'" + context.argument(plan.program) + "' did not end",
@@ -475,10 +473,8 @@ void command_waitusr(Context& context) {
     const std::uint64_t number = context.programs.find(name)->number;
     const auto living = [&]() -> const Programs::Entry* {
         const auto* const entry = context.programs.find_number(number);
-        const bool lives =
-            entry && entry->name == name &&
-            (!entry->dead() || entry->restart_ns != 0 || (entry->child && !entry->ended));
-        return lives ? entry : nullptr;
+        if (!entry || entry->name != name) return nullptr;
+        return entry->gone() && entry->restarts.due_ns == 0 ? nullptr : entry;
     };
     while (const auto* const entry = living()) {
         if (timeout.over()) {

@@ -17,7 +17,7 @@
 
 namespace hal {
 
-struct Programs;
+class Programs;
 class Script;
 struct CommandRow;
 
@@ -96,6 +96,8 @@ struct CommandRow {
     unsigned flags;
 
     bool edits() const { return function.edit != nullptr; }
+    bool is_query() const { return (flags & command_query) != 0; }
+    bool takes_paths() const { return (flags & command_path) != 0; }
     Usage usage() const { return {name, arguments}; }
     EditForm form() const { return {usage(), function.edit, (flags & command_arrows) != 0}; }
 };

@@ -18,8 +18,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::size_t most_pins = 100'000;
-constexpr std::size_t longest_name = 200;
+constexpr std::size_t max_pins = 100'000;
+constexpr std::size_t max_name_size = 200;
 
 struct Direction {
     const char* word;
@@ -58,7 +58,7 @@ hal_value value_of(const Json& value, hal_type type, const std::string& of) {
 }
 
 bool good_pin_name(const std::string& name) {
-    return !name.empty() && name.size() <= longest_name &&
+    return !name.empty() && name.size() <= max_name_size &&
            std::all_of(name.begin(), name.end(), [](unsigned char c) {
         return c > ' ' && c != 127 && c != '"' && c != '\\';
     });
@@ -136,25 +136,26 @@ Pin* add_pin(const Program& by, Transaction& transaction, const Programs::Entry&
             });
             return there;
         }
-        by.session.programs().remove_pins(transaction, entry.name, {there});
+        by.session.programs().model().remove_pins(transaction, entry.name, {there});
     }
     std::string problem;
-    Pin* const made = by.session.programs().add_pin(transaction, entry.name, wanted, problem);
+    Pin* const made =
+        by.session.programs().model().add_pin(transaction, entry.name, wanted, problem);
     if (!made) {
         throw RequestError{problem};
     }
     return made;
 }
 
-/// Declared values for pins that are there: numbers and values in turn.
-std::vector<std::pair<Pin*, hal_value>> declared_values(const Programs::Entry& entry,
-                                                        const Json& safe) {
+/// Values for pins that are there: numbers of pins and values in turn.
+std::vector<std::pair<Pin*, hal_value>> values_by_number(const Programs::Entry& entry,
+                                                         const Json& given) {
     std::vector<std::pair<Pin*, hal_value>> values;
-    for (std::size_t i = 0; i < safe.size(); i += 2) {
+    for (std::size_t i = 0; i < given.size(); i += 2) {
         const auto number = static_cast<std::size_t>(whole(
-            safe[i], "the number of a pin", 0, static_cast<std::int64_t>(entry.pins.size()) - 1));
+            given[i], "the number of a pin", 0, static_cast<std::int64_t>(entry.pins.size()) - 1));
         Pin* const pin = entry.pins[number];
-        values.emplace_back(pin, value_of(safe[i + 1], pin->type, pin->name));
+        values.emplace_back(pin, value_of(given[i + 1], pin->type, pin->name));
     }
     return values;
 }
@@ -176,6 +177,99 @@ void add_pins(const Program& by, Programs::Entry& entry, const std::vector<Progr
     entry.pins.insert(entry.pins.end(), made.begin(), made.end());
 }
 
+/// What a request {"component":…} declares, checked except for what needs the session.
+struct Declaration {
+    std::string name;
+    std::optional<bool> ready;
+    std::optional<std::int64_t> timeout_ns, every_ns;
+    std::optional<std::vector<ProgramPin>> pins;
+    const Json& safe;  ///< of pins that are there
+};
+
+std::optional<std::int64_t> milliseconds(const Json& body, const char* key, std::int64_t min) {
+    const Json& given = member(body, key);
+    if (given.is_null()) return std::nullopt;
+    const std::int64_t ms = whole(given, key, min, 86'400'000);
+    return ms < 0 ? -1 : ms * 1'000'000;
+}
+
+std::vector<ProgramPin> pins_of(const Json& pins, const std::string& prefix) {
+    if (!pins.is_array() || pins.size() > max_pins) {
+        throw RequestError{"pins must be an array of at most " + std::to_string(max_pins)};
+    }
+    std::vector<ProgramPin> all;
+    for (const Json& pin : pins) {
+        all.push_back(pin_of(pin, prefix));
+    }
+    return all;
+}
+
+Declaration declaration_of(const Json& body) {
+    Declaration to{.name = text_of(body["component"], "component"),
+                   .ready = {},
+                   .timeout_ns = {},
+                   .every_ns = {},
+                   .pins = {},
+                   .safe = member(body, "safe")};
+    const Json &prefix = member(body, "prefix"), &pins = member(body, "pins"),
+               &ready = member(body, "ready");
+    if (!to.safe.is_null() && (!to.safe.is_array() || to.safe.size() % 2 != 0)) {
+        throw RequestError{"safe must be an array of alternating pin numbers and declared values"};
+    }
+    if (!ready.is_null() && !ready.is_boolean()) {
+        throw RequestError{"ready must be true or false"};
+    }
+    const std::string before = prefix.is_null() ? to.name : text_of(prefix, "prefix");
+    if (!good_pin_name(before)) {
+        throw RequestError{"'" + before.substr(0, 60) + "' is not a valid prefix"};
+    }
+    if (!ready.is_null()) {
+        to.ready = ready.get<bool>();
+    }
+    to.timeout_ns = milliseconds(body, "timeout_ms", -1);
+    to.every_ns = milliseconds(body, "every_ms", 0);
+    if (!pins.is_null()) {
+        to.pins = pins_of(pins, before);
+    }
+    return to;
+}
+
+/// Gives the component its pins and declared values. When that is rejected, a component that was
+/// `fresh` keeps the pins and links that its dead predecessor had, if any.
+void add_declared(const Program& by, Programs::Entry& entry, const Declaration& wanted, bool fresh,
+                  bool was_dead) {
+    Programs& programs = by.session.programs();
+    try {
+        const auto declared = values_by_number(entry, wanted.safe);
+        if (wanted.pins) {
+            add_pins(by, entry, *wanted.pins);
+        }
+        for (const auto& [pin, value] : declared) {
+            pin->safe = value;
+            pin->flags |= HAL_PIN_SAFE;
+        }
+    } catch (const RequestError&) {
+        if (fresh && was_dead) {
+            programs.die(entry, "its pins were rejected");
+        } else if (fresh) {
+            programs.leave(entry);
+        }
+        throw;
+    }
+}
+
+void append_values(std::string& reply, const Program& by, const std::vector<Pin*>& pins) {
+    const auto values = by.session.values().peek(pins);
+    reply += ",\"values\":[";
+    for (std::size_t i = 0; i < pins.size(); ++i) {
+        if (i > 0) {
+            reply += ',';
+        }
+        json_value(reply, pins[i]->type, values[i]);
+    }
+    reply += ']';
+}
+
 }  // namespace
 
 void declare_component(const Program& by, const Json& body, std::string& reply) {
@@ -183,88 +277,62 @@ void declare_component(const Program& by, const Json& body, std::string& reply) 
         throw RequestError{
             "no process ID: the program runs outside the PID namespace of the machine"};
     }
-    const std::string& name = text_of(body["component"], "component");
-    const Json &prefix = member(body, "prefix"), &pins = member(body, "pins"),
-               &ready = member(body, "ready"), &timeout = member(body, "timeout_ms"),
-               &every = member(body, "every_ms"), &safe = member(body, "safe");
-    if (!safe.is_null() && (!safe.is_array() || safe.size() % 2 != 0)) {
-        throw RequestError{"safe must be an array of alternating pin numbers and declared values"};
-    }
-    if (!ready.is_null() && !ready.is_boolean()) {
-        throw RequestError{"ready must be true or false"};
-    }
-    const std::string before = prefix.is_null() ? name : text_of(prefix, "prefix");
-    if (!good_pin_name(before)) {
-        throw RequestError{"'" + before.substr(0, 60) + "' is not a valid prefix"};
-    }
-    const std::int64_t timeout_ms =
-        timeout.is_null() ? 0 : whole(timeout, "timeout_ms", -1, 86'400'000);
-    const std::int64_t every_ms = every.is_null() ? 0 : whole(every, "every_ms", 0, 86'400'000);
-    std::vector<ProgramPin> wanted;
-    if (!pins.is_null()) {
-        if (!pins.is_array() || pins.size() > most_pins) {
-            throw RequestError{"pins must be an array of at most " + std::to_string(most_pins)};
-        }
-        for (const Json& pin : pins) {
-            wanted.push_back(pin_of(pin, before));
-        }
-    }
-
+    const Declaration wanted = declaration_of(body);
     const auto lock = by.session.lock();
     Programs& programs = by.session.programs();
-    Programs::Entry* entry = programs.owned(name, by.owner);
+    Programs::Entry* entry = programs.owned(wanted.name, by.owner);
     const bool fresh = !entry;
-    const Programs::Entry* const there = programs.find(name);
+    const Programs::Entry* const there = programs.find(wanted.name);
     const bool was_dead = there && there->dead();
     if (fresh) {
-        if (const std::string why = programs.announce(by.peer, name, by.owner, false);
-            !why.empty()) {
+        const std::string why = programs.announce(by.peer, wanted.name, by.owner, false);
+        if (!why.empty()) {
             throw RequestError{why};
         }
-        entry = programs.owned(name, by.owner);
+        entry = programs.owned(wanted.name, by.owner);
     }
     const std::size_t first = entry->pins.size();
-    try {
-        const auto declared = declared_values(*entry, safe);
-        add_pins(by, *entry, wanted);
-        for (const auto& [pin, value] : declared) {
-            pin->safe = value;
-            pin->flags |= HAL_PIN_SAFE;
-        }
-    } catch (const RequestError&) {
-        // it keeps the pins and links it had
-        if (fresh && was_dead) {
-            programs.die(*entry, "its pins were rejected");
-        } else if (fresh) {
-            programs.leave(*entry);
-        }
-        throw;
-    }
-    if (!timeout.is_null()) {
-        entry->timeout_ns = timeout_ms < 0 ? -1 : timeout_ms * 1'000'000;
-    }
-    if (!every.is_null()) {
-        programs.set_rate(*entry, every_ms * 1'000'000);
+    add_declared(by, *entry, wanted, fresh, was_dead);
+    entry->timeout_ns = wanted.timeout_ns.value_or(entry->timeout_ns);
+    if (wanted.every_ns) {
+        programs.set_rate(*entry, *wanted.every_ns);
     } else {
         programs.note_alive(*entry);
     }
-    if (!pins.is_null()) {
-        const std::vector<Pin*> added(entry->pins.begin() + static_cast<std::ptrdiff_t>(first),
-                                      entry->pins.end());
-        const auto values = by.session.values().peek(added);
-        reply += ",\"first\":" + std::to_string(first) + ",\"values\":[";
-        for (std::size_t i = 0; i < added.size(); ++i) {
-            if (i > 0) {
-                reply += ',';
-            }
-            json_value(reply, added[i]->type, values[i]);
-        }
-        reply += ']';
+    if (wanted.pins) {
+        reply += ",\"first\":" + std::to_string(first);
+        append_values(
+            reply, by,
+            {entry->pins.begin() + static_cast<std::ptrdiff_t>(first), entry->pins.end()});
     }
-    if (!ready.is_null() || fresh) {
-        programs.set_ready(*entry, ready.is_null() || ready.get<bool>());
+    if (wanted.ready || fresh) {
+        programs.set_ready(*entry, wanted.ready.value_or(true));
     }
 }
+
+namespace {
+
+/// While a component does not respond, its pins keep their declared values; what it writes waits
+/// until it responds.
+void hold_back(Programs::Entry& entry, std::vector<std::pair<Pin*, hal_value>>& values) {
+    if (entry.heartbeat.missing.empty()) return;
+    for (auto& [pin, value] : entry.heartbeat.before_timeout) {
+        const auto written = std::ranges::find(values, pin, &std::pair<Pin*, hal_value>::first);
+        if (written == values.end()) continue;
+        value = written->second;
+        values.erase(written);
+    }
+}
+
+/// Returns true for an output that is linked to another pin of the same component.
+bool loops_back(const Pin& pin) {
+    if (pin.dir == HAL_DIR_IN || !pin.signal) return false;
+    return std::ranges::any_of(pin.signal->pins, [&](const Pin* other) {
+        return other != &pin && other->instance == pin.instance;
+    });
+}
+
+}  // namespace
 
 void exchange_values(const Program& by, const Json& body, std::string& reply) {
     const std::string& name = text_of(body["exchange"], "exchange");
@@ -282,51 +350,22 @@ void exchange_values(const Program& by, const Json& body, std::string& reply) {
 
     const auto lock = by.session.lock();
     Programs::Entry& entry = owned(by, name);
-    std::vector<std::pair<Pin*, hal_value>> values;
-    for (std::size_t i = 0; i < write.size(); i += 2) {
-        const auto number = static_cast<std::size_t>(whole(
-            write[i], "the number of a pin", 0, static_cast<std::int64_t>(entry.pins.size()) - 1));
-        Pin* const pin = entry.pins[number];
-        values.emplace_back(pin, value_of(write[i + 1], pin->type, pin->name));
-    }
+    auto values = values_by_number(entry, write);
     if (alive.is_null() || alive.get<bool>()) {
         by.session.programs().note_alive(entry);
     }
-    if (!entry.unresponsive
-             .empty()) {  // its pins keep their declared values; what it writes waits until it responds
-        for (auto& [pin, value] : entry.before_timeout) {
-            const auto written =
-                std::find_if(values.begin(), values.end(),
-                             [&, p = pin](const auto& one) { return one.first == p; });
-            if (written == values.end()) continue;
-            value = written->second;
-            values.erase(written);
-        }
-    }
+    hold_back(entry, values);
     by.session.values().write(values);
     if (!read.is_boolean() || !read.get<bool>()) return;
-    std::vector<Pin*> asked;
+    std::vector<Pin*> requested;
     bool loops = false;
     for (Pin* const pin : entry.pins) {
         if (!own(*pin)) {
-            asked.push_back(pin);
+            requested.push_back(pin);
         }
-        if (pin->dir != HAL_DIR_IN && pin->signal) {
-            loops = loops || std::any_of(pin->signal->pins.begin(), pin->signal->pins.end(),
-                                         [&](const Pin* other) {
-                return other != pin && other->instance == pin->instance;
-            });
-        }
+        loops = loops || loops_back(*pin);
     }
-    const auto readings = by.session.values().peek(asked);
-    reply += ",\"values\":[";
-    for (std::size_t i = 0; i < asked.size(); ++i) {
-        if (i > 0) {
-            reply += ',';
-        }
-        json_value(reply, asked[i]->type, readings[i]);
-    }
-    reply += ']';
+    append_values(reply, by, requested);
     if (loops) {
         reply += ",\"loops\":true";
     }
@@ -365,19 +404,52 @@ void append_hex(std::string& to, std::uint8_t byte) {
     to += digits[byte & 15];
 }
 
-}  // namespace
-
-// The session's lock makes all requests one reader or one writer; the other end may be a thread at
-// any moment.
-void use_port(const Program& by, const Json& body, std::string& reply) {
-    const std::string& name = text_of(body["port"], "port");
-    const Json &read = member(body, "read"), &peek = member(body, "peek"),
-               &write = member(body, "write");
-    if (!read.is_null() + !peek.is_null() + !write.is_null() > 1) {
-        throw RequestError{"a request either reads, peeks into or writes a port"};
+/// One end of a port. The session's lock makes all requests one reader or one writer; the other
+/// end may be a thread at any moment.
+class PortEnd {
+public:
+    explicit PortEnd(hal_port* port) : port_(port) {
+        if (!port) return;
+        head_ = __atomic_load_n(&port->head, __ATOMIC_ACQUIRE);
+        tail_ = __atomic_load_n(&port->tail, __ATOMIC_ACQUIRE);
     }
-    const bool takes = !read.is_null() || !peek.is_null();
-    const auto lock = by.session.lock();
+    std::uint64_t capacity() const { return port_ ? port_->capacity : 0; }
+    std::uint64_t readable() const { return head_ - tail_; }
+    /// One byte stays free, as LinuxCNC has it.
+    std::uint64_t writable() const {
+        return readable() + 1 < capacity() ? capacity() - 1 - readable() : 0;
+    }
+    /// Appends `count` bytes in hexadecimal; removes them unless `peek`. False when there are fewer.
+    bool read(std::uint64_t count, bool peek, std::string& hex) {
+        if (!port_ || count > readable()) return false;
+        for (std::uint64_t i = 0; i < count; ++i) {
+            append_hex(hex, port_->data[(tail_ + i) % capacity()]);
+        }
+        if (!peek) {
+            tail_ += count;
+            __atomic_store_n(&port_->tail, tail_, __ATOMIC_RELEASE);
+        }
+        return true;
+    }
+    /// Writes all of the bytes, or none and returns false.
+    bool write(const std::string& bytes) {
+        if (!port_ || bytes.size() > writable()) return false;
+        for (std::size_t i = 0; i < bytes.size(); ++i) {
+            port_->data[(head_ + i) % capacity()] = static_cast<std::uint8_t>(bytes[i]);
+        }
+        head_ += bytes.size();
+        __atomic_store_n(&port_->head, head_, __ATOMIC_RELEASE);
+        return true;
+    }
+
+private:
+    hal_port* port_;  // nullptr: it has no buffer
+    std::uint64_t head_ = 0;
+    std::uint64_t tail_ = 0;
+};
+
+/// Returns the port pin of a component of this connection, or throws.
+Pin& find_port(const Program& by, const std::string& name, bool takes, bool writes) {
     Pin* const pin = by.session.model().find_pin(name);
     if (!pin || !pin->instance) {
         throw RequestError{"unknown pin '" + name.substr(0, 60) + "'"};
@@ -389,48 +461,43 @@ void use_port(const Program& by, const Json& body, std::string& reply) {
     if (takes && pin->dir != HAL_DIR_IN) {
         throw RequestError{"port '" + name + "' is an output: use write"};
     }
-    if (!write.is_null() && pin->dir != HAL_DIR_OUT) {
+    if (writes && pin->dir != HAL_DIR_OUT) {
         throw RequestError{"port '" + name + "' is an input: use read or peek"};
     }
-    hal_port* const port = pin->signal ? pin->signal->port.get() : nullptr;
-    const std::uint64_t capacity = port ? port->capacity : 0;
-    std::uint64_t head = port ? __atomic_load_n(&port->head, __ATOMIC_ACQUIRE) : 0;
-
-    std::uint64_t tail = port ? __atomic_load_n(&port->tail, __ATOMIC_ACQUIRE) : 0;
-    // one byte stays free, as LinuxCNC has it
-    const auto room = [&] {
-        return capacity > 0 && head - tail < capacity - 1 ? capacity - 1 - (head - tail) : 0;
-    };
-    bool done = false;
-    if (takes) {
-        const auto count = static_cast<std::uint64_t>(
-            whole(read.is_null() ? peek : read, "the number of bytes", 0, 1 << 30));
-        reply += ",\"bytes\":\"";
-        if (done = port && count <= head - tail; done) {
-            for (std::uint64_t i = 0; i < count; ++i) {
-                append_hex(reply, port->data[(tail + i) % capacity]);
-            }
-            if (!read.is_null()) {
-                __atomic_store_n(&port->tail, tail += count, __ATOMIC_RELEASE);
-            }
-        }
-        reply += '"';
-    } else if (!write.is_null()) {
-        const std::string bytes = bytes_of(text_of(write, "write"));
-        if (done = port && bytes.size() <= room(); done) {
-            for (std::size_t i = 0; i < bytes.size(); ++i) {
-                port->data[(head + i) % capacity] = static_cast<std::uint8_t>(bytes[i]);
-            }
-            __atomic_store_n(&port->head, head += bytes.size(), __ATOMIC_RELEASE);
-        }
-    }
-    reply += std::string(",\"done\":") + (done ? "true" : "false") +
-             ",\"size\":" + std::to_string(capacity) +
-             ",\"readable\":" + std::to_string(head - tail) +
-             ",\"writable\":" + std::to_string(room());
+    return *pin;
 }
 
-// --- streams of records ----------------------------------------------------------------------------------------------------
+}  // namespace
+
+void use_port(const Program& by, const Json& body, std::string& reply) {
+    const std::string& name = text_of(body["port"], "port");
+    const Json &read = member(body, "read"), &peek = member(body, "peek"),
+               &write = member(body, "write");
+    if (!read.is_null() + !peek.is_null() + !write.is_null() > 1) {
+        throw RequestError{"a request either reads, peeks into or writes a port"};
+    }
+    const bool takes = !read.is_null() || !peek.is_null();
+    const auto lock = by.session.lock();
+    const Pin& pin = find_port(by, name, takes, !write.is_null());
+    PortEnd port(pin.signal ? pin.signal->port.get() : nullptr);
+    bool done = false;
+    if (takes) {
+        const Json& given = read.is_null() ? peek : read;
+        const auto count =
+            static_cast<std::uint64_t>(whole(given, "the number of bytes", 0, 1 << 30));
+        reply += ",\"bytes\":\"";
+        done = port.read(count, read.is_null(), reply);
+        reply += '"';
+    } else if (!write.is_null()) {
+        done = port.write(bytes_of(text_of(write, "write")));
+    }
+    reply += std::string(",\"done\":") + (done ? "true" : "false") +
+             ",\"size\":" + std::to_string(port.capacity()) +
+             ",\"readable\":" + std::to_string(port.readable()) +
+             ",\"writable\":" + std::to_string(port.writable());
+}
+
+// --- streams of records ---
 
 namespace {
 
@@ -475,6 +542,44 @@ void create_stream(const Program& by, const std::string& name, const Json& wante
     entry.streams.push_back(std::move(made));
 }
 
+/// Returns the stream of a component or of a program, or throws. `feeds`: the request does not take
+/// records from it.
+hal_stream& find_stream(const Program& by, const std::string& name, bool feeds) {
+    if (hal_stream* const stream = by.session.host().find_stream(name)) return *stream;
+    if (ProgramStream* const of_program = by.session.programs().find_stream(name)) {
+        of_program->stream.to_machine = feeds;  // programs are at both of its ends
+        return of_program->stream;
+    }
+    auto names = by.session.host().stream_names();
+    const auto more = by.session.programs().stream_names();
+    names.insert(names.end(), more.begin(), more.end());
+    std::string help = did_you_mean(name, names);
+    if (names.empty()) {
+        help = "no loaded component has a stream (sampler and streamer have one)";
+    } else if (help.empty()) {
+        help = "available: " + listed(names);
+    }
+    throw RequestError{"unknown stream '" + name.substr(0, 60) + "'; " + help};
+}
+
+std::vector<std::vector<std::string>> rows_of(const Json& records) {
+    constexpr const char* problem = "records must be an array of arrays";
+    if (!records.is_array()) {
+        throw RequestError{problem};
+    }
+    std::vector<std::vector<std::string>> rows;
+    for (const Json& record : records) {
+        if (!record.is_array()) {
+            throw RequestError{problem};
+        }
+        std::vector<std::string>& row = rows.emplace_back();
+        for (const Json& value : record) {
+            row.push_back(value_word(value));
+        }
+    }
+    return rows;
+}
+
 }  // namespace
 
 void use_stream(const Program& by, const Json& body, std::string& reply) {
@@ -489,49 +594,19 @@ void use_stream(const Program& by, const Json& body, std::string& reply) {
     if (!create.is_null()) {
         create_stream(by, name, create, member(body, "owner"));
     }
-    hal_stream* stream = by.session.host().find_stream(name);
-    if (ProgramStream* const of_program =
-            stream ? nullptr : by.session.programs().find_stream(name)) {
-        stream = &of_program->stream;
-        stream->to_machine = take.is_null();  // programs are at both of its ends
-    }
-    if (!stream) {
-        auto names = by.session.host().stream_names();
-        const auto more = by.session.programs().stream_names();
-        names.insert(names.end(), more.begin(), more.end());
-        const std::string meant = did_you_mean(name, names);
-        throw RequestError{"unknown stream '" + name.substr(0, 60) + "'; " +
-                           (names.empty()
-                                ? "no loaded component has a stream (sampler and streamer have one)"
-                            : meant.empty() ? "available: " + listed(names)
-                                            : meant)};
-    }
+    hal_stream& stream = find_stream(by, name, take.is_null());
     std::string why;
+    bool good = true;
     if (!take.is_null()) {
-        const auto most = static_cast<std::uint64_t>(whole(take, "take", 0, 1'000'000));
-        if (!take_records(*stream, most, reply, why)) {
-            throw RequestError{why};
-        }
+        const auto max_count = static_cast<std::uint64_t>(whole(take, "take", 0, 1'000'000));
+        good = take_records(stream, max_count, reply, why);
     } else if (!records.is_null()) {
-        if (!records.is_array()) {
-            throw RequestError{"records must be an array of arrays"};
-        }
-        std::vector<std::vector<std::string>> words;
-        for (const Json& record : records) {
-            if (!record.is_array()) {
-                throw RequestError{"records must be an array of arrays"};
-            }
-            std::vector<std::string> row;
-            for (const Json& value : record) {
-                row.push_back(value_word(value));
-            }
-            words.push_back(std::move(row));
-        }
-        if (!feed_records(*stream, words, reply, why)) {
-            throw RequestError{why};
-        }
+        good = feed_records(stream, rows_of(records), reply, why);
     }
-    describe_stream(*stream, reply);
+    if (!good) {
+        throw RequestError{why};
+    }
+    describe_stream(stream, reply);
 }
 
 }  // namespace hal

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -78,6 +79,26 @@ Span span_of(const GivenArgument& given, const Failure& why, const Sources& sour
     return {given.at.source, first + why.begin, first + why.end};
 }
 
+/// Reports why a constructor failed, at the argument that it rejects if there is one.
+void report_failure(const LoadedComponent& component, const LoadRequest& request,
+                    const Sources& sources, const Construction& c, Diagnostics& diagnostics) {
+    const Failure& why = c.failure;
+    const auto given = why.subject == HAL_SUBJECT_ARGUMENT ? request.arguments.find(why.name)
+                                                           : request.arguments.end();
+    if (given != request.arguments.end()) {
+        diagnostics.error(
+            failure_code(why.code, "bad-argument"), span_of(given->second, why, sources),
+            "component '" + component.name + "': " + why.text, "",
+            why.help.empty() ? "hal doc " + component.name + " lists its arguments" : why.help);
+        return;
+    }
+    if (is_misspelled(component, request, c.asked, diagnostics)) return;
+    diagnostics.error(failure_code(why.code, "construct-failed"), request.at,
+                      "component '" + component.name + "' cannot make '" + c.instance.name +
+                          "': " + (why.empty() ? "it gave no reason" : why.text),
+                      "", why.help);
+}
+
 // One instance: memory, constructor, declarations into the model.
 bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& request,
                    Sources& sources, Diagnostics& diagnostics, std::unique_ptr<Instance> instance,
@@ -96,22 +117,7 @@ bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& re
     if (!create()) {
         if (c.no_memory) throw std::bad_alloc();
         if (c.said_why && c.failure.empty()) return false;
-        const Failure& why = c.failure;
-        const auto given = why.subject == HAL_SUBJECT_ARGUMENT ? request.arguments.find(why.name)
-                                                               : request.arguments.end();
-        if (given != request.arguments.end()) {
-            diagnostics.error(
-                Code::named(why.code).value_or(Code("bad-argument")),
-                span_of(given->second, why, sources),
-                "component '" + component.name + "': " + why.text, "",
-                why.help.empty() ? "hal doc " + component.name + " lists its arguments" : why.help);
-            return false;
-        }
-        if (is_misspelled(component, request, c.asked, diagnostics)) return false;
-        diagnostics.error(Code::named(why.code).value_or(Code("construct-failed")), request.at,
-                          "component '" + component.name + "' cannot make '" + made.name +
-                              "': " + (why.empty() ? "it gave no reason" : why.text),
-                          "", why.help);
+        report_failure(component, request, sources, c, diagnostics);
         return false;
     }
     made.constructed = true;
@@ -290,81 +296,138 @@ bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, Load
     return true;
 }
 
-bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request,
-               Sources& sources, Diagnostics& diagnostics) {
-    const hal_component& plugin = *component.plugin;
-    const bool singleton = plugin.flags & HAL_COMPONENT_SINGLETON;
-    const std::size_t stride = stride_of(plugin);
-    const auto block = [&](std::size_t count) { return block_of(plugin, count); };
-    bool known = singleton || !request.names.empty() || request.count >= 0;
-    std::size_t total = singleton ? 1
-                        : !request.names.empty()
-                            ? request.names.size()
-                            : static_cast<std::size_t>(std::max<std::int64_t>(request.count, 0));
-    if (singleton && (request.names.size() > 1 || request.count > 1)) {
-        diagnostics.error("bad-argument", request.count_at.known() ? request.count_at : request.at,
-                          "component '" + component.name + "' has one instance only");
-        return false;
-    }
-    std::shared_ptr<void> storage = known ? block(std::max<std::size_t>(total, 1)) : block(1);
-    std::size_t in_block = 0;
-    std::set<std::string> asked;
-    for (std::size_t i = 0; !known || i < total; ++i) {
-        auto instance = std::make_unique<Instance>();
-        instance->component = &component;
-        instance->loaded = request.at;
-        const std::string serial =
-            !request.names.empty() || singleton ? "" : std::to_string(edit.take_number(component));
-        if (!request.names.empty()) {
-            instance->name = request.names[i];
-        } else if (singleton) {
-            instance->name = dashed(component.name);
-        } else {
-            instance->name = dashed(component.name) + "." + serial;
-        }
-        instance->memory = static_cast<char*>(storage.get()) + in_block++ * stride;
-        instance->storage = storage;
-        instance->load = component.loads.empty() ? 0 : component.loads.size() - 1;
-        instance->number = i;
-        const std::string personality =
-            request.personalities.empty() ? ""
-                                          : request.personalities[i % request.personalities.size()];
-        Construction c{model, request, *instance, i, personality, {}, {}, {}, {}, 0, {}, {}};
-        c.serial = serial;
-        if (!construct_one(edit, component, request, sources, diagnostics, std::move(instance),
-                           c)) {
+namespace {
+
+/// Makes the instances of one loadrt line. Their number may be known only when the first one has
+/// declared its arguments.
+class InstanceRow {
+public:
+    InstanceRow(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request,
+                Sources& sources, Diagnostics& diagnostics)
+        : model_(model),
+          edit_(edit),
+          component_(component),
+          request_(request),
+          sources_(sources),
+          diagnostics_(diagnostics),
+          plugin_(*component.plugin),
+          singleton_(plugin_.flags & HAL_COMPONENT_SINGLETON) {}
+
+    /// False after reporting.
+    bool make() {
+        if (singleton_ && (request_.names.size() > 1 || request_.count > 1)) {
+            diagnostics_.error("bad-argument",
+                               request_.count_at.known() ? request_.count_at : request_.at,
+                               "component '" + component_.name + "' has one instance only");
             return false;
         }
-        asked.insert(c.asked.begin(), c.asked.end());
-        if (i == 0) {
-            if (!all_known(component, request, c.asked, diagnostics)) return false;
-            if (!known) {
-                known = true;
-                total = c.declared_count > 0 ? c.declared_count
-                        : c.list_length > 0  ? c.list_length
-                                             : plugin.default_count;
-                if (total > 1) {
-                    storage = block(total - 1);
-                }
-                in_block = 0;
-            } else if (const auto list = c.list_length > total
-                                             ? request.arguments.find(*c.lists.begin())
-                                             : request.arguments.end();
-                       // a default may list more values than there are instances
-                       list != request.arguments.end()) {
-                diagnostics.error("bad-argument", list->second.at,
-                                  "argument '" + list->first + "' lists " +
-                                      std::to_string(c.list_length) + " values for " +
-                                      std::to_string(total) +
-                                      (total == 1 ? " instance" : " instances"));
+        const std::optional<std::size_t> given = given_count();
+        new_block(std::max<std::size_t>(given.value_or(1), 1));
+        std::optional<std::size_t> total = given;
+        for (std::size_t i = 0; !total || i < *total; ++i) {
+            auto instance = new_instance(i);
+            const std::string serial = name(*instance, i);
+            const std::string personality = personality_of(i);
+            Construction c{model_, request_, *instance, i, personality, {}, {}, {}, {}, 0, {}, {}};
+            c.serial = serial;
+            if (!construct_one(edit_, component_, request_, sources_, diagnostics_,
+                               std::move(instance), c)) {
                 return false;
             }
-            if (total > 1) {
-                make_room(model, *component.instances.back(), total - 1);
+            if (i > 0) continue;
+            if (!all_known(component_, request_, c.asked, diagnostics_)) return false;
+            if (given && !fits_lists(c, *given)) return false;
+            if (!total) {
+                total = declared_count(c);
+            }
+            if (*total > 1) {
+                if (!given) {
+                    new_block(*total - 1);
+                }
+                make_room(model_, *component_.instances.back(), *total - 1);
             }
         }
+        return true;
     }
-    return true;
+
+private:
+    /// Returns the number that the line gives, or nothing.
+    std::optional<std::size_t> given_count() const {
+        if (singleton_) return 1;
+        if (!request_.names.empty()) return request_.names.size();
+        if (request_.count < 0) return std::nullopt;
+        return static_cast<std::size_t>(request_.count);
+    }
+
+    std::size_t declared_count(const Construction& first) const {
+        if (first.declared_count > 0) return first.declared_count;
+        return first.list_length > 0 ? first.list_length : plugin_.default_count;
+    }
+
+    void new_block(std::size_t count) {
+        storage_ = block_of(plugin_, count);
+        in_block_ = 0;
+    }
+
+    std::unique_ptr<Instance> new_instance(std::size_t i) {
+        auto instance = std::make_unique<Instance>();
+        instance->component = &component_;
+        instance->loaded = request_.at;
+        instance->memory = static_cast<char*>(storage_.get()) + in_block_++ * stride_of(plugin_);
+        instance->storage = storage_;
+        instance->load = component_.loads.empty() ? 0 : component_.loads.size() - 1;
+        instance->number = i;
+        return instance;
+    }
+
+    /// Names the instance. Returns its serial number, "" when its name has none.
+    std::string name(Instance& instance, std::size_t i) {
+        if (!request_.names.empty()) {
+            instance.name = request_.names[i];
+            return "";
+        }
+        instance.name = dashed(component_.name);
+        if (singleton_) return "";
+        const std::string serial = std::to_string(edit_.take_number(component_));
+        instance.name += "." + serial;
+        return serial;
+    }
+
+    std::string personality_of(std::size_t i) const {
+        if (request_.personalities.empty()) return "";
+        return request_.personalities[i % request_.personalities.size()];
+    }
+
+    /// False after reporting an argument that lists more values than there are instances; a default
+    /// may.
+    bool fits_lists(const Construction& first, std::size_t total) {
+        if (first.list_length <= total) return true;
+        const auto list = request_.arguments.find(*first.lists.begin());
+        if (list == request_.arguments.end()) return true;
+        diagnostics_.error("bad-argument", list->second.at,
+                           "argument '" + list->first + "' lists " +
+                               std::to_string(first.list_length) + " values for " +
+                               std::to_string(total) + (total == 1 ? " instance" : " instances"));
+        return false;
+    }
+
+    Model& model_;
+    Edit& edit_;
+    LoadedComponent& component_;
+    const LoadRequest& request_;
+    Sources& sources_;
+    Diagnostics& diagnostics_;
+    const hal_component& plugin_;
+    bool singleton_;
+    std::shared_ptr<void> storage_;  // cleared, for the instances from in_block_ on
+    std::size_t in_block_ = 0;
+};
+
+}  // namespace
+
+bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request,
+               Sources& sources, Diagnostics& diagnostics) {
+    return InstanceRow(model, edit, component, request, sources, diagnostics).make();
 }
 
 }  // namespace hal

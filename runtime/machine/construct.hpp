@@ -59,6 +59,9 @@ struct Failure {
 /// Throws std::bad_alloc.
 Failure copy_of(const hal_rejection& rejection);
 
+/// Returns the code that the component gives; `usual` when it gives none, or one that is unknown.
+Code failure_code(std::string_view given, Code usual);
+
 /// Makes the instances of one loadrt line. False after reporting. Constructs only; start() comes
 /// with the commit. `sources` takes the texts that components find something wrong in.
 bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request,

@@ -98,8 +98,7 @@ bool take_function(const hal_host* host, const hal_function_decl* decl) {
     }
     c.functions.push_back({std::move(full), decl->doc ? decl->doc : "", decl->step,
                            decl->size >= sizeof *decl ? decl->row : nullptr, decl->self,
-                           decl->identity, shared,
-                           (decl->flags & HAL_FUNCTION_REQUIRED) != 0});
+                           decl->identity, shared, (decl->flags & HAL_FUNCTION_REQUIRED) != 0});
     return true;
 }
 
@@ -177,6 +176,11 @@ const void* extension_of(const hal_host* host, const char* id) {
 }
 
 }  // namespace
+
+Code failure_code(std::string_view given, Code usual) {
+    const std::optional<Code> known = Code::named(given);
+    return known.value_or(usual);
+}
 
 Failure copy_of(const hal_rejection& rejection) {
     const auto text = [](const char* t) { return t ? t : ""; };

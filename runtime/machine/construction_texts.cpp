@@ -65,7 +65,7 @@ void report_in_text(const hal_host* host, const hal_text_message* message) {
                                   : message->severity == HAL_SEVERITY_WARNING ? Severity::warning
                                                                               : Severity::note;
         Diagnostic d{severity,
-                     Code::named(message->code).value_or(Code("construct-failed")),
+                     failure_code(message->code, "construct-failed"),
                      message->sentence,
                      {{{c.text_source, begin, end}, message->label}}};
         if (*message->help) {

@@ -60,7 +60,7 @@ const char* signal_text(int signal) noexcept {
 void name_function(const Core* core, std::uint32_t id) noexcept {
     for (const auto& one : watched) {
         const SessionState* const state = one.load();
-        if (!state || std::none_of(state->cores.begin(), state->cores.end(),
+        if (!state || std::none_of(state->threads.cores().begin(), state->threads.cores().end(),
                                    [&](const auto& pair) { return pair.second == core; })) {
             continue;
         }
@@ -233,9 +233,9 @@ CycleNames names_of(const CycleNow& now) {
     for (const auto& one : watched) {
         const SessionState* const state = one.load();
         if (!state) continue;
-        const auto of = std::find_if(state->cores.begin(), state->cores.end(),
+        const auto of = std::find_if(state->threads.cores().begin(), state->threads.cores().end(),
                                      [&](const auto& pair) { return pair.second == now.core; });
-        if (of == state->cores.end()) continue;
+        if (of == state->threads.cores().end()) continue;
         names.thread = of->first->name;
         for (const auto& component : state->model.components) {
             for (const auto& function : component->functions) {

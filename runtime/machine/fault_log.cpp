@@ -86,6 +86,11 @@ std::string limit_of(const Thread& thread) {
            format_duration(static_cast<double>(thread.options.supervision_limit_ns())) + ")";
 }
 
+std::string process_gap_text(std::int64_t gap_ns) {
+    return "the process got no CPU time for " + format_duration(static_cast<double>(gap_ns)) +
+           " (stopped by a signal or a debugger, or the host was busy)";
+}
+
 constexpr const char* stopped_and_safe =
     "; the thread's functions are stopped and its outputs were set to their safe values; see: show "
     "thread ";
@@ -105,77 +110,88 @@ std::string starved_text(const Thread& thread, std::int64_t starved_ns, int cpu,
     return text;
 }
 
+FaultMessage exception_message(const Model& model, const Thread& thread, const FaultEvent& event,
+                               const std::string& at) {
+    const LoadedFunction* const function = function_with_id(model, event.subject);
+    const std::string who = function ? function_text(*function) : "a function";
+    return {"exception", thread.name + ": " + who + " threw an exception" + at +
+                             "; the thread's functions are stopped and its outputs were set to "
+                             "their safe values; see: show thread, start"};
+}
+
+FaultMessage not_finite_message(const Model& model, const Thread& thread, const FaultEvent& event,
+                                const std::string& at) {
+    std::string who = "a pin", safe = "0", see;
+    if (const Pin* const pin = pin_with_id(model, event.subject)) {
+        who = "pin '" + pin->name + "' (" + pin->instance->component->name + ")";
+        safe = format_value(HAL_TYPE_FLOAT, pin->safe);
+        see = "; see: show pin " + pin->instance->name;
+    }
+    const std::string value = format_value(HAL_TYPE_FLOAT, hal_value{.real = event.value});
+    return {"not-finite",
+            thread.name + ": " + who + " became " + value + at + "; it was set to " + safe + see};
+}
+
+FaultMessage budget_message(const Model& model, const Thread& thread, const FaultEvent& event,
+                            const std::string& at) {
+    const std::int64_t budget = thread.options.budget_ns;
+    const std::int64_t took = static_cast<std::int64_t>(event.value);
+    const bool over_budget = budget > 0 && took > budget;
+    const std::string why = over_budget
+                                ? "budget " + format_duration(static_cast<double>(budget))
+                                : std::to_string(took / thread.options.period_ns) + " periods";
+    return {over_budget ? FaultCode("budget") : FaultCode("overrun"),
+            thread.name + ": the cycle took " + format_duration(event.value) + " (" + why + ")" +
+                in_function(model, event.subject) + at + "; see: show timing " + thread.name};
+}
+
+FaultMessage silent_message(const Model& model, const Thread& thread, const FaultEvent& event,
+                            const Absence& absence, const std::string& at) {
+    if (absence.process_ns == 0 && absence.starved_ns > 0) {
+        return {"starved-thread", starved_text(thread, absence.starved_ns, absence.cpu, at, "")};
+    }
+    std::string what = "no cycle for " + format_duration(event.value);
+    if (event.subject != 0) {
+        what = "the cycle took " + format_duration(event.value) + in_function(model, event.subject);
+    } else if (absence.process_ns > 0) {
+        what = process_gap_text(absence.process_ns);
+    }
+    return {"hung-thread", thread.name + ": " + what + limit_of(thread) + at + stopped_and_safe +
+                               thread.name + ", start"};
+}
+
+/// "what happened {}; what was done": the number where the braces are, in {x} hexadecimal, the
+/// cycle before the semicolon.
+FaultMessage component_message(const Model& model, const Thread& thread, const FaultEvent& event,
+                               const std::string& at) {
+    std::string what = event.reason ? event.reason : "a fault", done;
+    if (const auto semicolon = what.find(';'); semicolon != std::string::npos) {
+        done = what.substr(semicolon);
+        what.resize(semicolon);
+    }
+    const std::string number = format_value(HAL_TYPE_FLOAT, hal_value{.real = event.value});
+    if (const auto braces = what.find("{}"); braces != std::string::npos) {
+        what.replace(braces, 2, number);
+    } else if (const auto code = what.find("{x}"); code != std::string::npos) {
+        what.replace(code, 3, hexadecimal(event.value));
+    } else if (!std::isnan(event.value)) {
+        what += " (" + number + ")";
+    }
+    const Instance* const instance = instance_at(model, event.self);
+    if (!instance) return {"component", thread.name + ": " + what + at + done};
+    return {"component",
+            instance->name + ": " + what + at + done + "; see: show pin " + instance->name};
+}
+
 FaultMessage message_of(const Model& model, const Thread& thread, const FaultEvent& event,
                         const Absence& absence) {
     const std::string at = " at cycle " + grouped(event.cycle);
     switch (event.code) {
-    case HAL_FAULT_EXCEPTION: {
-        const LoadedFunction* const function = function_with_id(model, event.subject);
-        const std::string who =
-            function ? "function '" + function->name + "' (" + function->component->name + ")"
-                     : "a function";
-        return {"exception", thread.name + ": " + who + " threw an exception" + at +
-                                 "; the thread's functions are stopped and its outputs were set to "
-                                 "their safe values; see: show thread, start"};
-    }
-    case HAL_FAULT_NOT_FINITE: {
-        const Pin* const pin = pin_with_id(model, event.subject);
-        const std::string who =
-            pin ? "pin '" + pin->name + "' (" + pin->instance->component->name + ")" : "a pin";
-        const std::string to = pin ? format_value(HAL_TYPE_FLOAT, pin->safe) : "0";
-        return {"not-finite", thread.name + ": " + who + " became " +
-                                  format_value(HAL_TYPE_FLOAT, hal_value{.real = event.value}) +
-                                  at + "; it was set to " + to +
-                                  (pin ? "; see: show pin " + pin->instance->name : "")};
-    }
-    case HAL_FAULT_BUDGET: {
-        const std::int64_t budget = thread.options.budget_ns;
-
-        const std::int64_t took = static_cast<std::int64_t>(event.value);
-        const bool over_budget = budget > 0 && took > budget;
-        const std::string why = over_budget
-                                    ? "budget " + format_duration(static_cast<double>(budget))
-                                    : std::to_string(took / thread.options.period_ns) + " periods";
-        return {over_budget ? FaultCode("budget") : FaultCode("overrun"),
-                thread.name + ": the cycle took " + format_duration(event.value) + " (" + why +
-                    ")" + in_function(model, event.subject) + at + "; see: show timing " +
-                    thread.name};
-    }
-    case HAL_FAULT_SILENT_THREAD:
-        if (absence.process_ns == 0 && absence.starved_ns > 0) {
-            return {"starved-thread",
-                    starved_text(thread, absence.starved_ns, absence.cpu, at, "")};
-        }
-        return {"hung-thread",
-                thread.name + ": " +
-                    (event.subject != 0 ? "the cycle took " + format_duration(event.value) +
-                                              in_function(model, event.subject)
-                     : absence.process_ns > 0
-                         ? "the process got no CPU time for " +
-                               format_duration(static_cast<double>(absence.process_ns)) +
-                               " (stopped by a signal or a debugger, or the host was busy)"
-                         : "no cycle for " + format_duration(event.value)) +
-                    limit_of(thread) + at + stopped_and_safe + thread.name + ", start"};
-    case HAL_FAULT_COMPONENT: {
-        const Instance* const instance = instance_at(model, event.self);
-        // "what happened {}; what was done": the number where the braces are, in {x} hexadecimal,
-        // the cycle before the semicolon
-        std::string what = event.reason ? event.reason : "a fault", done;
-        const std::string number = format_value(HAL_TYPE_FLOAT, hal_value{.real = event.value});
-        if (const auto semicolon = what.find(';'); semicolon != std::string::npos) {
-            done = what.substr(semicolon);
-            what.resize(semicolon);
-        }
-        if (const auto braces = what.find("{}"); braces != std::string::npos) {
-            what.replace(braces, 2, number);
-        } else if (const auto code = what.find("{x}"); code != std::string::npos) {
-            what.replace(code, 3, hexadecimal(event.value));
-        } else if (!std::isnan(event.value)) {
-            what += " (" + number + ")";
-        }
-        return {"component", (instance ? instance->name + ": " : thread.name + ": ") + what + at +
-                                 done + (instance ? "; see: show pin " + instance->name : "")};
-    }
+    case HAL_FAULT_EXCEPTION: return exception_message(model, thread, event, at);
+    case HAL_FAULT_NOT_FINITE: return not_finite_message(model, thread, event, at);
+    case HAL_FAULT_BUDGET: return budget_message(model, thread, event, at);
+    case HAL_FAULT_SILENT_THREAD: return silent_message(model, thread, event, absence, at);
+    case HAL_FAULT_COMPONENT: return component_message(model, thread, event, at);
     case HAL_FAULT_NONE: break;
     }
     return {"component", thread.name + ": a fault" + at};
@@ -189,61 +205,60 @@ std::string kind_of(const Thread& thread, const FaultEvent& event) {
            self + (event.reason ? event.reason : "");
 }
 
-/// What kept the thread from ending its cycle, beginning with its name.
-std::string message_of(const SessionState& s, const Thread& thread, const Stall& stall) {
-    const auto name_of = [&](std::uint32_t id) -> std::string {
-        for (const auto& [one, core] : s.cores) {
-            if (core->id() == id) return "'" + one->name + "'";
-        }
-        return "a thread that is gone";
-    };
-    if (stall.cause == Stall::Cause::starved) {
-        return starved_text(thread, stall.silent_ns, stall.cpu, " at cycle " + grouped(stall.cycle),
-                            stall.occupant != 0 ? name_of(stall.occupant) : "");
+/// "'servo'", or what to call a thread that has ended since.
+std::string name_of_thread(const SessionState& s, std::uint32_t id) {
+    for (const auto& [thread, core] : s.threads.cores()) {
+        if (core->id() == id) return "'" + thread->name + "'";
     }
-    const std::string silent = format_duration(static_cast<double>(stall.silent_ns));
-    const LoadedFunction* const function =
-        stall.function != 0 ? function_with_id(s.model, stall.function) : nullptr;
-    std::string text = thread.name + ": ";
-    using enum Stall::Cause;
+    return "a thread that is gone";
+}
+
+/// What a thread does instead of ending its cycle.
+std::string activity(const Stall& stall) {
     switch (stall.cause) {
-    case process:
-        text += "the process got no CPU time for " + silent +
-                " (stopped by a signal or a debugger, or the host was busy)";
-        break;
-    case suspended: text += "the host was suspended for " + silent; break;
-    case busy:
-    case waiting:
-    case stopped:
-    case starved:  // is another message
-        text += (function ? function_text(*function) + " has not returned, no cycle ended for "
-                          : "no cycle ended for ") +
-                silent;
-        if (stall.cause == busy) {
-            text += ", it uses CPU time (a long computation or an endless loop)";
-        } else if (stall.cause == waiting) {
-            text += ", it waits in a system call";
-        } else if (stall.tracer != 0) {
-            text += ", stopped by the debugger with process ID " + std::to_string(stall.tracer);
-        } else {
-            text += std::string(", stopped by a signal");
-        }
-        break;
+    case Stall::Cause::busy: return "it uses CPU time (a long computation or an endless loop)";
+    case Stall::Cause::waiting: return "it waits in a system call";
+    default: break;
     }
-    text += limit_of(thread) + " at cycle " + grouped(stall.cycle);
-    text += "; the thread's functions are stopped and its outputs were set to their safe values";
-    if (stall.starved_count != 0) {
-        text += stall.starved_count == 1 ? "; thread " : "; threads ";
-        for (std::uint32_t i = 0; i < stall.starved_count; ++i) {
-            text += (i == 0 ? "" : ", ") + name_of(stall.starved[i]);
-        }
-        text += std::string(" got no CPU time beside it") +
-                (stall.demoted ? " until its real-time priority was taken away"
-                               : ", nor get any now: its priority could not be taken away");
-    } else if (stall.demoted) {
-        text += "; its real-time priority was taken away";
+    if (stall.tracer == 0) return "stopped by a signal";
+    return "stopped by the debugger with process ID " + std::to_string(stall.tracer);
+}
+
+/// What kept the thread from ending its cycle.
+std::string cause_text(const Model& model, const Stall& stall) {
+    if (stall.cause == Stall::Cause::process) return process_gap_text(stall.silent_ns);
+    const std::string silent = format_duration(static_cast<double>(stall.silent_ns));
+    if (stall.cause == Stall::Cause::suspended) return "the host was suspended for " + silent;
+    const LoadedFunction* const function =
+        stall.function != 0 ? function_with_id(model, stall.function) : nullptr;
+    const std::string who = function ? function_text(*function) + " has not returned, " : "";
+    return who + "no cycle ended for " + silent + ", " + activity(stall);
+}
+
+/// What it means for other threads, and what was done about it.
+std::string effect_text(const SessionState& s, const Stall& stall) {
+    if (stall.starved_count == 0) {
+        return stall.demoted ? "; its real-time priority was taken away" : "";
     }
-    return text + "; see: show thread " + thread.name;
+    std::string text = stall.starved_count == 1 ? "; thread " : "; threads ";
+    for (std::uint32_t i = 0; i < stall.starved_count; ++i) {
+        text += (i == 0 ? "" : ", ") + name_of_thread(s, stall.starved[i]);
+    }
+    text += " got no CPU time beside it";
+    return text + (stall.demoted ? " until its real-time priority was taken away"
+                                 : ", nor get any now: its priority could not be taken away");
+}
+
+/// The message of a stall, beginning with the name of the thread.
+std::string message_of(const SessionState& s, const Thread& thread, const Stall& stall) {
+    const std::string at = " at cycle " + grouped(stall.cycle);
+    if (stall.cause == Stall::Cause::starved) {
+        const std::string user = stall.occupant != 0 ? name_of_thread(s, stall.occupant) : "";
+        return starved_text(thread, stall.silent_ns, stall.cpu, at, user);
+    }
+    return thread.name + ": " + cause_text(s.model, stall) + limit_of(thread) + at +
+           "; the thread's functions are stopped and its outputs were set to their safe values" +
+           effect_text(s, stall) + "; see: show thread " + thread.name;
 }
 
 }  // namespace
@@ -263,7 +278,7 @@ void FaultLog::collect() {
 }
 
 void FaultLog::collect(const Thread& thread) {
-    Core* const from = state_.core(&thread);
+    Core* const from = state_.threads.core(&thread);
     if (!from) return;
     collect_stalls();
     for (FaultEvent event; from->next_fault(event);) {
@@ -316,9 +331,9 @@ Absence FaultLog::absence_of(const FaultEvent& event, const Core& core) const {
 void FaultLog::collect_stalls() {
     for (Stall stall; state_.executor->supervisor().next(stall);) {
         const auto of =
-            std::find_if(state_.cores.begin(), state_.cores.end(),
+            std::find_if(state_.threads.cores().begin(), state_.threads.cores().end(),
                          [&](const auto& one) { return one.second->id() == stall.thread; });
-        if (of == state_.cores.end()) {
+        if (of == state_.threads.cores().end()) {
             continue;  // the thread has ended since
         }
         FaultRecord record;

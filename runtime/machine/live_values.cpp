@@ -19,17 +19,16 @@ struct Source {
 Source source(const SessionState& s, const Pin& pin);
 
 Source source(const SessionState& s, const Signal& signal) {
-    if (s.edit) {
-        if (const auto set = s.edit->signal_values.find(&signal);
-            set != s.edit->signal_values.end()) {
+    if (const Edit* const edit = s.transaction.edit()) {
+        if (const auto set = edit->signal_values.find(&signal); set != edit->signal_values.end()) {
             return {&set->second, nullptr};
         }
-        if (const auto from = s.edit->inherited.find(&signal); from != s.edit->inherited.end()) {
-            const auto own = s.edit->pin_values.find(from->second);
-            if (own != s.edit->pin_values.end()) {
+        if (const auto from = edit->inherited.find(&signal); from != edit->inherited.end()) {
+            const auto own = edit->pin_values.find(from->second);
+            if (own != edit->pin_values.end()) {
                 return {&own->second, nullptr};
             }
-            return {s.edit->present(*from->second).slot, from->second->home, true};
+            return {edit->present(*from->second).slot, from->second->home, true};
         }
     }
     if (signal.cell || !signal.home) {
@@ -40,13 +39,14 @@ Source source(const SessionState& s, const Signal& signal) {
 
 Source source(const SessionState& s, const Pin& pin) {
     if (pin.signal) return source(s, *pin.signal);
-    if (!s.edit) {
+    const Edit* const edit = s.transaction.edit();
+    if (!edit) {
         return {pin.memory->slot, pin.home, true};
     }
-    if (const auto own = s.edit->pin_values.find(&pin); own != s.edit->pin_values.end()) {
+    if (const auto own = edit->pin_values.find(&pin); own != edit->pin_values.end()) {
         return {&own->second, nullptr};
     }
-    return {s.edit->present(pin).slot, pin.home, true};
+    return {edit->present(pin).slot, pin.home, true};
 }
 
 // `together`: all values of one thread are of one cycle.
@@ -56,13 +56,13 @@ std::vector<hal_value> read_all(SessionState& s, const std::vector<Source>& sour
         std::vector<const hal_value*> from;
         std::vector<std::size_t> at;
         std::vector<hal_value> to;
-        Observation wish;
+        Observation request;
     };
     std::vector<hal_value> values(sources.size());
     std::map<Core*, Group> groups;
     for (std::size_t i = 0; i < sources.size(); ++i) {
         const Source from = sources[i];
-        Core* const core = from.owner ? s.core(from.owner) : nullptr;
+        Core* const core = from.owner ? s.threads.core(from.owner) : nullptr;
         // a single value is coherent with itself: no need to wait for the thread, unless it has
         // news of it in its queue
         const bool alone = !together || sources.size() == 1;
@@ -73,19 +73,19 @@ std::vector<hal_value> read_all(SessionState& s, const std::vector<Source>& sour
         groups[core].from.push_back(from.from);
         groups[core].at.push_back(i);
     }
-    std::vector<std::pair<Core*, Observation*>> wishes;
+    std::vector<std::pair<Core*, Observation*>> requests;
     for (auto& [core, group] : groups) {
         group.to.resize(group.from.size());
-        group.wish.from = group.from.data();
-        group.wish.to = group.to.data();
-        group.wish.count = group.from.size();
-        wishes.emplace_back(core, &group.wish);
+        group.request.from = group.from.data();
+        group.request.to = group.to.data();
+        group.request.count = group.from.size();
+        requests.emplace_back(core, &group.request);
     }
-    if (!wishes.empty()) {
-        s.executor->observe(wishes, answer_timeout_ns);
+    if (!requests.empty()) {
+        s.executor->observe(requests, answer_timeout_ns);
     }
     for (auto& [core, group] : groups) {
-        const bool answered = group.wish.done.load();
+        const bool answered = group.request.done.load();
         for (std::size_t k = 0; k < group.at.size(); ++k) {
             if (answered) {
                 values[group.at[k]] = group.to[k];
@@ -152,7 +152,7 @@ void LiveValues::write(const std::vector<std::pair<Pin*, hal_value>>& values) {
     const auto flush = [&] {
         Diagnostics ignored;  // a thread that hangs is found by every edit; it takes no values
         if (!row.empty()) {
-            state_.write_values({}, row, ignored);
+            state_.threads.write({}, row, ignored);
         }
         row.clear();
     };

@@ -272,8 +272,8 @@ void Probes::detach(const std::shared_ptr<LiveProbe>& probe) {
 // Between two plans: each thread takes a new set of probes.
 void Probes::offer() {
     std::unordered_map<const Thread*, std::unique_ptr<plan::ProbeSet>> sets;
-    for (const auto& [thread, plan] : state_.plans) {
-        if (!plan || !state_.core(thread)) continue;
+    for (const auto& [thread, plan] : state_.threads.plans()) {
+        if (!plan || !state_.threads.core(thread)) continue;
         auto set = std::make_unique<plan::ProbeSet>();
         set->epoch = ++epoch_;
         sets[thread] = std::move(set);
@@ -290,15 +290,16 @@ void Probes::offer() {
     }
     std::vector<std::pair<Core*, plan::ProbeSet*>> offers;
     for (const auto& [thread, set] : sets) {
-        if (!set->probes.empty() || state_.plans.at(thread)->probes) {
-            offers.emplace_back(state_.core(thread), set.get());
+        if (!set->probes.empty() || state_.threads.plans().at(thread)->probes) {
+            offers.emplace_back(state_.threads.core(thread), set.get());
         }
     }
     const std::vector<Core*> silent = state_.executor->swap(offers, answer_timeout_ns);
     for (auto& [thread, set] : sets) {
         // it hangs and keeps the old one
-        if (std::find(silent.begin(), silent.end(), state_.core(thread)) != silent.end()) continue;
-        auto& kept = state_.plans.at(thread)->probes;
+        if (std::find(silent.begin(), silent.end(), state_.threads.core(thread)) != silent.end())
+            continue;
+        auto& kept = state_.threads.plans().at(thread)->probes;
         if (!set->probes.empty()) {
             kept = std::move(set);
         } else if (kept) {

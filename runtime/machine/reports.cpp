@@ -66,7 +66,7 @@ ThreadReport Reports::thread(const Thread& thread) const {
     ThreadReport report;
     report.name = thread.name;
     report.period_ns = thread.options.period_ns;
-    const Core* const core = s.core(&thread);
+    const Core* const core = s.threads.core(&thread);
     if (!core) return report;
     report.cycles = core->cycles.load();
     report.missed = core->missed_by(monotonic_ns());
@@ -103,7 +103,7 @@ ThreadReport Reports::thread(const Thread& thread) const {
 
 ThreadHistograms Reports::histograms(const Thread& thread) const {
     ThreadHistograms histograms;
-    const Core* const core = state_.core(&thread);
+    const Core* const core = state_.threads.core(&thread);
     if (!core) return histograms;
     const auto copy = [](const Histogram& from, std::vector<std::uint64_t>& to) {
         for (std::size_t i = 0; i < Histogram::buckets; ++i) {
@@ -138,7 +138,7 @@ std::vector<std::string> Reports::missing_privileges() const {
     const SessionState& s = state_;
     std::vector<std::string> missing;
     std::string what, effect;
-    for (const auto& [thread, core] : s.cores) {
+    for (const auto& [thread, core] : s.threads.cores()) {
         if (s.executor->granted(*core).refused) {
             what = "real-time scheduling";
             effect = "threads are late under load";
@@ -152,7 +152,8 @@ std::vector<std::string> Reports::missing_privileges() const {
         missing.push_back("no " + what + " here: " + effect + "; grant it with: " +
                           grant_command() + " (or by limits of a group: hal doctor)");
     }
-    if (!s.cores.empty() && !s.options.virtual_clock && !s.executor->supervisor().has_own_cpu()) {
+    if (!s.threads.cores().empty() && !s.options.virtual_clock &&
+        !s.executor->supervisor().has_own_cpu()) {
         missing.push_back(
             "the threads use every CPU: their supervisor interrupts them every " +
             format_duration(static_cast<double>(s.executor->supervisor().interval_ns())) +

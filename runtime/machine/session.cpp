@@ -27,6 +27,26 @@ SessionState::SessionState(SessionOptions o)
 
 SessionState::~SessionState() = default;
 
+void SessionState::offer_names(Diagnostics& diagnostics) {
+    try {
+        diagnostics.offer([this](std::uint32_t group) {
+            return names.get(model, static_cast<NameGroup>(group), ending);
+        });
+    } catch (const std::bad_alloc&) {  // then no names are offered
+    }
+}
+
+Failure SessionState::start(Instance& instance) {
+    return start_instance(instance, model, *executor, status, journal.for_plugins());
+}
+
+void end_conditions(Executor& executor, const Instance& instance) {
+    const auto* const first = static_cast<const char*>(instance.memory);
+    const std::size_t size =
+        instance.component->plugin ? instance.component->plugin->instance_size : 0;
+    executor.board().end_all(first, first + size);
+}
+
 namespace {
 
 /// hal_status::text; its data is the Session.
@@ -67,7 +87,7 @@ Session::~Session() {
     programs_.reset();
     shut_down();
     end_watch_for_crashes(state_.get());
-    if (state_->abandoned) {
+    if (state_->life == SessionState::Life::abandoned) {
         keep_for_good(std::move(state_));
     } else if (ending()) {
         // The process ends: the kernel frees a hundred thousand objects at once.
@@ -85,16 +105,14 @@ Traces& Session::traces() { return state_->traces; }
 Absences& Session::absences() { return state_->absences; }
 
 Transaction Session::begin() {
-    if (state_->open) throw std::logic_error("a transaction is open already");
-    state_->open = true;
-    state_->commands = 0;
+    state_->transaction.begin();
     return Transaction(*this);
 }
 
 void Session::offer_names(Diagnostics& diagnostics) { state_->offer_names(diagnostics); }
 
 void Session::sweep_texts() noexcept {
-    if (state_->open || state_->options.check_only || !sources.worth_sweeping()) return;
+    if (in_transaction() || state_->options.check_only || !sources.worth_sweeping()) return;
     try {
         std::vector<bool> in_use;
         state_->model.sweep(in_use);
@@ -108,50 +126,41 @@ void Session::sweep_texts() noexcept {
     }
 }
 
-bool Session::in_transaction() const { return state_->open; }
+bool Session::in_transaction() const { return state_->transaction.is_open(); }
 void Session::when_committed(std::function<void()> action) {
-    if (state_->open) {
-        state_->when_committed.push_back(std::move(action));
+    if (in_transaction()) {
+        state_->transaction.when_committed(std::move(action));
     }
 }
 
-void Session::shut_down() {
-    SessionState& s = *state_;
-    if (s.shut) return;
-    s.shut = true;
-    s.when_committed.clear();
-    s.needs_threads = false;
-    if (s.edit) {
-        s.withdraw();
-    }
-    if (s.options.check_only) {
-        for (auto c = s.model.components.rbegin(); c != s.model.components.rend(); ++c) {
-            for (auto i = (*c)->instances.rbegin(); i != (*c)->instances.rend(); ++i) {
-                destroy_instance(**i);
-            }
-        }
-        return;
-    }
-    threads_.stop();
-    bool all_ended = true;
-    for (const auto& [thread, core] : s.cores) {
-        if (s.executor->remove(*core, answer_timeout_ns)) continue;
-        s.executor->abandon(*core);
-        all_ended = false;
-    }
-    // a function that hangs may still use its instance: leave everything as it is, and a watchdog
-    // to its time-out
-    if (!all_ended) {
-        s.abandoned = true;
-        return;
-    }
-    s.cores.clear();
-    threads_.disarm_watchdog();
-    for (auto c = s.model.components.rbegin(); c != s.model.components.rend(); ++c) {
+namespace {
+
+/// Destroys all instances in the reverse order of their creation.
+void destroy_instances(const Model& model) {
+    for (auto c = model.components.rbegin(); c != model.components.rend(); ++c) {
         for (auto i = (*c)->instances.rbegin(); i != (*c)->instances.rend(); ++i) {
             destroy_instance(**i);
         }
     }
+}
+
+}  // namespace
+
+void Session::shut_down() {
+    SessionState& s = *state_;
+    if (s.life != SessionState::Life::running) return;
+    s.life = SessionState::Life::shut;
+    s.transaction.abandon();
+    if (s.options.check_only) return destroy_instances(s.model);
+    threads_.stop();
+    // a function that hangs may still use its instance: leave everything as it is, and a watchdog
+    // to its time-out
+    if (!s.threads.end_all()) {
+        s.life = SessionState::Life::abandoned;
+        return;
+    }
+    threads_.disarm_watchdog();
+    destroy_instances(s.model);
 }
 
 }  // namespace hal

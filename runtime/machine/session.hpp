@@ -37,7 +37,7 @@
 
 namespace hal {
 
-struct Programs;
+class Programs;
 struct SessionState;
 
 class ExitObserver;

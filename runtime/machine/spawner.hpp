@@ -19,7 +19,14 @@
 
 namespace hal {
 
-struct ProcessStart;
+struct ProcessStart {
+    std::vector<std::string> arguments;  ///< the program first; looked up in PATH
+    std::string directory;               ///< to run in; empty: this process's
+    /// file descriptors for its stdout and stderr; -1: this process's
+    int out = -1;
+    int err = -1;
+    bool keep_stdin = false;  ///< false: it reads /dev/null
+};
 
 /// Returns the folder of liblinuxcnchal.so.0 (runtime/programs), by which LinuxCNC's programs
 /// connect to us, or "". Its `bin` has our programs under LinuxCNC's names. Both come before

@@ -9,47 +9,18 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include "machine/cpu_occupant.hpp"
 #include "machine/state.hpp"
 
 namespace hal {
-
-bool SessionState::starved_thread(const Thread& thread, const Core& core,
-                                  Diagnostics& diagnostics) const {
-    if (!executor->supervisor().starved(core)) return false;
-    const std::string silent =
-        format_duration(static_cast<double>(monotonic_ns() - core.finished_ns()));
-    const int cpu = executor->granted(core).cpu;
-    diagnostics.error("starved-thread", thread.made,
-                      "thread '" + thread.name + "' is ready to run, but has got no CPU time" +
-                          (cpu >= 0 ? " on CPU " + std::to_string(cpu) : "") + " for " + silent,
-                      core.hung() ? "its outputs are at their safe values" : "",
-                      starvation_help(cpu));
-    return true;
-}
-
-void SessionState::hung_thread(const Thread& thread, const Core& core,
-                               Diagnostics& diagnostics) const {
-    if (starved_thread(thread, core, diagnostics)) return;
-    const std::uint32_t id = core.hung_function();
-    const LoadedFunction* const function = id != 0 ? function_with_id(model, id) : nullptr;
-    const std::string silent =
-        format_duration(static_cast<double>(monotonic_ns() - core.finished_ns()));
-    diagnostics.error("hung-thread", thread.made,
-                      "thread '" + thread.name + "' has not finished a cycle for " + silent +
-                          (function ? ": " + function_text(*function) + " does not return" : ""),
-                      "its outputs are at their safe values",
-                      "see: show fault; a function that never returns ends only with the process");
-}
 
 bool ThreadControl::start(Diagnostics* diagnostics) {
     SessionState& s = state_;
     Diagnostics ignored;
     if (report_hung(diagnostics ? *diagnostics : ignored)) return false;
     bool all = true;
-    for (const auto& [thread, core] : s.cores) {
+    for (const auto& [thread, core] : s.threads.cores()) {
         if (!s.executor->reset(*core)) {
-            s.hung_thread(*thread, *core, diagnostics ? *diagnostics : ignored);
+            s.threads.report_hung(*thread, *core, diagnostics ? *diagnostics : ignored);
             all = false;
         }
     }
@@ -63,8 +34,8 @@ bool ThreadControl::start(Diagnostics* diagnostics) {
 bool ThreadControl::report_hung(Diagnostics& diagnostics) const {
     bool any = false;
     for (const auto& thread : state_.model.threads) {
-        if (const Core* const core = state_.core(thread.get()); core && core->hung()) {
-            state_.hung_thread(*thread, *core, diagnostics);
+        if (const Core* const core = state_.threads.core(thread.get()); core && core->hung()) {
+            state_.threads.report_hung(*thread, *core, diagnostics);
             any = true;
         }
     }
@@ -78,11 +49,11 @@ bool ThreadControl::stop(Diagnostics* diagnostics) {
     s.executor->stop();
     // every thread makes its outputs safe at the end of its next cycle; see it done
     std::deque<Observation> observations;
-    std::vector<std::pair<Core*, Observation*>> wishes;
-    for (const auto& [thread, core] : s.cores) {
-        wishes.emplace_back(core, &observations.emplace_back());
+    std::vector<std::pair<Core*, Observation*>> requests;
+    for (const auto& [thread, core] : s.threads.cores()) {
+        requests.emplace_back(core, &observations.emplace_back());
     }
-    const bool answered = s.executor->observe(wishes, answer_timeout_ns);
+    const bool answered = s.executor->observe(requests, answer_timeout_ns);
     if (report_hung(diagnostics ? *diagnostics : ignored)) return false;
     if (answered) return true;
     if (diagnostics) {  // not supervised, or a long period of supervision
@@ -130,7 +101,7 @@ void ThreadControl::advance_cycles(std::uint64_t cycles) {
     note_functions();
     if (s.model.threads.empty()) return;
     const Thread& fastest = *s.model.threads.front();
-    const Core* const core = s.core(&fastest);
+    const Core* const core = s.threads.core(&fastest);
     const std::uint64_t wanted = core->cycles.load() + cycles;
     if (s.executor->is_virtual()) return s.executor->advance_cycles(*core, cycles);
     s.executor->advance(static_cast<std::int64_t>(cycles) * fastest.options.period_ns);

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "machine/thread_options.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <map>
 #include <optional>
+#include <utility>
 
 namespace hal {
 namespace {
@@ -34,57 +36,88 @@ bool set_period(NewThread& thread, std::string_view text, Span at, Diagnostics& 
     return false;
 }
 
-// cpu=, policy=, priority=, spin=, budget=, supervise=, profile=, fp=; `known` is false for any
-// other key
+// Each of these sets an option of a thread, or returns false for an invalid value.
+
+bool parse_whole(std::string_view text, std::int64_t min, std::int64_t max, int& value) {
+    std::int64_t number = 0;
+    if (!whole(text, number) || number < min || number > max) return false;
+    value = static_cast<int>(number);
+    return true;
+}
+
+bool parse_ns(std::string_view text, std::int64_t& value) {
+    const auto ns = parse_duration_ns(text, 1.0);
+    if (!ns || *ns < 0) return false;
+    value = *ns;
+    return true;
+}
+
+bool parse_fp(std::string_view, ThreadOptions&) { return true; }  // every thread has it
+
+bool parse_cpu(std::string_view text, ThreadOptions& o) {
+    return parse_whole(text, 0, 1023, o.cpu);
+}
+
+bool parse_priority(std::string_view text, ThreadOptions& o) {
+    return parse_whole(text, 1, 99, o.priority);
+}
+
+bool parse_policy(std::string_view text, ThreadOptions& o) {
+    static constexpr std::pair<std::string_view, Policy> names[] = {
+        {"fifo", Policy::fifo}, {"deadline", Policy::deadline}, {"other", Policy::other}};
+    const auto named = std::ranges::find(names, text, &std::pair<std::string_view, Policy>::first);
+    if (named == std::end(names)) return false;
+    o.policy = named->second;
+    return true;
+}
+
+bool parse_spin(std::string_view text, ThreadOptions& o) { return parse_ns(text, o.spin_ns); }
+
+bool parse_budget(std::string_view text, ThreadOptions& o) { return parse_ns(text, o.budget_ns); }
+
+bool parse_supervise(std::string_view text, ThreadOptions& o) {
+    if (text != "off") return parse_ns(text, o.supervise_ns);
+    o.supervise_ns = 0;
+    return true;
+}
+
+bool parse_profile(std::string_view text, ThreadOptions& o) {
+    o.profile_every = text == "every";
+    return o.profile_every || text == "sampled";
+}
+
+struct ThreadOption {
+    const char* key;
+    bool (*parse)(std::string_view value, ThreadOptions& options);
+    const char* help;  ///< for a value that is not valid
+};
+
+constexpr ThreadOption thread_options[] = {
+    {"fp", parse_fp, ""},
+    {"cpu", parse_cpu, "cpu=0 is the first CPU"},
+    {"priority", parse_priority, "SCHED_FIFO priorities are 1 to 99"},
+    {"policy", parse_policy, "policy is fifo, deadline or other"},
+    {"spin", parse_spin, "a time in ns, or with a unit: 20us"},
+    {"budget", parse_budget, "a time in ns, or with a unit: 20us"},
+    {"supervise", parse_supervise, "a time: supervise=200ms, or supervise=off"},
+    {"profile", parse_profile, "profile is sampled or every"},
+};
+
+/// Sets the option of that key. `known` is false, and nothing is reported, for any other key.
 bool set_option(NewThread& thread, std::string_view key, std::string_view value, Span at,
                 Diagnostics& diagnostics, bool& known) {
-    ThreadOptions& o = thread.options;
-    const auto bad = [&](const char* help) {
+    const auto option =
+        std::ranges::find_if(thread_options, [&](const auto& o) { return key == o.key; });
+    known = option != std::end(thread_options);
+    if (!known) return true;
+    if (!option->parse(value, thread.options)) {
         diagnostics.error("bad-argument", at,
                           "'" + std::string(value) + "' is not a value of " + std::string(key), "",
-                          help);
+                          option->help);
         return false;
-    };
-    known = true;
-    std::int64_t number = 0;
-    if (key == "fp") {
-        return true;  // every thread has floating point
     }
-    if (key == "cpu") {
-        if (!whole(value, number) || number < 0 || number > 1023) {
-            return bad("cpu=0 is the first CPU");
-        }
-        o.cpu = static_cast<int>(number);
-    } else if (key == "priority") {
-        if (!whole(value, number) || number < 1 || number > 99) {
-            return bad("SCHED_FIFO priorities are 1 to 99");
-        }
-        o.priority = static_cast<int>(number);
-    } else if (key == "policy") {
-        if (value == "fifo") {
-            o.policy = Policy::fifo;
-        } else if (value == "deadline") {
-            o.policy = Policy::deadline;
-        } else if (value == "other") {
-            o.policy = Policy::other;
-        } else {
-            return bad("policy is fifo, deadline or other");
-        }
-    } else if (key == "spin" || key == "budget") {
-        const auto ns = parse_duration_ns(value, 1.0);
-        if (!ns || *ns < 0) return bad("a time in ns, or with a unit: 20us");
-        (key == "spin" ? o.spin_ns : o.budget_ns) = *ns;
-    } else if (key == "supervise") {
-        const auto ns =
-            value == "off" ? std::optional<std::int64_t>(0) : parse_duration_ns(value, 1.0);
-        if (!ns || *ns < 0) return bad("a time: supervise=200ms, or supervise=off");
-        o.supervise_ns = *ns;
+    if (key == "supervise") {
         thread.supervise_at = at;
-    } else if (key == "profile") {
-        if (value != "every" && value != "sampled") return bad("profile is sampled or every");
-        o.profile_every = value == "every";
-    } else {
-        known = false;
     }
     return true;
 }

@@ -13,7 +13,7 @@ std::string Traces::begin() {
     }
     on_ = true;
     named_.clear();
-    for (const auto& [thread, core] : state_.cores) {
+    for (const auto& [thread, core] : state_.threads.cores()) {
         start(*core);
     }
     return "";
@@ -22,7 +22,7 @@ std::string Traces::begin() {
 void Traces::end() {
     if (!on_) return;
     on_ = false;
-    for (const auto& [thread, core] : state_.cores) {
+    for (const auto& [thread, core] : state_.threads.cores()) {
         core->trace(nullptr);
     }
 }
@@ -43,7 +43,7 @@ TraceBatch Traces::take(std::size_t most) {
     TraceBatch batch;
     if (!on_) return batch;
     for (const auto& owned : state_.model.threads) {
-        Core* const core = state_.core(owned.get());
+        Core* const core = state_.threads.core(owned.get());
         if (!core) continue;
         if (!core->traced()) {
             start(*core);

@@ -3,6 +3,7 @@
 #include <csignal>
 #include <thread>
 
+#include "control/connection.hpp"
 #include "machine.hpp"
 #include "machine/programs.hpp"
 #include "shell_machine.hpp"
@@ -196,6 +197,81 @@ TEST(Process, the_real_clock_is_waited_for_without_the_mutex) {
     machine.shell.cancel();
     waiter.join();
     EXPECT_TRUE(has(machine.err, "[interrupted]")) << machine.err;
+}
+
+/// A child and a connection by which it registers a component with a pin.
+struct Child {
+    explicit Child(ShellMachine& of, bool waited = false) : machine(of) {
+        std::string problem;
+        const auto lock = machine.session.lock();
+        pid = machine.session.programs().start({.arguments = {"sleep", "1000"}, .directory = {}},
+                                               waited, problem);
+        EXPECT_NE(pid, 0) << problem;
+    }
+    void declare(const std::string& name, bool ready = true) {
+        connection = std::make_unique<Connection>(machine.shell, pid);
+        const std::string text = R"({"component":")" + name + R"(","ready":)" +
+                                 (ready ? "true" : "false") +
+                                 R"(,"pins":[{"name":"out","type":"bit","dir":"out"}]})";
+        std::string reply;
+        EXPECT_EQ(connection->handle(text, reply), Connection::Handled::done);
+        EXPECT_TRUE(has(reply, R"("ok":true)")) << reply;
+    }
+    void end() const {
+        kill(pid, SIGKILL);
+        EXPECT_TRUE(eventually([&] {
+            const auto lock = machine.session.lock();
+            const auto* const entry = machine.session.programs().find(pid);
+            return !entry || entry->ended();
+        }));
+    }
+
+    ShellMachine& machine;
+    pid_t pid = 0;
+    std::unique_ptr<Connection> connection;
+};
+
+TEST(Process, that_lost_its_component_registers_another_one) {
+    ShellMachine machine;
+    Child child(machine);
+    child.declare("first");
+    child.connection.reset();
+    EXPECT_TRUE(has(machine.says("show comp first"), " dead since ")) << machine.out;
+    child.declare("second");
+    EXPECT_TRUE(has(machine.says("show comp second"), " ready\n")) << machine.out;
+    EXPECT_EQ(machine.says("list comp"), "second \n");
+}
+
+TEST(Process, status_is_kept_for_the_command_that_waits_after_its_component_is_lost) {
+    ShellMachine machine;
+    Child child(machine, true);
+    child.declare("lost");
+    child.connection.reset();
+    child.end();
+    const auto lock = machine.session.lock();
+    Programs& programs = machine.session.programs();
+    ASSERT_NE(programs.find(child.pid), nullptr);
+    EXPECT_EQ(programs.find(child.pid)->status, 128 + SIGKILL);
+    programs.collect(child.pid);
+    EXPECT_EQ(programs.find(child.pid), nullptr);
+    EXPECT_TRUE(programs.find("lost")->dead());
+}
+
+TEST(Process, whose_start_failed_takes_no_other_program_with_it) {
+    ShellMachine machine;
+    Child failed(machine);
+    failed.declare("failed", false);
+    Child other(machine);
+    other.declare("other");
+    failed.end();
+    {
+        const auto lock = machine.session.lock();
+        Programs& programs = machine.session.programs();
+        ASSERT_TRUE(programs.find("failed")->dead());
+        programs.give_up(*programs.find("failed"));
+    }
+    EXPECT_EQ(machine.says("list comp"), "other \n");
+    EXPECT_TRUE(has(machine.says("show comp other"), " ready\n")) << machine.out;
 }
 
 }  // namespace

@@ -70,7 +70,7 @@ struct World {
             const auto ending = [&] {
                 for (const std::string& name : programs.names()) {
                     if (const auto* const entry = programs.find(name);
-                        entry->stopping && entry->child && !entry->ended) {
+                        entry->stopping && entry->running()) {
                         return true;
                     }
                 }

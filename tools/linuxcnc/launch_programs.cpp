@@ -42,7 +42,7 @@ pid_t Launch::start(const std::string& key, const Words& words, bool terminal) {
 std::optional<int> Launch::ended(pid_t pid) {
     const auto lock = machine_.session.lock();
     const auto* const entry = machine_.session.programs().find(pid);
-    if (entry && !entry->ended) return std::nullopt;
+    if (entry && !entry->ended()) return std::nullopt;
     return entry ? entry->status : 0;
 }
 
@@ -70,7 +70,7 @@ std::vector<pid_t> Launch::servers() {
             if (child.name != "linuxcncsvr") continue;
             // then the machine reaps it
             const auto* const entry = machine_.session.programs().find(child.pid);
-            if (entry ? !entry->ended : !child.ended) {
+            if (entry ? !entry->ended() : !child.ended) {
                 all.push_back(child.pid);
             }
             // its successor may be newer than the list of processes
@@ -97,7 +97,7 @@ std::string Launch::death_of(const std::string& component, const std::string& pr
     const std::string who = component == program
                                 ? fmt::format("'{}'", program)
                                 : fmt::format("'{}' (component {})", program, component);
-    std::string when = entry ? entry->end_report : "";  // "since 12:34:56 (SIGKILL)"
+    std::string when = entry ? entry->death()->report : "";  // "since 12:34:56 (SIGKILL)"
     if (when.starts_with("since ")) {
         when.replace(0, 5, "at");
     }
@@ -263,12 +263,12 @@ void Launch::end_component(const std::string& name) {
         if (!there) return;
         if (attempt == 0) {
             programs.terminate(*there);
-        } else if (there->child && !there->ended) {
+        } else if (there->running()) {
             ::kill(there->pid, SIGKILL);
         }
         const auto until =
             std::chrono::steady_clock::now() + std::chrono::nanoseconds(end_timeout_ns);
-        while ((there = programs.find_number(number)) && there->child && !there->ended &&
+        while ((there = programs.find_number(number)) && there->running() &&
                std::chrono::steady_clock::now() < until) {
             programs.wait(lock, 50ms);
         }
