@@ -2,11 +2,11 @@
 #include "commands/script.hpp"
 
 #include <algorithm>
-#include <cstdlib>
+#include <filesystem>
 #include <utility>
 
 #include "commands/files.hpp"
-#include "netlist/nodes.hpp"
+#include "commands/two_pass.hpp"
 #include "text/quoting.hpp"
 
 namespace hal {
@@ -14,15 +14,31 @@ namespace {
 
 /// Commands that only look at the machine. `save` with a file acts.
 bool only_looks(const CommandRow& row, const Command& command) {
-    return (row.flags & command_query) &&
-           !(row.function.act == command_save && command.args.size() > 1);
+    const bool writes_file = row.function.act == command_save && command.args.size() > 1;
+    return row.is_query() && !writes_file;
+}
+
+/// `hal check` starts no programs: notes which names are theirs.
+void note_program(Absences& absences, const Command& command) {
+    std::vector<std::string> names;
+    std::string program;
+    for (std::size_t i = 0; i < command.args.size(); ++i) {
+        const std::string& word = command.args[i].text;
+        const bool named = word == "-Wn" && i + 1 < command.args.size();
+        if (named) {
+            names.push_back(command.args[++i].text);
+        }
+        if (named || word.starts_with('-')) continue;
+        // Many programs take the name of their component as an argument: pyvcp -c panel panel.xml
+        names.push_back(std::filesystem::path(word).stem().string());
+        if (program.empty()) {
+            program = word;
+        }
+    }
+    absences.note_program(program, names);
 }
 
 }  // namespace
-
-std::string Context::path(const std::string& text) const {
-    return resolve_path(text, options().directory);
-}
 
 Script::Script(Shell& shell, Shell::State& state, Output& output)
     : shell_(shell),
@@ -30,103 +46,32 @@ Script::Script(Shell& shell, Shell::State& state, Output& output)
       session_(state.session),
       output_(output),
       lock_(state.session.lock()),
+      texts_(shell, state),
+      effects_(shell, state, output, lock_),
       collected_before_(state.collected.size()) {}
 
-Script::~Script() {
-    transaction_.reset();
-    Sources& sources = session_.sources;
-    for (const std::uint32_t text : texts_) {
-        sources.release(text);
-        if (!text_is_kept_ && !shell_.options.check) {
-            sources.drop(text);
-        }
-    }
-    session_.sweep_texts();
-}
-
-std::uint32_t Script::add_text(std::string name, std::string text, std::uint32_t first_line) {
-    texts_.reserve(texts_.size() + 1);
-    const std::uint32_t source = session_.sources.add(std::move(name), std::move(text), first_line);
-    session_.sources.hold(source);
-    texts_.push_back(source);
-    return source;
-}
-
-std::string Script::own_path(std::uint32_t source) const {
-    const std::string& name = session_.sources.get(source).name;
-    return name.starts_with('<') ? ""
-                                 : canonical_path(resolve_path(name, shell_.options.directory));
-}
-
-Script::Parsed Script::parse_text(std::uint32_t source) {
-    Parsed parsed;
-    auto variable = state_.variable;
-    if (!shell_.options.node.empty()) {
-        variable = [this](const std::string& name) -> std::optional<std::string> {
-            if (name == "NODE") return shell_.options.node;
-            if (state_.variable) return state_.variable(name);
-            const char* const value = std::getenv(name.c_str());
-            return value ? std::optional<std::string>(value) : std::nullopt;
-        };
-    }
-    parsed.commands =
-        parse(session_.sources, source,
-              {state_.ini ? &*state_.ini : &session_.ini, std::move(variable)}, parsed.problems);
-    // quotes remain in the words of a netlist, but do not belong to the name of a file
-    for (Command& command : parsed.commands) {
-        const CommandRow* const row = find_command(command.name.text);
-        if (row && (row->flags & command_path)) {
-            for (Token& word : command.args) {
-                word.text = without_quotes(word.text);
-            }
-        }
-    }
-    const auto files = std::count_if(files_.begin(), files_.end(),
-                                     [](const Open& open) { return !open.path.empty(); });
-    if (files <= 1 && !session_.sources.get(source).name.starts_with('<')) {
-        take_part(source, parsed);
-    }
-    return parsed;
-}
-
-// Of a netlist for several machines: the part of this one.
-void Script::take_part(std::uint32_t source, Parsed& parsed) {
-    const auto line = std::find_if(parsed.commands.begin(), parsed.commands.end(), is_node_line);
-    if (line == parsed.commands.end()) return;
-    std::vector<NodeLine> nodes;
-    collect_nodes(parsed.commands, nodes, parsed.problems);
-    if (!shell_.options.node.empty()) return keep_part(shell_.options.node, parsed.commands);
-    if (!nodes.empty()) {
-        std::vector<std::string> names;
-        for (const NodeLine& node : nodes) {
-            names.push_back(node.name);
-        }
-        parsed.problems.clear();  // of a text that is nobody's; $(NODE) has no value here
-        parsed.problems.error(
-            "several-nodes", line->span,
-            "this netlist is for " + counted(nodes.size(), "machine") + ": " + listed(names, 100),
-            "",
-            "hal run " + session_.sources.get(source).name + " --node " + names.front() +
-                " loads the part of one");
-    }
-    parsed.commands.clear();
-}
+Script::~Script() { transaction_.reset(); }
 
 int Script::run(std::uint32_t source) {
     const bool collecting_before = state_.collecting;
     const std::size_t collected_before = state_.collected.size();
-    files_.push_back({own_path(source), {}});
+    texts_.enter(source);
     run_commands(source);
-    files_.pop_back();
+    texts_.leave();
     if (shell_.options.linuxcnc) {
         state_.linuxcnc_check.model(session_.model(), pending_);
     }
     finish();
-    const bool file = !session_.sources.get(source).name.starts_with('<');
+    end_text(source, collecting_before, collected_before);
+    return failed_ ? 1 : 0;
+}
+
+void Script::end_text(std::uint32_t source, bool collecting_before, std::size_t collected_before) {
     if (state_.collecting && collecting_before && failed_) {
         forget_collected(collected_before);
     }
-    if (file && state_.collecting && !collecting_before) {
+    if (!texts_.is_file(source)) return;
+    if (state_.collecting && !collecting_before) {
         const std::size_t lost = state_.collected.size();
         state_.collecting = false;
         forget_collected(0);
@@ -138,27 +83,56 @@ int Script::run(std::uint32_t source) {
             finish();
         }
     }
-    if (separately() && errors_ > 0 && file && shell_.options.level != Level::nothing) {
-        output_.err(counted(errors_, "error") +
+    const std::size_t errors = effects_.errors();
+    if (separately() && errors > 0 && shell_.options.level != Level::nothing) {
+        output_.err(counted(errors, "error") +
                     "; lines with an error changed nothing, all others took effect\n");
     }
-    return failed_ ? 1 : 0;
 }
 
 int Script::run(const std::vector<Command>& commands) {
-    files_.push_back({"", {}});
+    texts_.enter("");
     run_row(commands, 0, commands.size());
-    files_.pop_back();
+    texts_.leave();
+    finish();
+    return failed_ ? 1 : 0;
+}
+
+int Script::run_two_pass(const std::vector<std::uint32_t>& texts, Pass pass) {
+    TwoPass sorted(texts_, shell_, pending_);
+    for (const std::uint32_t text : texts) {
+        sorted.add(text);
+    }
+    texts_.keep();
+    texts_.enter("");
+    if (pass != Pass::rest) {
+        run_row(sorted.programs(), 0, sorted.programs().size());
+        run_row(sorted.loads(), 0, sorted.loads().size());
+    }
+    if (pass != Pass::loads) {
+        std::size_t at = 0;
+        for (const TwoPass::Whole& whole : sorted.whole()) {
+            run_row(sorted.rest(), at, whole.before);
+            at = whole.before;
+            finish();
+            if (stop()) break;
+            const bool keep_going = std::exchange(shell_.options.keep_going, true);
+            run_commands(whole.text);
+            shell_.options.keep_going = keep_going;
+        }
+        run_row(sorted.rest(), at, sorted.rest().size());
+    }
+    texts_.leave();
     finish();
     return failed_ ? 1 : 0;
 }
 
 void Script::run_commands(std::uint32_t source) {
-    Parsed parsed = parse_text(source);
+    ParsedText parsed = texts_.parse(source);
     auto problem = parsed.problems.all().begin();
-    const auto take_problems_before = [&](std::uint32_t place) {
+    const auto report_problems_before = [&](std::uint32_t offset) {
         for (; problem != parsed.problems.all().end() &&
-               (problem->labels.empty() || problem->labels[0].span.begin < place);
+               (problem->labels.empty() || problem->labels[0].span.begin < offset);
              ++problem) {
             pending_.add(*problem);
             if (separately()) {
@@ -168,7 +142,7 @@ void Script::run_commands(std::uint32_t source) {
     };
     rows_.push_back({&parsed.commands, 0, parsed.commands.size()});
     for (const Command& command : parsed.commands) {
-        take_problems_before(command.span.begin);
+        report_problems_before(command.span.begin);
         if (stop() || ended(command)) break;
         ++rows_.back().next;
         run_line(command);
@@ -178,7 +152,7 @@ void Script::run_commands(std::uint32_t source) {
         if (stop()) break;
     }
     if (!stop()) {
-        take_problems_before(UINT32_MAX);
+        report_problems_before(UINT32_MAX);
     }
     rows_.pop_back();
 }
@@ -203,22 +177,13 @@ void Script::run_line(const Command& command) {
         echo_line(session_.sources.text(command.span), session_.sources.place(command.span).line);
     }
     const CommandRow* const row = row_of(command);
-    if (!row) {
-        const bool argument = command.name.text.find('=') != std::string::npos;
-        lines_.push_back(command.span);
-        pending_.error("unknown-command", command.name.span,
-                       "unknown command '" + command.name.text + "'",
-                       did_you_mean(command.name.text, command_names()),
-                       argument ? "write spaces around the = of an assignment: NAME = VALUE"
-                                : "`help` lists all commands");
-        return;
-    }
+    if (!row) return report_unknown(command);
     if (session_.journal().wanted() && !only_looks(*row, command)) {
         session_.journal().add(row->edits() ? "edit" : "command",
                                std::string(session_.sources.text(command.span)));
     }
     if (!row->edits() && !check_arity(row->usage(), command.name, command.args, pending_)) {
-        return lines_.push_back(command.span);
+        return effects_.add_line(command.span);
     }
     if (row->flags & command_transaction) {
         // else it was reported, and the whole file is to be looked at
@@ -233,6 +198,16 @@ void Script::run_line(const Command& command) {
     act(command, *row);
 }
 
+void Script::report_unknown(const Command& command) {
+    const bool argument = command.name.text.find('=') != std::string::npos;
+    effects_.add_line(command.span);
+    pending_.error("unknown-command", command.name.span,
+                   "unknown command '" + command.name.text + "'",
+                   did_you_mean(command.name.text, command_names()),
+                   argument ? "write spaces around the = of an assignment: NAME = VALUE"
+                            : "`help` lists all commands");
+}
+
 Transaction& Script::transaction() {
     if (!transaction_) {
         transaction_.emplace(session_.begin());
@@ -241,9 +216,9 @@ Transaction& Script::transaction() {
 }
 
 void Script::edit(const Command& command, const CommandRow& row) {
-    lines_.push_back(command.span);
+    effects_.add_line(command.span);
     if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
-    if (state_.module_loads && command.name.text == "loadrt" && merge_load(command)) return;
+    if (merge_module_load(command)) return;
     ++edits_;
     if ((row.flags & command_programs) && !shell_.options.check) {
         Context context{*this,   shell_,   session_, session_.programs(), output_, row,
@@ -251,14 +226,24 @@ void Script::edit(const Command& command, const CommandRow& row) {
         if (unload_processes(context)) return;
     }
     if (!(row.flags & command_traceless)) {
-        text_is_kept_ = true;
+        texts_.keep();
     }
     transaction().apply(row.form(), command, pending_);
 }
 
+/// The first pass of TWOPASS: true when the command was merged into the shell's module_loads.
+bool Script::merge_module_load(const Command& command) {
+    if (!state_.module_loads || command.name.text != "loadrt") return false;
+    if (!merge_load(command, *state_.module_loads)) return false;
+    texts_.keep();
+    state_.module_load_texts.push_back(command.span.source);
+    session_.sources.hold(command.span.source);
+    return true;
+}
+
 void Script::defer(const Command& command, const CommandRow& row) {
     if (shell_.options.check && !(row.flags & command_checked)) return;
-    lines_.push_back(command.span);
+    effects_.add_line(command.span);
     if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
     ++edits_;
     if (!locks_) {
@@ -272,83 +257,95 @@ void Script::defer(const Command& command, const CommandRow& row) {
 void Script::act(const Command& command, const CommandRow& row) {
     const bool checking = shell_.options.check;
     if (checking && row.function.act == command_loadusr) {
-        note_program(command);
+        note_program(session_.absences(), command);
     }
     if (checking && !(row.flags & command_checked)) return;
     if (checking) {
         session_.absences().begin(command.span);
     }
     // a check is one transaction: nothing acts
-    const bool apart = checking || (row.flags & command_apart) || only_looks(row, command);
+    const bool looks = only_looks(row, command);
+    const bool apart = checking || (row.flags & command_apart) || looks;
     if (!apart) {
-        if (!rows_.empty()) {
-            --rows_.back().next;  // not carried out yet
-        }
-        finish();
-        if (!rows_.empty()) {
-            ++rows_.back().next;
-        }
+        finish_before_acting();
         if (stop()) return;
-    } else if (!checking && only_looks(row, command) && pending_.failed()) {
+    } else if (!checking && looks && pending_.failed()) {
         return;  // it would show edits that are rolled back
     }
     const std::size_t errors_before = pending_.errors();
     if (!check_lock(row, command, locks(), session_.model(), pending_)) {
-        lines_.push_back(command.span);
+        effects_.add_line(command.span);
         return finish();
     }
-    // Commands about one thing take a range of them: getp pid.[0..2].output
-    const bool about_one = (row.flags & command_each) != 0;
-    const auto plain = about_one ? expand(command, pending_) : std::vector<Command>{command};
-    for (const Command& one : plain) {
-        if (one.args.size() > 1 && about_one) {  // a range among the arguments is a list of names
-            for (const Token& name : one.args) {
-                const Command single{one.name, {name}, one.span};
-                Context context{*this,  shell_,   session_, session_.programs(), output_, row,
-                                single, pending_, lock_};
-                row.function.act(context);
-            }
-            continue;
-        }
-        Context context{*this, shell_,   session_, session_.programs(), output_, row,
-                        one,   pending_, lock_};
-        row.function.act(context);
-    }
+    act_on_each(command, row);
     if (only_looks(row, command) && !pending_.failed() && session_.ending()) {
         report_end(command);  // what it has printed may be incomplete
     }
-    // its component remembers the place
+    // its component remembers the text
     if (row.function.act == command_loadusr) {
-        text_is_kept_ = true;
+        texts_.keep();
     }
     // for the warning that nothing ran
     if (row.function.act == command_advance && session_.threads().note_advance(command.span)) {
-        text_is_kept_ = true;
+        texts_.keep();
     }
     const bool failed = pending_.errors() > errors_before;
     if (apart) {
         if (failed && row.function.act != command_source) {
-            lines_.push_back(command.span);
+            effects_.add_line(command.span);
         }
         return;
     }
     if (failed) {
-        half_done_ = true;
+        effects_.note_half_done();
     } else {
-        effective_.push_back(command.span);
+        effects_.add_effective(command.span);
     }
     finish();
+}
+
+/// The edits before a command that acts take effect first; the command counts as not carried out
+/// yet.
+void Script::finish_before_acting() {
+    if (rows_.empty()) return finish();
+    --rows_.back().next;
+    finish();
+    ++rows_.back().next;
+}
+
+/// Commands about one thing take a range of them: getp pid.[0..2].output
+void Script::act_on_each(const Command& command, const CommandRow& row) {
+    if (!(row.flags & command_each)) return act_on(command, row);
+    for (const Command& one : expand(command, pending_)) {
+        if (one.args.size() <= 1) {
+            act_on(one, row);
+            continue;
+        }
+        // a range among the arguments is a list of names
+        for (const Token& name : one.args) {
+            act_on({one.name, {name}, one.span}, row);
+        }
+    }
+}
+
+void Script::act_on(const Command& command, const CommandRow& row) {
+    Context context{*this,   shell_,   session_, session_.programs(), output_, row,
+                    command, pending_, lock_};
+    row.function.act(context);
+}
+
+/// Returns a collected command that cannot be in a transaction with this one, or nullptr.
+const Command* Script::find_conflict(const Command& command) const {
+    const auto other = std::ranges::find_if(state_.collected, [&](const Command& one) {
+        return one.name.text != command.name.text && (row_of(one)->flags & command_collected);
+    });
+    return other == state_.collected.end() ? nullptr : &*other;
 }
 
 bool Script::collect(const Command& command, const CommandRow& row) {
     const bool acts = (row.flags & command_collected) != 0;
     if (row.edits() || (row.flags & command_deferred) || acts) {
-        const auto other =
-            std::find_if(state_.collected.begin(), state_.collected.end(), [&](const Command& one) {
-            return acts && one.name.text != command.name.text &&
-                   (row_of(one)->flags & command_collected);
-        });
-        if (other != state_.collected.end()) {
+        if (const Command* const other = acts ? find_conflict(command) : nullptr) {
             Diagnostic found{
                 Severity::error,
                 "open-transaction",
@@ -358,25 +355,24 @@ bool Script::collect(const Command& command, const CommandRow& row) {
                 {"all commands of a transaction take effect together; commit first, then type " +
                  command.name.text}};
             pending_.add(std::move(found));
-            lines_.push_back(command.span);
+            effects_.add_line(command.span);
             return true;
         }
         if (checked_begin_) return false;
         state_.collected.push_back(command);
         session_.sources.hold(command.span.source);
-        text_is_kept_ = true;
+        texts_.keep();
         return true;
     }
-    if ((row.flags & command_apart) || (row.flags & command_query) ||
-        row.function.act == command_advance) {
+    if ((row.flags & command_apart) || row.is_query() || row.function.act == command_advance) {
         return false;
     }
-    const bool typed = session_.sources.get(command.span.source).name.starts_with('<');
+    const bool typed = !texts_.is_file(command.span.source);
     pending_.error("open-transaction", command.name.span,
                    "'" + command.name.text + "' cannot be part of a transaction", "",
                    std::string(typed ? "the transaction is still open; type this" : "write it") +
                        " before `begin` or after `commit`");
-    lines_.push_back(command.span);
+    effects_.add_line(command.span);
     return true;
 }
 
@@ -384,7 +380,7 @@ void Script::forget_collected(std::size_t from) {
     for (; state_.collected.size() > from; state_.collected.pop_back()) {
         const Span span = state_.collected.back().span;
         session_.sources.release(span.source);
-        idle_.push_back(span);
+        effects_.add_idle(span);
     }
 }
 
@@ -396,13 +392,7 @@ void Script::group(const Command& command) {
     }
     if (stop() || shell_.options.check) return;
     if (name == "begin") {
-        if (state_.collecting) {
-            pending_.error("open-transaction", command.name.span, "a transaction is already open",
-                           "", "`commit` applies the collected edits, `abort` discards them");
-        } else {
-            collected_before_ = 0;
-        }
-        state_.collecting = true;
+        begin_collecting(command);
     } else if (!state_.collecting) {
         pending_.error("no-transaction", command.name.span,
                        "no open transaction to " + name + ": 'begin' is missing", "",
@@ -411,66 +401,91 @@ void Script::group(const Command& command) {
         state_.collecting = false;
         forget_collected(0);
     } else {
-        state_.collecting = false;
-        std::vector<Command> collected = std::exchange(state_.collected, {});
-        // no text is freed before this one is done
-        for (const Command& one : collected) {
-            session_.sources.release(one.span.source);
-        }
-        for (Command& one : collected) {
-            if (!one.name.span.known()) {
-                resolve_set(session_.model(), one);
-            }
-            const CommandRow& row = *row_of(one);
-            if (row.edits()) {
-                edit(one, row);
-            } else {
-                defer(one, row);
-            }
-        }
+        commit_collected();
     }
     finish();
 }
 
-void Script::source(Context& context) {
+void Script::begin_collecting(const Command& command) {
+    if (state_.collecting) {
+        pending_.error("open-transaction", command.name.span, "a transaction is already open", "",
+                       "`commit` applies the collected edits, `abort` discards them");
+    } else {
+        collected_before_ = 0;
+    }
+    state_.collecting = true;
+}
+
+void Script::commit_collected() {
+    state_.collecting = false;
+    std::vector<Command> collected = std::exchange(state_.collected, {});
+    // no text is freed before this one is done
+    for (const Command& one : collected) {
+        session_.sources.release(one.span.source);
+    }
+    for (Command& one : collected) {
+        if (!one.name.span.known()) {
+            resolve_set(session_.model(), one);
+        }
+        const CommandRow& row = *row_of(one);
+        if (row.edits()) {
+            edit(one, row);
+        } else {
+            defer(one, row);
+        }
+    }
+}
+
+/// Reads the file of a `source` command. False after reporting.
+bool Script::read_source(Context& context, std::string& path, std::string& text) {
     const std::string& given = context.argument(0);
-    std::string path = context.path(given), text, problem;
-    if (!read_netlist(given, context.options().directory, path, text, problem)) {
-        // Relative to the file it stands in, too: so that a folder of netlists can be run from
-        // anywhere.
-        const std::string beside = resolve_path(given, folder_of(files_.back().path));
-        std::string ignored;
-        if (given.starts_with('/') || !read_text_file(beside, text, ignored)) {
-            if (shell_.options.check) {
-                session_.absences().note_missing_text(given);
-            }
-            context.diagnostics.error("unreadable-file", context.span(0),
-                                      "'" + given + "' cannot be read: " + problem);
-            return;
-        }
+    std::string problem;
+    path = context.path(given);
+    if (read_netlist(given, context.options().directory, path, text, problem)) return true;
+    // Relative to the file it stands in, too: so that a folder of netlists can be run from
+    // anywhere.
+    const std::string beside = resolve_path(given, folder_of(texts_.open_files().back().path));
+    std::string ignored;
+    if (!given.starts_with('/') && read_text_file(beside, text, ignored)) {
         path = beside;
+        return true;
     }
+    if (shell_.options.check) {
+        session_.absences().note_missing_text(given);
+    }
+    context.diagnostics.error("unreadable-file", context.span(0),
+                              "'" + given + "' cannot be read: " + problem);
+    return false;
+}
+
+/// Reports a file that is being read already. Returns false when it is not.
+bool Script::reports_recursion(Context& context, const std::string& canonical) {
+    const std::vector<OpenFile>& files = texts_.open_files();
+    const auto open = std::ranges::find(files, canonical, &OpenFile::path);
+    if (open == files.end()) return false;
+    Diagnostic found{Severity::error,
+                     "recursive-source",
+                     "'" + context.argument(0) + "' includes itself",
+                     {{context.span(0), "included again"}},
+                     {}};
+    for (auto inner = open + 1; inner != files.end(); ++inner) {
+        found.labels.push_back({inner->at, "included from here"});
+    }
+    context.diagnostics.add(std::move(found));
+    return true;
+}
+
+void Script::source(Context& context) {
+    std::string path, text;
+    if (!read_source(context, path, text)) return;
     const std::string canonical = canonical_path(path);
-    for (auto open = files_.begin(); open != files_.end(); ++open) {
-        if (open->path != canonical) continue;
-        Diagnostic found{Severity::error,
-                         "recursive-source",
-                         "'" + given + "' includes itself",
-                         {{context.span(0), "included again"}},
-                         {}};
-        const std::string included = "included from here";
-        for (auto inner = open + 1; inner != files_.end(); ++inner) {
-            found.labels.push_back({inner->at, included});
-        }
-        context.diagnostics.add(std::move(found));
-        return;
-    }
+    if (reports_recursion(context, canonical)) return;
     const std::uint32_t source = add_text(path, std::move(text));
     const bool collecting = state_.collecting;
     const std::size_t collected = state_.collected.size();
-    files_.push_back({canonical, context.command.span});
+    texts_.enter(canonical, context.command.span);
     run_commands(source);
-    files_.pop_back();
+    texts_.leave();
     // all of the file or nothing
     if (collecting && state_.collecting && (pending_.failed() || stopped_)) {
         forget_collected(collected);
@@ -480,6 +495,66 @@ void Script::source(Context& context) {
 
 void Script::echo_line(std::string_view line, std::uint32_t number) {
     output_.err("(" + std::to_string(number) + ")<echo>: " + std::string(line) + "\n");
+}
+
+void Script::finish() {
+    if (!transaction_ && edits_ == 0 && pending_.all().empty()) return;
+    const std::size_t edits = std::exchange(edits_, 0);
+    const bool open = transaction_.has_value();
+    if (locks_ && transaction_) {
+        transaction_->when_committed(
+            [&session = session_, locks = *locks_] { session.locked = locks; });
+    }
+    const bool took_effect = open && transaction_->commit(pending_);
+    transaction_.reset();
+    locks_.reset();
+    Diagnostics found;
+    found.take(pending_);
+    const bool failed = found.failed() || (open && !took_effect);
+    effects_.report(found, outcome_of(edits, took_effect, failed));
+    if (!failed) return;
+    failed_ = true;
+    if (!separately()) {
+        stopped_ = true;
+    }
+}
+
+ScriptOutcome Script::outcome_of(std::size_t edits, bool took_effect, bool failed) const {
+    ScriptOutcome outcome{edits, took_effect, failed, separately()};
+    if (!failed) return outcome;
+    for (std::size_t i = collected_before_; i < state_.collected.size(); ++i) {
+        outcome.collected.push_back(state_.collected[i].span);
+    }
+    for (auto row = rows_.rbegin(); row != rows_.rend(); ++row) {
+        for (std::size_t i = row->next; i < row->end; ++i) {
+            outcome.not_reached.push_back((*row->commands)[i].span);
+        }
+    }
+    return outcome;
+}
+
+bool Script::ended(const Command& command) {
+    if (!session_.ending()) return false;
+    if (!pending_.failed()) {
+        report_end(command);
+    }
+    finish();
+    stopped_ = true;
+    return true;
+}
+
+void Script::report_end(const Command& command) {
+    pending_.error("interrupted", command.span,
+                   "'" + command.name.text + "' was interrupted: the machine ends");
+}
+
+bool Script::interrupted(Context& context) {
+    if (!state_.cancelled.load(std::memory_order_relaxed) && !session_.ending()) return false;
+    if (!context.diagnostics.failed()) {
+        context.diagnostics.error("interrupted", context.command.span,
+                                  "'" + context.command.name.text + "' was interrupted");
+    }
+    return true;
 }
 
 }  // namespace hal

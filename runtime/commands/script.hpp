@@ -12,11 +12,12 @@
 
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "commands/script_effects.hpp"
+#include "commands/script_texts.hpp"
 #include "commands/shell_state.hpp"
 #include "commands/table.hpp"
 
@@ -46,51 +47,44 @@ public:
     /// True when Shell::cancel was called; reports it once.
     bool interrupted(Context& context);
     bool quit_seen() const { return ended_; }
-    /// Adds a text to the session's sources for as long as this object lives, and longer when
-    /// something made by it points into it.
-    std::uint32_t add_text(std::string name, std::string text, std::uint32_t first_line = 1);
+    /// As ScriptTexts::add().
+    std::uint32_t add_text(std::string name, std::string text, std::uint32_t first_line = 1) {
+        return texts_.add(std::move(name), std::move(text), first_line);
+    }
 
 private:
-    struct Parsed {
-        std::vector<Command> commands;
-        Diagnostics problems;  ///< of the text itself
-    };
-    /// The canonical path of a text that is a file, else "".
-    std::string own_path(std::uint32_t source) const;
-    Parsed parse_text(std::uint32_t source);
-    void take_part(std::uint32_t source, Parsed& parsed);
+    void end_text(std::uint32_t source, bool collecting_before, std::size_t collected_before);
     void run_commands(std::uint32_t source);
     void run_row(const std::vector<Command>& commands, std::size_t from, std::size_t to);
     void run_line(const Command& command);
+    void report_unknown(const Command& command);
     void edit(const Command& command, const CommandRow& row);
-    /// The first pass of TWOPASS: true when the command was merged into the shell's module_loads.
-    bool merge_load(const Command& command);
+    bool merge_module_load(const Command& command);
     void defer(const Command& command, const CommandRow& row);
     void act(const Command& command, const CommandRow& row);
+    void act_on_each(const Command& command, const CommandRow& row);
+    void act_on(const Command& command, const CommandRow& row);
+    void finish_before_acting();
     /// begin, commit, abort
     void group(const Command& command);
+    void begin_collecting(const Command& command);
+    void commit_collected();
     /// After `begin`: true when the command was collected or rejected.
     bool collect(const Command& command, const CommandRow& row);
+    const Command* find_conflict(const Command& command) const;
     void forget_collected(std::size_t from);
     Transaction& transaction();
-    /// `hal check` starts no programs: which names are theirs.
-    void note_program(const Command& command);
+    bool read_source(Context& context, std::string& path, std::string& text);
+    bool reports_recursion(Context& context, const std::string& canonical);
     void echo_line(std::string_view line, std::uint32_t number);
-    void take_lock();
     /// Ends the transaction: commits, prints. Sets failed_ and, without -k, stopped_.
     void finish();
-    void look_up_names(Diagnostics& found);
     /// True after Session::interrupt(); then the transaction is rolled back, and `command` and
     /// those after it are not executed.
     bool ended(const Command& command);
     /// Adds the error that the end of the machine has interrupted `command`.
     void report_end(const Command& command);
-    void report(Diagnostics& found, std::size_t edits, bool took_effect);
-    /// The diagnostic with the places in the INI file of the values that the words at its main
-    /// place have.
-    Diagnostic with_values(Diagnostic diagnostic) const;
-    /// After a failure: "nothing was changed", or which lines took effect and which did not.
-    std::string outcome(bool edited) const;
+    ScriptOutcome outcome_of(std::size_t edits, bool took_effect, bool failed) const;
     /// -k: each line is a transaction. A check looks at the text as a whole in any case.
     bool separately() const { return shell_.options.keep_going && !shell_.options.check; }
     bool stop() const { return stopped_ || ended_; }
@@ -100,37 +94,24 @@ private:
     Session& session_;
     Output& output_;
     SessionLock lock_;
+    ScriptTexts texts_;
+    ScriptEffects effects_;
     std::optional<Transaction> transaction_;
     Diagnostics pending_;  ///< of the open transaction
     std::size_t edits_ = 0;  ///< in it
     /// Session::locked when it has taken effect, if it has `lock` or `unlock`
     std::optional<unsigned> locks_;
-    /// that messages have offered: kept for those to come
-    std::set<std::shared_ptr<const NameIndex>> names_;
-    std::vector<Span> lines_;  ///< in it
-    std::vector<Span> effective_;  ///< lines that took effect
-    /// lines that had none: of transactions that failed, or were forgotten by `abort`
-    std::vector<Span> idle_;
     struct Row {
         const std::vector<Command>* commands;
         std::size_t next, end;
     };
     std::vector<Row> rows_;  ///< being run, the outermost first
-    bool half_done_ = false;  ///< a command that acts failed: what it did stays
     /// of the shell's collected commands, those that came before this text
     std::size_t collected_before_;
     bool checked_begin_ = false;  ///< `hal check` is between begin and commit
-    std::size_t errors_ = 0;  ///< printed so far, for the summary with -k
     bool failed_ = false;
     bool stopped_ = false;
     bool ended_ = false;
-    bool text_is_kept_ = false;
-    struct Open {
-        std::string path;  ///< canonical
-        Span at;  ///< of the `source` command, in the file before
-    };
-    std::vector<std::uint32_t> texts_;  ///< of add_text()
-    std::vector<Open> files_;  ///< being read, the outermost first
 };
 
 }  // namespace hal

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <unordered_map>
 
+#include "commands/files.hpp"
+#include "commands/script.hpp"
 #include "machine/elaborate.hpp"
 #include "netlist/nodes.hpp"
 
@@ -243,6 +245,12 @@ bool sets_parameter(const Command& command, const Model& model) {
 }
 
 }  // namespace
+
+std::string Context::path(const std::string& text) const {
+    return resolve_path(text, options().directory);
+}
+
+bool Context::interrupted() { return script.interrupted(*this); }
 
 std::string Context::usage() const { return to_string(row.usage()); }
 
