@@ -33,9 +33,13 @@ class Compiler {
 public:
     Compiler(const Model& model, const CompileInput& input) : model_(model), input_(input) {
         for (const auto& component : model.components) {
-            if (is_module(*component)) {
-                for (const auto& function : component->functions) {
-                    module_functions_.push_back(function.get());
+            if (!is_module(*component)) continue;
+            for (const auto& function : component->functions) {
+                module_functions_.push_back(function.get());
+            }
+            for (const auto& instance : component->instances) {
+                if (instance->functions.empty()) {
+                    instances_without_function_.push_back(instance.get());
                 }
             }
         }
@@ -70,14 +74,16 @@ public:
         for (auto& [thread, plan] : out_.plans) {
             plan->scratch.resize(plan->carries.size());
         }
-        for (const auto& wish : unknown_) {
+        for (const auto& request : unknown_) {
             out_.unknowns.push_back(
-                {&plans_[wish.plan]->carries[wish.index], wish.from, wish.owner});
+                {&plans_[request.plan]->carries[request.index], request.from, request.owner});
         }
         return std::move(out_);
     }
 
 private:
+    using Copy = std::pair<Thread*, hal_value*>;
+
     bool excluded(const LoadedFunction* function) const {
         return function->halted || (input_.without && input_.without->contains(function));
     }
@@ -168,66 +174,64 @@ private:
         return *signal.slot;
     }
 
-    // Slots in the order in which the cycle first meets them.
-    void lay_out(Thread& thread, plan::Plan& plan) {
+    // The thread reads or writes the signal in its own image: at home, or as a copy.
+    static bool has_slot(const Compiled::Place& place, const Thread& thread) {
+        if (place.home == &thread) return place.slot != nullptr;
+        return std::ranges::any_of(place.copies,
+                                   [&](const auto& copy) { return copy.first == &thread; });
+    }
+
+    // Asks for a slot of the pin's signal in the image of the thread, unless there is one.
+    void want(const Pin& pin, Thread& thread, std::vector<Compiled::Place*>& wanted) {
+        if (!pin.signal || thread_for(pin) != &thread) return;
+        Compiled::Place& place = out_.places[pin.signal->index];
+        if (in_cell(place, pin) || has_slot(place, thread)) return;
+        static hal_value pending;  // a mark until the image exists
+        if (place.home == &thread) {
+            place.slot = &pending;
+        } else {
+            place.copies.emplace_back(&thread, &pending);
+        }
+        wanted.push_back(&place);
+    }
+
+    void want_all(const std::vector<std::unique_ptr<Pin>>& pins, Thread& thread,
+                  std::vector<Compiled::Place*>& wanted) {
+        for (const auto& pin : pins) {
+            want(*pin, thread, wanted);
+        }
+    }
+
+    // The signals of the thread in the order in which the cycle first meets them.
+    std::vector<Compiled::Place*> wanted_by(Thread& thread) {
         std::vector<Compiled::Place*> wanted;
-        const auto want = [&](const Pin& pin) {
-            if (!pin.signal || thread_for(pin) != &thread) return;
-            Compiled::Place& place = out_.places[pin.signal->index];
-            if (in_cell(place, pin)) return;
-            const bool there = place.home == &thread
-                                   ? place.slot != nullptr
-                                   : std::any_of(place.copies.begin(), place.copies.end(),
-                                                 [&](const auto& c) { return c.first == &thread; });
-            if (there) return;
-            static hal_value pending;  // a mark until the image exists
-            if (place.home == &thread) {
-                place.slot = &pending;
-            } else {
-                place.copies.emplace_back(&thread, &pending);
-            }
-            wanted.push_back(&place);
-        };
         for (const auto* row : {&thread.init, &thread.functions}) {
             for (const LoadedFunction* function : *row) {
                 if (excluded(function)) continue;
                 for (const Instance* instance : function->instances) {
-                    for (const auto& pin : instance->pins) {
-                        want(*pin);
-                    }
+                    want_all(instance->pins, thread, wanted);
                 }
-                for (const auto& pin : function->pins) {
-                    want(*pin);
-                }
+                want_all(function->pins, thread, wanted);
             }
         }
-        for (const auto& component : model_.components) {
-            if (is_module(*component)) {
-                for (const auto& instance : component->instances) {
-                    if (instance->functions.empty()) {
-                        for (const auto& pin : instance->pins) {
-                            want(*pin);
-                        }
-                    }
-                }
-            }
+        for (const Instance* const instance : instances_without_function_) {
+            want_all(instance->pins, thread, wanted);
         }
-        for (const auto& pin : thread.pins) {
-            want(*pin);
-        }
+        want_all(thread.pins, thread, wanted);
+        return wanted;
+    }
 
+    void lay_out(Thread& thread, plan::Plan& plan) {
+        const std::vector<Compiled::Place*> wanted = wanted_by(thread);
         plan.image_size = wanted.size();
         plan.image = std::make_unique<hal_value[]>(wanted.size());
         for (std::size_t i = 0; i < wanted.size(); ++i) {
+            Compiled::Place& place = *wanted[i];
             hal_value* const slot = &plan.image[i];
-            if (wanted[i]->home == &thread) {
-                wanted[i]->slot = slot;
+            if (place.home == &thread) {
+                place.slot = slot;
             } else {
-                for (auto& [reader, copy] : wanted[i]->copies) {
-                    if (reader == &thread) {
-                        copy = slot;
-                    }
-                }
+                std::ranges::find(place.copies, &thread, &Copy::first)->second = slot;
             }
         }
     }
@@ -423,49 +427,50 @@ private:
         plans_[thread]->carries.push_back({to, nullptr, {}});
     }
 
+    // Where the pin's value is once the plan has been taken.
+    hal_value* slot_of(const Pin& pin, Thread* thread) {
+        if (!pin.signal) return &pin.memory->own;
+        const Compiled::Place& place = out_.places[pin.signal->index];
+        if (in_cell(place, pin)) return place.slot;
+        if (!thread) return &pin.signal->value;
+        if (place.home == thread) return place.slot;
+        const auto copy = std::ranges::find(place.copies, thread, &Copy::first);
+        return copy == place.copies.end() ? &pin.memory->own : copy->second;
+    }
+
+    // An unlinked pin keeps the last value, unless the edit sets it; a stream's buffer stays with
+    // its signal.
+    void carry_unlinked(const Pin& pin, const Thread* thread, hal_value* slot, plan::Plan& plan) {
+        const hal_pin& now = present(pin);
+        if (const auto set = input_.pin_values->find(&pin); set != input_.pin_values->end()) {
+            plan.carries.push_back({slot, nullptr, set->second});
+        } else if (now.slot == slot) {
+            return;
+        } else if (pin.type == HAL_TYPE_PORT) {
+            plan.carries.push_back({slot, nullptr, {.raw = 0}});
+        } else if (pin.home == thread) {
+            plan.carries.push_back({slot, now.slot, {}});
+        } else {
+            plan.carries.push_back({slot, nullptr, *now.slot});
+        }
+    }
+
     void bind(Pin& pin) {
         Thread* const thread = thread_for(pin);
         if (thread != pin.home) {
             out_.homes.emplace_back(&pin, thread);
         }
         plan::Plan* const plan = thread ? plans_[thread] : nullptr;
-        hal_value* slot = &pin.memory->own;
+        hal_value* const slot = slot_of(pin, thread);
         const hal_pin& now = present(pin);
-        if (pin.signal) {
-            const Compiled::Place& place = out_.places[pin.signal->index];
-            if (!thread) {
-                slot = in_cell(place, pin) ? place.slot : &pin.signal->value;
-            } else if (in_cell(place, pin)) {
-                slot = place.slot;
-            } else if (place.home == thread) {
-                slot = place.slot;
-            } else {
-                for (const auto& [reader, copy] : place.copies) {
-                    if (reader == thread) {
-                        slot = copy;
-                    }
-                }
-            }
-        } else if (const auto set = input_.pin_values->find(&pin);
-                   set != input_.pin_values->end() && plan) {
-            plan->carries.push_back({slot, nullptr, set->second});
-        } else if (now.slot != slot && plan) {
-            // an unlinked pin keeps the last value; a stream's buffer stays with its signal
-            if (pin.type == HAL_TYPE_PORT) {
-                plan->carries.push_back({slot, nullptr, {.raw = 0}});
-            } else if (pin.home == thread) {
-                plan->carries.push_back({slot, now.slot, {}});
-            } else {
-                plan->carries.push_back({slot, nullptr, *now.slot});
-            }
+        if (!pin.signal && plan) {
+            carry_unlinked(pin, thread, slot, *plan);
         }
-        if (pin.memory->slot != slot || (&now != pin.memory && !plan)) {
-            if (plan) {
-                plan->rebinds.push_back({pin.memory, slot});
-            } else {
-                out_.session_rebinds.push_back(
-                    {pin.memory, slot, now.slot, pin.type != HAL_TYPE_PORT});
-            }
+        const bool moves = pin.memory->slot != slot;
+        if (plan && moves) {
+            plan->rebinds.push_back({pin.memory, slot});
+        } else if (!plan && (moves || &now != pin.memory)) {
+            out_.session_rebinds.push_back({pin.memory, slot, now.slot, pin.type != HAL_TYPE_PORT});
         }
         if (pin.pointer) {
             (plan ? plan->pointers : out_.session_pointers).push_back({pin.pointer, slot});
@@ -475,7 +480,7 @@ private:
         }
     }
 
-    struct Wish {
+    struct Unknown {
         Thread* plan;
         std::size_t index;
         const hal_value* from;
@@ -485,11 +490,13 @@ private:
     const Model& model_;
     const CompileInput& input_;
     std::vector<LoadedFunction*> module_functions_;
+    /// of modules
+    std::vector<const Instance*> instances_without_function_;
     Compiled out_;
     std::unordered_map<Thread*, plan::Plan*> plans_;
     std::map<std::pair<Thread*, Thread*>, std::pair<std::size_t, std::size_t>> channels_;
     plan::Import* import_ = nullptr;
-    std::vector<Wish> unknown_;
+    std::vector<Unknown> unknown_;
 };
 
 }  // namespace

@@ -53,6 +53,8 @@ struct Pin {
 
     /// A parameter that only its component sets.
     bool read_only() const { return dir == HAL_DIR_PARAM && (flags & HAL_PIN_READ_ONLY); }
+    /// An output that declares a safe value.
+    bool safe_output() const { return dir == HAL_DIR_OUT && (flags & HAL_PIN_SAFE); }
 };
 
 struct Signal {

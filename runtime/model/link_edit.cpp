@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Signals, links, values and aliases.
-#include "model/edit.hpp"
+#include "model/link_edit.hpp"
 
 #include <algorithm>
 
@@ -35,6 +34,34 @@ std::string pins_of_instance(const Model& model, std::string_view name) {
     return {};
 }
 
+hal_value load(const hal_value& slot) {
+    return {.raw = __atomic_load_n(&slot.raw, __ATOMIC_RELAXED)};
+}
+
+/// The pin is among those of the signal.
+void count(Pin& pin, Signal& signal) {
+    pin.signal = &signal;
+    if (pin.dir == HAL_DIR_OUT) {
+        signal.writer = &pin;
+    } else if (pin.dir == HAL_DIR_IN) {
+        ++signal.readers;
+    } else if (pin.dir == HAL_DIR_IO) {
+        ++signal.ios;
+    }
+}
+
+/// The opposite of count().
+void uncount(Pin& pin, Signal& signal) {
+    pin.signal = nullptr;
+    if (pin.dir == HAL_DIR_OUT) {
+        signal.writer = nullptr;
+    } else if (pin.dir == HAL_DIR_IN) {
+        --signal.readers;
+    } else if (pin.dir == HAL_DIR_IO) {
+        --signal.ios;
+    }
+}
+
 std::string nothing_yet(std::string_view kind) { return "no " + std::string(kind) + "s exist yet"; }
 
 }  // namespace
@@ -50,22 +77,17 @@ std::string conversion(hal_type from, hal_type to) {
     return {};
 }
 
-bool Edit::unknown_name(Code code, Word name, const char* what, NameGroup group, std::string help) {
+void LinkEdit::unknown_name(Code code, Word name, const char* what, NameGroup group,
+                            std::string help) {
     UnknownName unknown{.name = std::string(name.text),
                         .group = static_cast<std::uint32_t>(group),
                         .before = model_.next_id};
     diagnostics->error(code, name.span,
                        std::string("unknown ") + what + " " + hal::quoted(name.text),
                        std::move(unknown), std::move(help));
-    return false;
 }
 
-bool Edit::fail(Code code, Span at, std::string message, std::string label, std::string help) {
-    diagnostics->error(code, at, std::move(message), std::move(label), std::move(help));
-    return false;
-}
-
-Pin* Edit::pin(Word name) {
+Pin* LinkEdit::pin(Word name) {
     if (Pin* const found = model_.find_pin(name.text)) return found;
     if (is_absent(name.text, Absences::Kind::pin)) return nullptr;
     std::string help = pins_of_instance(model_, name.text);
@@ -80,18 +102,20 @@ Pin* Edit::pin(Word name) {
     return nullptr;
 }
 
-Signal* Edit::signal(Word name) {
+Signal* LinkEdit::signal(Word name) {
     if (Signal* const found = model_.find_signal(name.text)) return found;
     if (is_absent(name.text, Absences::Kind::signal)) return nullptr;
-    std::string help = model_.find_pin(name.text)
-                           ? hal::quoted(name.text) + " is a pin; getp, setp and unlinkp take pins"
-                       : model_.signal.empty() ? nothing_yet("signal") + "; net creates signals"
-                                               : "";
+    std::string help;
+    if (model_.find_pin(name.text)) {
+        help = hal::quoted(name.text) + " is a pin; getp, setp and unlinkp take pins";
+    } else if (model_.signal.empty()) {
+        help = nothing_yet("signal") + "; net creates signals";
+    }
     unknown_name("no-such-signal", name, "signal", NameGroup::signals, std::move(help));
     return nullptr;
 }
 
-LoadedFunction* Edit::function(Word name) {
+LoadedFunction* LinkEdit::function(Word name) {
     if (LoadedFunction* const found = model_.find_function(name.text)) return found;
     if (is_absent(name.text, Absences::Kind::function)) return nullptr;
     std::string help;
@@ -108,7 +132,7 @@ LoadedFunction* Edit::function(Word name) {
     return nullptr;
 }
 
-Thread* Edit::thread(Word name) {
+Thread* LinkEdit::thread(Word name) {
     if (Thread* const found = model_.find_thread(name.text)) return found;
     if (is_absent(name.text, Absences::Kind::thread)) return nullptr;
     const std::string help =
@@ -120,17 +144,10 @@ Thread* Edit::thread(Word name) {
     return nullptr;
 }
 
-Signal* Edit::add_signal(Word name, hal_type type, Span typed_at) {
+Signal* LinkEdit::add_signal(Word name, hal_type type, Span typed_at) {
     if (const Signal* const there = model_.find_signal(name.text)) {
-        Diagnostic d{Severity::error,
-                     "name-taken",
-                     "signal " + hal::quoted(name.text) + " already exists",
-                     {{name.span, "second time"}},
-                     {}};
-        if (there->made.known()) {
-            d.labels.push_back({there->made, "created here"});
-        }
-        diagnostics->add(std::move(d));
+        fail("name-taken", name.span, "signal " + hal::quoted(name.text) + " already exists",
+             "second time", Other{there->made, "created here"});
         return nullptr;
     }
     if (model_.find_pin(name.text)) {
@@ -162,7 +179,7 @@ Signal* Edit::add_signal(Word name, hal_type type, Span typed_at) {
     return made;
 }
 
-bool Edit::remove_signal(Word name) {
+bool LinkEdit::remove_signal(Word name) {
     Signal* const leaving = signal(name);
     if (!leaving) return false;
     while (!leaving->pins.empty()) {
@@ -188,86 +205,88 @@ bool Edit::remove_signal(Word name) {
     return true;
 }
 
-bool Edit::remove_all_signals() {
+bool LinkEdit::remove_all_signals() {
     while (!model_.signals.empty()) {
         remove_signal({model_.signals.back()->name, {}});
     }
     return true;
 }
 
-bool Edit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
-    if (pin.signal == &signal) return true;
-    const auto refuse = [&](Code code, std::string message, std::string here, Span other,
-                            std::string there, std::string help) {
-        Diagnostic d{Severity::error, code, std::move(message), {{word.span, std::move(here)}}, {}};
-        if (other.known()) {
-            d.labels.push_back({other, std::move(there)});
-        }
-        if (!help.empty()) {
-            d.help.push_back(std::move(help));
-        }
-        diagnostics->add(std::move(d));
-        return false;
-    };
+/// The rules about one pin and one signal. False after reporting.
+bool LinkEdit::check_link(const Pin& pin, const Signal& signal, Word word) {
+    const std::string pin_name(word.text);
     if (pin.dir == HAL_DIR_PARAM) {
-        return refuse("parameter-link",
-                      hal::quoted(word.text) + " is a parameter and cannot be linked", "parameter",
-                      {}, "", "set it: setp " + std::string(word.text) + " VALUE");
+        return fail("parameter-link", word.span,
+                    hal::quoted(pin_name) + " is a parameter and cannot be linked", "parameter",
+                    "set it: setp " + pin_name + " VALUE");
     }
     if (pin.signal) {
-        return refuse("pin-linked",
-                      "pin " + hal::quoted(word.text) + " is already linked to signal " +
-                          hal::quoted(pin.signal->name),
-                      "second signal", pin.linked_at, "first signal",
-                      "unlink it first: unlinkp " + std::string(word.text));
+        return fail("pin-linked", word.span,
+                    "pin " + hal::quoted(pin_name) + " is already linked to signal " +
+                        hal::quoted(pin.signal->name),
+                    "second signal", Other{pin.linked_at, "first signal"},
+                    "unlink it first: unlinkp " + pin_name);
     }
     if (pin.type != signal.type) {
         const bool writes = pin.dir == HAL_DIR_OUT;
         const std::string convert =
             writes ? conversion(pin.type, signal.type) : conversion(signal.type, pin.type);
-        return refuse("type-mismatch",
-                      "signal " + hal::quoted(signal.name) + " carries " + name(signal.type) +
-                          ", pin " + hal::quoted(word.text) + " is " + name(pin.type),
-                      name(pin.type), signal.typed,
-                      "the signal became " + std::string(name(signal.type)) + " here",
-                      convert.empty() ? ""
-                                      : "convert with " + convert + ": loadrt " + convert +
-                                            " names=" + signal.name + "-conv");
+        std::string help;
+        if (!convert.empty()) {
+            help = "convert with " + convert + ": loadrt " + convert + " names=" + signal.name +
+                   "-conv";
+        }
+        return fail(
+            "type-mismatch", word.span,
+            "signal " + hal::quoted(signal.name) + " carries " + name(signal.type) + ", pin " +
+                hal::quoted(pin_name) + " is " + name(pin.type),
+            name(pin.type),
+            Other{signal.typed, "the signal became " + std::string(name(signal.type)) + " here"},
+            std::move(help));
     }
-    if (pin.dir == HAL_DIR_OUT && signal.writer) {
-        return refuse("two-writers", "signal " + hal::quoted(signal.name) + " already has a writer",
-                      "second output", signal.writer->linked_at, "first output",
-                      "a signal has one output pin; join two sources with sum2, or2 or mux2");
+    return check_writers(pin, signal, word);
+}
+
+/// The rules about all pins of a signal. False after reporting.
+bool LinkEdit::check_writers(const Pin& pin, const Signal& signal, Word word) {
+    const std::string of_signal = "signal " + hal::quoted(signal.name);
+    const auto first = [&](hal_dir dir) {
+        return (*std::ranges::find(signal.pins, dir, &Pin::dir))->linked_at;
+    };
+    const char* const io_help = "I/O pins can share a signal only with other I/O pins and inputs";
+    const bool is_output = pin.dir == HAL_DIR_OUT;
+    if (is_output && signal.writer) {
+        return fail("two-writers", word.span, of_signal + " already has a writer", "second output",
+                    Other{signal.writer->linked_at, "first output"},
+                    "a signal has one output pin; join two sources with sum2, or2 or mux2");
     }
-    if (pin.dir == HAL_DIR_OUT && signal.ios != 0) {
-        const auto io = std::find_if(signal.pins.begin(), signal.pins.end(),
-                                     [](const Pin* p) { return p->dir == HAL_DIR_IO; });
-        return refuse("two-writers",
-                      "signal " + hal::quoted(signal.name) +
-                          " already has I/O pins, so it cannot have an output",
-                      "output", (*io)->linked_at, "I/O pin",
-                      "I/O pins can share a signal only with other I/O pins and inputs");
+    if (is_output && signal.ios != 0) {
+        return fail("two-writers", word.span,
+                    of_signal + " already has I/O pins, so it cannot have an output", "output",
+                    Other{first(HAL_DIR_IO), "I/O pin"}, io_help);
     }
     if (pin.dir == HAL_DIR_IO && signal.writer) {
-        return refuse("two-writers",
-                      "signal " + hal::quoted(signal.name) +
-                          " already has a writer, so it cannot have an I/O pin",
-                      "I/O pin", signal.writer->linked_at, "output",
-                      "I/O pins can share a signal only with other I/O pins and inputs");
+        return fail("two-writers", word.span,
+                    of_signal + " already has a writer, so it cannot have an I/O pin", "I/O pin",
+                    Other{signal.writer->linked_at, "output"}, io_help);
     }
     if (pin.type == HAL_TYPE_PORT && pin.dir == HAL_DIR_IN && signal.readers != 0) {
-        const auto reader = std::find_if(signal.pins.begin(), signal.pins.end(),
-                                         [](const Pin* p) { return p->dir == HAL_DIR_IN; });
-        return refuse("two-readers",
-                      "port signal " + hal::quoted(signal.name) + " already has a reader",
-                      "second reader", (*reader)->linked_at, "first reader",
-                      "a byte stream has one writer and one reader");
+        return fail("two-readers", word.span, "port " + of_signal + " already has a reader",
+                    "second reader", Other{first(HAL_DIR_IN), "first reader"},
+                    "a byte stream has one writer and one reader");
     }
+    return true;
+}
+
+bool LinkEdit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
+    if (pin.signal == &signal) return true;
+    if (!check_link(pin, signal, word)) return false;
 
     // LinuxCNC: the first reader, or a writer while there is none, hands its own value to the
     // signal.
     const bool unwritten = !signal.writer && signal.ios == 0;
-    if (pin.type != HAL_TYPE_PORT && unwritten && (pin.dir != HAL_DIR_IN || signal.readers == 0)) {
+    const bool hands_value = pin.dir != HAL_DIR_IN || signal.readers == 0;
+    if (pin.type != HAL_TYPE_PORT && unwritten && hands_value) {
         signal_values.erase(&signal);
         inherited[&signal] = &pin;
     }
@@ -275,100 +294,65 @@ bool Edit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
     on_undo([&pin, &signal, linked_before = pin.linked_at, in_before = pin.arrow_in,
              out_before = pin.arrow_out] {
         signal.pins.erase(std::find(signal.pins.rbegin(), signal.pins.rend(), &pin).base() - 1);
-        pin.signal = nullptr;
+        uncount(pin, signal);
         pin.linked_at = linked_before;
         pin.arrow_in = in_before;
         pin.arrow_out = out_before;
-        if (pin.dir == HAL_DIR_OUT) {
-            signal.writer = nullptr;
-        }
-        if (pin.dir == HAL_DIR_IN) {
-            --signal.readers;
-        }
-        if (pin.dir == HAL_DIR_IO) {
-            --signal.ios;
-        }
     });
     signal.pins.push_back(&pin);
-    pin.signal = &signal;
+    count(pin, signal);
     pin.linked_at = word.span;
     pin.arrow_in = arrow == Arrow::to_pin;
     pin.arrow_out = arrow == Arrow::from_pin;
-    if (pin.dir == HAL_DIR_OUT) {
-        signal.writer = &pin;
-    }
-    if (pin.dir == HAL_DIR_IN) {
-        ++signal.readers;
-    }
-    if (pin.dir == HAL_DIR_IO) {
-        ++signal.ios;
-    }
     structural_ = true;
     return true;
 }
 
-void Edit::unlink(Pin& pin) {
+/// The pin keeps the signal's value, which may be one that this very transaction set or let it
+/// inherit.
+void LinkEdit::keep_signal_value(Pin& pin, const Signal& signal) {
+    if (pin.type == HAL_TYPE_PORT) return;
+    if (const auto set = signal_values.find(&signal); set != signal_values.end()) {
+        pin_values[&pin] = set->second;
+        return;
+    }
+    if (const auto given = inherited.find(&signal);
+        given != inherited.end() && given->second != &pin) {
+        Pin& giver = *given->second;
+        const auto own = pin_values.find(&giver);
+        const hal_value value = own != pin_values.end() ? own->second : load(*present(giver).slot);
+        pin_values[&pin] = value;
+        return;
+    }
+    // of no thread: it has no slot where the value is
+    if (!pin.home && (signal.home || signal.cell)) {
+        pin_values[&pin] = load(*signal.slot);
+    }
+}
+
+void LinkEdit::unlink(Pin& pin) {
     Signal* const signal = pin.signal;
     if (!signal) return;
     // a signal with many pins loses them from either end
     const auto at = signal->pins.back() == &pin
                         ? signal->pins.end() - 1
                         : std::find(signal->pins.begin(), signal->pins.end(), &pin);
-    // it keeps the signal's value, which may be one that this very transaction set or let it
-    // inherit
-    if (pin.type != HAL_TYPE_PORT) {
-        if (const auto set = signal_values.find(signal); set != signal_values.end()) {
-            pin_values[&pin] = set->second;
-        } else if (const auto given = inherited.find(signal);
-                   given != inherited.end() && given->second != &pin) {
-            Pin& giver = *given->second;
-            const auto own = pin_values.find(&giver);
-            const hal_value value =
-                own != pin_values.end()
-                    ? own->second
-                    : hal_value{.raw =
-                                    __atomic_load_n(&present(giver).slot->raw, __ATOMIC_RELAXED)};
-            pin_values[&pin] = value;
-        } else if (!pin.home &&
-                   (signal->home ||
-                    signal->cell)) {  // of no thread: it has no slot where the value is
-            pin_values[&pin] =
-                hal_value{.raw = __atomic_load_n(&signal->slot->raw, __ATOMIC_RELAXED)};
-        }
-    }
+    keep_signal_value(pin, *signal);
     on_undo([signal, &pin, position = at - signal->pins.begin()] {
         signal->pins.insert(signal->pins.begin() + position, &pin);
-        pin.signal = signal;
-        if (pin.dir == HAL_DIR_OUT) {
-            signal->writer = &pin;
-        }
-        if (pin.dir == HAL_DIR_IN) {
-            ++signal->readers;
-        }
-        if (pin.dir == HAL_DIR_IO) {
-            ++signal->ios;
-        }
+        count(pin, *signal);
     });
     signal->pins.erase(at);
-    pin.signal = nullptr;
-    if (pin.dir == HAL_DIR_OUT) {
-        signal->writer = nullptr;
-    }
-    if (pin.dir == HAL_DIR_IN) {
-        --signal->readers;
-    }
-    if (pin.dir == HAL_DIR_IO) {
-        --signal->ios;
-    }
+    uncount(pin, *signal);
     structural_ = true;
 }
 
-void Edit::keep_value(Pin& pin) {
+void LinkEdit::keep_value(Pin& pin) {
     const hal_value before = *pin.memory->slot;
     on_undo([&pin, before] { *pin.memory->slot = before; });
 }
 
-void Edit::warn_of_wrap(Word value, hal_type type, const Parsed& parsed) {
+void LinkEdit::warn_of_wrap(Word value, hal_type type, const Parsed& parsed) {
     if (parsed.warning.empty()) return;
     const std::string result = format_value(type, parsed.value);
     diagnostics->add(
@@ -379,45 +363,42 @@ void Edit::warn_of_wrap(Word value, hal_type type, const Parsed& parsed) {
          {"LinuxCNC 2.9 does the same, 2.10 rejects it; write " + result + " if that is meant"}});
 }
 
-bool Edit::set_pin(Word name, Word value) {
-    Pin* const target = pin(name);
-    if (!target) return false;
-    const char* const kind = target->dir == HAL_DIR_PARAM ? "parameter " : "pin ";
-    if (target->dir == HAL_DIR_OUT) {
+/// The rules about a pin whose value is set. False after reporting.
+bool LinkEdit::check_settable(const Pin& target, Word name, Word value) {
+    if (target.dir == HAL_DIR_OUT) {
         return fail("output-set", name.span,
                     "pin " + hal::quoted(name.text) + " is an output: only its component writes it",
                     "output");
     }
-    if (target->read_only()) {
+    if (target.read_only()) {
         return fail(
             "output-set", name.span,
             "parameter " + hal::quoted(name.text) + " is read-only: only its component sets it",
             "read-only");
     }
-    if (target->signal) {
-        Diagnostic d{Severity::error,
-                     "linked-set",
-                     "pin " + hal::quoted(name.text) + " takes its value from signal " +
-                         hal::quoted(target->signal->name),
-                     {{name.span, "linked"}},
-                     {}};
-        if (target->linked_at.known()) {
-            d.labels.push_back({target->linked_at, "linked here"});
-        }
-        d.help.push_back(target->signal->writer
-                             ? "the value comes from '" + target->signal->writer->name +
-                                   "'; to set it by hand: unlinkp " + std::string(name.text)
-                             : "set the signal: sets " + target->signal->name + " " +
-                                   std::string(value.text));
-        diagnostics->add(std::move(d));
-        return false;
+    if (const Signal* const signal = target.signal) {
+        const std::string help =
+            signal->writer ? "the value comes from '" + signal->writer->name +
+                                 "'; to set it by hand: unlinkp " + std::string(name.text)
+                           : "set the signal: sets " + signal->name + " " + std::string(value.text);
+        return fail("linked-set", name.span,
+                    "pin " + hal::quoted(name.text) + " takes its value from signal " +
+                        hal::quoted(signal->name),
+                    "linked", Other{target.linked_at, "linked here"}, help);
     }
-    if (target->type == HAL_TYPE_PORT) {
+    if (target.type == HAL_TYPE_PORT) {
         return fail("bad-value", value.span, "a port pin has no value to set", "",
                     "link it and allocate the buffer of the signal: sets SIGNAL BYTES");
     }
+    return true;
+}
+
+bool LinkEdit::set_pin(Word name, Word value) {
+    Pin* const target = pin(name);
+    if (!target || !check_settable(*target, name, value)) return false;
     const Parsed parsed = parse_wrapping(target->type, value.text);
     if (!parsed.problem.empty()) {
+        const char* const kind = target->dir == HAL_DIR_PARAM ? "parameter " : "pin ";
         return fail("bad-value", value.span, parsed.problem,
                     kind + hal::quoted(name.text) + " is " + hal::name(target->type));
     }
@@ -432,52 +413,47 @@ bool Edit::set_pin(Word name, Word value) {
     return true;
 }
 
-bool Edit::set_signal(Word name, Word value) {
+/// Gives a port signal its buffer. False after reporting.
+bool LinkEdit::allocate_port(Signal& target, Word name, Word value) {
+    constexpr std::uint32_t max_size = 1u << 30;
+    const Parsed bytes = parse_value(HAL_TYPE_U32, value.text);
+    if (!bytes.problem.empty() || bytes.value.u32 == 0 || bytes.value.u32 > max_size) {
+        return fail("bad-value", value.span,
+                    hal::quoted(value.text) + " is not a buffer size in bytes (1 to 1073741824)",
+                    "port signal");
+    }
+    if (target.port) {
+        return fail("port-sized", name.span,
+                    "port signal " + hal::quoted(name.text) + " already has a buffer", "",
+                    "its size is fixed once set");
+    }
+    auto buffer = std::make_unique<std::uint8_t[]>(bytes.value.u32);
+    auto made = std::make_unique<hal_port>(hal_port{bytes.value.u32, 0, 0, 0, buffer.get()});
+    signal_values[&target] = hal_value{.port = made.get()};
+    on_undo([this, &target] {
+        removed_.ports.push_back(std::move(target.port));  // a thread may know it
+        target.value.port = nullptr;
+    });
+    buffer.release();
+    target.port = {made.release(), [](hal_port* p) {
+        delete[] p->data;
+        delete p;
+    }};
+    target.value.port = target.port.get();
+    structural_ = true;
+    return true;
+}
+
+bool LinkEdit::set_signal(Word name, Word value) {
     Signal* const target = signal(name);
     if (!target) return false;
-    if (target->type == HAL_TYPE_PORT) {
-        const Parsed bytes = parse_value(HAL_TYPE_U32, value.text);
-        if (!bytes.problem.empty() || bytes.value.u32 == 0 || bytes.value.u32 > (1u << 30)) {
-            return fail(
-                "bad-value", value.span,
-                hal::quoted(value.text) + " is not a buffer size in bytes (1 to 1073741824)",
-                "port signal");
-        }
-        if (target->port) {
-            return fail("port-sized", name.span,
-                        "port signal " + hal::quoted(name.text) + " already has a buffer", "",
-                        "its size is fixed once set");
-        }
-        auto room = std::make_unique<std::uint8_t[]>(bytes.value.u32);
-        auto made = std::make_unique<hal_port>(hal_port{bytes.value.u32, 0, 0, 0, room.get()});
-        signal_values[target] = hal_value{.port = made.get()};
-        on_undo([this, target] {
-            removed_.ports.push_back(std::move(target->port));  // a thread may know it
-            target->value.port = nullptr;
-        });
-        room.release();
-        target->port = {made.release(), [](hal_port* p) {
-            delete[] p->data;
-            delete p;
-        }};
-        target->value.port = target->port.get();
-        structural_ = true;
-        return true;
-    }
-    if (target->writer) {
-        Diagnostic d{Severity::error,
-                     "writer-set",
-                     "signal " + hal::quoted(name.text) + " is written by " +
-                         hal::quoted(target->writer->name),
-                     {{name.span, "has a writer"}},
-                     {}};
-        if (target->writer->linked_at.known()) {
-            d.labels.push_back({target->writer->linked_at, "linked here"});
-        }
-        d.help.push_back("to set it by hand, unlink the writer first: unlinkp " +
-                         target->writer->name);
-        diagnostics->add(std::move(d));
-        return false;
+    if (target->type == HAL_TYPE_PORT) return allocate_port(*target, name, value);
+    if (const Pin* const writer = target->writer) {
+        return fail(
+            "writer-set", name.span,
+            "signal " + hal::quoted(name.text) + " is written by " + hal::quoted(writer->name),
+            "has a writer", Other{writer->linked_at, "linked here"},
+            "to set it by hand, unlink the writer first: unlinkp " + writer->name);
     }
     const Parsed parsed = parse_wrapping(target->type, value.text);
     if (!parsed.problem.empty()) {
@@ -491,7 +467,7 @@ bool Edit::set_signal(Word name, Word value) {
 }
 
 /// Sets or clears the alias of a pin, and the index with it.
-void Edit::change_alias(Pin& pin, std::string alias) {
+void LinkEdit::change_alias(Pin& pin, std::string alias) {
     on_undo([this, &pin, before = pin.alias] {
         if (!pin.alias.empty()) {
             model_.pin.erase(pin.alias);
@@ -511,7 +487,7 @@ void Edit::change_alias(Pin& pin, std::string alias) {
     ++model_.next_id;  // similar names are looked up among those that existed
 }
 
-bool Edit::alias(Word name, Word second) {
+bool LinkEdit::alias(Word name, Word second) {
     Pin* const target = pin(name);
     if (!target) return false;
     if (model_.find_pin(second.text)) {
@@ -526,7 +502,7 @@ bool Edit::alias(Word name, Word second) {
     return true;
 }
 
-bool Edit::unalias(Word name) {
+bool LinkEdit::unalias(Word name) {
     Pin* const target = pin(name);
     if (!target) return false;
     if (!target->alias.empty()) {
