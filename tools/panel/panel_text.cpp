@@ -26,8 +26,8 @@ using text::Word;
 
 namespace {
 
-constexpr int deepest = 30;
-constexpr std::size_t most_widgets = 2000;
+constexpr int max_depth = 30;
+constexpr std::size_t max_widgets = 2000;
 
 /// A widget of the language.
 struct Kind {
@@ -186,7 +186,7 @@ private:
             return error(words[2].at, "a container has at most a title",
                          "write titles with blanks in quotation marks");
         }
-        if (open_.size() > deepest) {
+        if (open_.size() > max_depth) {
             return error(words[0].at, "containers are nested more than 30 deep");
         }
         Json node{{"widget", words[0].text == "row" ? "hbox" : "vbox"},
@@ -206,8 +206,17 @@ private:
     }
 
     void widget(const Kind& kind, const std::vector<Word>& words);
-    void pin(const Kind& kind, const std::vector<Word>& words,
-             const std::map<std::string, Word>& given, Json& options, Json& node);
+    using Given = std::map<std::string, Word>;  // options by key
+    void pin(const Kind& kind, const std::vector<Word>& words, const Given& given, Json& options,
+             Json& node);
+    bool check_name(const Word& word);
+    void set_value(const Kind& kind, const Given& given, const char* key, const PanelPin& pin,
+                   Json& to);
+    Given given_options(const Kind& kind, const std::vector<Word>& words);
+    Json widget_options(const Given& given);
+    void set_number(const std::string& key, const Word& word, Json& options);
+    void check_colour(const std::string& key, const Word& word);
+    void check_numbers(const Json& options, const Given& given);
     std::optional<Json> value_of(const Kind& kind, const Word& word);
 
 public:
@@ -247,27 +256,53 @@ std::optional<Json> Reader::value_of(const Kind& kind, const Word& word) {
     return std::nullopt;
 }
 
-void Reader::pin(const Kind& kind, const std::vector<Word>& words,
-                 const std::map<std::string, Word>& given, Json& options, Json& node) {
+bool is_pin_character(char c) {
+    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
+    const bool digit = c >= '0' && c <= '9';
+    return letter || digit || c == '-' || c == '_' || c == '.';
+}
+
+/// Checks the name of a new pin. False after reporting.
+bool Reader::check_name(const Word& word) {
+    const std::string& name = word.text;
+    const bool good =
+        !name.empty() && name.size() <= 100 && std::ranges::all_of(name, is_pin_character);
+    if (!good) {
+        error(word.at, fmt::format("'{}' is not a valid name of a pin", name.substr(0, 60)),
+              "use letters, digits, '-', '_' and '.'");
+        return false;
+    }
+    if (std::ranges::find(layout_.pins, name, &PanelPin::name) != layout_.pins.end()) {
+        error(word.at, fmt::format("duplicate pin '{}'", name),
+              "each pin of a panel needs a name of its own");
+        return false;
+    }
+    return true;
+}
+
+/// Sets the initial or the safe value of a pin, if it is given.
+void Reader::set_value(const Kind& kind, const Given& given, const char* key, const PanelPin& pin,
+                       Json& to) {
+    const auto at = given.find(key);
+    if (at == given.end()) return;
+    const Word& word = at->second;
+    const auto value = value_of(kind, word);
+    if (!value) return;
+    const double number = value->is_number() ? value->get<double>() : pin.least;
+    if (number < pin.least || number > pin.most) {
+        error(word.at, fmt::format("{}={} is outside {:g}..{:g}", key, word.text.substr(0, 60),
+                                   pin.least, pin.most));
+    }
+    to = *value;
+}
+
+void Reader::pin(const Kind& kind, const std::vector<Word>& words, const Given& given,
+                 Json& options, Json& node) {
+    if (!check_name(words[1])) return;
     PanelPin pin;
     pin.name = words[1].text;
     pin.type = kind.type;
     pin.output = kind.output;
-    const bool good = !pin.name.empty() && pin.name.size() <= 100 &&
-                      std::all_of(pin.name.begin(), pin.name.end(), [](unsigned char c) {
-        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-               c == '-' || c == '_' || c == '.';
-    });
-    if (!good) {
-        return error(words[1].at,
-                     fmt::format("'{}' is not a valid name of a pin", pin.name.substr(0, 60)),
-                     "use letters, digits, '-', '_' and '.'");
-    }
-    if (std::any_of(layout_.pins.begin(), layout_.pins.end(),
-                    [&](const PanelPin& other) { return other.name == pin.name; })) {
-        return error(words[1].at, fmt::format("duplicate pin '{}'", pin.name),
-                     "each pin of a panel needs a name of its own");
-    }
     if (kind.output && std::string_view(kind.name) == "button") {
         pin.safe = false;
     }
@@ -275,19 +310,10 @@ void Reader::pin(const Kind& kind, const std::vector<Word>& words,
         pin.least = options.value("min", pin.least);
         pin.most = options.value("max", pin.most);
     }
-    for (const auto& [key, word] : given) {
-        if (key != "initial" && key != "safe") continue;
-        const auto value = value_of(kind, word);
-        if (!value) continue;
-        if (value->is_number() &&
-            (value->get<double>() < pin.least || value->get<double>() > pin.most)) {
-            error(word.at, fmt::format("{}={} is outside {:g}..{:g}", key, word.text.substr(0, 60),
-                                       pin.least, pin.most));
-        }
-        (key == "initial" ? pin.initial : pin.safe) = *value;
-    }
-    if (kind.output && pin.initial.is_null() && pin.safe.is_null() &&
-        (pin.least > 0 || pin.most < 0)) {
+    set_value(kind, given, "initial", pin, pin.initial);
+    set_value(kind, given, "safe", pin, pin.safe);
+    const bool zero_is_outside = pin.least > 0 || pin.most < 0;
+    if (kind.output && zero_is_outside && pin.initial.is_null() && pin.safe.is_null()) {
         pin.initial = pin.least > 0 ? pin.least : pin.most;
     }
     if (given.contains("unit")) {
@@ -306,16 +332,9 @@ void Reader::pin(const Kind& kind, const std::vector<Word>& words,
     layout_.pins.push_back(std::move(pin));
 }
 
-void Reader::widget(const Kind& kind, const std::vector<Word>& words) {
-    if (++widgets_ > most_widgets) {
-        return widgets_ == most_widgets + 1 ? error(words[0].at, "more than 2000 widgets") : void();
-    }
-    if (words.size() < 2) {
-        return error(words[0].at,
-                     fmt::format("missing {} of '{}'", kind.type ? "pin" : "text", kind.name),
-                     fmt::format("write: {} NAME", kind.name));
-    }
-    std::map<std::string, Word> given;
+/// Parses the options KEY=VALUE of a widget; reports those that it does not have.
+Reader::Given Reader::given_options(const Kind& kind, const std::vector<Word>& words) {
+    Given given;
     const std::string keys = std::string("label doc unit ") + kind.keys;
     for (std::size_t i = 2; i < words.size(); ++i) {
         const std::size_t equals = words[i].text.find('=');
@@ -329,47 +348,78 @@ void Reader::widget(const Kind& kind, const std::vector<Word>& words) {
         }
         given[key] = {words[i].text.substr(equals + 1), words[i].at};
     }
-    Json options = Json::object();
-    Json node{{"widget", kind.widget}, {"kind", kind.name}};
-    for (const auto& [key, word] : given) {
-        if (std::find(std::begin(number_keys), std::end(number_keys), key) !=
-            std::end(number_keys)) {
-            if (const auto number = number_of(word.text)) {
-                options[key] = *number;
-            } else {
-                error(word.at,
-                      fmt::format("{} must be a number, not '{}'", key, word.text.substr(0, 60)));
-            }
-        } else if (key == "on" || key == "off" || key == "unit") {
-            options[key] = word.text;
-            if (key == "unit" || is_css_colour(word.text)) continue;
-            const std::string similar =
-                did_you_mean(word.text, {css_colours.begin(), css_colours.end()});
-            error(word.at, fmt::format("{}: unknown colour '{}'", key, word.text.substr(0, 60)),
-                  similar.empty() ? "write a name like green, or #rrggbb" : similar);
+    return given;
+}
+
+void Reader::set_number(const std::string& key, const Word& word, Json& options) {
+    if (const auto number = number_of(word.text)) {
+        options[key] = *number;
+    } else {
+        error(word.at, fmt::format("{} must be a number, not '{}'", key, word.text.substr(0, 60)));
+    }
+}
+
+void Reader::check_colour(const std::string& key, const Word& word) {
+    if (is_css_colour(word.text)) return;
+    const std::string similar = did_you_mean(word.text, {css_colours.begin(), css_colours.end()});
+    error(word.at, fmt::format("{}: unknown colour '{}'", key, word.text.substr(0, 60)),
+          similar.empty() ? "write a name like green, or #rrggbb" : similar);
+}
+
+/// The ranges of numeric options.
+void Reader::check_numbers(const Json& options, const Given& given) {
+    const auto number = [&](const char* key) { return options[key].get<double>(); };
+    if (options.contains("min") && options.contains("max") && number("min") >= number("max")) {
+        error(given.at("min").at, "min must be less than max");
+    }
+    for (const char* const key : {"seconds", "step"}) {
+        if (options.contains(key) && number(key) <= 0) {
+            error(given.at(key).at, fmt::format("{} must be positive", key));
         }
     }
-    if (options.contains("min") && options.contains("max") &&
-        options["min"].get<double>() >= options["max"].get<double>()) {
-        error(given["min"].at, "min must be less than max");
+    if (options.contains("digits") && !(number("digits") >= 0 && number("digits") <= 15)) {
+        error(given.at("digits").at, "digits must be 0 to 15");
     }
-    if (options.contains("seconds") && options["seconds"].get<double>() <= 0) {
-        error(given["seconds"].at, "seconds must be positive");
+}
+
+Json Reader::widget_options(const Given& given) {
+    Json options = Json::object();
+    for (const auto& [key, word] : given) {
+        if (std::ranges::find(number_keys, key) != std::end(number_keys)) {
+            set_number(key, word, options);
+        } else if (key == "on" || key == "off") {
+            options[key] = word.text;
+            check_colour(key, word);
+        } else if (key == "unit") {
+            options[key] = word.text;
+        }
     }
-    if (options.contains("digits") &&
-        !(options["digits"].get<double>() >= 0 && options["digits"].get<double>() <= 15)) {
-        error(given["digits"].at, "digits must be 0 to 15");
-    }
-    if (options.contains("step") && options["step"].get<double>() <= 0) {
-        error(given["step"].at, "step must be positive");
-    }
+    check_numbers(options, given);
     if (given.contains("label")) {
-        options["text"] = given["label"].text;
+        options["text"] = given.at("label").text;
     }
+    return options;
+}
+
+void Reader::widget(const Kind& kind, const std::vector<Word>& words) {
+    if (++widgets_ > max_widgets) {
+        if (widgets_ == max_widgets + 1) {
+            error(words[0].at, "more than 2000 widgets");
+        }
+        return;
+    }
+    if (words.size() < 2) {
+        return error(words[0].at,
+                     fmt::format("missing {} of '{}'", kind.type ? "pin" : "text", kind.name),
+                     fmt::format("write: {} NAME", kind.name));
+    }
+    const Given given = given_options(kind, words);
+    Json options = widget_options(given);
+    Json node{{"widget", kind.widget}, {"kind", kind.name}};
     if (!kind.type) {
         options["text"] = words[1].text;
     } else if (given.contains("of")) {  // shows a value that exists, without a pin of its own
-        node["of"] = given["of"].text;
+        node["of"] = given.at("of").text;
         if (!options.contains("text")) {
             options["text"] = words[1].text;
         }

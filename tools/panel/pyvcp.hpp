@@ -31,6 +31,27 @@ private:
                    nlohmann::json& node, bool always);
     nlohmann::json limited(const nlohmann::json& options, double low, double high) const;
 
+    void disable(const std::string& name, const nlohmann::json& options, nlohmann::json& node);
+    static std::string name_or(std::string automatic, const nlohmann::json& options);
+    /// Counts a widget, also one that is named. Returns its number.
+    unsigned count(std::string_view kind) { return counts_[std::string(kind)]++; }
+
+    // A function for each kind of widgets.
+    void label(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+    void multilabel(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+    void led(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+    void button(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+    void checkbutton(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+    void radiobutton(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+    void number(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+    void timer(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+    void bar(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+    void meter(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+    void spinbox(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+    void scale(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+    void dial(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+    void jogwheel(std::string_view kind, const nlohmann::json& options, nlohmann::json& node);
+
     PanelLayout& layout_;
     std::map<std::string, unsigned, std::less<>> counts_;
     std::string problem_;
