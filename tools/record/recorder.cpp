@@ -290,78 +290,96 @@ private:
     bool was_on_ = true;
 };
 
+/// Returns what is wrong with the options of a recording, "" when nothing is.
+std::string problem_of(const Recording& what) {
+    if (!what.file.ends_with(".mcap") && !what.file.ends_with(".csv")) {
+        return fmt::format("unknown format of '{}'; name the file .mcap or .csv", what.file);
+    }
+    std::string problem = unsupported_profile(what.profile, what.file);
+    if (!problem.empty()) return problem;
+    const bool last = what.last_ns >= 0;
+    const bool rotate = what.rotate_ns >= 0;
+    if (what.names.empty() && what.groups.empty() && !what.all) {
+        return "missing names of values; or --group NAME; or --all";
+    }
+    if (what.all && !what.groups.empty()) return "--all has every --group; leave one out";
+    if (last && rotate) return "--last and --rotate exclude each other; leave one out";
+    if (!last && what.after_ns >= 0) return "--after needs --last TIME";
+    if (!last && !rotate && what.keep != 0) return "--keep needs --rotate TIME or --last TIME";
+    if (!last && !what.trigger.empty()) {
+        return "--trigger needs --last TIME: what is kept until it comes";
+    }
+    return "";
+}
+
+void add_new(std::vector<std::string>& names, std::vector<std::string> more) {
+    for (std::string& name : more) {
+        if (std::ranges::find(names, name) == names.end()) {
+            names.push_back(std::move(name));
+        }
+    }
+}
+
+/// Returns the names of all values to record; sets `problem` when one is unknown.
+std::vector<std::string> names_of(Client& client, const Recording& what, std::string& problem) {
+    std::vector<std::string> given = what.names;
+    if (!what.trigger.empty()) {
+        given.push_back(what.trigger);
+    }
+    std::vector<std::string> names = probed_names(client, given, problem);
+    if (!problem.empty()) return names;
+    if (what.all) {
+        add_new(names, all_names(client));
+    }
+    for (const std::string& group : what.groups) {
+        add_new(names, group_names(client, group, problem));
+        if (!problem.empty()) return names;
+    }
+    if (names.size() > Probes::most_names) {
+        problem = fmt::format("{} values are more than {}; name fewer, or type --group NAME",
+                              names.size(), Probes::most_names);
+    }
+    return names;
+}
+
+/// Attaches a probe; for thousands of values with a shorter buffer, so that the disk may be late
+/// for a shorter time only. Returns nullptr and sets `problem` to the reason.
+std::unique_ptr<ProbeClient> attach(Client& client, const std::vector<std::string>& names,
+                                    const Recording& what, std::string& problem) {
+    constexpr auto min_buffer_ms = 100;
+    ProbeClient::Options wanted;
+    wanted.every = what.every;
+    wanted.journal = true;
+    for (;; wanted.buffer_ms /= 2) {
+        auto probe = ProbeClient::attach(client, names, wanted, problem);
+        if (probe) return probe;
+        const std::size_t advice = problem.find("; sample fewer values");
+        if (advice == std::string::npos) return nullptr;
+        if (wanted.buffer_ms > min_buffer_ms) continue;
+        // hal record has no buffer_ms
+        problem = problem.substr(0, advice) + "; name fewer values, or type a larger --every";
+        return nullptr;
+    }
+}
+
 }  // namespace
 
 int record_values(const Options& options, const std::string& instance, Recording what) {
-    if (!what.file.ends_with(".mcap") && !what.file.ends_with(".csv")) {
-        return fail(options,
-                    fmt::format("unknown format of '{}'; name the file .mcap or .csv", what.file));
-    }
-    std::string problem = unsupported_profile(what.profile, what.file);
+    std::string problem = problem_of(what);
     if (!problem.empty()) return fail(options, problem);
-    if (what.names.empty() && what.groups.empty() && !what.all) {
-        return fail(options, "missing names of values; or --group NAME; or --all");
-    }
-    if (what.all && !what.groups.empty()) {
-        return fail(options, "--all has every --group; leave one out");
-    }
-    if (what.last_ns >= 0 && what.rotate_ns >= 0) {
-        return fail(options, "--last and --rotate exclude each other; leave one out");
-    }
-    if (what.last_ns < 0 && what.after_ns >= 0) return fail(options, "--after needs --last TIME");
-    if (what.last_ns < 0 && what.rotate_ns < 0 && what.keep != 0) {
-        return fail(options, "--keep needs --rotate TIME or --last TIME");
-    }
     constexpr std::int64_t default_after_ns = 5'000'000'000;
     if (what.after_ns < 0) {
         what.after_ns = default_after_ns;
     }
-    if (what.last_ns < 0 && !what.trigger.empty()) {
-        return fail(options, "--trigger needs --last TIME: what is kept until it comes");
-    }
     const auto client = Client::connect(instance, problem);
     if (!client) return fail(options, problem);
+    const std::vector<std::string> names = names_of(*client, what, problem);
+    if (!problem.empty()) return fail(options, problem);
+    const auto probe = attach(*client, names, what, problem);
+    if (!probe) return fail(options, problem);
     if (!what.trigger.empty()) {
         what.names.push_back(what.trigger);
     }
-    std::vector<std::string> names = probed_names(*client, what.names, problem);
-    if (!problem.empty()) return fail(options, problem);
-    const auto add = [&](std::vector<std::string> more) {
-        for (std::string& name : more) {
-            if (std::find(names.begin(), names.end(), name) == names.end()) {
-                names.push_back(std::move(name));
-            }
-        }
-    };
-    if (what.all) {
-        add(all_names(*client));
-    }
-    for (const std::string& group : what.groups) {
-        add(group_names(*client, group, problem));
-        if (!problem.empty()) return fail(options, problem);
-    }
-    if (names.size() > Probes::most_names) {
-        return fail(options,
-                    fmt::format("{} values are more than {}; name fewer, or type --group NAME",
-                                names.size(), Probes::most_names));
-    }
-    ProbeClient::Options wanted;
-    wanted.every = what.every;
-    wanted.journal = true;
-    auto probe = ProbeClient::attach(*client, names, wanted, problem);
-    const auto too_much = [&] {
-        return probe ? std::string::npos : problem.find("; sample fewer values");
-    };
-    // thousands of values: the disk may be late for a shorter time only
-    while (too_much() != std::string::npos && wanted.buffer_ms > 100) {
-        wanted.buffer_ms /= 2;
-        probe = ProbeClient::attach(*client, names, wanted, problem);
-    }
-    if (const std::size_t advice = too_much(); advice != std::string::npos) {
-        problem = problem.substr(0, advice) +
-                  "; name fewer values, or type a larger --every";  // hal record has no buffer_ms
-    }
-    if (!probe) return fail(options, problem);
     Recorder recorder(options, what, *client, *probe);
     return what.last_ns >= 0 ? recorder.flight() : recorder.to_files();
 }
