@@ -109,63 +109,93 @@ ScopeView::Action ScopeView::key(const Key& key) {
 }
 
 ScopeView::Action ScopeView::letter(char c) {
-    const std::int64_t total = acquisition_.pre_ns() + acquisition_.post_ns();
-
-    const std::int64_t pre = acquisition_.pre_ns();
-    const bool running = acquisition_.state() != State::stopped;
-    ChannelView& trace = traces_[selected_];
-    switch (c) {
-    case 'q': return Action::quit;
-    case 'w': return Action::save;
-    case '?': help_ = true; break;
-    case ' ': running ? acquisition_.stop() : acquisition_.run(); break;
-    case 's': acquisition_.set_mode(Mode::single); break;
-    case 'n': acquisition_.set_mode(Mode::normal); break;
-    case 'u': acquisition_.set_mode(Mode::automatic); break;
-    case 'r': acquisition_.set_mode(Mode::roll); break;
-    case 'f': acquisition_.force(); break;
-    case 't': next_edge(); break;
-    case 'o': {
-        Trigger trigger = acquisition_.trigger().value_or(Trigger{});
-        trigger.source = selected_;
-        trigger.level = acquisition_.channels()[selected_].bit ? 0.5 : trace.centre;
-        acquisition_.set_trigger(trigger);
-        break;
+    if (c == 'q') return Action::quit;
+    if (c == 'w') return Action::save;
+    if (c >= '1' && c <= '9') {
+        select(static_cast<std::size_t>(c - '1'));
+        return Action::none;
     }
-    case '+':
-    case '=': trace.per_division = next_step(trace.per_division, false); break;
-    case '-': trace.per_division = next_step(trace.per_division, true); break;
-    case '[':
-    case ']': {
-        const double division = next_step(static_cast<double>(total) / divisions_x, c == ']');
-        const auto longer = static_cast<std::int64_t>(
-            std::clamp(division, least_division_ns, most_division_ns) * divisions_x);
-        change_window(longer, static_cast<std::int64_t>(static_cast<double>(longer) *
-                                                        static_cast<double>(pre) /
-                                                        static_cast<double>(total)));
-        break;
-    }
-    case '<': change_window(total, std::max<std::int64_t>(pre - total / divisions_x, 0)); break;
-    case '>': change_window(total, std::min(pre + total / divisions_x, total - 1)); break;
-    case 'a': fit(selected_); break;
-    case 'A': fit_all(); break;
-    case 'x': trace.shown = !trace.shown; break;
-    case 'm': measures_ = !measures_; break;
-    case 'c':
-        if (!cursors_.on) {
-            cursors_ = {true, 0, {0, acquisition_.post_ns() / 2}};
-        } else if (cursors_.active == 0) {
-            cursors_.active = 1;
-        } else {
-            cursors_.on = false;
-        }
-        break;
-    default:
-        if (c >= '1' && c <= '9') {
-            select(static_cast<std::size_t>(c - '1'));
-        }
+    struct Row {
+        char letter;
+        void (*act)(ScopeView& view);
+    };
+    static constexpr Row rows[] = {
+        {'?', [](ScopeView& v) { v.help_ = true; }},
+        {' ', [](ScopeView& v) { v.toggle_run(); }},
+        {'s', [](ScopeView& v) { v.acquisition_.set_mode(Mode::single); }},
+        {'n', [](ScopeView& v) { v.acquisition_.set_mode(Mode::normal); }},
+        {'u', [](ScopeView& v) { v.acquisition_.set_mode(Mode::automatic); }},
+        {'r', [](ScopeView& v) { v.acquisition_.set_mode(Mode::roll); }},
+        {'f', [](ScopeView& v) { v.acquisition_.force(); }},
+        {'t', [](ScopeView& v) { v.next_edge(); }},
+        {'o', [](ScopeView& v) { v.trigger_on_selected(); }},
+        {'+', [](ScopeView& v) { v.zoom(false); }},
+        {'=', [](ScopeView& v) { v.zoom(false); }},
+        {'-', [](ScopeView& v) { v.zoom(true); }},
+        {'[', [](ScopeView& v) { v.change_time(false); }},
+        {']', [](ScopeView& v) { v.change_time(true); }},
+        {'<', [](ScopeView& v) { v.move_trigger(-1); }},
+        {'>', [](ScopeView& v) { v.move_trigger(1); }},
+        {'a', [](ScopeView& v) { v.fit(v.selected_); }},
+        {'A', [](ScopeView& v) { v.fit_all(); }},
+        {'x', [](ScopeView& v) { v.traces_[v.selected_].shown = !v.traces_[v.selected_].shown; }},
+        {'m', [](ScopeView& v) { v.measures_ = !v.measures_; }},
+        {'c', [](ScopeView& v) { v.next_cursor(); }},
+    };
+    const auto row = std::ranges::find(rows, c, &Row::letter);
+    if (row != std::end(rows)) {
+        row->act(*this);
     }
     return Action::none;
+}
+
+void ScopeView::toggle_run() {
+    if (acquisition_.state() != State::stopped) {
+        acquisition_.stop();
+    } else {
+        acquisition_.run();
+    }
+}
+
+void ScopeView::trigger_on_selected() {
+    Trigger trigger = acquisition_.trigger().value_or(Trigger{});
+    trigger.source = selected_;
+    trigger.level = acquisition_.channels()[selected_].bit ? 0.5 : traces_[selected_].centre;
+    acquisition_.set_trigger(trigger);
+}
+
+void ScopeView::zoom(bool out) {
+    ChannelView& trace = traces_[selected_];
+    trace.per_division = next_step(trace.per_division, out);
+}
+
+/// Takes the next time per division; the trigger stays at its share of the window.
+void ScopeView::change_time(bool longer) {
+    const auto pre = static_cast<double>(acquisition_.pre_ns());
+    const auto total = static_cast<double>(acquisition_.pre_ns() + acquisition_.post_ns());
+    const double division =
+        std::clamp(next_step(total / divisions_x, longer), least_division_ns, most_division_ns);
+    const auto window = static_cast<std::int64_t>(division * divisions_x);
+    change_window(window, static_cast<std::int64_t>(static_cast<double>(window) * pre / total));
+}
+
+/// Moves the trigger within the window.
+void ScopeView::move_trigger(int divisions) {
+    const std::int64_t pre = acquisition_.pre_ns();
+    const std::int64_t total = pre + acquisition_.post_ns();
+    const std::int64_t wanted = pre + divisions * (total / divisions_x);
+    change_window(total, std::clamp<std::int64_t>(wanted, 0, total - 1));
+}
+
+/// Cursors on, then the second one is moved, then off.
+void ScopeView::next_cursor() {
+    if (!cursors_.on) {
+        cursors_ = {true, 0, {0, acquisition_.post_ns() / 2}};
+    } else if (cursors_.active == 0) {
+        cursors_.active = 1;
+    } else {
+        cursors_.on = false;
+    }
 }
 
 void ScopeView::change_window(std::int64_t total_ns, std::int64_t pre_ns) {

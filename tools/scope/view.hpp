@@ -56,6 +56,12 @@ public:
 
 private:
     Action letter(char c);
+    void toggle_run();
+    void trigger_on_selected();
+    void zoom(bool out);
+    void change_time(bool longer);
+    void move_trigger(int divisions);
+    void next_cursor();
     void arrow(const Key& key);
     void next_edge();
     void move_level(double divisions);
