@@ -50,7 +50,10 @@ Type described_type(const std::string& name, unsigned bits) {
 
 Type type_of(unsigned bits, bool with_sign) {
     if (bits == 1) return Type::bit;
-    const unsigned width = bits <= 8 ? 0 : bits <= 16 ? 1 : bits <= 32 ? 2 : 3;
+    unsigned width = 0;
+    for (unsigned max = 8; bits > max && max < 64; max *= 2) {
+        ++width;
+    }
     return static_cast<Type>(static_cast<unsigned>(with_sign ? Type::s8 : Type::u8) + width);
 }
 

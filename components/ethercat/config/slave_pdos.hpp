@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The process data of a slave in a `.ethercat` file: which objects and PDOs it has. Everything here is [setup].
+// The process data of a slave in a `.ethercat` file: which objects and PDOs it has. Everything here
+// is [setup].
 #pragma once
 
 #include "ethercat/config/config_text.hpp"

@@ -35,7 +35,8 @@ void SlaveWrites::read() {
     }
 }
 
-/// `sdo 6060 = 8`, `sdo 2000:1 u16 = 5`, `sdo 8000 complete = 01 00 02`, `register 0420 u16 = 1000`.
+/// `sdo 6060 = 8`, `sdo 2000:1 u16 = 5`, `sdo 8000 complete = 01 00 02`,
+/// `register 0420 u16 = 1000`.
 void SlaveWrites::sdo(const Line& line, const std::vector<Word>& words) {
     const bool is_register = words[0].text == "register";
     const auto at = parse_address(words[1], in_.report);

@@ -239,7 +239,8 @@ bool read_message_time(const Word& field, const char* name, Time min, Time& to, 
 
 }  // namespace
 
-/// `0x181 drive 1, status = 8, 2ms, -, 100us, drive`: identifier and name; bytes, period, deadline, jitter, queue.
+/// `0x181 drive 1, status = 8, 2ms, -, 100us, drive`: identifier and name; bytes, period, deadline,
+/// jitter, queue.
 void read_foreign(const Line& line, MasterConfig& to, Report& report) {
     Foreign f;
     f.at = line.key.at;
