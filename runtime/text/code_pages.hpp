@@ -120,9 +120,9 @@ inline constexpr CodePage code_pages[] = {
      "The object is missing in the description of the node, cannot be mapped to a PDO, or exceeds "
      "the space remaining in it: a PDO "
      "holds 64 bits.\n\n"
-     "Objects are written by name, in lower case with dashes, or as 0x6064 or 0x6099:1; `hal "
+     "Objects are written by name, in lower case with dashes, or as 6064 or 6099:1; `hal "
      "canopen check FILE` lists those in use. "
-     "Without a description an object needs its type: `0x2000:1 u16`."},
+     "Without a description an object needs its type: `2000:1 u16`."},
     {"canopen-value",
      "The value of a key of a CANopen configuration is invalid. The help line shows the valid "
      "values.\n\n"
@@ -188,15 +188,16 @@ inline constexpr CodePage code_pages[] = {
     {"ethercat-object",
      "The object is missing in the description of the slave, cannot be mapped to a PDO, or exceeds "
      "what the PDO can hold.\n\n"
-     "Objects are hexadecimal: `6040` or `60FE:1`. Without a description an object needs its type: "
-     "`2000:1 u16`."},
+     "An object is its hexadecimal index and its decimal sub-index: `6040` or `60FE:1`. Without a "
+     "description it needs its type: `2000:1 u16`."},
     {"ethercat-slave",
      "Slaves of an EtherCAT configuration conflict or are incomplete: a duplicate position, alias "
      "or name, or a missing identity."},
     {"ethercat-value",
      "The value of a key of an EtherCAT configuration is invalid. The help line shows the valid "
      "values.\n\n"
-     "Times have a unit (ns, us, ms, s); objects are hexadecimal, other numbers decimal, or "
+     "Times have a unit (ns, us, ms, s). An index is hexadecimal, all other numbers are decimal, "
+     "or "
      "hexadecimal with 0x."},
     {"function-in-thread",
      "A function runs in one thread, at one position. This one is already in a thread.\n\n"
