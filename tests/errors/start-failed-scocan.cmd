@@ -1,0 +1,1 @@
+hal sim start-failed-scocan.hal --for 1ms
