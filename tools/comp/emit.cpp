@@ -84,6 +84,10 @@ private:
     void state();
     void prototypes();
     void tables();
+    void begin_instance();
+    bool personal() const;
+    void counts();
+    void make();
     void create();
     void start_values();
     void variable_values();
@@ -226,7 +230,7 @@ void Emitter::start_values() {
     from_here();
 }
 
-void Emitter::create() {
+void Emitter::begin_instance() {
     std::string stem = spelled(tree_.name).hal;
     // by what stands at its end: trail_ makes trail.0
     const bool shortened = stem.size() != tree_.name.text.size();
@@ -243,15 +247,47 @@ void Emitter::create() {
         add("    if (!__comp_begin(&context, \"{}\", {}, !__comp_first_inst)) return false;\n",
             stem, renamed);
     }
+}
+
+/// Returns true when what an instance has depends on its personality.
+bool Emitter::personal() const {
+    if (tree_.option("personality") || tree_.option("default_personality")) return true;
+    if (find_word(sources_.text(tree_.code), "personality") != std::string::npos) return true;
+    return std::ranges::any_of(
+        tree_.items, [](const Item& item) { return item.condition.given() || item.count.given(); });
+}
+
+/// The number of elements of each item, an array in the order of the items.
+void Emitter::counts() {
+    add("    const long counts[] = {{\n");
+    for (const Item& item : tree_.items) {
+        std::string count = "-1";
+        if (item.count.given()) {
+            count = "__comp_count(" + item.count.text + ")";
+        } else if (item.size != 0) {
+            count = std::to_string(item.size);
+        }
+        const Span written = item.condition.given() ? item.condition.span : item.count.span;
+        if (written.known()) {
+            from(written);
+        }
+        if (item.condition.given()) {
+            add("        ({}) ? {} : 0,\n", item.condition.text, count);
+        } else {
+            add("        {},\n", count);
+        }
+    }
+    from_here();
+    add("    }};\n");
+}
+
+/// The function that makes an instance: its values, then its pins, then its functions.
+void Emitter::make() {
+    begin_instance();
     if (tree_.has("count_function")) {
         add("    if (!__comp_counted(&context, get_count())) return false;\n");
     }
-    const bool personal =
-        tree_.option("personality") || tree_.option("default_personality") ||
-        find_word(sources_.text(tree_.code), "personality") != std::string::npos ||
-        std::any_of(tree_.items.begin(), tree_.items.end(),
-                    [](const Item& item) { return item.condition.given() || item.count.given(); });
-    if (personal) {
+    if (personal()) {
         const Option* const usual = tree_.option("default_personality");
         add("    if (!__comp_personality(&context, \"{}\", &inst->_personality)) return false;\n",
             usual ? usual->value.text : "0");
@@ -273,23 +309,8 @@ void Emitter::create() {
     variable_values();  // EXTRA_SETUP sees zeros, as in LinuxCNC
     add("    const long personality = inst->_personality;\n    (void)personality;\n");
     if (pins) {
-        add("    const long counts[] = {{\n");
-        for (const Item& item : tree_.items) {
-            const std::string count = item.size == 0       ? "-1"
-                                      : item.count.given() ? "__comp_count(" + item.count.text + ")"
-                                                           : std::to_string(item.size);
-            const Span place = item.condition.given() ? item.condition.span : item.count.span;
-            if (place.known()) {
-                from(place);
-            }
-            if (item.condition.given()) {
-                add("        ({}) ? {} : 0,\n", item.condition.text, count);
-            } else {
-                add("        {},\n", count);
-            }
-        }
-        from_here();
-        add("    }};\n    if (!__comp_pins(&context, inst, __comp_items, counts, sizeof counts / "
+        counts();
+        add("    if (!__comp_pins(&context, inst, __comp_items, counts, sizeof counts / "
             "sizeof counts[0])) return false;\n");
     }
     if (!tree_.functions.empty()) {
@@ -302,6 +323,10 @@ void Emitter::create() {
     }
     add("    if (__comp_last_inst) __comp_last_inst->_next = inst;\n    else __comp_first_inst = "
         "inst;\n    __comp_last_inst = inst;\n    return true;\n}}\n\n");
+}
+
+void Emitter::create() {
+    make();
     if (own_main()) {
         add("static int export(char *prefix, long extra_arg) {{\n    struct __comp_state *const "
             "inst = hal_malloc(sizeof *inst);\n"

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fmt/core.h>
 #include <getopt.h>
+#include <optional>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -124,13 +125,19 @@ int carry_out(Mode mode, CompileOptions options, const std::string& path) {
     return compile_file(options, path);
 }
 
-}  // namespace
+bool is_count(const char* text) {
+    char* end = nullptr;
+    const long number = std::strtol(text, &end, 10);
+    return *text != '\0' && *end == '\0' && number >= 1;
+}
 
-int halcompile(int argc, char** argv) {
-    CompileOptions options;
-    options.program = "halcompile";
-    options.classic = true;
-    Mode mode = preprocess;
+void append_words(std::vector<std::string>& to, const char* text) {
+    const auto given = split_words(text);
+    to.insert(to.end(), given.begin(), given.end());
+}
+
+/// Parses the options before the files. Returns the exit code when nothing remains to be done.
+std::optional<int> parse_options(int argc, char** argv, Mode& mode, CompileOptions& options) {
     enum { compile_args = 1000, link_args, modinc, adoc_word, view_word, install_doc };
     static constexpr option words[] = {
         {"preprocess", no_argument, nullptr, 'p'},
@@ -159,22 +166,14 @@ int halcompile(int argc, char** argv) {
         case view_word: mode = view; break;
         case 'o': options.output = ::optarg; break;
         case 'u': options.as_program = true; break;
-        case 'P': {
-            char* end = nullptr;
-            if (const long number = std::strtol(::optarg, &end, 10);
-                *::optarg == '\0' || *end != '\0' || number < 1) {
+        case 'P':
+            if (!is_count(::optarg)) {
                 return fail(options,
                             fmt::format("--personalities={}: write a number from 1", ::optarg));
             }
             break;
-        }
-        case compile_args:
-        case link_args: {
-            auto& to = letter == compile_args ? options.compile_args : options.link_args;
-            const auto given = split_words(::optarg);
-            to.insert(to.end(), given.begin(), given.end());
-            break;
-        }
+        case compile_args: append_words(options.compile_args, ::optarg); break;
+        case link_args: append_words(options.link_args, ::optarg); break;
         case modinc:
             return fail(
                 options,
@@ -188,6 +187,17 @@ int halcompile(int argc, char** argv) {
         default: return 1;
         }
     }
+    return std::nullopt;
+}
+
+}  // namespace
+
+int halcompile(int argc, char** argv) {
+    CompileOptions options;
+    options.program = "halcompile";
+    options.classic = true;
+    Mode mode = preprocess;
+    if (const std::optional<int> done = parse_options(argc, argv, mode, options)) return *done;
     options.words.assign(argv + ::optind, argv + argc);
     if (options.words.empty()) {
         return fail(options,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Documentation strings are written in the macros of manual pages (groff_man); ours is Markdown.
 #include <algorithm>
+#include <utility>
 
 #include "base/types.hpp"
 #include "comp/syntax.hpp"
@@ -8,57 +9,84 @@
 namespace hal::comp {
 namespace {
 
-// Escapes within a line: fonts, dashes, bullets.
-std::string inline_text(std::string_view line) {
-    std::string out, open;  // `open`: what ends the font in use
-    const auto font = [&](std::string mark) {
-        out += open;
-        out += mark;
-        open = std::move(mark);
-    };
-    for (std::size_t i = 0; i < line.size(); ++i) {
-        if (line[i] != '\\' || i + 1 == line.size()) {
-            out += line[i];
-            continue;
-        }
-        const char c = line[++i];
-        if (c == 'f' && i + 1 < line.size()) {
-            const char which = line[++i];
-            if (which == '[' || which == '(') {  // a font of a longer name
-                const std::size_t end = which == '[' ? line.find(']', i) : i + 2;
-                font("");
-                i = std::min(end, line.size() - 1);
+/// Returns the character of the two-letter name behind `\(`, "" for an unknown one.
+const char* character_named(std::string_view name) {
+    static constexpr std::pair<std::string_view, const char*> characters[] = {
+        {"bu", "•"}, {"em", "—"}, {"en", "–"}, {"mu", "×"}, {"di", "÷"}, {"+-", "±"}, {"<=", "≤"},
+        {">=", "≥"}, {"!=", "≠"}, {"->", "→"}, {"<-", "←"}, {"de", "°"}, {"aq", "'"}, {"dq", "\""},
+        {"lq", "“"}, {"rq", "”"}, {"co", "©"}, {"mc", "µ"}, {"*p", "π"}, {"sr", "√"}};
+    const auto found =
+        std::ranges::find(characters, name, &std::pair<std::string_view, const char*>::first);
+    return found == std::end(characters) ? "" : found->second;
+}
+
+/// Returns what begins and ends the font in Markdown.
+std::string_view mark_of_font(char font) {
+    if (font == 'B') return "**";
+    if (font == 'I') return "*";
+    return "";
+}
+
+/// Converts the escapes within a line: fonts, dashes, bullets.
+class EscapeConverter {
+public:
+    explicit EscapeConverter(std::string_view line) : line_(line) {}
+
+    std::string convert() {
+        while (at_ < line_.size()) {
+            const char c = line_[at_++];
+            if (c != '\\' || at_ == line_.size()) {
+                out_ += c;
             } else {
-                font(which == 'B' ? "**" : which == 'I' ? "*" : "");
+                escape(line_[at_++]);
             }
-        } else if (c == '(' && i + 2 < line.size()) {
-            const std::string_view name = line.substr(i + 1, 2);
-            i += 2;
-            static constexpr std::pair<std::string_view, const char*> characters[] = {
-                {"bu", "•"}, {"em", "—"}, {"en", "–"}, {"mu", "×"},  {"di", "÷"},
-                {"+-", "±"}, {"<=", "≤"}, {">=", "≥"}, {"!=", "≠"},  {"->", "→"},
-                {"<-", "←"}, {"de", "°"}, {"aq", "'"}, {"dq", "\""}, {"lq", "“"},
-                {"rq", "”"}, {"co", "©"}, {"mc", "µ"}, {"*p", "π"},  {"sr", "√"}};
-            for (const auto& [key, character] : characters) {
-                if (key == name) {
-                    out += character;
-                }
-            }
+        }
+        out_ += open_;
+        return std::move(out_);
+    }
+
+private:
+    static bool is_one_of(char c, std::string_view set) { return set.find(c) != set.npos; }
+
+    void escape(char c) {
+        if (c == 'f' && at_ < line_.size()) {
+            font(line_[at_++]);
+        } else if (c == '(' && at_ + 1 < line_.size()) {
+            out_ += character_named(line_.substr(at_, 2));
+            at_ += 2;
         } else if (c == 'e' || c == '\\') {
-            out += '\\';
-        } else if (c == '&' || c == '|' || c == '^' || c == '/' || c == ',' || c == 'c' ||
-                   c == ':') {
-            continue;
+            out_ += '\\';
+        } else if (is_one_of(c, "&|^/,c:")) {
+            return;  // has no width
         } else if (c == '"') {
-            break;  // a comment
-        } else if (c == '~' || c == ' ' || c == '0') {
-            out += ' ';
+            at_ = line_.size();  // a comment
+        } else if (is_one_of(c, "~ 0")) {
+            out_ += ' ';
         } else {
-            out += c;  // \- and the like
+            out_ += c;  // \- and the like
         }
     }
-    return out + open;
-}
+
+    /// `which`: the letter behind `\f`; a longer name begins with [ or (.
+    void font(char which) {
+        out_ += open_;
+        open_ = mark_of_font(which);
+        out_ += open_;
+        const std::size_t letter = at_ - 1;
+        if (which == '[') {
+            at_ = std::min(line_.find(']', letter), line_.size() - 1) + 1;
+        } else if (which == '(') {
+            at_ = std::min(letter + 3, line_.size());
+        }
+    }
+
+    std::string_view line_;
+    std::size_t at_ = 0;
+    std::string out_;
+    std::string_view open_;  // what ends the font in use
+};
+
+std::string inline_text(std::string_view line) { return EscapeConverter(line).convert(); }
 
 std::string_view trimmed(std::string_view text) {
     const std::size_t begin = text.find_first_not_of(" \t\n");
@@ -187,15 +215,10 @@ private:
     static bool is_fonts_in_turn(std::string_view name) {
         return name.size() == 2 && name.find_first_not_of("BIR") == std::string_view::npos;
     }
-    static std::string_view mark_of(char font) {
-        if (font == 'B') return "**";
-        if (font == 'I') return "*";
-        return "";
-    }
     /// The words have the two fonts in turn, without blanks between them.
     void fonts_in_turn(const Macro& macro) {
         for (std::size_t i = 0; i < macro.words.size(); ++i) {
-            const std::string_view mark = mark_of(macro.name[i % 2]);
+            const std::string_view mark = mark_of_font(macro.name[i % 2]);
             out_ += mark;
             out_ += macro.words[i];
             out_ += mark;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "text/characters.hpp"
+
 namespace hal::comp {
 namespace {
 
@@ -14,64 +16,71 @@ bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z')
 bool is_hal(char c) { return is_letter(c) || is_digit(c) || c == '#' || c == '.' || c == '-'; }
 
 void append_utf8(std::string& to, unsigned long code) {
+    const auto continuation = [](unsigned long bits) {
+        return static_cast<char>(0x80 | (bits & 0x3F));
+    };
     if (code < 0x80) {
         to += static_cast<char>(code);
     } else if (code < 0x800) {
-        (to += static_cast<char>(0xC0 | (code >> 6))) += static_cast<char>(0x80 | (code & 0x3F));
+        to += static_cast<char>(0xC0 | (code >> 6));
+        to += continuation(code);
     } else {
-        ((to += static_cast<char>(0xE0 | (code >> 12))) +=
-         static_cast<char>(0x80 | ((code >> 6) & 0x3F))) += static_cast<char>(0x80 | (code & 0x3F));
+        to += static_cast<char>(0xE0 | (code >> 12));
+        to += continuation(code >> 6);
+        to += continuation(code);
     }
 }
 
-// The escapes that C and Python have in common; any other backslash is one.
+/// Reads digits of a base from `at` on, as many as `max_digits`. The emitted C strings cannot hold
+/// a zero, which becomes a question mark.
+unsigned long code_point(std::string_view raw, std::size_t& at, std::size_t max_digits,
+                         unsigned base) {
+    static constexpr std::string_view digits = "0123456789abcdef";
+    unsigned long value = 0;
+    for (std::size_t n = 0; n < max_digits && at < raw.size(); ++n, ++at) {
+        const std::size_t digit = digits.find(lower(raw[at]));
+        if (digit >= base) break;
+        value = value * base + digit;
+    }
+    return value == 0 ? '?' : value;
+}
+
+/// Appends what the escape behind the backslash at `at - 1` stands for. Returns the index behind
+/// it.
+std::size_t unescape(std::string_view raw, std::size_t at, std::string& text) {
+    const char c = raw[at];
+    if (c >= '0' && c <= '7') {
+        append_utf8(text, code_point(raw, at, 3, 8));
+        return at;
+    }
+    ++at;
+    switch (c) {
+    case 'n': text += '\n'; break;
+    case 't': text += '\t'; break;
+    case 'a':
+    case 'b':
+    case 'f':
+    case 'v': text += ' '; break;
+    case '\\':
+    case '"':
+    case '\'': text += c; break;
+    case 'r':
+    case '\n': break;
+    case 'x': append_utf8(text, code_point(raw, at, 2, 16)); break;
+    case 'u': append_utf8(text, code_point(raw, at, 4, 16)); break;
+    default: text += '\\'; text += c;
+    }
+    return at;
+}
+
+/// The escapes that C and Python have in common; any other backslash is one.
 std::string unescaped(std::string_view raw) {
     std::string text;
-    for (std::size_t i = 0; i < raw.size(); ++i) {
-        if (raw[i] != '\\' || i + 1 == raw.size()) {
-            text += raw[i];
-            continue;
-        }
-        const char c = raw[++i];
-        const auto number = [&](std::string_view digits, std::size_t most, unsigned base) {
-            unsigned long value = 0;
-            std::size_t n = 0;
-            for (; n < most && i < raw.size(); ++n, ++i) {
-                const char lower =
-                    raw[i] >= 'A' && raw[i] <= 'F' ? static_cast<char>(raw[i] + 32) : raw[i];
-                const std::size_t digit = digits.find(lower);
-                if (digit == std::string_view::npos) break;
-                value = value * base + digit;
-            }
-            --i;
-            return value == 0 ? '?' : value;  // the emitted C strings cannot hold a zero
-        };
-        switch (c) {
-        case 'n': text += '\n'; break;
-        case 't': text += '\t'; break;
-        case 'r': break;
-        case 'a':
-        case 'b':
-        case 'f':
-        case 'v': text += ' '; break;
-        case '\\':
-        case '"':
-        case '\'': text += c; break;
-        case '\n': break;
-        case 'x':
-            ++i;
-            append_utf8(text, number("0123456789abcdef", 2, 16));
-            break;
-        case 'u':
-            ++i;
-            append_utf8(text, number("0123456789abcdef", 4, 16));
-            break;
-        default:
-            if (c >= '0' && c <= '7') {
-                append_utf8(text, number("01234567", 3, 8));
-            } else {
-                (text += '\\') += c;
-            }
+    for (std::size_t i = 0; i < raw.size();) {
+        if (raw[i] == '\\' && i + 1 < raw.size()) {
+            i = unescape(raw, i + 1, text);
+        } else {
+            text += raw[i++];
         }
     }
     return text;
@@ -230,68 +239,72 @@ std::optional<Text> Scanner::header() {
     return taken(begin);
 }
 
+bool Scanner::at_expression_end(std::string_view stops, const Nesting& nesting) const {
+    if (at_ >= text_.size()) return true;
+    const char c = text_[at_];
+    if (c == ';' || string_start() != std::string_view::npos) return true;
+    if (nesting.depth > 0) return false;
+    const bool of_conditional = c == ':' && nesting.questions > 0;
+    if (of_conditional || starts("==")) return false;
+    return c == ')' || stops.find(c) != std::string_view::npos;
+}
+
+/// The length of a number or a word of C; 0 when none comes next.
+std::size_t Scanner::operand_length() const {
+    const char first = text_[at_];
+    if (!is_letter(first) && !is_digit(first)) return 0;
+    std::size_t end = at_;
+    while (end < text_.size() &&
+           (is_letter(text_[end]) || is_digit(text_[end]) || (text_[end] == '.' && end > at_))) {
+        ++end;
+    }
+    return end - at_;
+}
+
+/// The length of the token that comes next in an expression.
+std::size_t Scanner::token_length() const {
+    if (const std::size_t operand = operand_length()) return operand;
+    if (text_[at_] == '\'') {
+        // a character: 'a', '\n', '\x20'
+        const std::size_t close = text_.find('\'', at_ + 2);
+        if (close != std::string_view::npos && close < at_ + 6) return close + 1 - at_;
+    }
+    for (const std::string_view comparison : {"==", "!=", "<=", ">="}) {
+        if (starts(comparison)) return 2;
+    }
+    return 1;
+}
+
 Text Scanner::expression(std::string_view stops) {
     skip();
     const std::size_t begin = at_;
     std::size_t end = at_;
-    int depth = 0;
-    int questions = 0;
+    Nesting nesting;
     std::string text;
-    while (at_ < text_.size()) {
-        const char c = text_[at_];
-        if (c == ';' || string_start() != std::string_view::npos) break;
-        const char after = at_ + 1 < text_.size() ? text_[at_ + 1] : '\0';
-        const bool comparison = c == '=' && after == '=';
-        if (depth == 0 && !comparison && stops.find(c) != std::string_view::npos &&
-            !(c == ':' && questions > 0)) {
-            break;
-        }
-        if (is_blank(c) || starts("//") || starts("/*")) {
+    while (!at_expression_end(stops, nesting)) {
+        if (is_blank(text_[at_]) || starts("//") || starts("/*")) {
             skip();
             if (!text.empty()) {
                 text += ' ';
             }
             continue;
         }
-        std::size_t length = comparison || starts("!=") || starts("<=") || starts(">=") ? 2 : 1;
-        if (is_letter(c) || is_digit(c)) {
-            while (at_ + length < text_.size() &&
-                   (is_letter(text_[at_ + length]) || is_digit(text_[at_ + length]) ||
-                    text_[at_ + length] == '.')) {
-                ++length;
-            }
-            if (depth == 0 && text_.substr(at_, length) == "if") break;
-        } else if (c == '\'') {
-            const std::size_t close = text_.find('\'', at_ + 2);
-            if (close != std::string_view::npos && close < at_ + 6) {
-                length = close + 1 - at_;
-            }
-        }
-        if (c == '?') {
-            ++questions;
-        }
-        if (c == ':') {
-            --questions;
-        }
-        if (c == '(') {
-            ++depth;
-        }
-        if (c == ')' && --depth < 0) {
-            break;
-        }
-        text += text_.substr(at_, length);
-        end = at_ += length;
+        const std::string_view token = text_.substr(at_, token_length());
+        if (token == "if" && nesting.depth == 0) break;
+        nesting.enter(token[0]);
+        text += token;
+        at_ += token.size();
+        end = at_;
     }
-    if (depth > 0) {
+    if (nesting.depth > 0) {
         error(span(begin, end), "'(' without ')'");
     }
     while (text.ends_with(' ')) {
         text.pop_back();
     }
-    if (end > begin) {
-        last_ = end;
-    }
-    return {std::move(text), end > begin ? span(begin, end) : Span{}};
+    if (end == begin) return {std::move(text), Span{}};
+    last_ = end;
+    return {std::move(text), span(begin, end)};
 }
 
 void Scanner::recover() {

@@ -58,6 +58,18 @@ public:
 private:
     bool starts(std::string_view what) const { return text_.substr(at_).starts_with(what); }
     std::size_t string_start() const;
+    /// What is open in an expression.
+    struct Nesting {
+        int depth = 0;  ///< of parentheses
+        int questions = 0;  ///< conditional operators without their ':'
+        void enter(char token) {
+            depth += (token == '(') - (token == ')');
+            questions += (token == '?') - (token == ':');
+        }
+    };
+    bool at_expression_end(std::string_view stops, const Nesting& nesting) const;
+    std::size_t operand_length() const;
+    std::size_t token_length() const;
     Text taken(std::size_t begin);
 
     std::string_view text_;
