@@ -65,10 +65,10 @@ void call(const Function& function, const hal_cycle& cycle) {
     if (module.accesses_ports) {
         permit_ports();
     }
-    module.take_parameters(function);
+    module.parameters.import(function);
     adjust_clock(module, cycle);
     call(function, cycle);
-    module.show_parameters(function);
+    module.parameters.show(function);
 }
 void call_function(void* self, const hal_cycle* cycle) {
     Function& function = *static_cast<Function*>(self);

@@ -15,7 +15,7 @@ namespace {
 
 // The longest double: 309 digits, a point, and 1074 digits that may differ from 0. More precision
 // adds zeros.
-constexpr int most_exact = 1074;
+constexpr int max_exact = 1074;
 constexpr std::size_t number_length = 1500;
 
 struct Output {
@@ -99,11 +99,20 @@ void raise_case(char* from, char* to) noexcept {
     }
 }
 
+int base_of(char conversion) noexcept {
+    switch (conversion) {
+    case 'o': return 8;
+    case 'x':
+    case 'X':
+    case 'p': return 16;
+    default: return 10;
+    }
+}
+
 void put_integer(Output& out, const Spec& spec, std::uint64_t value,
                  std::string_view prefix) noexcept {
     char digits[32];
-    const char c = spec.conversion;
-    const int base = c == 'o' ? 8 : c == 'x' || c == 'X' || c == 'p' ? 16 : 10;
+    const int base = base_of(spec.conversion);
     char* const end = std::to_chars(digits, std::end(digits), value, base).ptr;
     if (spec.upper()) {
         raise_case(digits, end);
@@ -145,7 +154,7 @@ void resolve_general(Spec& spec, double value) noexcept {
     const int digits = std::max(spec.precision, 1);
     char text[number_length];
     char* const end = std::to_chars(text, std::end(text), value, std::chars_format::scientific,
-                                    std::min(digits - 1, most_exact))
+                                    std::min(digits - 1, max_exact))
                           .ptr;
     const std::string_view all(text, static_cast<std::size_t>(end - text));
     const auto e = all.rfind('e');
@@ -156,14 +165,36 @@ void resolve_general(Spec& spec, double value) noexcept {
     spec.conversion = static_cast<char>((fixed ? 'f' : 'e') - (spec.upper() ? 'a' - 'A' : 0));
 }
 
+std::chars_format format_of(char kind) noexcept {
+    switch (kind) {
+    case 'f': return std::chars_format::fixed;
+    case 'e': return std::chars_format::scientific;
+    case 'g': return std::chars_format::general;
+    default: return std::chars_format::hex;
+    }
+}
+
+/// Returns where the exponent begins, or the size.
+std::size_t exponent_of(std::string_view digits, char kind) noexcept {
+    if (kind == 'f' || kind == 'g') return digits.size();
+    return std::min(digits.find_last_of(kind == 'e' ? "eE" : "pP"), digits.size());
+}
+
+void put_infinite(Output& out, const Spec& spec, std::string_view sign, bool nan) noexcept {
+    char text[] = "inf";
+    if (nan) {
+        std::memcpy(text, "nan", 3);
+    }
+    if (spec.upper()) {
+        raise_case(text, text + 3);
+    }
+    put(out, spec, {sign, {text, 3}}, false);
+}
+
 void put_real(Output& out, Spec spec, double value) noexcept {
     const std::string_view sign = spec.sign(std::signbit(value));
     value = std::fabs(value);
-    if (!std::isfinite(value)) {
-        const std::string_view text =
-            std::isnan(value) ? (spec.upper() ? "NAN" : "nan") : (spec.upper() ? "INF" : "inf");
-        return put(out, spec, {sign, text}, false);
-    }
+    if (!std::isfinite(value)) return put_infinite(out, spec, sign, std::isnan(value));
     char kind = static_cast<char>(spec.conversion | 0x20);
     if (spec.precision < 0 && kind != 'a') {
         spec.precision = 6;
@@ -172,12 +203,9 @@ void put_real(Output& out, Spec spec, double value) noexcept {
         resolve_general(spec, value);
         kind = static_cast<char>(spec.conversion | 0x20);
     }
-    const auto format = kind == 'f'   ? std::chars_format::fixed
-                        : kind == 'e' ? std::chars_format::scientific
-                        : kind == 'g' ? std::chars_format::general
-                                      : std::chars_format::hex;
+    const std::chars_format format = format_of(kind);
     char digits[number_length];
-    const int precision = std::min(spec.precision, most_exact);
+    const int precision = std::min(spec.precision, max_exact);
     char* const end = spec.precision < 0
                           ? std::to_chars(digits, std::end(digits), value, format).ptr
                           : std::to_chars(digits, std::end(digits), value, format, precision).ptr;
@@ -185,22 +213,19 @@ void put_real(Output& out, Spec spec, double value) noexcept {
         raise_case(digits, end);
     }
     const std::string_view all(digits, static_cast<std::size_t>(end - digits));
-    auto mark = kind == 'f' || kind == 'g' ? all.npos : all.find_last_of(kind == 'e' ? "eE" : "pP");
-    if (mark == all.npos) {
-        mark = all.size();
-    }
+    const std::size_t exponent = exponent_of(all, kind);
     char prefix[4];
     std::size_t prefixed = sign.copy(prefix, 1);
     if (kind == 'a') {
         prefixed += std::string_view(spec.upper() ? "0X" : "0x").copy(prefix + prefixed, 2);
     }
     char body[number_length + 1];
-    std::size_t length = all.substr(0, mark).copy(body, number_length);
+    std::size_t length = all.substr(0, exponent).copy(body, number_length);
     if (spec.alternate && std::string_view(body, length).find('.') == std::string_view::npos) {
         body[length++] = '.';
     }
     const std::ptrdiff_t more = kind == 'g' ? 0 : std::max(spec.precision - precision, 0);
-    put(out, spec, {{prefix, prefixed}, {body, length}, all.substr(mark), 0, more}, true);
+    put(out, spec, {{prefix, prefixed}, {body, length}, all.substr(exponent), 0, more}, true);
 }
 
 int number(const char*& at) noexcept {
@@ -211,23 +236,46 @@ int number(const char*& at) noexcept {
     return static_cast<int>(value);
 }
 
-/// Reads what follows the %. Returns false for an argument with a position.
-bool read_spec(const char*& at, Spec& spec, Arguments& arguments) noexcept {
+/// Reads the flags before the width. Unknown ones to us, ' and I, are skipped.
+void read_flags(const char*& at, Spec& spec) noexcept {
+    struct Flag {
+        char c;
+        bool Spec::* member;
+    };
+    static constexpr Flag flags[] = {{'-', &Spec::left},
+                                     {'+', &Spec::plus},
+                                     {' ', &Spec::blank},
+                                     {'0', &Spec::zero},
+                                     {'#', &Spec::alternate}};
     for (;; ++at) {
-        if (*at == '-') {
-            spec.left = true;
-        } else if (*at == '+') {
-            spec.plus = true;
-        } else if (*at == ' ') {
-            spec.blank = true;
-        } else if (*at == '0') {
-            spec.zero = true;
-        } else if (*at == '#') {
-            spec.alternate = true;
+        const auto flag = std::ranges::find(flags, *at, &Flag::c);
+        if (flag != std::end(flags)) {
+            spec.*flag->member = true;
         } else if (*at != '\'' && *at != 'I') {
-            break;
+            return;
         }
     }
+}
+
+/// Reads the length modifiers: h, l, L and their like.
+void read_length(const char*& at, Spec& spec) noexcept {
+    for (;; ++at) {
+        switch (*at) {
+        case 'h': --spec.longs; break;
+        case 'l': ++spec.longs; break;
+        case 'j':
+        case 'q': spec.longs = 2; break;
+        case 'z':
+        case 't': spec.longs = 1; break;
+        case 'L': spec.longs = 3; break;
+        default: return;
+        }
+    }
+}
+
+/// Reads what follows the %. Returns false for an argument with a position.
+bool read_spec(const char*& at, Spec& spec, Arguments& arguments) noexcept {
+    read_flags(at, spec);
     if (*at == '*') {
         ++at;
         const int width = va_arg(arguments.list, int);
@@ -246,91 +294,78 @@ bool read_spec(const char*& at, Spec& spec, Arguments& arguments) noexcept {
             spec.precision = number(at);
         }
     }
-    for (;; ++at) {
-        if (*at == 'h') {
-            --spec.longs;
-        } else if (*at == 'l') {
-            ++spec.longs;
-        } else if (*at == 'j' || *at == 'z' || *at == 't' || *at == 'q') {
-            spec.longs = *at == 'q' || *at == 'j' ? 2 : 1;
-        } else if (*at == 'L') {
-            spec.longs = 3;
-        } else {
-            break;
-        }
-    }
+    read_length(at, spec);
     spec.conversion = *at;
     return true;
 }
 
+void convert_signed(Output& out, const Spec& spec, Arguments& arguments) noexcept {
+    const std::int64_t value = signed_argument(spec, arguments);
+    const auto raw = static_cast<std::uint64_t>(value);
+    put_integer(out, spec, value < 0 ? 0 - raw : raw, spec.sign(value < 0));
+}
+
+void convert_real(Output& out, const Spec& spec, Arguments& arguments) noexcept {
+    const double value = spec.longs == 3 ? static_cast<double>(va_arg(arguments.list, long double))
+                                         : va_arg(arguments.list, double);
+    put_real(out, spec, value);
+}
+
+void convert_character(Output& out, const Spec& spec, Arguments& arguments) noexcept {
+    const char c = static_cast<char>(va_arg(arguments.list, int));
+    put_text(out, spec, {spec.longs > 0 ? "?" : &c, 1});
+}
+
+void convert_text(Output& out, const Spec& spec, Arguments& arguments) noexcept {
+    constexpr std::string_view null = "(null)";
+    const char* text = va_arg(arguments.list, const char*);
+    const bool limited = spec.precision >= 0;
+    const auto limit = static_cast<std::size_t>(std::max(spec.precision, 0));
+    if (!text) {
+        // as glibc: all of it or nothing
+        text = limited && limit < null.size() ? "" : null.data();
+    } else if (spec.longs > 0) {
+        text = "?";  // a wide text
+    }
+    put_text(out, spec, {text, limited ? strnlen(text, limit) : std::strlen(text)});
+}
+
+void convert_pointer(Output& out, const Spec& spec, Arguments& arguments) noexcept {
+    const void* const pointer = va_arg(arguments.list, const void*);
+    if (!pointer) return put_text(out, spec, "(nil)");
+    Spec hex = spec;
+    hex.alternate = true;
+    put_integer(out, hex, reinterpret_cast<std::uintptr_t>(pointer), "");
+}
+
+void convert_error(Output& out, const Spec& spec, int error) noexcept {
+    Spec decimal = spec;
+    decimal.conversion = 'd';
+    out.put("error ");
+    put_integer(out, decimal, static_cast<std::uint64_t>(error), "");
+}
+
 /// Returns false for an unknown conversion.
 bool convert(Output& out, const Spec& spec, Arguments& arguments, int error) noexcept {
-    switch (spec.conversion) {
-    case 'd':
-    case 'i': {
-        const std::int64_t value = signed_argument(spec, arguments);
-        const auto size =
-            value < 0 ? 0 - static_cast<std::uint64_t>(value) : static_cast<std::uint64_t>(value);
-        put_integer(out, spec, size, spec.sign(value < 0));
-        return true;
-    }
-    case 'u':
-    case 'o':
-    case 'x':
-    case 'X': put_integer(out, spec, unsigned_argument(spec, arguments), ""); return true;
-    case 'f':
-    case 'F':
-    case 'e':
-    case 'E':
-    case 'g':
-    case 'G':
-    case 'a':
-    case 'A': {
-        const double value = spec.longs == 3
-                                 ? static_cast<double>(va_arg(arguments.list, long double))
-                                 : va_arg(arguments.list, double);
-        put_real(out, spec, value);
-        return true;
-    }
-    case 'c': {
-        const char c = static_cast<char>(va_arg(arguments.list, int));
-        put_text(out, spec, {spec.longs > 0 ? "?" : &c, 1});
-        return true;
-    }
-    case 's': {
-        const char* text = va_arg(arguments.list, const char*);
-        if (!text) {
-            text = spec.precision >= 0 && spec.precision < 6 ? "" : "(null)";
-        } else if (spec.longs > 0) {
-            text = "?";
+    if (spec.conversion == '\0') return false;
+    if (std::strchr("di", spec.conversion)) {
+        convert_signed(out, spec, arguments);
+    } else if (std::strchr("uoxX", spec.conversion)) {
+        put_integer(out, spec, unsigned_argument(spec, arguments), "");
+    } else if (std::strchr("fFeEgGaA", spec.conversion)) {
+        convert_real(out, spec, arguments);
+    } else {
+        switch (spec.conversion) {
+        case 'c': convert_character(out, spec, arguments); break;
+        case 's': convert_text(out, spec, arguments); break;
+        case 'p': convert_pointer(out, spec, arguments); break;
+        case 'n': (void)va_arg(arguments.list, void*); break;
+        case 'm': convert_error(out, spec, error); break;
+        case '%': out.put("%"); break;
+        default: return false;
         }
-        put_text(
-            out, spec,
-            {text, spec.precision < 0 ? std::strlen(text)
-                                      : strnlen(text, static_cast<std::size_t>(spec.precision))});
-
-        return true;
     }
-    case 'p': {
-        const void* const pointer = va_arg(arguments.list, const void*);
-        Spec hex = spec;
-        hex.alternate = true;
-        return pointer ? put_integer(out, hex, reinterpret_cast<std::uintptr_t>(pointer), "")
-                       : put_text(out, spec, "(nil)"),
-               true;
-    }
-    case 'n': (void)va_arg(arguments.list, void*); return true;
-    case 'm': {
-        Spec decimal = spec;
-        decimal.conversion = 'd';
-        out.put("error ");
-        put_integer(out, decimal, static_cast<std::uint64_t>(error), "");
-
-        return true;
-    }
-    case '%': out.put("%"); return true;
-    default: return false;
-    }
+    return true;
 }
 
 }  // namespace

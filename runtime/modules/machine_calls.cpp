@@ -90,9 +90,8 @@ int set_parameter(const char* name, int type, const void* value) {
         return wrong;
     }
     // its own variable has the value at once
-    if (const auto own = module->parameter_names.find(name); own != module->parameter_names.end()) {
-        std::memcpy(const_cast<void*>(own->second->value), value,
-                    static_cast<std::size_t>(width_of(type)));
+    if (const Parameter* const own = module->parameters.find(name)) {
+        std::memcpy(const_cast<void*>(own->value), value, static_cast<std::size_t>(width_of(type)));
     }
     return 0;
 }
@@ -133,8 +132,8 @@ int give_command(const char* function, const char* command,
             if (!word) break;
             all.push_back(word);
         }
-        const char* const name =
-            all.size() > 1 ? all[all.size() > 2 && std::strstr(command, "alias") ? 2 : 1] : "";
+        const bool is_alias = all.size() > 2 && std::strstr(command, "alias");
+        const char* const name = all.size() > 1 ? all[is_alias ? 2 : 1] : "";
         if (all.size() > 1 && !*name) return fail(function, name, "the name is empty");
         const Module* const module = Module::current();
         if (!module) return fail(function, name, only_while_loaded, -EPERM);
@@ -148,6 +147,24 @@ int give_command(const char* function, const char* command,
     });
 }
 
+namespace {
+
+/// Returns the type as `newsig` has it; nullptr: unsupported.
+const char* word_of(int type) {
+    switch (type) {
+    case bit: return "bit";
+    case real: return "float";
+    case s32: return "s32";
+    case u32: return "u32";
+    case port: return "port";
+    case s64: return "s64";
+    case u64: return "u64";
+    default: return nullptr;
+    }
+}
+
+}  // namespace
+
 }  // namespace hal::modules
 
 using namespace hal::modules;
@@ -155,14 +172,7 @@ using namespace hal::modules;
 extern "C" {
 
 int hal_signal_new(const char* name, int type) {
-    const char* const word = type == bit    ? "bit"
-                             : type == real ? "float"
-                             : type == s32  ? "s32"
-                             : type == u32  ? "u32"
-                             : type == port ? "port"
-                             : type == s64  ? "s64"
-                             : type == u64  ? "u64"
-                                            : nullptr;
+    const char* const word = word_of(type);
     if (!name || !word) return fail("hal_signal_new", name, word ? "no name" : "unsupported type");
     if (std::strlen(name) > longest_name()) {
         return fail("hal_signal_new", name,
@@ -173,8 +183,9 @@ int hal_signal_new(const char* name, int type) {
 }
 int hal_signal_delete(const char* name) {
     if (!name) return -EINVAL;
-    return Module::unloading() ? give_afterwards("hal_signal_delete", "delsig", name)
-                               : give_command("hal_signal_delete", "delsig", {name});
+    const bool exiting = Module::unloading() != nullptr;
+    return exiting ? give_afterwards("hal_signal_delete", "delsig", name)
+                   : give_command("hal_signal_delete", "delsig", {name});
 }
 int hal_link(const char* pin, const char* signal) {
     return pin && signal ? give_command("hal_link", "linkps", {pin, signal})
@@ -214,7 +225,8 @@ int hal_del_funct_from_thread(const char* function, const char* thread) {
 }
 int hal_start_threads() { return give_command("hal_start_threads", "start", {}); }
 int hal_stop_threads() {
-    return Module::unloading() ? 0 : give_command("hal_stop_threads", "stop", {});
+    const bool exiting = Module::unloading() != nullptr;
+    return exiting ? 0 : give_command("hal_stop_threads", "stop", {});
 }
 
 int hal_set_lock(unsigned char lock) {

@@ -7,6 +7,7 @@
 #include <dlfcn.h>
 #include <filesystem>
 
+#include "modules/arguments.hpp"
 #include "modules/messages.hpp"
 
 namespace hal::modules {
@@ -200,8 +201,36 @@ bool is_declared_only(std::string_view symbol) {
                                                "hal_thread_delete",
                                                "hal_port_wait_",
                                                "hal_stream_wait_"};
-    return std::any_of(std::begin(beginnings), std::end(beginnings),
-                       [&](std::string_view one) { return symbol.starts_with(one); });
+    return std::ranges::any_of(beginnings,
+                               [&](std::string_view one) { return symbol.starts_with(one); });
+}
+
+/// Why a symbol that no loaded library defines is missing; the first that fits.
+struct MissingKind {
+    bool (*is)(std::string_view symbol);
+    const char* text;
+    const char* help;
+};
+constexpr MissingKind missing_kinds[] = {
+    {reads_its_memory,
+     " reads LinuxCNC's memory directly, which a machine of Halcyon does not have",
+     "hal_get_pin_value_by_name and the like read values by name"},
+    {only_in_2_10, " is a function of LinuxCNC 2.10 that this runtime does not have",
+     "docs/linuxcnc-compatibility.md lists what is not supported; "
+     "hal compile builds a component from its source"},
+    {is_declared_only,
+     " is declared in LinuxCNC's headers, but LinuxCNC does not export it to modules either",
+     "a port or a stream passes data between a module and a program"},
+    {is_of_linuxcnc,
+     " is not in the interface of LinuxCNC 2.9 or 2.10: the module is built for another version",
+     "use the module of LinuxCNC 2.9 (linuxcnc-uspace) or 2.10, or build this one again with the "
+     "halcompile of one of these"},
+};
+
+const MissingKind* kind_of(std::string_view symbol) {
+    const auto kind =
+        std::ranges::find_if(missing_kinds, [&](const MissingKind& one) { return one.is(symbol); });
+    return kind == std::end(missing_kinds) ? nullptr : kind;
 }
 
 }  // namespace
@@ -255,34 +284,25 @@ void Module::explain_loading(std::string problem) const {
                !only_in_2_10(s);
     });
     std::string first;
-    const std::string owners = definers_of(missing[0], folder_, first);
-    const std::string text =
-        "it uses " + missing[0] +
-        (missing.size() == 1 ? ", which"
-                             : " and " + std::to_string(missing.size() - 1) +
-                                   " more missing symbols; " + missing[0]) +
-        (!owners.empty() ? " is defined by " + owners
-         : reads_its_memory(missing[0])
-             ? " reads LinuxCNC's memory directly, which a machine of Halcyon does not have"
-         : only_in_2_10(missing[0])
-             ? " is a function of LinuxCNC 2.10 that this runtime does not have"
-         : is_declared_only(missing[0]) ? " is declared in LinuxCNC's headers, but LinuxCNC does "
-                                          "not export it to modules either"
-         : is_of_linuxcnc(missing[0])
-             ? " is not in the interface of LinuxCNC 2.9 or 2.10: the module is built for another "
-               "version"
-             : " is defined neither by this runtime nor by a module in " + folder_);
-    const std::string help =
-        !owners.empty() ? "load that first: loadrt " + first
-        : reads_its_memory(missing[0])
-            ? "hal_get_pin_value_by_name and the like read values by name"
-        : only_in_2_10(missing[0]) ? "docs/linuxcnc-compatibility.md lists what is not supported; "
-                                     "hal compile builds a component from its source"
-        : is_declared_only(missing[0])
-            ? "a port or a stream passes data between a module and a program"
-        : is_of_linuxcnc(missing[0]) ? "use the module of LinuxCNC 2.9 (linuxcnc-uspace) or 2.10, "
-                                       "or build this one again with the halcompile of one of these"
-                                     : "check that it was built for LinuxCNC 2.9 or 2.10";
+    const std::string& symbol = missing[0];
+    const std::string owners = definers_of(symbol, folder_, first);
+    std::string text = "it uses " + symbol;
+    if (missing.size() == 1) {
+        text += ", which";
+    } else {
+        text += " and " + std::to_string(missing.size() - 1) + " more missing symbols; " + symbol;
+    }
+    std::string help;
+    if (!owners.empty()) {
+        text += " is defined by " + owners;
+        help = "load that first: loadrt " + first;
+    } else if (const MissingKind* const kind = kind_of(symbol)) {
+        text += kind->text;
+        help = kind->help;
+    } else {
+        text += " is defined neither by this runtime nor by a module in " + folder_;
+        help = "check that it was built for LinuxCNC 2.9 or 2.10";
+    }
     const hal_rejection rejection{sizeof rejection, HAL_SUBJECT_INSTANCE, "", 0, 0, "",
                                   text.c_str(),     help.c_str()};
     host_->reject(host_, &rejection);
@@ -346,7 +366,8 @@ bool Module::create(const hal_host* host, const hal_modules& extension,
     if (!library_) {
         explain_loading(dlerror());
     } else {
-        good = take_arguments() && extension.arguments_known(host) && run_main();
+        good = apply_arguments(host_, library_, described_, strings_) &&
+               extension.arguments_known(host) && run_main();
     }
     constructing = nullptr;
     for (const char* const call : {"ioperm", "iopl", "rtapi_inb", "rtapi_outb"}) {
@@ -355,10 +376,10 @@ bool Module::create(const hal_host* host, const hal_modules& extension,
         }
     }
     if (good) {
-        assign_parameters();
+        parameters.assign(declared);
         announce_memory();
         plain_ = parameters.empty() && !accesses_ports && !imports("rtapi_task_pll_set_correction");
-        settled_.store(true, std::memory_order_release);
+        parameters.settle(true);
         running_ = true;
         running_modules.push_back(this);
         start_printer();
@@ -406,11 +427,13 @@ bool Module::run_main() {
     if (signal != 0) {
         note_broken();  // its code stays mapped: who knows who has a pointer to it
     }
-    host_->fail(host_, (signal != 0 ? "rtapi_app_main crashed (" + why + ")" +
-                                          (cause.empty() ? "" : ": " + cause)
-                        : cause.empty() ? "rtapi_app_main failed: " + why
-                                        : cause + " (rtapi_app_main: " + why + ")")
-                           .c_str());
+    std::string text = "rtapi_app_main failed: " + why;
+    if (signal != 0) {
+        text = "rtapi_app_main crashed (" + why + ")" + (cause.empty() ? "" : ": " + cause);
+    } else if (!cause.empty()) {
+        text = cause + " (rtapi_app_main: " + why + ")";
+    }
+    host_->fail(host_, text.c_str());
     return false;
 }
 
@@ -457,16 +480,14 @@ void Module::destroy() {
 void Module::release() {
     release_tasks(*this);
     release_clock(*this);
-    settled_ = false;
+    parameters.settle(false);
     release_components(*this);
     release_ports(*this);
     release_cards(*this);
     release_claims(*this);
     parameters.clear();
-    shared_.clear();
     declared.clear();
     functions.clear();
-    parameter_names.clear();
     slots.clear();
     accesses_ports = false;
     for (auto& names : names_) {

@@ -4,10 +4,8 @@
 // per process.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <initializer_list>
-#include <map>
 #include <memory>
 #include <new>
 #include <set>
@@ -18,19 +16,11 @@
 #include "modules/elf_file.hpp"
 #include "modules/interface.hpp"
 #include "modules/module_host.hpp"
+#include "modules/parameters.hpp"
 #include "modules/rtapi_interface.hpp"
 #include "modules/segments.hpp"
 
 namespace hal::modules {
-
-/// A parameter lives twice: where the runtime reads and writes it, and in the module's variable,
-/// which has the width of its type only.
-struct Parameter {
-    hal_pin pin;
-    volatile void* value;
-    hal_value last;  ///< what both had when they were last compared
-    std::uint32_t width;
-};
 
 class Module;
 
@@ -93,29 +83,21 @@ public:
     /// True when its functions are called without anything around them: it has no parameters and
     /// accesses no ports.
     bool plain() const noexcept { return plain_; }
-    /// Before a call: copies parameters of the function that were set from outside. [realtime]
-    void take_parameters(const Function& function) noexcept;
-    /// After a call: copies parameters that the module has changed. [realtime]
-    void show_parameters(Function& function) noexcept;
-    bool take_name(bool parameter, const std::string& name) {
+    /// Returns false for a name that the module has used already.
+    bool reserve_name(bool parameter, const std::string& name) {
         return names_[parameter].insert(name).second;
     }
     bool has_pin(const std::string& name) const { return names_[false].contains(name); }
     /// Whether its file uses the symbol.
     bool imports(const char* symbol) const;
-    /// Between two cycles of a task of its own: copies all parameters both ways, once the module is
-    /// loaded.
-    void exchange_parameters() noexcept;
     /// A thread of it cannot be ended: its code and what its pointers lead to must stay.
     void keep_for_good() noexcept;
 
-    /// in memory of the instance; in the end sorted by the address of their values
-    std::vector<Parameter*> parameters;
+    ModuleParameters parameters;
     std::vector<Function*> declared;
     /// ids that it has from hal_init() and rtapi_init() and has not given back
     std::set<int> components;
     std::set<std::string> functions;
-    std::map<std::string, Parameter*> parameter_names;
     std::vector<hal_value**> slots;  ///< its pointers to values of pins
     std::vector<int> ports;  ///< numbers of its port pins
     bool accesses_ports = false;  ///< its functions need what permit_ports() gives
@@ -125,9 +107,7 @@ private:
     void find_neighbours();
     bool fits_the_others();
     void explain_loading(std::string problem) const;
-    bool take_arguments();
     bool run_main();
-    void assign_parameters();
     void announce_memory();
     void release();
 
@@ -142,13 +122,11 @@ private:
     std::set<const Module*> uses_;
     std::vector<std::unique_ptr<char[]>> strings_;  // values of text parameters
     std::set<std::string> names_[2];  // of pins and of parameters
-    std::vector<Parameter*> shared_;  // of no function
     void* library_ = nullptr;
     const hal_host* host_ = nullptr;
     const hal_modules* extension_ = nullptr;
     const hal_module_calls* calls_ = nullptr;
     void* machine_ = nullptr;
-    std::atomic<bool> settled_{false};  // all its parameters are known
     Interface interface_ = Interface::any;
     bool running_ = false;
     bool broken_ = false;

@@ -66,7 +66,7 @@ int new_parameter(const char* name, int type, int dir, void* value, int comp) {
     if (dir != read_only && dir != read_write) {
         return fail("hal_param_new", name, "invalid direction");
     }
-    if (!module.take_name(true, name)) {
+    if (!module.reserve_name(true, name)) {
         return fail("hal_param_new", name, "duplicate parameter name");
     }
     const hal_host* const host = module.host();
@@ -80,8 +80,7 @@ int new_parameter(const char* name, int type, int dir, void* value, int comp) {
     decl.doc = decl.unit = "";
     decl.initial = parameter->last;
     if (!host->pin(host, &decl, &parameter->pin)) return -EINVAL;
-    module.parameters.push_back(parameter);
-    module.parameter_names.emplace(name, parameter);
+    module.parameters.add(name, parameter);
     return 0;
 }
 
@@ -99,7 +98,7 @@ int new_slot(const char* function, bool parameter, const char* name, int type, i
     if (parameter ? dir != read_only && dir != read_write : dir != in && dir != out && dir != io) {
         return fail(function, name, "invalid direction");
     }
-    if (!module.take_name(parameter, name)) {
+    if (!module.reserve_name(parameter, name)) {
         return fail(function, name, parameter ? "duplicate parameter name" : "duplicate pin name");
     }
     const hal_host* const host = module.host();

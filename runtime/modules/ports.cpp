@@ -50,7 +50,7 @@ int fail(const char* name, const char* why) {
     return -EINVAL;
 }
 
-std::size_t free_place() noexcept {
+std::size_t free_index() noexcept {
     std::size_t free = 0;
     while (free < pins.size() && pins[free].load(std::memory_order_relaxed)) {
         ++free;
@@ -73,12 +73,12 @@ int new_port_pin(const char* name, int dir, void** slot, int comp) {
     if (dir != in && dir != out) {
         return fail(name, "invalid direction: a port has one writer and one reader");
     }
-    const std::size_t free = free_place();
+    const std::size_t free = free_index();
     if (free == pins.size()) {
         fail(name, "all modules together have at most 256 ports");
         return -ENOMEM;
     }
-    if (!module.take_name(false, name)) return fail(name, "duplicate pin name");
+    if (!module.reserve_name(false, name)) return fail(name, "duplicate pin name");
     const hal_host* const host = module.host();
     void* const memory = host->allocate(host, sizeof(PortPin), alignof(PortPin));
     if (!memory) return -ENOMEM;
@@ -102,11 +102,15 @@ namespace {
 /// process. 0: none.
 int new_buffer(unsigned size) {
     Module* const module = Module::current();
-    const std::size_t free = free_place();
-    const char* const why = !module               ? "only while a module is loaded"
-                            : size == 0           ? "the size is 0"
-                            : free == pins.size() ? "all modules together have at most 256 ports"
-                                                  : nullptr;
+    const std::size_t free = free_index();
+    const char* why = nullptr;
+    if (!module) {
+        why = "only while a module is loaded";
+    } else if (size == 0) {
+        why = "the size is 0";
+    } else if (free == pins.size()) {
+        why = "all modules together have at most 256 ports";
+    }
     if (why) {
         rtapi_print_msg(1, "hal_port_alloc: %s\n", why);
         return 0;

@@ -334,7 +334,7 @@ void rtapi_wait() {
         return;
     }
     leave_cycle();
-    task->module->exchange_parameters();
+    task->module->parameters.exchange();
     std::int64_t period = task->period_ns.load(std::memory_order_relaxed);
     task->due_ns += std::max<std::int64_t>(period + task->correction_ns, 0);
     task->waited_ns.store(now_ns(), std::memory_order_relaxed);
@@ -351,7 +351,7 @@ void rtapi_wait() {
         task->due_ns += late * period;
     }
     task->waited_ns.store(now_ns(), std::memory_order_relaxed);
-    task->module->exchange_parameters();
+    task->module->parameters.exchange();
     enter();
 }
 
