@@ -34,7 +34,7 @@ HAL_COMPONENT(MuxGeneric, "mux_generic", "Selects one of many values of any type
 to u32. The letters are b (bit), f (float), s (s32) and u (u32): first the type in, then the type out.
 
 The selection is `sel-int` plus the binary number of the `sel-bit` inputs, which exist if the number of inputs is a power of
-two or one more. A selection above the last input selects the last one. A new selection is in use after `debounce-us`; until then the output is
+two or one more. A selection above the last input selects the last one; a sum above 4294967295 counts as that (in LinuxCNC it wraps around). A new selection is in use after `debounce-us`; until then the output is
 held. The time begins when the selection leaves `selected` and ends when it is back, so a contact that bounces for longer passes.
 
 A value is truncated to an integer and limited to the range of the output's type. As a bit, a float is

@@ -136,10 +136,12 @@ public:
     /// if the outputs are held: while a new selection is debounced, and while the selection 0 is
     /// suppressed. [realtime]
     std::uint64_t update(const hal::Cycle& cycle) noexcept {
-        std::uint32_t wanted = number;
+        std::uint64_t sum = number;
         for (std::size_t i = 0; i < bit.size(); ++i) {
-            wanted += bit[i] ? std::uint32_t{1} << i : 0;
+            sum += bit[i] ? std::uint64_t{1} << i : 0;
         }
+        constexpr std::uint64_t max_selection = std::numeric_limits<std::uint32_t>::max();
+        const auto wanted = static_cast<std::uint32_t>(std::min(sum, max_selection));
         if (keep && wanted == 0) return ways;
         if (wanted != selected && elapsed < debounce_us) {
             elapsed = elapsed + static_cast<std::uint32_t>(cycle.period_ns() / 1000);
