@@ -38,6 +38,10 @@ bool is_omitted(std::string_view name, const std::vector<std::string>& words) {
     });
 }
 
+bool is_of(const LoadedComponent& threads, const Thread* thread) {
+    return thread && thread->component == &threads;
+}
+
 /// Threads of `loadrt threads` that a delthread removed again.
 std::vector<std::string> deleted_threads(const Model& model) {
     std::vector<std::string> gone;
@@ -48,7 +52,7 @@ std::vector<std::string> deleted_threads(const Model& model) {
         for (const std::string& word : words) {
             const auto equals = word.find('=');
             if (word.starts_with("name") && equals != word.npos &&
-                !model.find_thread(word.substr(equals + 1)) &&
+                !is_of(*threads, model.find_thread(word.substr(equals + 1))) &&
                 !is_omitted(word.substr(0, equals), words)) {
                 gone.push_back(word.substr(equals + 1));
             }
@@ -90,6 +94,82 @@ void new_thread(Text& text, const Thread& thread) {
     text.add("\n");
 }
 
+/// The instances that one loadrt made, without those that were unloaded.
+std::vector<const Instance*> remaining(const LoadedComponent& component, std::size_t load) {
+    std::vector<const Instance*> all;
+    for (const auto& instance : component.instances) {
+        if (instance->load == load) {
+            all.push_back(instance.get());
+        }
+    }
+    return all;
+}
+
+/// The names that names= lists.
+std::vector<std::string> listed_names(const std::string& arguments) {
+    std::vector<std::string> names;
+    for (const std::string& word : words_of(arguments)) {
+        const auto begin = word.find("names=");
+        if (begin > 1) continue;  // it may begin with a quote
+        std::string list = word.substr(begin + 6);
+        std::erase_if(list, [](char c) { return c == '"' || c == '\''; });
+        for (std::size_t at = 0; at < list.size();) {
+            const auto end = std::min(list.find(',', at), list.size());
+            names.push_back(list.substr(at, end - at));
+            at = end + 1;
+        }
+    }
+    return names;
+}
+
+/// True when no instance was unloaded that has a number in place of a name.
+bool has_all_numbered(const LoadedComponent& component) {
+    std::size_t number = 0;
+    for (const auto& instance : component.instances) {
+        if (listed_names(component.arguments[instance->load]).empty() &&
+            !instance->name.ends_with("." + std::to_string(number++))) {
+            return false;
+        }
+    }
+    return number == component.next_number;
+}
+
+/// " names=a,c personality=1,3": instead of the arguments as they were written, for what remains.
+std::string arguments_for(const std::vector<const Instance*>& instances, const Load& load) {
+    std::string names, personalities, text;
+    for (const Instance* const instance : instances) {
+        const char* const comma = names.empty() ? "" : ",";
+        names += comma + instance->name;
+        if (!load.personalities.empty()) {
+            personalities +=
+                comma + load.personalities[instance->number % load.personalities.size()];
+        }
+    }
+    for (const auto& [name, value] : load.arguments) {
+        text += " " + written(name + "=" + value);
+    }
+    return " names=" + names + (personalities.empty() ? "" : " personality=" + personalities) +
+           text;
+}
+
+/// A loadrt for each by which the component was loaded, as far as its instances remain.
+void save_loads(Text& text, const LoadedComponent& component, const std::string& name) {
+    const bool whole =
+        !component.plugin || is_module(component) ||
+        (component.plugin->flags & (HAL_COMPONENT_WHOLE_NAMES | HAL_COMPONENT_SINGLETON)) != 0;
+    const bool all_numbered = whole || has_all_numbered(component);
+    for (std::size_t i = 0; i < component.arguments.size(); ++i) {
+        const std::string& arguments = component.arguments[i];
+        const auto instances = remaining(component, i);
+        if (!whole && instances.empty()) continue;
+        const auto names = listed_names(arguments);
+        const bool complete = names.empty() ? all_numbered : instances.size() == names.size();
+        text.add("loadrt {}{}\n", name,
+                 whole || complete ? (arguments.empty() ? "" : " ") + arguments
+                                   : arguments_for(instances, component.loads[i]));
+    }
+}
+
 void save_comp(Context& context, Text& text) {
     const Model& model = context.session.model();
     text.add("# components\n");
@@ -101,11 +181,8 @@ void save_comp(Context& context, Text& text) {
     };
     for (const LoadedComponent* const component : oldest_first) {
         if (component->process != 0) continue;
-        for (const std::string& arguments : component->arguments) {
-            text.add("loadrt {}{}{}{}\n",
-                     is_module(*component) && contains(ours, component->name) ? "--linuxcnc " : "",
-                     component->name, arguments.empty() ? "" : " ", arguments);
-        }
+        const bool ambiguous = is_module(*component) && contains(ours, component->name);
+        save_loads(text, *component, (ambiguous ? "--linuxcnc " : "") + component->name);
     }
     for (const std::string& name : deleted_threads(model)) {
         text.add("delthread {}\n", name);
