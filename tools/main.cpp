@@ -4,13 +4,18 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
+#include <new>
+#include <string>
 #include <string_view>
 #include <sys/auxv.h>
 #include <sys/prctl.h>
+#include <system_error>
 #include <unistd.h>
 
 #include "classic.hpp"
 #include "cli/other_program.hpp"
+#include "cli/output.hpp"
 #include "cli/standard_streams.hpp"
 #include "commands.hpp"
 #include "execute/process_setup.hpp"
@@ -37,6 +42,29 @@ int run(const hal::tools::Classic* classic, int argc, char** argv) {
     return classic->run(argc, argv);
 }
 
+/// As run(); what no command expects, such as a limit of threads or descriptors, is an error too.
+int run_and_report(const hal::tools::Classic* classic, int argc, char** argv) {
+    std::string reason;
+    try {
+        return run(classic, argc, argv);
+    } catch (const std::bad_alloc&) {
+        reason = "there is no memory left";
+    } catch (const std::system_error& error) {
+        reason = error.what();
+        if (error.code() == std::errc::resource_unavailable_try_again) {
+            reason = "cannot create a thread: " + error.code().message() +
+                     "; see the limit of processes: ulimit -u";
+        } else if (error.code() == std::errc::too_many_files_open) {
+            reason += "; see the limit of open files: ulimit -n";
+        }
+    } catch (const std::exception& error) {
+        reason = error.what();
+    }
+    const std::string line = "hal: " + reason + "\n";
+    hal::tools::write_all(STDERR_FILENO, line);
+    return 1;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -54,6 +82,6 @@ int main(int argc, char** argv) {
     std::string_view program = argc > 0 ? argv[0] : "hal";
     program.remove_prefix(program.find_last_of('/') + 1);
     const hal::tools::Classic* const classic = hal::tools::find_classic(program);
-    const int status = run(classic, argc, argv);
+    const int status = run_and_report(classic, argc, argv);
     return status == 0 && (std::ferror(stdout) != 0 || hal::tools::print_failed()) ? 1 : status;
 }

@@ -85,8 +85,18 @@ Core& Executor::add(const CoreOptions& options, ThreadPins pins) {
         throw;
     }
     const Granted& granted = runner.granted;
-    supervisor_.add(runner.core, runner.thread, runner.tid,
-                    granted.policy == Granted::Policy::fifo ? granted.priority : 0, granted.cpu);
+    try {
+        supervisor_.add(runner.core, runner.thread, runner.tid,
+                        granted.policy == Granted::Policy::fifo ? granted.priority : 0,
+                        granted.cpu);
+    } catch (...) {
+        constexpr std::int64_t timeout_ns = 2'000'000'000;
+        runner.ask_to_end();
+        if (runner.join(timeout_ns)) {
+            forget(runner);
+        }
+        throw;
+    }
     return runner.core;
 }
 

@@ -208,8 +208,12 @@ public:
         sigaddset(&interrupt, SIGINT);
         ::pthread_sigmask(SIG_BLOCK, &interrupt, &before_);
         descriptor_ = ::signalfd(-1, &interrupt, SFD_CLOEXEC | SFD_NONBLOCK);
+        if (descriptor_ < 0) {  // then Ctrl-C ends this program
+            ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+        }
     }
     ~Interrupts() {
+        if (descriptor_ < 0) return;
         ::close(descriptor_);
         ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
     }
