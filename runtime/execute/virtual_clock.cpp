@@ -1,9 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "execute/virtual_clock.hpp"
 
+#include "execute/float_modes.hpp"
+
 namespace hal {
 
 void VirtualClock::advance(std::int64_t ns) {
+    const KeepFloatModes of_the_caller;
+    if (!FloatModes::now().is_default()) {
+        FloatModes::set_default();
+    }
     const std::int64_t end = now_ns_ + ns;
     for (bool ran = false;;) {
         Runner* next = nullptr;
@@ -22,10 +28,20 @@ void VirtualClock::advance(std::int64_t ns) {
         ran = true;
         now_ns_ = next_ns;
         __atomic_fetch_add(&supervisor_.shared.progress, 1, __ATOMIC_RELAXED);
-        next->core.cycle(next->grid_ns, next_ns, next_ns);
+        run(*next);
         next->grid_ns += next->options.period_ns;
     }
     now_ns_ = end;
+}
+
+void VirtualClock::run(Runner& runner) {
+    const std::int64_t begun_ns = cycle_limit.limit_ns > 0 ? monotonic_ns() : 0;
+    runner.core.cycle(runner.grid_ns, now_ns_, now_ns_);
+    if (cycle_limit.limit_ns == 0) return;
+    const std::int64_t took_ns = monotonic_ns() - begun_ns;
+    if (took_ns > cycle_limit.limit_ns) {
+        cycle_limit.report(runner.core, took_ns);
+    }
 }
 
 void VirtualClock::advance_cycles(const Runner& of, std::uint64_t cycles) {

@@ -14,6 +14,13 @@
 
 namespace hal {
 
+/// Of all virtual clocks of the process: `report` is called after each cycle that took longer than
+/// `limit_ns` of wall time; 0: none.
+struct CycleLimit {
+    std::int64_t limit_ns = 0;
+    void (*report)(const Core& core, std::int64_t took_ns) = nullptr;
+};
+
 /// [setup] throughout. What it is given must outlive it.
 class VirtualClock {
 public:
@@ -26,6 +33,7 @@ public:
           supervisor_(supervisor) {}
 
     std::int64_t now_ns() const { return now_ns_; }
+    inline static CycleLimit cycle_limit;  ///< set before the first cycle
     /// Runs every cycle due within the next `ns`.
     void advance(std::int64_t ns);
     /// Runs until `of` has finished this many more cycles, with all other cycles that are due until
@@ -37,6 +45,7 @@ private:
     const Timeline& timeline_;
     Background& background_;
     Supervisor& supervisor_;
+    void run(Runner& runner);
     std::int64_t now_ns_ = 0;
 };
 

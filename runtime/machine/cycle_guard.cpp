@@ -10,6 +10,7 @@
 #include "base/types.hpp"
 #include "execute/crash_table.hpp"
 #include "execute/process_setup.hpp"
+#include "execute/virtual_clock.hpp"
 #include "machine/crash.hpp"
 
 namespace hal {
@@ -48,7 +49,26 @@ CycleGuard::~CycleGuard() {
     thread_.join();
 }
 
+namespace {
+
+/// Of a cycle that has ended, too late: most are shorter than the interval in which the guard looks.
+void end_after_slow_cycle(const Core& core, std::int64_t took_ns) {
+    const CycleNames names = names_of({&core, 0, 0});
+    make_all_safe();
+    const std::string text =
+        "hal: " + names.thread + ": the cycle took " +
+        format_duration(static_cast<double>(took_ns)) + " of wall time (--cycle-limit " +
+        format_duration(static_cast<double>(VirtualClock::cycle_limit.limit_ns)) + ", cycle " +
+        std::to_string(core.cycles.load() - 1) +
+        "); outputs were set to their safe values; the process ends [hung-thread]\n";
+    [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());
+    end_process(1);
+}
+
+}  // namespace
+
 void CycleGuard::begin(std::int64_t limit_ns) {
+    VirtualClock::cycle_limit = {limit_ns, end_after_slow_cycle};
     time_limit_.limit_ns = limit_ns;
     thread_ = std::thread([this] { work(); });
 }

@@ -483,6 +483,17 @@ class Supervisor(HungCase):
         self.assertIn("safe", self.events())
         self.assertIn("invalid duration 'soon'", self.bad("sim", "x.hal", "--cycle-limit", "soon"))
 
+    def test_cycle_limit_ends_a_run_whose_cycle_has_ended_too_late(self):
+        path = self.write(
+            "short.hal", "newthread servo 1000000\nloadrt siggen\naddf siggen.0.update servo\n"
+        )
+        self.assertRegex(
+            self.bad("sim", path, "--cycle-limit", "1ns", "--for", "1s"),
+            r"^hal: servo: the cycle took [\d.]+ [mun]?s of wall time \(--cycle-limit 1 ns, cycle 0\); "
+            r"outputs were set to their safe values; the process ends \[hung-thread\]\n$",
+        )
+        self.good("sim", "-q", path, "--cycle-limit", "10min", "--for", "1s")
+
 
 if __name__ == "__main__":
     unittest.main()
