@@ -213,6 +213,11 @@ class Doctor(Case):
         self.assertRegex(text, r"(?m)^wake-up latency at 1 kHz, SCHED_\w+")
         self.assertRegex(text, r"(?m)^  sleeping, then spinning the last 200 us .*s$")
 
+    def test_rejects_what_has_no_meaning(self):
+        for seconds in ("nan", "inf", "-1", "1e9"):
+            self.assertIn("--seconds", self.bad("doctor", "--seconds", seconds))
+        self.assertIn("--yes applies to --fix", self.bad("doctor", "--yes"))
+
     def test_every_poor_verdict_has_a_remedy(self):
         report = json.loads(self.good("doctor", "--seconds", "0.05", "--json"))
         for finding in report["findings"]:

@@ -26,6 +26,15 @@ void DeclaredOption::in(int least, int most) {
     option_->check(CLI::Range(least, most).description(fmt::format("{}..{}", least, most)));
 }
 void DeclaredOption::in(double least, double most) { option_->check(CLI::Range(least, most)); }
+void DeclaredOption::finite() {
+    option_->check([](const std::string& text) {
+        char* end = nullptr;
+        const double value = std::strtod(text.c_str(), &end);
+        const bool is_number = end != text.c_str() && *end == '\0';
+        return is_number && !std::isfinite(value) ? fmt::format("{} is not a finite number", text)
+                                                  : std::string();
+    });
+}
 void DeclaredOption::quietly_in(int least, int most) {
     option_->check(CLI::Range(least, most).description(""));
 }
@@ -68,6 +77,9 @@ template <class T>
 DeclaredOption OptionSet::value(const char* names, T& to, const char* type,
                                 const std::string& what) {
     DeclaredOption option(app_->add_option(names, to, what)->type_name(type));
+    if (std::is_floating_point_v<T>) {
+        option.finite();
+    }
     if (std::is_unsigned_v<T>) {
         option.not_negative();  // a negative number would wrap around
     }

@@ -26,6 +26,7 @@ public:
     void in(double least, double most);
     void quietly_in(int least, int most);  ///< the help does not show it
     void not_negative();
+    void finite();
 
 private:
     CLI::Option* option_;

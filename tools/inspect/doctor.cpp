@@ -370,6 +370,9 @@ std::string described(const Finding& finding, const Finding* as, bool colour) {
 }  // namespace
 
 int run_doctor(const DoctorOptions& options) {
+    if (options.yes && !options.fix) {
+        return fail(options, "--yes applies to --fix: it carries out commands without asking");
+    }
     const bool colour = colours(STDOUT_FILENO);
     nlohmann::ordered_json report;
     std::vector<Remedy> remedies;
