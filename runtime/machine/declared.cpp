@@ -94,7 +94,8 @@ std::string Declared::full_name(const Function& function) const {
            (function.name.empty() ? "" : "." + function.name);
 }
 
-bool gather(const hal_component& component, Declared& page, std::string& problem) {
+bool gather(const hal_component& component, Declared& page, std::string& problem,
+            const std::function<void()>& before_destruction) {
     page.name = component.name;
     std::replace(page.name.begin(), page.name.end(), '_', '-');
     page.summary = component.summary;
@@ -123,6 +124,9 @@ bool gather(const hal_component& component, Declared& page, std::string& problem
         problem = gathering.failure.empty() ? "its constructor failed without a reason"
                                             : gathering.failure;
         return false;
+    }
+    if (before_destruction) {
+        before_destruction();
     }
     component.destroy(memory.get());
     return true;

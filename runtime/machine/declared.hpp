@@ -3,6 +3,7 @@
 // for manuals and completion.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -47,7 +48,8 @@ struct Declared {
 };
 
 /// Runs the component's constructor and gathers its declarations. Returns false and sets `problem`
-/// to the reason. [setup]
-bool gather(const hal_component& component, Declared& declared, std::string& problem);
+/// to the reason. `before_destruction` is called before its destructor. [setup]
+bool gather(const hal_component& component, Declared& declared, std::string& problem,
+            const std::function<void()>& before_destruction = {});
 
 }  // namespace hal

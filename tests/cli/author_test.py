@@ -65,6 +65,26 @@ REJECTED = {
         GOOD + '    bool made = [] { throw std::runtime_error("not today"); return true; }();\n',
         "component 'mine' cannot make 'mine.0': not today",
     ),
+    "a constructor that crashes": (
+        GOOD + "    bool made = [] { std::abort(); return true; }();\n",
+        "component 'mine': its constructor crashes (Aborted)",
+    ),
+    "a destructor that crashes": (
+        GOOD + "    ~Mine() { std::abort(); }\n",
+        "component 'mine': its destructor crashes (Aborted)",
+    ),
+    "a destructor that throws": (
+        GOOD + "    ~Mine() { throw 1; }\n",
+        "component 'mine': its destructor crashes (Aborted)",
+    ),
+    "a destructor that exits": (
+        GOOD + "    ~Mine() { std::exit(0); }\n",
+        "component 'mine': its destructor ends the process",
+    ),
+    "a function that crashes": (
+        IN + OUT + RUN + STEP.replace("out = in;", "out = in; std::abort();"),
+        "component 'mine': a function of it crashes (Aborted), with the initial values of its pins",
+    ),
 }
 
 

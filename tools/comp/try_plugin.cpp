@@ -2,6 +2,7 @@
 #include "comp/try_plugin.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
@@ -70,6 +71,24 @@ std::string mistake_of(const Pin& pin, const std::string& own) {
     return {};
 }
 
+/// What a component was doing when its process ended.
+enum class Stage : int { load, construct, destroy, run };
+
+/// "its constructor does not return within 20 s", "its destructor crashes (Segmentation fault)".
+std::string end_in(Stage stage, int signal) {
+    const std::string how = signal == SIGALRM
+                                ? fmt::format("does not return within {} s", longest_s)
+                            : signal != 0 ? fmt::format("crashes ({})", ::strsignal(signal))
+                                          : "ends the process";
+    switch (stage) {
+    case Stage::load: return "the constructor of a static object of it " + how;
+    case Stage::construct: return "its constructor " + how;
+    case Stage::destroy: return "its destructor " + how;
+    case Stage::run: break;
+    }
+    return "a function of it " + how + ", with the initial values of its pins";
+}
+
 /// Everything that is tried. What goes wrong is in "problem", the pin or function it is about in
 /// "subject".
 class Trial {
@@ -106,9 +125,10 @@ public:
                                    "a letter, and is neither threads nor all",
                                    own));
         }
+        stage(Stage::construct);
         Page page;
         std::string needs;
-        if (!gather(*plugin->component, page, needs)) {
+        if (!gather(*plugin->component, page, needs, [this] { stage(Stage::destroy); })) {
             page.functions.clear();
             page.pins.clear();
         }
@@ -128,13 +148,19 @@ public:
         if (!construct(arguments) || !answer_["needs"].get<std::string>().empty() || starts) {
             return finish();
         }
-        stage("run");
         cycles();
         finish();
     }
 
 private:
-    void stage(const char* what) { write_all(descriptor_, Json{{"stage", what}}.dump() + "\n"); }
+    void stage(Stage what) {
+        write_all(descriptor_, Json{{"stage", static_cast<int>(what)}}.dump() + "\n");
+    }
+    /// Notes that what was made is destroyed next.
+    struct EndOfBlock {
+        Trial& trial;
+        ~EndOfBlock() { trial.stage(Stage::destroy); }
+    };
     void finish() { write_all(descriptor_, answer_.dump() + "\n"); }
     void bad(const char* what, const std::string& why) {
         answer_["kind"] = what;
@@ -143,9 +169,11 @@ private:
     }
 
     bool construct(bool arguments) {
+        stage(Stage::construct);
         Session session(alone(true));
         Shell shell(session, ShellOptions{});
         TextOutput output;
+        const EndOfBlock end{*this};
         if (shell.run_text("compile", "loadrt " + name_ + "\n", output) != 0) {
             const std::string why = first_error(output.err_text);
             const bool authors = why.find("declare") != std::string::npos ||
@@ -183,14 +211,17 @@ private:
     }
 
     void cycles() {
+        stage(Stage::construct);
         Session session(alone(false));
         Shell shell(session, ShellOptions{});
         TextOutput output;
+        const EndOfBlock end{*this};
         std::string text =
             "loadrt threads name1=hal-compile period1=1000000\nloadrt " + name_ + "\n";
         if (shell.run_text("compile", text, output) != 0) {
             return void(answer_["problem"] = first_error(output.err_text));
         }
+        stage(Stage::run);
         text.clear();
         for (const auto& component : session.model().components) {
             for (const auto& function : component->functions) {
@@ -260,7 +291,10 @@ std::string place_of(const std::string& problem, const PluginSource& source) {
 bool try_plugin(const std::string& folder, const std::string& name, const PluginSource& source,
                 BuiltPlugin& built) {
     int ends[2];
-    if (::pipe2(ends, O_CLOEXEC) != 0) return false;
+    if (::pipe2(ends, O_CLOEXEC) != 0) {
+        built.problem = fmt::format("it cannot be tried: {}", std::strerror(errno));
+        return false;
+    }
     const pid_t child = ::fork();
     if (child == 0) {
         const int nothing = ::open("/dev/null", O_RDWR);
@@ -276,40 +310,29 @@ bool try_plugin(const std::string& folder, const std::string& name, const Plugin
     }
     ::close(ends[1]);
     if (child < 0) {
+        built.problem = fmt::format("it cannot be tried: {}", std::strerror(errno));
         ::close(ends[0]);
         return false;
     }
     std::string text;
     const int status = finish_program(child, ends[0], text);
     Json answer = Json::object();
-    bool running = false;
+    auto stage = Stage::load;
     std::istringstream lines(text);
     for (std::string line; std::getline(lines, line);) {
         const Json one = Json::parse(line, nullptr, false);
         if (!one.is_object()) continue;
         if (one.contains("stage")) {
-            running = true;
+            stage = static_cast<Stage>(one["stage"].get<int>());
         } else {
             answer = one;
         }
     }
     const auto word = [&](const char* key) { return answer.value(key, std::string()); };
     if (answer.empty() || WIFSIGNALED(status)) {
-        const int number = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
-        if (number == SIGALRM) {
-            built.problem =
-                fmt::format("{} does not return within {} s",
-                            running ? "a function of it" : "its constructor", longest_s);
-        } else if (running) {
-            built.problem =
-                fmt::format("a function of it crashes with the initial values of its pins ({})",
-                            number ? ::strsignal(number) : "it ends the process");
-        } else {
-            built.problem = fmt::format(
-                "it crashes when an instance is made ({}): its constructor, or that of a static "
-                "object",
-                number ? ::strsignal(number) : "it ends the process");
-        }
+        built.loads = stage != Stage::load;
+        built.problem = (built.loads ? "component '" + name + "': " : "") +
+                        end_in(stage, WIFSIGNALED(status) ? WTERMSIG(status) : 0);
         return false;
     }
     if (const std::string problem = word("problem"); !problem.empty()) {
