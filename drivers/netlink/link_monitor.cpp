@@ -7,6 +7,10 @@
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 
+#include <algorithm>
+#include <chrono>
+#include <iterator>
+#include <thread>
 #include <utility>
 
 namespace hal::link {
@@ -49,6 +53,11 @@ void LinkMonitor::run() {
         pollfd sources[] = {
             {wake_.get(), POLLIN, 0}, {events_.get(), POLLIN, 0}, {also_, POLLIN, 0}};
         ::poll(sources, 3, every_ms_);
+        // poll() does not sleep on a descriptor that another part of the process has closed
+        if (std::any_of(std::begin(sources), std::end(sources),
+                        [](const pollfd& source) { return (source.revents & POLLNVAL) != 0; })) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(every_ms_));
+        }
         while (::read(wake_.get(), discarded, sizeof discarded) > 0) {
         }
         // the content is irrelevant: a change was reported

@@ -125,6 +125,12 @@ void Gateway::run() {
             polled.push_back({client->fd, static_cast<short>(client->input_ended ? 0 : POLLIN), 0});
         }
         ::poll(polled.data(), polled.size(), pending_.empty() ? 50 : 1);
+        // closed by another part of the process; poll() would not sleep any more
+        for (int* const own : {&udp_, &tcp_}) {
+            if ((polled[own == &udp_ ? 0 : 1].revents & POLLNVAL) != 0) {
+                *own = -1;
+            }
+        }
         if (polled[0].revents != 0) {
             read_udp();
         }
