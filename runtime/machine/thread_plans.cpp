@@ -381,7 +381,8 @@ void ThreadPlans::keep_cells(const std::vector<std::shared_ptr<void>>& cells, bo
 
 void ThreadPlans::describe_functions() {
     for (const auto& [thread, plan] : plans_) {
-        if (const Core* const of = core(thread)) {
+        // a thread that did not answer the swap for its first plan has none
+        if (const Core* const of = core(thread); of && plan) {
             state_.options.observer->describe(of->mark(), *thread, *plan);
         }
     }
