@@ -142,7 +142,7 @@ bool Endpoint::listen_at(Diagnostics& diagnostics) {
 
 void Endpoint::stop_listening() {
     if (socket_ < 0) return;
-    // whoever watches the file sees that this instance ends in order
+    // a program that watches the file sees that this instance ends in order
     [[maybe_unused]] const int emptied = ftruncate(lock_, 0);
     unlink(path_.c_str());
     close(std::exchange(socket_, -1));

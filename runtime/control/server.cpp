@@ -145,8 +145,8 @@ void Server::State::remove_gone() {
 }
 
 /// True when the process ends and closes the connections with itself: a hundred clients that are
-/// woken before that would take CPU time from the end. The machine's programs are told: it waits for
-/// them.
+/// woken before that would take CPU time from the end. The machine's programs get a message: it waits
+/// for them.
 bool Server::State::clients_wait_for_end() const {
     Session& session = shell.session();
     const auto lock = session.lock();

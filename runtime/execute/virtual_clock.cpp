@@ -1,15 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "execute/virtual_clock.hpp"
 
-#include "execute/float_modes.hpp"
-
 namespace hal {
 
 void VirtualClock::advance(std::int64_t ns) {
-    const KeepFloatModes of_the_caller;
-    if (!FloatModes::now().is_default()) {
-        FloatModes::set_default();
-    }
     const std::int64_t end = now_ns_ + ns;
     for (bool ran = false;;) {
         Runner* next = nullptr;

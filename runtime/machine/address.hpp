@@ -26,8 +26,8 @@ enum class InstanceEnd {
     running  ///< it has not ended
 };
 
-/// The lock file of an instance, opened while it runs: whoever removes the file or starts another
-/// instance of this name meanwhile, it shows how this one ended.
+/// The lock file of an instance, opened while it runs: also when the file is removed or another
+/// instance of this name is started meanwhile, it shows how this one ended.
 class InstanceWitness {
 public:
     InstanceWitness() = default;
