@@ -387,7 +387,7 @@ class Dcf(Node):
         self.assertIn("SubNumber=", eds)
         place = eds.index("SubNumber=")
         line = eds[:place].count("\n") + 1
-        damaged = eds[:place] + "SubNumber=2O" + eds[eds.index("\r", place) :]
+        damaged = eds[:place] + "SubNumber=2O" + eds[eds.index("\n", place) :]
         (self.folder / "damaged.eds").write_bytes(damaged.encode())
         for words in (
             ["sdo", "read", self.bus, "5", "1000"],

@@ -881,7 +881,7 @@ behaviour(
     lambda v: v.beyond(2147483647),
     "`sel-int` beyond the number of inputs; a value beyond the range",
     "the last input; limited",
-    "reads beyond its inputs, or crashes",
+    "undefined",
     "a selection must not read other memory",
     (
         "mux_generic config=su4",
