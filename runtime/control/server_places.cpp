@@ -54,6 +54,17 @@ void Server::State::note_process_end(ServedClient& client) {
     shutdown(client.fd, SHUT_RD);
 }
 
+/// Closes the descriptor by which the process of the newest watched client is watched: a client is
+/// worth more than the watch of another. False when none is watched.
+bool Server::State::give_up_watch() {
+    for (auto client = clients.rbegin(); client != clients.rend(); ++client) {
+        if ((*client)->process < 0) continue;
+        close(std::exchange((*client)->process, -1));
+        return true;
+    }
+    return false;
+}
+
 /// Opens the descriptor in reserve again, once no client uses it.
 void Server::State::keep_spare() {
     if (spare < 0) {
@@ -71,6 +82,10 @@ int Server::State::accept_one() {
     if (fd >= 0) return fd;
     if (errno != EMFILE && errno != ENFILE && errno != ENOBUFS && errno != ENOMEM) return -1;
     files_short = true;
+    if (give_up_watch()) {
+        fd = accept4(endpoint.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+        if (fd >= 0) return fd;
+    }
     if (!close_one_idle(urgent_ns) && spare >= 0) {
         close(std::exchange(spare, -1));
     }

@@ -57,6 +57,7 @@ struct Server::State {
     void serve();
     void serve_client(ServedClient& client, short events);
     void watch_process(ServedClient& client);
+    bool give_up_watch();
     void note_process_end(ServedClient& client);
     void end_all();
     bool clients_wait_for_end() const;

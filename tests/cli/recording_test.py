@@ -239,7 +239,7 @@ setp io.fault-emcy-storm 1
         self.write("run.csv", "time_s,feedback,effort\n0.001,0,nan\n0.002,0,1\n0.003,0,1\n")
         words = ("replay", "run.csv", "control.hal")
         self.assertIn(
-            "--tolerance: nan is not a number; use 0 or more",
+            "--tolerance: nan is not a finite number; see: hal help replay",
             self.bad(*words, "--tolerance", "nan", "--", "GAIN=1"),
         )
         self.assertEqual(
