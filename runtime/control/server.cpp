@@ -71,9 +71,12 @@ void Server::State::serve() {
     release_unused_stack();
     pool.start();
     keep_spare();
+    // only open descriptors: poll() rejects more entries than the process may have descriptors
     std::vector<pollfd> ready;
+    std::vector<ServedClient*> watched;  // whose process is in `ready`, behind the sockets
     while (!ending) {
         ready.clear();
+        watched.clear();
         ready.push_back(
             {endpoint.fd(), static_cast<short>(monotonic_ns() >= accepts_from ? POLLIN : 0), 0});
         ready.push_back({wake, POLLIN, 0});
@@ -81,6 +84,12 @@ void Server::State::serve() {
             const int reads = listens_to(*client) ? POLLIN : 0;
             ready.push_back({client->gone ? -1 : client->fd,
                              static_cast<short>(reads | (client->waiting() > 0 ? POLLOUT : 0)), 0});
+            if (client->process >= 0) {
+                watched.push_back(client.get());
+            }
+        }
+        const std::size_t before = clients.size();
+        for (const ServedClient* client : watched) {
             ready.push_back({client->process, POLLIN, 0});
         }
         const int timeout = sleep_ms();
@@ -88,15 +97,16 @@ void Server::State::serve() {
         eventfd_t ignored;
         eventfd_read(wake, &ignored);
 
-        const std::size_t before = clients.size();
         if (ready[0].revents & POLLIN) {
             accept_clients();
         }
-        for (std::size_t i = 0; i < before; ++i) {
-            if (ready[2 * i + 3].revents != 0) {
-                note_process_end(*clients[i]);
+        for (std::size_t i = 0; i < watched.size(); ++i) {
+            if (ready[2 + before + i].revents != 0) {
+                note_process_end(*watched[i]);
             }
-            serve_client(*clients[i], ready[2 * i + 2].revents);
+        }
+        for (std::size_t i = 0; i < before; ++i) {
+            serve_client(*clients[i], ready[2 + i].revents);
         }
         remove_gone();
         reclaim();
