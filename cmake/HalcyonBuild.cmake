@@ -192,7 +192,7 @@ if(HALCYON_RT_GUARD AND NOT HALCYON_RTSAN_ARCHIVE)
     message(FATAL_ERROR "HALCYON_RT_GUARD needs clang 19's real-time sanitizer; type: apt install libclang-rt-19-dev")
 endif()
 if(HALCYON_RTSAN_ARCHIVE)
-    add_library(halcyon_guard STATIC "${PROJECT_SOURCE_DIR}/runtime/guard/module_calls.cpp")
+    add_library(halcyon_guard STATIC "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/binary/guard/module_calls.cpp")
     target_compile_features(halcyon_guard PRIVATE cxx_std_20)
     add_library(halcyon_rtsan INTERFACE)
     target_link_libraries(halcyon_rtsan INTERFACE "$<LINK_LIBRARY:WHOLE_ARCHIVE,halcyon_guard>"
@@ -250,7 +250,7 @@ constinit const std::string_view build_python = "@PROJECT_BINARY_DIR@/python";
 constinit const std::string_view install_python = "@CMAKE_INSTALL_FULL_LIBDIR@/halcyon/python";
 constinit const std::string_view libraries_from_programs = "@HALCYON_LIBRARIES_FROM_PROGRAMS@";
 constinit const std::string_view includes_from_programs = "@HALCYON_INCLUDES_FROM_PROGRAMS@";
-constinit const std::string_view build_includes = "@PROJECT_SOURCE_DIR@/runtime/abi:@PROJECT_SOURCE_DIR@/runtime/sdk";
+constinit const std::string_view build_includes = "@PROJECT_SOURCE_DIR@/runtime/abi:@PROJECT_SOURCE_DIR@/runtime/sdk:@PROJECT_SOURCE_DIR@/runtime/linuxcnc/source";
 constinit const std::string_view build_machines = "@PROJECT_SOURCE_DIR@/halfiles";
 constinit const std::string_view machines_from_programs = "@HALCYON_MACHINES_FROM_PROGRAMS@";
 constinit const std::string_view install_includes = "@CMAKE_INSTALL_FULL_INCLUDEDIR@";

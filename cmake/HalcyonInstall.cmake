@@ -4,7 +4,7 @@
 include(CMakePackageConfigHelpers)
 
 set(HALCYON_PACKAGE_DIR "${CMAKE_INSTALL_LIBDIR}/cmake/Halcyon")
-install(DIRECTORY runtime/abi/hal runtime/sdk/hal runtime/sdk/linuxcnc runtime/sdk/check DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" PATTERN "*.c")
+install(DIRECTORY runtime/abi/hal runtime/sdk/hal runtime/linuxcnc/source/linuxcnc runtime/sdk/check DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" PATTERN "*.c")
 set_target_properties(halcyon_text PROPERTIES EXPORT_NAME text)
 install(TARGETS halcyon_abi halcyon_sdk halcyon_text EXPORT HalcyonTargets ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}")
 install(DIRECTORY runtime/text DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.hpp")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 # libhalcyon_modules.so runs LinuxCNC's compiled modules. machine/module_library.cpp opens it at run time, with its symbols in the global
-# scope; nothing links to it. It exports what runtime/modules/exports.map lists.
-file(GLOB sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/runtime/modules/*.cpp")
-set(map "${PROJECT_SOURCE_DIR}/runtime/modules/exports.map")
+# scope; nothing links to it. It exports what runtime/linuxcnc/binary/exports.map lists.
+file(GLOB sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/binary/*.cpp")
+set(map "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/binary/exports.map")
 add_library(halcyon_modules SHARED ${sources})
 target_include_directories(halcyon_modules PRIVATE "${PROJECT_SOURCE_DIR}/runtime" "${PROJECT_SOURCE_DIR}/runtime/sdk")
 target_link_libraries(halcyon_modules PRIVATE halcyon_abi Threads::Threads ${CMAKE_DL_LIBS})

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-# liblinuxcnchal.so.0, by which LinuxCNC's programs connect to a machine; see runtime/programs/README.md. It is in a folder of its own, which only
+# liblinuxcnchal.so.0, by which LinuxCNC's programs connect to a machine; see runtime/linuxcnc/programs/README.md. It is in a folder of its own, which only
 # started programs search: outside of that it must not stand in the way of LinuxCNC's library of the same name.
-set(sdk "${PROJECT_SOURCE_DIR}/runtime/sdk/linuxcnc")
-set(map "${PROJECT_SOURCE_DIR}/runtime/programs/exports.map")
-file(GLOB sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/runtime/programs/*.c" "${PROJECT_SOURCE_DIR}/runtime/programs/*.cpp")
-add_library(linuxcnchal SHARED ${sources} "${PROJECT_SOURCE_DIR}/runtime/modules/streams.cpp" "${PROJECT_SOURCE_DIR}/runtime/modules/shared_memory.cpp"
-    "${sdk}/declare.c" "${sdk}/program.c" "${sdk}/program_exchange.c" "${sdk}/program_protocol.c" "${sdk}/rtapi.c")
-target_include_directories(linuxcnchal PRIVATE "${PROJECT_SOURCE_DIR}/runtime" "${PROJECT_SOURCE_DIR}/runtime/sdk" "${sdk}")
+set(source "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/source/linuxcnc")
+set(map "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/programs/exports.map")
+file(GLOB sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/programs/*.c" "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/programs/*.cpp")
+add_library(linuxcnchal SHARED ${sources} "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/binary/streams.cpp" "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/binary/shared_memory.cpp"
+    "${source}/declare.c" "${source}/program.c" "${source}/program_exchange.c" "${source}/program_protocol.c" "${source}/rtapi.c")
+target_include_directories(linuxcnchal PRIVATE "${PROJECT_SOURCE_DIR}/runtime" "${PROJECT_SOURCE_DIR}/runtime/sdk" "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/source" "${source}")
 target_compile_definitions(linuxcnchal PRIVATE HALCYON_PROGRAM=1 HALCYON_LINUXCNC_PROGRAMS=1 ULAPI=1)
 target_link_libraries(linuxcnchal PRIVATE halcyon_abi Threads::Threads ${CMAKE_DL_LIBS})
 target_compile_features(linuxcnchal PRIVATE c_std_11 cxx_std_20)

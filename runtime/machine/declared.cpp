@@ -7,7 +7,7 @@
 #include <new>
 
 #include "hal/modules.h"
-#include "modules/module_host.hpp"
+#include "linuxcnc/binary/module_host.hpp"
 
 namespace hal {
 

@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <string>
 
-#include "machine/linuxcnc_home.hpp"
+#include "linuxcnc/find/home.hpp"
 #include "machine/source_tree.hpp"
-#include "modules/module_host.hpp"
+#include "linuxcnc/binary/module_host.hpp"
 #include "paths.hpp"
 
 namespace hal {

@@ -12,7 +12,7 @@
 #include <optional>
 #include <sstream>
 
-#include "modules/elf_value.hpp"
+#include "linuxcnc/binary/elf_value.hpp"
 #include "paths.hpp"
 #include "text/read_all.hpp"
 

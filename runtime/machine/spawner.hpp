@@ -28,7 +28,7 @@ struct ProcessStart {
     bool keep_stdin = false;  ///< false: it reads /dev/null
 };
 
-/// Returns the folder of liblinuxcnchal.so.0 (runtime/programs), by which LinuxCNC's programs
+/// Returns the folder of liblinuxcnchal.so.0 (runtime/linuxcnc/programs), by which LinuxCNC's programs
 /// connect to us, or "". Its `bin` has our programs under LinuxCNC's names. Both come before
 /// LinuxCNC's own in the environment of what is started. [setup]
 std::string linuxcnc_folder();

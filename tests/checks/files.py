@@ -13,6 +13,7 @@ SOURCES = {".c", ".h", ".cpp", ".hpp", ".py", ".sh", ".cmake"}
 NO_README = (
     "runtime/abi/hal",
     "runtime/sdk/hal",
+    "runtime/linuxcnc/source/linuxcnc",
     "tests/netlists/",
     "tests/errors/",
     "tests/fuzz/",

@@ -95,7 +95,7 @@ std::vector<std::string> flags(Language language, bool clang, bool program) {
     return all;
 }
 
-/// A source in runtime/sdk/linuxcnc, and which components are compiled with it.
+/// A source in runtime/linuxcnc/source, and which components are compiled with it.
 struct LinuxcncSource {
     const char* file;
     bool (*needed)(const PluginSource&);

@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 #include "comp/toolchain.hpp"
-#include "machine/linuxcnc_home.hpp"
+#include "linuxcnc/find/home.hpp"
 
 namespace hal::tools {
 

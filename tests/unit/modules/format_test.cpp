@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What modules print in a cycle is formatted as the C library formats it.
-#include "modules/format.hpp"
+#include "linuxcnc/binary/format.hpp"
 
 #include <cfloat>
 #include <climits>
