@@ -212,15 +212,18 @@ function(halcyon_precompiled target)
     target_precompile_headers(${target} REUSE_FROM halcyon_precompiled_runtime)
 endfunction()
 
-# halcyon_folder(NAME DEPENDENCY... [NOT_REALTIME] [ALONE SOURCE...]): the library halcyon_NAME from all sources in runtime/NAME; ALONE as in
-# halcyon_unity(). NOT_REALTIME: compiled with HALCYON_TOOL_OPTIONS and the precompiled header.
+# halcyon_folder(NAME DEPENDENCY... [NOT_REALTIME] [FOLDER PATH] [ALONE SOURCE...]): the library halcyon_NAME from all sources in runtime/NAME or
+# runtime/PATH; ALONE as in halcyon_unity(). NOT_REALTIME: compiled with HALCYON_TOOL_OPTIONS and the precompiled header.
 function(halcyon_folder name)
-    cmake_parse_arguments(PARSE_ARGV 1 with NOT_REALTIME "" ALONE)
-    file(GLOB_RECURSE sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/runtime/${name}/*.cpp")
+    cmake_parse_arguments(PARSE_ARGV 1 with NOT_REALTIME FOLDER ALONE)
+    if(NOT with_FOLDER)
+        set(with_FOLDER ${name})
+    endif()
+    file(GLOB_RECURSE sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/runtime/${with_FOLDER}/*.cpp")
     if(sources)
         set(scope PUBLIC)
         add_library(halcyon_${name} STATIC ${sources})
-        list(TRANSFORM with_ALONE PREPEND "${PROJECT_SOURCE_DIR}/runtime/${name}/")
+        list(TRANSFORM with_ALONE PREPEND "${PROJECT_SOURCE_DIR}/runtime/${with_FOLDER}/")
         halcyon_unity_quick(halcyon_${name} BATCH ${HALCYON_UNIT_SOURCES} ALONE ${with_ALONE})
         if(with_NOT_REALTIME)
             halcyon_precompiled(halcyon_${name})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# libhalcyon_modules.so runs LinuxCNC's compiled modules. machine/module_library.cpp opens it at run time, with its symbols in the global
+# libhalcyon_modules.so runs LinuxCNC's compiled modules. machine/load/module_library.cpp opens it at run time, with its symbols in the global
 # scope; nothing links to it. It exports what runtime/linuxcnc/binary/exports.map lists.
 file(GLOB sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/binary/*.cpp")
 set(map "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/binary/exports.map")

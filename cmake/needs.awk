@@ -5,7 +5,7 @@
 #     python    Python's module hal
 #     all       all components
 # It runs before the program is built, so it is only a rough parser of netlists and INI files: it may print an unused name, or one that is not
-# a component, and it misses names that only the program can determine. The program builds missing ones later (runtime/machine/plugins.cpp).
+# a component, and it misses names that only the program can determine. The program builds missing ones later (runtime/machine/load/plugins.cpp).
 
 function emit(name) {
     gsub(/["']/, "", name)

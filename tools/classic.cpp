@@ -14,7 +14,7 @@
 #include "comp/halcompile.hpp"
 #include "control/client.hpp"
 #include "inspect/shell.hpp"
-#include "machine/address.hpp"
+#include "machine/processes/address.hpp"
 #include "run/run.hpp"
 #include "tcl/tcl.hpp"
 

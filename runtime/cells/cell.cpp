@@ -7,7 +7,7 @@
 
 #include <unistd.h>
 
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 
 namespace hal {
 namespace {

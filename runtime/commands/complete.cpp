@@ -10,7 +10,7 @@
 #include "commands/listing.hpp"
 #include "commands/shell_state.hpp"
 #include "commands/table.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 #include "text/fault_pages.hpp"
 
 namespace hal {

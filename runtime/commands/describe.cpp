@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 #include "machine/session.hpp"
 
 namespace hal {

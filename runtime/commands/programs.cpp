@@ -10,7 +10,7 @@
 #include <fcntl.h>
 
 #include "commands/table.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 
 namespace hal {
 namespace {

@@ -16,7 +16,7 @@
 #include "commands/script.hpp"
 #include "commands/shell_state.hpp"
 #include "commands/table.hpp"
-#include "machine/module_library.hpp"
+#include "linuxcnc/find/modules.hpp"
 #include "machine/session.hpp"
 
 namespace hal {

@@ -11,7 +11,7 @@
 #include "commands/listing.hpp"
 #include "commands/table.hpp"
 #include "commands/text_writer.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 
 namespace hal {
 namespace {

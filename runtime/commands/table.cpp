@@ -6,7 +6,7 @@
 
 #include "commands/files.hpp"
 #include "commands/script.hpp"
-#include "machine/elaborate.hpp"
+#include "machine/load/elaborate.hpp"
 #include "netlist/nodes.hpp"
 
 namespace hal {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "commands/files.hpp"
-#include "machine/module_library.hpp"
+#include "linuxcnc/find/modules.hpp"
 #include "text/characters.hpp"
 #include "text/numbers.hpp"
 

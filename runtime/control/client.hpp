@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "commands/completion.hpp"
-#include "machine/address.hpp"
+#include "machine/processes/address.hpp"
 
 namespace hal {
 

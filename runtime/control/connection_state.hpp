@@ -17,7 +17,7 @@
 #include "control/request.hpp"
 #include "control/subscriptions.hpp"
 #include "control/trace_feed.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 #include "machine/session.hpp"
 
 namespace hal {

@@ -13,7 +13,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "machine/address.hpp"
+#include "machine/processes/address.hpp"
 
 namespace hal {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "control/client.hpp"
-#include "machine/probes.hpp"
+#include "machine/run/probes.hpp"
 
 namespace hal {
 

@@ -10,7 +10,7 @@
 #include "commands/shell.hpp"
 #include "control/request.hpp"
 #include "control/streams.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 #include "machine/session.hpp"
 
 namespace hal {

@@ -14,7 +14,7 @@
 #include "commands/shell.hpp"
 #include "control/server_state.hpp"
 #include "execute/process_setup.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 #include "machine/session.hpp"
 
 namespace hal {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Where a thread is in its cycle, in memory that a process outside may share
-// (machine/exit_observer.hpp).
+// (machine/report/exit_observer.hpp).
 #pragma once
 
 #include <atomic>

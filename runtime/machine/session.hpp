@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// One running machine, as its parts: the model and its transactions, the threads, the values, the
-// plugin host, the programs and the reports (docs/design.md). Only the command language, the tools
-// and tests use it.
+// One running machine: the model and its transactions, the threads, the values, the plugin host,
+// the programs and the reports (docs/design.md). Only the command language, the tools and tests use
+// it.
 //
 //   Session session;
 //   const auto lock = session.lock();
@@ -14,130 +14,23 @@
 // is marked otherwise.
 #pragma once
 
-#include <atomic>
-#include <functional>
 #include <memory>
-#include <mutex>
-#include <stop_token>
-#include <string>
-#include <vector>
 
-#include "machine/journal.hpp"
-#include "machine/live_values.hpp"
-#include "machine/plugin_host.hpp"
-#include "machine/probes.hpp"
-#include "machine/reports.hpp"
-#include "machine/thread_control.hpp"
-#include "machine/traces.hpp"
-#include "machine/transaction.hpp"
-#include "model/absence.hpp"
-#include "model/model.hpp"
-#include "netlist/netlist.hpp"
-#include "text/diagnostic.hpp"
+#include "machine/run/running_model.hpp"
 
 namespace hal {
 
 class Programs;
-struct SessionState;
 
-class ExitObserver;
-
-struct SessionOptions {
-    std::string name = "default";  ///< of the instance; its control socket carries it
-    bool virtual_clock = false;  ///< `hal sim`: threads run only in ThreadControl::advance_ns()
-    bool check_only = false;  ///< `hal check`: construct, but start nothing
-    /// Longest gap without CPU that is reported and does not stop a thread: without a real-time
-    /// policy, and with one.
-    std::int64_t max_gap_ns = 0;
-    std::int64_t max_gap_realtime_ns = 0;
-    std::vector<std::string> plugin_path;  ///< searched first
-    /// made before the session, and outlives it; nullptr: none
-    ExitObserver* observer = nullptr;
-};
-
-/// Groups of commands that the `lock` command locks; LinuxCNC's names and bits.
-enum class Lock : unsigned {
-    none = 0,
-    load = 1,
-    config = 2,
-    params = 4,
-    run = 8,
-    tune = 3,
-    all = 255
-};
-
-/// Exclusive access to a session; a command that waits releases it meanwhile.
-using SessionLock = std::unique_lock<std::mutex>;
-
-class Session {
+class Session : public RunningModel {
 public:
-    /// Prepares the process for real time unless the clock is virtual or nothing is to run.
     explicit Session(SessionOptions options = {});
     /// Ends all programs that loadusr started, then shut_down(). Takes the lock.
     ~Session();
-    Session(const Session&) = delete;
 
-    /// Waits for exclusive access to the session. Not recursive. [any]
-    [[nodiscard]] SessionLock lock() const { return SessionLock(mutex_); }
-    /// The same without waiting: the result owns nothing while another thread has access. [any]
-    [[nodiscard]] SessionLock try_lock() const { return {mutex_, std::try_to_lock}; }
-
-    /// Opens the transaction. Throws std::logic_error while another one is open. Values, model and
-    /// reports show the machine with the edits made so far.
-    Transaction begin();
-    bool in_transaction() const;
-    /// As Transaction::when_committed(), for what is destroyed at the end of the open transaction.
-    /// Forgotten when none is open.
-    void when_committed(std::function<void()> action);
-    /// Offers the names of the model to diagnostics about unknown ones. To be called before
-    /// Diagnostics::look_up(), which needs no lock.
-    void offer_names(Diagnostics& diagnostics);
-    /// Frees texts of `sources` that nothing refers to any more, when that is worth the time. Not
-    /// while a transaction is open.
-    void sweep_texts() noexcept;
-    /// Interrupts what other threads do with this session: the commands of a text end at the next
-    /// line, and queries end early. Used before shut_down(), which would wait for them. [any]
-    void interrupt() noexcept { ending_.request_stop(); }
-    /// after interrupt() [any]
-    bool ending() const noexcept { return ending_.stop_requested(); }
-    /// The same for long work that does not know the session: it is requested to stop by
-    /// interrupt(). [any]
-    std::stop_token end_token() const noexcept { return ending_.get_token(); }
-    /// Rolls back an open transaction, stops the threads with safe outputs, and stops and destroys
-    /// all instances. Idempotent.
-    void shut_down();
-
-    const SessionOptions& options() const;
-    const Model& model() const;
-    /// What `hal check` knows to exist elsewhere or could not read, and the lines that depend on
-    /// it.
-    Absences& absences();
-
-    ThreadControl& threads() { return threads_; }
-    const ThreadControl& threads() const { return threads_; }
-    LiveValues& values() { return values_; }
-    Probes& probes();
-    Journal& journal();
-    Traces& traces();
-    Reports& reports() { return reports_; }
-    const Reports& reports() const { return reports_; }
-    const PluginHost& host() const { return host_; }
     Programs& programs() { return *programs_; }
 
-    Sources sources;  ///< the texts that spans of the model refer to
-    Ini ini;  ///< values of [SECTION]KEY
-    /// may be read without the session's lock; command groups that are locked: bits of Lock
-    std::atomic<unsigned> locked{0};
-
 private:
-    friend class Transaction;
-    mutable std::mutex mutex_;
-    std::stop_source ending_;
-    std::unique_ptr<SessionState> state_;
-    ThreadControl threads_;
-    LiveValues values_;
-    Reports reports_;
-    PluginHost host_;
     std::unique_ptr<Programs> programs_;
 };
 

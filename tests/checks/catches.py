@@ -51,7 +51,9 @@ GOOD = {
     "runtime/model/model.hpp": SPDX + '#include "text/source.hpp"\n#include "plan/plan.hpp"\n',
     "runtime/execute/executor.hpp": SPDX + '#include "plan/plan.hpp"\n',
     "runtime/machine/session.hpp": SPDX
-    + '#include "execute/executor.hpp"\n#include "paths.hpp"\n#include <nlohmann/json.hpp>\n',
+    + '#include "execute/executor.hpp"\n#include "machine/load/plugins.hpp"\n',
+    "runtime/machine/load/plugins.hpp": SPDX
+    + '#include "paths.hpp"\n#include <nlohmann/json.hpp>\n',
     "drivers/link/link.hpp": SPDX,
     "components/logic/not.cpp": SPDX + '#include "hal/component.hpp"\n#include "own.hpp"\n',
     "components/logic/own.hpp": SPDX,

@@ -21,13 +21,17 @@ ROWS = {
     "runtime/linuxcnc/binary": ["runtime/sdk"],
     "runtime/linuxcnc/binary/guard": [],
     "runtime/linuxcnc/programs": ["runtime/linuxcnc/binary", "runtime/linuxcnc/source"],
-    "runtime/machine": [
+    "runtime/machine/load": [
         "runtime/execute",
         "runtime/model",
         "runtime/netlist",
         "runtime/linuxcnc/binary",
         "runtime/linuxcnc/find",
     ],
+    "runtime/machine/report": ["runtime/machine/load"],
+    "runtime/machine/run": ["runtime/machine/report"],
+    "runtime/machine/processes": ["runtime/machine/run"],
+    "runtime/machine": ["runtime/machine/processes"],
     "runtime/commands": ["runtime/machine"],
     "runtime/control": ["runtime/commands"],
     "runtime/cells": ["runtime/control", "components/dds/links"],
@@ -238,7 +242,9 @@ INCLUDE_ROOTS = [
 ]  # as the compiler searches
 SINGLE = {
     "paths.hpp": [
-        "runtime/machine",
+        "runtime/linuxcnc/find",
+        "runtime/machine/load",
+        "runtime/machine/processes",
         "runtime/commands",
         "runtime/control",
         "tools",
@@ -309,10 +315,16 @@ def resolve(root, source, name):
     return None
 
 
+def is_in(folder, outer):
+    return f"{folder}/".startswith(f"{outer}/")
+
+
 def rule(folder, target):
     plain = "components" if ROWS[folder] == ["components"] else None
     for (source, banned), words in BANS.items():
-        if source in (None, folder, plain) and banned in (None, target):
+        if source not in (None, folder, plain):
+            continue
+        if banned is None or (is_in(target or "", banned) and not is_in(folder, banned)):
             return words
     allowed = ", ".join(sorted(ROWS[folder])) or "nothing"
     return f"{folder} may include {allowed}"

@@ -7,7 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "machine/cpu_occupant.hpp"
+#include "machine/report/cpu_occupant.hpp"
 #include "text/folder_entries.hpp"
 
 namespace hal::test {

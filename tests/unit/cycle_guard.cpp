@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <gtest/gtest.h>
 
-#include "machine/cycle_guard.hpp"
+#include "machine/report/cycle_guard.hpp"
 
 namespace {
 

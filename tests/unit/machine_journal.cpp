@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What a listener of the journal gets when more happens than is kept: a line that counts what is
 // missing.
-#include "machine/journal.hpp"
+#include "machine/report/journal.hpp"
 #include "shell_machine.hpp"
 
 namespace hal::test {

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "machine.hpp"
-#include "machine/probes.hpp"
+#include "machine/run/probes.hpp"
 
 namespace hal::test {
 namespace {

@@ -3,7 +3,7 @@
 #include <map>
 
 #include "machine.hpp"
-#include "machine/traces.hpp"
+#include "machine/report/traces.hpp"
 
 namespace hal::test {
 namespace {

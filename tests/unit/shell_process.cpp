@@ -5,7 +5,7 @@
 
 #include "control/connection.hpp"
 #include "machine.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 #include "shell_machine.hpp"
 
 namespace hal::test {

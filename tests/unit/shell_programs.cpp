@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "control/connection.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 #include "shell_machine.hpp"
 
 namespace hal::test {

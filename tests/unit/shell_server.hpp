@@ -15,7 +15,7 @@
 #include "control/client.hpp"
 #include "control/server.hpp"
 #include "machine.hpp"
-#include "machine/address.hpp"
+#include "machine/processes/address.hpp"
 #include "shell_machine.hpp"
 
 namespace hal::test {

@@ -14,7 +14,7 @@
 #include <sys/wait.h>
 
 #include "control/connection.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 
 namespace hal::test {
 namespace {

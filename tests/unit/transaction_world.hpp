@@ -9,7 +9,7 @@
 #include <string>
 
 #include "control/connection.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 
 namespace hal::test {
 

@@ -13,7 +13,7 @@
 
 #include "cli/capabilities.hpp"
 #include "cli/output.hpp"
-#include "machine/source_tree.hpp"
+#include "machine/load/source_tree.hpp"
 
 namespace hal::tools {
 namespace {

@@ -17,7 +17,7 @@
 #include "cli/output.hpp"
 #include "comp/toolchain.hpp"
 #include "comp/try_plugin.hpp"
-#include "machine/plugins.hpp"
+#include "machine/load/plugins.hpp"
 #include "paths.hpp"
 
 namespace hal::tools {

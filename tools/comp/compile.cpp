@@ -17,7 +17,7 @@
 #include "comp/check_realtime.hpp"
 #include "comp/comp.hpp"
 #include "hal/read_file.hpp"
-#include "machine/plugins.hpp"
+#include "machine/load/plugins.hpp"
 #include "text/quoting.hpp"
 
 namespace hal::tools {

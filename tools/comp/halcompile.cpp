@@ -19,7 +19,7 @@
 #include "comp/toolchain.hpp"
 #include "doc/page.hpp"
 #include "doc/page_asciidoc.hpp"
-#include "machine/plugins.hpp"
+#include "machine/load/plugins.hpp"
 #include "text/quoting.hpp"
 
 namespace hal::tools {

@@ -13,7 +13,7 @@
 #include <sstream>
 
 #include "cli/output.hpp"
-#include "machine/plugins.hpp"
+#include "machine/load/plugins.hpp"
 #include "netlist/netlist.hpp"
 #include "text/diagnostic.hpp"
 #include "text/folder_entries.hpp"

@@ -19,7 +19,7 @@
 #include "commands/shell.hpp"
 #include "comp/toolchain.hpp"
 #include "doc/page.hpp"
-#include "machine/plugins.hpp"
+#include "machine/load/plugins.hpp"
 #include "machine/session.hpp"
 #include "text/glyphs.hpp"
 

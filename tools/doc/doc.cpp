@@ -11,8 +11,8 @@
 
 #include "cli/output.hpp"
 #include "doc/page.hpp"
-#include "machine/plugins.hpp"
-#include "machine/source_tree.hpp"
+#include "machine/load/plugins.hpp"
+#include "machine/load/source_tree.hpp"
 
 namespace hal::tools {
 

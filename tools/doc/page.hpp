@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "machine/declared.hpp"
+#include "machine/load/declared.hpp"
 
 namespace hal::tools {
 

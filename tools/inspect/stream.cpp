@@ -10,7 +10,7 @@
 
 #include "base/types.hpp"
 #include "cli/output.hpp"
-#include "machine/spawner.hpp"
+#include "linuxcnc/find/programs.hpp"
 
 namespace hal::tools {
 

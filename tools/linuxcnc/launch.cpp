@@ -11,7 +11,7 @@
 
 #include "cli/output.hpp"
 #include "commands/files.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 #include "run/fault_lines.hpp"
 #include "run/report.hpp"
 

@@ -11,7 +11,7 @@
 #include "commands/files.hpp"
 #include "hal/clock.hpp"
 #include "linuxcnc/launch.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 #include "text/diagnostic.hpp"
 #include "text/numbers.hpp"
 

@@ -10,7 +10,7 @@
 #include <unistd.h>
 #include <vector>
 
-#include "machine/address.hpp"
+#include "machine/processes/address.hpp"
 
 namespace hal::tools {
 

@@ -12,7 +12,7 @@
 
 #include "base/types.hpp"
 #include "cli/output.hpp"
-#include "machine/address.hpp"
+#include "machine/processes/address.hpp"
 #include "panel/css_colours.hpp"
 #include "panel/panel_errors.hpp"
 #include "panel/panel_layout.hpp"

@@ -9,7 +9,7 @@
 
 #include "cli/output.hpp"
 #include "cli/signals.hpp"
-#include "machine/address.hpp"
+#include "machine/processes/address.hpp"
 #include "panel/panel.hpp"
 #include "panel/panel_layout.hpp"
 #include "panel/server.hpp"

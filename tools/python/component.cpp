@@ -10,7 +10,7 @@
 #include <sys/prctl.h>
 #include <unistd.h>
 
-#include "machine/address.hpp"
+#include "machine/processes/address.hpp"
 
 namespace hal::python {
 

@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "cli/output.hpp"
-#include "machine/cycle_guard.hpp"
+#include "machine/report/cycle_guard.hpp"
 #include "run/offline.hpp"
 #include "run/report.hpp"
 #include "run/sim_summary.hpp"

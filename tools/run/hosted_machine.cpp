@@ -11,8 +11,8 @@
 #include "cli/output.hpp"
 #include "commands/files.hpp"
 #include "execute/process_setup.hpp"
-#include "machine/address.hpp"
-#include "machine/source_tree.hpp"
+#include "machine/load/source_tree.hpp"
+#include "machine/processes/address.hpp"
 #include "tcl/tcl.hpp"
 
 namespace hal::tools {

@@ -11,10 +11,10 @@
 #include "cli/signals.hpp"
 #include "commands/shell.hpp"
 #include "control/server.hpp"
-#include "machine/cycle_guard.hpp"
-#include "machine/exit_observer.hpp"
+#include "machine/report/cycle_guard.hpp"
+#include "machine/report/exit_observer.hpp"
+#include "machine/report/setup_guard.hpp"
 #include "machine/session.hpp"
-#include "machine/setup_call.hpp"
 #include "run/netlist_options.hpp"
 
 namespace hal::tools {

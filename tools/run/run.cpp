@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "cli/output.hpp"
-#include "machine/address.hpp"
+#include "machine/processes/address.hpp"
 #include "run/cell_netlists.hpp"
 #include "run/examples.hpp"
 #include "run/fault_lines.hpp"

@@ -19,7 +19,7 @@
 #include "cli/output.hpp"
 #include "cli/signals.hpp"
 #include "control/client.hpp"
-#include "machine/address.hpp"
+#include "machine/processes/address.hpp"
 #include "text/numbers.hpp"
 #include "text/quoting.hpp"
 #include "trace/perfetto.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A crash in a module's set-up code is an error of that command. One in a cycle is the runtime's
-// (machine/crash.cpp).
+// (machine/report/crash.cpp).
 #include <csetjmp>
 #include <csignal>
 #include <cstdlib>

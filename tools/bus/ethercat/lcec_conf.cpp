@@ -10,7 +10,7 @@
 #include "cli/signals.hpp"
 #include "control/client.hpp"
 #include "ethercat/config/lcec_handover.hpp"
-#include "machine/address.hpp"
+#include "machine/processes/address.hpp"
 
 namespace hal::tools {
 

@@ -54,7 +54,8 @@ void halcyon_exchange(struct halcyon_program*);
 bool halcyon_start_helper(void); /* false when the thread cannot be made */
 void halcyon_stop_helper(void); /* not under the lock */
 void halcyon_catch_end_signals(void);
-__attribute__((weak)) void halcyon_begins(void); /* of runtime/linuxcnc/programs: called by hal_init() */
+__attribute__((weak)) void halcyon_begins(
+    void); /* ../../programs: called by hal_init() */
 
 /* --- program_protocol.c: requests and replies --------------------------------------------------------------------------------- */
 

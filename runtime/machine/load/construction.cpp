@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: MIT
+#include "machine/load/construction.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+namespace hal {
+namespace {
+
+std::vector<std::string> split(const std::string& text, char by) {
+    std::vector<std::string> parts;
+    std::size_t from = 0;
+    for (std::size_t at; (at = text.find(by, from)) != std::string::npos; from = at + 1) {
+        parts.push_back(text.substr(from, at - from));
+    }
+    parts.push_back(text.substr(from));
+    return parts;
+}
+
+bool whole_names(const Instance& instance) {
+    return instance.component->plugin->flags & HAL_COMPONENT_WHOLE_NAMES;
+}
+
+// Characters that netlists, the shell or a file name would read otherwise.
+bool good_name(std::string_view name) {
+    return std::all_of(name.begin(), name.end(), [](char c) {
+        return static_cast<unsigned char>(c) > ' ' && c != 0x7f &&
+               std::strchr("\"'`#$\\=,[](){}<>|&;*?", c) == nullptr;
+    });
+}
+
+bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
+    Construction& c = construction_of(host);
+    if (decl->size < HAL_PIN_DECL_SIZE_1_0 || !decl->name || !*decl->name || !memory ||
+        decl->type < HAL_TYPE_BIT || decl->type > HAL_TYPE_PORT || decl->dir < HAL_DIR_IN ||
+        decl->dir > HAL_DIR_PARAM) {
+        return refuse(
+            c,
+            "invalid pin declaration: name, memory, type or direction is missing or out of range");
+    }
+    if (!good_name(decl->name)) {
+        return refuse(c, "it declares a pin with the invalid name '" + std::string(decl->name) +
+                             "': letters, digits and - _ . : are valid");
+    }
+    auto pin = std::make_unique<Pin>();
+    pin->name = whole_names(c.instance) ? decl->name : c.instance.name + "." + decl->name;
+    pin->type = decl->type;
+    pin->dir = decl->dir;
+    pin->flags = decl->flags;
+    pin->doc = c.model.keep(decl->doc ? decl->doc : "");
+    pin->unit = c.model.keep(decl->unit ? decl->unit : "");
+    pin->initial = decl->initial;
+    pin->safe = decl->safe;
+    pin->memory = memory;
+    pin->instance = &c.instance;
+    pin->id = c.model.next_id++;
+    memory->own = decl->initial;
+    memory->slot = &memory->own;
+    if (decl->size >= sizeof *decl && decl->pointer) {
+        pin->pointer = decl->pointer;
+        *decl->pointer = memory->slot;
+    }
+    if (decl->function && std::none_of(c.functions.begin(), c.functions.end(), [&](const auto& f) {
+        return f.identity == decl->function;
+    })) {
+        return refuse(c, "pin '" + std::string(decl->name) +
+                             "' uses a function that is declared below it; move that member up");
+    }
+    c.pins.emplace_back(std::move(pin), decl->function);
+    return true;
+}
+
+bool take_function(const hal_host* host, const hal_function_decl* decl) {
+    Construction& c = construction_of(host);
+    if (decl->size < HAL_FUNCTION_DECL_SIZE_1_0 || !decl->name || !decl->step) {
+        return refuse(c, "invalid function declaration: name or step is null");
+    }
+    if (decl->flags & HAL_FUNCTION_EMERGENCY) {
+        c.instance.emergency.push_back({decl->step, decl->self});
+        return true;
+    }
+    if (!good_name(decl->name)) {
+        return refuse(c, "it declares a function with the invalid name '" +
+                             std::string(decl->name) + "': letters, digits and - _ . : are valid");
+    }
+    const bool shared = decl->flags & HAL_FUNCTION_SHARED;
+    const bool whole = c.whole_function_names || whole_names(c.instance);
+    std::string full = whole    ? decl->name
+                       : shared ? dashed(c.instance.component->name)
+                                : c.instance.name;
+    if (*decl->name && !whole) {
+        full += std::string(".") + decl->name;
+    }
+    if (std::any_of(c.functions.begin(), c.functions.end(),
+                    [&](const auto& other) { return other.full == full; })) {
+        return refuse(c, "it declares function '" + full +
+                             "' twice; only one of them could be added to a thread");
+    }
+    c.functions.push_back({std::move(full), decl->doc ? decl->doc : "", decl->step,
+                           decl->size >= sizeof *decl ? decl->row : nullptr, decl->self,
+                           decl->identity, shared, (decl->flags & HAL_FUNCTION_REQUIRED) != 0});
+    return true;
+}
+
+const char* find_argument(const hal_host* host, const hal_argument_decl* decl) {
+    Construction& c = construction_of(host);
+    c.asked.insert(decl->name);
+    if (std::strcmp(decl->name, "personality") == 0 && !c.personality.empty()) {
+        return c.personality.c_str();
+    }
+    const auto given = c.request.arguments.find(decl->name);
+    if (given == c.request.arguments.end()) return decl->fallback;
+    if (!(decl->flags & HAL_ARGUMENT_PER_INSTANCE)) return given->second.value.c_str();
+    const auto elements = split(given->second.value, ',');
+    c.lists.insert(decl->name);
+    c.list_length = std::max(c.list_length, elements.size());
+    if (c.number >= elements.size()) return decl->fallback;
+    c.texts.push_back(elements[c.number]);
+    return c.texts.back().c_str();
+}
+
+bool declare_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
+    return guarded(construction_of(host), false, [&] { return take_pin(host, decl, memory); });
+}
+bool declare_function(const hal_host* host, const hal_function_decl* decl) {
+    return guarded(construction_of(host), false, [&] { return take_function(host, decl); });
+}
+const char* give_argument(const hal_host* host, const hal_argument_decl* decl) {
+    return guarded(construction_of(host), decl->fallback,
+                   [&] { return find_argument(host, decl); });
+}
+void* allocate(const hal_host* host, std::size_t bytes, std::size_t align) {
+    void* const memory = allocate_for(construction_of(host).instance, bytes, align);
+    construction_of(host).no_memory = construction_of(host).no_memory || !memory;
+    return memory;
+}
+void record_failure(const hal_host* host, const char* reason) {
+    guarded(construction_of(host), false,
+            [&] { return refuse(construction_of(host), std::string(reason ? reason : "")); });
+}
+void record_rejection(const hal_host* host, const hal_rejection* rejection) {
+    Construction& c = construction_of(host);
+    guarded(c, false, [&] {
+        if (rejection->size < sizeof *rejection) {
+            return refuse(c, "unsupported hal_rejection of " + std::to_string(rejection->size) +
+                                 " bytes; rebuild the component");
+        }
+        return refuse(c, copy_of(*rejection));
+    });
+}
+
+// Names that LinuxCNC makes otherwise than COMPONENT.N.
+void name_instance(const hal_host* host, const char* prefix, unsigned digits) {
+    Construction& c = construction_of(host);
+    guarded(c, false, [&] {
+        if (!c.pins.empty() || !c.functions.empty()) {
+            return refuse(c, "an instance is named before its first pin");
+        }
+        if (c.serial.empty()) {
+            return true;  // it has a name of its own
+        }
+        std::string number = c.serial;
+        if (number.size() < digits) {
+            number.insert(0, digits - number.size(), '0');
+        }
+        c.instance.name = std::string(prefix) + "." + number;
+        return true;
+    });
+}
+const void* extension_of(const hal_host* host, const char* id) {
+    if (std::strcmp(id, "hal.faults/1") == 0) return construction_of(host).request.faults;
+    if (std::strcmp(id, HAL_NAMING) == 0) return &naming_extension;
+    if (std::strcmp(id, HAL_MODULES) == 0) return &modules_extension;
+    if (std::strcmp(id, HAL_MODULE_CALLS) == 0) return &module_calls_extension;
+    return std::strcmp(id, HAL_TEXTS) == 0 ? &texts_extension : nullptr;
+}
+
+}  // namespace
+
+Code failure_code(std::string_view given, Code usual) {
+    const std::optional<Code> known = Code::named(given);
+    return known.value_or(usual);
+}
+
+Failure copy_of(const hal_rejection& rejection) {
+    const auto text = [](const char* t) { return t ? t : ""; };
+    return {text(rejection.text), text(rejection.name), text(rejection.code), text(rejection.help),
+            rejection.subject,    rejection.begin,      rejection.end};
+}
+
+bool refuse(Construction& c, std::string why) { return refuse(c, Failure{.text = std::move(why)}); }
+
+bool refuse(Construction& c, Failure failure) {
+    if (c.failure.empty()) {
+        c.failure = std::move(failure);
+    }
+    return false;
+}
+
+constexpr hal_naming naming_extension{sizeof naming_extension, name_instance,
+                                      [](const hal_host* host) {
+    construction_of(host).whole_function_names = true;
+}, [](const hal_host* host, const char* argument, uint64_t instances) {
+    Construction& c = construction_of(host);
+    guarded(c, false, [&] { return c.lists.insert(argument).second; });
+    c.list_length = std::max(c.list_length, static_cast<std::size_t>(instances));
+    c.declared_count = static_cast<std::size_t>(instances);
+}, [](const hal_host* host) { return construction_of(host).instance.name.c_str(); }};
+
+hal_host host_for(Construction& c) {
+    return {sizeof(hal_host), &c,       declare_pin,    declare_function,
+            give_argument,    allocate, record_failure, extension_of,
+            record_rejection};
+}
+
+}  // namespace hal

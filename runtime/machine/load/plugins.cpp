@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: MIT
+#include "machine/load/plugins.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <sstream>
+#include <sys/mman.h>
+#include <sys/sendfile.h>
+#include <unistd.h>
+
+#include "machine/load/module_library.hpp"
+#include "machine/load/plugin_file.hpp"
+#include "machine/load/source_tree.hpp"
+#include "paths.hpp"
+#include "text/folder_entries.hpp"
+
+namespace hal {
+namespace {
+
+namespace fs = std::filesystem;
+
+// why a description cannot be used, or empty
+std::string problem_of(const hal_component& component) {
+    if (component.size < offsetof(hal_component, abi_minor) + sizeof component.abi_minor) {
+        return "its description is too short to be one";
+    }
+    if (component.abi_major != HAL_ABI_MAJOR) {
+        return "it was built for version " + std::to_string(component.abi_major) +
+               " of the component interface, this runtime has " + std::to_string(HAL_ABI_MAJOR);
+    }
+    if (component.size < sizeof component) {
+        return "its description has " + std::to_string(component.size) + " bytes, at least " +
+               std::to_string(sizeof component) + " are needed";
+    }
+    if (!component.name || !*component.name || !component.summary || !component.doc) {
+        return "its description has no name, summary or doc";
+    }
+    if (!component.create || !component.start || !component.stop || !component.destroy) {
+        return "its description leaves out create, start, stop or destroy";
+    }
+    const std::size_t align = component.instance_align;
+    if (component.instance_size == 0 || component.instance_size > (1u << 30) || align == 0 ||
+        (align & (align - 1)) != 0 || align > 4096) {
+        return "the size or alignment of its instances makes no sense";
+    }
+    return {};
+}
+
+/// Copies the file at `path` to the end of `target`, in the kernel: plugins with debugging
+/// information have tens of megabytes. Returns false when a part of it was not copied.
+bool copy_file(const std::string& path, int target) {
+    const int source = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+    if (source < 0) return false;
+    constexpr std::size_t max_copied = 1u << 30;
+    ssize_t copied = 0;
+    do {
+        copied = sendfile(target, source, nullptr, max_copied);
+    } while (copied > 0 || (copied < 0 && errno == EINTR));
+    close(source);
+    return copied == 0;
+}
+
+// The loader knows a library by its path and would give the one that is loaded for a file that has
+// since been written anew; and who writes over a mapped file pulls the code from under a running
+// machine. So what is loaded is a copy in memory, each with a path of its own, under which
+// debuggers find it too. nullptr when there can be none; then the file itself is loaded.
+std::shared_ptr<void> open_copy(const std::string& path) {
+    const std::string name = path.substr(path.rfind('/') + 1);
+    const int copy = memfd_create(name.c_str(), MFD_CLOEXEC);
+    if (copy < 0) return nullptr;
+    char place[64];
+    std::snprintf(place, sizeof place, "/proc/%d/fd/%d", static_cast<int>(getpid()), copy);
+    void* const library = copy_file(path, copy) ? dlopen(place, RTLD_NOW | RTLD_LOCAL) : nullptr;
+    if (!library) {
+        close(copy);
+        return nullptr;
+    }
+    return {library, [copy, path = std::string(place)](void* handle) {
+        dlclose(handle);
+        // Only when the library is really gone may another have the number, and with it the
+        // path.
+        if (!dlopen(path.c_str(), RTLD_LAZY | RTLD_NOLOAD)) {
+            close(copy);
+        }
+    }};
+}
+
+std::string underlined(std::string_view name) {
+    std::string text(name);
+    std::replace(text.begin(), text.end(), '-', '_');
+    return text;
+}
+
+/// The Debian package for want of which the build left a component out, or "": the build writes
+/// them down beside the plugins.
+std::string package_of(const std::string& name, const std::vector<std::string>& path) {
+    for (const std::string& folder : path) {
+        std::ifstream file(folder + "/absent");
+        for (std::string component, package; file >> component >> package;) {
+            if (component == name) return package;
+        }
+    }
+    return {};
+}
+
+void report_missing_module(std::string_view name, Span at, Diagnostics& diagnostics) {
+    std::error_code none;
+    const bool installed = fs::is_directory(module_folder(), none);
+    const std::string quoted = "'" + std::string(name) + "'";
+    const std::string folder = module_folder();
+    diagnostics.error(
+        "no-such-component", at,
+        installed ? "LinuxCNC module " + quoted + " does not exist in " + folder
+                  : quoted + " is a module of LinuxCNC, which is not installed: " + folder +
+                        " does not exist",
+        "",
+        installed
+            ? "HAL_RTMOD_DIR names another folder; for a component of ours: loadrt --native " +
+                  std::string(name)
+            : "sudo apt-get install linuxcnc-uspace");
+}
+
+}  // namespace
+
+std::string user_folder(std::string_view kind) {
+    if (const char* data = std::getenv("XDG_DATA_HOME"); data && *data) {
+        return std::string(data) + "/halcyon/" + std::string(kind);
+    }
+    if (const char* home = std::getenv("HOME"); home && *home) {
+        return std::string(home) + "/.local/share/halcyon/" + std::string(kind);
+    }
+    return {};
+}
+
+Plugins::Plugins(std::vector<std::string> first) : path_(std::move(first)) {
+    const auto add = [this](std::string folder) {
+        if (!folder.empty() && std::find(path_.begin(), path_.end(), folder) == path_.end()) {
+            path_.push_back(std::move(folder));
+        }
+    };
+    if (const char* variable = std::getenv("HALCYON_PLUGIN_PATH")) {
+        std::istringstream folders(variable);
+        for (std::string folder; std::getline(folders, folder, ':');) {
+            add(folder);
+        }
+    }
+    add(user_folder("components"));
+    // beside the program first, so that a moved tree finds its own
+    std::error_code none;
+    const fs::path program = fs::read_symlink("/proc/self/exe", none).parent_path();
+    for (const fs::path& folder :
+         {program / "../components",
+          program / paths::libraries_from_programs / "halcyon/components"}) {
+        if (fs::is_directory(folder, none)) {
+            add(fs::canonical(folder, none).string());
+        }
+    }
+    add(std::string(paths::build_components));
+    add(std::string(paths::install_components));
+}
+
+std::string Plugins::find(std::string_view name) const {
+    std::string dashed(name);
+    std::replace(dashed.begin(), dashed.end(), '_', '-');
+    if (name.find('/') != std::string_view::npos) {
+        return {};
+    }
+    for (const std::string& folder : path_) {
+        for (const std::string& candidate : {std::string(name), underlined(name), dashed}) {
+            std::error_code none;
+            if (std::string file = folder + "/" + candidate + ".so";
+                fs::is_regular_file(file, none)) {
+                return file;
+            }
+        }
+    }
+    return {};
+}
+
+std::optional<Plugin> Plugins::open(std::string_view name, Span at,
+                                    Diagnostics& diagnostics) const {
+    return open_component(*this, name, Origin::any, at, diagnostics);
+}
+
+std::optional<Plugin> open_component(const Plugins& plugins, std::string_view name, Origin origin,
+                                     Span at, Diagnostics& diagnostics) {
+    const std::vector<std::string>& path = plugins.path();
+    std::string found = origin == Origin::linuxcnc ? "" : plugins.find(name);
+    const std::string module = origin == Origin::native || !found.empty() ? "" : find_module(name);
+    if (origin == Origin::linuxcnc && module.empty()) {
+        report_missing_module(name, at, diagnostics);
+        return std::nullopt;
+    }
+    if (!module.empty() &&
+        (origin == Origin::linuxcnc || !listed_components(path).contains(underlined(name)))) {
+        return open_module(module, at, diagnostics);
+    }
+    const bool unbuilt = found.empty() && listed_components(path).contains(underlined(name));
+    if (unbuilt && build_on_demand(underlined(name))) {
+        found = plugins.find(name);
+    }
+    if (found.empty() && unbuilt) {
+        diagnostics.error("no-such-component", at,
+                          "component '" + std::string(name) + "' is not built yet", "",
+                          "in the source tree, type: ./hal build " + underlined(name));
+        return {};
+    }
+    if (found.empty()) {
+        if (const std::string package = package_of(underlined(name), path); !package.empty()) {
+            diagnostics.error("no-such-component", at,
+                              "component '" + std::string(name) +
+                                  "' was left out of this build: it needs " + package,
+                              "",
+                              "sudo apt-get install " + package +
+                                  ", then build again; ./hal does that by itself");
+            return {};
+        }
+        const std::string similar = did_you_mean(name, plugins.available());
+        std::error_code none;
+        const bool may_be_linuxcncs =
+            origin == Origin::any && similar.empty() && !fs::is_directory(module_folder(), none);
+        diagnostics.error("no-such-component", at, "unknown component '" + std::string(name) + "'",
+                          similar,
+                          std::string("hal doc lists all components") +
+                              (may_be_linuxcncs ? "; if it is a module of LinuxCNC, which is not "
+                                                  "installed: sudo apt-get install linuxcnc-uspace"
+                                                : ""));
+        return {};
+    }
+    const auto bad = [&](const PluginProblem& problem) {
+        diagnostics.error("bad-plugin", at,
+                          "'" + found + "' is not a usable component: " + problem.why, "",
+                          problem.help);
+        return std::nullopt;
+    };
+    const PluginFile file = read_plugin_file(found);
+    if (!file.problem.empty()) {
+        return bad({file.problem});
+    }
+    load_own_libraries(file.needed, fs::path(found).parent_path().string());
+    std::shared_ptr<void> library = open_copy(found);
+    if (!library) {
+        void* const direct = dlopen(found.c_str(), RTLD_NOW | RTLD_LOCAL);
+        if (!direct) return bad(explain_loader_error(dlerror(), found));
+        library = {direct, [](void* handle) { dlclose(handle); }};
+    }
+    Plugin plugin{nullptr, library, found};
+    plugin.component = static_cast<const hal_component*>(dlsym(library.get(), "hal_plugin"));
+    if (!plugin.component) {
+        return bad(
+            {"it exports no symbol hal_plugin, which HAL_COMPONENT(Type, \"name\", \"summary\") "
+             "makes"});
+    }
+    if (const std::string why = problem_of(*plugin.component); !why.empty()) {
+        return bad({why});
+    }
+    return plugin;
+}
+
+std::vector<std::string> Plugins::available() const {
+    std::set<std::string> names;
+    for (const std::string& folder : path_) {
+        for (const fs::path& path : folder_entries(folder)) {
+            if (path.extension() == ".so") {
+                names.insert(path.stem().string());
+            }
+        }
+    }
+    for (const auto& [name, about] : listed_components(path_)) {
+        names.insert(name);
+    }
+    names.insert("threads");
+    return {names.begin(), names.end()};
+}
+
+}  // namespace hal

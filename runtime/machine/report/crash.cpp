@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: MIT
+// The last resort: a crash signal or an exception inside a cycle. Outputs first, then a report,
+// then the end.
+#include <algorithm>
+#include <atomic>
+#include <csetjmp>
+#include <csignal>
+#include <cstdarg>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <cxxabi.h>
+#include <dlfcn.h>
+#include <exception>
+#include <pthread.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include "execute/crash_table.hpp"
+#include "machine/load/module_library.hpp"
+#include "machine/load/setup_call.hpp"
+#include "machine/report/crash.hpp"
+#include "machine/report/exit_observer.hpp"
+#include "model/model.hpp"
+
+extern "C" [[gnu::weak]] void __rtsan_realtime_enter();  // a program with the real-time guard
+
+namespace hal {
+namespace {
+
+// the machines of this process; further ones are not named in reports
+std::atomic<const MachineView*> watched[64];
+
+void print(const char* text) noexcept {
+    [[maybe_unused]] const auto written = write(STDERR_FILENO, text, std::strlen(text));
+}
+
+void print(std::uint64_t number) noexcept {
+    char digits[24];
+    char* at = digits + sizeof digits;
+    *--at = '\0';
+    do {
+        *--at = static_cast<char>('0' + number % 10);
+    } while (number /= 10);
+    print(at);
+}
+
+const char* signal_text(int signal) noexcept {
+    switch (signal) {
+    case SIGSEGV: return "segmentation fault";
+    case SIGBUS: return "bus error";
+    case SIGFPE: return "integer division by zero or overflow";
+    case SIGILL: return "illegal instruction";
+    case SIGSYS: return "invalid system call";
+    case SIGTRAP: return "trap";
+    default: return "abort";
+    }
+}
+
+// The process is dying: the model is read without a lock, by pointer only.
+void name_function(const Core* core, std::uint32_t id) noexcept {
+    for (const auto& one : watched) {
+        const MachineView* const machine = one.load();
+        if (!machine || std::none_of(machine->cores.begin(), machine->cores.end(),
+                                     [&](const auto& pair) { return pair.second == core; })) {
+            continue;
+        }
+        for (const auto& component : machine->model.components) {
+            for (const auto& function : component->functions) {
+                if (function->id == id) {
+                    print(component->name.c_str());
+                    print(": function '");
+                    print(function->name.c_str());
+                    return print("'");
+                }
+            }
+        }
+    }
+    print("a function");
+}
+
+std::atomic<bool> reported{false};
+
+void on_signal(int signal) {
+    if (reported.exchange(true)) {  // by the terminate handler, or a crash while making safe
+        raise(signal);
+        return;
+    }
+    ExitObserver::silence();
+    make_all_safe();
+    print("hal: ");
+    if (const Core* const core = Core::current(); core && core->in_function()) {
+        name_function(core, core->current_function());
+        print(" crashed (");
+        print(signal_text(signal));
+        print(") at cycle ");
+        print(core->cycle_number());
+    } else if (const char* const module = module_of_task()) {
+        print(module);
+        print(": a task of the module's own crashed (");
+        print(signal_text(signal));
+        print(")");
+    } else {
+        print("the program crashed outside of the cycle (");
+        print(signal_text(signal));
+        print(")");
+    }
+    print("; outputs were set to their safe values; the process ends\n");
+    raise(signal);  // SA_RESETHAND put the default action back
+}
+
+std::atomic<pid_t> machine_process{0};  // the process of the machines; one that it forks ends without a word
+
+bool has_machine() noexcept {
+    return std::any_of(std::begin(watched), std::end(watched),
+                       [](const auto& one) { return one.load() != nullptr; });
+}
+
+// What calls: a function in its cycle, a task of a module, a constructor, start or stop of an
+// instance, or any other thread.
+void name_caller(const Core* in_function, const char* module) noexcept {
+    if (in_function) return name_function(in_function, in_function->current_function());
+    if (module) {
+        print(module);
+        return print(": a task of the module's own");
+    }
+    if (SetupCall::is_mine()) {
+        print("'");
+        print(SetupCall::now.instance);
+        print("' (");
+        print(SetupCall::now.component);
+        return print(")");
+    }
+    char name[32] = "";
+    pthread_getname_np(pthread_self(), name, sizeof name);
+    print("thread '");
+    print(name);
+    print("'");
+}
+
+// A machine ends by its own orders. Returns false when this is such an end, or one that was
+// reported already.
+bool report_end(const char* call) noexcept {
+    if (machine_process.load() != getpid()) return false;
+    const Core* const core = Core::current();
+    const Core* const in_function = core && core->in_function() ? core : nullptr;
+    const char* const module = in_function ? nullptr : module_of_task();
+    const bool machine = has_machine();
+    if (!in_function && !module && !machine && !SetupCall::is_mine()) return false;
+    if (reported.exchange(true)) return false;
+    ExitObserver::silence();
+    make_all_safe();
+    print("hal: ");
+    name_caller(in_function, module);
+    if (__rtsan_realtime_enter && (in_function || module)) {
+        print(" made the call that the real-time guard prints above");
+        if (in_function) {
+            print(", at cycle ");
+        }
+    } else {
+        print(" called ");
+        print(call);
+        if (in_function) {
+            print(" at cycle ");
+        } else if (SetupCall::is_mine()) {
+            print(" in ");
+        } else if (!module) {
+            print(" while the machine runs");
+        }
+    }
+    if (in_function) {
+        print(in_function->cycle_number());
+    } else if (!module && SetupCall::is_mine()) {
+        print(SetupCall::now.what);
+    }
+    print(machine ? "; outputs were set to their safe values; the process ends\n"
+                  : "; the process ends\n");
+    return true;
+}
+
+int failure(int status) noexcept { return status != 0 ? status : 1; }
+
+// Static destructors must not run beside threads that use the objects.
+void on_exit_of_process(int status, void*) {
+    if (!report_end("exit()")) {
+        if (reported.load()) {
+            end_process(failure(status));
+        }
+        return;
+    }
+    if (ftrylockfile(stdout) == 0) {
+        fflush_unlocked(stdout);
+    }
+    end_process(failure(status));
+}
+
+void on_quick_exit() {
+    if (report_end("quick_exit()")) {
+        end_process(1);
+    }
+}
+
+// A noexcept function let an exception out. The cycle goes on without the thread's functions.
+[[noreturn]] void on_terminate() {
+    if (Core* const core = Core::current(); core && core->in_function()) {
+        if (std::current_exception()) {
+            abi::__cxa_end_catch();  // gives the exception's memory back
+        }
+        std::longjmp(core->recover, 1);
+    }
+    if (reported.exchange(true)) {
+        std::abort();
+    }
+    ExitObserver::silence();
+    make_all_safe();
+    print(
+        "hal: an exception outside of the cycle was not caught; outputs were set to their safe "
+        "values; the process ends\n");
+    std::abort();
+}
+
+}  // namespace
+
+void end_process(int status) noexcept {
+    reported = true;
+    ExitObserver::silence();
+    for (;;) {
+        syscall(SYS_exit_group, status);
+    }
+}
+
+CycleNames names_of(const CycleNow& now) {
+    CycleNames names;
+    for (const auto& one : watched) {
+        const MachineView* const machine = one.load();
+        if (!machine) continue;
+        const auto of = std::find_if(machine->cores.begin(), machine->cores.end(),
+                                     [&](const auto& pair) { return pair.second == now.core; });
+        if (of == machine->cores.end()) continue;
+        names.thread = of->first->name;
+        for (const auto& component : machine->model.components) {
+            for (const auto& function : component->functions) {
+                if (function->id == now.function) {
+                    names.function = "function '" + function->name + "' (" + component->name + ")";
+                }
+            }
+        }
+    }
+    return names;
+}
+
+void watch_for_exits() {
+    machine_process = getpid();
+    static const bool installed =
+        ::on_exit(on_exit_of_process, nullptr) == 0 && std::at_quick_exit(on_quick_exit) == 0;
+    (void)installed;
+}
+
+void watch_for_crashes(const MachineView& machine) {
+    watch_for_exits();
+    static const bool installed = [] {
+        std::set_terminate(on_terminate);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+        // for the program's own thread, which runs the cycles of a virtual clock; the executor's
+        // threads have one each
+        alignas(16) static char room[1 << 15];
+        const stack_t other{.ss_sp = room, .ss_flags = 0, .ss_size = sizeof room};
+        sigaltstack(&other, nullptr);
+        struct sigaction action{};
+        action.sa_handler = on_signal;
+        action.sa_flags = SA_RESETHAND | SA_NODEFER | SA_ONSTACK;
+        for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP})
+            sigaction(signal, &action, nullptr);
+#endif
+        return true;
+    }();
+    (void)installed;
+    for (auto& place : watched) {
+        const MachineView* empty = nullptr;
+        if (place.compare_exchange_strong(empty, &machine)) return;
+    }
+}
+
+void end_watch_for_crashes(const MachineView& machine) {
+    for (auto& place : watched) {
+        const MachineView* expected = &machine;
+        if (place.compare_exchange_strong(expected, nullptr)) return;
+    }
+}
+
+}  // namespace hal
+
+// The program exports these functions: what a plugin or a library of the process calls by these
+// names ends here, safe and named. A sanitizer has its own.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
+namespace {
+
+[[noreturn]] void end_directly(int status, const char* call) noexcept {
+    if (hal::report_end(call)) {
+        hal::end_process(hal::failure(status));
+    }
+    for (;;) {
+        syscall(SYS_exit_group, status);
+    }
+}
+
+using Syscall = long (*)(long, ...);
+Syscall next_syscall() noexcept {
+    // no guarded initialisation: the guard may need a system call
+    static std::atomic<Syscall> next{nullptr};
+    Syscall found = next.load(std::memory_order_relaxed);
+    if (found == nullptr) {
+        found = reinterpret_cast<Syscall>(dlsym(RTLD_NEXT, "syscall"));
+        next.store(found, std::memory_order_relaxed);
+    }
+    return found;
+}
+
+}  // namespace
+
+extern "C" {
+
+[[noreturn, gnu::visibility("default")]] void _exit(int status) { end_directly(status, "_exit()"); }
+[[noreturn, gnu::visibility("default")]] void _Exit(int status) noexcept {
+    end_directly(status, "_Exit()");
+}
+
+[[gnu::visibility("default")]] long syscall(long number, ...) noexcept {
+    va_list list;
+    va_start(list, number);
+    long argument[6];
+    for (long& one : argument) {
+        one = va_arg(list, long);
+    }
+    va_end(list);
+    if (number == SYS_exit_group && hal::report_end("the system call exit_group")) {
+        argument[0] = hal::failure(static_cast<int>(argument[0]));
+    }
+    return next_syscall()(number, argument[0], argument[1], argument[2], argument[3], argument[4],
+                          argument[5]);
+}
+
+}  // extern "C"
+
+#endif

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: MIT
+#include "machine/run/open_transaction.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "base/keep.hpp"
+#include "machine/load/construct.hpp"
+#include "machine/run/replaced_instances.hpp"
+#include "machine/run/state.hpp"
+
+namespace hal {
+namespace {
+
+/// No thread runs these instances any more: their devices get their safe values, as on `stop`.
+void make_abandoned_safe(const Model& model, const Edit& edit) noexcept {
+    const hal_cycle none{
+        .size = sizeof none, .pad = 0, .period_ns = 0, .period_s = 0.0, .start_ns = 0, .number = 0};
+    const auto runs = [](const LoadedFunction* function) { return function->thread != nullptr; };
+    for (const LoadedFunction* const function : edit.taken_functions()) {
+        for (const Instance* const instance : function->instances) {
+            const bool is_loaded = model.find_instance(instance->name) == instance;
+            if (!is_loaded || !instance->started ||
+                std::any_of(instance->functions.begin(), instance->functions.end(), runs)) {
+                continue;
+            }
+            for (const plan::Step& step : instance->emergency) {
+                step.step(step.self, &none);
+            }
+        }
+    }
+}
+
+void note_functions_in_threads(Model& model) {
+    for (const auto& component : model.components) {
+        for (const auto& function : component->functions) {
+            function->was_in_thread = function->thread != nullptr;
+        }
+    }
+}
+
+/// Destroys instances in the reverse order of their creation.
+void destroy(const std::vector<std::unique_ptr<Instance>>& instances, Executor& executor) {
+    for (auto it = instances.rbegin(); it != instances.rend(); ++it) {
+        destroy_instance(**it);
+        end_conditions(executor, **it);
+    }
+}
+
+}  // namespace
+
+void OpenTransaction::begin() {
+    if (open_) throw std::logic_error("a transaction is open already");
+    open_ = true;
+    commands_ = 0;
+}
+
+Edit& OpenTransaction::editing(Diagnostics& diagnostics) {
+    if (!reserve_) {
+        reserve_ = std::make_unique<char[]>(1 << 20);
+    }
+    if (!edit_) {
+        edit_ = state_.options.check_only ? std::make_unique<Edit>(state_.model, state_.absences)
+                                          : std::make_unique<Edit>(state_.model);
+    }
+    edit_->diagnostics = &diagnostics;
+    return *edit_;
+}
+
+void OpenTransaction::out_of_memory(Diagnostics& diagnostics) {
+    reserve_.reset();
+    diagnostics.error("out-of-memory", {}, "there is no memory left for this edit", "",
+                      "the machine runs on as it was; 'ulimit -v' and 'ulimit -l' limit a process");
+}
+
+void OpenTransaction::abandon() {
+    actions_.clear();
+    needs_threads_ = false;
+    if (edit_) {
+        withdraw();
+    }
+}
+
+void OpenTransaction::roll_back() {
+    abandon();
+    actions_.clear();  // what modules wanted while they were unloaded again
+    open_ = false;
+}
+
+bool OpenTransaction::commit(Diagnostics& diagnostics) {
+    if (edit_) {
+        edit_->absences().report(diagnostics);
+    }
+    bool good = false;
+    try {
+        if (std::exchange(needs_threads_, false)) {
+            state_.threads.all_answer(diagnostics);
+        }
+        good = !diagnostics.failed() && (!edit_ || carry_out(diagnostics));
+    } catch (const std::bad_alloc&) {
+        out_of_memory(diagnostics);
+    }
+    state_.offer_names(diagnostics);  // also those that are rolled back now
+    // Nothing runs under `hal check`: what could be made stays, so that the texts after this one
+    // are checked against it.
+    if (!good && edit_ && state_.options.check_only) {
+        close_edit();
+    } else if (!good && edit_) {
+        withdraw(&diagnostics);
+    }
+    open_ = false;
+    const auto actions = std::exchange(actions_, {});
+    if (good) {
+        for (const auto& action : actions) {
+            action();
+        }
+    }
+    return good;
+}
+
+bool OpenTransaction::carry_out(Diagnostics& diagnostics) {
+    const std::size_t values = edit_->pin_values.size() + edit_->signal_values.size();
+    if (!edit_->structural() && values <= Core::most_writes / 2) {
+        if (!state_.threads.write(edit_->pin_values, edit_->signal_values, diagnostics)) {
+            return false;
+        }
+        close_edit();
+        return true;
+    }
+    apply_auto_order(state_.model, *edit_, auto_orders_, diagnostics);
+    checks_.run(state_.model,
+                {.whole = commands_ > 1,
+                 .complete = state_.options.check_only,
+                 .open = edit_->absences().open()},
+                diagnostics);
+    if (diagnostics.failed()) return false;
+    if (state_.options.check_only) {  // no thread takes them
+        for (const auto& [signal, value] : edit_->signal_values) {
+            signal->value = value;
+        }
+    } else if (!carry_out_checked(diagnostics)) {
+        return false;
+    }
+    close_edit();
+    return true;
+}
+
+/// Starts new instances, and gives the threads their new plans.
+bool OpenTransaction::carry_out_checked(Diagnostics& diagnostics) {
+    ThreadPlans& threads = state_.threads;
+    if (!threads.all_answer(diagnostics)) return false;
+    if (!start_added(diagnostics)) return false;
+    touched_ = true;
+    edit_->make_taken_safe();
+    if (!ReplacedInstances(state_, *edit_, before_).start(diagnostics)) return false;
+    if (!threads.make(diagnostics)) return false;
+    if (!threads.end(edit_->removed().threads, diagnostics)) return false;
+    if (!threads.synchronise(*edit_, before_, diagnostics)) return false;
+    threads.free_stuck();
+    make_abandoned_safe(state_.model, *edit_);
+    return true;
+}
+
+bool OpenTransaction::start_added(Diagnostics& diagnostics) {
+    for (Instance* const instance : edit_->added_instances()) {
+        if (!instance->constructed || instance->started) continue;
+        // unloaded again in the same edit
+        if (state_.model.find_instance(instance->name) != instance) continue;
+        const Failure why = state_.start(*instance);
+        if (why.empty()) continue;
+        diagnostics.error(failure_code(why.code, "start-failed"), instance->loaded,
+                          "'" + instance->name + "' (" + instance->component->name +
+                              ") cannot start: " + why.text,
+                          "", why.help);
+    }
+    return !diagnostics.failed();
+}
+
+/// Undoes the transaction, in the model and in threads that have taken it.
+void OpenTransaction::withdraw(Diagnostics* diagnostics) {
+    edit_->undo();
+    Diagnostics ignored;
+    if (!touched_ || restore_threads(diagnostics ? *diagnostics : ignored)) {
+        close_edit();
+    } else {
+        keep_for_good(std::move(edit_));  // a thread may still use what the edit made
+    }
+}
+
+/// Threads that took the new plan take one of the old model again, with the values it had. Returns
+/// false when a thread may still use the edit.
+bool OpenTransaction::restore_threads(Diagnostics& diagnostics) {
+    bool restored = state_.threads.end_orphans();
+    edit_->pin_values = before_.pins;
+    for (const auto& signal : state_.model.signals) {
+        const auto value = before_.signals.find(signal.get());
+        if (value != before_.signals.end()) {
+            edit_->signal_values.insert(*value);
+        }
+    }
+    try {
+        Diagnostics ignored;
+        ReplacedInstances(state_, *edit_, before_).restart(diagnostics);
+        state_.threads.make(ignored);
+        // a thread that does not take the old instances again may go on with the new ones
+        if (!state_.threads.synchronise(*edit_, before_, ignored) && !edit_->replaced().empty()) {
+            restored = false;
+        }
+    } catch (const std::bad_alloc&) {
+        restored = false;
+    }
+    return restored;
+}
+
+/// The transaction is over, one way or the other: what is no longer in the model is destroyed.
+void OpenTransaction::close_edit() {
+    if (edit_->structural()) {
+        note_functions_in_threads(state_.model);
+    }
+    state_.faults.collect();  // before the plugins whose texts they use
+    auto& removed = edit_->removed();
+    destroy(removed.instances, *state_.executor);
+    auto& replaced = edit_->replaced();
+    for (auto one = replaced.rbegin(); one != replaced.rend(); ++one) {
+        destroy(one->other->instances, *state_.executor);
+    }
+    // another instance may soon be where theirs was
+    if (!removed.instances.empty() || !replaced.empty()) {
+        state_.faults.close_rows();
+    }
+    edit_.reset();
+    auto_orders_.clear();
+    before_.clear();
+    touched_ = false;
+}
+
+}  // namespace hal
