@@ -185,7 +185,7 @@ void Script::run_line(const Command& command) {
     if (!row->edits() && !check_arity(row->usage(), command.name, command.args, pending_)) {
         return effects_.add_line(command.span);
     }
-    if (row->flags & command_transaction) {
+    if (row->behaviour.timing == Timing::group) {
         // else it was reported, and the whole file is to be looked at
         if (!shell_.options.linuxcnc) {
             group(command);
@@ -194,7 +194,7 @@ void Script::run_line(const Command& command) {
     }
     if ((state_.collecting || checked_begin_) && collect(command, *row)) return;
     if (row->edits()) return edit(command, *row);
-    if (row->flags & command_deferred) return defer(command, *row);
+    if (row->behaviour.timing == Timing::at_commit) return defer(command, *row);
     act(command, *row);
 }
 
@@ -220,12 +220,12 @@ void Script::edit(const Command& command, const CommandRow& row) {
     if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
     if (merge_module_load(command)) return;
     ++edits_;
-    if ((row.flags & command_programs) && !shell_.options.check) {
+    if (row.behaviour.effect == Effect::end_of_program && !shell_.options.check) {
         Context context{*this,   shell_,   session_, session_.programs(), output_, row,
                         command, pending_, lock_,    &transaction()};
         if (unload_processes(context)) return;
     }
-    if (!(row.flags & command_traceless)) {
+    if (row.behaviour.effect == Effect::addition) {
         texts_.keep();
     }
     transaction().apply(row.form(), command, pending_);
@@ -242,7 +242,7 @@ bool Script::merge_module_load(const Command& command) {
 }
 
 void Script::defer(const Command& command, const CommandRow& row) {
-    if (shell_.options.check && !(row.flags & command_checked)) return;
+    if (shell_.options.check && !row.is_checked()) return;
     effects_.add_line(command.span);
     if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
     ++edits_;
@@ -259,13 +259,13 @@ void Script::act(const Command& command, const CommandRow& row) {
     if (checking && row.function.act == command_loadusr) {
         note_program(session_.absences(), command);
     }
-    if (checking && !(row.flags & command_checked)) return;
+    if (checking && !row.is_checked()) return;
     if (checking) {
         session_.absences().begin(command.span);
     }
     // a check is one transaction: nothing acts
     const bool looks = only_looks(row, command);
-    const bool apart = checking || (row.flags & command_apart) || looks;
+    const bool apart = checking || row.is_apart() || looks;
     if (!apart) {
         finish_before_acting();
         if (stop()) return;
@@ -315,7 +315,7 @@ void Script::finish_before_acting() {
 
 /// Commands about one thing take a range of them: getp pid.[0..2].output
 void Script::act_on_each(const Command& command, const CommandRow& row) {
-    if (!(row.flags & command_each)) return act_on(command, row);
+    if (row.behaviour.operands != Operands::ranges) return act_on(command, row);
     for (const Command& one : expand(command, pending_)) {
         if (one.args.size() <= 1) {
             act_on(one, row);
@@ -337,14 +337,15 @@ void Script::act_on(const Command& command, const CommandRow& row) {
 /// Returns a collected command that cannot be in a transaction with this one, or nullptr.
 const Command* Script::find_conflict(const Command& command) const {
     const auto other = std::ranges::find_if(state_.collected, [&](const Command& one) {
-        return one.name.text != command.name.text && (row_of(one)->flags & command_collected);
+        return one.name.text != command.name.text &&
+               row_of(one)->behaviour.timing == Timing::at_request;
     });
     return other == state_.collected.end() ? nullptr : &*other;
 }
 
 bool Script::collect(const Command& command, const CommandRow& row) {
-    const bool acts = (row.flags & command_collected) != 0;
-    if (row.edits() || (row.flags & command_deferred) || acts) {
+    if (row.can_be_collected()) {
+        const bool acts = row.behaviour.timing == Timing::at_request;
         if (const Command* const other = acts ? find_conflict(command) : nullptr) {
             Diagnostic found{
                 Severity::error,
@@ -364,7 +365,7 @@ bool Script::collect(const Command& command, const CommandRow& row) {
         texts_.keep();
         return true;
     }
-    if ((row.flags & command_apart) || row.is_query() || row.function.act == command_advance) {
+    if (row.is_apart() || row.is_query() || row.function.act == command_advance) {
         return false;
     }
     const bool typed = !texts_.is_file(command.span.source);

@@ -27,7 +27,7 @@ std::optional<std::string> variable_of_node(const std::string& name, const Shell
 void unquote_paths(std::vector<Command>& commands) {
     for (Command& command : commands) {
         const CommandRow* const row = find_command(command.name.text);
-        if (!row || !row->takes_paths()) continue;
+        if (!row || row->behaviour.operands != Operands::paths) continue;
         for (Token& word : command.args) {
             word.text = without_quotes(word.text);
         }

@@ -439,7 +439,7 @@ bool Shell::may_wait(std::string_view text) {
     static const auto waiting = [] {
         std::vector<std::string_view> names;
         for (const auto& row : command_table()) {
-            if (row.flags & command_waits) {
+            if (row.behaviour.waiting == Waiting::possible) {
                 names.push_back(row.name);
             }
         }

@@ -17,6 +17,25 @@ constexpr unsigned config = 2;
 constexpr unsigned params = 4;
 constexpr unsigned run = 8;  // bits of Lock
 
+namespace kind {
+constexpr Behaviour addition{.effect = Effect::addition, .timing = Timing::at_commit};
+constexpr Behaviour linking{
+    .effect = Effect::addition, .timing = Timing::at_commit, .operands = Operands::arrows};
+constexpr Behaviour change{.effect = Effect::change, .timing = Timing::at_commit};
+constexpr Behaviour unloading{.effect = Effect::end_of_program, .timing = Timing::at_commit};
+constexpr Behaviour deferred{.timing = Timing::at_commit};
+constexpr Behaviour on_request{.timing = Timing::at_request};
+constexpr Behaviour waiting{.waiting = Waiting::possible};
+constexpr Behaviour grouping{.timing = Timing::group};
+constexpr Behaviour reading{.effect = Effect::reading};
+constexpr Behaviour reading_each{.effect = Effect::reading, .operands = Operands::ranges};
+constexpr Behaviour reading_to_file{.effect = Effect::reading, .operands = Operands::paths};
+constexpr Behaviour nothing{.effect = Effect::nothing};
+constexpr Behaviour output{.effect = Effect::output};
+constexpr Behaviour sourcing{
+    .effect = Effect::nothing, .waiting = Waiting::possible, .operands = Operands::paths};
+}  // namespace kind
+
 constexpr CommandRow rows[] = {
     // --- components
     {"loadrt", "", "[--native|--linuxcnc] COMPONENT [ARGUMENT=VALUE]...",
@@ -30,13 +49,13 @@ constexpr CommandRow rows[] = {
      "/usr/lib/linuxcnc/modules; --native loads components only, --linuxcnc modules only. With "
      "HALCYON_MODULES=linuxcnc in the environment of the\n"
      "machine, modules come first.",
-     edits::loadrt, load, command_plain},
+     edits::loadrt, load, kind::addition},
     {"unloadrt", "", "COMPONENT|INSTANCE|all",
      "unload a component with all its instances, or one instance", "", edits::unload, load,
-     command_traceless},
+     kind::change},
     {"unload", "", "COMPONENT|INSTANCE|all",
      "unload a component or an instance, or end a program started by loadusr", "", edits::unload,
-     load, command_traceless | command_programs},
+     load, kind::unloading},
     {"reload", "", "COMPONENT",
      "replace a loaded plugin by the version that is now on the plugin path, at a cycle boundary",
      "The new version is constructed with the same arguments. Pins of the same name and type keep "
@@ -44,7 +63,7 @@ constexpr CommandRow rows[] = {
      "keep their positions in the threads; new pins have their initial values. If a linked pin or "
      "a function in a thread is missing\n"
      "in the new version, or differs, the reload is rejected and nothing changes.",
-     edits::reload, load, command_traceless},
+     edits::reload, load, kind::change},
     {"loadusr", "",
      "[-W] [-Wn NAME] [-w] [-t TIME] [-i] [--restart=no|on-failure|always] [--restart-delay=TIME] "
      "PROGRAM [ARGUMENT]...",
@@ -62,15 +81,15 @@ constexpr CommandRow rows[] = {
      "terminated it or its exit status is\n"
      "not 0; --restart=always restarts it whenever it has ended. unloadusr ends it for good; after "
      "5 restarts within 10 s no other follows.",
-     command_loadusr, load, command_waits | command_checked},
+     command_loadusr, load, kind::waiting},
     {"waitusr", "", "[-t TIME] PROCESS", "wait until a program has ended",
      "-t TIME (10s, 500ms) limits the wait: then the command fails, and the program continues.",
-     command_waitusr, 0, command_waits | command_checked},
+     command_waitusr, 0, kind::waiting},
     {"unloadusr", "", "PROCESS|all", "end a program (SIGTERM)",
      "Sends SIGTERM and does not wait for the program to end (waitusr does); until then `show "
      "comp` shows it as stopping. Its pins\n"
      "are removed when it ends, those of a dead program at once.",
-     command_unloadusr, load, command_deferred | command_checked},
+     command_unloadusr, load, kind::deferred},
     // --- threads and functions
     {"newthread", "",
      "NAME PERIOD_NS [fp] [cpu=N] [policy=fifo|deadline|other] [priority=N] [spin=TIME] "
@@ -84,67 +103,65 @@ constexpr CommandRow rows[] = {
      "A thread that does not finish a cycle within supervise= (default: 10 periods or 100 ms, "
      "whichever is longer) is stopped by a\n"
      "fault, and its outputs take their safe values; supervise=off disables the supervision.",
-     edits::newthread, config, command_plain},
+     edits::newthread, config, kind::addition},
     {"delthread", "", "THREAD", "remove a thread; its functions are then in no thread", "",
-     edits::delthread, config, command_traceless},
+     edits::delthread, config, kind::change},
     {"addf", "", "FUNCTION THREAD [POSITION] | --auto THREAD [FUNCTION]...",
      "add a function to a thread",
      "At the end, or at POSITION: 1 is the first, -1 the last. Functions run in this order.\n"
      "With --auto: adds several functions, or all that are in no thread, in the order of the data "
      "flow.",
-     edits::addf, config, command_plain},
+     edits::addf, config, kind::addition},
     {"delf", "", "FUNCTION THREAD", "remove a function from a thread", "", edits::delf, config,
-     command_traceless},
+     kind::change},
     {"initf", "", "FUNCTION THREAD [POSITION]",
      "run a function once, before the first cycle of the thread", "", edits::initf, config,
-     command_plain},
+     kind::addition},
     {"start", "", "", "let the threads run their functions", "", command_start, run,
-     command_collected},
+     kind::on_request},
     {"stop", "", "", "stop running functions; threads continue, outputs take their safe values", "",
-     command_stop, run, command_collected},
+     command_stop, run, kind::on_request},
     {"advance", "", "COUNT|TIME [cycles]",
      "let time pass: `advance 10 cycles` of the fastest thread, or `advance 50ms`",
      "On the virtual clock (hal sim) the threads run for exactly this time; on the real clock the "
      "command waits.",
-     command_advance, 0, command_waits | command_checked},
+     command_advance, 0, kind::waiting},
     // --- signals
     {"net", "", "SIGNAL PIN...", "link pins to a signal, which is created if needed",
      "Pins may be preceded by arrows (=>, <=, <=>), which must agree with the directions of the "
      "pins.\n"
      "Ranges and sets expand to several names: net j[0..5]-cmd traj.out-[0..5] => "
      "pid.[0..5].command",
-     edits::net, config, command_arrows},
+     edits::net, config, kind::linking},
     {"newsig", "", "NAME TYPE", "create a signal: bit float s32 u32 s64 u64 port", "",
-     edits::newsig, config, command_plain},
+     edits::newsig, config, kind::addition},
     {"delsig", "", "SIGNAL|all", "delete a signal and unlink its pins", "", edits::delsig, config,
-     command_traceless},
+     kind::change},
     {"linkps", "", "PIN SIGNAL", "link a pin to an existing signal", "", edits::linkps, config,
-     command_arrows},
+     kind::linking},
     {"linksp", "", "SIGNAL PIN", "link a pin to an existing signal", "", edits::linksp, config,
-     command_arrows},
+     kind::linking},
     {"linkpp", "", "PIN PIN", "link two pins by a signal named after the first", "", edits::linkpp,
-     config, command_arrows},
+     config, kind::linking},
     {"unlinkp", "", "PIN", "unlink a pin from its signal; it keeps its value", "", edits::unlinkp,
-     config, command_traceless},
+     config, kind::change},
     // --- values
     {"setp", "", "PIN-OR-PARAMETER VALUE",
      "set an unlinked input pin or a parameter; also: NAME = VALUE", "", edits::setp, params,
-     command_traceless},
+     kind::change},
     {"getp", "", "PIN-OR-PARAMETER", "print the value of a pin or parameter", "", command_getp, 0,
-     command_query | command_each | command_checked},
+     kind::reading_each},
     {"ptype", "", "PIN-OR-PARAMETER", "print the type of a pin or parameter", "", command_ptype, 0,
-     command_query | command_each | command_checked},
+     kind::reading_each},
     {"sets", "", "SIGNAL VALUE",
      "set a signal that has no writer; for a port signal: allocate its buffer (bytes)", "",
-     edits::sets, 0, command_traceless},
-    {"gets", "", "SIGNAL", "print the value of a signal", "", command_gets, 0,
-     command_query | command_each | command_checked},
-    {"stype", "", "SIGNAL", "print the type of a signal", "", command_stype, 0,
-     command_query | command_each | command_checked},
+     edits::sets, 0, kind::change},
+    {"gets", "", "SIGNAL", "print the value of a signal", "", command_gets, 0, kind::reading_each},
+    {"stype", "", "SIGNAL", "print the type of a signal", "", command_stype, 0, kind::reading_each},
     {"alias", "", "pin|param PIN-OR-PARAMETER NAME", "give a pin or parameter a second name", "",
-     edits::alias, config, command_plain},
+     edits::alias, config, kind::addition},
     {"unalias", "", "pin|param ALIAS", "remove the second name", "", edits::unalias, config,
-     command_traceless},
+     kind::change},
     // --- transactions
     {"begin", "", "", "open a transaction: collect the following edits until `commit`",
      "lock, unlock, start, stop, fault clear and the end of programs (unload, unloadusr) are "
@@ -153,10 +170,10 @@ constexpr CommandRow rows[] = {
      "after `start`.\n"
      "Commands that only show something, and advance, act at once, on the machine without the "
      "collected edits.",
-     command_nothing, 0, command_transaction},
+     command_nothing, 0, kind::grouping},
     {"commit", "", "", "apply all collected edits at the same cycle boundary, or none of them", "",
-     command_nothing, 0, command_transaction},
-    {"abort", "", "", "discard the collected edits", "", command_nothing, 0, command_transaction},
+     command_nothing, 0, kind::grouping},
+    {"abort", "", "", "discard the collected edits", "", command_nothing, 0, kind::grouping},
     // --- looking
     {"show", "",
      "[comp|pin|sig|signal|param|parameter|funct|function|thread|alias|timing|latency|fault|all] "
@@ -167,35 +184,34 @@ constexpr CommandRow rows[] = {
      "timing: cycles, missed periods and wake-up latency of each thread, execution times of each "
      "function. latency: delay of each\n"
      "signal in cycles, with the reason. fault: the faults since start.",
-     command_show, 0, command_query | command_checked},
+     command_show, 0, kind::reading},
     {"list", "", "comp|pin|sig|signal|param|parameter|funct|function|thread [PATTERN]...",
-     "list names on one line", "", command_list, 0, command_query | command_checked},
+     "list names on one line", "", command_list, 0, kind::reading},
     {"status", "", "[lock|mem|instance|all]", "show the locks and the number of objects",
-     "instance: threads and faults as lines, for hal top.", command_status, 0,
-     command_query | command_checked},
+     "instance: threads and faults as lines, for hal top.", command_status, 0, kind::reading},
     {"save", "",
      "[comp|alias|sig|signal|sigu|link|linka|net|neta|netl|netla|netal|param|parameter|thread|"
      "unconnectedinpins|signalvalues|all|allu] [FILE]",
      "print the state as commands, to the terminal or a file",
      "all (or nothing): comp, alias, sigu, netla, param, thread; allu also sets unlinked inputs "
      "and signals without writer.",
-     command_save, 0, command_query | command_path | command_checked},
+     command_save, 0, kind::reading_to_file},
     {"fault", "", "clear", "acknowledge all faults that are over",
      "A fault whose condition lasts, such as a thread that hangs or a node that is offline, stays "
      "a fault: the command names it.",
-     command_fault, 0, command_deferred | command_checked},
+     command_fault, 0, kind::deferred},
     // --- locks
     {"lock", "", "[none|tune|all]",
      "forbid changes: tune still allows values, start and stop; all (the default) forbids "
      "everything",
      "Values of pins and signals are never locked; `lock all` forbids setp of parameters.",
-     command_lock, 0, command_deferred | command_checked},
+     command_lock, 0, kind::deferred},
     {"unlock", "", "[all|none|tune]", "release all locks (all, none), or those of tune only", "",
-     command_unlock, 0, command_deferred | command_checked},
+     command_unlock, 0, kind::deferred},
     // --- the shell itself
     {"source", "", "FILE", "run the commands of a file",
      "After `begin` its edits are collected: all of them, or none if a line has an error.",
-     command_source, 0, command_apart | command_waits | command_checked | command_path},
+     command_source, 0, kind::sourcing},
     {"node", "", node_usage.arguments, "in a netlist: assign the following lines to these nodes",
      "The lines up to the next `node` line belong to these nodes. `hal run FILE --node NAME` loads "
      "the part of NAME, the lines before the\n"
@@ -204,23 +220,22 @@ constexpr CommandRow rows[] = {
      "(10ms). If nothing arrives within deadline=, the readers use the value that `sets` gave the "
      "signal in their own part, else 0.\n"
      "$NODE is the name of the node.",
-     command_node, 0, command_apart | command_checked},
-    {"echo", "", "", "print each line before it is executed", "", command_echo, 0, command_apart},
-    {"unecho", "", "", "end echo", "", command_unecho, 0, command_apart},
+     command_node, 0, kind::nothing},
+    {"echo", "", "", "print each line before it is executed", "", command_echo, 0, kind::output},
+    {"unecho", "", "", "end echo", "", command_unecho, 0, kind::output},
     {"debug", "", "LEVEL",
      "set the verbosity: 0 nothing, 1 errors, 2 also results, 3..5 everything", "", command_debug,
-     0, command_apart | command_checked},
+     0, kind::nothing},
     {"print", "", "[TEXT]...", "print file, line and the text on stderr", "", command_print, 0,
-     command_apart},
+     kind::output},
     {"help", "", "[COMMAND]", "list all commands, or describe one", "", command_help, 0,
-     command_apart | command_checked},
+     kind::nothing},
     {"explain", "", "CODE", "explain an error code: what it means and what to do", "",
-     command_explain, 0, command_apart | command_checked},
+     command_explain, 0, kind::nothing},
     {"setexact_for_test_suite_only", "", "", "accepted without effect: periods are always exact",
-     "", command_nothing, 0, command_apart | command_checked},
+     "", command_nothing, 0, kind::nothing},
     {"quit", "exit", "[STATUS]", "leave the shell, or stop reading the file",
-     "STATUS is accepted without effect, as in LinuxCNC.", command_quit, 0,
-     command_apart | command_checked},
+     "STATUS is accepted without effect, as in LinuxCNC.", command_quit, 0, kind::nothing},
 };
 
 struct LockBit {

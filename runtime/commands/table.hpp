@@ -66,23 +66,42 @@ struct CommandFunction {
     Edit edit = nullptr;
 };
 
-enum CommandFlags : unsigned {
-    command_plain = 0,        ///< acts on the machine: pending edits take effect first
-    command_apart = 1,        ///< does not access the machine: does not end a transaction
-    command_waits = 2,        ///< may wait for something outside
-    command_transaction = 4,  ///< begin, commit, abort
-    command_checked = 8,      ///< called under `hal check`, too: see Context::checking()
-    /// only reads the machine, including the edits made so far: does not end a transaction
-    command_query = 16,
-    /// part of a transaction: executed after its commit, and not at all after a rollback
-    command_deferred = 32,
-    command_collected = 64,   ///< start, stop: acts at once, but after `begin` it is deferred
-    command_arrows = 128,     ///< an edit with arrows among its arguments
-    /// an edit that leaves nothing in the model that points into its text
-    command_traceless = 256,
-    command_each = 512,       ///< takes one name; a range of them is a command for each
-    command_path = 1024,      ///< its arguments may be paths: quotes around them are removed
-    command_programs = 2048,  ///< an edit that also ends programs
+/// What a command touches.
+enum class Effect {
+    nothing,        ///< does not access the machine: does not end a transaction
+    output,         ///< the same, and only prints: not called under `hal check`
+    reading,        ///< only reads the machine, including the edits made so far: does not end a
+                    ///< transaction
+    machine,        ///< acts on the machine: pending edits take effect first
+    addition,       ///< an edit after which the model refers to its text
+    change,         ///< an edit that leaves nothing in the model that refers to its text
+    end_of_program  ///< the same, and ends programs
+};
+
+/// When a command acts.
+enum class Timing {
+    at_once,
+    at_commit,   ///< with the transaction that it is part of, and not at all after a rollback
+    at_request,  ///< start, stop: at once, but after `begin` with the transaction
+    group        ///< begin, commit, abort: it bounds a transaction
+};
+
+/// Whether a command may wait for something outside.
+enum class Waiting { none, possible };
+
+/// How its arguments are read.
+enum class Operands {
+    plain,
+    arrows,  ///< arrows may stand among them
+    ranges,  ///< one name; a range of names is a command for each
+    paths    ///< they may be paths: quotes around them are removed
+};
+
+struct Behaviour {
+    Effect effect = Effect::machine;
+    Timing timing = Timing::at_once;
+    Waiting waiting = Waiting::none;
+    Operands operands = Operands::plain;
 };
 
 struct CommandRow {
@@ -93,13 +112,25 @@ struct CommandRow {
     const char* help;       ///< more about it, or ""
     CommandFunction function;
     unsigned lock;          ///< bits of Lock that forbid it
-    unsigned flags;
+    Behaviour behaviour;
 
     bool edits() const { return function.edit != nullptr; }
-    bool is_query() const { return (flags & command_query) != 0; }
-    bool takes_paths() const { return (flags & command_path) != 0; }
+    bool is_query() const { return behaviour.effect == Effect::reading; }
+    /// Does not access the machine.
+    bool is_apart() const {
+        return behaviour.effect == Effect::nothing || behaviour.effect == Effect::output;
+    }
+    /// Called under `hal check`, too: see Context::checking().
+    bool is_checked() const {
+        return behaviour.effect != Effect::output && behaviour.timing != Timing::at_request;
+    }
+    bool can_be_collected() const {
+        return behaviour.timing == Timing::at_commit || behaviour.timing == Timing::at_request;
+    }
     Usage usage() const { return {name, arguments}; }
-    EditForm form() const { return {usage(), function.edit, (flags & command_arrows) != 0}; }
+    EditForm form() const {
+        return {usage(), function.edit, behaviour.operands == Operands::arrows};
+    }
 };
 
 /// All rows, in the order `help` lists them.
