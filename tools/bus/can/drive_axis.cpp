@@ -1,119 +1,38 @@
 // SPDX-License-Identifier: MIT
 #include "bus/can/drive_axis.hpp"
 
+#include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <fmt/core.h>
-
-#include "canopen/protocol/emcy.hpp"
-#include "cia402/error_words.hpp"
-#include "cli/output.hpp"
 
 namespace hal::tools {
 
 using namespace canopen::cia402;
-using canopen::SdoRequest;
 
 namespace {
 
-constexpr std::int64_t rest_ns = 100'000'000;     // without a count: at standstill
 constexpr std::int64_t stall_ns = 2'000'000'000;  // without a count before arrival: stalled
+
+bool is_cyclic(Mode mode) {
+    return mode == Mode::cyclic_position || mode == Mode::cyclic_velocity ||
+           mode == Mode::cyclic_torque || mode == Mode::interpolated_position;
+}
 
 }  // namespace
 
-SdoAxis::SdoAxis(const Options& options, NodeClient& station, std::uint8_t node, unsigned axis)
-    : options_(options), station_(station), node_(node), axis_(axis) {
-    emergencies_ = station_.network.add(node_).emergencies();
+void SdoAxis::allow(std::int64_t ns) {
+    timeout_ns_ = ns;
+    deadline_ns_ = monotonic_ns() + ns;
+    in_motion_ = false;
 }
 
-bool SdoAxis::refuse(const std::string& sentence) const {
-    std::string text = fmt::format("{}: {}", letter(), sentence);
-    canopen::RemoteNode& node = station_.network.add(node_);
-    if (node.emergencies() > emergencies_) {
-        const std::uint16_t code = node.emergency(0).code;
-        text += fmt::format("; last EMCY 0x{:04X}: {}", code, error_word(code));
-    }
-    fail(options_, text);
-    return false;
+bool SdoAxis::target_reached() const {
+    return (feedback_.statusword & status::target_reached) != 0;
 }
 
-bool SdoAxis::read(std::uint16_t index, std::uint8_t sub, std::int64_t& value, bool is_signed,
-                   bool* missing) {
-    std::uint8_t room[8] = {};
-    const std::uint16_t at = of_axis(index, axis_);
-    SdoRequest request{.index = at, .sub = sub, .upload = true, .buffer = room};
-    if (!station_.transfer(node_, request)) {
-        const bool none =
-            request.aborted_by_server &&
-            (request.abort == canopen::Abort::no_object || request.abort == canopen::Abort::no_sub);
-        if (missing && none) {
-            *missing = true;
-            return false;
-        }
-        station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", at, sub));
-        return false;
-    }
-    std::uint64_t bits = 0;
-    std::memcpy(&bits, room, request.size);
-    const unsigned unused = 64 - 8 * static_cast<unsigned>(request.size);
-    value = is_signed && unused < 64 ? static_cast<std::int64_t>(bits << unused) >> unused
-                                     : static_cast<std::int64_t>(bits);
-    return true;
-}
-
-bool SdoAxis::write(std::uint16_t index, std::uint8_t sub, std::int64_t value, unsigned bytes) {
-    std::uint8_t data[8];
-    std::memcpy(data, &value, sizeof data);
-    const std::uint16_t at = of_axis(index, axis_);
-    SdoRequest request{.index = at, .sub = sub, .data = std::span(data, bytes)};
-    if (station_.transfer(node_, request)) return true;
-    station_.fail_transfer(node_, request, fmt::format("{:04X}:{}", at, sub));
-    return false;
-}
-
-bool SdoAxis::look() {
-    std::int64_t value = 0;
-    bool missing = false;
-    if (!read(object::statusword, 0, value, false, &missing)) {
-        return missing && refuse(fmt::format("node {} has no such axis: object {:04X} is missing",
-                                             node_, of_axis(object::statusword, axis_)));
-    }
-    feedback_.statusword = static_cast<std::uint16_t>(value);
-    const auto optional = [&](bool& there, std::uint16_t index, auto& to) {
-        missing = false;
-        if (!there) return true;
-        if (read(index, 0, value, true, &missing)) {
-            to = static_cast<std::remove_reference_t<decltype(to)>>(value);
-            return true;
-        }
-        return missing ? (there = false, true) : false;
-    };
-    if (!optional(feedback_.has_mode, object::modes_of_operation_display, feedback_.mode)) {
-        return false;
-    }
-    if (!optional(feedback_.has_velocity, object::velocity_actual, feedback_.velocity)) {
-        return false;
-    }
-    if (!optional(has_torque_, object::torque_actual, feedback_.torque)) return false;
-    if (!read(object::position_actual, 0, value, true)) return false;
-    feedback_.position = static_cast<std::int32_t>(value);
-    feedback_.error_code = 0;
-    const State state = state_of(feedback_.statusword);
-    if ((state == State::fault || state == State::fault_reaction_active) &&
-        read(object::error_code, 0, value, false, &missing)) {
-        feedback_.error_code = static_cast<std::uint16_t>(value);
-    }
-    const std::int64_t now = monotonic_ns();
-    if (feedback_.position != rest_position_ || rest_since_ == 0) {
-        rest_since_ = now;
-    }
-    rest_position_ = feedback_.position;
-    return true;
-}
-
-/// Takes over a drive that is already running by an earlier command.
+/// Adopts a drive that is already running by an earlier command.
 bool SdoAxis::adopt() {
-    emergencies_ = station_.network.add(node_).emergencies();
+    forget_emergencies();
     if (adopted_) return true;
     if (!look()) return false;
     std::int64_t velocity = 0;
@@ -122,61 +41,66 @@ bool SdoAxis::adopt() {
     if (!read(object::target_velocity, 0, velocity, true, &missing) && !missing) return false;
     missing = false;
     if (!read(object::target_torque, 0, torque, true, &missing) && !missing) return false;
-    command_.mode = feedback_.mode;
-    command_.enable = state_of(feedback_.statusword) == State::operation_enabled;
+    // the cyclic set-points of the other modes are missing
+    command_.mode = is_cyclic(feedback_.mode) ? Mode::profile_position : feedback_.mode;
+    command_.enable = state() == State::operation_enabled;
     command_.velocity = rules.velocity.to_user(static_cast<double>(velocity));
     command_.torque = rules.torque.to_user(static_cast<double>(torque));
-    if (command_.mode == Mode::cyclic_position || command_.mode == Mode::cyclic_velocity ||
-        command_.mode == Mode::cyclic_torque || command_.mode == Mode::interpolated_position) {
-        command_.mode = Mode::profile_position;  // the cyclic set-points of these modes are missing
-    }
-    return adopted_ = true;
+    adopted_ = true;
+    return true;
 }
 
 bool SdoAxis::cycle() {
     if (!look()) return false;
-    return tell(machine_.step(feedback_, command_, rules, monotonic_ns()));
+    return write_orders(machine_.step(feedback_, command_, rules, monotonic_ns()));
+}
+
+bool SdoAxis::cycles(unsigned count) {
+    for (unsigned n = 0; n < count; ++n) {
+        if (!cycle()) return false;
+    }
+    return true;
+}
+
+template <typename Value>
+bool SdoAxis::write_changed(std::optional<Value>& written, Value value, std::uint16_t index) {
+    if (written == value) return true;
+    if (!write(index, 0, static_cast<std::int64_t>(value), sizeof value)) return false;
+    written = value;
+    return true;
+}
+
+/// Writes the set-point of the mode.
+bool SdoAxis::write_target(const AxisOrders& orders) {
+    switch (orders.mode) {
+    case Mode::profile_position:
+        return write_changed(written_.position, orders.target_position, object::target_position);
+    case Mode::profile_velocity:
+        return write_changed(written_.velocity, orders.target_velocity, object::target_velocity);
+    case Mode::profile_torque:
+        return write_changed(written_.torque, orders.target_torque, object::target_torque);
+    case Mode::velocity:
+        return write_changed(written_.vl, orders.vl_target_velocity, object::vl_target_velocity);
+    default: return true;
+    }
 }
 
 /// Writes changed values; the controlword last, because it activates the others.
-bool SdoAxis::tell(const AxisOrders& orders) {
-    const auto put = [&](auto& told, auto value, std::uint16_t index) {
-        if (told == value) return true;
-        if (!write(index, 0, static_cast<std::int64_t>(value), sizeof value)) return false;
-        told = value;
-        return true;
-    };
+bool SdoAxis::write_orders(const AxisOrders& orders) {
     const auto mode = static_cast<std::int8_t>(orders.mode);
-    if (mode != 0 && !reported_.mode && feedback_.mode == orders.mode) {
-        reported_.mode = mode;
+    if (orders.mode != Mode::none) {
+        if (!written_.mode && feedback_.mode == orders.mode) {
+            written_.mode = mode;
+        }
+        if (!write_changed(written_.mode, mode, object::modes_of_operation)) return false;
     }
-    if (mode != 0 && !put(reported_.mode, mode, object::modes_of_operation)) return false;
-    if (machine_.active()) {
-        if (orders.mode == Mode::profile_position &&
-            !put(reported_.position, orders.target_position, object::target_position)) {
-            return false;
-        }
-        if (orders.mode == Mode::profile_velocity &&
-            !put(reported_.velocity, orders.target_velocity, object::target_velocity)) {
-            return false;
-        }
-        if (orders.mode == Mode::profile_torque &&
-            !put(reported_.torque, orders.target_torque, object::target_torque)) {
-            return false;
-        }
-        if (orders.mode == Mode::velocity &&
-            !put(reported_.vl, orders.vl_target_velocity, object::vl_target_velocity)) {
-            return false;
-        }
-    }
-    return put(reported_.controlword, orders.controlword, object::controlword);
+    if (machine_.active() && !write_target(orders)) return false;
+    return write_changed(written_.controlword, orders.controlword, object::controlword);
 }
 
-bool SdoAxis::standing() { return monotonic_ns() - rest_since_ >= rest_ns; }
-
-/// Returns true when the axis has stalled before its target.
+/// Returns false when the axis has stalled before its target.
 bool SdoAxis::arrived() {
-    if (monotonic_ns() - std::max(rest_since_, moved_at_) < stall_ns) return true;
+    if (monotonic_ns() - std::max(rest_since(), began_ns_) < stall_ns) return true;
     return refuse(fmt::format(
         "drive stopped at {:.10g} without reporting target reached (statusword 0x{:04X})",
         position(), feedback_.statusword));
@@ -197,25 +121,58 @@ bool SdoAxis::report() {
     return refuse(why);
 }
 
+/// Handles a timeout: stops what the command started.
+bool SdoAxis::timed_out() {
+    const double seconds = static_cast<double>(timeout_ns_) / 1e9;
+    if (!in_motion_) {
+        return refuse(fmt::format(
+            "not done within {:g} s (timeout; drive is in \"{}\", statusword 0x{:04X}); for more "
+            "time add: within {:g}s",
+            seconds, to_string(state()), feedback_.statusword, 2 * seconds));
+    }
+    allow(rules.limits.stop);
+    interrupted = nullptr;
+    const bool stopped = machine_.enabled() && stop();
+    return refuse(fmt::format(
+        "not done within {:g} s (timeout); {} at {:.10g}; for more time add: within {:g}s", seconds,
+        stopped ? "axis stopped" : "axis not stopped, last seen", position(), 2 * seconds));
+}
+
+/// Ends the command by an interruption.
+bool SdoAxis::interrupt(Interruption why) {
+    if (why == Interruption::end) return false;
+    interrupted = nullptr;
+    allow(rules.limits.stop);
+    const bool stopped = machine_.enabled() && stop();
+    return refuse(stopped ? "interrupted; axis stopped" : "interrupted");
+}
+
 /// Runs cycles until `ready`; `still` reports when that is no longer possible.
 bool SdoAxis::until(const Ready& ready, bool (SdoAxis::*still)()) {
-    moved_at_ = monotonic_ns();
+    began_ns_ = monotonic_ns();
     for (;;) {
         if (!cycle()) return false;
         if (machine_.failure()) return report();
         if (ready()) return true;
         if (still && !(this->*still)()) return false;
-        const Interruption why = interrupted ? interrupted() : Interruption::none;
-        if (why == Interruption::end) return false;
-        if (why == Interruption::stop) {
-            interrupted = nullptr;
-            allow(rules.limits.stop);
-            const bool stopped = machine_.enabled() && stop();
-            return refuse(stopped ? "interrupted; axis stopped" : "interrupted");
-        }
-        if (monotonic_ns() >= deadline_) return overdue();
-        station_.until([&] { return is_interrupted(); }, pause_ns);
+        const Interruption why = interruption();
+        if (why != Interruption::none) return interrupt(why);
+        if (monotonic_ns() >= deadline_ns_) return timed_out();
+        station_.until([&] { return interruption() != Interruption::none; }, pause_ns);
     }
+}
+
+bool SdoAxis::until_target_reached() {
+    return until([&] { return target_reached(); }, &SdoAxis::arrived);
+}
+
+/// Clears a failure of the state machine; a fault of the drive needs `reset`.
+bool SdoAxis::clear_failure() {
+    command_.enable = false;
+    command_.reset = true;
+    if (!cycle()) return false;
+    command_.reset = false;
+    return true;
 }
 
 bool SdoAxis::on() {
@@ -224,21 +181,18 @@ bool SdoAxis::on() {
     if (command_.mode == Mode::none || command_.mode == Mode::homing) {
         command_.mode = Mode::profile_position;
     }
-    if (state_of(feedback_.statusword) != State::operation_enabled) {
-        command_.velocity = command_.torque = 0.0;
+    if (state() != State::operation_enabled) {
+        command_.velocity = 0.0;
+        command_.torque = 0.0;
     }
     if (!look()) return false;
-    const State state = state_of(feedback_.statusword);
-    command_.quick_stop = command_.halt = command_.reset = false;
-    if (state != State::operation_enabled || !machine_.enabled()) {
-        // clears our failure only; a fault of the drive needs `reset`
-        if (state != State::fault && machine_.failure()) {
-            command_.enable = false;
-            command_.reset = true;
-            if (!cycle()) return false;
-            command_.reset = false;
-        }
-        command_.enable = state == State::operation_enabled;
+    const State before = state();
+    command_.quick_stop = false;
+    command_.halt = false;
+    command_.reset = false;
+    if (before != State::operation_enabled || !machine_.enabled()) {
+        if (before != State::fault && machine_.failure() && !clear_failure()) return false;
+        command_.enable = before == State::operation_enabled;
         if (!cycle()) return false;
         if (machine_.failure()) return report();
         command_.enable = true;
@@ -248,33 +202,30 @@ bool SdoAxis::on() {
 
 bool SdoAxis::off() {
     if (!adopt()) return false;
-    command_.enable = command_.go = command_.home = command_.halt = false;
-    return until([&] {
-        return !machine_.walking() && state_of(feedback_.statusword) != State::operation_enabled;
-    });
+    command_.enable = false;
+    command_.go = false;
+    command_.home = false;
+    command_.halt = false;
+    return until([&] { return !machine_.walking() && state() != State::operation_enabled; });
 }
 
 /// Checks that the axis is enabled, and selects the mode.
 bool SdoAxis::begin_motion(Mode mode) {
     if (!adopt()) return false;
     if (!look()) return false;
-    if (state_of(feedback_.statusword) == State::fault && !machine_.failure()) {
-        if (!cycle()) return false;
-    }
-    if (machine_.failure() && machine_.failure().cause != Cause::drive_fault) {
-        command_.enable = false;
-        command_.reset = true;
-        if (!cycle()) return false;
-        command_.reset = false;
-    }
+    if (state() == State::fault && !machine_.failure() && !cycle()) return false;
+    const bool own_failure = machine_.failure() && machine_.failure().cause != Cause::drive_fault;
+    if (own_failure && !clear_failure()) return false;
     if (machine_.failure()) return report();
-    if (!command_.enable || state_of(feedback_.statusword) != State::operation_enabled) {
+    if (!command_.enable || state() != State::operation_enabled) {
         return refuse(fmt::format("not enabled (drive is in \"{}\"); type: {} on",
-                                  to_string(state_of(feedback_.statusword)), letter()));
+                                  to_string(state()), letter()));
     }
     command_.mode = mode;
-    command_.home = command_.go = false;
-    touched_ = in_motion_ = true;
+    command_.home = false;
+    command_.go = false;
+    touched_ = true;
+    in_motion_ = true;
     return until([&] { return machine_.active(); });
 }
 
@@ -303,9 +254,7 @@ bool SdoAxis::go(double position, bool relative, bool wait, bool queued) {
     };
     if (!until(done, wait ? &SdoAxis::arrived : nullptr)) return false;
     if (wait) return true;
-    for (int n = 0; n < 3; ++n) {  // the edge, and its end
-        if (!cycle()) return false;
-    }
+    if (!cycles(3)) return false;  // the edge, and its end
     return !machine_.failure() || report();
 }
 
@@ -318,12 +267,9 @@ bool SdoAxis::speed(double velocity, bool wait) {
     if (!begin_motion(mode)) return false;
     command_.velocity = velocity;
     command_.halt = false;
-    for (int n = 0; n < 3; ++n) {  // by then the status of the drive is that of this speed
-        if (!cycle()) return false;
-    }
+    if (!cycles(3)) return false;  // by then the status of the drive is that of this speed
     if (!wait || mode == Mode::velocity) return !machine_.failure() || report();
-    return until([&] { return (feedback_.statusword & status::target_reached) != 0; },
-                 &SdoAxis::arrived);
+    return until_target_reached();
 }
 
 bool SdoAxis::torque(double permille, bool wait) {
@@ -333,55 +279,61 @@ bool SdoAxis::torque(double permille, bool wait) {
     if (!begin_motion(Mode::profile_torque)) return false;
     command_.torque = permille;
     command_.halt = false;
-    for (int n = 0; n < 3; ++n) {
-        if (!cycle()) return false;
-    }
+    if (!cycles(3)) return false;
     if (!wait) return !machine_.failure() || report();
-    return until([&] { return (feedback_.statusword & status::target_reached) != 0; },
-                 &SdoAxis::arrived);
+    return until_target_reached();
 }
 
-/// Checks that the drive supports a homing method, by 60E3h if it exists.
-bool SdoAxis::choose_homing(int method) {
-    const auto data = static_cast<std::uint8_t>(method);
-    const std::uint16_t at = of_axis(object::homing_method, axis_);
-    SdoRequest request{.index = at, .data = std::span(&data, 1)};
-    if (station_.transfer(node_, request)) return true;
-    using canopen::Abort;
-    if (!request.aborted_by_server ||
-        (request.abort != Abort::value && request.abort != Abort::too_high &&
-         request.abort != Abort::too_low)) {
-        station_.fail_transfer(node_, request, fmt::format("{:04X}:0", at));
-        return false;
-    }
-    std::string known;
-    std::int64_t count = 0;
-    std::int64_t one = 0;
-    bool missing = false;
-    if (read(object::supported_homing_methods, 0, count, false, &missing)) {
-        for (unsigned sub = 1; sub <= count && sub < 255; ++sub) {
-            if (!read(object::supported_homing_methods, static_cast<std::uint8_t>(sub), one, true,
-                      &missing)) {
-                break;
-            }
-            known += fmt::format("{}{}", known.empty() ? "" : ", ", one);
-        }
-    }
-    if (known.empty() && !missing) {
-        return false;  // the bus failed
-    }
-    return refuse(fmt::format(
-        "the drive does not support homing method {}; {}", method,
-        known.empty() ? "see its manual for those it supports" : "it supports " + known));
+/// Replaces the target by the present position, so that no set-point of the drive is left.
+bool SdoAxis::withdraw_set_points() {
+    command_.position = machine_.position();
+    command_.relative = false;
+    command_.immediate = true;
+    command_.go = true;
+    if (!until([&] { return machine_.set_points() == 0; })) return false;
+    if (!cycles(3)) return false;
+    command_.go = false;
+    return true;
+}
+
+/// Halts, then withdraws the motion, so that nothing continues when halt ends.
+bool SdoAxis::stop() {
+    if (!adopt()) return false;
+    if (!look()) return false;
+    if (state() != State::operation_enabled) return true;
+    command_.enable = true;
+    command_.halt = true;
+    command_.home = false;
+    command_.go = false;
+    in_motion_ = false;
+    restart_standstill();
+    if (!until([&] { return standing(); })) return false;
+    command_.velocity = 0.0;
+    command_.torque = 0.0;
+    const bool has_set_points = command_.mode == Mode::profile_position && machine_.active();
+    if (has_set_points && !withdraw_set_points()) return false;
+    command_.halt = false;
+    const bool by_set_point = command_.mode == Mode::profile_position && machine_.active();
+    return until([&] { return !by_set_point || machine_.target_reached(); }, &SdoAxis::arrived);
+}
+
+bool SdoAxis::quick_stop() {
+    if (!adopt()) return false;
+    command_.quick_stop = true;
+    command_.home = false;
+    command_.go = false;
+    if (!until([&] { return !machine_.walking() && standing(); })) return false;
+    command_.quick_stop = false;
+    command_.enable = false;
+    return true;
 }
 
 bool SdoAxis::home(std::optional<int> method) {
     if (!adopt()) return false;
     if (method && !choose_homing(*method)) return false;
-    const Mode before =
-        command_.mode == Mode::profile_position ? command_.mode : Mode::profile_position;
-    command_.velocity = command_.torque = 0.0;
-    if (!begin_motion(before)) return false;
+    command_.velocity = 0.0;
+    command_.torque = 0.0;
+    if (!begin_motion(Mode::profile_position)) return false;
     command_.home = true;
     if (!until([&] { return machine_.homed(); })) return false;
     command_.home = false;
@@ -390,7 +342,8 @@ bool SdoAxis::home(std::optional<int> method) {
 
 bool SdoAxis::reset() {
     if (!adopt()) return false;
-    command_.enable = command_.reset = false;
+    command_.enable = false;
+    command_.reset = false;
     if (!cycle()) return false;
     command_.reset = true;
     const bool good = until([&] { return !machine_.fault() && !machine_.walking(); });
@@ -400,21 +353,36 @@ bool SdoAxis::reset() {
 
 bool SdoAxis::set_mode(Mode mode) {
     if (!adopt()) return false;
-    command_.velocity = command_.torque = 0.0;
+    command_.velocity = 0.0;
+    command_.torque = 0.0;
     command_.mode = mode;
     const std::int64_t end = monotonic_ns() + rules.limits.step;
-    return until([&] {
-        return feedback_.mode == mode || !feedback_.has_mode || monotonic_ns() >= end;
-    }) && (feedback_.mode == mode || !feedback_.has_mode ||
-           refuse(fmt::format("drive does not accept mode {}, displays {}", abbreviation(mode),
-                              abbreviation(feedback_.mode))));
+    const auto accepted = [&] { return feedback_.mode == mode || !feedback_.has_mode; };
+    if (!until([&] { return accepted() || monotonic_ns() >= end; })) return false;
+    if (accepted()) return true;
+    return refuse(fmt::format("drive does not accept mode {}, displays {}", abbreviation(mode),
+                              abbreviation(feedback_.mode)));
 }
 
 bool SdoAxis::wait() {
     if (!adopt()) return false;
-    return until([&] {
-        return (feedback_.statusword & status::target_reached) != 0 && machine_.set_points() == 0;
-    }, &SdoAxis::arrived);
+    return until([&] { return target_reached() && machine_.set_points() == 0; }, &SdoAxis::arrived);
+}
+
+bool SdoAxis::secure(std::string& what) {
+    interrupted = nullptr;
+    touched_ = false;
+    adopted_ = false;
+    written_ = {};
+    return stop_and_disable(what);
+}
+
+bool SdoAxis::moves() {
+    if (!touched_ || !look() || state() != State::operation_enabled) {
+        return false;
+    }
+    if (command_.mode == Mode::profile_position) return !target_reached();
+    return command_.velocity != 0.0 || command_.torque != 0.0;
 }
 
 }  // namespace hal::tools

@@ -7,18 +7,15 @@
 #include <optional>
 #include <string>
 
-#include "bus/can/node_client.hpp"
-#include "cia402/axis.hpp"
+#include "bus/can/drive_access.hpp"
 
 namespace hal::tools {
 
-/// Every function that accesses the drive prints the reason on stderr when it returns false.
-class SdoAxis {
+/// Commands one axis through the state machine of CiA 402. Every function that accesses the drive
+/// prints the reason on stderr when it returns false. For the thread that owns the NodeClient.
+class SdoAxis final : public AxisAccess {
 public:
-    SdoAxis(const Options&, NodeClient&, std::uint8_t node, unsigned axis);
-
-    unsigned number() const { return axis_; }
-    char letter() const { return static_cast<char>('A' + axis_); }
+    using AxisAccess::AxisAccess;
 
     /// Sets the timeout of the next command, ns. A motion that takes longer is stopped, and the
     /// command fails.
@@ -45,64 +42,49 @@ public:
     /// Returns true when the axis is enabled and commanded to move.
     bool moves();
 
-    // Reading, without a command.
-    bool look();
-    const canopen::cia402::AxisFeedback& seen() const { return feedback_; }
-    double position() const { return rules.position.to_user(feedback_.position); }
-    double velocity() const { return rules.velocity.to_user(feedback_.velocity); }
-
-    /// Accesses an object of the axis, by its index on the first one. Returns false after printing
-    /// the reason; or sets `missing` instead when the drive has no such object.
-    bool read(std::uint16_t index, std::uint8_t sub, std::int64_t& value, bool is_signed,
-              bool* missing = nullptr);
-    bool write(std::uint16_t index, std::uint8_t sub, std::int64_t value, unsigned bytes);
-    bool choose_homing(int method);
-    /// Prints "A: " and the sentence on stderr. Returns false.
-    bool refuse(const std::string& sentence) const;
-
-    canopen::cia402::AxisRules rules;
-    /// `stop` (Ctrl-C at a prompt) stops the axis; `end` ends the command at once, secure() must follow. Polled between two cycles.
+    /// `stop` (Ctrl-C at a prompt) stops the axis; `end` ends the command at once, and secure()
+    /// must follow. Polled between two cycles.
     enum class Interruption : std::uint8_t { none, stop, end };
     std::function<Interruption()> interrupted;
 
 private:
     using Ready = std::function<bool()>;
-    // between two cycles, to leave the bus to others
-    static constexpr std::int64_t pause_ns = 10'000'000;
-    bool overdue();
-    bool is_interrupted() const { return interrupted && interrupted() != Interruption::none; }
-    bool adopt();
-    bool cycle();
-    bool tell(const canopen::cia402::AxisOrders&);
-    bool until(const Ready&, bool (SdoAxis::*still)() = nullptr);
-    bool report();
-    bool begin_motion(canopen::cia402::Mode);
-    bool standing();
-    bool arrived();
-
-    const Options& options_;
-    NodeClient& station_;
-    const std::uint8_t node_;
-    const unsigned axis_;
-    canopen::cia402::Axis machine_;
-    canopen::cia402::AxisCommand command_;
-    canopen::cia402::AxisFeedback feedback_;
-    bool adopted_ = false;
-    bool has_torque_ = true;
-    bool touched_ = false;
-    bool in_motion_ = false;
-    struct Told {
+    /// The values that the drive has received.
+    struct Written {
         std::optional<std::uint16_t> controlword;
         std::optional<std::int8_t> mode;
         std::optional<std::int32_t> position, velocity;
         std::optional<std::int16_t> torque, vl;
-    } reported_;
-    std::uint64_t emergencies_ = 0;
-    std::int32_t rest_position_ = 0;
-    std::int64_t rest_since_ = 0;
-    std::int64_t moved_at_ = 0;
-    std::int64_t allowed_ = 0;
-    std::int64_t deadline_ = INT64_MAX;
+    };
+
+    Interruption interruption() const { return interrupted ? interrupted() : Interruption::none; }
+    bool adopt();
+    bool cycle();
+    bool cycles(unsigned count);
+    bool write_orders(const canopen::cia402::AxisOrders&);
+    bool write_target(const canopen::cia402::AxisOrders&);
+    template <typename Value>
+    bool write_changed(std::optional<Value>& written, Value value, std::uint16_t index);
+    bool until(const Ready&, bool (SdoAxis::*still)() = nullptr);
+    bool until_target_reached();
+    bool interrupt(Interruption why);
+    bool timed_out();
+    bool report();
+    bool clear_failure();
+    bool begin_motion(canopen::cia402::Mode);
+    bool arrived();
+    bool withdraw_set_points();
+    bool target_reached() const;
+
+    canopen::cia402::Axis machine_;
+    canopen::cia402::AxisCommand command_;
+    Written written_;
+    bool adopted_ = false;
+    bool touched_ = false;
+    bool in_motion_ = false;
+    std::int64_t began_ns_ = 0;
+    std::int64_t timeout_ns_ = 0;
+    std::int64_t deadline_ns_ = INT64_MAX;
 };
 
 }  // namespace hal::tools

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The parameters of `set` and `NAME?`.
+#include "bus/can/drive_values.hpp"
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <fmt/core.h>
 
-#include "bus/can/drive_shell.hpp"
 #include "cia402/error_words.hpp"
 #include "cli/output.hpp"
 #include "text/diagnostic.hpp"
@@ -73,22 +73,6 @@ Factor* find_factor(SdoAxis& a, const std::string& name) {
     return found == std::end(factors) ? nullptr : all[found - std::begin(factors)];
 }
 
-bool no_such_value(const Options& options, const std::string& name, bool reading) {
-    const std::string hint = did_you_mean(name, value_names(reading));
-    fail(options,
-         fmt::format("unknown parameter '{}'; {}", name, hint.empty() ? "type: help" : hint));
-
-    return false;
-}
-
-}  // namespace
-
-bool parse_real(const std::string& text, double& value) {
-    const char* first = text.c_str() + (text.starts_with('+') ? 1 : 0);
-    const auto [end, error] = std::from_chars(first, text.c_str() + text.size(), value);
-    return error == std::errc() && *end == '\0' && std::isfinite(value);
-}
-
 /// Parses `4096/360`, `4096,360`, `4096`.
 bool parse_factor(const std::string& text, Factor& factor) {
     const auto mark = text.find_first_of("/,");
@@ -100,13 +84,57 @@ bool parse_factor(const std::string& text, Factor& factor) {
     return true;
 }
 
+/// A value that the drive reports about itself.
+struct Report {
+    const char* name;
+    std::string (*text)(const SdoAxis&);
+};
+constexpr Report reports[] = {
+    {"position", [](const SdoAxis& a) { return fmt::format("{:.10g}", a.position()); }},
+    {"speed", [](const SdoAxis& a) { return fmt::format("{:.10g}", a.velocity()); }},
+    {"torque",
+     [](const SdoAxis& a) {
+    return fmt::format("{:.10g}", a.rules.torque.to_user(a.seen().torque));
+}},
+    {"mode", [](const SdoAxis& a) { return std::string(abbreviation(a.seen().mode)); }},
+    {"state",
+     [](const SdoAxis& a) { return std::string(to_string(state_of(a.seen().statusword))); }},
+};
+
+const Report* find_report(const std::string& name) {
+    const auto* found = std::find_if(std::begin(reports), std::end(reports),
+                                     [&](const Report& each) { return name == each.name; });
+    return found == std::end(reports) ? nullptr : found;
+}
+
+/// The values of an object of `bytes`, as numbers.
+struct Range {
+    double min, max;
+};
+Range range_of(unsigned bytes, bool is_signed) {
+    const int bits = static_cast<int>(8 * bytes);
+    if (!is_signed) return {0.0, std::ldexp(1.0, bits) - 1};
+    const double max = std::ldexp(1.0, bits - 1) - 1;
+    return {-max - 1, max};
+}
+
+}  // namespace
+
+bool parse_real(const std::string& text, double& value) {
+    const char* first = text.c_str() + (text.starts_with('+') ? 1 : 0);
+    const auto [end, error] = std::from_chars(first, text.c_str() + text.size(), value);
+    return error == std::errc() && *end == '\0' && std::isfinite(value);
+}
+
 std::vector<std::string> value_names(bool reading) {
     std::vector<std::string> names(std::begin(factors), std::end(factors));
     for (const Setting& s : settings) {
         names.emplace_back(s.name);
     }
     if (reading) {
-        names.insert(names.end(), {"position", "speed", "torque", "mode", "state"});
+        for (const Report& report : reports) {
+            names.emplace_back(report.name);
+        }
     }
     return names;
 }
@@ -122,56 +150,53 @@ std::string value_help() {
     return text;
 }
 
-bool DriveShell::query(SdoAxis& a, const std::string& name) {
-    if (const Factor* f = find_factor(a, name)) {
-        return print_line(
-            fmt::format("{}: {} {:.10g}/{:.10g}", a.letter(), name, f->numerator, f->denominator));
-    }
-    for (const Setting& s : settings) {
-        if (name != s.name) continue;
-        double value = 0;
-        return fetch(a, name, value) &&
-               print_line(fmt::format("{}: {} {:.10g}", a.letter(), name, value));
-    }
-    const bool known = name == "position" || name == "speed" || name == "torque" ||
-                       name == "mode" || name == "state";
-    if (!known) return no_such_value(options_, name, true);
-    if (!a.look()) return false;
-    const AxisFeedback& seen = a.seen();
-    const std::string value = name == "position" ? fmt::format("{:.10g}", a.position())
-                              : name == "speed"  ? fmt::format("{:.10g}", a.velocity())
-                              : name == "torque"
-                                  ? fmt::format("{:.10g}", a.rules.torque.to_user(seen.torque))
-                              : name == "mode" ? std::string(abbreviation(seen.mode))
-                                               : std::string(to_string(state_of(seen.statusword)));
-    return print_line(fmt::format("{}: {} {}", a.letter(), name, value));
+bool DriveValues::unknown(const std::string& name, bool reading) const {
+    const std::string hint = did_you_mean(name, value_names(reading));
+    return session_.wrong(
+        fmt::format("unknown parameter '{}'; {}", name, hint.empty() ? "type: help" : hint));
 }
 
-bool DriveShell::set(SdoAxis& a, const std::string& name, const std::string& text) {
+bool DriveValues::query(SdoAxis& a, const std::string& name) {
+    if (const Factor* f = find_factor(a, name)) {
+        return session_.print_line(
+            fmt::format("{}: {} {:.10g}/{:.10g}", a.letter(), name, f->numerator, f->denominator));
+    }
+    if (find_setting(name)) {
+        double value = 0;
+        return fetch(a, name, value) &&
+               session_.print_line(fmt::format("{}: {} {:.10g}", a.letter(), name, value));
+    }
+    const Report* const report = find_report(name);
+    if (!report) return unknown(name, true);
+    return a.look() &&
+           session_.print_line(fmt::format("{}: {} {}", a.letter(), name, report->text(a)));
+}
+
+bool DriveValues::set(SdoAxis& a, const std::string& name, const std::string& text) {
     if (Factor* f = find_factor(a, name)) {
         if (!parse_factor(text, *f)) {
-            return wrong(
+            return session_.wrong(
                 fmt::format("invalid factor '{}'; write NUMERATOR/DENOMINATOR, such as 4096/360, "
                             "neither of them 0",
                             text));
         }
-        if (settings_.one_shot) {
-            return without_effect(fmt::format("{} set {} {}", a.letter(), name, text));
+        if (session_.settings().one_shot) {
+            return session_.without_effect(fmt::format("{} set {} {}", a.letter(), name, text));
         }
         return query(a, name);
     }
     double value = 0;
     double back = 0;
-    if (!find_setting(name)) return no_such_value(options_, name, false);
+    if (!find_setting(name)) return unknown(name, false);
     if (!parse_real(text, value)) {
-        return wrong(
+        return session_.wrong(
             fmt::format("invalid number '{}'; type: {} set {} NUMBER", text, a.letter(), name));
     }
     return store(a, name, value, back) &&
-           print_line(fmt::format("{}: {} {:.10g}", a.letter(), name, back));
+           session_.print_line(fmt::format("{}: {} {:.10g}", a.letter(), name, back));
 }
 
-bool DriveShell::fetch(SdoAxis& a, const std::string& name, double& value) {
+bool DriveValues::fetch(SdoAxis& a, const std::string& name, double& value) {
     const Setting* s = find_setting(name);
     std::int64_t raw = 0;
     if (!s || !a.read(s->index, s->sub, raw, s->is_signed)) return false;
@@ -179,17 +204,15 @@ bool DriveShell::fetch(SdoAxis& a, const std::string& name, double& value) {
     return true;
 }
 
-bool DriveShell::store(SdoAxis& a, const std::string& name, double value, double& back) {
+bool DriveValues::store(SdoAxis& a, const std::string& name, double value, double& back) {
     const Setting* s = find_setting(name);
     if (!s) return false;
     const double raw = std::nearbyint(value * factor_of(a, s->unit));
-    const double most =
-        std::ldexp(1.0, static_cast<int>(8 * s->bytes) - (s->is_signed ? 1 : 0)) - 1;
-    const double least = s->is_signed ? -most - 1 : 0.0;
-    if (raw < least || raw > most) {
-        return wrong(
+    const auto [min, max] = range_of(s->bytes, s->is_signed);
+    if (raw < min || raw > max) {
+        return session_.wrong(
             fmt::format("{} {:.10g} is {:.10g} in drive units, out of the range {:.10g}..{:.10g}",
-                        name, value, raw, least, most));
+                        name, value, raw, min, max));
     }
     std::int64_t kept = 0;
     if (!a.write(s->index, s->sub, static_cast<std::int64_t>(raw), s->bytes)) return false;
@@ -199,7 +222,7 @@ bool DriveShell::store(SdoAxis& a, const std::string& name, double value, double
            a.refuse(fmt::format("drive accepted the write but keeps {} at {:.10g}", name, back));
 }
 
-bool DriveShell::status(SdoAxis& a) {
+bool DriveValues::status(SdoAxis& a) {
     if (!a.look()) return false;
     const AxisFeedback& seen = a.seen();
     const State state = state_of(seen.statusword);
@@ -222,7 +245,7 @@ bool DriveShell::status(SdoAxis& a) {
         text +=
             fmt::format("\n   error 0x{:04X}: {}", seen.error_code, error_word(seen.error_code));
     }
-    return print_line(text);
+    return session_.print_line(text);
 }
 
 }  // namespace hal::tools
