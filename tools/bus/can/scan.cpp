@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal can scan`: finds CANopen nodes. All 127 are queried at once for type and identity while heartbeats are received.
+// `hal can scan`: finds CANopen nodes. All 127 are queried at once for type and identity while
+// heartbeats are received.
 #include "bus/can/scan.hpp"
 
 #include <fmt/core.h>
@@ -20,8 +21,8 @@ namespace {
 struct Node {
     std::optional<canopen::NmtState> state;
     std::optional<std::uint32_t> type, identity[4];
-    std::string refused;  ///< abort of the read of its type
-    unsigned unasked = 0;
+    std::string abort;  ///< of the read of its type
+    unsigned unexpected_responses = 0;
     bool booted = false;
 };
 
@@ -33,10 +34,103 @@ std::string member(const std::optional<std::uint32_t>& value) {
 }
 
 std::string remark(const Node& n) {
-    if (n.unasked > 1) return "more than one response: possible duplicate node ID";
-    if (!n.refused.empty()) return "cannot read its type: " + n.refused;
+    if (n.unexpected_responses > 1) return "more than one response: possible duplicate node ID";
+    if (!n.abort.empty()) return "cannot read its type: " + n.abort;
     if (!n.type) return "no response to SDO requests";
     return profile_name(*n.type);
+}
+
+/// Returns nullptr for a node without heartbeat.
+const char* state_text(const Node& n) {
+    if (!n.state) return nullptr;
+    const bool boot_up = n.booted && *n.state == canopen::NmtState::initialising;
+    return boot_up ? "boot-up" : canopen::to_string(*n.state);
+}
+
+bool is_heartbeat(const can::Frame& f) {
+    if (f.own || f.error || f.extended || f.remote) return false;
+    return f.length == 1 && f.id > 0x700 && f.id <= 0x77f;
+}
+
+/// The nodes that send heartbeats or respond to a read.
+class NodeScan {
+public:
+    NodeScan() {
+        for (std::uint8_t node = 1; node <= 127; ++node) {
+            reads_.ask(node, type_index, 0);
+        }
+        reads_.on_answer = [this](const ParallelReads::Answer& answer) { apply(answer); };
+    }
+
+    void receive(const can::Frame& f) {
+        received_ += !f.own && !f.error;
+        reads_.handle(f);
+        if (!is_heartbeat(f)) return;
+        Node& n = nodes_[f.id & 0x7f];
+        n.state = static_cast<canopen::NmtState>(f.data[0] & 0x7f);
+        n.booted = n.booted || f.data[0] == 0;
+    }
+    void poll(can::Link& link) { reads_.poll(link, 8); }
+
+    const std::map<unsigned, Node>& nodes() const { return nodes_; }
+    /// Returns the number of frames of others.
+    std::uint64_t received() const { return received_; }
+
+private:
+    static constexpr std::uint16_t type_index = 0x1000;
+    static constexpr std::uint16_t identity_index = 0x1018;
+
+    void apply(const ParallelReads::Answer& answer) {
+        Node& n = nodes_[answer.node];
+        if (!answer.asked) {
+            ++n.unexpected_responses;
+        } else if (answer.index == type_index) {
+            apply_type(n, answer);
+        } else if (answer.abort == 0) {
+            n.identity[answer.sub - 1] = answer.value;
+        }
+    }
+    void apply_type(Node& n, const ParallelReads::Answer& answer) {
+        if (answer.abort == 0) {
+            n.type = answer.value;
+        } else {
+            n.abort = canopen::to_string(static_cast<canopen::Abort>(answer.abort));
+        }
+        for (std::uint8_t sub = 1; sub <= 4; ++sub) {
+            reads_.ask(answer.node, identity_index, sub);
+        }
+    }
+
+    std::map<unsigned, Node> nodes_;
+    ParallelReads reads_;
+    std::uint64_t received_ = 0;
+};
+
+std::string table_of(const std::map<unsigned, Node>& nodes) {
+    std::string text = fmt::format("{:>4}  {:15}  {:10}  {:10}  {:10}  {:10}  {}\n", "node",
+                                   "state", "type", "vendor", "product", "revision", "serial");
+    for (const auto& [id, n] : nodes) {
+        const char* const state = state_text(n);
+        text +=
+            fmt::format("{:>4}  {:15}  {:10}  {:10}  {:10}  {:10}  {:10}  {}\n", id,
+                        state ? state : "no heartbeat", cell(n.type), cell(n.identity[0]),
+                        cell(n.identity[1]), cell(n.identity[2]), cell(n.identity[3]), remark(n));
+    }
+    return text;
+}
+
+std::string json_of(const std::map<unsigned, Node>& nodes) {
+    std::string text;
+    for (const auto& [id, n] : nodes) {
+        const char* const state = state_text(n);
+        const char* const separator = text.empty() ? "[" : ",\n ";
+        text += fmt::format(
+            R"({}{{"node":{},"state":{},"device_type":{},"vendor":{},"product":{},"revision":{},"serial":{},"remark":"{}"}})",
+            separator, id, state ? fmt::format("\"{}\"", state) : "null", member(n.type),
+            member(n.identity[0]), member(n.identity[1]), member(n.identity[2]),
+            member(n.identity[3]), remark(n));
+    }
+    return text + "]\n";
 }
 
 }  // namespace
@@ -48,75 +142,24 @@ int run_can_scan(const ScanOptions& options) {
     }
     Bus bus;
     if (!bus.open(options, options.words[0], false)) return 1;
-    std::map<unsigned, Node> nodes;
-    ParallelReads reads;
-    std::uint64_t heard = 0;
-    for (std::uint8_t node = 1; node <= 127; ++node) {
-        reads.ask(node, 0x1000, 0);
-    }
-    reads.on_answer = [&](const ParallelReads::Answer& a) {
-        Node& n = nodes[a.node];
-        if (!a.asked) {
-            ++n.unasked;
-        } else if (a.index == 0x1000) {
-            if (a.abort == 0) {
-                n.type = a.value;
-            } else {
-                n.refused = canopen::to_string(static_cast<canopen::Abort>(a.abort));
-            }
-            for (std::uint8_t sub = 1; sub <= 4; ++sub) {
-                reads.ask(a.node, 0x1018, sub);
-            }
-        } else if (a.abort == 0) {
-            n.identity[a.sub - 1] = a.value;
-        }
-    };
+    NodeScan scan;
     const std::int64_t for_ns = options.for_ns >= 0 ? options.for_ns : 1'000'000'000;
-    listen(bus, for_ns, [&](std::span<const can::Frame> batch) {
+    const auto receive = [&](std::span<const can::Frame> batch) {
         for (const can::Frame& f : batch) {
-            heard += !f.own && !f.error;
-            reads.handle(f);
-            if (f.own || f.error || f.extended || f.remote || f.length != 1 || f.id <= 0x700 ||
-                f.id > 0x77f) {
-                continue;
-            }
-            Node& n = nodes[f.id & 0x7f];
-            n.state = static_cast<canopen::NmtState>(f.data[0] & 0x7f);
-            n.booted = n.booted || f.data[0] == 0;
+            scan.receive(f);
         }
         return true;
-    }, 1'000'000, [&] { reads.poll(*bus.link, 8); });
-    const can::Statistics s = bus.link->statistics();
-    if (nodes.empty()) {
-        return fail(options,
-                    fmt::format("no node responded within {:g} s; the bus is {}, {} frames of "
-                                "others received; check bit rate and wiring",
-                                static_cast<double>(for_ns) / 1e9, can::to_string(s.state), heard));
+    };
+    listen(bus, for_ns, receive, 1'000'000, [&] { scan.poll(*bus.link); });
+    if (scan.nodes().empty()) {
+        const can::Statistics s = bus.link->statistics();
+        return fail(options, fmt::format("no node responded within {:g} s; the bus is {}, {} "
+                                         "frames of others received; check bit rate and wiring",
+                                         static_cast<double>(for_ns) / 1e9, can::to_string(s.state),
+                                         scan.received()));
     }
-    std::string text;
-    for (const auto& [id, n] : nodes) {
-        const char* state = n.state ? n.booted && *n.state == canopen::NmtState::initialising
-                                          ? "boot-up"
-                                          : canopen::to_string(*n.state)
-                                    : nullptr;
-        if (options.json) {
-            text += fmt::format(
-                R"({}{{"node":{},"state":{},"device_type":{},"vendor":{},"product":{},"revision":{},"serial":{},"remark":"{}"}})",
-                text.empty() ? "[" : ",\n ", id, state ? fmt::format("\"{}\"", state) : "null",
-                member(n.type), member(n.identity[0]), member(n.identity[1]), member(n.identity[2]),
-                member(n.identity[3]), remark(n));
-        } else {
-            if (text.empty()) {
-                text = fmt::format("{:>4}  {:15}  {:10}  {:10}  {:10}  {:10}  {}\n", "node",
-                                   "state", "type", "vendor", "product", "revision", "serial");
-            }
-            text += fmt::format("{:>4}  {:15}  {:10}  {:10}  {:10}  {:10}  {:10}  {}\n", id,
-                                state ? state : "no heartbeat", cell(n.type), cell(n.identity[0]),
-                                cell(n.identity[1]), cell(n.identity[2]), cell(n.identity[3]),
-                                remark(n));
-        }
-    }
-    return print(text + (options.json ? "]\n" : "")) ? 0 : 1;
+    const std::string text = options.json ? json_of(scan.nodes()) : table_of(scan.nodes());
+    return print(text) ? 0 : 1;
 }
 
 }  // namespace hal::tools
