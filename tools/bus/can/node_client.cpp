@@ -90,62 +90,77 @@ bool NodeClient::transfer(std::uint8_t node, canopen::SdoRequest& request) {
 
 namespace {
 
-/// Returns what to do about an abort, as part of a sentence; empty when there is no general advice.
-std::string advice(Abort why, const std::string& bus, unsigned node, std::uint16_t index) {
-    switch (why) {
-    case Abort::toggle:
-    case Abort::sequence:
-    case Abort::crc:
-    case Abort::block_size: return "frames were lost or reordered: retry, or add --segmented";
-    case Abort::command:
-        return "another master may access this node, or it does not support block transfer: add "
-               "--segmented";
-    case Abort::timeout:
-        return "the device timed out; to check for an overloaded bus: hal can load";
-    case Abort::write_only: return "the object is write-only";
-    case Abort::read_only: return "the object is read-only";
-    case Abort::no_object: return "see the EDS of the device for its objects";
-    case Abort::no_sub: return "sub-index 0 is the highest sub-index of the object";
-    case Abort::not_mappable: return "mappable objects have PDOMapping=1 in the EDS of the device";
-    case Abort::pdo_length:
-        return "a PDO holds 8 bytes, and this device may allow fewer objects: map less";
-    case Abort::length:
-    case Abort::too_long:
-    case Abort::too_short: return "the object has another length: add --type, such as u16 or i32";
-    case Abort::value:
-    case Abort::too_high:
-    case Abort::too_low: return "see LowLimit and HighLimit in the EDS of the device";
-    case Abort::incompatible:
-    case Abort::internal_incompatible:
-    case Abort::range_reversed: return "it conflicts with another object of the device";
-    case Abort::access:
-        return fmt::format(
-            "the object may be locked while in use; disable a PDO before changing it: hal can pdo "
-            "show {} {}, then pdo disable",
-            bus, node);
-    case Abort::cannot_store:
-        if (index == 0x1f50) {
-            return "the device rejected the image and may have no valid program now; check that "
-                   "the image is for this device";
-        }
-        return "1010 accepts only 0x65766173 (save), 1011 only 0x64616F6C (load); otherwise the "
-               "memory is locked or worn out";
-    case Abort::local_control: return "the device is under local control";
-    case Abort::device_state:
-        if (index == 0x1f50) {
-            return fmt::format(
-                "stop and clear its program first: hal can sdo write {0} {1} 1F51:1 0 --type u8, "
-                "then 3",
-                bus, node);
-        }
-        return fmt::format(
-            "most settings are accepted in pre-operational only: hal can nmt {} preop {}", bus,
-            node);
-    case Abort::hardware:
-        return fmt::format("see its error register: hal can sdo read {} {} 1001", bus, node);
-    case Abort::no_resource: return "all SDO channels of the device are in use";
-    default: return "";
+/// Advice about an abort, as part of a sentence: {0} is the bus, {1} the node.
+struct Advice {
+    Abort abort;
+    const char* text;
+};
+
+constexpr const char* lost_frames = "frames were lost or reordered: retry, or add --segmented";
+constexpr const char* wrong_length =
+    "the object has another length: add --type, such as u16 or i32";
+constexpr const char* out_of_limits = "see LowLimit and HighLimit in the EDS of the device";
+constexpr const char* conflict = "it conflicts with another object of the device";
+
+constexpr Advice advices[] = {
+    {Abort::toggle, lost_frames},
+    {Abort::sequence, lost_frames},
+    {Abort::crc, lost_frames},
+    {Abort::block_size, lost_frames},
+    {Abort::command,
+     "another master may access this node, or it does not support block transfer: add --segmented"},
+    {Abort::timeout, "the device timed out; to check for an overloaded bus: hal can load"},
+    {Abort::write_only, "the object is write-only"},
+    {Abort::read_only, "the object is read-only"},
+    {Abort::no_object, "see the EDS of the device for its objects"},
+    {Abort::no_sub, "sub-index 0 is the highest sub-index of the object"},
+    {Abort::not_mappable, "mappable objects have PDOMapping=1 in the EDS of the device"},
+    {Abort::pdo_length, "a PDO holds 8 bytes, and this device may allow fewer objects: map less"},
+    {Abort::length, wrong_length},
+    {Abort::too_long, wrong_length},
+    {Abort::too_short, wrong_length},
+    {Abort::value, out_of_limits},
+    {Abort::too_high, out_of_limits},
+    {Abort::too_low, out_of_limits},
+    {Abort::incompatible, conflict},
+    {Abort::internal_incompatible, conflict},
+    {Abort::range_reversed, conflict},
+    {Abort::access,
+     "the object may be locked while in use; disable a PDO before changing it: hal can pdo show "
+     "{0} {1}, then pdo disable"},
+    {Abort::cannot_store,
+     "1010 accepts only 0x65766173 (save), 1011 only 0x64616F6C (load); otherwise the memory is "
+     "locked or worn out"},
+    {Abort::local_control, "the device is under local control"},
+    {Abort::device_state,
+     "most settings are accepted in pre-operational only: hal can nmt {0} preop {1}"},
+    {Abort::hardware, "see its error register: hal can sdo read {0} {1} 1001"},
+    {Abort::no_resource, "all SDO channels of the device are in use"},
+};
+
+/// The advice about program data (1F50h), where it differs.
+constexpr Advice program_advices[] = {
+    {Abort::cannot_store,
+     "the device rejected the image and may have no valid program now; check that the image is for "
+     "this device"},
+    {Abort::device_state,
+     "stop and clear its program first: hal can sdo write {0} {1} 1F51:1 0 --type u8, then 3"},
+};
+
+const char* find_advice(std::span<const Advice> rows, Abort abort) {
+    const auto row = std::find_if(rows.begin(), rows.end(),
+                                  [&](const Advice& each) { return each.abort == abort; });
+    return row == rows.end() ? nullptr : row->text;
+}
+
+/// Returns what to do about an abort; empty when there is no general advice.
+std::string advice(Abort abort, const std::string& bus, unsigned node, std::uint16_t index) {
+    constexpr std::uint16_t program_data = 0x1f50;
+    const char* text = index == program_data ? find_advice(program_advices, abort) : nullptr;
+    if (!text) {
+        text = find_advice(advices, abort);
     }
+    return text ? fmt::format(fmt::runtime(text), bus, node) : "";
 }
 
 }  // namespace
