@@ -65,8 +65,13 @@ std::string listed(const std::vector<std::string>& names) {
         while (to < names.size() && stem(names[to]) == stem(names[from])) {
             ++to;
         }
-        text +=
-            (from == 0 ? "" : ", ") + names[from] + (to - from > 1 ? " … " + names[to - 1] : "");
+        if (from > 0) {
+            text += ", ";
+        }
+        text += names[from];
+        if (to - from > 1) {
+            text += " … " + names[to - 1];
+        }
     }
     return text;
 }
@@ -209,83 +214,130 @@ private:
     can::State bus_ = can::State::active;
 };
 
-int turn_until_ended(const NodeOptions& options, const NodeKind& kind, canopen::Program& program,
-                     std::vector<Setting> settings, std::uint8_t id,
-                     const std::vector<std::pair<canopen::Fault, canopen::FaultSetting>>& faults) {
-    StopRequest stop;
-    can::Options how;
-    how.receive_capacity = 16384;
-    std::string link = options.link;
-    std::unique_ptr<TdmaStation> station;
-    const std::int64_t give_up = options.for_ns >= 0 ? monotonic_ns() + options.for_ns : INT64_MAX;
-    const auto ended = [&] { return stop.wait_ns(5'000'000) || monotonic_ns() >= give_up; };
-    if (!options.tdma.empty()) {
-        const std::string problem = TdmaStation::make(options, link, ended, station);
-        if (!problem.empty()) return fail(options, problem);
-    }
-    can::Opened opened = can::open(link, how);
-    if (!opened) return fail(options, opened.problem);
-    const can::Description about = opened.link->description();
-    if (const std::string why = out_of_reach(about); !why.empty()) return fail(options, why);
-    canopen::Node node(program, std::move(opened.link),
-                       {.node_id = id, .auto_start = options.starts_itself});
-    for (const auto& [fault, setting] : faults) {
-        node.faults().set(fault, setting);
-    }
+using Faults = std::vector<std::pair<canopen::Fault, canopen::FaultSetting>>;
 
-    const std::string who =
-        id == canopen::unconfigured ? "without node ID" : fmt::format("node {}", id);
-    if (!print(fmt::format("{}, {} on {} ({}): {}; press Ctrl-C to end\n", kind.name, who,
-                           about.address, about.transport, kind.what))) {
-        return 1;
-    }
-    const std::int64_t began = monotonic_ns();
+/// One run of a node: turns it on its link until the time is over, a signal arrives, or standard
+/// output is closed.
+class NodeRun {
+public:
+    NodeRun(const NodeOptions& options, const NodeKind& kind, canopen::Program& program,
+            std::vector<Setting> settings)
+        : options_(options), kind_(kind), program_(program), settings_(std::move(settings)) {}
 
-    const std::int64_t end = options.for_ns >= 0 ? began + options.for_ns : INT64_MAX;
-    std::optional<BackgroundWriter> writer;
-    if (station) {
-        writer.emplace();
-    }
-    Reporter reporter(node, program, began, [&](const std::string& text) {
-        return writer ? writer->write(text) : print(text);
-    });
-    std::size_t next = 0;
-    std::string problem;
-    const auto change_world = [&](std::int64_t now) {
-        for (; next < settings.size() && now - began >= settings[next].at_ns; ++next) {
-            program.set(settings[next].name, settings[next].value);
+    /// Returns the exit status.
+    int run(std::uint8_t id, const Faults& faults) {
+        std::string link = options_.link;
+        std::unique_ptr<TdmaStation> station;
+        if (const std::string problem = make_station(link, station); !problem.empty()) {
+            return fail(options_, problem);
         }
-    };
-    const auto look = [&](std::int64_t now) {
-        return reporter.look(now) && (!kind.keep || (problem = kind.keep()).empty());
-    };
-    std::int64_t now = began;
-    bool is_read = true;
-    if (station) {
-        station->run([&](std::int64_t local, bool) {
-            change_world(now);
-            node.turn(local, can::unclocked);
-            now = monotonic_ns();
-            return !stop.requested() && now < end && (is_read = look(now));
+        can::Options settings;
+        settings.receive_capacity = 16384;
+        can::Opened opened = can::open(link, settings);
+        if (!opened) return fail(options_, opened.problem);
+        const can::Description about = opened.link->description();
+        if (const std::string why = out_of_reach(about); !why.empty()) return fail(options_, why);
+        canopen::Node node(program_, std::move(opened.link),
+                           {.node_id = id, .auto_start = options_.starts_itself});
+        for (const auto& [fault, setting] : faults) {
+            node.faults().set(fault, setting);
+        }
+        if (!announce(id, about)) return 1;
+        began_ns_ = monotonic_ns();
+        now_ns_ = began_ns_;
+        end_ns_ = end_of(began_ns_);
+        return station ? run_on_segment(node, *station) : run_on_link(node, about.simulated);
+    }
+
+private:
+    std::int64_t end_of(std::int64_t began_ns) const {
+        return options_.for_ns >= 0 ? began_ns + options_.for_ns : INT64_MAX;
+    }
+    bool over() const { return stop_.requested() || now_ns_ >= end_ns_; }
+
+    /// Makes the station of a TDMA segment, if one is wanted; `link` is then its end of the bus.
+    std::string make_station(std::string& link, std::unique_ptr<TdmaStation>& station) {
+        if (options_.tdma.empty()) return {};
+        const std::int64_t give_up = end_of(monotonic_ns());
+        const auto ended = [&] { return stop_.wait_ns(5'000'000) || monotonic_ns() >= give_up; };
+        return TdmaStation::make(options_, link, ended, station);
+    }
+
+    bool announce(std::uint8_t id, const can::Description& about) const {
+        const std::string who =
+            id == canopen::unconfigured ? "without node ID" : fmt::format("node {}", id);
+        return print(fmt::format("{}, {} on {} ({}): {}; press Ctrl-C to end\n", kind_.name, who,
+                                 about.address, about.transport, kind_.what));
+    }
+
+    /// Sets the values of the environment whose time has come.
+    void apply_settings() {
+        while (next_setting_ < settings_.size() &&
+               now_ns_ - began_ns_ >= settings_[next_setting_].at_ns) {
+            const Setting& setting = settings_[next_setting_];
+            program_.set(setting.name, setting.value);
+            ++next_setting_;
+        }
+    }
+
+    /// Prints what has changed, and keeps the memory of the node. Returns false at a failure.
+    bool report(Reporter& reporter) {
+        is_read_ = reporter.look(now_ns_);
+        if (!is_read_) return false;
+        if (kind_.keep) {
+            problem_ = kind_.keep();
+        }
+        return problem_.empty();
+    }
+
+    int run_on_segment(canopen::Node& node, TdmaStation& station) {
+        std::optional<BackgroundWriter> writer(std::in_place);
+        Reporter reporter(node, program_, began_ns_,
+                          [&](const std::string& text) { return writer->write(text); });
+        station.run([&](std::int64_t local_ns, bool) {
+            apply_settings();
+            node.turn(local_ns, can::unclocked);
+            now_ns_ = monotonic_ns();
+            return !over() && report(reporter);
         });
         writer.reset();
-        if (is_read) {
-            is_read = print(station->summary());
+        if (is_read_ && problem_.empty()) {
+            is_read_ = print(station.summary());
         }
-    } else {
-        while (!stop.requested() && now < end) {
-            change_world(now);
-            node.turn(now, about.simulated ? now : can::unclocked);
-            is_read = look(now);
-            if (!is_read) break;
-            node.link().wait(1'000'000);
-            now = monotonic_ns();
-        }
+        return finish(reporter);
     }
-    if (!problem.empty()) return fail(options, problem);
-    if (!is_read) return 1;
-    return print(reporter.end(now)) ? 0 : 1;
-}
+
+    int run_on_link(canopen::Node& node, bool simulated) {
+        Reporter reporter(node, program_, began_ns_,
+                          [](const std::string& text) { return print(text); });
+        while (!over()) {
+            apply_settings();
+            node.turn(now_ns_, simulated ? now_ns_ : can::unclocked);
+            if (!report(reporter)) break;
+            node.link().wait(1'000'000);
+            now_ns_ = monotonic_ns();
+        }
+        return finish(reporter);
+    }
+
+    int finish(Reporter& reporter) const {
+        if (!problem_.empty()) return fail(options_, problem_);
+        if (!is_read_) return 1;
+        return print(reporter.end(now_ns_)) ? 0 : 1;
+    }
+
+    StopRequest stop_;
+    const NodeOptions& options_;
+    const NodeKind& kind_;
+    canopen::Program& program_;
+    const std::vector<Setting> settings_;
+    std::size_t next_setting_ = 0;
+    std::int64_t began_ns_ = 0;
+    std::int64_t now_ns_ = 0;
+    std::int64_t end_ns_ = INT64_MAX;
+    bool is_read_ = true;  // standard output is open
+    std::string problem_;
+};
 
 }  // namespace
 
@@ -337,7 +389,7 @@ int run_node(const NodeOptions& options, const NodeKind& kind, canopen::Program&
     std::stable_sort(settings.begin(), settings.end(),
                      [](const Setting& a, const Setting& b) { return a.at_ns < b.at_ns; });
     try {
-        return turn_until_ended(options, kind, program, std::move(settings), id, faults);
+        return NodeRun(options, kind, program, std::move(settings)).run(id, faults);
     } catch (const std::invalid_argument& e) {
         return fail(options, e.what());
     }
