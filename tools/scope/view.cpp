@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Keys of the scope.
 #include "scope/view.hpp"
 
 #include <algorithm>
 #include <cmath>
+
+#include "scope/picture.hpp"
 
 namespace hal::tools {
 
@@ -30,10 +31,15 @@ std::pair<double, double> range_of(const Samples& samples) {
 
 double next_step(double value, bool up) {
     const double decade = std::pow(10.0, std::floor(std::log10(value) + 1e-9));
-
     const double digit = value / decade;
-    if (up) return decade * (digit < 1.5 ? 2 : digit < 4.5 ? 5 : 10);
-    return decade * (digit > 4.5 ? 2 : digit > 1.5 ? 1 : 0.5);
+    if (up) {
+        if (digit < 1.5) return decade * 2;
+        if (digit < 4.5) return decade * 5;
+        return decade * 10;
+    }
+    if (digit > 4.5) return decade * 2;
+    if (digit > 1.5) return decade;
+    return decade * 0.5;
 }
 
 ScopeView::ScopeView(Acquisition& acquisition, bool unicode, bool colour)
@@ -243,10 +249,31 @@ void ScopeView::move_cursor(int samples) {
     // On a sample, the one before `next` is where the cursor is.
     const bool on_sample =
         next > 0 && all[static_cast<std::size_t>(next - 1)].time_ns == at + record.trigger_ns;
-    const auto target = samples > 0 ? next + samples - 1 : next + samples - (on_sample ? 1 : 0);
+    const bool one_less = samples > 0 || on_sample;
+    const auto target = next + samples - std::ptrdiff_t{one_less};
     const auto index = static_cast<std::size_t>(
         std::clamp<std::ptrdiff_t>(target, 0, static_cast<std::ptrdiff_t>(all.size()) - 1));
     at = std::clamp(all[index].time_ns, record.begin_ns, record.end_ns) - record.trigger_ns;
+}
+
+/// Fits all channels once, when there is something to see.
+void ScopeView::fit_first_record() {
+    if (fitted_) return;
+    const Record record = shown();
+    const bool has_trace = std::any_of(record.samples.begin(), record.samples.end(),
+                                       [](const Samples& samples) { return samples.size() > 1; });
+    const bool ready = acquisition_.record() || acquisition_.state() == State::armed;
+    if (!has_trace || !ready) return;
+    fit_all();
+    fitted_ = true;
+}
+
+std::vector<std::string> ScopeView::frame(std::size_t columns, std::size_t rows,
+                                          std::uint64_t lost) {
+    if (columns >= ScopePicture::min_columns && rows >= ScopePicture::min_rows) {
+        fit_first_record();
+    }
+    return ScopePicture(*this, acquisition_, unicode_, colour_).lines(columns, rows, lost);
 }
 
 }  // namespace hal::tools

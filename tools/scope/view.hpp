@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The scope's picture in the terminal and what its keys change. Knows no terminal: tests give it
-// keys and read its lines.
+// What the scope's keys change: scales, cursors, trigger, time window. Knows no terminal: tests give
+// it keys and read its lines.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "cli/keys.hpp"
-#include "cli/raster.hpp"
 #include "scope/acquisition.hpp"
 
 namespace hal::tools {
@@ -19,20 +18,18 @@ constexpr int divisions_y = 8;
 /// How a channel is drawn.
 struct ChannelView {
     double per_division = 1;  ///< of the channel's unit
-    double centre = 0;        ///< the value in the middle of the picture
+    double centre = 0;  ///< the value in the middle of the picture
     bool shown = true;
 };
 
 class ScopeView {
 public:
-    /// Changes the acquisition by its keys. `colour` false: one colour, channels are marked by
-    /// numbers only.
+    /// Changes the acquisition by its keys. `unicode`, `colour`: of the picture.
     ScopeView(Acquisition& acquisition, bool unicode, bool colour);
 
     enum class Action { none, quit, save };
     Action key(const Key& key);
-    /// Draws columns x rows characters; at least 40 x 10, otherwise one line that asks for more.
-    /// `lost`: samples.
+    /// Returns the lines of a ScopePicture, after fitting the first record. `lost`: samples.
     std::vector<std::string> frame(std::size_t columns, std::size_t rows, std::uint64_t lost = 0);
     /// Shows a sentence below the picture until the next key.
     void say(std::string sentence) { message_ = std::move(sentence); }
@@ -53,6 +50,9 @@ public:
         std::int64_t at_ns[2] = {0, 0};  ///< relative to the trigger
     };
     const Cursors& cursors() const { return cursors_; }
+    bool measures() const { return measures_; }
+    bool help() const { return help_; }
+    const std::string& message() const { return message_; }
 
 private:
     Action letter(char c);
@@ -69,12 +69,7 @@ private:
     void change_window(std::int64_t total_ns, std::int64_t pre_ns);
     void fit_lane(std::size_t channel, double lane_divisions, double above_centre);
     void select(std::size_t channel);
-
-    std::string status_line(const Record& record, std::uint64_t lost) const;
-    std::string channel_line(const Record& record, std::size_t channel) const;
-    void draw_grid(Raster& raster, const Record& record) const;
-    void draw_trace(Raster& raster, const Record& record, std::size_t channel) const;
-    std::uint8_t colour_of(std::size_t channel) const;
+    void fit_first_record();
 
     Acquisition& acquisition_;
     bool unicode_, colour_;
