@@ -6,6 +6,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fmt/format.h>
+#include <poll.h>
 #include <thread>
 #include <unistd.h>
 
@@ -14,6 +15,7 @@
 #include "machine/processes/programs.hpp"
 #include "run/fault_lines.hpp"
 #include "run/report.hpp"
+#include "text/diagnostic.hpp"
 
 namespace hal::tools {
 
@@ -35,28 +37,32 @@ Launch::Launch(const LinuxcncOptions& options, const Configuration& configuratio
       configuration_(configuration),
       machine_(machine),
       lock_(lock),
-      task_watch_(configuration.nml, configuration.task_timeout_ns) {
+      programs_(options, configuration, machine),
+      monitor_(configuration, machine, programs_) {
     machine_.ini_path = configuration.file;
 }
 
-int Launch::run() {
+bool Launch::start_task_and_netlists() {
     const Configuration& c = configuration_;
-    const auto component = [this](const char* key, const char* name, const Words& program) {
-        return program.empty() || start_component(key, name, program);
+    const auto component = [this](const char* key, const char* name, const Words& program,
+                                  bool reads_ini = true) {
+        return program.empty() || start_component(key, name, program, reads_ini);
     };
     const auto modules = [&] { return load_module(c.planner) && load_module(c.homing); };
-    const bool newer = c.linuxcnc.version == LinuxcncVersion::v2_10;
-    const bool started =
-        check() && start_server() &&
-        (newer ? modules() && component("[TASK]TASK", "inihal", c.task) &&
-                     component("[HAL]HALUI", "halui", c.halui) &&
-                     (c.bridge.empty() ||
-                      start_component("[HAL]HALBRIDGE", "bridge", c.bridge, false)) &&
-                     load_netlists() && start_threads() && task_knows_motion()
-               : component("[EMCIO]EMCIO", "iocontrol", c.io) &&
-                     component("[HAL]HALUI", "halui", c.halui) && modules() && load_netlists() &&
-                     start_task()) &&
-        start_applications() && start_display();
+    if (c.linuxcnc.version == LinuxcncVersion::v2_10) {
+        return modules() && component("[TASK]TASK", "inihal", c.task) &&
+               component("[HAL]HALUI", "halui", c.halui) &&
+               component("[HAL]HALBRIDGE", "bridge", c.bridge, false) && load_netlists() &&
+               start_threads() && task_knows_motion();
+    }
+    return component("[EMCIO]EMCIO", "iocontrol", c.io) &&
+           component("[HAL]HALUI", "halui", c.halui) && modules() && load_netlists() &&
+           start_task();
+}
+
+int Launch::run() {
+    const bool started = check() && start_server() && start_task_and_netlists() &&
+                         start_applications() && start_display();
     if (started) {
         const FaultLines faults(machine_.session);
         watch();
@@ -96,17 +102,18 @@ bool Launch::check() {
         return step("check the configuration: left out");
     }
     if (!step("check the configuration")) return false;
-    const pid_t pid = start(std::filesystem::path(checker[checker.size() - 2]).filename(), checker);
-    const auto status = pid == 0 ? std::optional(1) : wait_for(pid, -1);
+    const pid_t pid =
+        programs_.start(std::filesystem::path(checker[checker.size() - 2]).filename(), checker);
+    const auto status = pid == 0 ? std::optional(1) : programs_.wait_for(pid, -1);
     return status == 0;
 }
 
 bool Launch::start_server() {
     if (!step("start linuxcncsvr")) return false;
-    const pid_t pid = start("linuxcncsvr", {"linuxcncsvr", "-ini", configuration_.file});
+    const pid_t pid = programs_.start("linuxcncsvr", {"linuxcncsvr", "-ini", configuration_.file});
     if (pid == 0) return false;
     // it ends once its successor, adopted by this process, has the buffers ready
-    const auto status = wait_for(pid, 10'000'000'000);
+    const auto status = programs_.wait_for(pid, 10'000'000'000);
     if (machine_.stop.requested()) return false;
     if (status && *status != 0) {
         fail(options_,
@@ -115,7 +122,7 @@ bool Launch::start_server() {
 
         return false;
     }
-    const auto running = servers();
+    const auto running = programs_.servers();
     if (running.empty()) {
         fail(options_, "linuxcncsvr has ended; the NML buffers need it");
         return false;
@@ -133,7 +140,7 @@ bool Launch::start_component(const char* key, const char* component, const Words
         words.push_back(word);
     }
     if (!command(words, fmt::format("{} {}", configuration_.given, key))) return false;
-    components_.emplace_back(component, program[0]);
+    monitor_.add(component, program[0]);
     return true;
 }
 
@@ -203,7 +210,7 @@ bool Launch::start_task() {
     }
     waiting.join();
     if (task == 0) {
-        components_.emplace_back("inihal", configuration_.task[0]);
+        monitor_.add("inihal", configuration_.task[0]);
     }
     return good && task == 0 && !machine_.stop.requested();
 }
@@ -214,7 +221,7 @@ bool Launch::start_applications() {
     for (const Words& words : configuration_.applications) {
         if (words.empty()) continue;
         if (!step(fmt::format("start {}", words[0]))) return false;
-        const pid_t pid = start("[APPLICATIONS]APP", words);
+        const pid_t pid = programs_.start("[APPLICATIONS]APP", words);
         if (pid == 0) return false;
         applications_.push_back({words[0], pid});
     }
@@ -252,49 +259,126 @@ bool Launch::start_display() {
         words.insert(words.end(), arguments.begin(), arguments.end());
         words.insert(words.end(), options_.arguments.begin(), options_.arguments.end());
     }
-    display_.pid = start("[DISPLAY]DISPLAY", words, true);
+    display_.pid = programs_.start("[DISPLAY]DISPLAY", words, true);
     return display_.pid != 0;
 }
 
+bool Launch::display_ended() {
+    const auto status = programs_.ended(display_.pid);
+    if (!status) return false;
+    // What ends all its programs, such as Ctrl-C in the terminal, is about to arrive here too.
+    if (*status > 128 && machine_.stop.wait_ns(200'000'000)) {
+        status_ = 0;
+        return true;
+    }
+    status_ = *status;
+    if (*status != 0) {
+        fail(options_, fmt::format("the display '{}' {}", display_.name, end_description(*status)));
+    }
+    return true;
+}
+
+void Launch::report(const LaunchMonitor::Failure& failure) {
+    status_ = 1;
+    if (failure.task_works) {
+        fail(options_, failure.sentence + "; the machine ends");
+        return;
+    }
+    stop_threads();
+    fail(options_, failure.sentence + "; the outputs have their safe values, the machine ends");
+}
+
 void Launch::watch() {
-    Failure found;
-    unsigned looks = 0;
-    for (std::chrono::steady_clock::time_point since{};;) {
-        if (machine_.stop.requested()) return void(status_ = 0);
+    LaunchMonitor::Failure found;
+    std::chrono::steady_clock::time_point since{};
+    for (unsigned looks = 1;; ++looks) {
+        if (machine_.stop.requested()) break;
         if (display_.pid != 0) {
-            if (const auto status = ended(display_.pid)) {
-                // What ends all its programs, such as Ctrl-C in the terminal, is about to arrive
-                // here too.
-                if (*status > 128 && machine_.stop.wait_ns(200'000'000)) return void(status_ = 0);
-                status_ = *status;
-                if (*status != 0) {
-                    fail(options_, fmt::format("the display '{}' {}", display_.name,
-                                               end_description(*status)));
-                }
-                return;
-            }
+            if (display_ended()) return;
         } else if (line_typed()) {
-            return void(status_ = 0);
+            break;
         }
-        if (++looks % 5 == 0) {
-            report_gaps();
+        const bool look_at_threads = looks % 5 == 0;
+        if (look_at_threads) {
+            monitor_.report_gaps();
         }
         if (found.sentence.empty()) {
-            found = failure(looks % 5 == 0);
+            found = monitor_.failure(look_at_threads);
             since = std::chrono::steady_clock::now();
         } else if (std::chrono::steady_clock::now() - since > 200ms) {
-            if (!found.task_works) {
-                stop_threads();
-            }
-            status_ = 1;
-            fail(options_,
-                 found.sentence + (found.task_works
-                                       ? "; the machine ends"
-                                       : "; the outputs have their safe values, the machine ends"));
+            report(found);
             return;
         }
         machine_.stop.wait_ns(20'000'000);
     }
+    status_ = 0;
+}
+
+bool Launch::line_typed() {
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    char c = 0;
+    while (::poll(&input, 1, 0) > 0) {
+        if (::read(STDIN_FILENO, &c, 1) <= 0 || c == '\n') return true;
+    }
+    return false;
+}
+
+void Launch::stop_threads() {
+    const auto lock = machine_.session.lock();
+    Diagnostics diagnostics;
+    if (!machine_.session.threads().stop(&diagnostics)) {
+        write_all(STDERR_FILENO,
+                  render(diagnostics, machine_.session.sources, colours(STDERR_FILENO)));
+    }
+}
+
+/// Runs the netlist of [HAL]SHUTDOWN.
+void Launch::run_shutdown() {
+    if (configuration_.shutdown.empty()) return;
+    step(fmt::format("run {}", configuration_.shutdown));
+    std::string path, text, problem;
+    if (!read_netlist(configuration_.shutdown, configuration_.folder, path, text, problem)) {
+        fail(options_, fmt::format("[HAL]SHUTDOWN is '{}', which cannot be read: {}",
+                                   configuration_.shutdown, problem));
+        return;
+    }
+    machine_.shell.run_text(path, std::move(text), output_);
+}
+
+void Launch::end() {
+    machine_.shell.cancel(false);
+    if (!programs_.runs("inihal")) {
+        stop_threads();  // nobody commands motion
+    }
+    if (display_.pid != 0) {
+        step("end the display");
+    }
+    programs_.end_program(display_);
+    for (LaunchPrograms::Program& application : applications_) {
+        programs_.end_program(application);
+    }
+    // In the place of motmod, for tests: what task of 2.9 sends while it ends does not belong to
+    // the log.
+    if (configuration_.linuxcnc.version == LinuxcncVersion::v2_9) {
+        programs_.end_component("motion-logger");
+    }
+    if (programs_.runs("inihal")) {
+        step(fmt::format("end {}", configuration_.task[0]));
+    }
+    programs_.end_component("inihal");
+    programs_.end_component("motion-logger");
+    if (!programs_.servers().empty()) {
+        step("end linuxcncsvr");
+    }
+    programs_.end_server();
+    run_shutdown();
+    step("stop the threads");
+    stop_threads();
+    step("unload everything");
+    machine_.shell.execute(Words{"unload", "all"}, output_, "<linuxcnc>");
+    programs_.wait_until_idle();
+    machine_.shut_down();
+    programs_.end_orphans();
 }
 
 }  // namespace hal::tools

@@ -1,19 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The programs of a run: started, watched, ended.
-#include <algorithm>
+#include "linuxcnc/launch_programs.hpp"
+
 #include <chrono>
 #include <csignal>
 #include <fmt/format.h>
-#include <poll.h>
 #include <unistd.h>
 
 #include "cli/output.hpp"
-#include "commands/files.hpp"
-#include "hal/clock.hpp"
-#include "linuxcnc/launch.hpp"
+#include "linuxcnc/leftovers.hpp"
 #include "machine/processes/programs.hpp"
-#include "text/diagnostic.hpp"
-#include "text/numbers.hpp"
 
 namespace hal::tools {
 
@@ -25,7 +20,7 @@ constexpr std::int64_t end_timeout_ns = 5'000'000'000;  // from SIGTERM to SIGKI
 
 }  // namespace
 
-pid_t Launch::start(const std::string& key, const Words& words, bool terminal) {
+pid_t LaunchPrograms::start(const std::string& key, const Words& words, bool terminal) {
     ProcessStart how;
     how.arguments = words;
     how.directory = configuration_.folder;
@@ -39,14 +34,14 @@ pid_t Launch::start(const std::string& key, const Words& words, bool terminal) {
     return pid;
 }
 
-std::optional<int> Launch::ended(pid_t pid) {
+std::optional<int> LaunchPrograms::ended(pid_t pid) {
     const auto lock = machine_.session.lock();
     const auto* const entry = machine_.session.programs().find(pid);
     if (entry && !entry->ended()) return std::nullopt;
     return entry ? entry->status : 0;
 }
 
-std::optional<int> Launch::wait_for(pid_t pid, std::int64_t ns) {
+std::optional<int> LaunchPrograms::wait_for(pid_t pid, std::int64_t ns) {
     const auto until = std::chrono::steady_clock::now() + std::chrono::nanoseconds(ns);
     for (;;) {
         if (const auto status = ended(pid)) {
@@ -61,7 +56,7 @@ std::optional<int> Launch::wait_for(pid_t pid, std::int64_t ns) {
     }
 }
 
-std::vector<pid_t> Launch::servers() {
+std::vector<pid_t> LaunchPrograms::servers() {
     std::vector<pid_t> all;
     const auto lock = machine_.session.lock();
     for (bool again = true; again && all.empty();) {
@@ -82,146 +77,14 @@ std::vector<pid_t> Launch::servers() {
     return all;
 }
 
-bool Launch::runs(const std::string& component) {
+bool LaunchPrograms::runs(const std::string& component) {
     const auto lock = machine_.session.lock();
     const auto* const entry = machine_.session.programs().find(component);
     return entry && !entry->dead();
 }
 
-std::string Launch::death_of(const std::string& component, const std::string& program) {
-    const auto lock = machine_.session.lock();
-    const auto* const entry = machine_.session.programs().find(component);
-    if (entry && !entry->dead()) {
-        return {};
-    }
-    const std::string who = component == program
-                                ? fmt::format("'{}'", program)
-                                : fmt::format("'{}' (component {})", program, component);
-    std::string when = entry ? entry->death()->report : "";  // "since 12:34:56 (SIGKILL)"
-    if (when.starts_with("since ")) {
-        when.replace(0, 5, "at");
-    }
-    return when.empty() ? who + " died" : who + " died " + when;
-}
-
-std::string Launch::death() {
-    for (const auto& [component, program] : components_) {
-        if (std::string found = death_of(component, program); !found.empty()) return found;
-    }
-    const auto now = std::chrono::steady_clock::now();
-    if (now - looked_ < 500ms) {
-        return {};  // reading all of /proc is not for every 20 ms
-    }
-    looked_ = now;
-    return servers().empty() ? "'linuxcncsvr' died" : "";
-}
-
-std::string Launch::hang(bool& of_task) {
-    constexpr int most_looks = 50;  // of 20 ms: a second
-    for (const auto& [component, program] : components_) {
-        pid_t pid = 0;
-        {
-            const auto lock = machine_.session.lock();
-            const auto* const entry = machine_.session.programs().find(component);
-            if (entry && !entry->dead()) {
-                pid = entry->pid;
-            }
-        }
-        int& looks = stopped_looks_[component];
-        looks = pid != 0 && state_of(pid) == 'T' ? looks + 1 : 0;
-        if (looks < most_looks) continue;
-        of_task = component == "inihal";
-        return fmt::format("'{}' (component {}, process {}) is stopped by a signal for 1 s",
-                           program, component, pid);
-    }
-    const std::int64_t silent_ns = task_watch_.silent_ns();
-    if (silent_ns == 0) {
-        return {};
-    }
-    of_task = true;
-    return fmt::format("'{}' has ended no cycle for {} ([HALCYON]TASK_TIMEOUT {})",
-                       configuration_.task[0], format_duration(static_cast<double>(silent_ns)),
-                       format_duration(static_cast<double>(configuration_.task_timeout_ns)));
-}
-
-std::string Launch::stopped_thread() {
-    const auto lock = machine_.session.lock();
-    if (!machine_.session.threads().running()) {
-        return {};
-    }
-    for (const ThreadReport& report : machine_.session.reports().threads()) {
-        if (!report.faulted && !report.hung) continue;
-        const std::vector<FaultRecord> faults = machine_.session.reports().faults();
-        const auto newest =
-            std::find_if(faults.rbegin(), faults.rend(),
-                         [&](const FaultRecord& fault) { return fault.thread == report.name; });
-        if (newest == faults.rend()) {
-            return fmt::format("thread '{}' is stopped by a fault", report.name);
-        }
-        return newest->sentence.substr(0, newest->sentence.find("; "));
-    }
-    return {};
-}
-
-Launch::Failure Launch::failure(bool look_at_threads) {
-    Failure found;
-    if (found.sentence = death(); !found.sentence.empty()) {
-        found.task_works = runs("inihal");
-        return found;
-    }
-    bool of_task = false;
-    if (found.sentence = hang(of_task); !found.sentence.empty()) {
-        found.task_works = !of_task;
-        return found;
-    }
-    if (look_at_threads) {
-        found.sentence = stopped_thread();
-    }
-    found.task_works = found.sentence.empty();
-    return found;
-}
-
-void Launch::report_gaps() {
-    const std::int64_t now_ns = monotonic_ns();
-    std::vector<ThreadReport> reports;
-    {
-        const auto lock = machine_.session.lock();
-        reports = machine_.session.reports().threads();
-    }
-    for (const ThreadReport& report : reports) {
-        std::uint64_t& seen = gaps_[report.name];
-        if (report.gaps == seen) continue;
-        seen = report.gaps;
-        gap_log_.print(report.name,
-                       fmt::format("{}: no CPU time for {}; the machine goes on "
-                                   "([HALCYON]MAX_CPU_GAP {}); see: hal doctor",
-                                   report.name, format_duration(static_cast<double>(report.gap_ns)),
-                                   format_duration(static_cast<double>(configuration_.max_gap_ns))),
-                       now_ns);
-    }
-    gap_log_.flush(now_ns);
-}
-
-bool Launch::line_typed() {
-    pollfd input{STDIN_FILENO, POLLIN, 0};
-    char c = 0;
-    while (::poll(&input, 1, 0) > 0) {
-        if (::read(STDIN_FILENO, &c, 1) <= 0 || c == '\n') return true;
-    }
-    return false;
-}
-
-void Launch::stop_threads() {
-    const auto lock = machine_.session.lock();
-    Diagnostics diagnostics;
-    if (!machine_.session.threads().stop(&diagnostics)) {
-        write_all(STDERR_FILENO,
-                  render(diagnostics, machine_.session.sources, colours(STDERR_FILENO)));
-    }
-}
-
 /// SIGTERM, and SIGKILL when that has no effect in time.
-void Launch::end_program(Program& program) {
+void LaunchPrograms::end_program(Program& program) {
     if (program.pid == 0) return;
     const auto gone = [&] {
         if (!ended(program.pid)) return false;
@@ -240,7 +103,7 @@ void Launch::end_program(Program& program) {
     program.pid = 0;
 }
 
-void Launch::end_server() {
+void LaunchPrograms::end_server() {
     for (const int number : {SIGTERM, SIGKILL}) {
         for (const pid_t pid : servers()) {
             ::kill(pid, number);
@@ -252,7 +115,7 @@ void Launch::end_server() {
     }
 }
 
-void Launch::end_component(const std::string& name) {
+void LaunchPrograms::end_component(const std::string& name) {
     auto lock = machine_.session.lock();
     Programs& programs = machine_.session.programs();
     const auto* const entry = programs.find(name);
@@ -276,7 +139,7 @@ void Launch::end_component(const std::string& name) {
 }
 
 /// Programs that others have started, and that have outlived them: helpers of the display.
-void Launch::end_orphans() {
+void LaunchPrograms::end_orphans() {
     const auto ours = [&](pid_t pid) {
         const auto lock = machine_.session.lock();
         return machine_.session.programs().find(pid) != nullptr;
@@ -307,56 +170,12 @@ void Launch::end_orphans() {
     }
 }
 
-void Launch::end() {
-    machine_.shell.cancel(false);
-    if (!runs("inihal")) {
-        stop_threads();  // nobody commands motion
+void LaunchPrograms::wait_until_idle() {
+    auto lock = machine_.session.lock();
+    const auto until = std::chrono::steady_clock::now() + std::chrono::nanoseconds(end_timeout_ns);
+    while (!machine_.session.programs().idle() && std::chrono::steady_clock::now() < until) {
+        machine_.session.programs().wait(lock, 50ms);
     }
-    if (display_.pid != 0) {
-        step("end the display");
-    }
-    end_program(display_);
-    for (Program& application : applications_) {
-        end_program(application);
-    }
-    // In the place of motmod, for tests: what task of 2.9 sends while it ends does not belong to
-    // the log.
-    if (configuration_.linuxcnc.version == LinuxcncVersion::v2_9) {
-        end_component("motion-logger");
-    }
-    if (runs("inihal")) {
-        step(fmt::format("end {}", configuration_.task[0]));
-    }
-    end_component("inihal");
-    end_component("motion-logger");
-    if (!servers().empty()) {
-        step("end linuxcncsvr");
-    }
-    end_server();
-    if (!configuration_.shutdown.empty()) {
-        step(fmt::format("run {}", configuration_.shutdown));
-        std::string path, text, problem;
-        if (read_netlist(configuration_.shutdown, configuration_.folder, path, text, problem)) {
-            machine_.shell.run_text(path, std::move(text), output_);
-        } else {
-            fail(options_, fmt::format("[HAL]SHUTDOWN is '{}', which cannot be read: {}",
-                                       configuration_.shutdown, problem));
-        }
-    }
-    step("stop the threads");
-    stop_threads();
-    step("unload everything");
-    machine_.shell.execute(Words{"unload", "all"}, output_, "<linuxcnc>");
-    {
-        auto lock = machine_.session.lock();
-        const auto until =
-            std::chrono::steady_clock::now() + std::chrono::nanoseconds(end_timeout_ns);
-        while (!machine_.session.programs().idle() && std::chrono::steady_clock::now() < until) {
-            machine_.session.programs().wait(lock, 50ms);
-        }
-    }
-    machine_.shut_down();
-    end_orphans();
 }
 
 }  // namespace hal::tools
