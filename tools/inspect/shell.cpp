@@ -117,61 +117,79 @@ Client::Options client_options(const RemoteShellOptions& options) {
     return how;
 }
 
-/// Executes commands from standard input that is not a terminal: a file as a whole; from a pipe,
-/// each line when it comes, so that a program can wait for the answer.
-int follow_input(Client& client, const RemoteShellOptions& options) {
-    struct stat about{};
-    if (::fstat(STDIN_FILENO, &about) == 0 && S_ISREG(about.st_mode)) {
-        std::string text;
-        if (!read_file("-", text)) {
-            return complain(options, fmt::format("cannot read standard input: {}", text));
-        }
-        return show(options, client.run_text("<stdin>", text));
+/// Where a pipe stands.
+struct PipeState {
+    std::uint32_t line = 0;  ///< number of the last command
+    std::uint32_t begin = 0;  ///< where the lines begin that are collected; 0: none are
+    int status = 0;
+};
+
+/// Reports after an error what the lines before it have changed.
+void report_partial(const RemoteShellOptions& options, const PipeState& at) {
+    // the last line that took effect
+    const std::uint32_t last = (at.begin != 0 ? at.begin : at.line) - 1;
+    std::string sentence = "a pipe is read line by line: ";
+    if (last > 0) {
+        const std::string lines =
+            last == 1 ? "line 1 was" : fmt::format("lines 1 to {} were", last);
+        sentence += fmt::format("{} carried out before the error in line {}", lines, at.line);
     }
+    if (last > 0 && at.begin != 0) {
+        sentence += "; ";
+    }
+    if (at.begin != 0) {
+        sentence += fmt::format("the edits collected from line {} on had no effect", at.begin);
+    }
+    complain(options, sentence);
+}
+
+/// Executes the lines of a pipe when they come, so that a program can wait for the answer.
+int follow_pipe(Client& client, const RemoteShellOptions& options) {
     RemoteShell executor(client, options, "<stdin>");
     LineReader input(STDIN_FILENO);
-    int status = 0;
-    // where the lines begin that are collected; 0: none are
-    std::uint32_t number = 1;
-    std::uint32_t first = 1;
-    std::uint32_t begin = 0;
-    for (std::string line, more;
-         !executor.over() && (status == 0 || options.keep_going) && input.read(line); ++number) {
-        first = number;
-        for (; line.ends_with('\\') && input.read(more); ++number) {
+    PipeState at;
+    std::uint32_t next = 1;
+    std::string line;
+    while (!executor.over() && (at.status == 0 || options.keep_going) && input.read(line)) {
+        at.line = next;
+        std::string more;
+        while (line.ends_with('\\') && input.read(more)) {
             line += '\n' + more;
+            ++next;
         }
-        const int done = executor.execute(line, first);
-        status = std::max(status, done);
-        if (executor.collecting() && begin == 0) {
-            begin = first;
+        ++next;
+        const int done = executor.execute(line, at.line);
+        at.status = std::max(at.status, done);
+        if (executor.collecting() && at.begin == 0) {
+            at.begin = at.line;
         }
         if (!executor.collecting() && (done == 0 || options.keep_going)) {
-            begin = 0;
+            at.begin = 0;
         }
     }
-    if (status != 0 && !options.keep_going && first > 1) {
-        const std::uint32_t last = (begin != 0 ? begin : first) - 1;  // that took effect
-        std::string sentence = "a pipe is read line by line: ";
-        if (last > 0) {
-            sentence += fmt::format(
-                "{} carried out before the error in line {}",
-                last == 1 ? "line 1 was" : fmt::format("lines 1 to {} were", last), first);
-        }
-        if (last > 0 && begin != 0) {
-            sentence += "; ";
-        }
-        if (begin != 0) {
-            sentence += fmt::format("the edits collected from line {} on had no effect", begin);
-        }
-        complain(options, sentence);
-    } else if (executor.collecting()) {
-        return complain(
-            options,
-            fmt::format("'begin' in line {} without 'commit': the collected edits had no effect",
-                        begin));
+    if (at.status != 0 && !options.keep_going && at.line > 1) {
+        report_partial(options, at);
+        return at.status;
     }
-    return status;
+    if (!executor.collecting()) return at.status;
+    return complain(
+        options,
+        fmt::format("'begin' in line {} without 'commit': the collected edits had no effect",
+                    at.begin));
+}
+
+/// Executes commands from standard input that is not a terminal: a file as a whole; a pipe line by
+/// line.
+int follow_input(Client& client, const RemoteShellOptions& options) {
+    struct stat about{};
+    if (::fstat(STDIN_FILENO, &about) != 0 || !S_ISREG(about.st_mode)) {
+        return follow_pipe(client, options);
+    }
+    std::string text;
+    if (!read_file("-", text)) {
+        return complain(options, fmt::format("cannot read standard input: {}", text));
+    }
+    return show(options, client.run_text("<stdin>", text));
 }
 
 /// The end of a connection after `begin` discards the collected edits.
@@ -235,11 +253,64 @@ int follow_file(Client& client, const RemoteShellOptions& options) {
     return show(options, client.run_text(path, text));
 }
 
+/// The commands of -e.
+int run_commands(Client& client, const RemoteShellOptions& options) {
+    int status = 0;
+    Client::Answer last{};
+    for (const std::string& command : options.execute) {
+        if (status != 0 && !options.keep_going) break;
+        std::optional<int> done = run_own(options, client, command);
+        if (!done) {
+            last = client.run(command, "<commandline>");
+            done = show(options, last);
+        }
+        status = std::max(status, *done);
+    }
+    return without_commit(options, last, status);
+}
+
+/// The command of the command line.
+int run_words(Client& client, const RemoteShellOptions& options) {
+    const std::vector<std::string>& words = options.words;
+    if (const auto own = run_own(options, client, fmt::format("{}", fmt::join(words, " ")))) {
+        return *own;
+    }
+    // A single word with blanks is a line that was typed between quotes.
+    const bool line = words.size() == 1 && words[0].find_first_of(" \t") != std::string::npos;
+    const Client::Answer answer = line ? client.run(words[0], "<commandline>") : client.run(words);
+    return without_commit(options, answer, show(options, answer));
+}
+
+Prompt prompt_of(const RemoteShellOptions& options) {
+    if (options.script) return {"%%\n", "%%\n"};
+    if (options.classic) return {"halcmd: ", "halcmd+: "};
+    return {"hal> ", "hal+> "};
+}
+
+/// The commands that a person types.
+int run_prompt(Client& client, const RemoteShellOptions& options) {
+    if (!options.classic) {
+        print(fmt::format("instance '{}', process {}; 'help' lists the commands, Tab completes\n",
+                          client.instance(), client.pid()));
+    }
+    const Interrupts interrupts;
+    client.cancel_on(interrupts.descriptor());
+    RemoteShell executor(client, options, "<shell>");
+    const int status = run_prompt_loop(executor, prompt_of(options));
+    if (client.connected()) return status;
+    const std::string& why = client.closed_because();
+    if (why.empty()) {
+        return complain(options, fmt::format("instance '{}' has ended", client.instance()));
+    }
+    return complain(options,
+                    fmt::format("instance '{}' closed the connection: {}", client.instance(), why));
+}
+
 }  // namespace
 
 int run_shell(const RemoteShellOptions& options) {
-    if (options.from_file && !options.words.empty() && !options.classic &&
-        options.words.size() > 1) {
+    const bool has_file = options.from_file && !options.words.empty();
+    if (has_file && !options.classic && options.words.size() > 1) {
         return complain(options,
                         fmt::format("unexpected argument '{}' after the file; options go before -f",
                                     options.words[1]));
@@ -248,53 +319,16 @@ int run_shell(const RemoteShellOptions& options) {
     const auto client = Client::connect(instance_wanted(options.name), problem);
     if (!client) return complain(options, problem);
     client->on_notice([](std::string_view text) { write_all(STDERR_FILENO, text); });
-    Client::Options how = client_options(options);
-    if (!options.ini.empty() && !read_ini(options, how)) return 1;
-    if (!client->set_options(how) && !client->connected()) {
+    Client::Options settings = client_options(options);
+    if (!options.ini.empty() && !read_ini(options, settings)) return 1;
+    if (!client->set_options(settings) && !client->connected()) {
         return complain(options, fmt::format("instance '{}' does not respond", client->instance()));
     }
-    if (options.from_file && !options.words.empty()) return follow_file(*client, options);
-    if (!options.execute.empty()) {
-        int status = 0;
-        Client::Answer last{};
-        for (const std::string& command : options.execute) {
-            if (status != 0 && !options.keep_going) break;
-            const auto own = run_own(options, *client, command);
-            status = std::max(
-                status, own ? *own : show(options, last = client->run(command, "<commandline>")));
-        }
-        return without_commit(options, last, status);
-    }
-    if (!options.words.empty() && !options.from_file) {
-        // A single word with blanks is a line that was typed between quotes.
-        if (const auto own =
-                run_own(options, *client, fmt::format("{}", fmt::join(options.words, " ")))) {
-            return *own;
-        }
-        const bool line =
-            options.words.size() == 1 && options.words[0].find_first_of(" \t") != std::string::npos;
-        const Client::Answer answer =
-            line ? client->run(options.words[0], "<commandline>") : client->run(options.words);
-        return without_commit(options, answer, show(options, answer));
-    }
+    if (has_file) return follow_file(*client, options);
+    if (!options.execute.empty()) return run_commands(*client, options);
+    if (!options.words.empty()) return run_words(*client, options);
     if (!::isatty(STDIN_FILENO)) return follow_input(*client, options);
-    if (!options.classic) {
-        print(fmt::format("instance '{}', process {}; 'help' lists the commands, Tab completes\n",
-                          client->instance(), client->pid()));
-    }
-    const Interrupts interrupts;
-    client->cancel_on(interrupts.descriptor());
-    RemoteShell executor(*client, options, "<shell>");
-    const Prompt prompt = options.script    ? Prompt{"%%\n", "%%\n"}
-                          : options.classic ? Prompt{"halcmd: ", "halcmd+: "}
-                                            : Prompt{"hal> ", "hal+> "};
-    const int status = run_prompt_loop(executor, prompt);
-    if (client->connected()) return status;
-    const std::string& why = client->closed_because();
-    return complain(options, why.empty()
-                                 ? fmt::format("instance '{}' has ended", client->instance())
-                                 : fmt::format("instance '{}' closed the connection: {}",
-                                               client->instance(), why));
+    return run_prompt(*client, options);
 }
 
 }  // namespace hal::tools
