@@ -55,64 +55,104 @@ Sent Sender::drop(Sent why) noexcept {
     return why;
 }
 
-Sent Sender::leave(std::span<const std::uint8_t> frame, const Launch& launch) noexcept {
-    std::array<std::uint8_t, smallest_frame> small{};
-    std::array<std::uint8_t, largest_frame> large;
-    const auto length = frame.size();
-    if (length < smallest_frame) {
-        std::memcpy(small.data(), frame.data(), length);
-        frame = small;
-    } else if (launch.stamp_at != 0 || launch.finisher != nullptr) {
-        if (frame.size() > large.size()) return drop(Sent::rejected);
-        std::memcpy(large.data(), frame.data(), frame.size());
-        frame = {large.data(), frame.size()};
+namespace {
+
+void write_big_endian(std::uint8_t* to, std::uint64_t value) noexcept {
+    for (int i = 8; i-- > 0; value >>= 8) {
+        to[i] = static_cast<std::uint8_t>(value);
     }
+}
+
+/// A frame as it is sent: padded, and in a buffer of its own when it is changed at launch.
+class Outgoing {
+public:
+    /// Returns false for a frame that is too long to be changed.
+    bool adopt(std::span<const std::uint8_t> frame, bool changes) noexcept {
+        length_ = frame.size();
+        bytes_ = frame;
+        if (length_ < smallest_frame) {
+            std::memcpy(buffer_.data(), frame.data(), length_);
+            std::memset(buffer_.data() + length_, 0, smallest_frame - length_);
+            bytes_ = {buffer_.data(), smallest_frame};
+            return true;
+        }
+        if (!changes) return true;
+        if (length_ > buffer_.size()) return false;
+        std::memcpy(buffer_.data(), frame.data(), length_);
+        bytes_ = {buffer_.data(), length_};
+        return true;
+    }
+    /// Returns what is sent.
+    std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
+    /// Returns the frame without padding, in the buffer.
+    std::span<std::uint8_t> content() noexcept { return {buffer_.data(), length_}; }
+
+private:
+    std::span<const std::uint8_t> bytes_;
+    std::size_t length_ = 0;
+    std::array<std::uint8_t, largest_frame> buffer_;
+};
+
+bool is_gone(int error) noexcept { return error == ENETDOWN || error == ENXIO || error == ENODEV; }
+
+}  // namespace
+
+/// Gives the bytes to the kernel. Returns 0 or errno.
+int Sender::transmit(std::span<const std::uint8_t> bytes) noexcept {
+    bool retried = false;
+    for (;;) {
+        if (::send(socket_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT) >= 0) return 0;
+        if (errno == EINTR) continue;
+        if (errno != ENETDOWN || retried) return errno;
+        retried = true;  // a stale error
+    }
+}
+
+/// Notes how far from its launch time a frame left.
+void Sender::measure(const Launch& launch, std::int64_t now_ns) noexcept {
+    if (launch.at_ns != 0) {
+        launch_error_ns.store(now_ns - launch.at_ns, std::memory_order_relaxed);
+    }
+    if (!transmit_stamps_) return;
+    read_stamps();
+    const auto left = departure_ns.load(std::memory_order_relaxed);
+    if (launch.at_ns != 0 && left >= now_ns) {
+        launch_error_ns.store(left - launch.at_ns, std::memory_order_relaxed);
+    }
+}
+
+Sent Sender::leave(std::span<const std::uint8_t> frame, const Launch& launch) noexcept {
+    const bool stamped = launch.stamp_at != 0;
+    const bool finished = launch.finisher != nullptr;
+    Outgoing outgoing;
+    if (!outgoing.adopt(frame, stamped || finished)) return drop(Sent::rejected);
     std::int64_t now = 0;
-    if (launch.at_ns != 0 || launch.stamp_at != 0) {
+    if (launch.at_ns != 0 || stamped) {
         now = link::monotonic_ns();
         if (launch.is_late(now)) return drop(Sent::late);
     }
-    auto* const own = frame.data() == small.data() ? small.data() : large.data();
-    if (launch.stamp_at != 0) {
-        auto* place = own + launch.stamp_at;
-        auto stamp = static_cast<std::uint64_t>(now + launch.stamp_add_ns);
-        for (int i = 8; i-- > 0; stamp >>= 8) {
-            place[i] = static_cast<std::uint8_t>(stamp);
-        }
+    if (stamped) {
+        write_big_endian(outgoing.content().data() + launch.stamp_at,
+                         static_cast<std::uint64_t>(now + launch.stamp_add_ns));
     }
-    if (launch.finisher != nullptr) {
-        launch.finisher->leaves({own, length});
+    if (finished) {
+        launch.finisher->leaves(outgoing.content());
     }
-    for (int tries = 0;; ++tries) {
-        if (::send(socket_.get(), frame.data(), frame.size(), MSG_DONTWAIT) >= 0) break;
-        const int error = errno;
-        if (error == EINTR) continue;
-        if (error == ENETDOWN && tries == 0) {
-            continue;  // a stale error
-        }
-        if (launch.finisher != nullptr) {
-            launch.finisher->stayed({own, length});
+    if (const int error = transmit(outgoing.bytes()); error != 0) {
+        if (finished) {
+            launch.finisher->stayed(outgoing.content());
         }
         errors.fetch_add(1, std::memory_order_relaxed);
         dropped.fetch_add(1, std::memory_order_relaxed);
-        if (error == ENETDOWN || error == ENXIO || error == ENODEV) return Sent::down;
+        if (is_gone(error)) return Sent::down;
         return error == EMSGSIZE ? Sent::rejected : Sent::full;
     }
     if (now != 0) {
         last_ns_.store(now, std::memory_order_relaxed);
     }
     sent.fetch_add(1, std::memory_order_relaxed);
-    sent_bytes.fetch_add(frame.size(), std::memory_order_relaxed);
-    if (launch.at_ns != 0) {
-        launch_error_ns.store(now - launch.at_ns, std::memory_order_relaxed);
-    }
-    if (transmit_stamps_) {
-        read_stamps();
-        if (const auto left = departure_ns.load(std::memory_order_relaxed);
-            launch.at_ns != 0 && left >= now) {
-            launch_error_ns.store(left - launch.at_ns, std::memory_order_relaxed);
-        }
-    }
+    sent_bytes.fetch_add(outgoing.bytes().size(), std::memory_order_relaxed);
+    measure(launch, now);
     return Sent::queued;
 }
 

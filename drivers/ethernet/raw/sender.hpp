@@ -4,6 +4,7 @@
 #pragma once
 
 #include <atomic>
+#include <span>
 #include <string>
 
 #include "link/ethernet.hpp"
@@ -46,6 +47,8 @@ public:
     std::atomic<std::int64_t> departure_ns{0};
 
 private:
+    int transmit(std::span<const std::uint8_t> bytes) noexcept;
+    void measure(const Launch&, std::int64_t now_ns) noexcept;
     void read_stamps() noexcept;
 
     RealTime& clock_;
