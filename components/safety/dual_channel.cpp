@@ -72,72 +72,108 @@ struct DualChannel : hal::Component {
     hal::Function run{*this, "", &DualChannel::update, "compares the channels"};
 
     void update(hal::Cycle cycle) noexcept {
-        const bool pressed = reset && !was_reset_;
+        const bool reset_edge = reset && !was_reset_;
         was_reset_ = reset;
         // the host wrote the safe value
         if (latch && fault_ == agree && !ok && was_ok_) {
             fault_ = not_reset;
         }
+        const Comparison now = compare();
+        count_time(now, cycle.seconds());
+        update_fault(now, reset_edge, cycle.seconds());
+        update_largest(now, reset_edge);
+        publish(now);
+    }
 
-        const double second = b * scale_b + offset_b;
-        const double apart = a - second;
-        const bool numbers = std::isfinite(apart) && std::isfinite(a + second);
-        const bool sound = tolerance >= 0.0 && relative >= 0.0 && time >= 0.0 &&
-                           std::isfinite(scale_b + offset_b) && choice <= nearer_0;
-        const double allowed = tolerance + relative * std::max(std::fabs(a), std::fabs(second));
+private:
+    /// The channels in one cycle.
+    struct Comparison {
+        double second = 0.0;      ///< b in the scale of a
+        double difference = 0.0;  ///< a - second
+        bool finite = false;
+        bool bits = false;        ///< both bits are TRUE
+        std::uint32_t found = agree;
+        bool agrees() const noexcept { return found == agree; }
+    };
+
+    bool parameters_valid() const noexcept {
+        return tolerance >= 0.0 && relative >= 0.0 && time >= 0.0 &&
+               std::isfinite(scale_b + offset_b) && choice <= nearer_0;
+    }
+
+    Comparison compare() const noexcept {
+        Comparison c;
+        c.second = b * scale_b + offset_b;
+        c.difference = a - c.second;
+        c.finite = std::isfinite(c.difference) && std::isfinite(a + c.second);
         const bool first_bit = bit_a;
         const bool second_bit = bit_b != antivalent;
-        std::uint32_t found = agree;
-        if (!sound) {
-            found = bad_parameter;
-        } else if (!numbers) {
-            found = no_number;
-        } else if (std::fabs(apart) > allowed * (1 + 1e-15)) {
-            found = values_differ;
+        c.bits = first_bit && second_bit;
+        const double allowed = tolerance + relative * std::max(std::fabs(a), std::fabs(c.second));
+        if (!parameters_valid()) {
+            c.found = bad_parameter;
+        } else if (!c.finite) {
+            c.found = no_number;
+        } else if (std::fabs(c.difference) > allowed * (1 + 1e-15)) {
+            c.found = values_differ;
         } else if (first_bit != second_bit) {
-            found = bits_differ;
+            c.found = bits_differ;
         }
+        return c;
+    }
 
-        for_ = found == agree ? 0.0 : std::min(for_ + cycle.seconds(), 1e9);
-        const bool late = for_ > time + cycle.seconds() * 1e-6 || time == 0.0;
-        if (found == agree) {
-            if (pressed || !latch) {
+    void count_time(const Comparison& now, double period) noexcept {
+        for_ = now.agrees() ? 0.0 : std::min(for_ + period, 1e9);
+    }
+
+    void update_fault(const Comparison& now, bool reset_edge, double period) noexcept {
+        if (now.agrees()) {
+            if (reset_edge || !latch) {
                 fault_ = agree;
             }
-        } else if ((late || found >= no_number) && fault_ == agree) {
-            fault_ = found;
+            return;
         }
-        if (pressed) {
+        if (fault_ != agree) return;
+        const bool late = for_ > time + period * 1e-6 || time == 0.0;
+        const bool immediate = now.found >= no_number;
+        if (late || immediate) {
+            fault_ = now.found;
+        }
+    }
+
+    void update_largest(const Comparison& now, bool reset_edge) noexcept {
+        if (reset_edge) {
             largest_ = 0.0;
         }
-        if (numbers) {
-            largest_ = std::max(largest_, std::fabs(apart));
+        if (now.finite) {
+            largest_ = std::max(largest_, std::fabs(now.difference));
         }
+    }
 
+    std::uint32_t reason_of(const Comparison& now) const noexcept {
+        if (fault_ != agree) return fault_;
+        return now.agrees() ? agree : differ;
+    }
+
+    void publish(const Comparison& now) noexcept {
         // Within the discrepancy time the value is held, and the bit is FALSE if one of the two is.
-        if (found == agree) {
-            good_ = chosen(second);
+        if (now.agrees()) {
+            good_ = chosen(now.second);
         }
         const bool healthy = fault_ == agree;
         was_ok_ = healthy;
         ok = healthy;
         fault = !healthy;
-        differs = found != agree;
-        if (!healthy) {
-            reason = fault_;
-        } else if (found == agree) {
-            reason = std::uint32_t{agree};
-        } else {
-            reason = std::uint32_t{differ};
-        }
-        out = healthy || !use_substitute || !std::isfinite(substitute) ? good_ : substitute.get();
-        bit_out = healthy && first_bit && second_bit;
-        difference = numbers ? apart : 0.0;
+        differs = !now.agrees();
+        reason = reason_of(now);
+        const bool substituted = !healthy && use_substitute && std::isfinite(substitute);
+        out = substituted ? substitute.get() : good_;
+        bit_out = healthy && now.bits;
+        difference = now.finite ? now.difference : 0.0;
         largest = largest_;
         since = for_;
     }
 
-private:
     double chosen(double second) const noexcept {
         switch (choice) {
         case channel_a: return a;
@@ -147,6 +183,7 @@ private:
         default: return a / 2 + second / 2;
         }
     }
+
     double for_ = 0.0;
     double good_ = 0.0;
     double largest_ = 0.0;
