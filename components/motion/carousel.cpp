@@ -283,57 +283,65 @@ private:
         left_ = std::max(left_ - dt, 0.0);
         switch (state_) {
         case State::rests: break;
-        case State::homing:
-            direction_ = 1;
-            if (encoding == Encoding::counts && !asked_index_) {
-                index_enable = asked_index_ = true;
-            }
-            if (!homed) break;
-            if (enable) {
-                set_out();
-            } else {
-                enter(State::rests);
-            }
-            break;
-        case State::moves:
-            if (position_ != target_ || !(marker_ || pocket_number == 0)) {
-                moved_ = true;
-            } else if (moved_ && align_dc != 0.0) {
-                wait(State::slows, decel_time);
-            } else {
-                arrive();
-            }
-            break;
-        case State::slows:
-            if (left_ > 0.0) break;
-            enter(direction_ > 0 && !marker_ ? State::seeks : State::leaves);
-            break;
-        case State::seeks:
-            if (marker_) {
-                enter(State::leaves);
-            }
-            break;
-        case State::leaves:
-            if (!marker_) {
-                enter(State::returns);
-            }
-            break;
+        case State::homing: step_homing(); break;
+        case State::moves: step_move(); break;
+        case State::slows: step_slowdown(); break;
+        case State::seeks: enter_if(marker_, State::leaves); break;
+        case State::leaves: enter_if(!marker_, State::returns); break;
         case State::returns:
             if (marker_) {
                 arrive();
             }
             break;
-        case State::locks:
-            if (left_ > 0.0) break;
-            ready = true;
-            enter(State::rests);
-            break;
+        case State::locks: step_lock(); break;
         case State::jogging:
             ready = false;
-            if (position_ == from_ || !marker_) break;
-            enter(State::rests);
+            enter_if(position_ != from_ && marker_, State::rests);
             break;
         }
+    }
+
+    void enter_if(bool condition, State next) noexcept {
+        if (condition) {
+            enter(next);
+        }
+    }
+
+    void step_homing() noexcept {
+        direction_ = 1;
+        if (encoding == Encoding::counts && !asked_index_) {
+            asked_index_ = true;
+            index_enable = true;
+        }
+        if (!homed) return;
+        if (enable) {
+            set_out();
+        } else {
+            enter(State::rests);
+        }
+    }
+
+    void step_move() noexcept {
+        const bool at_target = position_ == target_ && (marker_ || pocket_number == 0);
+        if (!at_target) {
+            moved_ = true;
+        } else if (moved_ && align_dc != 0.0) {
+            wait(State::slows, decel_time);
+        } else {
+            arrive();
+        }
+    }
+
+    void step_slowdown() noexcept {
+        if (left_ > 0.0) return;
+        const bool too_short = direction_ > 0 && !marker_;
+        enter(too_short ? State::seeks : State::leaves);
+    }
+
+    void step_lock() noexcept {
+        if (left_ > 0.0) return;
+        ready = true;
+        enter(State::rests);
     }
 
     void arrive() noexcept {
