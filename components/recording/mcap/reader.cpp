@@ -144,7 +144,7 @@ bool Reader::open(std::unique_ptr<Source> source) {
         channel_count_.reset();
     }
     const bool indexed = !chunks_.empty();
-    if (!scan(!summary_has_channels())) return false;
+    scan(!summary_has_channels());
     unfinished_ = !indexed && !(ends_ && (summary || footer));
     return true;
 }
@@ -164,51 +164,67 @@ bool Reader::summary_has_channels() const {
     return channel_count_ ? channels_.size() >= *channel_count_ : listed;
 }
 
-// A schema, a channel or an index: from the summary, or found by a scan.
-bool Reader::take(std::uint8_t opcode, std::string_view content) {
+void Reader::add_schema(Fields fields) {
+    const auto id = fields.get<std::uint16_t>();
+    Schema schema{id, std::string(fields.text()), std::string(fields.text()),
+                  std::string(fields.text())};
+    if (fields.good() && id != 0) {
+        schemas_.try_emplace(id, std::move(schema));
+    }
+}
+
+void Reader::add_channel(Fields fields) {
+    const auto id = fields.get<std::uint16_t>();
+    const auto schema = fields.get<std::uint16_t>();
+    Channel channel{id, schema, std::string(fields.text()), std::string(fields.text()),
+                    read_pairs(fields.text())};
+    if (fields.good()) {
+        channels_.try_emplace(id, std::move(channel));
+    }
+}
+
+bool Reader::add_chunk_index(Fields fields) {
+    ChunkIndex index;
+    index.begin_time = fields.get<std::uint64_t>();
+    index.end_time = fields.get<std::uint64_t>();
+    index.offset = fields.get<std::uint64_t>();
+    index.length = fields.get<std::uint64_t>();
+    for (Fields entries(fields.text()); entries.more();) {
+        const auto channel = entries.get<std::uint16_t>();
+        index.message_indexes[channel] = entries.get<std::uint64_t>();
+    }
+    index.message_index_length = fields.get<std::uint64_t>();
+    index.compression = fields.text();
+    index.compressed_size = fields.get<std::uint64_t>();
+    index.size = fields.get<std::uint64_t>();
+    if (!fields.good()) return fail("a chunk index is incomplete");
+    chunks_.push_back(std::move(index));
+    return true;
+}
+
+// Adds a schema, a channel or an index: from the summary, or found by a scan. Ignores other
+// records.
+bool Reader::add_entry(std::uint8_t opcode, std::string_view content) {
     if (schemas_.size() + channels_.size() + chunks_.size() + metadata_.size() > most_entries) {
         return fail("the file has too many parts");
     }
     Fields fields(content);
-    if (opcode == op_schema) {
-        const auto id = fields.get<std::uint16_t>();
-        Schema schema{id, std::string(fields.text()), std::string(fields.text()),
-                      std::string(fields.text())};
-        if (fields.good() && id != 0) {
-            schemas_.try_emplace(id, std::move(schema));
-        }
-    } else if (opcode == op_channel) {
-        const auto id = fields.get<std::uint16_t>();
-        const auto schema = fields.get<std::uint16_t>();
-        Channel channel{id, schema, std::string(fields.text()), std::string(fields.text()),
-                        read_pairs(fields.text())};
-        if (fields.good()) {
-            channels_.try_emplace(id, std::move(channel));
-        }
-    } else if (opcode == op_chunk_index) {
-        ChunkIndex index;
-        index.begin_time = fields.get<std::uint64_t>();
-        index.end_time = fields.get<std::uint64_t>();
-        index.offset = fields.get<std::uint64_t>();
-        index.length = fields.get<std::uint64_t>();
-        for (Fields entries(fields.text()); entries.more();) {
-            const auto channel = entries.get<std::uint16_t>();
-            index.message_indexes[channel] = entries.get<std::uint64_t>();
-        }
-        index.message_index_length = fields.get<std::uint64_t>();
-        index.compression = fields.text();
-        index.compressed_size = fields.get<std::uint64_t>();
-        index.size = fields.get<std::uint64_t>();
-        if (!fields.good()) return fail("a chunk index is incomplete");
-        chunks_.push_back(std::move(index));
-    } else if (opcode == op_metadata_index) {
+    switch (opcode) {
+    case op_schema: add_schema(fields); break;
+    case op_channel: add_channel(fields); break;
+    case op_chunk_index: return add_chunk_index(fields);
+    case op_metadata_index: {
         const auto offset = fields.get<std::uint64_t>();
         const auto length = fields.get<std::uint64_t>();
         metadata_.push_back({offset, length, std::string(fields.text())});
-    } else if (opcode == op_statistics) {
+        break;
+    }
+    case op_statistics:
         fields.get<std::uint64_t>();
         fields.get<std::uint16_t>();
         channel_count_ = fields.get<std::uint32_t>();
+        break;
+    default: break;
     }
     return true;
 }
@@ -238,68 +254,117 @@ bool Reader::read_summary() {
     for (Fields records(summary); records.more();) {
         const auto opcode = records.get<std::uint8_t>();
         const std::string_view content = records.blob();
-        if (!records.good() || !take(opcode, content)) return false;
+        if (!records.good() || !add_entry(opcode, content)) return false;
     }
     return true;
 }
 
+/// A record of the file, without its content.
+struct Reader::RecordHead {
+    std::uint8_t opcode = 0;
+    std::uint64_t offset = 0;
+    std::uint64_t length = 0;    ///< of the content
+    std::uint64_t log_time = 0;  ///< of a message
+
+    std::uint64_t whole() const { return record_head + length; }
+};
+
+/// What the summary lists.
+struct Reader::Listed {
+    std::set<std::uint64_t> chunks, metadata;  ///< offsets
+};
+
+// Returns false when the record is incomplete.
+bool Reader::read_head(std::uint64_t offset, RecordHead& record) {
+    const std::uint64_t left = source_->size() - offset;
+    const std::uint64_t count = std::min<std::uint64_t>(record_head + message_head, left);
+    std::string head;
+    if (!source_->read(offset, static_cast<std::size_t>(count), head)) return false;
+    Fields fields(head);
+    record.opcode = fields.get<std::uint8_t>();
+    record.offset = offset;
+    record.length = fields.get<std::uint64_t>();
+    fields.get<std::uint16_t>();
+    fields.get<std::uint32_t>();
+    record.log_time = fields.get<std::uint64_t>();
+    return record.length <= left - record_head;
+}
+
+bool Reader::read_content(const RecordHead& record, std::string& content) {
+    return source_->read(record.offset + record_head, static_cast<std::size_t>(record.length),
+                         content);
+}
+
+bool Reader::add_message(const RecordHead& record) {
+    if (record.length < message_head || record.length > most_chunk) return false;
+    if (chunks_.size() >= most_entries) return false;
+    add_loose(record.offset, record.whole(), record.log_time);
+    return true;
+}
+
+bool Reader::add_chunk(const RecordHead& record, bool listed) {
+    ChunkIndex index;
+    index.offset = record.offset;
+    index.length = record.whole();
+    if (chunks_.size() >= most_entries || !scan_chunk(index)) return false;
+    if (!listed) {
+        chunks_.push_back(std::move(index));
+    }
+    return true;
+}
+
+void Reader::add_metadata(const RecordHead& record) {
+    std::string content;
+    if (metadata_.size() >= 1000 || record.length > (1 << 20)) return;
+    if (!read_content(record, content)) return;
+    metadata_.push_back({record.offset, record.whole(), std::string(Fields(content).text())});
+}
+
+// Returns false for a record that ends the scan: it is damaged, or there are too many.
+bool Reader::add_record(const RecordHead& record, const Listed& listed, bool load_listed) {
+    switch (record.opcode) {
+    case op_message: return add_message(record);
+    case op_chunk: {
+        const bool is_listed = listed.chunks.contains(record.offset);
+        return (is_listed && !load_listed) || add_chunk(record, is_listed);
+    }
+    case op_schema:
+    case op_channel: {
+        std::string content;
+        if (record.length > most_chunk) return true;
+        return read_content(record, content) && add_entry(record.opcode, content);
+    }
+    case op_metadata:
+        if (!listed.metadata.contains(record.offset)) {
+            add_metadata(record);
+        }
+        return true;
+    default: return true;
+    }
+}
+
 // Reads the records after each other up to the first that is incomplete. Chunks of the summary are
-// read with `load_known` only, for the schemas and channels in them; metadata of the summary is
+// read with `load_listed` only, for the schemas and channels in them; metadata of the summary is
 // known.
-bool Reader::scan(bool load_known) {
-    const std::uint64_t size = source_->size();
-    std::set<std::uint64_t> known, described;
+void Reader::scan(bool load_listed) {
+    Listed listed;
     for (const ChunkIndex& chunk : chunks_) {
-        known.insert(chunk.offset);
+        listed.chunks.insert(chunk.offset);
     }
     for (const Metadata& one : metadata_) {
-        described.insert(one.offset);
+        listed.metadata.insert(one.offset);
     }
-    std::string head, content;
     ends_ = false;
-    for (std::uint64_t at = magic.size(); at + record_head <= size;) {
-        if (!source_->read(at,
-                           static_cast<std::size_t>(
-                               std::min<std::uint64_t>(record_head + message_head, size - at)),
-                           head)) {
-            break;
-        }
-        Fields fields(head);
-        const auto opcode = fields.get<std::uint8_t>();
-        const auto length = fields.get<std::uint64_t>();
-        ends_ = opcode == op_data_end;
-        if (length > size - at - record_head || ends_) break;
-        if (opcode == op_message) {
-            if (length < message_head || length > most_chunk || chunks_.size() >= most_entries) {
-                break;
-            }
-            fields.get<std::uint16_t>();
-            fields.get<std::uint32_t>();
-            add_loose(at, record_head + length, fields.get<std::uint64_t>());
-        } else if (opcode == op_chunk && (load_known || !known.contains(at))) {
-            ChunkIndex index;
-            index.offset = at;
-            index.length = record_head + length;
-            if (chunks_.size() >= most_entries || !scan_chunk(index)) break;
-            if (!known.contains(at)) {
-                chunks_.push_back(std::move(index));
-            }
-        } else if ((opcode == op_schema || opcode == op_channel) && length <= most_chunk) {
-            if (!source_->read(at + record_head, static_cast<std::size_t>(length), content) ||
-                !take(opcode, content)) {
-                break;
-            }
-        } else if (opcode == op_metadata && !described.contains(at) && metadata_.size() < 1000 &&
-                   length <= (1 << 20) &&
-                   source_->read(at + record_head, static_cast<std::size_t>(length), content)) {
-            metadata_.push_back({at, record_head + length, std::string(Fields(content).text())});
-        }
-        at += record_head + length;
+    RecordHead record;
+    for (std::uint64_t at = magic.size(); at + record_head <= source_->size();
+         at += record.whole()) {
+        const bool complete = read_head(at, record);
+        ends_ = record.opcode == op_data_end;
+        if (!complete || ends_ || !add_record(record, listed, load_listed)) break;
     }
     problem_.clear();
     std::stable_sort(chunks_.begin(), chunks_.end(),
                      [](const ChunkIndex& a, const ChunkIndex& b) { return a.offset < b.offset; });
-    return true;
 }
 
 // Completes the index of a chunk from its head, and reads the schemas and channels in it. A chunk
@@ -329,7 +394,7 @@ bool Reader::scan_chunk(ChunkIndex& index) {
     for (Fields inner(records); inner.more();) {
         const auto kind = inner.get<std::uint8_t>();
         const std::string_view what = inner.blob();
-        if (inner.good() && (kind == op_schema || kind == op_channel) && !take(kind, what)) {
+        if (inner.good() && (kind == op_schema || kind == op_channel) && !add_entry(kind, what)) {
             return false;
         }
     }
@@ -342,7 +407,8 @@ void Reader::add_loose(std::uint64_t at, std::uint64_t length, std::uint64_t tim
     if (chunks_.empty() || !chunks_.back().loose ||
         chunks_.back().offset + chunks_.back().length != at || chunks_.back().length >= run) {
         ChunkIndex& index = chunks_.emplace_back();
-        index.begin_time = index.end_time = time;
+        index.begin_time = time;
+        index.end_time = time;
         index.offset = at;
         index.loose = true;
     }

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "recording/mcap/bytes.hpp"
 #include "recording/mcap/records.hpp"
 
 namespace hal::mcap {
@@ -65,16 +66,28 @@ public:
     std::uint64_t chunks_read() const { return chunks_read_; }
 
 private:
+    struct RecordHead;
+    struct Listed;
+
     bool fail(std::string sentence) {
         problem_ = std::move(sentence);
         return false;
     }
     bool read_summary();
     bool summary_has_channels() const;
-    bool scan(bool load_known);
+    void scan(bool load_listed);
+    bool read_head(std::uint64_t offset, RecordHead&);
+    bool read_content(const RecordHead&, std::string& content);
+    bool add_record(const RecordHead&, const Listed&, bool load_listed);
+    bool add_message(const RecordHead&);
+    bool add_chunk(const RecordHead&, bool listed);
+    void add_metadata(const RecordHead&);
     bool scan_chunk(ChunkIndex& index);
     void add_loose(std::uint64_t at, std::uint64_t length, std::uint64_t time);
-    bool take(std::uint8_t opcode, std::string_view content);
+    bool add_entry(std::uint8_t opcode, std::string_view content);
+    void add_schema(Fields);
+    void add_channel(Fields);
+    bool add_chunk_index(Fields);
     bool load_chunk(const ChunkIndex& chunk, std::string& records);
 
     std::unique_ptr<Source> source_;

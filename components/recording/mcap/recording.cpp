@@ -135,6 +135,122 @@ bool read_log(std::string_view payload, std::string& kind, std::string& text) {
     return fields.good();
 }
 
+/// Fills a Recording from the channels and the messages of an MCAP file.
+class McapLoader {
+public:
+    McapLoader(Reader& reader, Recording& to, std::size_t max_bytes)
+        : reader_(reader), to_(to), max_bytes_(max_bytes), skipped_(to.skipped) {}
+
+    /// Makes the tables, one per channel that can be read.
+    void add_channels() {
+        for (const auto& [id, channel] : reader_.channels()) {
+            if (channel.topic == "/hal/events") {
+                event_encodings_[id] = channel.encoding;
+            } else if (!is_joint_state(reader_, channel)) {
+                add_channel(id, channel);
+            }
+        }
+    }
+
+    /// Returns false when the recording has become too large.
+    bool add(const Message& message) {
+        bytes_ += 8;
+        if (const auto row = rows_.find(message.channel); row != rows_.end()) {
+            if (!add_row(row->second, message)) return true;
+        } else if (event_encodings_.contains(message.channel)) {
+            if (!add_event(message)) return true;
+        }
+        return !too_large();
+    }
+
+    bool too_large() const { return bytes_ > max_bytes_; }
+
+    /// Sets the reasons why the recording is empty, and what of it was not read.
+    void finish() {
+        skipped_.finish();
+        if (!reader_.problem().empty()) {
+            to_.unread = reader_.problem();
+        } else if (!to_.unread.empty()) {
+            return;
+        } else if (!unreadable_.empty()) {
+            to_.unread = to_.skipped.back();
+        } else {
+            to_.unread = rows_.empty() ? "it has no topics" : "none of its topics has a message";
+        }
+    }
+
+private:
+    struct Row {
+        RowReader reader;
+        std::size_t table = 0;
+    };
+
+    void add_channel(std::uint16_t id, const Channel& channel) {
+        const auto schema = reader_.schemas().find(channel.schema);
+        if (schema == reader_.schemas().end()) return skip(channel, "it has no schema");
+        RowReader row;
+        if (!row.open(schema->second, channel)) return skip(channel, row.problem());
+        if (!row.skipped().empty()) {
+            skipped_.add(topic_text(channel) + ": not read: " + listed(row.skipped()));
+        }
+        const auto thread = channel.metadata.find("thread");
+        to_.tables.push_back({channel.topic,
+                              row.columns(),
+                              {},
+                              {},
+                              thread == channel.metadata.end() ? "" : thread->second});
+        rows_.emplace(id, Row{std::move(row), to_.tables.size() - 1});
+    }
+
+    void skip(const Channel& channel, const std::string& why) {
+        const std::string sentence = topic_text(channel) + " is not read: " + why;
+        if (to_.unread.empty()) {
+            to_.unread = sentence + supported;
+        }
+        skipped_.add(sentence);
+    }
+
+    bool add_row(Row& row, const Message& message) {
+        Table& table = to_.tables[row.table];
+        if (!row.reader.read(message.payload, values_)) {
+            if (unreadable_.insert(message.channel).second) {
+                skipped_.add("a message of topic '" + table.topic.substr(0, 60) +
+                             "' is shorter than its schema, or not plain CDR");
+            }
+            return false;
+        }
+        table.times_ns.push_back(static_cast<std::int64_t>(message.log_time));
+        table.words.insert(table.words.end(), values_.begin(), values_.end());
+        bytes_ += values_.size() * 8;
+        return true;
+    }
+
+    bool add_event(const Message& message) {
+        std::string kind;
+        std::string text;
+        if (event_encodings_[message.channel] == "json") {
+            kind = json_text(message.payload, "kind");
+            text = json_text(message.payload, "text");
+        } else if (!read_log(message.payload, kind, text)) {
+            return false;
+        }
+        to_.events.push_back(
+            {static_cast<std::int64_t>(message.log_time), std::move(kind), std::move(text)});
+        bytes_ += message.payload.size();
+        return true;
+    }
+
+    Reader& reader_;
+    Recording& to_;
+    const std::size_t max_bytes_;
+    Skipped skipped_;
+    std::map<std::uint16_t, Row> rows_;  // by channel
+    std::map<std::uint16_t, std::string> event_encodings_;  // by channel
+    std::set<std::uint16_t> unreadable_;  // channels
+    std::vector<std::uint64_t> values_;
+    std::size_t bytes_ = 0;
+};
+
 bool load_mcap(const std::string& path, Recording& to, std::string& problem,
                const LoadOptions& options) {
     Reader reader;
@@ -148,85 +264,17 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem,
         to.note = "'" + path +
                   "' ends without a summary: it was read up to its last complete chunk or message";
     }
-    std::map<std::uint16_t, std::pair<RowReader, std::size_t>> rows;
-    // the encoding of their messages
-    std::map<std::uint16_t, std::string> events;
-    Skipped skipped(to.skipped);
-    for (const auto& [id, channel] : reader.channels()) {
-        if (channel.topic == "/hal/events") {
-            events[id] = channel.encoding;
-            continue;
-        }
-        if (is_joint_state(reader, channel)) continue;
-        const auto schema = reader.schemas().find(channel.schema);
-        RowReader row;
-        if (schema != reader.schemas().end() && row.open(schema->second, channel)) {
-            if (!row.skipped().empty()) {
-                skipped.add(topic_text(channel) + ": not read: " + listed(row.skipped()));
-            }
-            const auto thread = channel.metadata.find("thread");
-            to.tables.push_back({channel.topic,
-                                 row.columns(),
-                                 {},
-                                 {},
-                                 thread == channel.metadata.end() ? "" : thread->second});
-            rows.emplace(id, std::pair{std::move(row), to.tables.size() - 1});
-            continue;
-        }
-        const std::string why =
-            schema == reader.schemas().end() ? "it has no schema" : row.problem();
-        const std::string sentence = topic_text(channel) + " is not read: " + why;
-        if (to.unread.empty()) {
-            to.unread = sentence + supported;
-        }
-        skipped.add(sentence);
-    }
-    std::vector<std::uint64_t> values;
-    std::size_t bytes = 0;
-    std::set<std::uint16_t> unreadable;
-    const auto visit = [&](const Message& message) {
-        const auto time_ns = static_cast<std::int64_t>(message.log_time);
-        bytes += 8;
-        if (const auto at = rows.find(message.channel); at != rows.end()) {
-            Table& table = to.tables[at->second.second];
-            if (!at->second.first.read(message.payload, values)) {
-                if (unreadable.insert(message.channel).second) {
-                    skipped.add("a message of topic '" + table.topic.substr(0, 60) +
-                                "' is shorter than its schema, or not plain CDR");
-                }
-                return true;
-            }
-            table.times_ns.push_back(time_ns);
-            table.words.insert(table.words.end(), values.begin(), values.end());
-            bytes += values.size() * 8;
-        } else if (const auto event = events.find(message.channel); event != events.end()) {
-            std::string kind, text;
-            if (event->second == "json") {
-                kind = json_text(message.payload, "kind");
-                text = json_text(message.payload, "text");
-            } else if (!read_log(message.payload, kind, text)) {
-                return true;
-            }
-            to.events.push_back({time_ns, std::move(kind), std::move(text)});
-            bytes += message.payload.size();
-        }
-        return bytes <= options.most_bytes;
-    };
+    McapLoader loader(reader, to, options.most_bytes);
+    loader.add_channels();
+    const auto begin = static_cast<std::uint64_t>(std::max<std::int64_t>(options.begin_ns, 0));
     const auto end =
         options.end_ns == INT64_MAX ? UINT64_MAX : static_cast<std::uint64_t>(options.end_ns);
-    if (!reader.each(visit, static_cast<std::uint64_t>(std::max<std::int64_t>(options.begin_ns, 0)),
-                     end)) {
+    const auto visit = [&](const Message& message) { return loader.add(message); };
+    if (!reader.each(visit, begin, end)) {
         to.note = "'" + path + "': " + reader.problem() + "; it was read up to there";
     }
-    skipped.finish();
-    if (!reader.problem().empty()) {
-        to.unread = reader.problem();
-    } else if (to.unread.empty() && !unreadable.empty()) {
-        to.unread = to.skipped.back();
-    } else if (to.unread.empty()) {
-        to.unread = rows.empty() ? "it has no topics" : "none of its topics has a message";
-    }
-    if (bytes > options.most_bytes) {
+    loader.finish();
+    if (loader.too_large()) {
         problem = "'" + path + "' has more than " + std::to_string(options.most_bytes >> 20) +
                   " MiB of values; choose a part of it";
         return false;
