@@ -41,62 +41,92 @@ private:
 
 Problem damaged(std::string text) { return {FrameError::damaged, std::move(text)}; }
 
-std::uint8_t scaled(unsigned sample, unsigned most) {
-    return static_cast<std::uint8_t>(most == 255 ? sample : (sample * 255u + most / 2) / most);
+std::uint8_t scaled(unsigned sample, unsigned max) {
+    return static_cast<std::uint8_t>(max == 255 ? sample : (sample * 255u + max / 2) / max);
+}
+
+/// Frames have blue first, files red.
+std::size_t pixel_index(std::size_t sample, bool colour) {
+    return colour ? sample + 2 - 2 * (sample % 3) : sample;
+}
+
+struct Header {
+    bool colour = false;
+    bool plain = false;  ///< decimal numbers, not bytes
+    int width = 0;
+    int height = 0;
+    int max = 0;         ///< value of white
+
+    std::size_t samples() const {
+        return static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
+               (colour ? 3 : 1);
+    }
+    std::size_t sample_bytes() const { return max > 255 ? 2 : 1; }
+    /// binary: one white space, then the samples; plain: at least a digit and a space each
+    std::size_t min_bytes() const { return plain ? 2 * samples() : 1 + samples() * sample_bytes(); }
+};
+
+bool has_magic(const std::uint8_t* bytes, std::size_t count) {
+    if (count < 2 || bytes[0] != 'P') return false;
+    const std::uint8_t kind = bytes[1];
+    return kind == '2' || kind == '3' || kind == '5' || kind == '6';
+}
+
+std::optional<Problem> read_header(Reader& reader, Header& header) {
+    for (int* const value : {&header.width, &header.height, &header.max}) {
+        *value = reader.number();
+        if (*value < 0) return damaged("its header is truncated before width, height and maximum");
+    }
+    if (header.width == 0 || header.height == 0 || header.max == 0 || header.max > 65535) {
+        return damaged("invalid header: a value is 0, or the maximum exceeds 65535");
+    }
+    if (!Frame::fits(header.width, header.height)) {
+        return Problem{FrameError::too_large, "a frame of " + std::to_string(header.width) + " x " +
+                                                  std::to_string(header.height) +
+                                                  " is larger than " + std::to_string(most_wide) +
+                                                  " x " + std::to_string(most_high) +
+                                                  " or 22 million pixels"};
+    }
+    if (reader.left() < header.min_bytes()) {
+        return damaged("truncated: " + std::to_string(reader.left()) + " of " +
+                       std::to_string(header.min_bytes()) + " bytes");
+    }
+    return std::nullopt;
+}
+
+/// Returns -1 for text that is not a number.
+int read_sample(Reader& reader, const Header& header) {
+    if (header.plain) return reader.number();
+    const std::uint8_t* const p = reader.take(header.sample_bytes());
+    return header.sample_bytes() == 2 ? p[0] << 8 | p[1] : p[0];
 }
 }  // namespace
 
 std::optional<Problem> read_pnm(const std::uint8_t* bytes, std::size_t count, Frame& frame) {
-    if (count < 2 || bytes[0] != 'P' ||
-        (bytes[1] != '2' && bytes[1] != '3' && bytes[1] != '5' && bytes[1] != '6')) {
+    if (!has_magic(bytes, count)) {
         return damaged("invalid PGM or PPM: it does not begin with P2, P3, P5 or P6");
     }
-    const bool colour = bytes[1] == '3' || bytes[1] == '6';
-    const bool plain = bytes[1] < '5';
+    Header header;
+    header.colour = bytes[1] == '3' || bytes[1] == '6';
+    header.plain = bytes[1] < '5';
     Reader reader(bytes + 2, count - 2);
-    const int width = reader.number();
-    const int height = width < 0 ? -1 : reader.number();
-
-    const int most = height < 0 ? -1 : reader.number();
-    if (most < 0) return damaged("its header is truncated before width, height and maximum");
-    if (width == 0 || height == 0 || most == 0 || most > 65535) {
-        return damaged("invalid header: a value is 0, or the maximum exceeds 65535");
-    }
-    if (!Frame::fits(width, height)) {
-        return Problem{FrameError::too_large,
-                       "a frame of " + std::to_string(width) + " x " + std::to_string(height) +
-                           " is larger than " + std::to_string(most_wide) + " x " +
-                           std::to_string(most_high) + " or 22 million pixels"};
-    }
-    const std::size_t samples =
-        static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * (colour ? 3 : 1);
-    const std::size_t wide = most > 255 ? 2 : 1;
-    // binary: one white space, then the samples; plain: at least a digit and a space each
-    const std::size_t needed = plain ? 2 * samples : 1 + samples * wide;
-    if (reader.left() < needed) {
-        return damaged("truncated: " + std::to_string(reader.left()) + " of " +
-                       std::to_string(needed) + " bytes");
-    }
-    frame.resize(width, height, colour ? Format::bgr : Format::grey);
-    if (!plain) {
+    if (auto problem = read_header(reader, header)) return problem;
+    frame.resize(header.width, header.height, header.colour ? Format::bgr : Format::grey);
+    if (!header.plain) {
         reader.take(1);
     }
+    const std::size_t samples = header.samples();
     for (std::size_t i = 0; i < samples; ++i) {
-        int sample;
-        if (plain) {
-            sample = reader.number();
-        } else {
-            const std::uint8_t* const p = reader.take(wide);
-            sample = wide == 2 ? p[0] << 8 | p[1] : p[0];
-        }
+        const int sample = read_sample(reader, header);
         if (sample < 0) {
             return damaged("sample " + std::to_string(i + 1) + " of " + std::to_string(samples) +
                            " is not a number");
         }
-        if (sample > most) return damaged("a sample exceeds the maximum given in the header");
-        // files have red first, frames blue
-        frame.pixels[colour ? i + 2 - 2 * (i % 3) : i] =
-            scaled(static_cast<unsigned>(sample), static_cast<unsigned>(most));
+        if (sample > header.max) {
+            return damaged("a sample exceeds the maximum given in the header");
+        }
+        frame.pixels[pixel_index(i, header.colour)] =
+            scaled(static_cast<unsigned>(sample), static_cast<unsigned>(header.max));
     }
     return std::nullopt;
 }
@@ -106,7 +136,7 @@ std::string write_pnm(const Frame& frame) {
     std::string text = std::string(colour ? "P6\n" : "P5\n") + std::to_string(frame.width) + " " +
                        std::to_string(frame.height) + "\n255\n";
     for (std::size_t i = 0; i < frame.pixels.size(); ++i) {
-        text += static_cast<char>(frame.pixels[colour ? i + 2 - 2 * (i % 3) : i]);
+        text += static_cast<char>(frame.pixels[pixel_index(i, colour)]);
     }
     return text;
 }
