@@ -11,14 +11,27 @@
 let shown = '';  // the hash of what the page shows
 
 /**
+ * Splits a hash.
+ * @param {string} hash
+ * @returns {{view: string, query: string}} both empty for a hash without a view
+ */
+function split(hash) {
+    const [path, query] = hash.split(/\?(.*)/s);
+    const view = path.startsWith('#/') ? path.slice(2) : '';
+    if (!/^\w+$/.test(view)) return {view: '', query: ''};
+    return {view, query: query ?? ''};
+}
+
+/**
  * Reads the hash of a URL.
  * @param {string} hash
  * @param {string[]} names the views; the first one is shown for any other name
  * @returns {Place}
  */
 export function parse(hash, names) {
-    const [, name = names[0], query = ''] = /^#\/(\w+)(?:\?(.*))?$/.exec(hash) ?? [];
-    return {name: names.includes(name) ? name : names[0], query: new URLSearchParams(query)};
+    const {view, query} = split(hash);
+    const name = names.includes(view) ? view : names[0];
+    return {name, query: new URLSearchParams(query)};
 }
 
 /**
@@ -28,7 +41,7 @@ export function parse(hash, names) {
  * @returns {string}
  */
 export function changed(hash, values) {
-    const [, view = '', query = ''] = /^#\/(\w+)(?:\?(.*))?$/.exec(hash) ?? [];
+    const {view, query} = split(hash);
     const parameters = new URLSearchParams(query);
     for (const [key, value] of Object.entries(values)) {
         if (value === '' || value === null || value === undefined)
