@@ -14,43 +14,28 @@ namespace {
 bool same_pin(const Pin& a, const Pin& b) { return a.type == b.type; }
 bool same_function(const LoadedFunction&, const LoadedFunction&) { return true; }
 
+template <class T, class... Member>
+void swap_members(T& a, T& b, Member T::*... members) {
+    (std::swap(a.*members, b.*members), ...);
+}
+
 /// The properties of a pin that may differ in a new version.
 void swap_declarations(Pin& a, Pin& b) {
-    std::swap(a.dir, b.dir);
-    std::swap(a.flags, b.flags);
-    std::swap(a.doc, b.doc);
-    std::swap(a.unit, b.unit);
-    std::swap(a.initial, b.initial);
-    std::swap(a.safe, b.safe);
-    std::swap(a.memory, b.memory);
-    std::swap(a.pointer, b.pointer);
-    std::swap(a.function, b.function);
+    swap_members(a, b, &Pin::dir, &Pin::flags, &Pin::doc, &Pin::unit, &Pin::initial, &Pin::safe,
+                 &Pin::memory, &Pin::pointer, &Pin::function);
 }
 void swap_declarations(LoadedFunction& a, LoadedFunction& b) {
-    std::swap(a.doc, b.doc);
-    std::swap(a.steps, b.steps);
-    std::swap(a.row, b.row);
-    std::swap(a.instances, b.instances);
-    std::swap(a.shared, b.shared);
-    std::swap(a.halted, b.halted);
+    swap_members(a, b, &LoadedFunction::doc, &LoadedFunction::steps, &LoadedFunction::row,
+                 &LoadedFunction::instances, &LoadedFunction::shared, &LoadedFunction::halted);
 }
 
 void swap_contents(Instance& a, Instance& b) {
-    std::swap(a.memory, b.memory);
-    std::swap(a.storage, b.storage);
-    std::swap(a.blocks, b.blocks);
-    std::swap(a.further, b.further);
-    std::swap(a.functions, b.functions);
-    std::swap(a.emergency, b.emergency);
-    std::swap(a.streams, b.streams);
-    std::swap(a.finite, b.finite);
-    std::swap(a.constructed, b.constructed);
-    std::swap(a.started, b.started);
+    swap_members(a, b, &Instance::memory, &Instance::storage, &Instance::blocks, &Instance::further,
+                 &Instance::functions, &Instance::emergency, &Instance::streams, &Instance::finite,
+                 &Instance::constructed, &Instance::started);
 }
 void swap_contents(LoadedComponent& a, LoadedComponent& b) {
-    std::swap(a.plugin, b.plugin);
-    std::swap(a.library, b.library);
-    std::swap(a.path, b.path);
+    swap_members(a, b, &LoadedComponent::plugin, &LoadedComponent::library, &LoadedComponent::path);
 }
 
 /// Replaces a pointer by what stands for it, if anything does.
