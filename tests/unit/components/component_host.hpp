@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "hal/abi.h"
+#include "hal/pin_type.hpp"
 
 namespace hal::test {
 
@@ -57,7 +58,7 @@ public:
     /// uint64_t).
     template <class T>
     T get(std::string_view pin) const {
-        return *reinterpret_cast<const T*>(of_type(pin, type_of<T>()).memory->slot);
+        return *reinterpret_cast<const T*>(of_type(pin, detail::type_of<T>()).memory->slot);
     }
     /// Sets a pin of any direction, linked or not. Any number goes into a float pin; other types
     /// must match exactly, except that a non-negative or in-range int literal goes into any integer
@@ -112,23 +113,6 @@ public:
 
 private:
     void release();
-    template <class T>
-    static constexpr hal_type type_of() {
-        if constexpr (std::same_as<T, bool>) {
-            return HAL_TYPE_BIT;
-        } else if constexpr (std::same_as<T, double>) {
-            return HAL_TYPE_FLOAT;
-        } else if constexpr (std::same_as<T, std::int32_t>) {
-            return HAL_TYPE_S32;
-        } else if constexpr (std::same_as<T, std::uint32_t>) {
-            return HAL_TYPE_U32;
-        } else if constexpr (std::same_as<T, std::int64_t>) {
-            return HAL_TYPE_S64;
-        } else {
-            static_assert(std::same_as<T, std::uint64_t>, "not a type of pins");
-            return HAL_TYPE_U64;
-        }
-    }
     template <class To, class From>
     static To in_range(std::string_view pin, From value) {
         if (!std::in_range<To>(value)) {
