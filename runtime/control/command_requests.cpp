@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: MIT
-// The verbs that execute commands: run, script, options, complete.
+#include "control/command_requests.hpp"
+
 #include <algorithm>
 #include <limits>
 #include <optional>
 #include <utility>
 
 #include "commands/describe.hpp"
-#include "control/connection_state.hpp"
+#include "commands/json_text.hpp"
+#include "control/request.hpp"
 #include "netlist/netlist.hpp"
 
 namespace hal {
 namespace {
+
+using Json = nlohmann::json;
 
 /// What a command prints; what it reports while it waits goes to the client at once.
 class Reply final : public Output {
@@ -42,7 +46,7 @@ void append_answer(int status, const Shell& shell, const Reply& output, std::str
 
 }  // namespace
 
-void Connection::State::run(const Json& body, std::string& reply) {
+void CommandRequests::run(const Json& body, std::string& reply) {
     if (!body["run"].is_array()) return execute(body, text_of(body["run"], "run"), false, reply);
     const auto words = names_in(body["run"], "run");
     if (words.empty()) {
@@ -51,49 +55,53 @@ void Connection::State::run(const Json& body, std::string& reply) {
     const Json& name = member(body, "name");
     Reply output(event);
     const int status =
-        shell.execute(words, output, name.is_null() ? "<commandline>" : text_of(name, "name"));
-    append_answer(status, shell, output, reply);
+        shell_.execute(words, output, name.is_null() ? "<commandline>" : text_of(name, "name"));
+    append_answer(status, shell_, output, reply);
 }
 
-void Connection::State::script(const Json& body, std::string& reply) {
+void CommandRequests::script(const Json& body, std::string& reply) {
     execute(body, text_of(body["script"], "script"), true, reply);
 }
 
-void Connection::State::execute(const Json& body, const std::string& text, bool script,
-                                std::string& reply) {
+/// Reads the number of the line, 1 when it is not given.
+static std::uint32_t line_number(const Json& line) {
+    if (line.is_null()) return 1;
+    if (!line.is_number_unsigned() || line.get<std::uint64_t>() - 1 > 4'000'000'000) {
+        throw RequestError{"line must be a number, 1 or more"};
+    }
+    return line.get<std::uint32_t>();
+}
+
+/// Makes $NAME in the request the variable of the client.
+void CommandRequests::look_up(const Json& variables) {
+    if (variables.is_null()) return;
+    if (!variables.is_object()) {
+        throw RequestError{"env must be an object of names and strings"};
+    }
+    environment_.clear();
+    for (const auto& [key, value] : variables.items()) {
+        environment_[key] = text_of(value, "a value in env");
+    }
+    shell_.look_up([this](const std::string& key) -> std::optional<std::string> {
+        const auto at = environment_.find(key);
+        return at == environment_.end() ? std::nullopt : std::optional(at->second);
+    });
+}
+
+void CommandRequests::execute(const Json& body, const std::string& text, bool script,
+                              std::string& reply) {
     const Json& name = member(body, "name");
-    const Json& env = member(body, "env");
+    std::string source = script ? "<stdin>" : "<shell>";
     if (!name.is_null()) {
-        text_of(name, "name");
+        source = text_of(name, "name");
     }
-    std::uint32_t number = 1;
-    if (const Json& line = member(body, "line"); !line.is_null()) {
-        if (!line.is_number_unsigned() || line.get<std::uint64_t>() - 1 > 4'000'000'000) {
-            throw RequestError{"line must be a number, 1 or more"};
-        }
-        number = line.get<std::uint32_t>();
-    }
-    if (!env.is_null()) {
-        if (!env.is_object()) {
-            throw RequestError{"env must be an object of names and strings"};
-        }
-        environment.clear();
-        for (const auto& [key, value] : env.items()) {
-            environment[key] = text_of(value, "a value in env");
-        }
-        shell.look_up([this](const std::string& key) -> std::optional<std::string> {
-            const auto at = environment.find(key);
-            return at == environment.end() ? std::nullopt : std::optional(at->second);
-        });
-    }
+    const std::uint32_t number = line_number(member(body, "line"));
+    look_up(member(body, "env"));
     Reply output(event);
-    const std::string source = name.is_string() ? name.get<std::string>()
-                               : script         ? "<stdin>"
-                                                : "<shell>";
-    const int status =
-        script ? shell.run_text(source, text, output) : shell.execute(text, output, source, number);
-    shell.look_up({});
-    append_answer(status, shell, output, reply);
+    const int status = script ? shell_.run_text(source, text, output)
+                              : shell_.execute(text, output, source, number);
+    shell_.look_up({});
+    append_answer(status, shell_, output, reply);
 }
 
 namespace {
@@ -122,7 +130,7 @@ Ini ini_of(const Json& entries) {
 
 }  // namespace
 
-void Connection::State::options(const Json& body, std::string&) {
+void CommandRequests::options(const Json& body) {
     static constexpr std::pair<const char*, bool ShellOptions::*> flags[] = {
         {"keep_going", &ShellOptions::keep_going}, {"echo", &ShellOptions::echo},
         {"script", &ShellOptions::script},         {"json", &ShellOptions::json},
@@ -132,7 +140,7 @@ void Connection::State::options(const Json& body, std::string&) {
     if (!given.is_object()) {
         throw RequestError{"options must be an object"};
     }
-    ShellOptions wanted = shell.options;
+    ShellOptions wanted = shell_.options;
     std::optional<Ini> ini;
     for (const auto& [key, value] : given.items()) {
         const auto flag = std::find_if(std::begin(flags), std::end(flags),
@@ -157,20 +165,20 @@ void Connection::State::options(const Json& body, std::string&) {
             throw RequestError{"unknown option '" + key.substr(0, 60) + "'"};
         }
     }
-    shell.options = std::move(wanted);
+    shell_.options = std::move(wanted);
     if (ini) {
-        shell.look_in(std::move(ini));
+        shell_.look_in(std::move(ini));
     }
 }
 
-void Connection::State::complete(const Json& body, std::string& reply) {
+void CommandRequests::complete(const Json& body, std::string& reply) {
     const std::string& line = text_of(body["complete"], "complete");
     const Json& cursor = member(body, "cursor");
     const auto at = cursor.is_null()
                         ? line.size()
                         : static_cast<std::size_t>(
                               whole(cursor, "cursor", 0, std::numeric_limits<std::int32_t>::max()));
-    const Completion completion = shell.complete(line, at);
+    const Completion completion = shell_.complete(line, at);
     auto candidates = nlohmann::ordered_json::array();
     for (const Candidate& candidate : completion.candidates) {
         auto& row = candidates.emplace_back(nlohmann::ordered_json{{"text", candidate.text}});

@@ -2,19 +2,75 @@
 #include "control/connection.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <utility>
 #include <vector>
 
 #include <unistd.h>
 
 #include "commands/json_text.hpp"
-#include "control/connection_state.hpp"
+#include "commands/shell.hpp"
+#include "control/command_requests.hpp"
+#include "control/probe_requests.hpp"
+#include "control/program_requests.hpp"
+#include "control/request.hpp"
+#include "control/value_requests.hpp"
+#include "machine/programs.hpp"
+#include "machine/session.hpp"
 #include "paths.hpp"
 
 namespace hal {
+
+using Json = nlohmann::json;
+
+struct Connection::State {
+    State(Shell& main, pid_t client) : shell(main, {}), session(main.session()), peer(client) {}
+
+    /// On whose behalf a verb of a component is executed.
+    Program program() { return {shell, session, peer, owner}; }
+    /// A verb that changes the model at once is not for a connection that collects edits.
+    void reject_in_transaction(const char* verb) const {
+        if (!shell.collecting()) return;
+        throw RequestError{std::string("'") + verb +
+                           "' cannot be part of a transaction; this connection has an open "
+                           "'begin': commit or abort it first"};
+    }
+
+    /// While a request is being executed.
+    class Engaged {
+    public:
+        explicit Engaged(State& state) : state_(state) { state_.engaged = true; }
+        ~Engaged() { state_.engaged = state_.shell.collecting(); }
+        Engaged(const Engaged&) = delete;
+
+    private:
+        State& state_;
+    };
+
+    Shell shell;  // beside cancel(): for the thread in handle()
+    Session& session;
+    const pid_t peer;
+    /// of the components that this client answers for
+    const std::uint64_t owner = session.programs().new_owner();
+    CommandRequests commands{shell};
+    ValueRequests values{shell};
+    ProbeRequests probes{session};
+    std::atomic<std::uint64_t> requests{0};
+    std::atomic<std::uint64_t> invalid_requests{0};
+    /// the client has declared one since idle() last found none
+    std::atomic<bool> has_component{false};
+    /// a request is being executed, or `begin` is open since the last one
+    std::atomic<bool> engaged{false};
+    // What follows belongs to the thread in handle().
+    bool stop = false;
+    /// a request was rejected because the machine ends
+    bool told_end = false;
+    std::uint64_t halt_ticket = 0;
+};
+
 namespace {
 
-constexpr int deepest = 16;  // brackets within brackets of a request
+constexpr int max_depth = 16;  // brackets within brackets of a request
 
 /// Arrays and objects in each other, counted without building them: a hostile line costs one pass.
 bool too_deep(std::string_view line) {
@@ -31,7 +87,7 @@ bool too_deep(std::string_view line) {
         } else if (c == '"') {
             quoted = true;
         } else if (c == '[' || c == '{') {
-            if (++depth > deepest) return true;
+            if (++depth > max_depth) return true;
         } else if (c == ']' || c == '}') {
             --depth;
         }
@@ -43,34 +99,93 @@ std::string dumped(const Json& value) {
     return value.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-struct Verb {
-    const char* name;
-    void (Connection::State::*handle)(const Json&, std::string&);
-    const char* members;  ///< beside the verb itself and id, each followed by a blank
+/// What a verb is for, where requests of its kind are treated differently.
+enum class VerbKind : std::uint8_t {
+    ordinary,
+    command,       ///< executes commands, which may wait
+    urgent,        ///< is executed by the server's own thread
+    inspection,    ///< may be abandoned halfway when the machine ends
+    until_closed,  ///< is executed until the connection is closed, also while the machine ends
 };
 
+struct Verb {
+    const char* name;
+    VerbKind kind;
+    const char* members;  ///< beside the verb itself and id, each followed by a blank
+    /// Appends the members of the reply after "ok":true, beginning with a comma, or throws
+    /// RequestError before anything.
+    void (*handle)(Connection::State&, const Json& body, std::string& reply);
+
+    bool ends_instance() const { return std::string_view(name) == "stop"; }
+};
+
+void declare(Connection::State& s, const Json& body, std::string& reply) {
+    s.reject_in_transaction("component");
+    s.has_component = true;
+    declare_component(s.program(), body, reply);
+}
+
+void leave(Connection::State& s, const Json& body, std::string&) {
+    s.reject_in_transaction("exit");
+    leave_component(s.program(), body);
+}
+
+void stop(Connection::State& s, const Json& body, std::string&) {
+    if (body["stop"] != true) {
+        throw RequestError{"stop must be true"};
+    }
+    s.stop = true;
+}
+
+/// A command that is being executed is cancelled by cancels(); here none is.
+void cancel_nothing(Connection::State&, const Json& body, std::string&) {
+    if (body["cancel"] != true) {
+        throw RequestError{"cancel must be true"};
+    }
+}
+
+using Held = Connection::State;
 constexpr Verb verbs[] = {
-    {"run", &Connection::State::run, "name line env "},
-    {"script", &Connection::State::script, "name env "},
-    {"options", &Connection::State::options, ""},
-    {"read", &Connection::State::read, ""},
-    {"set", &Connection::State::set, ""},
-    {"subscribe", &Connection::State::subscribe, "every_ms changes "},
-    {"unsubscribe", &Connection::State::unsubscribe, ""},
-    {"probe", &Connection::State::probe, "every batch_ms buffer_ms "},
-    {"unprobe", &Connection::State::unprobe, ""},
-    {"journal", &Connection::State::journal, ""},
-    {"trace", &Connection::State::trace, ""},
-    {"list", &Connection::State::list, "patterns "},
-    {"describe", &Connection::State::describe_kind, "patterns type histograms "},
-    {"complete", &Connection::State::complete, "cursor "},
-    {"component", &Connection::State::component, "prefix pins ready timeout_ms every_ms safe "},
-    {"exchange", &Connection::State::exchange, "write read alive "},
-    {"exit", &Connection::State::exit, ""},
-    {"port", &Connection::State::port, "read peek write "},
-    {"stream", &Connection::State::stream, "take records create owner "},
-    {"stop", &Connection::State::end, ""},
-    {"cancel", &Connection::State::cancelled, ""},
+    {"run", VerbKind::command, "name line env ",
+     [](Held& s, const Json& body, std::string& reply) { s.commands.run(body, reply); }},
+    {"script", VerbKind::command, "name env ",
+     [](Held& s, const Json& body, std::string& reply) { s.commands.script(body, reply); }},
+    {"options", VerbKind::urgent, "",
+     [](Held& s, const Json& body, std::string&) { s.commands.options(body); }},
+    {"read", VerbKind::ordinary, "",
+     [](Held& s, const Json& body, std::string& reply) { s.values.read(body, reply); }},
+    {"set", VerbKind::ordinary, "",
+     [](Held& s, const Json& body, std::string& reply) { s.values.set(body, reply); }},
+    {"subscribe", VerbKind::ordinary, "every_ms changes ",
+     [](Held& s, const Json& body, std::string& reply) { s.values.subscribe(body, reply); }},
+    {"unsubscribe", VerbKind::ordinary, "",
+     [](Held& s, const Json& body, std::string&) { s.values.unsubscribe(body); }},
+    {"probe", VerbKind::ordinary, "every batch_ms buffer_ms ",
+     [](Held& s, const Json& body, std::string& reply) { s.probes.probe(body, reply); }},
+    {"unprobe", VerbKind::ordinary, "",
+     [](Held& s, const Json& body, std::string& reply) { s.probes.unprobe(body, reply); }},
+    {"journal", VerbKind::ordinary, "",
+     [](Held& s, const Json& body, std::string&) { s.probes.journal(body); }},
+    {"trace", VerbKind::ordinary, "",
+     [](Held& s, const Json& body, std::string& reply) { s.probes.trace(body, reply); }},
+    {"list", VerbKind::inspection, "patterns ",
+     [](Held& s, const Json& body, std::string& reply) { s.values.list(body, reply); }},
+    {"describe", VerbKind::inspection, "patterns type histograms ",
+     [](Held& s, const Json& body, std::string& reply) { s.values.describe(body, reply); }},
+    {"complete", VerbKind::ordinary, "cursor ",
+     [](Held& s, const Json& body, std::string& reply) { s.commands.complete(body, reply); }},
+    {"component", VerbKind::ordinary, "prefix pins ready timeout_ms every_ms safe ", declare},
+    {"exchange", VerbKind::until_closed, "write read alive ",
+     [](Held& s, const Json& body, std::string& reply) {
+    exchange_values(s.program(), body, reply);
+}},
+    {"exit", VerbKind::until_closed, "", leave},
+    {"port", VerbKind::until_closed, "read peek write ",
+     [](Held& s, const Json& body, std::string& reply) { use_port(s.program(), body, reply); }},
+    {"stream", VerbKind::until_closed, "take records create owner ",
+     [](Held& s, const Json& body, std::string& reply) { use_stream(s.program(), body, reply); }},
+    {"stop", VerbKind::urgent, "", stop},
+    {"cancel", VerbKind::ordinary, "", cancel_nothing},
 };
 
 /// True when `word` is one of those in `words`, each followed by a blank.
@@ -124,15 +239,13 @@ Connection::~Connection() {
 }
 
 void Connection::on_event(std::function<void(std::string)> take) {
-    state_->event = std::move(take);
+    state_->commands.event = std::move(take);
 }
 
 bool Connection::idle() const {
-    if (state_->engaged || !state_->subscriptions.empty() || !state_->probes.empty() ||
-        state_->traces.on()) {
-        return false;
-    }
-    if (!state_->has_component) return true;
+    const State& s = *state_;
+    if (s.engaged || !s.values.subscriptions.empty() || !s.probes.empty()) return false;
+    if (!s.has_component) return true;
     const auto lock = state_->session.try_lock();
     if (!lock || state_->session.programs().answers(state_->owner)) return false;
     state_->has_component = false;
@@ -147,78 +260,92 @@ std::string Connection::hello() const {
            "\n";
 }
 
+namespace {
+
+bool may_be_id(const Json& value) {
+    return value.is_number() ||
+           (value.is_string() && value.get_ref<const std::string&>().size() <= 200);
+}
+
+/// Returns the id of a request as it is repeated in the reply.
+std::string id_text(const Json& body) {
+    const Json& id = member(body, "id");
+    return may_be_id(id) ? dumped(id) : "null";
+}
+
+/// Returns true for commands that may wait: a line, or a command as a list.
+bool may_wait_for(const Json& commands) {
+    const Json* first = &commands;
+    if (commands.is_array() && !commands.empty()) {
+        first = &commands[0];
+    }
+    return first->is_string() && Shell::may_wait(first->get_ref<const std::string&>());
+}
+
+/// Appends the reply of a request that is rejected.
+Connection::Handled reject(std::string& replies, const std::string& id,
+                           const std::string& sentence) {
+    replies += "{\"id\":" + id + ",\"ok\":false,\"error\":";
+    json_quote(replies, sentence);
+    replies += "}\n";
+    return Connection::Handled::done;
+}
+
+constexpr const char* machine_ends = "the machine ends";
+
+}  // namespace
+
 Connection::Handled Connection::handle(std::string_view line, std::string& replies, bool may_wait) {
     State& state = *state_;
     const State::Engaged engaged(state);
-    std::string id = "null";
-    const auto refuse = [&](const std::string& sentence) {
-        replies += "{\"id\":" + id + ",\"ok\":false,\"error\":";
-        json_quote(replies, sentence);
-        replies += "}\n";
-        return Handled::done;
-    };
     if (too_deep(line)) {
-        ++state.rubbish;
-        return refuse("more than " + std::to_string(deepest) + " nested brackets");
+        ++state.invalid_requests;
+        return reject(replies, "null",
+                      "more than " + std::to_string(max_depth) + " nested brackets");
     }
     const Json body = Json::parse(line.begin(), line.end(), nullptr, false);
     if (!body.is_object()) {
-        ++state.rubbish;
-        return refuse(body.is_discarded() ? "invalid JSON; a request is one JSON object on one line"
+        ++state.invalid_requests;
+        return reject(replies, "null",
+                      body.is_discarded() ? "invalid JSON; a request is one JSON object on one line"
                                           : "a request is a JSON object");
     }
-    if (const Json& given = member(body, "id");
-        given.is_number() ||
-        (given.is_string() && given.get_ref<const std::string&>().size() <= 200)) {
-        id = dumped(given);
-    }
-    const auto refuse_at_end = [&] {
-        state.told_end = true;
-        return refuse("the machine ends");
-    };
+    const std::string id = id_text(body);
     const std::size_t before = replies.size();
     try {
         const Verb& verb = verb_of(body);
         // A program's values go on until the connection is closed, which is what it takes for the
         // end of the machine.
-        constexpr decltype(verb.handle) until_closed[] = {
-            &State::end, &State::exchange, &State::exit, &State::port, &State::stream};
-        const bool answered = std::find(std::begin(until_closed), std::end(until_closed),
-                                        verb.handle) != std::end(until_closed);
-        if (state.session.ending() && !answered) return refuse_at_end();
-        const bool script = verb.handle == &State::script;
-        if (!may_wait && (verb.handle == &State::run || script)) {
-            const Json& text = body[script ? "script" : "run"];
-            if (text.is_string() && Shell::may_wait(text.get_ref<const std::string&>())) {
-                return Handled::wants_thread;
-            }
-            if (text.is_array() && !text.empty() && text[0].is_string() &&
-                Shell::may_wait(text[0].get_ref<const std::string&>())) {
-                return Handled::wants_thread;
-            }
+        const bool goes_on = verb.kind == VerbKind::until_closed || verb.ends_instance();
+        if (state.session.ending() && !goes_on) {
+            state.told_end = true;
+            return reject(replies, id, machine_ends);
+        }
+        if (!may_wait && verb.kind == VerbKind::command && may_wait_for(body[verb.name])) {
+            return Handled::wants_thread;
         }
         ++state.requests;
         replies += "{\"id\":" + id + ",\"ok\":true";
-        (state.*verb.handle)(body, replies);
-        const bool looks = verb.handle == &State::describe_kind || verb.handle == &State::list;
-        if (looks && state.session.ending()) {  // it may have been abandoned halfway
-            replies.resize(before);
-            return refuse_at_end();
+        verb.handle(state, body, replies);
+        if (verb.kind == VerbKind::inspection && state.session.ending()) {
+            replies.resize(before);  // it may have been abandoned halfway
+            state.told_end = true;
+            return reject(replies, id, machine_ends);
         }
         replies += "}\n";
     } catch (const RequestError& refusal) {
         replies.resize(before);
-        return refuse(refusal.sentence);
+        return reject(replies, id, refusal.sentence);
     } catch (const std::bad_alloc&) {
         replies.resize(before);
-        return refuse("not enough memory for this request");
+        return reject(replies, id, "not enough memory for this request");
     }
     return std::exchange(state.stop, false) ? Handled::stop : Handled::done;
 }
 
 namespace {
 
-constexpr std::size_t longest_urgent = std::size_t{64} << 10;
+constexpr std::size_t max_urgent_size = std::size_t{64} << 10;
 
 /// True for `stop` and ["stop"].
 bool is_stop(const Json& command) {
@@ -237,21 +364,22 @@ bool Connection::told_end() const { return state_->told_end; }
 Connection::Urgent Connection::execute_urgent(std::string_view line, std::string& reply) {
     State& state = *state_;
     const bool stops = line.find("stop") != line.npos;
-    if (line.size() > longest_urgent || (!stops && line.find("\"options\"") == line.npos) ||
+    if (line.size() > max_urgent_size || (!stops && line.find("\"options\"") == line.npos) ||
         too_deep(line)) {
         return Urgent::no;
     }
     const Json body = Json::parse(line.begin(), line.end(), nullptr, false);
     if (!body.is_object()) return Urgent::no;
     try {
-        const auto handle = verb_of(body).handle;
-        if (handle == &State::options || handle == &State::end) {
-            return this->handle(line, reply) == Handled::stop ? Urgent::stop : Urgent::done;
+        const Verb& verb = verb_of(body);
+        if (verb.kind == VerbKind::urgent) {
+            return handle(line, reply) == Handled::stop ? Urgent::stop : Urgent::done;
         }
         const bool locked = (state.session.locked & static_cast<unsigned>(Lock::run)) != 0;
         const bool plain = !locked && !state.shell.collecting() && !state.shell.options.echo &&
                            !state.session.options().virtual_clock;
-        if (handle != &State::run || !plain || !is_stop(body["run"])) return Urgent::no;
+        const bool runs = std::string_view(verb.name) == "run";
+        if (!runs || !plain || !is_stop(body["run"])) return Urgent::no;
     } catch (const RequestError&) {
         return Urgent::no;  // handle() reports it
     }
@@ -268,11 +396,8 @@ Connection::Urgent Connection::halted(std::string_view line, std::string& reply)
     }
     state.session.journal().note("command", "stop");
     ++state.requests;
-    const Json id = Json::parse(line.begin(), line.end(), nullptr, false).value("id", Json());
-    const bool echoed =
-        id.is_number() || (id.is_string() && id.get_ref<const std::string&>().size() <= 200);
-    reply += "{\"id\":" + (echoed ? dumped(id) : "null") +
-             ",\"ok\":true,\"status\":0,\"out\":\"\",\"err\":\"\"}\n";
+    const std::string id = id_text(Json::parse(line.begin(), line.end(), nullptr, false));
+    reply += "{\"id\":" + id + ",\"ok\":true,\"status\":0,\"out\":\"\",\"err\":\"\"}\n";
     return Urgent::done;
 }
 
@@ -287,17 +412,15 @@ bool Connection::cancels(std::string_view line) {
 void Connection::cancel(bool on) { state_->shell.cancel(on); }
 
 std::int64_t Connection::next_due_ns() const {
-    return std::min({state_->subscriptions.next_due_ns(), state_->probes.next_due_ns(),
-                     state_->traces.next_due_ns()});
+    return std::min(state_->values.subscriptions.next_due_ns(), state_->probes.next_due_ns());
 }
 
 void Connection::publish(std::int64_t now_ns, bool congested, std::string& events) {
-    state_->subscriptions.publish(state_->session, now_ns, congested, events);
+    state_->values.subscriptions.publish(state_->session, now_ns, congested, events);
     state_->probes.publish(now_ns, congested, events);
-    state_->traces.publish(now_ns, congested, events);
 }
 
 std::uint64_t Connection::requests() const { return state_->requests; }
-std::uint64_t Connection::rubbish() const { return state_->rubbish; }
+std::uint64_t Connection::invalid_requests() const { return state_->invalid_requests; }
 
 }  // namespace hal

@@ -79,7 +79,7 @@ public:
     void publish(std::int64_t now_ns, bool congested, std::string& events);
 
     std::uint64_t requests() const;  ///< [any]
-    std::uint64_t rubbish() const;  ///< lines that were not valid requests [any]
+    std::uint64_t invalid_requests() const;  ///< lines that were not valid requests [any]
 
     struct State;
 

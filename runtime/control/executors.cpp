@@ -53,7 +53,7 @@ void Executors::carry_out(ServedClient& client) {
     if (turn.closes) return client.connection.reset();
     Connection& connection = *client.connection;
     const std::uint64_t requests = connection.requests();
-    const std::uint64_t rubbish = connection.rubbish();
+    const std::uint64_t invalid = connection.invalid_requests();
     std::size_t taken = 0;
     while (taken < turn.lines.size() && turn.replies.size() <= turn.capacity &&
            turn.waiting.empty() && !turn.stop && (taken == 0 || !ends_())) {
@@ -73,7 +73,7 @@ void Executors::carry_out(ServedClient& client) {
     turn.told_end = connection.told_end();
     turn.lines.erase(0, taken);
     turn.requests = connection.requests() - requests;
-    turn.rubbish = connection.rubbish() - rubbish;
+    turn.invalid = connection.invalid_requests() - invalid;
     if (const std::int64_t now = monotonic_ns(); connection.next_due_ns() <= now) {
         connection.publish(now, turn.congested, turn.replies);
     }

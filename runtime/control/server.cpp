@@ -1,18 +1,27 @@
 // SPDX-License-Identifier: MIT
 #include "control/server.hpp"
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <limits>
+#include <thread>
+#include <utility>
+#include <vector>
 
 #include <poll.h>
+#include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include "base/keep.hpp"
 #include "commands/shell.hpp"
-#include "control/server_state.hpp"
+#include "control/admission.hpp"
+#include "control/client_list.hpp"
+#include "control/endpoint.hpp"
+#include "control/executors.hpp"
 #include "execute/process_setup.hpp"
 #include "machine/processes/programs.hpp"
 #include "machine/session.hpp"
@@ -29,6 +38,48 @@ constexpr std::int64_t halt_timeout_ns = 1'000'000'000;
 constexpr int lines_at_once = 1000;
 
 }  // namespace
+
+// Two kinds of threads: the server's own accepts, reads and writes, and executes what must not wait
+// (`stop`, `options`); executors do all the rest. The server's thread takes no lock of the session,
+// so whatever clients do, the next `stop` is seen at once.
+struct Server::State {
+    State(Shell& s, ServerOptions o) : shell(s), options(std::move(o)) {}
+
+    void serve();
+    void serve_client(ServedClient& client, short events);
+    void end_all();
+    bool clients_wait_for_end() const;
+    int sleep_ms();
+    bool has_work(ServedClient& client);
+    std::int64_t next_due_ns(ServedClient& client);
+    std::int64_t next_due_ns(std::int64_t now_ns);
+    void receive(ServedClient& client, bool hung_up);
+    void reject_too_long(ServedClient& client);
+    void execute(ServedClient& client);
+    bool execute_urgent(ServedClient& client);
+    void give_turn(ServedClient& client);
+    void collect_turn(ServedClient& client);
+    void start_worker(ServedClient& client, std::string request);
+    void look_for_cancel(ServedClient& client);
+    void collect_worker(ServedClient& client);
+    void remove_gone();
+
+    Shell& shell;
+    const ServerOptions options;
+    Endpoint endpoint;
+    /// eventfd: a worker or an executor has finished, or the server is to end
+    int wake = -1;
+    std::atomic<bool> ending{false};
+    std::thread thread;
+    ClientList clients{options};
+    Admission admission{shell, options, endpoint, clients, [this] { eventfd_write(wake, 1); }};
+    Executors pool{[this] { eventfd_write(wake, 1); },
+                   [this] { return ending || shell.session().ending(); }};
+    // written by the server's thread
+    std::atomic<std::uint64_t> connected{0};
+    std::atomic<std::uint64_t> requests{0};
+    std::atomic<std::uint64_t> invalid_requests{0};
+};
 
 Server::Server(Shell& shell, ServerOptions options)
     : state_(new State(shell, std::move(options))) {}
@@ -64,13 +115,14 @@ const std::string& Server::path() const { return state_->endpoint.path(); }
 
 ServerCounts Server::counts() const {
     const State& s = *state_;
-    return {s.connected, s.accepted, s.dropped, s.reclaimed, s.refused, s.requests, s.rubbish};
+    return {s.connected,         s.admission.accepted, s.clients.dropped, s.admission.reclaimed,
+            s.admission.refused, s.requests,           s.invalid_requests};
 }
 
 void Server::State::serve() {
     release_unused_stack();
     pool.start();
-    keep_spare();
+    admission.keep_spare();
     // only open descriptors: poll() rejects more entries than the process may have descriptors
     std::vector<pollfd> ready;
     std::vector<ServedClient*> watched;  // whose process is in `ready`, behind the sockets
@@ -78,17 +130,17 @@ void Server::State::serve() {
         ready.clear();
         watched.clear();
         ready.push_back(
-            {endpoint.fd(), static_cast<short>(monotonic_ns() >= accepts_from ? POLLIN : 0), 0});
+            {endpoint.fd(), static_cast<short>(admission.accepts(monotonic_ns()) ? POLLIN : 0), 0});
         ready.push_back({wake, POLLIN, 0});
-        for (const auto& client : clients) {
-            const int reads = listens_to(*client) ? POLLIN : 0;
+        for (const auto& client : clients.all()) {
+            const int reads = clients.listens_to(*client) ? POLLIN : 0;
             ready.push_back({client->gone ? -1 : client->fd,
                              static_cast<short>(reads | (client->waiting() > 0 ? POLLOUT : 0)), 0});
             if (client->process >= 0) {
                 watched.push_back(client.get());
             }
         }
-        const std::size_t before = clients.size();
+        const std::size_t before = clients.all().size();
         for (const ServedClient* client : watched) {
             ready.push_back({client->process, POLLIN, 0});
         }
@@ -98,21 +150,21 @@ void Server::State::serve() {
         eventfd_read(wake, &ignored);
 
         if (ready[0].revents & POLLIN) {
-            accept_clients();
+            admission.accept_clients();
         }
         for (std::size_t i = 0; i < watched.size(); ++i) {
             if (ready[2 + before + i].revents != 0) {
-                note_process_end(*watched[i]);
+                admission.note_process_end(*watched[i]);
             }
         }
         for (std::size_t i = 0; i < before; ++i) {
-            serve_client(*clients[i], ready[2 + i].revents);
+            serve_client(*clients.all()[i], ready[2 + i].revents);
         }
         remove_gone();
-        reclaim();
-        place_clients();
-        keep_spare();
-        connected = clients.size();
+        admission.reclaim();
+        admission.place_clients();
+        admission.keep_spare();
+        connected = clients.all().size();
     }
     end_all();
 }
@@ -124,9 +176,9 @@ void Server::State::serve_client(ServedClient& client, short events) {
     if (events & POLLIN) {
         receive(client, (events & POLLHUP) != 0 || client.process_ended);
     } else if (events & (POLLHUP | POLLERR)) {
-        leave(client);
-    } else if (client.process_ended && !listens_to(client)) {
-        leave(client);
+        clients.leave(client);
+    } else if (client.process_ended && !clients.listens_to(client)) {
+        clients.leave(client);
     }
     if (client.gone) return;
     if (client.busy()) {
@@ -134,22 +186,23 @@ void Server::State::serve_client(ServedClient& client, short events) {
     }
     execute(client);
     if (!client.gone) {
-        send_out(client);
+        clients.send_out(client);
     }
     if (!client.gone && client.input_ended && client.is_served()) {
-        leave(client);
+        clients.leave(client);
     }
 }
 
 void Server::State::remove_gone() {
-    for (const auto& client : clients) {
+    for (const auto& client : clients.all()) {
         if (!client->gone || client->busy() || client->has_turn || !client->connection) continue;
         client->turn = {};
-        client->turn.closes = client->has_turn = true;
+        client->turn.closes = true;
+        client->has_turn = true;
         client->turn_over = false;
         pool.give(*client);
     }
-    std::erase_if(clients, [](const auto& client) {
+    std::erase_if(clients.all(), [](const auto& client) {
         return client->gone && !client->busy() && !client->has_turn && !client->connection;
     });
 }
@@ -164,14 +217,14 @@ bool Server::State::clients_wait_for_end() const {
 }
 
 void Server::State::end_all() {
-    for (const auto& client : clients) {
+    for (const auto& client : clients.all()) {
         const bool is_being_closed = client->turn.closes;  // an executor has the connection
         if (!is_being_closed && client->connection) {
             client->connection->cancel();
         }
     }
     pool.end();
-    for (const auto& client : clients) {
+    for (const auto& client : clients.all()) {
         if (client->has_turn) {
             client->out += client->turn.replies;
         }
@@ -180,17 +233,15 @@ void Server::State::end_all() {
             client->out += client->result;
         }
         if (!client->gone) {
-            send_out(*client);
+            clients.send_out(*client);
         }
     }
     endpoint.stop_listening();
     if (clients_wait_for_end()) {
-        keep_for_good(std::make_unique<decltype(clients)>(std::move(clients)));
+        keep_for_good(std::make_unique<ClientList::Clients>(std::move(clients.all())));
     }
-    clients.clear();
-    if (spare >= 0) {
-        close(std::exchange(spare, -1));
-    }
+    clients.all().clear();
+    admission.close_spare();
     connected = 0;
 }
 
@@ -210,46 +261,46 @@ bool Server::State::has_work(ServedClient& client) {
     return client.line_end() != std::string::npos && (client.placed || !client.not_urgent);
 }
 
-/// Time until the next subscription or client timeout is due; 0 while complete requests are
-/// pending.
-int Server::State::sleep_ms() {
-    const std::int64_t now = monotonic_ns();
-    std::int64_t until =
-        accepts_from > now ? accepts_from : std::numeric_limits<std::int64_t>::max();
-    for (const auto& client : clients) {
+/// When the server's thread has to look at its clients again.
+std::int64_t Server::State::next_due_ns(std::int64_t now_ns) {
+    std::int64_t due = admission.next_due_ns(now_ns);
+    for (const auto& client : clients.all()) {
         if (client->gone) continue;
-        if (has_work(*client)) return 0;
-        until = std::min(until, next_due_ns(*client));
+        if (has_work(*client)) return now_ns;
+        due = std::min(due, next_due_ns(*client));
         if (client->halting_since != 0) {
-            until = std::min(until, now + halt_poll_ns);
-        }
-        if (!client->placed) {
-            until = std::min(until, client->came_ns + give_up_ns);
+            due = std::min(due, now_ns + halt_poll_ns);
         }
         if (client->stalled_since != 0) {
-            until =
-                std::min(until, client->stalled_since + std::int64_t{options.stall_ms} * 1'000'000);
+            const std::int64_t stall_ns = std::int64_t{options.stall_ms} * 1'000'000;
+            due = std::min(due, client->stalled_since + stall_ns);
         }
     }
-    if (files_short || count(true) > options.max_clients) {
-        until = std::min(until, now + std::int64_t{options.idle_ms} * 250'000);
-    }
-    if (until == std::numeric_limits<std::int64_t>::max()) return -1;
-    return until <= now ? 0
-                        : static_cast<int>(
-                              std::min<std::int64_t>((until - now + 999'999) / 1'000'000, 60'000));
+    return due;
+}
+
+/// Time until the next subscription or client timeout is due; 0 while complete requests are
+/// pending; -1: no limit.
+int Server::State::sleep_ms() {
+    const std::int64_t now = monotonic_ns();
+    const std::int64_t due = next_due_ns(now);
+    if (due == std::numeric_limits<std::int64_t>::max()) return -1;
+    if (due <= now) return 0;
+    constexpr std::int64_t max_ms = 60'000;
+    return static_cast<int>(std::min((due - now + 999'999) / 1'000'000, max_ms));
 }
 
 /// `hung_up`: the client has closed both directions.
 void Server::State::receive(ServedClient& client, bool hung_up) {
     if (client.taken > 0) {
         client.in.erase(0, client.taken);
-        client.taken = client.searched = 0;
+        client.taken = 0;
+        client.searched = 0;
     }
     std::array<char, read_at_once> part;
     const ssize_t got = recv(client.fd, part.data(), part.size(), 0);
-    if (got < 0 && errno != EAGAIN && errno != EINTR) return leave(client);
-    if (got == 0 && hung_up) return leave(client);
+    if (got < 0 && errno != EAGAIN && errno != EINTR) return clients.leave(client);
+    if (got == 0 && hung_up) return clients.leave(client);
     if (got == 0) {
         client.input_ended = true;
         return;
@@ -264,25 +315,19 @@ void Server::State::receive(ServedClient& client, bool hung_up) {
     }
     client.in += text;
     if (client.in.size() > options.max_request && client.line_end() == std::string::npos) {
-        ++rubbish;
-        client.out += "{\"id\":null,\"ok\":false,\"error\":\"the request is longer than " +
-                      std::to_string(options.max_request) + " bytes\"}\n";
-        client.in.clear();
-        client.in.shrink_to_fit();
-        client.searched = 0;
-        client.discarding = true;
+        reject_too_long(client);
     }
 }
 
-/// A client that has gone: what it sent last is not executed, what its command waits for is not
-/// waited for.
-void Server::State::leave(ServedClient& client) {
-    client.gone = true;
-    client.connection->cancel();
-    close(std::exchange(client.fd, -1));
-    if (client.process >= 0) {
-        close(std::exchange(client.process, -1));
-    }
+/// Rejects a request of which there is no end yet; the rest of it is discarded.
+void Server::State::reject_too_long(ServedClient& client) {
+    ++invalid_requests;
+    client.out += "{\"id\":null,\"ok\":false,\"error\":\"the request is longer than " +
+                  std::to_string(options.max_request) + " bytes\"}\n";
+    client.in.clear();
+    client.in.shrink_to_fit();
+    client.searched = 0;
+    client.discarding = true;
 }
 
 void Server::State::execute(ServedClient& client) {
@@ -325,7 +370,7 @@ bool Server::State::execute_urgent(ServedClient& client) {
     client.active_ns = now;
     client.done_up_to(end + 1);
     if (done == Connection::Urgent::stop && options.stop) {
-        send_out(client);
+        clients.send_out(client);
         options.stop();
     }
     return true;
@@ -358,11 +403,11 @@ void Server::State::collect_turn(ServedClient& client) {
     Turn& turn = client.turn;
     if (turn.closes) return;
     client.told_end = client.told_end || turn.told_end;
-    if (turn.requests + turn.rubbish > 0) {
+    if (turn.requests + turn.invalid > 0) {
         client.active_ns = monotonic_ns();
     }
     requests += turn.requests;
-    rubbish += turn.rubbish;
+    invalid_requests += turn.invalid;
     if (!client.busy()) {
         const std::scoped_lock lock(client.events_mutex);
         client.out += std::exchange(client.events, {});
@@ -371,12 +416,13 @@ void Server::State::collect_turn(ServedClient& client) {
     turn.replies = {};
     if (!turn.lines.empty()) {
         client.in.replace(0, client.taken, turn.lines);
-        client.taken = client.searched = 0;
+        client.taken = 0;
+        client.searched = 0;
         turn.lines = {};
     }
     if (turn.stop && options.stop) {
         if (!client.gone) {
-            send_out(client);
+            clients.send_out(client);
         }
         options.stop();
     }
@@ -424,42 +470,6 @@ void Server::State::collect_worker(ServedClient& client) {
     }
     client.out += std::exchange(client.events, {});
     client.out += std::exchange(client.result, {});
-}
-
-void Server::State::send_out(ServedClient& client) {
-    const std::size_t before = client.sent;
-    while (client.waiting() > 0) {
-        const ssize_t gone = send(client.fd, client.out.data() + client.sent, client.waiting(),
-                                  MSG_NOSIGNAL | MSG_DONTWAIT);
-        if (gone < 0 && errno == EINTR) continue;
-        if (gone < 0 && errno != EAGAIN && errno != EWOULDBLOCK) return leave(client);
-        if (gone <= 0) break;
-        client.sent += static_cast<std::size_t>(gone);
-    }
-    const bool moved = client.sent != before;
-    if (client.waiting() == 0) {
-        client.out.clear();
-        if (client.out.capacity() > options.queue) {
-            client.out.shrink_to_fit();
-        }
-        client.sent = 0;
-    } else if (client.sent > options.queue) {
-        client.out.erase(0, client.sent);
-        client.sent = 0;
-    }
-    if (client.waiting() <= options.queue || moved) {
-        client.stalled_since = client.waiting() > options.queue ? monotonic_ns() : 0;
-        return;
-    }
-    const std::int64_t now = monotonic_ns();
-    if (client.stalled_since == 0) {
-        client.stalled_since = now;
-    }
-    if (now - client.stalled_since < std::int64_t{options.stall_ms} * 1'000'000) return;
-    ++dropped;
-    log("disconnected a client: " + std::to_string(client.waiting()) +
-        " bytes of replies pending, nothing read for " + std::to_string(options.stall_ms) + " ms");
-    leave(client);
 }
 
 }  // namespace hal

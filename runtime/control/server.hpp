@@ -40,7 +40,7 @@ struct ServerCounts {
     std::uint64_t reclaimed = 0;
     std::uint64_t refused = 0;
     std::uint64_t requests = 0;
-    std::uint64_t rubbish = 0;
+    std::uint64_t invalid_requests = 0;
 };
 
 class Server {

@@ -46,7 +46,7 @@ private:
     std::uint64_t next_ = 1;
 };
 
-/// Appends the values as a JSON array; null where there is none.
+/// Appends the values as a JSON array; null for a missing value.
 void append_values(std::string& to, const std::vector<std::optional<Reading>>& readings);
 
 }  // namespace hal

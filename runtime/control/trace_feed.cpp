@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "commands/json_text.hpp"
-#include "control/connection_state.hpp"
 #include "hal/clock.hpp"
 
 namespace hal {
@@ -92,16 +91,6 @@ void TraceFeed::publish(std::int64_t now_ns, bool congested, std::string& events
     for (const TraceBatch::Part& part : batch.parts) {
         events.append(reinterpret_cast<const char*>(part.events.data()),
                       part.events.size() * sizeof(TraceEvent));
-    }
-}
-
-void Connection::State::trace(const Json& body, std::string& reply) {
-    const Json& on = body["trace"];
-    if (!on.is_boolean()) {
-        throw RequestError{"trace must be true or false"};
-    }
-    if (std::string problem = traces.set(on.get<bool>(), reply); !problem.empty()) {
-        throw RequestError{std::move(problem)};
     }
 }
 

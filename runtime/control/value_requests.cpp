@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The verbs about values and names: read, set, subscribe, unsubscribe, list, describe.
+#include "control/value_requests.hpp"
+
 #include <limits>
 #include <mutex>
 #include <optional>
@@ -9,14 +10,19 @@
 #include "commands/describe.hpp"
 #include "commands/json_text.hpp"
 #include "commands/table.hpp"
-#include "control/connection_state.hpp"
+#include "control/request.hpp"
 
 namespace hal {
+namespace {
 
-void Connection::State::read(const Json& body, std::string& reply) {
+using Json = nlohmann::json;
+
+}  // namespace
+
+void ValueRequests::read(const Json& body, std::string& reply) {
     const auto names = names_in(body["read"], "read");
-    const auto lock = session.lock();
-    const auto readings = session.values().read(names);
+    const auto lock = session_.lock();
+    const auto readings = session_.values().read(names);
     append_values(reply += ",\"values\":", readings);
     reply += ",\"types\":[";
     for (const auto& reading : readings) {
@@ -28,7 +34,7 @@ void Connection::State::read(const Json& body, std::string& reply) {
     reply += "]";
 }
 
-void Connection::State::set(const Json& body, std::string& reply) {
+void ValueRequests::set(const Json& body, std::string& reply) {
     const Json& values = body["set"];
     if (!values.is_object()) {
         throw RequestError{"set must be an object of names and values"};
@@ -42,29 +48,29 @@ void Connection::State::set(const Json& body, std::string& reply) {
         }
         commands.push_back({{"setp", {}}, {{key, {}}, {word, {}}}, {}});
     }
-    if (shell.collecting()) {  // part of what `commit` makes take effect
-        shell.collect(commands);
+    if (shell_.collecting()) {  // part of what `commit` makes take effect
+        shell_.collect(commands);
         reply += ",\"count\":" + std::to_string(commands.size()) + ",\"collecting\":true";
         return;
     }
-    const auto lock = session.lock();
+    const auto lock = session_.lock();
     Diagnostics diagnostics;
-    Transaction transaction = session.begin();
+    Transaction transaction = session_.begin();
     for (Command& command : commands) {
-        resolve_set(session.model(), command);
+        resolve_set(session_.model(), command);
         const CommandRow& row = *find_command(command.name.text);
-        if (!check_lock(row, command, session.locked, session.model(), diagnostics)) break;
-        session.journal().add(
+        if (!check_lock(row, command, session_.locked, session_.model(), diagnostics)) break;
+        session_.journal().add(
             "edit", command.name.text + " " + command.args[0].text + " " + command.args[1].text);
         transaction.apply(row.form(), command, diagnostics);
     }
     if (!transaction.commit(diagnostics)) {
-        throw RequestError{render(diagnostics, session.sources) + "nothing was changed"};
+        throw RequestError{render(diagnostics, session_.sources) + "nothing was changed"};
     }
     reply += ",\"count\":" + std::to_string(commands.size());
 }
 
-void Connection::State::subscribe(const Json& body, std::string& reply) {
+void ValueRequests::subscribe(const Json& body, std::string& reply) {
     auto names = names_in(body["subscribe"], "subscribe");
     const Json& every = member(body, "every_ms");
     const std::int64_t every_ms = every.is_null() ? 100 : whole(every, "every_ms", 1, 3'600'000);
@@ -81,7 +87,7 @@ void Connection::State::subscribe(const Json& body, std::string& reply) {
     reply += ",\"subscription\":" + std::to_string(number);
 }
 
-void Connection::State::unsubscribe(const Json& body, std::string&) {
+void ValueRequests::unsubscribe(const Json& body) {
     const auto id = static_cast<std::uint64_t>(
         whole(body["unsubscribe"], "unsubscribe", 1, std::numeric_limits<std::int64_t>::max()));
     if (!subscriptions.remove(id)) {
@@ -107,12 +113,12 @@ Patterns patterns_of(const Json& body) {
 
 }  // namespace
 
-void Connection::State::list(const Json& body, std::string& reply) {
+void ValueRequests::list(const Json& body, std::string& reply) {
     const Listed kind = kind_of(body["list"], "list");
     const Patterns patterns = patterns_of(body);
-    const auto lock = session.lock();
+    const auto lock = session_.lock();
     reply += ",\"names\":[";
-    for (const auto& name : names_of(session, kind, patterns)) {
+    for (const auto& name : names_of(session_, kind, patterns)) {
         if (reply.back() != '[') {
             reply += ',';
         }
@@ -121,7 +127,7 @@ void Connection::State::list(const Json& body, std::string& reply) {
     reply += ']';
 }
 
-void Connection::State::describe_kind(const Json& body, std::string& reply) {
+void ValueRequests::describe(const Json& body, std::string& reply) {
     const Listed kind = kind_of(body["describe"], "describe");
     const Patterns patterns = patterns_of(body);
     std::optional<hal_type> type;
@@ -136,12 +142,12 @@ void Connection::State::describe_kind(const Json& body, std::string& reply) {
         throw RequestError{
             "histograms must be true or false, and is a member of a request to describe threads"};
     }
-    const auto lock = session.lock();
-    describe(reply += ",\"objects\":", session, kind, patterns, type);
+    const auto lock = session_.lock();
+    hal::describe(reply += ",\"objects\":", session_, kind, patterns, type);
     if (!histograms.is_boolean() || !histograms.get<bool>()) return;
     auto all = nlohmann::ordered_json::object();
-    for (const auto& thread : session.model().threads) {
-        const ThreadHistograms one = session.reports().histograms(*thread);
+    for (const auto& thread : session_.model().threads) {
+        const ThreadHistograms one = session_.reports().histograms(*thread);
         all[thread->name] = {{"wakeup", one.wakeup}, {"busy", one.busy}};
     }
     reply += ",\"histograms\":" + json_text(all);

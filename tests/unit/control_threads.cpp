@@ -40,7 +40,7 @@ TEST(ConnectionThreads,
             }
             connection.publish(now, rounds % 5 == 0, events);
             if (connection.idle()) {
-                EXPECT_GE(connection.requests(), connection.rubbish());
+                EXPECT_GE(connection.requests(), connection.invalid_requests());
             }
         }
     });
@@ -133,7 +133,7 @@ TEST(ServerThreads, clients_subscribe_edit_wait_and_disconnect_at_the_same_time)
         thread.join();
     }
     EXPECT_TRUE(eventually([&] { return server.counts().clients == 0; }));
-    EXPECT_EQ(server.counts().rubbish, 0U);
+    EXPECT_EQ(server.counts().invalid_requests, 0U);
     const auto lock = machine.session.lock();
     EXPECT_FALSE(machine.session.in_transaction());
 }

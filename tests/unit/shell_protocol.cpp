@@ -232,7 +232,7 @@ TEST_F(Protocol, options_hold_for_the_connection) {
     EXPECT_EQ(ask({{"run", "show sig level"}})["out"], "float  1  level\n\n");
 }
 
-TEST_F(Protocol, rubbish_gets_an_error_and_changes_nothing) {
+TEST_F(Protocol, invalid_input_gets_an_error_and_changes_nothing) {
     for (const std::string line : {"",
                                    "hello",
                                    "{",
@@ -275,7 +275,7 @@ TEST_F(Protocol, rubbish_gets_an_error_and_changes_nothing) {
     EXPECT_EQ(
         Json::parse(raw("{\"id\":\"" + std::string(1000, 'x') + "\",\"run\":\"status\"}"))["id"],
         nullptr);
-    EXPECT_GT(connection.rubbish(), 5U);
+    EXPECT_GT(connection.invalid_requests(), 5U);
     EXPECT_EQ(ask({{"run", "getp a.in0"}})["out"], "FALSE\n");
 }
 

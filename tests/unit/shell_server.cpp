@@ -110,7 +110,7 @@ TEST_F(ServerTest, invalid_requests_get_an_error_and_the_connection_continues) {
     EXPECT_EQ(Json::parse(wire.line())["ok"], false);
     EXPECT_EQ(Json::parse(wire.line())["ok"], false);
     EXPECT_EQ(Json::parse(wire.line())["out"], "FALSE\n");
-    EXPECT_TRUE(eventually([&] { return server->counts().rubbish == 2; }));
+    EXPECT_TRUE(eventually([&] { return server->counts().invalid_requests == 2; }));
 }
 
 TEST_F(ServerTest, a_line_received_in_parts_is_one_request) {
