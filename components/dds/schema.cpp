@@ -222,7 +222,7 @@ public:
         at_ += sizeof(T);
         return value;
     }
-    /// Without its 0; empty when there is none.
+    /// Returns the string without its terminating 0; empty if the 0 is missing.
     std::string_view text() noexcept {
         const auto size = get<std::uint32_t>();
         if (!room(size)) {

@@ -17,7 +17,7 @@ public:
         kept_.push_back(std::make_unique<std::vector<Filter>>(filters.begin(), filters.end()));
         now_.store(kept_.back().get(), std::memory_order_release);
     }
-    /// Returns true when any filter passes the frame, or there are none. [realtime] receiver
+    /// Returns true when any filter passes the frame, or without filters. [realtime] receiver
     bool pass(const Frame& f) const noexcept {
         const auto* filters = now_.load(std::memory_order_acquire);
         if (filters == nullptr || filters->empty()) return true;

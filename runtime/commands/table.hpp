@@ -135,13 +135,13 @@ struct CommandRow {
 
 /// All rows, in the order `help` lists them.
 std::span<const CommandRow> command_table();
-/// By either name; nullptr when there is none.
+/// Finds a command by either name; nullptr when it is unknown.
 const CommandRow* find_command(std::string_view name);
 /// What the row of `NAME = VALUE` is: setp.
 const CommandRow* row_of(const Command& command);
 std::vector<std::string> command_names();
 
-/// Applies an edit by its row. Reports unknown-command when there is none.
+/// Applies an edit by its row. Reports unknown-command when no row exists.
 void apply_edit(Transaction& transaction, const Command& command, Diagnostics& diagnostics);
 
 /// Checks the locks. False after reporting the lock and how to release it. Values of pins and

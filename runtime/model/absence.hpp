@@ -28,7 +28,7 @@ public:
         file,  ///< so does any signal
     };
     /// Enters what is missing: "component 'motmod'", "which is missing". `at` is the place of its
-    /// error, or unknown when there is none.
+    /// error, or unknown without an error.
     Cause add(std::string what, std::string why, Span at, Scope scope);
     /// A name that is missing because of `cause`; without one, because of an error that was
     /// reported.

@@ -282,7 +282,7 @@ bool LinkEdit::link(Pin& pin, Signal& signal, Word word, Arrow arrow) {
     if (pin.signal == &signal) return true;
     if (!check_link(pin, signal, word)) return false;
 
-    // LinuxCNC: the first reader, or a writer while there is none, hands its own value to the
+    // LinuxCNC: the first reader, or a writer of a signal without readers, hands its own value to the
     // signal.
     const bool unwritten = !signal.writer && signal.ios == 0;
     const bool hands_value = pin.dir != HAL_DIR_IN || signal.readers == 0;

@@ -73,7 +73,7 @@ private:
     std::optional<Span> dos_ending_;
 };
 
-/// What quotes and `#` do to a line: where its comment starts (its size when there is none), and
+/// What quotes and `#` do to a line: where its comment starts (its size without a comment), and
 /// the quote that is never closed.
 struct QuoteScan {
     std::size_t comment = 0;

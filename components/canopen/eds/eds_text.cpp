@@ -30,7 +30,7 @@ void append_utf8(std::string& out, std::uint32_t c) {
     add(0x80 | (c & 0x3F));
 }
 
-/// Bytes of the UTF-8 character at `at`; 0 when there is none.
+/// Returns the bytes of the UTF-8 character at `at`; 0 for invalid UTF-8.
 std::size_t utf8_at(std::string_view text, std::size_t at) {
     const auto byte = [&](std::size_t i) {
         return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;

@@ -8,7 +8,7 @@ namespace hal::canopen::cia402 {
 
 namespace {
 
-/// Returns a requested acceleration within its limit; a limit of 0 is none, a request of 0 the limit.
+/// Limits a requested acceleration. A limit of 0 means unlimited; a request of 0 selects the limit.
 std::uint32_t within(std::uint32_t requested, std::uint32_t limit) noexcept {
     if (limit == 0) return requested;
     if (requested == 0) return limit;

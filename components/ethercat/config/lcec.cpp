@@ -316,7 +316,7 @@ private:
             s.startup.push_back(std::move(w));
         }
     }
-    /// Returns the bytes of the elements `name`; reports when there are none.
+    /// Returns the bytes of the elements `name`; reports when they are missing.
     std::vector<std::uint8_t> raw_data(const Xml& node, const char* name) {
         std::vector<std::uint8_t> bytes;
         bool valid = true;

@@ -223,7 +223,7 @@ public:
 private:
     const esi::Device* device() const { return modular_ ? &*modular_ : device_; }
 
-    /// Finds the description of the device. Returns false after reporting that there is none.
+    /// Finds the description of the device. Returns false after reporting that it is missing.
     bool describe() {
         const Line* const esi = keys_.find("esi");
         const Line* const name = keys_.find("device");

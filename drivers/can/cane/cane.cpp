@@ -322,7 +322,7 @@ private:
         }
     }
 
-    /// Opens the next frame with messages for this link. Returns false when there is none.
+    /// Opens the next frame with messages for this link. Returns false when no frame is left.
     bool refill(std::int64_t now_ns) noexcept {
         next_ = filled_ = 0;
         // per call: a babbling station must not delay the cycle without limit

@@ -31,7 +31,7 @@ public:
     /// The plugin of that name (`-` and `_` are the same), built first where build_on_demand() does
     /// that; nothing after reporting no-such-component or bad-plugin.
     std::optional<Plugin> open(std::string_view name, Span at, Diagnostics& diagnostics) const;
-    /// The file of the plugin of that name; empty when there is none.
+    /// Returns the file of the plugin of that name; empty when it is missing.
     std::string find(std::string_view name) const;
     /// Every name that open() would find or build, sorted.
     std::vector<std::string> available() const;

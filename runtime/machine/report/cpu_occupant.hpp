@@ -7,7 +7,7 @@
 namespace hal {
 
 /// Returns "process 1234 (stress, SCHED_FIFO 99)": a real-time thread of another process that is
-/// ready to run on the CPU; "" when there is none. Reads all of /proc. [setup]
+/// ready to run on the CPU; "" when no such thread exists. Reads all of /proc. [setup]
 std::string cpu_occupant(int cpu);
 
 /// What to do about a thread that gets no CPU time on `cpu`; -1: it is not bound to one. [setup]

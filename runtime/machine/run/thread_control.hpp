@@ -24,7 +24,7 @@ public:
     /// Stops the functions and sets the outputs to their safe values. Returns false after reporting
     /// when a thread does not answer; the outputs of a thread that hangs are safe all the same.
     bool stop(Diagnostics* diagnostics = nullptr);
-    /// Reports the threads that hang as errors. Returns false when there are none.
+    /// Reports the threads that hang as errors. Returns false when no thread hangs.
     bool report_hung(Diagnostics& diagnostics) const;
     bool running() const;
     /// Returns true when start() was successful once.

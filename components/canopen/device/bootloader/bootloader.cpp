@@ -259,7 +259,7 @@ Abort Bootloader::Flash::close(Entry&, bool writing, bool whole) noexcept {
     d.writing_ = false;
     d.broken_off_ = !whole;
     ++d.changes_;
-    if (!whole) {  // half a program is none
+    if (!whole) {  // an incomplete program is invalid
         d.header_ = {};
         d.identification_ = 0;
         if (d.error_ != FlashError::address) {

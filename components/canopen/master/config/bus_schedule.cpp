@@ -125,7 +125,7 @@ private:
         out_.assumed.back() = !of_sync && p.inhibit_100us == 0 && p.request == 0;
     }
 
-    /// Returns the name of the message with the identifier of an RPDO; nullptr: there is none.
+    /// Returns the name of the message with the identifier of an RPDO; nullptr if no message has it.
     std::string* shared_name(const Pdo& p) {
         const bool extended = (p.cob & cob_extended) != 0;
         const auto same = std::find_if(out_.messages.begin(), out_.messages.end(),

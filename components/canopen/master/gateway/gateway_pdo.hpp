@@ -17,7 +17,7 @@ class Pdos {
 public:
     explicit Pdos(FrameQueue& out) : out_(out) {}
 
-    /// `set rpdo` and `set tpdo`. No data types: there is none of that number any more.
+    /// `set rpdo` and `set tpdo`. Data types are not supported: their numbers were withdrawn.
     Error configure(bool received, const Command&);
     /// `r p N`: "pdo 1 2 17 -5". Error::state: nothing has come yet.
     Error read(unsigned number, std::string& text) const;

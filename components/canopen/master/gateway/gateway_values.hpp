@@ -20,9 +20,9 @@ struct Format {
 };
 
 std::span<const Format> formats();
-/// Upper and lower case are the same; nullptr when there is none.
+/// Ignores case. Returns nullptr for an unknown name.
 const Format* format(std::string_view word);
-/// The first of that type; nullptr when there is none.
+/// Returns the first row of that type; nullptr for a type without a row.
 const Format* format(Type type);
 
 /// The value in one word, quoted where it needs to be; two words for times. Bytes of another length

@@ -120,7 +120,7 @@ void Transmitter::plan(const SlotIndex& at, Time begin) noexcept {
     plan_idle(at.slot, begin);
 }
 
-/// Hands over the frame for an own slot. Returns false when there is none.
+/// Queues the frame of an own slot on the link. Returns false when no frame is due.
 bool Transmitter::plan_private(const Use& use, std::uint32_t slot, Time begin) noexcept {
     const Table& table = core_.table;
     SendQueue::Entry* e = next_private(use, slot);

@@ -182,7 +182,7 @@ void Transmitter::send_pings(const Slot& slot, Time local_at, std::size_t used) 
     }
 }
 
-/// Sends the oldest answer to a ping. Returns false when there is none.
+/// Sends the oldest pending ping response. Returns false when no response is pending.
 bool Transmitter::send_answer(Time local_at) noexcept {
     const Pings::Owed* owed = pings_.answer();
     if (owed == nullptr) return false;
@@ -204,7 +204,7 @@ Address Transmitter::ping_target(std::size_t n) const noexcept {
     return roster_[n].from != Address{} ? roster_[n].from : others[n].mac;
 }
 
-/// Sends the next ping to a station with a known address. Returns false when there is none, or when
+/// Sends the next ping to a station with a known address. Returns false when no ping is due, or when
 /// it could not be sent; then it is tried again.
 bool Transmitter::send_ping(Time local_at) noexcept {
     for (std::size_t n = pings_.waiting(); n != pings_.size(); n = pings_.waiting()) {
