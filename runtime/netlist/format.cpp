@@ -197,7 +197,12 @@ private:
         const bool net = words[0] == "net";
         // net: the signal, the pins in front of the first arrow, the rest. loadrt: the component,
         // the rest.
-        const std::size_t columns = table ? 6 : net ? 4 : words[0] == "loadrt" ? 3 : 2;
+        std::size_t columns = 2;
+        if (table) {
+            columns = 6;
+        } else if (words[0] == "loadrt") {
+            columns = 3;
+        }
         for (std::size_t i = 1; i < words.size(); ++i) {
             const bool next =
                 net ? i <= 2 || (cells.size() == 3 && is_arrow(words[i])) : cells.size() < columns;

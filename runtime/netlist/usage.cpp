@@ -34,8 +34,8 @@ std::vector<UsageWord> words_of(std::string_view text) {
         if (end == text.npos) {
             end = text.size();
         }
-        std::string_view inner =
-            text.substr(at + (optional ? 1 : 0), end - at - (optional ? 1 : 0));
+        const std::size_t begin = optional ? at + 1 : at;
+        std::string_view inner = text.substr(begin, end - begin);
         if (optional) {
             ++end;
         }

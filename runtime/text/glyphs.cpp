@@ -28,22 +28,28 @@ bool in(const Range (&ranges)[n], char32_t code) {
                        [code](Range r) { return r.first <= code && code <= r.last; });
 }
 
+/// The bytes of a code point that begins with `first`; 0 when none does.
+std::size_t encoded_length(unsigned char first) {
+    if (first < 0xC2 || first >= 0xF5) return 0;
+    if (first < 0xE0) return 2;
+    return first < 0xF0 ? 3 : 4;
+}
+
 /// The code point at `at` and its length, or length 0 when the bytes are not valid UTF-8.
 std::size_t decode(std::string_view text, std::size_t at, char32_t& code) {
     const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
     const unsigned char first = byte(at);
-    const std::size_t length = first >= 0xF0 && first < 0xF5 ? 4
-                               : first >= 0xE0               ? 3
-                               : first >= 0xC2               ? 2
-                                                             : 0;
-    if (first >= 0xF5 || length == 0 || at + length > text.size()) return 0;
+    const std::size_t length = encoded_length(first);
+    if (length == 0 || at + length > text.size()) return 0;
     code = first & (0x7Fu >> length);
     for (std::size_t i = 1; i < length; ++i) {
         if ((byte(at + i) & 0xC0) != 0x80) return 0;
         code = code << 6 | (byte(at + i) & 0x3Fu);
     }
-    const char32_t least = length == 4 ? 0x10000 : length == 3 ? 0x800 : 0x80;
-    return code < least || code > 0x10FFFF || (code >= 0xD800 && code <= 0xDFFF) ? 0 : length;
+    constexpr char32_t min_codes[] = {0, 0, 0x80, 0x800, 0x10000};  // by length
+    if (code < min_codes[length] || code > 0x10FFFF) return 0;
+    const bool surrogate = code >= 0xD800 && code <= 0xDFFF;
+    return surrogate ? 0 : length;
 }
 
 }  // namespace
@@ -62,7 +68,8 @@ Glyph glyph_at(std::string_view text, std::size_t at) {
     if (in(unsafe, code)) {
         return {length, 4 * length, true};
     }
-    return {length, in(combining, code) ? 0u : in(wide, code) ? 2u : 1u, false};
+    if (in(combining, code)) return {length, 0, false};
+    return {length, in(wide, code) ? 2u : 1u, false};
 }
 
 void append_glyph(std::string& out, std::string_view text, std::size_t at, Glyph glyph) {

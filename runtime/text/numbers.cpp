@@ -77,12 +77,16 @@ std::string format_duration(double ns) {
         ++unit;
     }
     const double number = ns / unit->ns;
-    const double digits = std::fabs(number);
-    const bool whole = number == std::floor(number);
-    const int places = whole || digits >= 99.95 ? 0 : digits >= 9.995 ? 1 : 2;
+    const double magnitude = std::fabs(number);
+    int decimals = 2;
+    if (number == std::floor(number) || magnitude >= 99.95) {
+        decimals = 0;
+    } else if (magnitude >= 9.995) {
+        decimals = 1;
+    }
     char text[400];
     const auto end =
-        std::to_chars(text, text + sizeof text, number, std::chars_format::fixed, places).ptr;
+        std::to_chars(text, text + sizeof text, number, std::chars_format::fixed, decimals).ptr;
     return std::string(text, end) + unit->name;
 }
 

@@ -41,7 +41,7 @@ int edits(std::string_view a, std::string_view b, int limit) {
             const auto k = static_cast<std::size_t>(d);
             const int j = i + d - 1 - limit;
             if (j < 0 || j > m) continue;
-            int cost = i == 0 ? j : j == 0 ? i : far;
+            int cost = i == 0 ? j : i;  // against an empty beginning
             if (i > 0 && j > 0) {
                 cost = std::min({before[k] + (at(a, i - 1) != at(b, j - 1)), before[k + 1] + 1,
                                  now[k - 1] + 1});

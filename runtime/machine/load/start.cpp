@@ -167,8 +167,8 @@ Failure start_instance(Instance& instance, const Model& model, Executor& executo
 
 void stop_instance(Instance& instance) noexcept {
     if (!instance.started) return;
-    const hal_cycle none{
-        .size = sizeof none, .pad = 0, .period_ns = 0, .period_s = 0.0, .start_ns = 0, .number = 0};
+    hal_cycle none{};
+    none.size = sizeof none;
     for (const plan::Step& step : instance.emergency) {
         step.step(step.self, &none);
     }

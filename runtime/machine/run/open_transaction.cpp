@@ -15,8 +15,8 @@ namespace {
 
 /// No thread runs these instances any more: their devices get their safe values, as on `stop`.
 void make_abandoned_safe(const Model& model, const Edit& edit) noexcept {
-    const hal_cycle none{
-        .size = sizeof none, .pad = 0, .period_ns = 0, .period_s = 0.0, .start_ns = 0, .number = 0};
+    hal_cycle none{};
+    none.size = sizeof none;
     const auto runs = [](const LoadedFunction* function) { return function->thread != nullptr; };
     for (const LoadedFunction* const function : edit.taken_functions()) {
         for (const Instance* const instance : function->instances) {

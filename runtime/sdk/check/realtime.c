@@ -195,7 +195,7 @@ static char** arguments_given;
 static const hal_component* component;
 static const char *running = "", *phase = "constructor";
 
-static bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
+static bool accept_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
     (void)host;
     memory->own = decl->initial;
     memory->slot = &memory->own;
@@ -210,12 +210,17 @@ static bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* me
     }
     return true;
 }
-static bool take_function(const hal_host* host, const hal_function_decl* decl) {
+static bool accept_function(const hal_host* host, const hal_function_decl* decl) {
     (void)host;
     if ((decl->flags & HAL_FUNCTION_EMERGENCY) || function_count == most) return true;
     const bool whole = component->flags & HAL_COMPONENT_WHOLE_NAMES;
-    snprintf(functions[function_count].name, sizeof functions->name, "%s%s%s",
-             whole ? "" : component->name, !whole && *decl->name ? "." : "", decl->name);
+    char* const name = functions[function_count].name;
+    if (whole) {
+        snprintf(name, sizeof functions->name, "%s", decl->name);
+    } else {
+        const char* const separator = *decl->name ? "." : "";
+        snprintf(name, sizeof functions->name, "%s%s%s", component->name, separator, decl->name);
+    }
     functions[function_count].step = decl->step;
     functions[function_count++].self = decl->self;
     return true;
@@ -233,15 +238,16 @@ static const char* give_argument(const hal_host* host, const hal_argument_decl* 
 }
 static void* allocate(const hal_host* host, size_t bytes, size_t align) {
     (void)host;
-    void* const memory = __libc_memalign(align < 16 ? 16 : align, bytes ? bytes : 1);
+    const size_t at_least_16 = align < 16 ? 16 : align;
+    void* const memory = __libc_memalign(at_least_16, bytes ? bytes : 1);
     return memory ? memset(memory, 0, bytes) : NULL;
 }
-static void take_failure(const hal_host* host, const char* reason) {
+static void report_failure(const hal_host* host, const char* reason) {
     (void)host;
     printf("%s: %s\n", strcmp(phase, "start()") == 0 ? "start fails" : "rejected", reason);
 }
-static void take_rejection(const hal_host* host, const hal_rejection* rejection) {
-    take_failure(host, rejection->text);
+static void report_rejection(const hal_host* host, const hal_rejection* rejection) {
+    report_failure(host, rejection->text);
 }
 static const void* no_extension(const hal_host* host, const char* id) {
     return (void)host, (void)id, NULL;
@@ -261,23 +267,27 @@ static hal_value some_value(hal_type type, bool extreme) {
     static const double edges[] = {0.0,    -0.0,     -1.0,      1e300, -1e300,
                                    1e-310, INFINITY, -INFINITY, NAN};
     const uint64_t bits = random_bits() >> 11;
+    const bool odd = bits & 1;
     hal_value value = {0};
+    if (extreme) {
+        switch (type) {
+        case HAL_TYPE_BIT: value.bit = odd; break;
+        case HAL_TYPE_FLOAT: value.real = edges[bits % (sizeof edges / sizeof *edges)]; break;
+        case HAL_TYPE_S32: value.s32 = odd ? INT32_MIN : INT32_MAX; break;
+        case HAL_TYPE_U32: value.u32 = odd ? 0 : UINT32_MAX; break;
+        case HAL_TYPE_S64: value.s64 = odd ? INT64_MIN : INT64_MAX; break;
+        case HAL_TYPE_U64: value.u64 = odd ? 0 : UINT64_MAX; break;
+        case HAL_TYPE_PORT: break;
+        }
+        return value;
+    }
     switch (type) {
-    case HAL_TYPE_BIT: value.bit = bits & 1; break;
-    case HAL_TYPE_FLOAT:
-        value.real = extreme ? edges[bits % (sizeof edges / sizeof *edges)]
-                             : (double)bits / 9007199254740992.0 * 20.0 - 10.0;
-        break;
-    case HAL_TYPE_S32:
-        value.s32 = extreme ? (bits & 1 ? INT32_MIN : INT32_MAX) : (int32_t)(bits % 21) - 10;
-        break;
-    case HAL_TYPE_U32:
-        value.u32 = extreme ? (bits & 1 ? 0 : UINT32_MAX) : (uint32_t)(bits % 20);
-        break;
-    case HAL_TYPE_S64:
-        value.s64 = extreme ? (bits & 1 ? INT64_MIN : INT64_MAX) : (int64_t)(bits % 21) - 10;
-        break;
-    case HAL_TYPE_U64: value.u64 = extreme ? (bits & 1 ? 0 : UINT64_MAX) : bits % 20; break;
+    case HAL_TYPE_BIT: value.bit = odd; break;
+    case HAL_TYPE_FLOAT: value.real = (double)bits / 9007199254740992.0 * 20.0 - 10.0; break;
+    case HAL_TYPE_S32: value.s32 = (int32_t)(bits % 21) - 10; break;
+    case HAL_TYPE_U32: value.u32 = (uint32_t)(bits % 20); break;
+    case HAL_TYPE_S64: value.s64 = (int64_t)(bits % 21) - 10; break;
+    case HAL_TYPE_U64: value.u64 = bits % 20; break;
     case HAL_TYPE_PORT: break;
     }
     return value;
@@ -310,9 +320,8 @@ static void ended(int number) {
         put(thrown);
         put(cycle ? " in a cycle\n" : ", which nothing catches\n");
     } else {
-        put(number == SIGABRT ? (cycle ? "aborts in a cycle\n" : "aborts\n")
-            : cycle           ? "crashes in a cycle\n"
-                              : "crashes\n");
+        put(number == SIGABRT ? "aborts" : "crashes");
+        put(cycle ? " in a cycle\n" : "\n");
     }
     _exit(2);
 }
@@ -368,8 +377,9 @@ int main(int argc, char** argv) {
     for (int number = 0; number < 6; ++number) {
         signal((const int[]){SIGSEGV, SIGFPE, SIGBUS, SIGILL, SIGALRM, SIGABRT}[number], ended);
     }
-    const hal_host host = {sizeof host, NULL,         take_pin,     take_function, give_argument,
-                           allocate,    take_failure, no_extension, take_rejection};
+    const hal_host host = {sizeof host,     NULL,          accept_pin,
+                           accept_function, give_argument, allocate,
+                           report_failure,  no_extension,  report_rejection};
     void* const instance = allocate(&host, component->instance_size, component->instance_align);
     alarm(10);
     if (!component->create(&host, instance)) {
