@@ -224,7 +224,7 @@ private:
             hall_state_ = -1;
             error_ = false;
         }
-        const unsigned code = (hall[0] ? 4u : 0u) | (hall[1] ? 2u : 0u) | (hall[2] ? 1u : 0u);
+        const unsigned code = unsigned{hall[0]} << 2 | unsigned{hall[1]} << 1 | unsigned{hall[2]};
         const int state = bldc::state_of(code, used_pattern_);
         const int moved = state < 0 || hall_state_ < 0 ? 0 : (state - hall_state_ + 9) % 6 - 3;
         error_ = error_ || state < 0 || moved > 1 || moved < -1;

@@ -199,6 +199,11 @@ private:
         command_d_ = command_d;
     }
 
+    static double direction(double excess) {
+        if (excess > 0.0) return 1.0;
+        return excess < 0.0 ? -1.0 : 0.0;
+    }
+
     void control(double e, double dt) {
         double integral = integral_;
         // while saturated, only away from the limit
@@ -214,7 +219,7 @@ private:
             return;
         }
         integral_ = integral;
-        finish(given, wanted > given ? 1.0 : wanted < given ? -1.0 : 0.0, dt);
+        finish(given, direction(wanted - given), dt);
     }
 
     /// `pushing` is the direction in which the output is limited: -1, 0 or 1.

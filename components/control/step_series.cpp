@@ -84,7 +84,8 @@ private:
             itae.add(sum_, steps);
         }
         from_ = command;
-        command = command == 0.0 ? (size != 0.0 ? size.get() : 1.0) : 0.0;
+        const double step = size != 0.0 ? size.get() : 1.0;
+        command = command == 0.0 ? step : 0.0;
         started_ = true;
         since_ = peak_ = settled_ = sum_ = 0.0;
     }

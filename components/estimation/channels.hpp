@@ -109,7 +109,8 @@ private:
     };
     static std::int64_t cycles(const Row& row, hal::Cycle cycle) noexcept {
         const double count = row.age / cycle.seconds();
-        return count > 0.5 ? (count < 1e9 ? std::llround(count) : 1'000'000'000) : 0;
+        if (!(count > 0.5)) return 0;
+        return count < 1e9 ? std::llround(count) : 1'000'000'000;
     }
 
     std::vector<std::unique_ptr<Row>> rows_;

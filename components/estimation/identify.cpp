@@ -106,15 +106,18 @@ struct Identify : hal::Component {
         case Phase::relay: swing(y, dt); break;
         default: break;
         }
-        const double side = now_ == Phase::step    ? amplitude.get()
-                            : now_ == Phase::relay ? (high_ ? amplitude : -amplitude)
-                                                   : 0.0;
-        const double given = bias + side;
+        const double given = bias + excitation();
         output = std::isfinite(given) ? given : 0.0;
         phase = static_cast<std::uint32_t>(now_);
     }
 
 private:
+    double excitation() const noexcept {
+        if (now_ == Phase::step) return amplitude;
+        if (now_ != Phase::relay) return 0.0;
+        return high_ ? amplitude.get() : -amplitude;
+    }
+
     void enter(Phase next) noexcept {
         now_ = next;
         time_ = 0.0;

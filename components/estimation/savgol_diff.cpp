@@ -116,9 +116,10 @@ private:
             }
             basis.push_back(std::move(p));
         }
+        const double scales[] = {1.0, 1.0 / reach, 2.0 / (reach * reach)};  // d! / reach^d
         for (std::size_t d = 0; d < 3; ++d) {
             weights_[d].assign(n, 0.0);
-            const double scale = d == 0 ? 1.0 : d == 1 ? 1.0 / reach : 2.0 / (reach * reach);
+            const double scale = scales[d];
             for (const Poly& b : basis) {
                 for (std::size_t i = 0; d <= degree && i < n; ++i) {
                     weights_[d][i] += scale * b.c[d] * b.at[i];

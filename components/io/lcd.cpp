@@ -54,7 +54,8 @@ void number(Text& text, const Item& item, std::uint64_t magnitude, bool negative
         digits[count++] = "0123456789ABCDEF"[magnitude % base];
         magnitude /= base;
     }
-    const char sign = negative ? '-' : item.plus ? '+' : '\0';
+    const char plus = item.plus ? '+' : '\0';
+    const char sign = negative ? '-' : plus;
     const unsigned needed = count + (sign ? 1u : 0u);
     const unsigned width = item.width != 0 ? item.width : needed;
     if (magnitude != 0 || needed > width || needed > Text::room) {

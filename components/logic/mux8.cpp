@@ -11,7 +11,8 @@ struct Mux8 : hal::Component {
     hal::Function run{*this, "", hal::step<&Mux8::update>, "computes out"};
 
     void update(hal::Cycle) noexcept {
-        out = in[(sel[2] ? 4u : 0u) + (sel[1] ? 2u : 0u) + (sel[0] ? 1u : 0u)].get();
+        const unsigned selected = unsigned{sel[2]} << 2 | unsigned{sel[1]} << 1 | unsigned{sel[0]};
+        out = in[selected].get();
     }
 };
 

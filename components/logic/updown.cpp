@@ -22,7 +22,7 @@ struct Updown : hal::Component {
         const bool down = count_down;
         std::int64_t n = count_;
         if (started_) {
-            n += (up && !was_up_ ? 1 : 0) - (down && !was_down_ ? 1 : 0);
+            n += int{up && !was_up_} - int{down && !was_down_};
         }
         if (reset) {
             n = 0;

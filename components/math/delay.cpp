@@ -28,7 +28,10 @@ struct Delay : hal::Component {
         const double most = static_cast<double>(size_ - 1);
         const double wanted = static_cast<double>(cycles) + seconds / cycle.seconds();
         const bool possible = wanted >= -1e-9 && wanted <= most + 1e-9;
-        double back = wanted >= most ? most : wanted > 0.0 ? wanted : 0.0;  // 0 for NaN
+        double back = 0.0;  // also for NaN
+        if (wanted > 0.0) {
+            back = std::min(wanted, most);
+        }
         // Seconds that are a multiple of the period must not round down to one period less.
         const double whole = std::round(back);
         if (!interpolate || std::fabs(back - whole) < 1e-6) {

@@ -171,8 +171,12 @@ struct DiffDrive : hal::Component {
         };
         slowly(v - v_, max_linear_acceleration);
         slowly(w - w_, max_angular_acceleration);
-        v_ = enable ? step < 1.0 ? v_ + step * (v - v_) : v : 0.0;
-        w_ = enable ? step < 1.0 ? w_ + step * (w - w_) : w : 0.0;
+        v_ = step < 1.0 ? v_ + step * (v - v_) : v;
+        w_ = step < 1.0 ? w_ + step * (w - w_) : w;
+        if (!enable) {
+            v_ = 0.0;
+            w_ = 0.0;
+        }
         if (!std::isfinite(v_ + w_)) {
             v_ = w_ = 0.0;
         }

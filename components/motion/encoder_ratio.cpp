@@ -11,7 +11,7 @@ class Edges {
 public:
     int operator()(bool a, bool b) noexcept {
         // 0 1 2 3 in the order in which A leads B
-        const unsigned now = (a != b ? 1u : 0u) | (b ? 2u : 0u);
+        const unsigned now = unsigned{a != b} | unsigned{b} << 1;
         const unsigned moved = (now - last_) & 3u;
         last_ = now;
         if (!started_) {

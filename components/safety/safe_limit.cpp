@@ -173,7 +173,8 @@ private:
             !velocity.linked() && speed_filter > 0.0 ? dt / (speed_filter + dt) : 1.0;
         const double before = speed_;
         speed_ = known_ > 0 ? speed_ + share * (raw - speed_) : raw;
-        slew_ = known_ > (velocity.linked() ? 0 : 1) ? (speed_ - before) / dt : 0.0;
+        const int needed = velocity.linked() ? 0 : 1;
+        slew_ = known_ > needed ? (speed_ - before) / dt : 0.0;
         if (!std::isfinite(slew_)) {
             slew_ = 0.0;
         }

@@ -75,7 +75,8 @@ struct DcMotor : hal::Component {
 
     void update(hal::Cycle cycle) noexcept {
         const sim::Winding winding{resistance, inductance, constant, limit};
-        const double wanted = voltage + (pwm ? direction ? -supply : supply.get() : 0.0);
+        const double bridge = direction ? -supply : supply.get();
+        const double wanted = voltage + (pwm ? bridge : 0.0);
         const double applied = std::clamp(wanted, -std::abs(supply), std::abs(supply));
         const std::int64_t steps =
             std::max<std::int64_t>(1, (cycle.period_ns() + longest_step_ns - 1) / longest_step_ns);

@@ -203,7 +203,8 @@ struct Furuta : hal::Component {
             push = 0.0;
             rig_.tap(now, given);
         }
-        const double wanted = voltage + (pwm ? direction ? -supply : supply.get() : 0.0);
+        const double bridge = direction ? -supply : supply.get();
+        const double wanted = voltage + (pwm ? bridge : 0.0);
         if (!rig_.step(now, wanted, enable, cycle.period_ns())) {
             rest();
         }

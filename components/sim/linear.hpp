@@ -210,7 +210,8 @@ private:
 /// A parameter of a plant in a range that keeps the equations finite; what is not a number counts
 /// as `least`. [any]
 inline double sane(double value, double least) noexcept {
-    return value > least ? (value < 1e15 ? value : 1e15) : least;
+    if (!(value > least)) return least;
+    return value < 1e15 ? value : 1e15;
 }
 
 /// An input of a plant: what is not a number counts as 0. [any]

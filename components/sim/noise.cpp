@@ -69,7 +69,10 @@ struct Noise : hal::Component {
 
         const double most = std::fabs(limit);
         const double wanted = size * value_;
-        const double shown = !enable ? 0.0 : most > 0.0 ? std::clamp(wanted, -most, most) : wanted;
+        double shown = most > 0.0 ? std::clamp(wanted, -most, most) : wanted;
+        if (!enable) {
+            shown = 0.0;
+        }
         noise = std::isfinite(shown) ? shown : 0.0;
         out = in + offset + noise;
     }

@@ -168,19 +168,19 @@ private:
         }
     }
 
-    static std::string describe(std::string_view text) {
-        const auto instance = values_of(text, "instance");
-        const auto host = values_of(text, "host");
+    /// Returns the first value of a key, or "?".
+    static std::string value_of(std::string_view text, const char* key) {
+        const auto values = values_of(text, key);
+        return values.empty() ? "?" : std::string(values[0]);
+    }
 
-        const auto pid = values_of(text, "pid");
-        return shown("instance '" + (instance.empty() ? "?" : instance[0]) + "' on " +
-                     (host.empty() ? "?" : host[0]) + ", process " + (pid.empty() ? "?" : pid[0]));
+    static std::string describe(std::string_view text) {
+        return shown("instance '" + value_of(text, "instance") + "' on " + value_of(text, "host") +
+                     ", process " + value_of(text, "pid"));
     }
 
     static std::string process(std::string_view text) {
-        const auto host = values_of(text, "host");
-        const auto pid = values_of(text, "pid");
-        return (host.empty() ? "?" : host[0]) + ":" + (pid.empty() ? "?" : pid[0]);
+        return value_of(text, "host") + ":" + value_of(text, "pid");
     }
 
     /// Reports another process with this node's name. The own status is received too.

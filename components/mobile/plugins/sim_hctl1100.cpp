@@ -163,10 +163,13 @@ private:
     void turn(double dt) noexcept {
         const double settled = on ? command_ / 127.0 * fastest : 0.0;
         const double decay = lag > 1e-6 ? std::exp(-dt / lag) : 0.0;
-        const double next = held ? 0.0 : settled + (speed_ - settled) * decay;
-        angle_ +=
-            held ? 0.0 : settled * dt + (speed_ - settled) * (lag > 1e-6 ? lag * (1 - decay) : 0.0);
-        speed_ = next;
+        const double transient = lag > 1e-6 ? lag * (1 - decay) : 0.0;
+        if (held) {
+            speed_ = 0.0;
+        } else {
+            angle_ += settled * dt + (speed_ - settled) * transient;
+            speed_ = settled + (speed_ - settled) * decay;
+        }
         if (!std::isfinite(angle_ + speed_) || std::fabs(angle_) > 1e6) {
             angle_ = speed_ = 0.0;
         }

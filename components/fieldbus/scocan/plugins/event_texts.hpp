@@ -186,7 +186,8 @@ private:
         return mode != nullptr ? mode->name : "";
     }
     std::string rejection(const Happened& h) const {
-        const std::string node = "node " + (h.who < t_.nodes.size() ? t_.nodes[h.who].name : "?");
+        const bool known = h.who < t_.nodes.size();
+        const std::string node = known ? "node " + t_.nodes[h.who].name : "node ?";
         const bool silent = static_cast<Answer::Reason>(h.value) == Answer::Reason::offline;
         return node + (silent ? " did not answer; check that it runs with the same table"
                               : " has no such mode");

@@ -280,7 +280,9 @@ private:
 
     bool read_message(const Entry& entry) {
         const Words& w = entry.words;
-        message_ = {.name = w[1].text, .at = w[1].at};
+        message_ = Message{};
+        message_.name = w[1].text;
+        message_.at = w[1].at;
         has_sender_ = false;
         has_size_ = false;
         const bool good = name(w[1]) && identifier(w[2], message_.id) && is_new_message(w) &&

@@ -136,12 +136,16 @@ void Applicant::check(const Offer& offer) {
     if (!one || all_.size() >= most_accepted) {
         rejected_ = text;
         if (++rejections_ <= most_rejections) {
-            log("rejected the configuration from " + server + ": " +
-                (reading.good() ? one ? "it changed too often"
-                                      : "it is not the block of one station with a slot"
-                                : first_error(reading)) +
-                "; waiting for another" +
-                (rejections_ == most_rejections ? " (further rejections are not reported)" : ""));
+            std::string why = "it changed too often";
+            if (!reading.good()) {
+                why = first_error(reading);
+            } else if (!one) {
+                why = "it is not the block of one station with a slot";
+            }
+            const char* const last =
+                rejections_ == most_rejections ? " (further rejections are not reported)" : "";
+            log("rejected the configuration from " + server + ": " + why + "; waiting for another" +
+                last);
         }
         answers_.push(nullptr);
         return;

@@ -427,7 +427,10 @@ void Station::count_lost(const Sync& s) noexcept {
 }
 
 void Station::note_sync(const Sync& s, Time arrived) noexcept {
-    sync_ = {.ever = true, .received = true, .cycle = s.cycle, .at = arrived};
+    sync_.ever = true;
+    sync_.received = true;
+    sync_.cycle = s.cycle;
+    sync_.at = arrived;
 }
 
 /// Returns true when this station stops sending syncs for another one.
