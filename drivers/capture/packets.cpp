@@ -42,6 +42,15 @@ private:
 
 std::string cut_off(std::size_t at) { return "damaged or truncated at byte " + std::to_string(at); }
 
+/// Converts ticks to ns: exact for ticks of 1 ns and 1 us, where a double is not. 0: out of range.
+std::int64_t time_of(std::uint64_t ticks, double tick_ns) {
+    const double time_ns = static_cast<double>(ticks) * tick_ns;
+    if (time_ns >= 9e18) return 0;
+    if (tick_ns == 1.0) return static_cast<std::int64_t>(ticks);
+    if (tick_ns == 1000.0) return static_cast<std::int64_t>(ticks * 1000U);
+    return static_cast<std::int64_t>(time_ns);
+}
+
 std::string parse_pcapng(std::string_view all, const Take& take) {
     struct Interface {
         unsigned link;
@@ -83,13 +92,8 @@ std::string parse_pcapng(std::string_view all, const Take& take) {
             if (number >= interfaces.size() || held > size - 32) return cut_off(at);
             const auto ticks = std::uint64_t{in.number(at + 12, 4)} << 32 | in.number(at + 16, 4);
             const auto tick = interfaces[number].tick_ns;
-            const double rough = static_cast<double>(ticks) * tick;
-            // exact integers, where a double is not
-            const bool whole = tick == 1.0 || tick == 1000.0;
-            const auto exact = static_cast<std::int64_t>(ticks * (tick == 1.0 ? 1U : 1000U));
-            const auto time = rough >= 9e18 ? 0 : whole ? exact : static_cast<std::int64_t>(rough);
-            take({static_cast<std::uint16_t>(interfaces[number].link), time, in.part(at + 28, held),
-                  in.number(at + 24, 4)});
+            take({static_cast<std::uint16_t>(interfaces[number].link), time_of(ticks, tick),
+                  in.part(at + 28, held), in.number(at + 24, 4)});
         }
         at += size;
     }

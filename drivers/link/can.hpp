@@ -75,7 +75,8 @@ struct Frame {
     }
     /// Returns the data; empty for a remote frame. [any]
     std::span<const std::uint8_t> bytes() const noexcept {
-        return {data.data(), remote ? std::size_t{0} : length < 64 ? length : std::size_t{64}};
+        if (remote) return {};
+        return {data.data(), length < 64 ? length : std::size_t{64}};
     }
 
     /// Returns true for a frame that a controller can send (ISO 11898-1). [any]

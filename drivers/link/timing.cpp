@@ -156,8 +156,9 @@ Bits worst_case_bits(unsigned length, bool extended, bool fd, bool bit_rate_swit
                      bool remote) noexcept {
     // The k-th stuff bit comes at the earliest after bit 4k + 1.
     if (!fd) {
-        const unsigned stuffed =
-            (extended ? 54U : 34U) + (remote ? 0U : 8U * (length < 8 ? length : 8U));
+        const unsigned bytes = length < 8 ? length : 8U;
+        const unsigned head = extended ? 54U : 34U;
+        const unsigned stuffed = remote ? head : head + 8U * bytes;
         return {stuffed + (stuffed - 1) / 4 + classic_tail, 0};
     }
     length = length_of_code(code_of_length(length));

@@ -50,7 +50,9 @@ std::uint64_t get64(const std::uint8_t* from) noexcept {
 unsigned get16(const std::uint8_t* from) noexcept { return from[0] | unsigned{from[1]} << 8; }
 
 std::uint32_t word_of(const Frame& f) noexcept {
-    return f.id | (f.extended ? extended_bit : 0) | (f.remote ? remote_bit : 0);
+    const std::uint32_t extended = f.extended ? extended_bit : 0;
+    const std::uint32_t remote = f.remote ? remote_bit : 0;
+    return f.id | extended | remote;
 }
 
 /// Decodes identifier, flags and length. Returns false when they are invalid.

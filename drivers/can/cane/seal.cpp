@@ -34,8 +34,12 @@ ethernet::Address destination(std::span<const std::uint8_t> frame) noexcept {
 }  // namespace
 
 void Seal::leaves(std::span<std::uint8_t> frame) noexcept {
-    finish_packed(frame, sequences_of(frame).next(destination(frame)),
-                  key_ ? next_counter(simulated_) : 0, key_ ? &*key_ : nullptr);
+    const auto sequence = sequences_of(frame).next(destination(frame));
+    if (key_) {
+        finish_packed(frame, sequence, next_counter(simulated_), &*key_);
+    } else {
+        finish_packed(frame, sequence, 0, nullptr);
+    }
 }
 
 void Seal::stayed(std::span<const std::uint8_t> frame) noexcept {

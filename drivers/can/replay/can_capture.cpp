@@ -66,14 +66,14 @@ public:
         : writer_(file, link_can, channel) {}
     bool write(const Frame& f) override {
         std::string s;
-        const auto id = f.id | (f.extended ? 0x80000000U : 0U) | (f.remote ? 0x40000000U : 0U) |
-                        (f.error ? 0x20000000U : 0U);
+        const std::uint32_t flags = std::uint32_t{f.extended} << 31 |
+                                    std::uint32_t{f.remote} << 30 | std::uint32_t{f.error} << 29;
+        const std::uint32_t id = f.id | flags;
         for (int shift = 24; shift >= 0; shift -= 8) {
             s += static_cast<char>(id >> shift & 0xff);
         }
         s += static_cast<char>(f.length);
-        s += static_cast<char>((f.bit_rate_switch ? 1 : 0) | (f.error_state ? 2 : 0) |
-                               (f.fd ? 4 : 0));
+        s += static_cast<char>(int{f.bit_rate_switch} | int{f.error_state} << 1 | int{f.fd} << 2);
         s += std::string(2, '\0');
         for (const auto b : f.bytes()) {
             s += static_cast<char>(b);

@@ -277,8 +277,7 @@ std::string log_line(const Frame& f, std::string_view channel) {
     line.append(text, static_cast<std::size_t>(size));
     if (f.fd) {
         line += "#";
-
-        line += static_cast<char>('0' + (f.bit_rate_switch ? 1 : 0) + (f.error_state ? 2 : 0));
+        line += static_cast<char>('0' + (int{f.bit_rate_switch} | int{f.error_state} << 1));
     }
     if (f.remote) {
         line += f.length == 0 ? "R" : "R" + std::to_string(f.length);

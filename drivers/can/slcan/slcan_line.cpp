@@ -23,6 +23,12 @@ bool number(std::string_view text, std::uint32_t& value) noexcept {
 
 }  // namespace
 
+/// The letter of the command that sends a frame with 11 bits of identifier.
+static char command_of(const Frame& f) noexcept {
+    if (f.fd) return f.bit_rate_switch ? 'b' : 'd';
+    return f.remote ? 'r' : 't';
+}
+
 std::size_t encode(const Frame& f, Line& out) noexcept {
     std::size_t size = 0;
     const auto hex = [&](std::uint32_t v, int width) {
@@ -30,7 +36,7 @@ std::size_t encode(const Frame& f, Line& out) noexcept {
             out[size++] = digits[v >> width * 4 & 15U];
         }
     };
-    const char letter = f.fd ? (f.bit_rate_switch ? 'b' : 'd') : f.remote ? 'r' : 't';
+    const char letter = command_of(f);
     out[size++] = f.extended ? static_cast<char>(letter - 'a' + 'A') : letter;
     hex(f.id, f.extended ? 8 : 3);
     hex(code_of_length(f.length), 1);

@@ -18,7 +18,13 @@ static_assert(error_send_timeout == CAN_ERR_TX_TIMEOUT && error_controller == CA
 /// Converts a valid frame. Returns the number of bytes to write. [realtime]
 inline std::size_t to_kernel(const Frame& f, canfd_frame& out) noexcept {
     out = {};
-    out.can_id = f.id | (f.extended ? CAN_EFF_FLAG : 0U) | (f.remote ? CAN_RTR_FLAG : 0U);
+    out.can_id = f.id;
+    if (f.extended) {
+        out.can_id |= CAN_EFF_FLAG;
+    }
+    if (f.remote) {
+        out.can_id |= CAN_RTR_FLAG;
+    }
     out.len = f.length;
     if (f.fd) {
         out.flags = static_cast<__u8>((f.bit_rate_switch ? CANFD_BRS : 0) |
@@ -43,7 +49,8 @@ inline bool from_kernel(const canfd_frame& in, std::size_t size, Frame& f) noexc
     f.id = in.can_id & (f.error || f.extended ? CAN_EFF_MASK : CAN_SFF_MASK);
     f.bit_rate_switch = f.fd && (in.flags & CANFD_BRS) != 0;
     f.error_state = f.fd && (in.flags & CANFD_ESI) != 0;
-    f.length = in.len < (f.fd ? 64 : 8) ? in.len : static_cast<std::uint8_t>(f.fd ? 64 : 8);
+    const std::uint8_t max_length = f.fd ? 64 : 8;
+    f.length = in.len < max_length ? in.len : max_length;
     f.own = false;
     if (!f.remote) {
         std::memcpy(f.data.data(), in.data, f.length);

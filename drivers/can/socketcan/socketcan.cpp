@@ -240,9 +240,9 @@ public:
             // now and then, or after a burst.
             const bool many = several_ || ++waits_ % 32 == 0;
             const bool plain = !many && !options_.stamps && !options_.own_frames;
-            if (const int got =
-                    plain ? take_one() : take_batch(MSG_WAITFORONE, many ? batch : 1, unclocked);
-                got > 0) {
+            const unsigned count = many ? batch : 1;
+            const int got = plain ? take_one() : take_batch(MSG_WAITFORONE, count, unclocked);
+            if (got > 0) {
                 if (many) {
                     several_ = got > 1;
                 } else {
