@@ -192,8 +192,8 @@ std::string find_compiler(Language language, std::string& problem) {
     for (const char* name : cpp ? cpp_names : c_names) {
         if (const std::string path = in_path(name); !path.empty()) return path;
     }
-    problem = fmt::format("no {} compiler found; install one: sudo apt install {}",
-                          cpp ? "C++" : "C", cpp ? "g++" : "gcc");
+    problem = cpp ? "no C++ compiler found; install one: sudo apt install g++"
+                  : "no C compiler found; install one: sudo apt install gcc";
     return {};
 }
 

@@ -113,8 +113,9 @@ int to_page(Mode mode, const CompileOptions& options, const std::string& path) {
     }
     if (mode == view) return show(page, temporary);
     const bool adoc = mode == asciidoc;
-    problem = write_file(options.output.empty() ? name + (adoc ? ".adoc" : ".9") : options.output,
-                         adoc ? as_asciidoc(page) : as_man(page));
+    const std::string usual = name + (adoc ? ".adoc" : ".9");
+    const std::string& output = options.output.empty() ? usual : options.output;
+    problem = write_file(output, adoc ? as_asciidoc(page) : as_man(page));
     return problem.empty() ? 0 : fail(options, problem);
 }
 

@@ -193,8 +193,8 @@ bool Parser::array(Item& item) {
     const Text size = in_.expression(":]");
     const auto end = size.text.data() + size.text.size();
     const bool hex = size.text.starts_with("0x") || size.text.starts_with("0X");
-    const auto read =
-        std::from_chars(size.text.data() + (hex ? 2 : 0), end, item.size, hex ? 16 : 10);
+    const auto begin = hex ? size.text.data() + 2 : size.text.data();
+    const auto read = std::from_chars(begin, end, item.size, hex ? 16 : 10);
     if (!size.given() || read.ec != std::errc{} || read.ptr != end || item.size == 0 ||
         item.size > largest_array) {
         item.size = 1;

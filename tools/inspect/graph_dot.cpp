@@ -238,11 +238,19 @@ private:
               const char* style, bool labelled, bool both) {
         // A value that is one cycle old runs against the order of execution: it does not count for
         // the ranks.
-        text_ += fmt::format(
-            "    {} -> {} [color=\"{}\", style={}, tooltip={}{}{}{}];\n", from, to,
-            type_colours[static_cast<std::size_t>(signal.type)], style, dot_text(signal.name),
-            labelled ? ", label=" + dot_text(signal.name) : "", both ? ", dir=both" : "",
-            std::string_view(style) == "dashed" ? ", headlabel=\"z⁻¹\", constraint=false" : "");
+        text_ += fmt::format("    {} -> {} [color=\"{}\", style={}, tooltip={}", from, to,
+                             type_colours[static_cast<std::size_t>(signal.type)], style,
+                             dot_text(signal.name));
+        if (labelled) {
+            text_ += ", label=" + dot_text(signal.name);
+        }
+        if (both) {
+            text_ += ", dir=both";
+        }
+        if (std::string_view(style) == "dashed") {
+            text_ += ", headlabel=\"z⁻¹\", constraint=false";
+        }
+        text_ += "];\n";
     }
 
     /// A signal without a source, or without readers, is a node of its own.

@@ -211,28 +211,42 @@ bool read_status(std::string_view text, SeenInstance& seen) {
     return !seen.instance.empty();
 }
 
+static std::string instance_columns(const SeenInstance& one) {
+    const std::string node = one.node.empty() ? "" : one.cell + "/" + one.node;
+    return fmt::format("{:<16} {:<12} {:<20}", one.instance, one.host, node);
+}
+
+static std::string state_text(const SeenInstance& one) {
+    if (one.silent_s > silent_after_s) return fmt::format("  offline for {:.0f} s", one.silent_s);
+    return one.running ? "" : "  stopped";
+}
+
+/// An instance without threads has a row, too.
+static std::vector<SeenThread> rows_of(const SeenInstance& one) {
+    if (one.threads.empty()) return {SeenThread{"-", 0, 0, 0, false}};
+    return one.threads;
+}
+
 std::string top_table(const std::vector<SeenInstance>& all) {
     if (all.empty()) return "no instance is running; start one: hal run FILE.hal\n";
     std::string text =
         fmt::format("{:<16} {:<12} {:<20} {:<14} {:>9} {:>12} {:>8} {:>6}\n", "INSTANCE", "HOST",
                     "NODE", "THREAD", "PERIOD", "CYCLES", "MISSED", "FAULTS");
     for (const SeenInstance& one : all) {
-        const std::string node = one.node.empty() ? "" : one.cell + "/" + one.node;
-        const bool silent = one.silent_s > silent_after_s;
-        for (std::size_t i = 0; i < std::max<std::size_t>(one.threads.size(), 1); ++i) {
-            const SeenThread thread =
-                i < one.threads.size() ? one.threads[i] : SeenThread{"-", 0, 0, 0, false};
-            const std::string state = i != 0   ? ""
-                                      : silent ? fmt::format("  offline for {:.0f} s", one.silent_s)
-                                      : one.running ? ""
-                                                    : "  stopped";
-            text += fmt::format(
-                "{:<16} {:<12} {:<20} {:<14} {:>9} {:>12} {:>8} {:>6}{}{}\n",
-                i == 0 ? one.instance : "", i == 0 ? one.host : "", i == 0 ? node : "", thread.name,
-                thread.period_ns == 0 ? "-"
-                                      : format_duration(static_cast<double>(thread.period_ns)),
-                thread.cycles, thread.missed, i == 0 ? std::to_string(one.faults) : "",
-                thread.faulted ? "  stopped by a fault" : "", state);
+        std::string head = instance_columns(one);
+        std::string faults = std::to_string(one.faults);
+        std::string state = state_text(one);
+        for (const SeenThread& thread : rows_of(one)) {
+            const std::string period = thread.period_ns == 0
+                                           ? "-"
+                                           : format_duration(static_cast<double>(thread.period_ns));
+            text += fmt::format("{} {:<14} {:>9} {:>12} {:>8} {:>6}{}{}\n", head, thread.name,
+                                period, thread.cycles, thread.missed, faults,
+                                thread.faulted ? "  stopped by a fault" : "", state);
+            // the instance is named once
+            head = fmt::format("{:50}", "");
+            faults.clear();
+            state.clear();
         }
         if (!one.fault.empty()) {
             text += fmt::format("{:<16} newest fault: {}\n", "", one.fault);
@@ -282,7 +296,9 @@ int run_top(const TopOptions& options) {
         std::this_thread::sleep_for(3 * status_period);
     }
     if (!live) {
-        return print(options.json ? top_json(everybody(over)) : top_table(everybody(over))) ? 0 : 1;
+        const std::vector<SeenInstance> seen = everybody(over);
+        const std::string text = options.json ? top_json(seen) : top_table(seen);
+        return print(text) ? 0 : 1;
     }
     const auto end = options.for_ns >= 0 ? Clock::now() + std::chrono::nanoseconds(options.for_ns)
                                          : Clock::time_point::max();

@@ -39,9 +39,10 @@ double quarter(const Strip& strip) { return strip.high / 4 - strip.low / 4; }
 double tick_step(double span, double parts) {
     const double raw = span / parts;
     const double power = std::pow(10, std::floor(std::log10(raw)));
-
     const double digit = raw / power;
-    return power * (digit < 1.5 ? 1 : digit < 3.5 ? 2 : digit < 7.5 ? 5 : 10);
+    if (digit < 1.5) return power;
+    if (digit < 3.5) return power * 2;
+    return digit < 7.5 ? power * 5 : power * 10;
 }
 
 class Picture {

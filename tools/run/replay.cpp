@@ -270,6 +270,12 @@ private:
         return "";
     }
 
+    static hal_type type_of(const Model& model, const std::string& name) {
+        if (const Pin* const pin = model.find_pin(name)) return pin->type;
+        const Signal* const signal = model.find_signal(name);
+        return signal ? signal->type : HAL_TYPE_FLOAT;
+    }
+
     /// A table has no types: its values get those that the netlist has. Returns them as playback's
     /// argument.
     std::string take_types(std::string& problem) {
@@ -279,9 +285,7 @@ private:
             const auto lock = machine_.session.lock();
             const Model& model = machine_.session.model();
             for (const mcap::Column& column : recording_.tables.front().columns) {
-                const Pin* const pin = model.find_pin(column.name);
-                const Signal* const signal = pin ? nullptr : model.find_signal(column.name);
-                const hal_type type = pin ? pin->type : signal ? signal->type : HAL_TYPE_FLOAT;
+                const hal_type type = type_of(model, column.name);
                 if (type == HAL_TYPE_FLOAT || type == HAL_TYPE_PORT ||
                     !matches(options_.names, column.name)) {
                     continue;

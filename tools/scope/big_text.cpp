@@ -64,8 +64,10 @@ std::vector<std::string> big_text(std::string_view text, std::size_t columns, st
             const bool lower = dot(x, y + 1);
             if (!unicode) {
                 line += upper ? '#' : ' ';
+            } else if (upper) {
+                line += lower ? "█" : "▀";
             } else {
-                line += upper ? lower ? "█" : "▀" : lower ? "▄" : " ";
+                line += lower ? "▄" : " ";
             }
         }
     }

@@ -343,10 +343,12 @@ int Tracer::finish() {
     }
     if (ring() && fired_ns_ == 0) {
         remove_if_empty();
-        print(fmt::format(
-            "no {} in {}; nothing was written\n",
-            options_.on_overrun ? options_.on_fault ? "overrun or fault" : "overrun" : "fault",
-            counted(summary_.cycles, "cycle")));
+        const char* what = options_.on_overrun ? "overrun" : "fault";
+        if (options_.on_overrun && options_.on_fault) {
+            what = "overrun or fault";
+        }
+        print(fmt::format("no {} in {}; nothing was written\n", what,
+                          counted(summary_.cycles, "cycle")));
         return status;
     }
     if (ring()) {

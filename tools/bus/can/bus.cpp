@@ -219,7 +219,8 @@ bool parse_filter(std::string_view text, can::Filter& filter, std::string& probl
 }
 
 std::string id_text(const can::Frame& f) {
-    return f.error ? "error" : fmt::format("{:0{}X}", f.id, f.extended ? 8 : 3);
+    if (f.error) return "error";
+    return fmt::format("{:0{}X}", f.id, f.extended ? 8 : 3);
 }
 
 std::string data_text(const can::Frame& f, const char* separator) {

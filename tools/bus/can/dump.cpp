@@ -14,6 +14,7 @@
 #include "cli/output.hpp"
 #include "link/capture.hpp"
 #include "link/timing.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -170,13 +171,12 @@ bool report(const DumpOptions& options, const Source& source, double seconds) {
     }
     const std::string share = about.bit_rate ? fmt::format("{:.1f} %", load)
                                              : "unknown (add ?bitrate=500k to the address)";
-    write_all(
-        STDERR_FILENO,
-        fmt::format(
-            "{}{}{} frame{} in {:.2f} s, bus load {}, {} errors, {} lost{}\n", source.name,
-            source.name.empty() ? "" : ": ", source.frames, source.frames == 1 ? "" : "s", seconds,
-            share, s.errors, s.lost,
-            about.transport == "capture" ? "" : fmt::format(", bus {}", can::to_string(s.state))));
+    const std::string name = source.name.empty() ? "" : source.name + ": ";
+    const std::string state =
+        about.transport == "capture" ? "" : fmt::format(", bus {}", can::to_string(s.state));
+    write_all(STDERR_FILENO, fmt::format("{}{} in {:.2f} s, bus load {}, {} errors, {} lost{}\n",
+                                         name, counted(source.frames, "frame"), seconds, share,
+                                         s.errors, s.lost, state));
     return true;
 }
 

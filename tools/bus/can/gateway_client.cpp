@@ -108,8 +108,10 @@ std::string error_text(std::string_view answer) {
         number.pop_back();
     }
     const bool abort = number.starts_with("0x");
-    std::string text = mark == answer.npos ? (abort ? "SDO abort" : "error")
-                                           : std::string(answer.substr(mark + 1));
+    std::string text = abort ? "SDO abort" : "error";
+    if (mark != answer.npos) {
+        text = answer.substr(mark + 1);
+    }
     text += abort ? fmt::format(" ({})", number) : fmt::format(" (error {})", number);
     if (number == "104") {
         text += "; write the net before the command, or type: set network NET";

@@ -187,15 +187,15 @@ int store(Lss& l) {
 int fastscan(Lss& l) {
     l.station.lss.scan(monotonic_ns());
     if (!l.wait()) return l.silent("a scan finds unconfigured slaves in the waiting state only");
-    return print(text_of(l.station.lss.result().identity, ", now in the configuration state")) ? 0
-                                                                                               : 1;
+    const Identity& found = l.station.lss.result().identity;
+    return print(text_of(found, ", now in the configuration state")) ? 0 : 1;
 }
 
 int identify(Lss& l) {
     if (l.arguments.empty()) {
         l.station.lss.identify_unconfigured(monotonic_ns());
-        return l.wait() ? print("at least one unconfigured slave\n") ? 0 : 1
-                        : l.silent("no unconfigured slave that supports LSS");
+        if (!l.wait()) return l.silent("no unconfigured slave that supports LSS");
+        return print("at least one unconfigured slave\n") ? 0 : 1;
     }
     Identity low{};
     Identity high{};
@@ -221,8 +221,8 @@ int identify(Lss& l) {
         high = {low[0], low[1], revision, serial};
     }
     l.station.lss.identify(low, high, monotonic_ns());
-    return l.wait() ? print("slave identified\n") ? 0 : 1
-                    : l.silent("no slave of this identity that supports LSS");
+    if (!l.wait()) return l.silent("no slave of this identity that supports LSS");
+    return print("slave identified\n") ? 0 : 1;
 }
 
 struct Command {

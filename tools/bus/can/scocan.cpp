@@ -76,7 +76,12 @@ std::string slots_text(const Table& t, const Mode& m) {
     for (std::uint32_t slot = 0; slot < t.slots; ++slot) {
         for (const Use& u : m.slots[slot]) {
             if (u.kind == Kind::shared) continue;
-            std::string ids = u.kind == Kind::sync ? "0x000" : u.ids.empty() ? "any" : "";
+            std::string ids;
+            if (u.kind == Kind::sync) {
+                ids = "0x000";
+            } else if (u.ids.empty()) {
+                ids = "any";
+            }
             for (const std::uint32_t id : u.ids) {
                 ids += (ids.empty() ? "" : " ") + id_text(id);
             }

@@ -12,6 +12,7 @@
 #include "fieldbus/tdma/config/schedule_plan.hpp"
 #include "text/diagnostic.hpp"
 #include "text/glyphs.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -100,9 +101,8 @@ std::string text_of(const config::Schedule& s, const plan::Plan& p) {
         std::count_if(p.entries.begin(), p.entries.end(),
                       [](const auto& e) { return e.what == plan::Entry::What::slot; }));
     std::string text =
-        fmt::format("cycle {:g} us at {} Mbit/s, guard {:g} us: {} station{}, {} slot{}\n\n",
-                    us(s.cycle), s.speed, us(s.guard), s.stations.size(),
-                    s.stations.size() == 1 ? "" : "s", slots, slots == 1 ? "" : "s");
+        fmt::format("cycle {:g} us at {} Mbit/s, guard {:g} us: {}, {}\n\n", us(s.cycle), s.speed,
+                    us(s.guard), counted(s.stations.size(), "station"), counted(slots, "slot"));
     text += table_text(s, p) + "\n" + timeline_text(s, p) + "\n";
     text += fmt::format(
         "load {:.1f} % with frames of full length; a frame of 60 bytes takes {:.2f} us on a line, "
@@ -182,8 +182,9 @@ int run_tdma_plan(const TdmaPlanOptions& options) {
         const std::string why = write_file(options.svg, picture);
         return why.empty() ? 0 : fail(options, why);
     }
-    return print(options.json ? json_text(reading.schedule, p) : text_of(reading.schedule, p)) ? 0
-                                                                                               : 1;
+    const std::string text =
+        options.json ? json_text(reading.schedule, p) : text_of(reading.schedule, p);
+    return print(text) ? 0 : 1;
 }
 
 }  // namespace hal::tools

@@ -117,15 +117,15 @@ int run_ethercat_pdos(const EthercatOptions& options) {
         const auto& c = wire.contents(n);
         text += fmt::format("{}  {}\n", n, wire.name(n));
         for (const bool outputs : {true, false}) {
+            const char* const direction = outputs ? "outputs" : "inputs";
             for (const auto& pdo : outputs ? c.rx : c.tx) {
                 const std::string place = pdo.sync_manager == 0xff
                                               ? "not assigned"
                                               : fmt::format("sync manager {}", pdo.sync_manager);
-                text += fmt::format("  {:04X} {}, {}  {}\n", pdo.index,
-                                    outputs ? "outputs" : "inputs", place, pdo.name);
+                text += fmt::format("  {:04X} {}, {}  {}\n", pdo.index, direction, place, pdo.name);
                 json += fmt::format(
                     R"({}{{"position":{},"index":{},"direction":"{}","sync_manager":{},"name":{},"entries":[)",
-                    json.empty() ? "[" : ",\n ", n, pdo.index, outputs ? "outputs" : "inputs",
+                    json.empty() ? "[" : ",\n ", n, pdo.index, direction,
                     pdo.sync_manager == 0xff ? "null" : std::to_string(pdo.sync_manager),
                     json_string(pdo.name));
                 for (std::size_t i = 0; i < pdo.entries.size(); ++i) {
@@ -202,7 +202,8 @@ int run_ethercat_check(const EthercatCheckOptions& options) {
             }
         }
     }
-    return !options.json || print((json.empty() ? "[" : json) + "]\n") ? status : 1;
+    if (options.json && !print((json.empty() ? "[" : json) + "]\n")) return 1;
+    return status;
 }
 
 int run_ethercat_plan(const EthercatPlanOptions& options) {

@@ -187,7 +187,8 @@ int run_ethercat_graph(const EthercatOptions& options) {
     EthercatWire wire;
     if (!wire.open(options) || !wire.without_arguments(options)) return 1;
     const std::string text = topology_svg(wire);
-    return print(options.json ? fmt::format("{{\"svg\":{}}}\n", json_string(text)) : text) ? 0 : 1;
+    if (!options.json) return print(text) ? 0 : 1;
+    return print(fmt::format("{{\"svg\":{}}}\n", json_string(text))) ? 0 : 1;
 }
 
 }  // namespace hal::tools

@@ -44,7 +44,10 @@ int list(const EthercatOptions& options, EthercatWire& wire, Line line, Member m
             text += line(s) + "\n";
         }
     }
-    return print(text + (options.json ? "]\n" : "")) ? 0 : 1;
+    if (options.json) {
+        text += "]\n";
+    }
+    return print(text) ? 0 : 1;
 }
 
 std::string state_column(const BusSlave& s) {
@@ -296,7 +299,10 @@ int run_ethercat_crc(const EthercatOptions& options) {
     if (options.json) {
         return print(fmt::format("{{\"ports\":[{}],\"cables\":[{}]}}\n", rows, cables)) ? 0 : 1;
     }
-    return print(text + (cables.empty() ? "no port has counted errors of its own\n" : "")) ? 0 : 1;
+    if (cables.empty()) {
+        text += "no port has counted errors of its own\n";
+    }
+    return print(text) ? 0 : 1;
 }
 
 }  // namespace hal::tools

@@ -19,6 +19,7 @@
 #include "link/ethernet.hpp"
 #include "link/system.hpp"
 #include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -288,10 +289,13 @@ int run_node_ethercat(const EthercatLineOptions& options) {
         line.execute(fault, began);
     }
 
-    std::string text = fmt::format(
-        "EtherCAT line of {} slave{} on {}{}{} ({}); press Ctrl-C to end\n", devices.size(),
-        devices.size() == 1 ? "" : "s", primary->description().address, secondary ? " and " : "",
-        secondary ? secondary->description().address : "", primary->description().transport);
+    std::string addresses = primary->description().address;
+    if (secondary) {
+        addresses += " and " + secondary->description().address;
+    }
+    std::string text =
+        fmt::format("EtherCAT line of {} on {} ({}); press Ctrl-C to end\n",
+                    counted(devices.size(), "slave"), addresses, primary->description().transport);
     for (std::size_t n = 0; n < devices.size(); ++n) {
         text += fmt::format("{:4}  {}\n", n, devices[n].name);
     }
