@@ -24,8 +24,8 @@ struct SampleClock : hal::Component {
     hal::Out<std::uint32_t> sequence{*this, "sequence", "number of the newest sample, from 1"};
     hal::Out<double> delay{
         *this, "delay", "time from the newest sample with an effect to that effect", {.unit = "s"}};
-    hal::Out<double> least{*this, "delay-min", "shortest delay", {.unit = "s"}};
-    hal::Out<double> most{*this, "delay-max", "longest delay", {.unit = "s"}};
+    hal::Out<double> min{*this, "delay-min", "shortest delay", {.unit = "s"}};
+    hal::Out<double> max{*this, "delay-max", "longest delay", {.unit = "s"}};
     hal::Out<double> mean{*this, "delay-mean", "mean delay", {.unit = "s"}};
     hal::Out<double> deviation{*this, "delay-sd", "standard deviation of the delay", {.unit = "s"}};
     hal::Out<double> jitter{*this, "jitter", "delay-max - delay-min", {.unit = "s"}};
@@ -68,8 +68,8 @@ struct SampleClock : hal::Component {
             overtaken = 0;
             square_ = 0.0;
             delay = 0.0;
-            least = 0.0;
-            most = 0.0;
+            min = 0.0;
+            max = 0.0;
             mean = 0.0;
             deviation = 0.0;
             jitter = 0.0;
@@ -86,8 +86,8 @@ struct SampleClock : hal::Component {
         const bool first = measured == 0;
         measured = measured + 1;
         delay = d;
-        least = first ? d : std::fmin(least, d);
-        most = first ? d : std::fmax(most, d);
+        min = first ? d : std::fmin(min, d);
+        max = first ? d : std::fmax(max, d);
         // B. P. Welford, Note on a method for calculating corrected sums of squares and products,
         // Technometrics 4 (1962)
         const double off = d - mean;
@@ -95,7 +95,7 @@ struct SampleClock : hal::Component {
         mean = mean + off / count;
         square_ += off * (d - mean);
         deviation = std::sqrt(std::fmax(square_, 0.0) / count);
-        jitter = most - least;
+        jitter = max - min;
     }
 
 private:

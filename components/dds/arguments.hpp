@@ -95,12 +95,12 @@ public:
           deadline_(c, "deadline_ms", 0,
                     "DDS deadline, maximum sample interval (ms): offered by publishers, requested "
                     "by subscribers; 0: none",
-                    {.min = 0, .max = longest_ms}),
+                    {.min = 0, .max = max_ms}),
           budget_(c, "latency_ms", 0, "DDS latency budget (ms), a hint to the library",
-                  {.min = 0, .max = longest_ms}),
+                  {.min = 0, .max = max_ms}),
           lease_(c, "lease_ms", 0,
                  "liveliness lease of the publisher (ms); 0: that of its participant, 5000",
-                 {.min = 0, .max = longest_ms}),
+                 {.min = 0, .max = max_ms}),
           participant(c) {}
 
     /// Returns the type of the topic. Throws hal::ArgumentError or std::invalid_argument. [setup]
@@ -164,7 +164,7 @@ private:
     mutable hal::MessageLog log_{name};
 
     static constexpr std::size_t longest_name = 250;  // 255 in DDS, of which ROS 2 takes some
-    static constexpr std::int64_t longest_ms = 86'400'000;
+    static constexpr std::int64_t max_ms = 86'400'000;
 
     static std::string name_of(hal::Component&) {
         const auto* naming = hal::extension<hal_naming>(HAL_NAMING);

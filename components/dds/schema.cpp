@@ -18,7 +18,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "values are stored in native byte order");
 
 constexpr std::size_t header = 4;
-constexpr std::size_t most_fields = 1024;
+constexpr std::size_t max_fields = 1024;
 constexpr std::size_t most_bytes = 60'000;
 
 struct TypeName {
@@ -122,9 +122,9 @@ void parse(const std::string& whole, std::vector<Field>& to) {
         const std::string_view digits = rest.substr(at + 1);
         const auto got = std::from_chars(digits.data(), digits.data() + digits.size(), count);
         if (got.ec != std::errc{} || got.ptr != digits.data() + digits.size() || count == 0 ||
-            count > most_fields) {
+            count > max_fields) {
             reject("fields", "fields: '" + whole + "': invalid count after *; write 1.." +
-                                 std::to_string(most_fields));
+                                 std::to_string(max_fields));
         }
         rest = rest.substr(0, at);
         is_row = true;
@@ -150,8 +150,8 @@ void parse(const std::string& whole, std::vector<Field>& to) {
         }
         to.push_back(std::move(field));
     }
-    if (to.size() > most_fields) {
-        reject("fields", "fields: more than " + std::to_string(most_fields) +
+    if (to.size() > max_fields) {
+        reject("fields", "fields: more than " + std::to_string(max_fields) +
                              " fields; split them into two topics");
     }
 }

@@ -6,7 +6,7 @@
 namespace hal::dds {
 
 std::vector<std::uint8_t> status_bytes(std::string_view text) {
-    text = text.substr(0, largest_status);
+    text = text.substr(0, max_status_size);
     std::vector<std::uint8_t> bytes{0, 1, 0, 0};
     const auto length = static_cast<std::uint32_t>(text.size() + 1);
     for (unsigned shift = 0; shift < 32; shift += 8) {

@@ -13,9 +13,9 @@
 
 namespace hal::dds {
 
-constexpr std::size_t largest_status = 60'000;
+constexpr std::size_t max_status_size = 60'000;
 
-/// Returns a status as a sample: a string in XCDR1, truncated to `largest_status` bytes. [any]
+/// Returns a status as a sample: a string in XCDR1, truncated to `max_status_size` bytes. [any]
 /// allocates
 std::vector<std::uint8_t> status_bytes(std::string_view text);
 /// Returns the text of a sample; empty when it is not a valid string. [any]

@@ -26,7 +26,7 @@ class Nonlinear {
 public:
     explicit Nonlinear(Model model) : model_(std::move(model)), values_(model_.variables()) {
         for (std::size_t i = 0; i < model_.constants.size(); ++i) {
-            values_[most_slopes + Model::most_inputs + i].value = model_.constants[i];
+            values_[max_slopes + Model::max_inputs + i].value = model_.constants[i];
         }
     }
     const Model& model() const noexcept { return model_; }
@@ -35,7 +35,7 @@ public:
     void predict(Moment& to, const Moment& from) noexcept {
         const std::size_t n = model_.states.size();
         for (std::size_t i = 0; i < model_.inputs.size(); ++i) {
-            values_[most_slopes + i] = Dual{to.u(static_cast<Eigen::Index>(i))};
+            values_[max_slopes + i] = Dual{to.u(static_cast<Eigen::Index>(i))};
         }
         States x{};
         States k1{};
@@ -83,7 +83,7 @@ public:
             values_[i].slope[i] = 1.0;
         }
         for (std::size_t i = 0; i < model_.inputs.size(); ++i) {
-            values_[most_slopes + i] = Dual{moment.u(static_cast<Eigen::Index>(i))};
+            values_[max_slopes + i] = Dual{moment.u(static_cast<Eigen::Index>(i))};
         }
         const Dual expected = m.value(values_.data(), n);
         double off = moment.z(channel) - expected.value;
@@ -100,7 +100,7 @@ public:
     }
 
 private:
-    using States = std::array<Dual, most_slopes>;
+    using States = std::array<Dual, max_slopes>;
 
     void rates(const States& x, States& to) noexcept {
         const std::size_t n = model_.states.size();

@@ -19,12 +19,12 @@
 
 namespace hal::estimation {
 
-inline constexpr int most_slopes = 8;  ///< states of a nonlinear model at most
+inline constexpr int max_slopes = 8;  ///< states of a nonlinear model at most
 
 /// A number and its derivatives by the states: forward differentiation is exact, not a difference.
 struct Dual {
     double value = 0.0;
-    std::array<double, most_slopes> slope{};
+    std::array<double, max_slopes> slope{};
 };
 
 /// One formula as steps on a stack. Evaluating it takes no memory.

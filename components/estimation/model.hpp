@@ -18,13 +18,13 @@ namespace hal::estimation {
 /// `measure NAME = FORMULA sigma S`, with `wrap` behind an angle, `wrap PERIOD` behind a counter. [setup]
 class Model {
 public:
-    static constexpr std::size_t most_inputs = 8;
+    static constexpr std::size_t max_inputs = 8;
 
 public:
-    static constexpr std::size_t most_measures = 12;
+    static constexpr std::size_t max_measures = 12;
 
 public:
-    static constexpr std::size_t most_constants = 32;
+    static constexpr std::size_t max_constants = 32;
 
     struct State {
         std::string name;
@@ -66,7 +66,7 @@ public:
         }
     }
     /// Returns the number of variables: states, inputs, constants, in this order. [realtime]
-    std::size_t variables() const noexcept { return most_slopes + most_inputs + constants.size(); }
+    std::size_t variables() const noexcept { return max_slopes + max_inputs + constants.size(); }
 
 private:
     struct Words {
@@ -144,9 +144,9 @@ private:
     }
     void input(std::size_t begin, std::size_t end) {
         const Words name = word(begin, end);
-        if (!fresh(name, most_inputs, inputs.size(), "inputs")) return;
+        if (!fresh(name, max_inputs, inputs.size(), "inputs")) return;
         index_[std::string(piece(name))] =
-            static_cast<std::uint16_t>(static_cast<std::size_t>(most_slopes) + inputs.size());
+            static_cast<std::uint16_t>(static_cast<std::size_t>(max_slopes) + inputs.size());
         inputs.emplace_back(piece(name));
     }
     /// A formula of constants only.
@@ -154,7 +154,7 @@ private:
         Expression e;
         const auto constants_only = [this](std::string_view name) -> std::optional<std::uint16_t> {
             const auto found = index_.find(std::string(name));
-            return found != index_.end() && found->second >= most_slopes + most_inputs
+            return found != index_.end() && found->second >= max_slopes + max_inputs
                        ? std::optional(found->second)
                        : std::nullopt;
         };
@@ -165,7 +165,7 @@ private:
         }
         std::vector<Dual> values(variables() + 1);
         for (std::size_t i = 0; i < constants.size(); ++i) {
-            values[most_slopes + most_inputs + i].value = constants[i];
+            values[max_slopes + max_inputs + i].value = constants[i];
         }
         const double v = e(values.data(), 0).value;
         if (!std::isfinite(v)) {
@@ -176,10 +176,10 @@ private:
     }
     void constant(std::size_t begin, std::size_t sign, std::size_t end) {
         const Words name = word(begin, sign);
-        if (!fresh(name, most_constants, constants.size(), "constants")) return;
+        if (!fresh(name, max_constants, constants.size(), "constants")) return;
         const double v = fixed(trim(sign + 1, end));
         index_[std::string(piece(name))] =
-            static_cast<std::uint16_t>(most_slopes + most_inputs + constants.size());
+            static_cast<std::uint16_t>(max_slopes + max_inputs + constants.size());
         constants.push_back(v);
     }
     /// Where a keyword begins, or `end`.
@@ -195,7 +195,7 @@ private:
     }
     void state(std::size_t begin, std::size_t sign, std::size_t end) {
         const Words name = word(begin, sign);
-        if (!fresh(name, most_slopes, states.size(), "states")) return;
+        if (!fresh(name, max_slopes, states.size(), "states")) return;
         const std::size_t sigma = keyword(sign + 1, end, "sigma");
 
         const std::size_t noise = keyword(sign + 1, end, "noise");
@@ -249,7 +249,7 @@ private:
         if (piece(name).empty()) {
             return report_at(begin, sign, "missing name", "names consist of letters, digits and _");
         }
-        if (measures.size() >= most_measures) {
+        if (measures.size() >= max_measures) {
             return report_at(name.begin, name.end, "more than 12 measurements", "reduce the model");
         }
         const std::size_t sigma = keyword(sign + 1, end, "sigma");

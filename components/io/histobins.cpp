@@ -7,7 +7,7 @@
 
 namespace {
 
-constexpr std::int32_t most = 200;
+constexpr std::int32_t max = 200;
 
 struct Histobins : hal::Component {
     using Component::Component;
@@ -38,14 +38,14 @@ struct Histobins : hal::Component {
     hal::Out<double> variance{*this, "variance", "variance of the values"};
     hal::Out<double> mean{*this, "mean", "mean of the values"};
     hal::Out<std::int32_t> available{
-        *this, "availablebins", "maximum number of bins", {.initial = most}};
+        *this, "availablebins", "maximum number of bins", {.initial = max}};
     hal::Function run{*this, "", &Histobins::update, "counts the value"};
 
     void update(hal::Cycle) noexcept {
         check = index.get();
-        available = most;
+        available = max;
         const double value = chosen();
-        const bool bins = nbins >= 1 && nbins <= most && binsize > 0.0 && std::isfinite(binsize) &&
+        const bool bins = nbins >= 1 && nbins <= max && binsize > 0.0 && std::isfinite(binsize) &&
                           std::isfinite(minvalue);
         input_error = !bins || !(std::fabs(value) <= 1e150);
         if (input_error) return;
@@ -112,7 +112,7 @@ private:
         variance = statistics_.variance();
     }
     measure::Statistics statistics_;
-    std::array<double, most> bins_{};
+    std::array<double, max> bins_{};
     double above_ = 0.0;
     double below_ = 0.0;
     double smallest_ = 0.0;

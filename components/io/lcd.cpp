@@ -234,10 +234,10 @@ private:
         return all[i++];
     }
 
-    static unsigned digits(const std::string& all, std::size_t& i, unsigned most) {
+    static unsigned digits(const std::string& all, std::size_t& i, unsigned max) {
         unsigned value = 0;
         for (; i < all.size() && all[i] >= '0' && all[i] <= '9'; ++i) {
-            value = std::min(value * 10 + static_cast<unsigned>(all[i] - '0'), most);
+            value = std::min(value * 10 + static_cast<unsigned>(all[i] - '0'), max);
         }
         return value;
     }

@@ -12,14 +12,14 @@ struct Abs : hal::Component {
     hal::Out<bool> is_negative{*this, "is-negative", "TRUE while in is below -1e-6"};
     hal::Function run{*this, "", hal::step<&Abs::update>, "computes out and the sign"};
 
-    static constexpr double least = 1e-6;  // a smaller magnitude is neither positive nor negative
+    static constexpr double min = 1e-6;  // a smaller magnitude is neither positive nor negative
 
     void update(hal::Cycle) noexcept {
         const double value = in;
         out = std::fabs(value);
         sign = value < 0.0;
-        is_positive = value > least;
-        is_negative = value < -least;
+        is_positive = value > min;
+        is_negative = value < -min;
     }
 };
 

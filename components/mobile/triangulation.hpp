@@ -36,10 +36,10 @@ struct Fix {
 inline double wrapped(double angle) noexcept { return std::remainder(angle, 2 * std::numbers::pi); }
 
 /// Returns the pose from which the beacons have these bearings, relative to the heading, rad.
-/// Invalid where |D| is below `least_d`, or where the bearings contradict each other by more than
+/// Invalid where |D| is below `min_d`, or where the bearings contradict each other by more than
 /// 0.1 rad. [any]
 inline Fix triangulate(const std::array<Place, 3>& beacons, const std::array<double, 3>& bearings,
-                       double least_d) noexcept {
+                       double min_d) noexcept {
     // An angle of 0 or pi between two beacons has no cotangent; its largest useful value places the
     // centre far away.
     const auto cot = [](double angle) { return std::clamp(1.0 / std::tan(angle), -1e8, 1e8); };
@@ -63,7 +63,7 @@ inline Fix triangulate(const std::array<Place, 3>& beacons, const std::array<dou
     const double d = (x12 - x23) * (y23 - y31) - (y12 - y23) * (x23 - x31);
     Fix fix;
     fix.d = std::fabs(d);
-    if (!(fix.d >= least_d && fix.d > 0.0)) return fix;
+    if (!(fix.d >= min_d && fix.d > 0.0)) return fix;
     fix.x = b2.x + k * (y12 - y23) / d;
     fix.y = b2.y + k * (x23 - x12) / d;
     if (!std::isfinite(fix.x + fix.y)) return fix;

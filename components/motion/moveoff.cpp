@@ -9,8 +9,8 @@
 
 namespace {
 
-constexpr std::size_t most_joints = 9;
-using Offsets = std::array<double, most_joints>;
+constexpr std::size_t max_joints = 9;
+using Offsets = std::array<double, max_joints>;
 
 struct Moveoff : hal::Component {
     using Component::Component;
@@ -18,7 +18,7 @@ struct Moveoff : hal::Component {
                               "personality",
                               3,
                               "number of joints",
-                              {.per_instance = true, .min = 1, .max = most_joints}};
+                              {.per_instance = true, .min = 1, .max = max_joints}};
 
     hal::Function read{*this, "read-inputs", &Moveoff::read_inputs,
                        "computes the offsets; add it before write-outputs"};
@@ -197,7 +197,7 @@ private:
         state = paused_ ? std::int32_t{off} : state_;
     }
 
-    std::array<plan::Axis, most_joints> axes_;
+    std::array<plan::Axis, max_joints> axes_;
     Offsets applied_{};
     Offsets last_{};
     // allocated here, not in a cycle

@@ -79,7 +79,7 @@ struct DcMotor : hal::Component {
         const double wanted = voltage + (pwm ? bridge : 0.0);
         const double applied = std::clamp(wanted, -std::abs(supply), std::abs(supply));
         const std::int64_t steps =
-            std::max<std::int64_t>(1, (cycle.period_ns() + longest_step_ns - 1) / longest_step_ns);
+            std::max<std::int64_t>(1, (cycle.period_ns() + max_step_ns - 1) / max_step_ns);
         const double dt = cycle.seconds() / static_cast<double>(steps);
         for (std::int64_t i = 0; i < steps; ++i) {
             step(winding, applied, dt);
@@ -91,7 +91,7 @@ struct DcMotor : hal::Component {
     }
 
 private:
-    static constexpr std::int64_t longest_step_ns = 100'000;
+    static constexpr std::int64_t max_step_ns = 100'000;
 
     /// Solves the current exactly, then speed and angle by a classical Runge-Kutta step with the
     /// mean torque of the step.

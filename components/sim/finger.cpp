@@ -58,7 +58,7 @@ struct Finger : hal::Component {
         const double edge = sim::force(wall);
         const double lag = sim::sane(actuator_lag, 0.0);
         const std::int64_t steps =
-            std::clamp<std::int64_t>(cycle.period_ns() / longest_step_ns, 1, 10'000);
+            std::clamp<std::int64_t>(cycle.period_ns() / max_step_ns, 1, 10'000);
         const double h = cycle.seconds() / static_cast<double>(steps);
         for (std::int64_t i = 0; i < steps && !reset; ++i) {
             push_ += (wanted - push_) * (lag > 0.0 ? -std::expm1(-h / lag) : 1.0);
@@ -80,7 +80,7 @@ struct Finger : hal::Component {
     }
 
 private:
-    static constexpr std::int64_t longest_step_ns = 20'000;
+    static constexpr std::int64_t max_step_ns = 20'000;
 
     static double contact(double depth, double speed, double k, double d) noexcept {
         return depth > 0.0 ? std::fmax(k * depth + d * speed, 0.0) : 0.0;

@@ -121,7 +121,7 @@ public:
         const Winding winding{of.resistance, of.inductance, of.torque_constant, of.current_limit};
         const double applied = std::clamp(voltage, -std::abs(of.supply), std::abs(of.supply));
         const std::int64_t steps =
-            std::max<std::int64_t>(1, (period_ns + longest_step_ns - 1) / longest_step_ns);
+            std::max<std::int64_t>(1, (period_ns + max_step_ns - 1) / max_step_ns);
         const double dt = static_cast<double>(period_ns) * 1e-9 / static_cast<double>(steps);
         torque_ = 0.0;
         for (std::int64_t i = 0; i < steps; ++i) {
@@ -157,7 +157,7 @@ public:
 
 private:
     // the fastest mode is some 100 rad/s: an error far below 1e-9
-    static constexpr std::int64_t longest_step_ns = 100'000;
+    static constexpr std::int64_t max_step_ns = 100'000;
 
     /// Limits to ten seconds; NaN counts as 0.
     static std::int64_t nanoseconds(double seconds) noexcept {

@@ -67,9 +67,9 @@ struct Noise : hal::Component {
         ++age_;
         const double size = std::fabs(amplitude) <= 1e300 ? amplitude.get() : 0.0;
 
-        const double most = std::fabs(limit);
+        const double max = std::fabs(limit);
         const double wanted = size * value_;
-        double shown = most > 0.0 ? std::clamp(wanted, -most, most) : wanted;
+        double shown = max > 0.0 ? std::clamp(wanted, -max, max) : wanted;
         if (!enable) {
             shown = 0.0;
         }

@@ -9,16 +9,16 @@ namespace {
 
 using namespace hal::vision;
 
-constexpr std::int64_t most_kinds = 8;
+constexpr std::int64_t max_kinds = 8;
 
 struct Found {
     bool found = false;
     std::uint32_t crowded = 0;
-    std::array<Track, most_tracks> tracks{};
+    std::array<Track, max_tracks> tracks{};
 };
 
 struct Settings {
-    std::array<BlobKind, most_kinds> kinds{};
+    std::array<BlobKind, max_kinds> kinds{};
     TrackRules track;
     std::uint32_t threshold = 0;
     std::uint32_t area = 0;
@@ -38,12 +38,12 @@ struct VisionBlob : CameraComponent<VisionBlob, Found, Settings> {
                         "kinds",
                         2,
                         "number of object kinds, each of one colour",
-                        {.min = 1, .max = most_kinds}};
+                        {.min = 1, .max = max_kinds}};
     hal::Argument count{*this,
                         "tracks",
                         8,
                         "maximum number of tracked objects",
-                        {.min = 1, .max = static_cast<std::int64_t>(most_tracks)}};
+                        {.min = 1, .max = static_cast<std::int64_t>(max_tracks)}};
 
     hal::Outs<std::uint32_t> id{*this, "track-#-id", count,
                                 "id of the object in track #, from 1; 0: no object"};
@@ -89,9 +89,9 @@ struct VisionBlob : CameraComponent<VisionBlob, Found, Settings> {
 
     hal::Param<std::uint32_t> threshold{
         *this, "threshold", "minimum strength of the colour, 0..255", {.initial = 40}};
-    hal::Param<std::uint32_t> least_area{
+    hal::Param<std::uint32_t> min_area{
         *this, "min-area", "minimum area of an object in pixels", {.initial = 40}};
-    hal::Param<double> most_distance{
+    hal::Param<double> max_distance{
         *this, "max-distance", "maximum distance of objects", {.initial = 3.0, .unit = "m"}};
     hal::Param<double> gate{*this,
                             "gate",
@@ -130,8 +130,8 @@ struct VisionBlob : CameraComponent<VisionBlob, Found, Settings> {
         of.track = {finite(gate), finite(gain),
                     static_cast<std::int64_t>(std::clamp(finite(forget), 0.0, 1e6) * 1e9)};
         of.threshold = threshold;
-        of.area = least_area;
-        of.distance = finite(most_distance);
+        of.area = min_area;
+        of.distance = finite(max_distance);
         return of;
     }
 

@@ -69,7 +69,7 @@ struct VisionLine : CameraComponent<VisionLine, Found, Settings> {
                              {.initial = 0.6, .unit = "m"}};
     hal::Param<double> contrast{
         *this, "contrast", "minimum difference from the floor, 0..255", {.initial = 20.0}};
-    hal::Param<double> least_quality{
+    hal::Param<double> min_quality{
         *this, "min-quality", "minimum quality of a valid line", {.initial = 0.4}};
     hal::Param<std::uint32_t> bands{
         *this, "bands", "number of horizontal bands to evaluate, 3..32", {.initial = 12}};
@@ -82,7 +82,7 @@ struct VisionLine : CameraComponent<VisionLine, Found, Settings> {
         rules.reach = of.reach;
 
         rules.contrast = of.contrast;
-        rules.least_quality = of.quality;
+        rules.min_quality = of.quality;
         rules.bands = static_cast<int>(std::clamp(of.bands, 3u, 32u));
         const LineSeen seen = find_line(frame, ground.in(frame), rules);
         result = {seen.found, seen.offset, seen.heading, seen.curvature, seen.quality};
@@ -93,7 +93,7 @@ struct VisionLine : CameraComponent<VisionLine, Found, Settings> {
                 finite(ahead),
                 finite(reach),
                 finite(contrast),
-                finite(least_quality),
+                finite(min_quality),
                 bands,
                 light};
     }

@@ -21,7 +21,7 @@ struct Found {
 struct Settings {
     std::int32_t id = -1;
     double size_mm = 0;
-    double most_error = 0;
+    double max_error_px = 0;
     bool operator==(const Settings&) const = default;
 };
 
@@ -40,7 +40,7 @@ public:
         const std::vector<Marker> markers = detector_->find(frame, of.id, of.size_mm);
         const Marker* best = nullptr;
         for (const Marker& marker : markers) {
-            if (!best && (of.most_error <= 0.0 || marker.error_px <= of.most_error)) {
+            if (!best && (of.max_error_px <= 0.0 || marker.error_px <= of.max_error_px)) {
                 best = &marker;
             }
         }

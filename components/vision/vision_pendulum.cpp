@@ -92,18 +92,18 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
         *this, "hue-tolerance", "a colour may be off by so much", {.initial = 40.0, .unit = "deg"}};
     hal::Param<std::uint32_t> threshold{
         *this, "threshold", "how strong a ball's colour has to be, of 255", {.initial = 30}};
-    hal::Param<std::uint32_t> least_area{
+    hal::Param<std::uint32_t> min_area{
         *this, "min-area", "minimum area of a ball in pixels", {.initial = 12}};
     hal::Param<double> lost_time{
         *this,
         "lost-time",
         "time without the pendulum after which a fault is raised; 0: never",
         {.initial = 0.25, .unit = "s"}};
-    hal::Param<double> most_residual{*this,
-                                     "most-residual",
-                                     "a frame with a greater residual does not count",
-                                     {.initial = 1.5, .unit = "px"}};
-    hal::Param<double> most_sigma{
+    hal::Param<double> max_residual{*this,
+                                    "most-residual",
+                                    "a frame with a greater residual does not count",
+                                    {.initial = 1.5, .unit = "px"}};
+    hal::Param<double> max_sigma{
         *this,
         "max-sigma",
         "maximum uncertainty of an angle, assuming 0.05 px for the balls; other frames are ignored",
@@ -136,17 +136,17 @@ struct VisionPendulum : CameraComponent<VisionPendulum, Found, Settings> {
         limits.tip = {of.tip_hue, of.tolerance};
         limits.threshold = static_cast<int>(std::min(of.threshold, 254u));
 
-        limits.least_area = static_cast<int>(std::clamp(of.area, 1u, 1000000u));
-        limits.most_residual = of.residual;
-        limits.most_sigma = of.sigma;
+        limits.min_area = static_cast<int>(std::clamp(of.area, 1u, 1000000u));
+        limits.max_residual = of.residual;
+        limits.max_sigma = of.sigma;
         const PendulumSeen seen = find_pendulum(frame, view, limits);
         result = {seen.found,        seen.arm,          seen.pendulum,   seen.residual,
                   seen.pivot_ball.u, seen.pivot_ball.v, seen.tip_ball.u, seen.tip_ball.v};
     }
 
     Settings settings() const noexcept {
-        return {finite(pivot_hue),  finite(tip_hue), finite(tolerance), finite(most_residual),
-                finite(most_sigma), threshold,       least_area};
+        return {finite(pivot_hue), finite(tip_hue), finite(tolerance), finite(max_residual),
+                finite(max_sigma), threshold,       min_area};
     }
 
     void show(const Found& found, bool fresh, hal::Cycle cycle) noexcept {

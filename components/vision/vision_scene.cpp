@@ -29,9 +29,9 @@ public:
                          "height of the camera above the arm (furuta) or the floor (floor), m"),
           pitch_(*this, "pitch", 0.6, "floor: downward tilt of the camera, rad"),
           objects_(*this, "objects", 0, "floor: number of bottles and cans",
-                   {.min = 0, .max = static_cast<std::int64_t>(most_objects)}),
+                   {.min = 0, .max = static_cast<std::int64_t>(max_objects)}),
           markers_(*this, "markers", 1, "markers: number of markers",
-                   {.min = 1, .max = static_cast<std::int64_t>(most_markers)}),
+                   {.min = 1, .max = static_cast<std::int64_t>(max_markers)}),
           settings_(settled()) {
         switch (settings_.kind) {
         case Kind::furuta: declare_furuta(); break;

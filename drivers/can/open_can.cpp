@@ -74,11 +74,11 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
         to = *r;
         return {};
     };
-    const auto to_number = [&](auto& to, std::uint32_t most) -> std::string {
+    const auto to_number = [&](auto& to, std::uint32_t max) -> std::string {
         const auto n = number(value);
-        if (!n || *n > most) {
+        if (!n || *n > max) {
             return "invalid " + std::string(key) + " " + quoted(value) + "; write a number 0.." +
-                   std::to_string(most);
+                   std::to_string(max);
         }
         to = *n;
         return {};

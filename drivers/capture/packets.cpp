@@ -17,7 +17,7 @@ constexpr std::uint32_t interface_block = 1;
 constexpr std::uint32_t packet_block = 6;
 
 constexpr std::uint32_t byte_order = 0x1a2b3c4d;
-constexpr std::size_t largest_file = std::size_t{1} << 30;
+constexpr std::size_t max_file_size = std::size_t{1} << 30;
 using Take = std::function<void(const Packet&)>;
 
 class Bytes {
@@ -151,7 +151,7 @@ std::optional<std::string> read_file(const std::string& name, std::string& probl
     char part[65536];
     while (in && (in.read(part, sizeof part), in.gcount() > 0)) {
         text.append(part, static_cast<std::size_t>(in.gcount()));
-        if (text.size() <= largest_file) continue;
+        if (text.size() <= max_file_size) continue;
         problem = "larger than 1 GiB; split it with editcap or split";
         return std::nullopt;
     }

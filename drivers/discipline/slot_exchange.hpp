@@ -39,7 +39,7 @@ struct SlotUser {
 
 class SlotExchange {
 public:
-    static constexpr std::size_t most_users = 16;
+    static constexpr std::size_t max_users = 16;
 
     /// Returns false when there are too many. [setup]
     bool add(SlotUser&);
@@ -64,7 +64,7 @@ public:
     Description description;  ///< of the link of the node; written by offer_slots()
 
 private:
-    std::array<std::atomic<SlotUser*>, most_users> users_{};
+    std::array<std::atomic<SlotUser*>, max_users> users_{};
     std::atomic<unsigned> busy_{0};
 };
 

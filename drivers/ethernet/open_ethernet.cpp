@@ -25,13 +25,13 @@ constexpr link::Driver<Opened, Options, Description> drivers[] = {
 using link::quoted;
 
 template <class T>
-std::string to_number(std::string_view key, std::string_view value, T& to, long least, long most) {
+std::string to_number(std::string_view key, std::string_view value, T& to, long min, long max) {
     long number = 0;
     const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), number);
-    if (wrong != std::errc{} || end != value.data() + value.size() || number < least ||
-        number > most) {
+    if (wrong != std::errc{} || end != value.data() + value.size() || number < min ||
+        number > max) {
         return "invalid " + std::string(key) + " " + quoted(value) + "; write a number " +
-               std::to_string(least) + ".." + std::to_string(most);
+               std::to_string(min) + ".." + std::to_string(max);
     }
     to = static_cast<T>(number);
     return {};

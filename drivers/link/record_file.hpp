@@ -37,7 +37,7 @@ public:
         if (error_ != 0) return fail();
         waiting_ += record;
         ends_.push_back(waiting_.size());
-        return waiting_.size() < most_waiting || flush();
+        return waiting_.size() < max_waiting || flush();
     }
     /// Writes the queued records. Returns false, with errno set, on failure; the file then ends
     /// with its last complete record.
@@ -82,7 +82,7 @@ public:
     std::size_t records() const { return records_; }  ///< complete records in the file
 
 private:
-    static constexpr std::size_t most_waiting = 65536;
+    static constexpr std::size_t max_waiting = 65536;
     bool fail() const {
         errno = error_;
         return false;

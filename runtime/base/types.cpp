@@ -18,8 +18,8 @@ namespace {
 
 /// Cuts a value that is too long for a message.
 std::string shown(std::string_view text) {
-    constexpr std::size_t most = 60;
-    return text.size() <= most ? std::string(text) : std::string(text.substr(0, most)) + "…";
+    constexpr std::size_t max = 60;
+    return text.size() <= max ? std::string(text) : std::string(text.substr(0, max)) + "…";
 }
 
 std::string quoted(std::string_view text) { return "'" + shown(text) + "'"; }

@@ -128,24 +128,24 @@ int Admission::accept_one() {
 /// depends; nullptr without such a client.
 ServedClient* Admission::longest_idle(std::int64_t idle_ns) const {
     const std::int64_t now = monotonic_ns();
-    ServedClient* longest = nullptr;
+    ServedClient* max = nullptr;
     for (const auto& client : clients_.all()) {
         const bool occupied = client->gone || client->has_turn || client->busy() ||
                               client->halting_since != 0 || now - client->active_ns < idle_ns;
-        if (occupied || (longest && longest->active_ns <= client->active_ns)) continue;
+        if (occupied || (max && max->active_ns <= client->active_ns)) continue;
         if (!client->placed || client->connection->idle()) {
-            longest = client.get();
+            max = client.get();
         }
     }
-    return longest;
+    return max;
 }
 
 /// Closes the client that has been idle longest, for at least this time. Returns false without such
 /// a client.
 bool Admission::close_one_idle(std::int64_t idle_ns) {
-    ServedClient* const longest = longest_idle(idle_ns);
-    if (!longest) return false;
-    close_idle(*longest);
+    ServedClient* const max = longest_idle(idle_ns);
+    if (!max) return false;
+    close_idle(*max);
     return true;
 }
 
@@ -250,15 +250,15 @@ void Admission::reclaim() {
         return;
     }
     for (; living > options_.max_clients; --living) {
-        ServedClient* longest = nullptr;
+        ServedClient* max = nullptr;
         for (const auto& client : clients_.all()) {
-            if (longest && longest->active_ns <= client->active_ns) continue;
+            if (max && max->active_ns <= client->active_ns) continue;
             if (may_reclaim(*client, living == places(), idle_ns, now)) {
-                longest = client.get();
+                max = client.get();
             }
         }
-        if (!longest) return;
-        close_idle(*longest);
+        if (!max) return;
+        close_idle(*max);
     }
 }
 

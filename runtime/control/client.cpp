@@ -40,7 +40,7 @@ struct Client::State {
     std::deque<Event> events;
     std::size_t payload_left = 0;  ///< bytes still to come of the newest event
     std::function<void(std::string_view)> notice;
-    static constexpr std::size_t most_payload = std::size_t{256} << 20;
+    static constexpr std::size_t max_payload = std::size_t{256} << 20;
     InstanceWitness witness;
     std::string reason;       ///< that the other side gave for closing the connection
 
@@ -65,7 +65,7 @@ struct Client::State {
                     bytes != message.end() && bytes->is_number_unsigned()) {
                     payload_left = bytes->get<std::size_t>();
                 }
-                if (payload_left > most_payload) return lose();
+                if (payload_left > max_payload) return lose();
                 return events.push_back({std::move(message)});
             }
             if (notice) {

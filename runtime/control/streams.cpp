@@ -47,7 +47,7 @@ void describe_stream(const hal_stream& stream, std::string& to) {
     }
 }
 
-bool take_records(hal_stream& stream, std::uint64_t most, std::string& to, std::string& why) {
+bool take_records(hal_stream& stream, std::uint64_t max, std::string& to, std::string& why) {
     if (stream.to_machine) {
         why = "this stream is written, not read: use records";
         return false;
@@ -55,7 +55,7 @@ bool take_records(hal_stream& stream, std::uint64_t most, std::string& to, std::
     const auto columns = column_types(stream);
     const std::uint64_t head = __atomic_load_n(&stream.head, __ATOMIC_ACQUIRE);
     const std::uint64_t begin = stream.tail;
-    const std::uint64_t end = begin + std::min(most, head - begin);
+    const std::uint64_t end = begin + std::min(max, head - begin);
     const auto* const timed = stream.size >= HAL_TIMED_STREAM_SIZE_1
                                   ? reinterpret_cast<const hal_timed_stream*>(&stream)
                                   : nullptr;

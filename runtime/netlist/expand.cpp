@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t most_names = 1'000'000;                  // that one command stands for
 constexpr std::size_t most_bytes = std::size_t{256} << 20;  // of text that one command becomes
-constexpr std::size_t most_parts = 1000;  // ranges and literals of one word
+constexpr std::size_t max_parts = 1000;  // ranges and literals of one word
 constexpr std::size_t word_overhead = sizeof(Token);
 
 /// A segment of a word: a literal, the numbers from `first` to `last`, or the elements of a set.
@@ -112,7 +112,7 @@ private:
     }
 
     bool add(Pattern& pattern, Part part, std::size_t begin, std::size_t end) {
-        if (pattern.parts.size() > most_parts) {
+        if (pattern.parts.size() > max_parts) {
             return fail(begin, end, "too many ranges in one word");
         }
         if (part.count > most_names || pattern.count * part.count > most_names) {

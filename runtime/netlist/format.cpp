@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t line_width = 100;   // up to which continuation lines are joined
 // a longer word does not push the columns of its neighbours
 constexpr std::size_t widest_cell = 60;
-constexpr std::size_t most_blank_lines = 2;
+constexpr std::size_t max_blank_lines = 2;
 
 /// What fills a column when lines are aligned: words with a blank between them.
 using Cells = std::vector<std::string>;
@@ -260,7 +260,7 @@ private:
     /// Blank lines that stood here: none at the start of the text, at most two in a row.
     void begin_line() {
         if (!out_.empty()) {
-            out_.append(std::min(blank_lines_, most_blank_lines), '\n');
+            out_.append(std::min(blank_lines_, max_blank_lines), '\n');
         }
         blank_lines_ = 0;
     }

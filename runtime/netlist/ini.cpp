@@ -10,16 +10,16 @@ namespace hal {
 
 namespace {
 
-constexpr std::size_t largest_file = std::size_t{1} << 30;  // spans count bytes in 32 bits
+constexpr std::size_t max_file_size = std::size_t{1} << 30;  // spans count bytes in 32 bits
 constexpr int deepest_include = 16;
-constexpr int most_includes = 1000;
+constexpr int max_includes = 1000;
 
 }  // namespace
 
 std::optional<std::uint32_t> read_source(Sources& sources, const std::string& path, Span asked,
                                          Diagnostics& diagnostics) {
     std::string text;
-    if (read_regular_file(path, largest_file, text)) {
+    if (read_regular_file(path, max_file_size, text)) {
         const std::uint32_t source = sources.add(path, std::move(text));
         sources.hold(source);  // its values may be used at any time
         return source;
@@ -82,7 +82,7 @@ private:
             !is_blank(comment[word.size()])) {
             return;
         }
-        if (depth == deepest_include || ++includes_ > most_includes) {
+        if (depth == deepest_include || ++includes_ > max_includes) {
             return diagnostics_.error(
                 "bad-ini-line", span,
                 "INI files include each other more than 16 deep or 1000 times", "",

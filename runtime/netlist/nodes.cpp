@@ -9,7 +9,7 @@ namespace hal {
 namespace {
 
 constexpr std::size_t longest_name = 32;
-constexpr std::size_t most_nodes = 100;
+constexpr std::size_t max_nodes = 100;
 constexpr std::int64_t shortest_ns = 100'000;
 constexpr std::int64_t longest_ns = 60'000'000'000;
 
@@ -126,10 +126,10 @@ void collect_nodes(const std::vector<Command>& commands, std::vector<NodeLine>& 
                 auto node = std::find_if(nodes.begin(), nodes.end(),
                                          [&](const NodeLine& n) { return n.name == token->text; });
                 if (node == nodes.end()) {
-                    if (nodes.size() == most_nodes) {
+                    if (nodes.size() == max_nodes) {
                         diagnostics.error(
                             "bad-node", token->span,
-                            "more than " + std::to_string(most_nodes) + " nodes in this netlist");
+                            "more than " + std::to_string(max_nodes) + " nodes in this netlist");
                         return;
                     }
                     node = nodes.insert(nodes.end(), NodeLine{token->text, token->span, 0, 0, {}});

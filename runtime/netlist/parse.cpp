@@ -14,9 +14,9 @@ namespace hal {
 namespace {
 
 constexpr std::size_t most_errors = 20;                     // shown of one source
-constexpr std::size_t most_words = 5'000'000;               // of one source: a million nets
+constexpr std::size_t max_words = 5'000'000;               // of one source: a million nets
 // bytes of values in one source: a value may be long, and named often
-constexpr std::size_t most_substituted = std::size_t{32} << 20;
+constexpr std::size_t max_substituted = std::size_t{32} << 20;
 
 std::vector<std::string> environment_names() {
     std::vector<std::string> names;
@@ -180,7 +180,7 @@ private:
             good = good && value != nullptr;
             if (good) {
                 substituted_ += value->size();
-                if (substituted_ > most_substituted) {
+                if (substituted_ > max_substituted) {
                     error("substitution-too-long", span,
                           "the values that replace references in this file exceed 32 MB in total");
                     return false;
@@ -305,10 +305,10 @@ private:
             if (at == text.size()) break;
             const std::size_t stop = word_end(at);
             Token token{std::string(text.substr(at, stop - at)), line.span(at, stop)};
-            if (++words_ > most_words) {
+            if (++words_ > max_words) {
                 given_up_ = true;
                 return error("too-many-words", token.span,
-                             "this file has more than " + std::to_string(most_words) + " words", "",
+                             "this file has more than " + std::to_string(max_words) + " words", "",
                              "it is probably not a netlist; the whole file was ignored");
             }
             if (named) {

@@ -94,30 +94,30 @@ bool check_arity(const Usage& usage, const Token& name, std::span<const Token> a
     const auto by_option = std::find_if(forms.begin() + 1, forms.end(), [&](const auto& form) {
         return !form.empty() && !args.empty() && form.front().text == args.front().text;
     });
-    std::size_t least = 0;
-    std::size_t most = 0;
+    std::size_t min = 0;
+    std::size_t max = 0;
     for (const UsageWord& word : by_option == forms.end() ? forms.front() : *by_option) {
         if (!word.optional) {
-            ++least;
+            ++min;
         }
-        most = word.repeats || most == SIZE_MAX ? SIZE_MAX : most + 1;
+        max = word.repeats || max == SIZE_MAX ? SIZE_MAX : max + 1;
     }
     const std::size_t given = args.size();
-    if (given >= least && given <= most) return true;
-    const bool few = given < least;
-    const std::size_t bound = few ? least : most;
+    if (given >= min && given <= max) return true;
+    const bool few = given < min;
+    const std::size_t bound = few ? min : max;
     Span at = name.span;
     if (!few) {
-        at = args[most].span;
+        at = args[max].span;
         if (const Span last = args.back().span; last.source == at.source && last.end > at.end) {
             at.end = last.end;
         }
     }
     diagnostics.error("wrong-arguments", at,
                       std::string(usage.name) + " takes " +
-                          (least == most ? ""
-                           : few         ? "at least "
-                                         : "at most ") +
+                          (min == max ? ""
+                           : few      ? "at least "
+                                      : "at most ") +
                           std::to_string(bound) +
                           (bound == 1 ? " argument, not " : " arguments, not ") +
                           std::to_string(given),

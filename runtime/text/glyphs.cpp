@@ -98,7 +98,7 @@ void append_printable(std::string& out, std::string_view text) {
 
 }  // namespace
 
-std::string printable(std::string_view text, std::size_t longest_word) {
+std::string printable(std::string_view text, std::size_t max_word_size) {
     std::string out;
     out.reserve(std::min<std::size_t>(text.size(), 4096));
     for (std::size_t at = 0; at < text.size();) {
@@ -110,7 +110,7 @@ std::string printable(std::string_view text, std::size_t longest_word) {
         const std::size_t stop = std::min(text.find_first_of(blanks, at), text.size());
         const std::string_view word = text.substr(at, stop - at);
         at = stop;
-        if (word.size() <= longest_word) {
+        if (word.size() <= max_word_size) {
             append_printable(out, word);
             continue;
         }
@@ -121,9 +121,9 @@ std::string printable(std::string_view text, std::size_t longest_word) {
             }
             return place;
         };
-        append_printable(out, word.substr(0, cut(longest_word * 2 / 3)));
+        append_printable(out, word.substr(0, cut(max_word_size * 2 / 3)));
         out += "…";
-        append_printable(out, word.substr(cut(word.size() - longest_word / 4)));
+        append_printable(out, word.substr(cut(word.size() - max_word_size / 4)));
     }
     return out;
 }

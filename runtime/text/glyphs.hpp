@@ -25,8 +25,8 @@ void append_glyph(std::string& out, std::string_view text, std::size_t at, Glyph
 
 /// The text on one line: line breaks and tabs as blanks, what cannot be printed as escapes; a word
 /// of more than
-/// `longest_word` bytes keeps its beginning and its end with `…` between them.
-std::string printable(std::string_view text, std::size_t longest_word = 200);
+/// `max_word_size` bytes keeps its beginning and its end with `…` between them.
+std::string printable(std::string_view text, std::size_t max_word_size = 200);
 
 /// Terminal columns of a text as printable() shows it.
 std::size_t columns(std::string_view text);

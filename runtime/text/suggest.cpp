@@ -14,8 +14,8 @@ namespace {
 /// Ignores what people confuse: the case of letters, and which separator a name has.
 char folded(char c) { return c == '_' || c == '.' ? '-' : lower(c); }
 
-constexpr int most_edits = 5;
-constexpr int typed_in_part = most_edits + 2;  // ranks below any mistyped name
+constexpr int max_edits = 5;
+constexpr int typed_in_part = max_edits + 2;  // ranks below any mistyped name
 
 /// Counts the insertions, deletions, replacements and swaps of neighbours that lead from `a` to
 /// `b`; `limit` + 1 stands for more. Only the diagonal band that can stay within `limit` is
@@ -29,7 +29,7 @@ int edits(std::string_view a, std::string_view b, int limit) {
         return folded(text[static_cast<std::size_t>(i)]);
     };
     // cell d of row i is column i + d - 1 - limit; a border on both sides
-    std::array<int, 2 * most_edits + 3> rows[3];
+    std::array<int, 2 * max_edits + 3> rows[3];
     for (auto& row : rows) {
         row.fill(far);
     }
@@ -61,7 +61,7 @@ int edits(std::string_view a, std::string_view b, int limit) {
 
 /// The number of edits up to which a name is similar to this one.
 int edit_limit(std::string_view name) {
-    return name.size() < 2 ? 0 : std::min(most_edits, 1 + static_cast<int>(name.size()) / 5);
+    return name.size() < 2 ? 0 : std::min(max_edits, 1 + static_cast<int>(name.size()) / 5);
 }
 
 /// Beside a name that is one slip away, the others are noise.
@@ -76,7 +76,7 @@ bool starts_with(std::string_view text, std::string_view prefix) {
 }  // namespace
 
 std::vector<std::string> similar(std::string_view name, const std::vector<std::string>& candidates,
-                                 std::size_t most) {
+                                 std::size_t max) {
     struct Found {
         int distance;
         const std::string* name;
@@ -96,7 +96,7 @@ std::vector<std::string> similar(std::string_view name, const std::vector<std::s
     const auto better = [](const Found& a, const Found& b) {
         return a.distance != b.distance ? a.distance < b.distance : *a.name < *b.name;
     };
-    const auto kept = std::min(most, found.size());
+    const auto kept = std::min(max, found.size());
     std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), found.end(),
                       better);
     std::vector<std::string> names;
@@ -141,7 +141,7 @@ void NameIndex::sort(const std::stop_token& stop) const {
 std::vector<NameIndex::Found> NameIndex::within(std::string_view name, int limit,
                                                 std::uint32_t before,
                                                 const std::stop_token& stop) const {
-    using Row = std::array<int, 2 * most_edits + 3>;
+    using Row = std::array<int, 2 * max_edits + 3>;
     const int far = limit + 1;
     const int m = static_cast<int>(name.size());
     std::vector<Found> found;
@@ -287,11 +287,11 @@ std::string did_you_mean(std::string_view name, const NameIndex& candidates, std
     return question(candidates.similar(name, 3, before, stop));
 }
 
-std::string listed(const std::vector<std::string>& names, std::size_t most) {
+std::string listed(const std::vector<std::string>& names, std::size_t max) {
     constexpr std::size_t width = 100;
     std::string text;
     std::size_t shown = 0;
-    for (; shown < names.size() && shown < most; ++shown) {
+    for (; shown < names.size() && shown < max; ++shown) {
         if (shown > 0 && text.size() + names[shown].size() > width) break;
         text += (shown == 0 ? "" : ", ") + names[shown];
     }

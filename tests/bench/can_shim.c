@@ -23,13 +23,13 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
-enum { sockets = 1024, most_filters = 32, first_index = 0x10000, port = 43222, batch = 64 };
+enum { sockets = 1024, max_filters = 32, first_index = 0x10000, port = 43222, batch = 64 };
 
 static struct can_socket {
     int there, hears_itself, filter_count;
     uint64_t cookie;
     struct sockaddr_in group;
-    struct can_filter filters[most_filters];
+    struct can_filter filters[max_filters];
 } table[sockets];
 
 /* The C library's function of that name, looked up once. */
@@ -56,7 +56,7 @@ static unsigned index_of(const char* name) {
 /* The payload begins behind the 8 bytes of the UDP header, with the identifier; the cookie is at its end. Words are loaded big endian. */
 static void attach(int fd) {
     const struct can_socket* s = &table[fd];
-    struct sock_filter code[12 + 3 * most_filters];
+    struct sock_filter code[12 + 3 * max_filters];
     unsigned n = 0, i;
     uint32_t word[2];
     memcpy(word, &s->cookie, 8);
@@ -137,8 +137,8 @@ int setsockopt(int fd, int level, int name, const void* value, socklen_t size) {
     }
     if (name == CAN_RAW_FILTER) {
         s->filter_count = (int)(size / sizeof(struct can_filter));
-        if (s->filter_count > most_filters) {
-            s->filter_count = most_filters;
+        if (s->filter_count > max_filters) {
+            s->filter_count = max_filters;
         }
         memcpy(s->filters, value, (size_t)s->filter_count * sizeof(struct can_filter));
     }

@@ -11,8 +11,8 @@ TEST(DdsStatusText, a_status_survives_the_round_trip_and_is_truncated_at_the_lim
     const std::string text = "instance arm\nnode left\nnode right\nnodes 2\nnode\n";
     EXPECT_EQ(text, status_text(status_bytes(text)));
     EXPECT_EQ((std::vector<std::string>{"left", "right"}), values_of(text, "node"));
-    EXPECT_EQ(largest_status,
-              status_text(status_bytes(std::string(largest_status + 1, 'x'))).size());
+    EXPECT_EQ(max_status_size,
+              status_text(status_bytes(std::string(max_status_size + 1, 'x'))).size());
 }
 
 TEST(DdsStatusText, malformed_bytes_give_an_empty_status) {

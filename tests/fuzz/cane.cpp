@@ -27,7 +27,7 @@ void unpack(std::span<const std::uint8_t> whole, Nodes& nodes, Streams& streams)
         require(f.valid() && !f.fd && !f.error, "a message is a frame of classic CAN");
         nodes.learn(f.id, from, static_cast<std::int64_t>(count) * 300'000'000);
         nodes.where(f.id, true);
-        std::array<std::uint8_t, longest_message> again{};
+        std::array<std::uint8_t, max_message_size> again{};
         require(put_packed(f, again) != 0, "what was read can be written");
     }
     require(count == u.messages(), "the header's number of messages is read");

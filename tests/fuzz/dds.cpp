@@ -66,7 +66,7 @@ bool plain(std::string_view text) {
 void status(std::span<const std::uint8_t> given) {
     const std::vector<std::uint8_t> bytes(given.begin(), given.end());
     const std::string text(status_text(bytes));
-    require(status_text(status_bytes(text)) == std::string_view(text).substr(0, largest_status),
+    require(status_text(status_bytes(text)) == std::string_view(text).substr(0, max_status_size),
             "what was read can be written");
     std::vector<std::string> layouts{""};
     for (const char* key : {"offers", "wants", "instance"}) {

@@ -41,13 +41,13 @@ void model(const std::string& text) {
     read.read(text);
     places(read.problems, text.size());
     if (!read.problems.empty()) return;
-    require(!read.states.empty() && read.states.size() <= most_slopes && !read.measures.empty() &&
-                read.inputs.size() <= Model::most_inputs,
+    require(!read.states.empty() && read.states.size() <= max_slopes && !read.measures.empty() &&
+                read.inputs.size() <= Model::max_inputs,
             "a model that is taken has states and measurements, and not too many");
     std::vector<Dual> values(read.variables());
     for (std::size_t i = 0; i < read.constants.size(); ++i) {
         require(std::isfinite(read.constants[i]), "a constant is a number");
-        values[most_slopes + Model::most_inputs + i].value = read.constants[i];
+        values[max_slopes + Model::max_inputs + i].value = read.constants[i];
     }
     for (const Model::State& s : read.states) {
         require(s.sigma >= 0.0 && s.noise >= 0.0 && std::isfinite(s.start),

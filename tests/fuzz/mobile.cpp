@@ -32,9 +32,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         FloorPlan floor;
         floor.read(text);
         places(floor.problems, text.size());
-        require(floor.walls.size() + floor.discs.size() + floor.beacons.size() <=
-                    FloorPlan::most_shapes,
-                "a floor plan is bounded");
+        require(
+            floor.walls.size() + floor.discs.size() + floor.beacons.size() <= FloorPlan::max_shapes,
+            "a floor plan is bounded");
         for (int i = 0; i < 8; ++i) {
             const Hit hit = floor.cast(0.1, 0.2, i * 0.8, 10.0);
             require(hit.distance >= 0.0 && !std::isnan(hit.distance), "a ray has a length");
@@ -46,14 +46,14 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         list.read(text);
         places(list.problems, text.size());
         require(!list.problems.empty() ||
-                    (!list.goals.empty() && list.goals.size() <= GoalList::most_goals),
+                    (!list.goals.empty() && list.goals.size() <= GoalList::max_goals),
                 "a list that is taken has goals");
     } else {
         StepText program;
         program.read(text);
         places(program.problems, text.size());
         if (!program.problems.empty()) return 0;
-        require(!program.steps.empty() && program.steps.size() <= StepText::most_steps,
+        require(!program.steps.empty() && program.steps.size() <= StepText::max_steps,
                 "a program that is taken has steps");
         for (const Step& s : program.steps) {
             for (const Transition& t : s.transitions) {

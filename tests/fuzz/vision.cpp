@@ -23,7 +23,7 @@ void picture(const std::uint8_t* bytes, std::size_t count) {
     if (const auto problem = read_pnm(bytes, count, frame)) {
         require(problem->kind == FrameError::damaged || problem->kind == FrameError::too_large,
                 "the kind of the problem is reported");
-        require(frame.pixels.size() <= 3 * most_pixels,
+        require(frame.pixels.size() <= 3 * max_pixels,
                 "no picture takes more memory than one may have");
         return;
     }

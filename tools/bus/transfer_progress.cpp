@@ -16,8 +16,8 @@ constexpr std::int64_t first_after_ns = 500'000'000;
 constexpr std::int64_t between_ns = 200'000'000;
 constexpr const char* clear_line = "\r\x1b[K";
 
-std::string amount(double bytes, double largest) {
-    return largest < 1e6 ? fmt::format("{:.1f}", bytes / 1e3) : fmt::format("{:.1f}", bytes / 1e6);
+std::string amount(double bytes, double max) {
+    return max < 1e6 ? fmt::format("{:.1f}", bytes / 1e3) : fmt::format("{:.1f}", bytes / 1e6);
 }
 
 }  // namespace
@@ -30,13 +30,13 @@ std::string progress_text(std::size_t done, std::size_t total, std::int64_t elap
     const double all = static_cast<double>(total);
 
     const double elapsed_s = static_cast<double>(elapsed_ns) * 1e-9;
-    const double largest = total != 0 ? all : so_far;
-    const char* const unit = largest < 1e6 ? "kB" : "MB";
+    const double max = total != 0 ? all : so_far;
+    const char* const unit = max < 1e6 ? "kB" : "MB";
     if (total == 0) {
-        return fmt::format("{} {}", amount(so_far, largest), unit);
+        return fmt::format("{} {}", amount(so_far, max), unit);
     }
-    std::string text = fmt::format("{} of {} {}, {:.0f} %", amount(so_far, largest),
-                                   amount(all, largest), unit, std::floor(100 * so_far / all));
+    std::string text = fmt::format("{} of {} {}, {:.0f} %", amount(so_far, max), amount(all, max),
+                                   unit, std::floor(100 * so_far / all));
     if (done == 0 || done > total) return text;
     return text + fmt::format(", {:.0f} s left", std::ceil(elapsed_s * (all - so_far) / so_far));
 }

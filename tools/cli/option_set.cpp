@@ -22,10 +22,10 @@ bool is_whole(std::string_view text) {
 
 }  // namespace
 
-void DeclaredOption::in(int least, int most) {
-    option_->check(CLI::Range(least, most).description(fmt::format("{}..{}", least, most)));
+void DeclaredOption::in(int min, int max) {
+    option_->check(CLI::Range(min, max).description(fmt::format("{}..{}", min, max)));
 }
-void DeclaredOption::in(double least, double most) { option_->check(CLI::Range(least, most)); }
+void DeclaredOption::in(double min, double max) { option_->check(CLI::Range(min, max)); }
 void DeclaredOption::finite() {
     option_->check([](const std::string& text) {
         char* end = nullptr;
@@ -35,8 +35,8 @@ void DeclaredOption::finite() {
                                                   : std::string();
     });
 }
-void DeclaredOption::quietly_in(int least, int most) {
-    option_->check(CLI::Range(least, most).description(""));
+void DeclaredOption::quietly_in(int min, int max) {
+    option_->check(CLI::Range(min, max).description(""));
 }
 void DeclaredOption::not_negative() {
     option_->check([](const std::string& text) {
@@ -102,11 +102,11 @@ void OptionSet::values(const char* names, std::vector<std::string>& to, const ch
     app_->add_option(names, to, what)->type_name(type)->allow_extra_args(false);
 }
 
-void OptionSet::duration(const char* name, std::int64_t& to, const char* what,
-                         std::int64_t least_ns, const char* examples) {
-    const auto take = [name, &to, least_ns, examples](const std::string& text) {
+void OptionSet::duration(const char* name, std::int64_t& to, const char* what, std::int64_t min_ns,
+                         const char* examples) {
+    const auto take = [name, &to, min_ns, examples](const std::string& text) {
         const auto ns = parse_duration_ns(text);
-        if (!ns || *ns < least_ns) {
+        if (!ns || *ns < min_ns) {
             throw CLI::ValidationError(
                 name, fmt::format("invalid duration '{}'; use {}", text, examples));
         }

@@ -51,9 +51,9 @@ public:
     /// Declares an option that takes one value and may be repeated.
     void values(const char* names, std::vector<std::string>& to, const char* type,
                 const char* what);
-    /// Declares an option that takes a duration in ns, at least `least_ns`. A message about an
+    /// Declares an option that takes a duration in ns, at least `min_ns`. A message about an
     /// invalid one ends with `examples`.
-    void duration(const char* name, std::int64_t& to, const char* what, std::int64_t least_ns = 0,
+    void duration(const char* name, std::int64_t& to, const char* what, std::int64_t min_ns = 0,
                   const char* examples = "10ms, 1s or 500us");
     /// Declares --for TIME.
     void for_how_long(std::int64_t& to, const char* what);

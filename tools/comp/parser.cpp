@@ -10,7 +10,7 @@
 namespace hal::comp {
 namespace {
 
-constexpr unsigned largest_array = 1024;
+constexpr unsigned max_array_size = 1024;
 
 // "no such type 'x'" and the like list what there is.
 const std::vector<std::string>& type_names() {
@@ -196,11 +196,11 @@ bool Parser::array(Item& item) {
     const auto begin = hex ? size.text.data() + 2 : size.text.data();
     const auto read = std::from_chars(begin, end, item.size, hex ? 16 : 10);
     if (!size.given() || read.ec != std::errc{} || read.ptr != end || item.size == 0 ||
-        item.size > largest_array) {
+        item.size > max_array_size) {
         item.size = 1;
         in_.error(
             size.given() ? size.span : in_.here(),
-            "the size of an array must be an integer, 1.." + std::to_string(largest_array), "",
+            "the size of an array must be an integer, 1.." + std::to_string(max_array_size), "",
             "put the part that depends on the personality after it: [16 : personality & 0xff]");
     }
     if (in_.take(':')) {

@@ -89,9 +89,9 @@ std::string unescaped(std::string_view raw) {
 }  // namespace
 
 Span Scanner::span(std::size_t begin, std::size_t end) const {
-    const std::size_t most = text_.size();
-    return {source_, static_cast<std::uint32_t>(std::min(begin, most)),
-            static_cast<std::uint32_t>(std::min(end, most))};
+    const std::size_t max = text_.size();
+    return {source_, static_cast<std::uint32_t>(std::min(begin, max)),
+            static_cast<std::uint32_t>(std::min(end, max))};
 }
 
 void Scanner::error(Span at, std::string message, std::string label, std::string help) {

@@ -28,7 +28,7 @@ namespace hal::tools {
 namespace {
 
 using Json = nlohmann::json;
-constexpr unsigned longest_s = 20;  // for all that is tried
+constexpr unsigned max_s = 20;  // for all that is tried
 
 /// The first error of a shell's text, without its place and code.
 std::string first_error(const std::string& text) {
@@ -76,10 +76,9 @@ enum class Stage : int { load, construct, destroy, run };
 
 /// "its constructor does not return within 20 s", "its destructor crashes (Segmentation fault)".
 std::string end_in(Stage stage, int signal) {
-    const std::string how = signal == SIGALRM
-                                ? fmt::format("does not return within {} s", longest_s)
-                            : signal != 0 ? fmt::format("crashes ({})", ::strsignal(signal))
-                                          : "ends the process";
+    const std::string how = signal == SIGALRM ? fmt::format("does not return within {} s", max_s)
+                            : signal != 0     ? fmt::format("crashes ({})", ::strsignal(signal))
+                                              : "ends the process";
     switch (stage) {
     case Stage::load: return "the constructor of a static object of it " + how;
     case Stage::construct: return "its constructor " + how;
@@ -301,7 +300,7 @@ bool try_plugin(const std::string& folder, const std::string& name, const Plugin
         ::dup2(nothing, STDOUT_FILENO);
         ::dup2(nothing, STDERR_FILENO);
         std::signal(SIGALRM, SIG_DFL);
-        ::alarm(longest_s);
+        ::alarm(max_s);
         const char* const path = std::getenv("HALCYON_PLUGIN_PATH");
         ::setenv("HALCYON_PLUGIN_PATH",
                  (folder + (path && *path ? ":" + std::string(path) : "")).c_str(), 1);

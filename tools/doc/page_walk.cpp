@@ -83,8 +83,8 @@ bool follows(const Page::Pin& a, const Page::Pin& b, std::string& doc) {
     while (b_end < b.name.size() && digit(b.name[b_end])) {
         ++b_end;
     }
-    constexpr std::size_t longest = 9;
-    if (a_end == from || b_end == from || a_end - from > longest || b_end - from > longest ||
+    constexpr std::size_t max = 9;
+    if (a_end == from || b_end == from || a_end - from > max || b_end - from > max ||
         a.name.substr(a_end) != b.name.substr(b_end)) {
         return false;
     }

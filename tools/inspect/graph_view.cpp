@@ -11,7 +11,7 @@ namespace hal::tools {
 namespace {
 
 // instances of a drawing that shows unlinked pins unasked
-constexpr std::size_t most_with_all_pins = 40;
+constexpr std::size_t max_with_all_pins = 40;
 
 std::string unknown_name(const Model& model, const std::string& name) {
     std::vector<std::string> names;
@@ -41,7 +41,7 @@ const Pin* source_of(const Signal& signal) {
     return nullptr;
 }
 
-bool is_hub(const Signal& signal) { return signal.pins.size() > most_edges + 1; }
+bool is_hub(const Signal& signal) { return signal.pins.size() > max_edges + 1; }
 
 GraphView::GraphView(const Model& model, const Sources& sources, const GraphWish& wish) {
     const bool whole = wish.around.empty();
@@ -55,7 +55,7 @@ GraphView::GraphView(const Model& model, const Sources& sources, const GraphWish
         select_around(model, wish);
     }
     if (!problem_.empty()) return;
-    all_pins_ = wish.all_pins.value_or(whole && shown_.size() <= most_with_all_pins);
+    all_pins_ = wish.all_pins.value_or(whole && shown_.size() <= max_with_all_pins);
     select_signals(model, whole);
     make_clusters(model, sources, wish.cluster);
 }

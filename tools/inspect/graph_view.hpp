@@ -29,7 +29,7 @@ struct GraphWish {
 
 /// A signal with more readers is drawn as a label at its writer and at each reader, and a
 /// neighbourhood does not extend across it.
-constexpr std::size_t most_edges = 8;
+constexpr std::size_t max_edges = 8;
 
 /// The selection of a drawing. References the model.
 class GraphView {
@@ -74,7 +74,7 @@ private:
 
 /// Returns the pin that writes the signal; without one the first I/O pin, or nullptr.
 const Pin* source_of(const Signal& signal);
-/// Returns true for a signal with more than `most_edges` readers.
+/// Returns true for a signal with more than `max_edges` readers.
 bool is_hub(const Signal& signal);
 
 }  // namespace hal::tools

@@ -223,13 +223,13 @@ int run_tdma_ping(const TdmaPingOptions& options) {
                                    done == 1 ? "" : "s", instance, times.size(), lost,
                                    100.0 * static_cast<double>(lost) / static_cast<double>(done));
     if (!times.empty()) {
-        const auto [least, most] = std::minmax_element(times.begin(), times.end());
+        const auto [min, max] = std::minmax_element(times.begin(), times.end());
         double sum = 0;
         for (const double t : times) {
             sum += t;
         }
-        text += fmt::format("; min {:.2f}, mean {:.2f}, max {:.2f} us", *least,
-                            sum / static_cast<double>(times.size()), *most);
+        text += fmt::format("; min {:.2f}, mean {:.2f}, max {:.2f} us", *min,
+                            sum / static_cast<double>(times.size()), *max);
     }
     if (!print(text + "\n")) return 1;
     if (!times.empty()) return 0;

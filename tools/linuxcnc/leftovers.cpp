@@ -159,7 +159,7 @@ std::vector<pid_t> left_by(pid_t launcher, pid_t server) {
 /// the way of those that start next.
 void MachineLock::take_over(const std::string& noted) {
     constexpr int wait_us = 10'000;
-    constexpr int most_waits = 500;
+    constexpr int max_waits = 500;
     pid_t launcher = 0;
     pid_t server = 0;
     std::istringstream(noted) >> launcher >> server;
@@ -173,7 +173,7 @@ void MachineLock::take_over(const std::string& noted) {
             ::kill(pid, number);
             ::kill(pid, SIGCONT);  // one that is stopped would never see it
         }
-        for (int waited = 0; waited < most_waits && !left.empty(); ++waited) {
+        for (int waited = 0; waited < max_waits && !left.empty(); ++waited) {
             ::usleep(wait_us);
             std::erase_if(left,
                           [](pid_t pid) { return state_of(pid) == 0 || state_of(pid) == 'Z'; });

@@ -17,12 +17,12 @@ namespace hal::tools {
 namespace {
 
 // a longer one is a time without CPU, which task may not have had either
-constexpr std::int64_t longest_step_ns = 100'000'000;
+constexpr std::int64_t max_step_ns = 100'000'000;
 
 // A buffer begins with its name in 32 bytes and a byte for each process, then a header of three
 // `long`: read since the last write, number of writes, size.
 constexpr std::size_t name_bytes = 32;
-constexpr std::size_t most_processes = 1000;
+constexpr std::size_t max_processes = 1000;
 
 struct Buffer {
     key_t key = -1;
@@ -41,7 +41,7 @@ Buffer buffer_of(const std::string& nml, const std::string& name) {
         }
         const auto processes = parse_natural(words[8]);
         const auto key = parse_natural(words[9]);
-        if (!key || !processes || *processes > most_processes) {
+        if (!key || !processes || *processes > max_processes) {
             return {};
         }
         return {static_cast<key_t>(*key),
@@ -90,7 +90,7 @@ std::int64_t TaskWatch::silent_ns() {
     }
     if (!writes_) return 0;
     const Clock::time_point now = Clock::now();
-    silent_ns_ += std::min(std::chrono::nanoseconds(now - looked_).count(), longest_step_ns);
+    silent_ns_ += std::min(std::chrono::nanoseconds(now - looked_).count(), max_step_ns);
     looked_ = now;
     if (const std::int64_t writes = number_at(writes_); writes != seen_) {
         seen_ = writes;

@@ -49,7 +49,7 @@ bool ControlLink::retry() {
 }
 
 bool ControlLink::send(std::string_view line) {
-    if (!wsi_ || !greeted_ || out_.size() + line.size() > most_waiting) return false;
+    if (!wsi_ || !greeted_ || out_.size() + line.size() > max_waiting) return false;
     out_.append(line);
     out_ += '\n';
     lws_callback_on_writable(wsi_);
@@ -64,7 +64,7 @@ void ControlLink::pause(bool on) {
 
 bool ControlLink::received(std::string_view bytes) {
     in_.append(bytes);
-    return in_.size() <= longest_line && take_lines();
+    return in_.size() <= max_line_length && take_lines();
 }
 
 bool ControlLink::take_lines() {
@@ -76,7 +76,7 @@ bool ControlLink::take_lines() {
         if (line.starts_with("{\"event\":\"samples\"")) {
             const auto head = nlohmann::json::parse(line, nullptr, false);
             bytes = head.is_object() ? head.value("bytes", std::size_t{0}) : 0;
-            if (bytes > longest_line) return false;
+            if (bytes > max_line_length) return false;
             if (in_.size() < end + 1 + bytes) {
                 break;  // its payload is not complete
             }

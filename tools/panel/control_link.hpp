@@ -45,10 +45,10 @@ public:
     void closed();
 
 private:
-    static constexpr std::size_t most_waiting = 1 << 20;
+    static constexpr std::size_t max_waiting = 1 << 20;
 
 private:
-    static constexpr std::size_t longest_line = 64 << 20;
+    static constexpr std::size_t max_line_length = 64 << 20;
     bool take_lines();
 
     lws_vhost* host_;

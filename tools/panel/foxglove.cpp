@@ -18,7 +18,7 @@ using Json = nlohmann::json;
 namespace {
 
 constexpr std::size_t most_channels = 5000;
-constexpr std::size_t most_subscriptions = 1000;
+constexpr std::size_t max_subscriptions = 1000;
 
 std::string text_of(const Json& json) {
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -170,7 +170,7 @@ void FoxgloveClient::subscribe(const Json& request) {
         const auto channel = one.at("channelId").get<std::size_t>();
         if (channel < 1 || channel > channels_.size()) {
             status(1, fmt::format("unknown channel {}", channel));
-        } else if (subscriptions_.size() >= most_subscriptions) {
+        } else if (subscriptions_.size() >= max_subscriptions) {
             status(2, "a client has at most 1000 subscriptions");
         } else {
             subscriptions_[one.at("id").get<std::uint32_t>()] = channel - 1;

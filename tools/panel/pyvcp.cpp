@@ -41,7 +41,7 @@ constexpr std::array<std::string_view, 14> colour_options{"fg",
                                                           "edgecolor",
                                                           "dotcolor"};
 constexpr int deepest = 60;
-constexpr std::size_t most_widgets = 5000;
+constexpr std::size_t max_widgets = 5000;
 
 template <class Names>
 bool one_of(std::string_view name, const Names& names) {
@@ -63,12 +63,12 @@ Json attribute_value(std::string_view text) {
     return std::string(text);
 }
 
-bool read_bytes(const std::string& path, std::size_t most, std::string& bytes) {
+bool read_bytes(const std::string& path, std::size_t max, std::string& bytes) {
     std::ifstream file(path, std::ios::binary);
-    bytes.resize(most + 1);
+    bytes.resize(max + 1);
     file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     bytes.resize(static_cast<std::size_t>(file.gcount()));
-    return !bytes.empty() && bytes.size() <= most;
+    return !bytes.empty() && bytes.size() <= max;
 }
 
 std::string base64(std::string_view bytes) {
@@ -241,8 +241,8 @@ private:
     }
 
     Json widget(pugi::xml_node element) {
-        if (++widgets_ > most_widgets) {
-            if (widgets_ == most_widgets + 1) {
+        if (++widgets_ > max_widgets) {
+            if (widgets_ == max_widgets + 1) {
                 error(element, "more than 5000 widgets");
             }
             return {};

@@ -119,14 +119,14 @@ void PyvcpPins::parameter(std::string_view kind, unsigned n, const Json& options
 }
 
 Json PyvcpPins::limited(const Json& options, double low, double high) const {
-    const double least = real(options, "min_", low);
-    const double most = real(options, "max_", high);
+    const double min = real(options, "min_", low);
+    const double max = real(options, "max_", high);
 
     const double wanted = real(options, "initval", 0);
-    if (least > most) {
-        return least;  // an inverted scale starts at its first end
+    if (min > max) {
+        return min;  // an inverted scale starts at its first end
     }
-    return std::clamp(wanted, least, most);
+    return std::clamp(wanted, min, max);
 }
 
 void PyvcpPins::disable(const std::string& name, const Json& options, Json& node) {

@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::int64_t least_period_ms = 10;
+constexpr std::int64_t min_period_ms = 10;
 
 struct Verb {
     std::string_view name;
@@ -77,7 +77,7 @@ RequestKind check_request(Json& request, std::string& problem) {
     }
     for (const char* const period : {"every_ms", "batch_ms"}) {
         if (request.contains(period) && request[period].is_number_integer()) {
-            request[period] = std::max(request[period].get<std::int64_t>(), least_period_ms);
+            request[period] = std::max(request[period].get<std::int64_t>(), min_period_ms);
         }
     }
     return kind;

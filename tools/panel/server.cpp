@@ -319,7 +319,7 @@ bool PanelServer::admit(WebClient& client) {
 }
 
 bool PanelServer::make_space() {
-    if (clients_.size() < most_connections) return true;
+    if (clients_.size() < max_connections) return true;
     const auto silent = [](const auto& one) { return !one->by_token() && !one->admitted(); };
     auto oldest = std::find_if(clients_.begin(), clients_.end(), silent);
     if (oldest == clients_.end()) {
@@ -329,7 +329,7 @@ bool PanelServer::make_space() {
     if (oldest == clients_.end()) return false;
     (*oldest)->drop();
     // a dropped one is removed when the library has closed it
-    return clients_.size() < 2 * most_connections;
+    return clients_.size() < 2 * max_connections;
 }
 
 void PanelServer::remove(WebClient* client) {

@@ -65,7 +65,7 @@ public:
     void tick();
 
     static constexpr std::size_t most_clients = 32;
-    static constexpr std::size_t most_connections = 48;
+    static constexpr std::size_t max_connections = 48;
 
 private:
     void tell_control();

@@ -7,8 +7,8 @@
 namespace hal::tools {
 
 bool WebClient::send(std::string_view text, bool binary, bool live) {
-    if (close_code_ != 0 || (live && waiting_ > most_live)) return false;
-    if (waiting_ > most_waiting) {
+    if (close_code_ != 0 || (live && waiting_ > max_live)) return false;
+    if (waiting_ > max_waiting) {
         queue_.clear();
         waiting_ = 0;
         close(1013, "the client reads too slowly");
@@ -43,7 +43,7 @@ bool WebClient::received(std::string_view part, bool last, bool binary, std::int
     if (close_code_ != 0) {
         return true;  // on its way out
     }
-    if (part_.size() + part.size() > longest_message) {
+    if (part_.size() + part.size() > max_message_size) {
         close_code_ = 1009;
         close_reason_ = "a message has at most 65536 bytes";
         return closing();
@@ -80,7 +80,7 @@ bool WebClient::writeable() {
     if (!queue_.empty() || close_code_ != 0) {
         lws_callback_on_writable(wsi_);
     }
-    if (waiting_ < most_live / 4) {
+    if (waiting_ < max_live / 4) {
         drained();
     }
     return true;

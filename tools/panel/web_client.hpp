@@ -49,10 +49,10 @@ private:
         std::string bytes;  ///< behind LWS_PRE bytes for the library
         bool binary;
     };
-    static constexpr std::size_t longest_message = 64 << 10;
-    static constexpr std::size_t most_live = 1 << 20;
+    static constexpr std::size_t max_message_size = 64 << 10;
+    static constexpr std::size_t max_live = 1 << 20;
 
-    static constexpr std::size_t most_waiting = 96 << 20;
+    static constexpr std::size_t max_waiting = 96 << 20;
     static constexpr double messages_per_s = 200;
     static constexpr double burst = 400;
     bool closing();

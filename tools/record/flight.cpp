@@ -82,7 +82,7 @@ void FlightTrigger::event(std::int64_t time_ns, const std::string& cause) {
 }
 
 void FlightBacklog::add(FlightEvent event) {
-    if (events_.size() >= most_events) {
+    if (events_.size() >= max_events) {
         ++lost_;
     } else {
         events_.push_back(std::move(event));

@@ -87,7 +87,7 @@ struct FlightEvent {
 /// The events that could not be written yet: they stay in memory until there is space again.
 class FlightBacklog {
 public:
-    static constexpr std::size_t most_events = 1000;
+    static constexpr std::size_t max_events = 1000;
 
     explicit FlightBacklog(std::string folder) : folder_(std::move(folder)) {}
 

@@ -276,7 +276,7 @@ Range range_of(const Trace& trace, std::int64_t begin_ns, std::int64_t end_ns) {
 
 // The range with a margin, so high that its parts differ.
 void scale(Strip& strip, Range range) {
-    constexpr double most = std::numeric_limits<double>::max();
+    constexpr double max = std::numeric_limits<double>::max();
     if (range.empty()) {
         range = {0, 1};
     }
@@ -284,17 +284,17 @@ void scale(Strip& strip, Range range) {
     const double margin = range.low == range.high
                               ? std::max(size * 0.1, 0.5)
                               : std::max({range.half() * 0.1, size * 1e-10, 1e-290});
-    strip.low = std::max(range.low - margin, -most);
-    strip.high = std::min(range.high + margin, most);
+    strip.low = std::max(range.low - margin, -max);
+    strip.high = std::min(range.high + margin, max);
 }
 
 // Values without a unit are often of different kinds: the smaller would be a line in the strip of
 // the larger. Zero goes with all.
 bool alike(const Range& strip, const Range& range) {
-    constexpr double most = 20;
+    constexpr double max = 20;
     const double size = range.size();
     return size == 0 || strip.size() == 0 ||
-           (size / most <= strip.least && strip.size() / most <= size);
+           (size / max <= strip.least && strip.size() / max <= size);
 }
 
 }  // namespace

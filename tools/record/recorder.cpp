@@ -148,7 +148,7 @@ private:
             what_.for_ns < 0 || begin_ns_ < 0 ? INT64_MAX : begin_ns_ + what_.for_ns;
         if (!add_batch(*sink_, batch_, 0, end_ns, rows_)) return false;
         ended_ = begin_ns_ >= 0 && batch_.until_ns >= end_ns;
-        if (what_.most_mb > 0 && static_cast<double>(sink_->bytes()) >= what_.most_mb * 1e6) {
+        if (what_.max_mb > 0 && static_cast<double>(sink_->bytes()) >= what_.max_mb * 1e6) {
             ended_ = true;
         }
         if (what_.rotate_ns < 0 || begin_ns_ < 0 || ended_ ||

@@ -18,7 +18,7 @@ struct Recording {
     std::uint32_t every = 1;
     std::int64_t for_ns = -1;
     std::int64_t rotate_ns = -1;  ///< -1: not given
-    double most_mb = 0;                        ///< 0: no limit
+    double max_mb = 0;                        ///< 0: no limit
     unsigned keep = 0;                         ///< files of a rotation, or of triggers; 0: all
     std::int64_t last_ns = -1;                 ///< flight recorder: how much it keeps
     std::int64_t after_ns = -1;                ///< -1: not given
@@ -34,7 +34,7 @@ struct Recording {
         set.value("--every", every, "N", "record each N-th cycle of each thread (default 1)")
             .in(1, 1'000'000);
         set.duration("--for", for_ns, "end after this time of the machine", 1);
-        set.value("--limit", most_mb, "MB", "end when the file has this size").not_negative();
+        set.value("--limit", max_mb, "MB", "end when the file has this size").not_negative();
         set.duration("--rotate", rotate_ns,
                      "start another file, FILE-001, FILE-002 …, after each such time", 1'000'000,
                      "10min, 1h or 30s");
@@ -54,7 +54,7 @@ struct Recording {
     }
     /// Something of it was given: the words are FILE NAMES.
     bool asked() const {
-        return all || !groups.empty() || every != 1 || for_ns >= 0 || most_mb > 0 ||
+        return all || !groups.empty() || every != 1 || for_ns >= 0 || max_mb > 0 ||
                rotate_ns >= 0 || last_ns >= 0 || keep != 0 || !trigger.empty() || after_ns >= 0 ||
                !profile.empty();
     }

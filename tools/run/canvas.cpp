@@ -26,9 +26,9 @@ void Canvas::dot(double x, double y) {
 }
 
 void Canvas::line(double x0, double y0, double x1, double y1) {
-    const double longest = std::max(std::abs(x1 - x0), std::abs(y1 - y0)) * half_ * 2.0;
-    if (!(longest < 1e4)) return;
-    const int steps = std::max(1, static_cast<int>(longest));
+    const double max = std::max(std::abs(x1 - x0), std::abs(y1 - y0)) * half_ * 2.0;
+    if (!(max < 1e4)) return;
+    const int steps = std::max(1, static_cast<int>(max));
     for (int i = 0; i <= steps; ++i) {
         const double t = static_cast<double>(i) / steps;
         dot(x0 + t * (x1 - x0), y0 + t * (y1 - y0));

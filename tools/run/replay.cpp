@@ -63,20 +63,20 @@ struct Gap {
     std::int64_t length_ns() const { return end_ns - begin_ns; }
 };
 
-Gap longest_gap(const mcap::Recording& recording) {
+Gap max_gap(const mcap::Recording& recording) {
     std::vector<std::int64_t> times;
     for (const mcap::Table& table : recording.tables) {
         times.insert(times.end(), table.times_ns.begin(), table.times_ns.end());
     }
     std::sort(times.begin(), times.end());
-    Gap longest;
+    Gap max;
     for (std::size_t i = 1; i < times.size(); ++i) {
         const Gap gap{times[i - 1] - recording.begin_ns(), times[i] - recording.begin_ns()};
-        if (gap.length_ns() > longest.length_ns()) {
-            longest = gap;
+        if (gap.length_ns() > max.length_ns()) {
+            max = gap;
         }
     }
-    return longest;
+    return max;
 }
 
 /// Prints how far a long replay is: after 5 s, then every minute.
@@ -239,7 +239,7 @@ private:
     /// A gap is replayed like the rest: a clock that jumped makes hours of it.
     void warn_of_gap(std::int64_t wanted_ns) const {
         constexpr std::int64_t long_gap_ns = 600'000'000'000;
-        const Gap gap = longest_gap(recording_);
+        const Gap gap = max_gap(recording_);
         if (gap.length_ns() < long_gap_ns || gap.begin_ns >= wanted_ns) return;
         const double begin = static_cast<double>(gap.begin_ns) * 1e-9;
         write_all(

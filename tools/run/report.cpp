@@ -14,16 +14,15 @@ std::string counted(std::size_t n, const char* one, const char* many) {
     return fmt::format("{} {}", n, n == 1 ? one : many);
 }
 
-/// "a b c" in lines of at most 100 columns, continued under the first word; beyond `most` words: "…
+/// "a b c" in lines of at most 100 columns, continued under the first word; beyond `max` words: "…
 /// 31 more".
 std::string wrapped(const std::string& head, const std::vector<std::string>& words,
-                    std::size_t most) {
+                    std::size_t max) {
     constexpr std::size_t columns = 100;
     std::string text, line = head;
     bool first = true;
     for (std::size_t i = 0; i < words.size(); ++i) {
-        const std::string word =
-            i < most ? words[i] : fmt::format("… {} more", words.size() - most);
+        const std::string word = i < max ? words[i] : fmt::format("… {} more", words.size() - max);
         if (!first && line.size() + 1 + word.size() > columns) {
             text += line + "\n";
             line = std::string(head.size(), ' ');
@@ -31,7 +30,7 @@ std::string wrapped(const std::string& head, const std::vector<std::string>& wor
         }
         line += (first ? "" : " ") + word;
         first = false;
-        if (i >= most) break;
+        if (i >= max) break;
     }
     return text + line + "\n";
 }
@@ -41,7 +40,7 @@ struct Slowest {
     double mean_ns, max_ns;
 };
 
-std::vector<Slowest> slowest_functions(const Model& model, std::size_t most) {
+std::vector<Slowest> slowest_functions(const Model& model, std::size_t max) {
     std::vector<Slowest> all;
     for (const auto& thread : model.threads) {
         for (const LoadedFunction* function : thread->functions) {
@@ -57,17 +56,17 @@ std::vector<Slowest> slowest_functions(const Model& model, std::size_t most) {
     }
     std::stable_sort(all.begin(), all.end(),
                      [](const Slowest& a, const Slowest& b) { return a.max_ns > b.max_ns; });
-    if (all.size() > most) {
-        all.resize(most);
+    if (all.size() > max) {
+        all.resize(max);
     }
     return all;
 }
 
 /// The last faults, a line for each.
 std::string sentences(const std::vector<FaultRecord>& faults) {
-    constexpr std::size_t most = 10;
+    constexpr std::size_t max = 10;
     std::string text;
-    for (std::size_t i = faults.size() > most ? faults.size() - most : 0; i < faults.size(); ++i) {
+    for (std::size_t i = faults.size() > max ? faults.size() - max : 0; i < faults.size(); ++i) {
         text += "  " + faults[i].line() + "\n";
     }
     return text;

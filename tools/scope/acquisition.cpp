@@ -8,7 +8,7 @@ namespace hal::tools {
 namespace {
 
 // automatic mode: without a trigger for a record or this, it runs freely
-constexpr std::int64_t least_patience_ns = 50'000'000;
+constexpr std::int64_t min_timeout_ns = 50'000'000;
 
 auto first_at_or_after(const std::deque<Sample>& samples, std::int64_t time_ns) {
     return std::lower_bound(
@@ -110,7 +110,7 @@ void Acquisition::progress(std::int64_t until_ns) {
     const bool free = !search_ || mode_ == Mode::automatic;
     if (state_ == State::armed && mode_ != Mode::roll && free &&
         until_ns_ - armed_ns_ >=
-            (search_ ? std::max(pre_ns_ + post_ns_, least_patience_ns) : post_ns_)) {
+            (search_ ? std::max(pre_ns_ + post_ns_, min_timeout_ns) : post_ns_)) {
         trigger_ns_ = until_ns_ - post_ns_;
         finish(false);
     }

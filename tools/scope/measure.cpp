@@ -18,8 +18,8 @@ namespace {
 using View = std::span<const Sample>;
 
 constexpr double band = 0.02;  // of the step: settled
-constexpr std::size_t least_before = 3;  // samples before a step
-constexpr std::size_t least_on_edge = 5;  // samples on a rising edge
+constexpr std::size_t min_before = 3;  // samples before a step
+constexpr std::size_t min_on_edge = 5;  // samples on a rising edge
 constexpr double crossing_hysteresis = 0.2;  // of the range
 
 double mean_of(View samples) {
@@ -74,7 +74,7 @@ void measure_step(View samples, std::int64_t step_ns, double range, Measurements
         return sample.time_ns < t;
     }) - samples.begin());
     const std::size_t tail = std::max<std::size_t>(samples.size() / 10, 1);
-    if (before < least_before || samples.size() < before + 2 * tail) return;
+    if (before < min_before || samples.size() < before + 2 * tail) return;
     const double first = mean_of(samples.first(before));
     const double last = mean_of(samples.last(tail));
 
@@ -113,7 +113,7 @@ void measure_step(View samples, std::int64_t step_ns, double range, Measurements
         }
         if (!std::isnan(low_ns) && now >= 0.9) {
             high_ns = crossing_ns(samples[i - 1], samples[i], first + 0.9 * step);
-            if (i - low_at + 1 >= least_on_edge) {
+            if (i - low_at + 1 >= min_on_edge) {
                 to.rise_s = (high_ns - low_ns) * 1e-9;
             }
         }

@@ -10,21 +10,21 @@ namespace hal::tools {
 
 namespace {
 
-constexpr double least_division_ns = 1e3;
-constexpr double most_division_ns = 100e9;
+constexpr double min_division_ns = 1e3;
+constexpr double max_division_ns = 100e9;
 
 /// Returns the smallest and the largest finite value; the first is larger than the second when no
 /// value is finite.
 std::pair<double, double> range_of(const Samples& samples) {
-    double least = 1;
-    double most = -1;
+    double min = 1;
+    double max = -1;
     for (const Sample& sample : samples) {
         if (!std::isfinite(sample.value)) continue;
-        const bool first = least > most;
-        least = first ? sample.value : std::min(least, sample.value);
-        most = first ? sample.value : std::max(most, sample.value);
+        const bool first = min > max;
+        min = first ? sample.value : std::min(min, sample.value);
+        max = first ? sample.value : std::max(max, sample.value);
     }
-    return {least, most};
+    return {min, max};
 }
 
 }  // namespace
@@ -56,13 +56,13 @@ Record ScopeView::shown() const {
 
 void ScopeView::fit_lane(std::size_t channel, double lane_divisions, double above_centre) {
     const Record record = shown();
-    auto [least, most] = range_of(record.samples[channel]);
-    if (least > most) return;
+    auto [min, max] = range_of(record.samples[channel]);
+    if (min > max) return;
     if (acquisition_.channels()[channel].bit) {
-        least = 0;
-        most = 1;
+        min = 0;
+        max = 1;
     }
-    const double range = most > least ? most - least : std::max(std::abs(most), 1.0) * 0.1;
+    const double range = max > min ? max - min : std::max(std::abs(max), 1.0) * 0.1;
 
     const double fine = range / (lane_divisions * 0.9);
     double step = std::pow(10.0, std::floor(std::log10(fine)));
@@ -70,7 +70,7 @@ void ScopeView::fit_lane(std::size_t channel, double lane_divisions, double abov
         step = next_step(step, true);
     }
     traces_[channel].per_division = step;
-    traces_[channel].centre = (least + most) / 2 - above_centre * step;
+    traces_[channel].centre = (min + max) / 2 - above_centre * step;
 }
 
 void ScopeView::fit(std::size_t channel) { fit_lane(channel, divisions_y, 0); }
@@ -180,7 +180,7 @@ void ScopeView::change_time(bool longer) {
     const auto pre = static_cast<double>(acquisition_.pre_ns());
     const auto total = static_cast<double>(acquisition_.pre_ns() + acquisition_.post_ns());
     const double division =
-        std::clamp(next_step(total / divisions_x, longer), least_division_ns, most_division_ns);
+        std::clamp(next_step(total / divisions_x, longer), min_division_ns, max_division_ns);
     const auto window = static_cast<std::int64_t>(division * divisions_x);
     change_window(window, static_cast<std::int64_t>(static_cast<double>(window) * pre / total));
 }

@@ -95,17 +95,18 @@ WatchTable::Texts WatchTable::texts(std::size_t channel) const {
 }
 
 std::vector<std::string> WatchTable::lines(std::size_t columns) const {
-    constexpr std::size_t least_name = 4;
+    constexpr std::size_t min_name_columns = 4;
     constexpr std::size_t of_value = 15;
     constexpr std::size_t of_unit = 9;
     constexpr std::size_t of_extremes = 30;
 
     constexpr std::size_t of_rate = 15;
-    std::size_t width = least_name;
+    std::size_t width = min_name_columns;
     for (const Channel& channel : channels_) {
         width = std::max(width, hal::columns(printable(channel.name)));
     }
-    std::size_t left = columns > of_value + least_name ? columns - of_value : least_name;
+    std::size_t left =
+        columns > of_value + min_name_columns ? columns - of_value : min_name_columns;
     width = std::min(width, left);
     left -= width;
     const auto fits = [&](std::size_t needed) {

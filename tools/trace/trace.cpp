@@ -34,7 +34,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::int64_t default_keep_ns = 5'000'000'000;
 constexpr std::int64_t default_after_ns = 200'000'000;
 constexpr auto times_period = std::chrono::milliseconds(100);
-constexpr std::size_t most_kept_bytes = std::size_t{512} << 20;
+constexpr std::size_t max_kept_bytes = std::size_t{512} << 20;
 
 std::int64_t now_ns(clockid_t clock) {
     timespec now{};
@@ -263,7 +263,7 @@ void Tracer::keep(Chunk chunk) {
     kept_.push_back(std::move(chunk));
     const std::int64_t keep_ns = options_.keep_ns >= 0 ? options_.keep_ns : default_keep_ns;
     while ((fired_ns_ == 0 && kept_.front().time_ns < kept_.back().time_ns - keep_ns) ||
-           kept_bytes_ > most_kept_bytes) {
+           kept_bytes_ > max_kept_bytes) {
         kept_bytes_ -= kept_.front().bytes();
         kept_.pop_front();
     }

@@ -9,7 +9,7 @@
 
 namespace hal::dds {
 
-TopicType status_topic() { return {"halcyon/status", "halcyon::Status", largest_status + 16}; }
+TopicType status_topic() { return {"halcyon/status", "halcyon::Status", max_status_size + 16}; }
 Quality status_quality() { return {.reliable = true, .last_value = true, .depth = 1}; }
 
 namespace {
@@ -17,7 +17,7 @@ namespace {
 class StatusBeacon final : public Beacon, private Served {
 public:
     StatusBeacon(std::shared_ptr<Participant> participant, const hal_status* host)
-        : participant_(std::move(participant)), host_(host), buffer_(largest_status) {
+        : participant_(std::move(participant)), host_(host), buffer_(max_status_size) {
         Quality quality = status_quality();
         quality.depth = 1;
         writer_ = participant_->writer(status_topic(), quality, nullptr);

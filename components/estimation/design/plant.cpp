@@ -184,10 +184,10 @@ std::optional<Dense> place_observer(const Dense& a, const Dense& c, const Eigen:
 
 bool positive(const Dense& a, bool semi) {
     const Eigen::SelfAdjointEigenSolver<Dense> solver(symmetric(a), Eigen::EigenvaluesOnly);
-    const double least = solver.eigenvalues().minCoeff();
+    const double min = solver.eigenvalues().minCoeff();
 
-    const double most = solver.eigenvalues().cwiseAbs().maxCoeff();
-    return semi ? least >= -1e-12 * most : least > 1e-14 * most && least > 0.0;
+    const double max = solver.eigenvalues().cwiseAbs().maxCoeff();
+    return semi ? min >= -1e-12 * max : min > 1e-14 * max && min > 0.0;
 }
 
 }  // namespace hal::estimation

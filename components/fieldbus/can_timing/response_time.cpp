@@ -47,10 +47,9 @@ std::int64_t bit_time(const Bus& bus) { return can::duration_ns({1, 0}, bus.bit_
 
 /// The time that errors take, for a message and those of higher priority.
 struct ErrorTime {
-    ErrorTime(const Bus& bus, std::int64_t longest)
+    ErrorTime(const Bus& bus, std::int64_t max)
         : errors(bus.errors),
-          each(bus.errors.burst == 0 ? 0
-                                     : can::duration_ns({error_bits, 0}, bus.bit_rate) + longest) {}
+          each(bus.errors.burst == 0 ? 0 : can::duration_ns({error_bits, 0}, bus.bit_rate) + max) {}
     std::int64_t operator()(std::int64_t t) const {
         if (each == 0) return 0;
         const std::int64_t more =
@@ -103,11 +102,11 @@ double use_of(std::span<const Item> items) {
 }
 
 std::int64_t longest_of(std::span<const Item> items) {
-    std::int64_t longest = 0;
+    std::int64_t max = 0;
     for (const Item& k : items) {
-        longest = std::max(longest, k.c);
+        max = std::max(max, k.c);
     }
-    return longest;
+    return max;
 }
 
 /// The exact analysis. `busy`: those of higher priority, and behind them m itself.

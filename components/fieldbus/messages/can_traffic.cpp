@@ -117,7 +117,7 @@ struct CanTraffic : hal::Component {
     }
 
 private:
-    static constexpr std::size_t most_waiting = 8;
+    static constexpr std::size_t max_waiting = 8;
     struct Node {
         std::unique_ptr<hal::can::Link> link;
         std::size_t first = 0;
@@ -125,7 +125,7 @@ private:
     };
     /// The last releases of a message without an echo. A link without echoes never removes them.
     struct Message {
-        std::array<std::int64_t, most_waiting> release{};
+        std::array<std::int64_t, max_waiting> release{};
         std::uint64_t queued = 0;
         std::uint64_t done = 0;
     };
@@ -137,7 +137,7 @@ private:
             if (message.done == message.queued) continue;
             worst = std::fmax(
                 worst, 1e-9 * static_cast<double>(buffer_.time_ns -
-                                                  message.release[message.done++ % most_waiting]));
+                                                  message.release[message.done++ % max_waiting]));
         }
         for (std::size_t i = node.first; due && i < node.end; ++i) {
             release(node, i, now);
@@ -159,16 +159,16 @@ private:
                 varied_ ? static_cast<std::uint8_t>(random_ >> (8 * n)) : std::uint8_t{0x3c};
         }
         released = released + 1;
-        if (node.link->statistics().queued >= most_waiting * (node.end - node.first)) {
+        if (node.link->statistics().queued >= max_waiting * (node.end - node.first)) {
             ++busy_;
             return;
         }
         if (node.link->send(frame, now) != hal::can::Sent::queued) return;
         Message& message = messages_[number];
-        if (message.queued - message.done == most_waiting) {
+        if (message.queued - message.done == max_waiting) {
             ++message.done;
         }
-        message.release[message.queued++ % most_waiting] = now;
+        message.release[message.queued++ % max_waiting] = now;
     }
 
     std::vector<Node> nodes_;

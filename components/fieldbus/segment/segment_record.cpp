@@ -57,8 +57,8 @@ struct SegmentRecord final : hal::Component {
     }
 
     void update(hal::Cycle cycle) noexcept {
-        constexpr int most = 256;  // per cycle: a babbling station must not block the thread
-        for (int n = 0; n < most; ++n) {
+        constexpr int max = 256;  // per cycle: a babbling station must not block the thread
+        for (int n = 0; n < max; ++n) {
             const auto arrival = port_->receive(cycle.start_ns());
             if (!arrival) break;
             if (pause || arrival->bytes.size() > largest_frame) continue;

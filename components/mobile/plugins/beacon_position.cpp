@@ -43,7 +43,7 @@ struct BeaconPosition : hal::Component {
                                "timeout",
                                "time without three accepted bearings after which lost becomes TRUE",
                                {.initial = 0.5, .unit = "s"}};
-    hal::Param<double> least_d{
+    hal::Param<double> min_d{
         *this, "min-d", "smallest |D| of a triangulation", {.initial = 0.5, .unit = "m^2"}};
     hal::Param<double> min_x{
         *this, "min-x", "smallest x of the field", {.initial = 0.0, .unit = "m"}};
@@ -170,20 +170,20 @@ private:
     }
     bool fits(const Seen& seen, std::size_t i, double px, double py) const noexcept {
         const double expected = expected_width(i, px, py);
-        const double most = std::fmax(tolerance, 1.0);
+        const double max = std::fmax(tolerance, 1.0);
 
         const double count = 2 * std::numbers::pi / std::max<std::uint32_t>(resolution, 1);
-        return seen.width <= expected * most + count && seen.width + count >= expected / most;
+        return seen.width <= expected * max + count && seen.width + count >= expected / max;
     }
     /// The beacon in whose direction the reflection is expected; `beacons`: none.
     std::size_t nearest(const Seen& seen) const noexcept {
         std::size_t best = beacons;
-        double least = gate;
+        double min = gate;
         for (std::size_t i = 0; i < beacons; ++i) {
             const double off = std::fabs(
                 wrapped(std::atan2(map_[i].y - y, map_[i].x - x) - heading - seen.bearing));
-            if (off < least && fits(seen, i, x, y)) {
-                least = off;
+            if (off < min && fits(seen, i, x, y)) {
+                min = off;
                 best = i;
             }
         }
@@ -213,7 +213,7 @@ private:
             return;
         }
         hal::mobile::Fix best;
-        double least = 1e9;
+        double min = 1e9;
         double second = 1e9;
         for (int order = 0; order < 2;
              ++order) {  // seen from outside of the triangle, they are met the other way round
@@ -233,15 +233,15 @@ private:
                 }
                 if (!good) continue;
                 const double wrong = mismatch(to, fix);
-                second = std::fmin(second, std::fmax(wrong, least));
-                if (wrong < least) {
-                    least = wrong;
+                second = std::fmin(second, std::fmax(wrong, min));
+                if (wrong < min) {
+                    min = wrong;
                     best = fix;
                 }
             }
         }
         // two places explain what was seen: wait until the robot has moved or turned
-        if (least > 1e8 || second < least + 0.1) return;
+        if (min > 1e8 || second < min + 0.1) return;
         const Pose at = last_[2].odometry;
         const Pose here = odometry_at(now);
         const double turn = best.heading - at.heading;
@@ -268,7 +268,7 @@ private:
             bearings[i] = last_[i].bearing;
             corrected[i] = bearings[i] + last_[i].odometry.heading - end.heading;
         }
-        hal::mobile::Fix fix = hal::mobile::triangulate(places, corrected, least_d);
+        hal::mobile::Fix fix = hal::mobile::triangulate(places, corrected, min_d);
         for (int round = 0; round < 2 && fix.valid; ++round) {
             for (std::size_t i = 0; i < beacons; ++i) {
                 const Pose& then = last_[i].odometry;
@@ -285,7 +285,7 @@ private:
                 const double from_now = std::atan2(places[i].y - fix.y, places[i].x - fix.x);
                 corrected[i] = bearings[i] + then.heading - end.heading + from_now - from_then;
             }
-            fix = hal::mobile::triangulate(places, corrected, least_d);
+            fix = hal::mobile::triangulate(places, corrected, min_d);
         }
         return fix;
     }

@@ -104,7 +104,7 @@ private:
     /// Where the sensors report something, and reported something a short time ago: an obstacle
     /// beside the robot may be between two of them.
     void look(std::int64_t now) noexcept {
-        double least = 1000.0;
+        double min = 1000.0;
         for (std::size_t i = 0; i < sensors; ++i) {
             if (reading[i] == 0) continue;
             const double range = std::sqrt(std::fmax(constant, 0.0) / reading[i]) - offset;
@@ -114,7 +114,7 @@ private:
             const double aside = i % 2 == 0 ? -spread : spread.get();
             const double out = apothem + std::fmax(range, 0.0);
             const double at = std::hypot(out, aside);
-            least = std::fmin(least, at);
+            min = std::fmin(min, at);
             if (!(at < horizon)) continue;
             remember(at, facing + std::atan2(aside, out), now);
         }
@@ -124,7 +124,7 @@ private:
                 remember(echo_range, echo_bearing, now);
             }
         }
-        nearest = go.finite(least);
+        nearest = go.finite(min);
         count_ = 0;
         for (const Point& p : points_) {
             const double at = std::hypot(p.x - go.x, p.y - go.y);
@@ -152,16 +152,16 @@ private:
         *oldest = seen;
     }
     double free_ahead() const noexcept {
-        double least = horizon;
+        double min = horizon;
         for (std::size_t i = 0; i < count_; ++i) {  // what is in the lane of the body
             const double ahead = seen_[i].distance * std::cos(seen_[i].angle);
 
             const double aside = seen_[i].distance * std::sin(seen_[i].angle);
             if (ahead > 0.0 && std::fabs(aside) < 0.85 * body) {
-                least = std::fmin(least, ahead);
+                min = std::fmin(min, ahead);
             }
         }
-        return least;
+        return min;
     }
     bool is_free(double angle, double left) const noexcept {
         for (std::size_t i = 0; i < count_; ++i) {
@@ -190,7 +190,7 @@ private:
             return wanted;
         }
         double best = 0.0;
-        double least = 1e9;
+        double min = 1e9;
         for (int i = 0; i < sectors; ++i) {
             const double angle = std::remainder(i * 2 * pi / sectors, 2 * pi);
             if (!is_free(angle, left)) continue;
@@ -198,12 +198,12 @@ private:
                 2.0 * std::fabs(std::remainder(angle - wanted, 2 * pi)) +
                 1.5 * (avoiding ? std::fabs(std::remainder(angle - before, 2 * pi)) : 0.0) +
                 0.3 * std::fabs(angle);
-            if (cost < least) {
-                least = cost;
+            if (cost < min) {
+                min = cost;
                 best = angle;
             }
         }
-        blocked = least > 1e8;
+        blocked = min > 1e8;
         avoiding = true;
         direction = blocked ? 0.0 : best;
         if (!blocked) {

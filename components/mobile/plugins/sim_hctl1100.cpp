@@ -144,7 +144,7 @@ private:
         return profile_ + std::clamp(wanted - profile_, -step, step);
     }
     /// A trapezoid from setpoint_ to target; triangular when it is short.
-    void follow_profile(double step, double most) noexcept {
+    void follow_profile(double step, double max) noexcept {
         const double way = target - setpoint_;
         const double stopping = step > 0.0 ? profile_ * profile_ / (2 * step) : 0.0;
         if (std::fabs(way) <= std::fabs(profile_) || std::fabs(way) < 1.0) {
@@ -156,7 +156,7 @@ private:
         profile_ =
             brake ? std::copysign(
                         std::fmax(std::fabs(profile_) - step, std::fmin(1.0, std::fabs(way))), way)
-                  : toward(std::copysign(most, way), step);
+                  : toward(std::copysign(max, way), step);
         setpoint_ += profile_;
     }
     /// speed' = (drive fastest - speed) / lag

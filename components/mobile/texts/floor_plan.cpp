@@ -53,8 +53,8 @@ void FloorPlan::read(std::string_view text) {
                       "the radius is not above 0", "write " + form);
             continue;
         }
-        if (walls.size() + discs.size() + beacons.size() + (is_box ? 4 : 1) > most_shapes) {
-            reject("more than " + std::to_string(most_shapes) + " shapes",
+        if (walls.size() + discs.size() + beacons.size() + (is_box ? 4 : 1) > max_shapes) {
+            reject("more than " + std::to_string(max_shapes) + " shapes",
                    "a box counts as four walls; leave something out");
             return;
         }
@@ -108,14 +108,14 @@ Hit FloorPlan::cast(double x, double y, double angle, double reach) const noexce
 }
 
 double FloorPlan::clearance(double x, double y) const noexcept {
-    double least = nowhere;
+    double min = nowhere;
     for (const Wall& w : walls) {
-        least = std::fmin(least, distance_to(w, x, y));
+        min = std::fmin(min, distance_to(w, x, y));
     }
     for (const Disc& d : discs) {
-        least = std::fmin(least, std::hypot(x - d.x, y - d.y) - d.radius);
+        min = std::fmin(min, std::hypot(x - d.x, y - d.y) - d.radius);
     }
-    return least;
+    return min;
 }
 
 }  // namespace hal::mobile

@@ -29,7 +29,7 @@ struct Hit {
 
 class FloorPlan {
 public:
-    static constexpr std::size_t most_shapes = 256;
+    static constexpr std::size_t max_shapes = 256;
 
     std::vector<Wall> walls;
     std::vector<Disc> discs, beacons;

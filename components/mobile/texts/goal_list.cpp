@@ -18,9 +18,9 @@ void GoalList::read(std::string_view text) {
             continue;
         }
         if (!read_numbers(words, 1, place, "goal X Y, in metres", problems)) continue;
-        if (goals.size() == most_goals) {
+        if (goals.size() == max_goals) {
             text::add(problems, words[0].at.offset, words[0].at.offset + words[0].at.length,
-                      "more than " + std::to_string(most_goals) + " goals", "split the list");
+                      "more than " + std::to_string(max_goals) + " goals", "split the list");
             return;
         }
         goals.push_back({place[0], place[1]});

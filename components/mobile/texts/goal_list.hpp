@@ -14,7 +14,7 @@ struct Goal {
 };
 
 struct GoalList {
-    static constexpr std::size_t most_goals = 256;
+    static constexpr std::size_t max_goals = 256;
     std::vector<Goal> goals;
     std::vector<text::Problem> problems;  ///< of the file; empty: it was valid
 

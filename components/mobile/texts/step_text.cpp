@@ -120,7 +120,7 @@ private:
                 return reject(words[1], "duplicate step '" + s.name + "'", "choose another name");
             }
         }
-        if (to_.steps.size() == StepText::most_steps) {
+        if (to_.steps.size() == StepText::max_steps) {
             return reject(words[1], "more than 128 steps", "split the program");
         }
         to_.steps.push_back({words[1].text, words[1].at, 0, {}});
@@ -146,7 +146,7 @@ private:
     }
     void target(const text::Word& name, const Transition& transition,
                 std::vector<Transition>& list) {
-        if (list.size() == StepText::most_transitions) {
+        if (list.size() == StepText::max_transitions) {
             return reject(name, "more than 32 transitions", "split the step");
         }
         targets_.push_back(

@@ -36,8 +36,8 @@ struct Step {
 
 struct StepText {
     static constexpr std::size_t most_bits = 64;
-    static constexpr std::size_t most_steps = 128;
-    static constexpr std::size_t most_transitions = 32;
+    static constexpr std::size_t max_steps = 128;
+    static constexpr std::size_t max_transitions = 32;
 
     std::vector<std::string> inputs, outputs;
     std::vector<Step> steps;

@@ -244,7 +244,7 @@ bool Reader::read_summary() {
     const std::uint64_t footer = size - magic.size() - footer_bytes;
     if (fields.rest() != magic) return false;
     ends_ = begin == 0;  // a file without a summary may be whole
-    if (begin == 0 || begin > footer || footer - begin > most_chunk) return false;
+    if (begin == 0 || begin > footer || footer - begin > max_chunk) return false;
     std::string summary;
     if (!source_->read(begin, static_cast<std::size_t>(footer - begin), summary)) return false;
     if (crc != 0 &&
@@ -296,7 +296,7 @@ bool Reader::read_content(const RecordHead& record, std::string& content) {
 }
 
 bool Reader::add_message(const RecordHead& record) {
-    if (record.length < message_head || record.length > most_chunk) return false;
+    if (record.length < message_head || record.length > max_chunk) return false;
     if (chunks_.size() >= most_entries) return false;
     add_loose(record.offset, record.whole(), record.log_time);
     return true;
@@ -331,7 +331,7 @@ bool Reader::add_record(const RecordHead& record, const Listed& listed, bool loa
     case op_schema:
     case op_channel: {
         std::string content;
-        if (record.length > most_chunk) return true;
+        if (record.length > max_chunk) return true;
         return read_content(record, content) && add_entry(record.opcode, content);
     }
     case op_metadata:
@@ -372,13 +372,12 @@ void Reader::scan(bool load_listed) {
 // incomplete.
 bool Reader::scan_chunk(ChunkIndex& index) {
     constexpr std::size_t fixed = 8 + 8 + 8 + 4 + 4;
-    constexpr std::size_t most_head = 256;
+    constexpr std::size_t max_head = 256;
     const std::uint64_t length = index.length - record_head;
     std::string head;
     if (length < fixed) return false;
     if (!source_->read(index.offset + record_head,
-                       static_cast<std::size_t>(std::min<std::uint64_t>(length, most_head)),
-                       head)) {
+                       static_cast<std::size_t>(std::min<std::uint64_t>(length, max_head)), head)) {
         return false;
     }
     Fields chunk(head);
@@ -424,7 +423,7 @@ bool Reader::load_chunk(const ChunkIndex& chunk, std::string& records) {
         return source_->read(chunk.offset, static_cast<std::size_t>(chunk.length), records) ||
                fail("a message is missing");
     }
-    if (chunk.length < record_head || chunk.length > most_chunk || chunk.size > most_chunk) {
+    if (chunk.length < record_head || chunk.length > max_chunk || chunk.size > max_chunk) {
         return fail("a chunk is larger than 256 MiB");
     }
     if (!source_->read(chunk.offset, static_cast<std::size_t>(chunk.length), bytes)) {
@@ -441,7 +440,7 @@ bool Reader::load_chunk(const ChunkIndex& chunk, std::string& records) {
     const auto crc = content.get<std::uint32_t>();
     const std::string_view compression = content.text();
     const std::string_view compressed = content.blob();
-    if (!fields.good() || !content.good() || size > most_chunk) {
+    if (!fields.good() || !content.good() || size > max_chunk) {
         return fail("a chunk is incomplete");
     }
     std::string problem;

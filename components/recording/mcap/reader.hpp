@@ -35,7 +35,7 @@ std::unique_ptr<Source> open_bytes(std::string_view bytes);
 class Reader {
 public:
     /// bytes of a chunk, expanded
-    static constexpr std::uint64_t most_chunk = std::uint64_t{256} << 20;
+    static constexpr std::uint64_t max_chunk = std::uint64_t{256} << 20;
     /// chunks, or other records of the summary
     static constexpr std::size_t most_entries = 1'000'000;
 

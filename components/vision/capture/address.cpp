@@ -64,7 +64,7 @@ bool Address::has(const char* name) const {
                        [name](const Option& option) { return option.name == name; });
 }
 
-double Address::number(const char* name, double fallback, double least, double most) {
+double Address::number(const char* name, double fallback, double min, double max) {
     const Option* const option = find(name);
     if (!option) return fallback;
     char* end = nullptr;
@@ -74,16 +74,15 @@ double Address::number(const char* name, double fallback, double least, double m
                                                "' is not a number; write " + name + "=" +
                                                plain(fallback));
     }
-    if (value < least || value > most) {
+    if (value < min || value > max) {
         throw hal::ArgumentError("source", "source=" + text_ + ": " + name + "=" + option->value +
-                                               " is outside " + plain(least) + " to " +
-                                               plain(most));
+                                               " is outside " + plain(min) + " to " + plain(max));
     }
     return value;
 }
 
-int Address::whole(const char* name, int fallback, int least, int most) {
-    const double value = number(name, fallback, least, most);
+int Address::whole(const char* name, int fallback, int min, int max) {
+    const double value = number(name, fallback, min, max);
     if (value != std::floor(value)) {
         throw hal::ArgumentError("source", "source=" + text_ + ": " + name + "=" + plain(value) +
                                                " is not a whole number; write " + name + "=" +

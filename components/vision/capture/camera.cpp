@@ -194,13 +194,12 @@ private:
                    "the keys are size, focal, centre, distortion");
         }
     }
-    bool counted(const std::vector<Word>& words, const std::string& name, std::size_t least,
-                 std::size_t most, const char* example) {
+    bool counted(const std::vector<Word>& words, const std::string& name, std::size_t min,
+                 std::size_t max, const char* example) {
         const std::size_t count = words.size() - 1;
-        if (count >= least && count <= most) return true;
-        const std::string wants = least == most
-                                      ? std::to_string(most)
-                                      : std::to_string(least) + " to " + std::to_string(most);
+        if (count >= min && count <= max) return true;
+        const std::string wants =
+            min == max ? std::to_string(max) : std::to_string(min) + " to " + std::to_string(max);
         report(words[0].begin, words.back().end,
                name + " has " + hal::counted(count, "number") + ", expected " + wants,
                std::string("write ") + example);

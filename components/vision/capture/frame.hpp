@@ -10,9 +10,9 @@ namespace hal::vision {
 enum class Format : std::uint8_t { grey, bgr };  ///< 1 or 3 bytes per pixel
 
 /// Maximum number of pixels: 64 MiB in colour.
-constexpr int most_wide = 8192;
-constexpr int most_high = 8192;
-constexpr std::size_t most_pixels = 22'000'000;
+constexpr int max_width = 8192;
+constexpr int max_height = 8192;
+constexpr std::size_t max_pixels = 22'000'000;
 
 /// A picture and its exposure time. Owned by its creator, which reuses its memory for the next
 /// frame.
@@ -39,8 +39,8 @@ struct Frame {
         return true;
     }
     static bool fits(int w, int h) {
-        return w >= 1 && h >= 1 && w <= most_wide && h <= most_high &&
-               static_cast<std::size_t>(w) * static_cast<std::size_t>(h) <= most_pixels;
+        return w >= 1 && h >= 1 && w <= max_width && h <= max_height &&
+               static_cast<std::size_t>(w) * static_cast<std::size_t>(h) <= max_pixels;
     }
     std::uint8_t* row(int y) { return pixels.data() + stride() * static_cast<std::size_t>(y); }
     const std::uint8_t* row(int y) const {

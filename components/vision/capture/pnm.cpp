@@ -83,8 +83,8 @@ std::optional<Problem> read_header(Reader& reader, Header& header) {
     if (!Frame::fits(header.width, header.height)) {
         return Problem{FrameError::too_large, "a frame of " + std::to_string(header.width) + " x " +
                                                   std::to_string(header.height) +
-                                                  " is larger than " + std::to_string(most_wide) +
-                                                  " x " + std::to_string(most_high) +
+                                                  " is larger than " + std::to_string(max_width) +
+                                                  " x " + std::to_string(max_height) +
                                                   " or 22 million pixels"};
     }
     if (reader.left() < header.min_bytes()) {

@@ -18,9 +18,9 @@ namespace hal::vision {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr std::size_t most_files = 100'000;
+constexpr std::size_t max_files = 100'000;
 // of a file: what the largest frame has in 16 bits
-constexpr std::size_t most_bytes = std::size_t{3} * 2 * most_pixels + 4096;
+constexpr std::size_t most_bytes = std::size_t{3} * 2 * max_pixels + 4096;
 
 class Frames final : public Source {
 public:
@@ -36,7 +36,7 @@ public:
         files_.clear();
         std::error_code error;
         for (auto at = fs::directory_iterator(folder_, error);
-             !error && at != fs::directory_iterator() && files_.size() < most_files;
+             !error && at != fs::directory_iterator() && files_.size() < max_files;
              at.increment(error)) {
             const std::string end = at->path().extension().string();
             if (end == ".pgm" || end == ".ppm") {

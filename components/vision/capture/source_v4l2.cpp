@@ -76,8 +76,8 @@ std::string four_letters(std::uint32_t code) {
 class V4l2 final : public Source {
 public:
     V4l2(Address address, VideoSystem& system) : system_(system), device_(address.place()) {
-        width_ = address.whole("width", 640, 2, most_wide);
-        height_ = address.whole("height", 480, 2, most_high);
+        width_ = address.whole("width", 640, 2, max_width);
+        height_ = address.whole("height", 480, 2, max_height);
         asked_ = address.has("fps");
         fps_ = given_fps_ = address.number("fps", 30.0, 0.1, 1000.0);
         grey_ = address.flag("grey");
@@ -255,7 +255,7 @@ private:
         is_yuyv_ = wanted == V4L2_PIX_FMT_YUYV;
         const std::size_t row = static_cast<std::size_t>(width_) * (is_yuyv_ ? 2 : 1);
         line_ = std::max<std::size_t>(is.bytesperline, row);
-        if (!Frame::fits(width_, height_) || line_ > std::size_t{16} * most_wide ||
+        if (!Frame::fits(width_, height_) || line_ > std::size_t{16} * max_width ||
             (is_yuyv_ && width_ % 2 != 0)) {
             return fail(FrameError::too_large, "frames of " + std::to_string(width_) + " x " +
                                                    std::to_string(height_) +

@@ -10,7 +10,7 @@
 namespace hal::vision {
 namespace {
 constexpr std::int64_t second = 1'000'000'000;
-constexpr std::int64_t most_wait = second / 10;
+constexpr std::int64_t max_wait = second / 10;
 constexpr std::int64_t again_after = second;           // retry interval of opening a source
 // minimum interval of messages about the same problem
 constexpr std::int64_t quiet_for = 10 * second;
@@ -91,11 +91,11 @@ void Worker::step(std::int64_t now, bool may_wait) {
     }
     if (!open_) {
         if (may_wait) {
-            std::this_thread::sleep_for(std::chrono::nanoseconds(most_wait / 2));
+            std::this_thread::sleep_for(std::chrono::nanoseconds(max_wait / 2));
         }
         return;
     }
-    const Got got = source_->next(now, may_wait ? most_wait : 0, frame_);
+    const Got got = source_->next(now, may_wait ? max_wait : 0, frame_);
     const std::uint32_t dropped = dropped_before_ + static_cast<std::uint32_t>(source_->skipped());
     const bool more = dropped != status_.dropped;
     status_.dropped = dropped;

@@ -14,7 +14,7 @@ std::vector<Sighting> find_blobs(const Frame& frame, const Ground& ground,
     for (std::size_t kind = 0; kind < kinds.size(); ++kind) {
         weigh(frame, kinds[kind].hue, weights);
         for (const Spot& spot : find_spots(weights, frame.width, frame.height, rules.threshold,
-                                           rules.least_area, most_tracks)) {
+                                           rules.min_area, max_tracks)) {
             double x = 0.0;
             double y = 0.0;
             double x_above = 0.0;
@@ -29,7 +29,7 @@ std::vector<Sighting> find_blobs(const Frame& frame, const Ground& ground,
             x += half_width * kinds[kind].radius * (x_above - x) / away;
 
             y += half_width * kinds[kind].radius * (y_above - y) / away;
-            if (std::hypot(x, y) <= rules.most_distance) {
+            if (std::hypot(x, y) <= rules.max_distance) {
                 sightings.push_back(
                     {static_cast<std::uint32_t>(kind), x, y, static_cast<double>(spot.area)});
             }

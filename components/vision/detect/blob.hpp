@@ -23,8 +23,8 @@ struct BlobKind {
 
 struct BlobRules {
     int threshold = 40;     ///< minimum weight of the colour, of 255
-    int least_area = 40;    ///< px
-    double most_distance = 3;  ///< m: maximum distance of objects
+    int min_area = 40;    ///< px
+    double max_distance = 3;  ///< m: maximum distance of objects
 };
 
 /// Detects the objects of each kind; the axis of an object is `radius` behind its lower end. Skips

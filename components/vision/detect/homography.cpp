@@ -11,8 +11,8 @@
 
 namespace hal::vision {
 namespace {
-constexpr std::size_t least_points = 4;
-constexpr std::size_t most_points = 1000;
+constexpr std::size_t min_points = 4;
+constexpr std::size_t max_points = 1000;
 
 /// Four of these span a plane: no matter which line through two of them is taken, two others are
 /// off it.
@@ -61,7 +61,7 @@ GroundText read_ground(std::string_view text) {
                                                ? "more than 4 numbers"
                                                : counted(numbers.size(), "number") + ", not 4"),
                       form);
-        } else if (result.points.size() < most_points) {
+        } else if (result.points.size() < max_points) {
             result.points.push_back({numbers[0], numbers[1], numbers[2], numbers[3], first, last});
         }
     };
@@ -71,7 +71,7 @@ GroundText read_ground(std::string_view text) {
             point(row);
         }
     }
-    if (result.problems.empty() && result.points.size() < least_points) {
+    if (result.problems.empty() && result.points.size() < min_points) {
         text::add(result.problems, 0, std::min<std::size_t>(text.size(), 1),
                   counted(result.points.size(), "point") + ", but a plane needs four",
                   "write four points that are far apart, one per row: u v x y");
@@ -118,27 +118,27 @@ void Ground::fit(GroundText& text, const std::optional<Camera>& camera) {
         return refuse("no plane fits these points", "check whether two of them are exchanged");
     }
     std::copy(h.begin<double>(), h.end<double>(), h_.begin());
-    double least = 1e300;
-    double most = -1e300;
+    double min = 1e300;
+    double max = -1e300;
     double sum = 0;
     for (const auto& p : seen) {
         const double w = h_[6] * p.x + h_[7] * p.y + h_[8];
-        least = std::min(least, w);
-        most = std::max(most, w);
+        min = std::min(min, w);
+        max = std::max(max, w);
     }
-    if (most < 0) {  // so that w is positive where the plane is
+    if (max < 0) {  // so that w is positive where the plane is
         for (double& value : h_) {
             value = -value;
         }
-        std::swap(least, most);
-        least = -least;
-        most = -most;
+        std::swap(min, max);
+        min = -min;
+        max = -max;
     }
-    if (least <= 0) {
+    if (min <= 0) {
         return refuse("some of these points are above the horizon",
                       "check whether two of them are exchanged");
     }
-    least_w_ = 1e-3 * least;
+    least_w_ = 1e-3 * min;
     for (std::size_t i = 0; i < seen.size(); ++i) {
         double x = 0;
         double y = 0;

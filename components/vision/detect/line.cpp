@@ -29,12 +29,12 @@ void look(const std::vector<float>& row, double v, int band, const Ground& groun
     const double floor = sorted[n / 2];
     const double sign = rules.dark ? -1.0 : 1.0;
     std::vector<double> out(n);
-    double most = 0.0;
+    double max = 0.0;
     for (std::size_t u = 0; u < n; ++u) {
-        most = std::max(most, out[u] = sign * (row[u] - floor));
+        max = std::max(max, out[u] = sign * (row[u] - floor));
     }
-    if (most < rules.contrast) return;
-    const double threshold = std::max(0.5 * most, rules.contrast);
+    if (max < rules.contrast) return;
+    const double threshold = std::max(0.5 * max, rules.contrast);
     std::vector<LinePoint> found;
     for (std::size_t u = 0; u < n;) {
         if (out[u] < threshold) {
@@ -177,7 +177,7 @@ LineSeen find_line(const Frame& frame, const Ground& ground, const LineRules& ru
     seen.heading = std::atan(through.b);
     seen.curvature = 2.0 * through.c / std::pow(1.0 + through.b * through.b, 1.5);
     seen.points = std::move(best);
-    seen.found = seen.quality >= rules.least_quality;
+    seen.found = seen.quality >= rules.min_quality;
     return seen;
 }
 

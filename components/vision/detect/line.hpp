@@ -17,7 +17,7 @@ struct LineRules {
     /// m: maximum distance; farther away a parabola does not describe the line
     double reach = 0.6;
     double contrast = 20.0;      ///< minimum difference from the floor, of 255
-    double least_quality = 0.4;  ///< minimum fraction of the bands that agree
+    double min_quality = 0.4;  ///< minimum fraction of the bands that agree
     int bands = 12;           ///< strips of the picture that are searched, 3..32
 };
 

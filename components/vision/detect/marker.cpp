@@ -137,8 +137,8 @@ struct Track {
     }
     /// 0: the other candidate does not fit; 1: it fits as well.
     double ambiguity() const {
-        const double most = std::max(shares[0], shares[1]);
-        return std::isnormal(most) ? std::sqrt(std::min(shares[0], shares[1]) / most) : 1.0;
+        const double max = std::max(shares[0], shares[1]);
+        return std::isnormal(max) ? std::sqrt(std::min(shares[0], shares[1]) / max) : 1.0;
     }
 };
 }  // namespace

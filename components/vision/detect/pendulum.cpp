@@ -178,18 +178,18 @@ PendulumSeen find_pendulum(const Frame& frame, const PendulumView& view,
     std::vector<std::uint8_t> weights;
     weigh(frame, limits.pivot, weights);
     const auto pivots =
-        find_spots(weights, frame.width, frame.height, limits.threshold, limits.least_area, 1);
+        find_spots(weights, frame.width, frame.height, limits.threshold, limits.min_area, 1);
     weigh(frame, limits.tip, weights);
     const auto tips =
-        find_spots(weights, frame.width, frame.height, limits.threshold, limits.least_area, 1);
+        find_spots(weights, frame.width, frame.height, limits.threshold, limits.min_area, 1);
     if (pivots.empty() || tips.empty()) return seen;
     seen.pivot_ball = pivots[0];
     seen.tip_ball = tips[0];
     constexpr double unlike = 0.5;  // px: ten times what the middles are off
     seen.found = fit_pendulum(view, pivots[0].u, pivots[0].v, tips[0].u, tips[0].v, seen) &&
-                 seen.residual <= limits.most_residual &&
+                 seen.residual <= limits.max_residual &&
                  seen.rival > std::fmax(unlike, 3.0 * seen.residual) &&
-                 seen.sigma <= limits.most_sigma;
+                 seen.sigma <= limits.max_sigma;
     return seen;
 }
 

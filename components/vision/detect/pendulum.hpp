@@ -25,9 +25,9 @@ struct PendulumLimits {
     Hue pivot{0.0, 40.0};
     Hue tip{120.0, 40.0};
     int threshold = 30;      ///< minimum weight of a ball's colour, of 255
-    int least_area = 12;     ///< minimum area of a ball, px
-    double most_residual = 1.5; ///< px
-    double most_sigma = 0.005;  ///< rad
+    int min_area = 12;     ///< minimum area of a ball, px
+    double max_residual = 1.5; ///< px
+    double max_sigma = 0.005;  ///< rad
 };
 
 struct PendulumSeen {

@@ -41,7 +41,7 @@ void weigh(const Frame& frame, Hue hue, std::vector<std::uint8_t>& weights) {
 }
 
 std::vector<Spot> find_spots(const std::vector<std::uint8_t>& weights, int width, int height,
-                             int threshold, int least_area, std::size_t most) {
+                             int threshold, int min_area, std::size_t max) {
     // is only read
     const cv::Mat weight(height, width, CV_8UC1, const_cast<std::uint8_t*>(weights.data()));
     cv::Mat labels, stats, middles;
@@ -50,7 +50,7 @@ std::vector<Spot> find_spots(const std::vector<std::uint8_t>& weights, int width
     std::vector<Spot> spots;
     for (int label = 1; label < count; ++label) {
         const int* const s = stats.ptr<int>(label);
-        if (s[cv::CC_STAT_AREA] < least_area) continue;
+        if (s[cv::CC_STAT_AREA] < min_area) continue;
         Spot spot;
         spot.area = s[cv::CC_STAT_AREA];
         spot.left = s[cv::CC_STAT_LEFT];
@@ -109,8 +109,8 @@ std::vector<Spot> find_spots(const std::vector<std::uint8_t>& weights, int width
     }
     std::sort(spots.begin(), spots.end(),
               [](const Spot& a, const Spot& b) { return a.mass > b.mass; });
-    if (spots.size() > most) {
-        spots.resize(most);
+    if (spots.size() > max) {
+        spots.resize(max);
     }
     return spots;
 }

@@ -36,9 +36,9 @@ struct Spot {
 /// Computes the weights of a colour frame; those of a grey frame are 0. [any] allocates memory
 void weigh(const Frame& frame, Hue hue, std::vector<std::uint8_t>& weights);
 
-/// Returns at most `most` connected spots of at least `least_area` px above `threshold`, the
+/// Returns at most `most` connected spots of at least `min_area` px above `threshold`, the
 /// heaviest first. [any] allocates memory
 std::vector<Spot> find_spots(const std::vector<std::uint8_t>& weights, int width, int height,
-                             int threshold, int least_area, std::size_t most);
+                             int threshold, int min_area, std::size_t most);
 
 }  // namespace hal::vision

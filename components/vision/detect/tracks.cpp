@@ -26,7 +26,7 @@ void Tracks::see(std::span<const Sighting> sightings, std::int64_t stamp_ns,
     std::stable_sort(pairs.begin(), pairs.end(),
                      [](const Pair& a, const Pair& b) { return a.off < b.off; });
     std::vector<bool> met(sightings.size());
-    std::array<bool, most_tracks> seen{};
+    std::array<bool, max_tracks> seen{};
     const double gain = std::clamp(rules.gain, 0.01, 1.0);
     for (const Pair& p : pairs) {
         if (seen[p.track] || met[p.sighting]) continue;

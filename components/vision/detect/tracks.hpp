@@ -37,13 +37,13 @@ struct TrackRules {
     std::int64_t forget_ns = 1'000'000'000;
 };
 
-constexpr std::size_t most_tracks = 32;
+constexpr std::size_t max_tracks = 32;
 
 /// Assigns detections to tracks: the nearest pair of one kind first, then the nearest of the
 /// remaining ones. A track keeps its slot as long as it exists.
 class Tracks {
 public:
-    explicit Tracks(std::size_t count) : count_(count < most_tracks ? count : most_tracks) {}
+    explicit Tracks(std::size_t count) : count_(count < max_tracks ? count : max_tracks) {}
     /// [any]
     void see(std::span<const Sighting> sightings, std::int64_t stamp_ns, const TrackRules& rules);
     std::span<const Track> all() const noexcept { return {tracks_.data(), count_}; }
@@ -51,7 +51,7 @@ public:
     std::uint32_t crowded() const noexcept { return crowded_; }
 
 private:
-    std::array<Track, most_tracks> tracks_{};
+    std::array<Track, max_tracks> tracks_{};
     std::size_t count_;
     std::uint32_t next_ = 1;
     std::uint32_t crowded_ = 0;

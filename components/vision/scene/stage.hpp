@@ -65,8 +65,8 @@ constexpr std::size_t of_marker = 8;
 }  // namespace at
 
 constexpr std::size_t most_values = 72;
-constexpr std::size_t most_objects = 16;
-constexpr std::size_t most_markers = 8;
+constexpr std::size_t max_objects = 16;
+constexpr std::size_t max_markers = 8;
 
 /// The state of the scene at a moment of the runtime's clock.
 struct State {

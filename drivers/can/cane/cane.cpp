@@ -20,8 +20,8 @@ namespace hal::can::cane {
 
 namespace {
 
-constexpr unsigned most_messages = 255;  // per packed frame: the count is one byte
-constexpr std::size_t most_payload = ethernet::largest_frame - ethernet::header_bytes;
+constexpr unsigned max_messages = 255;  // per packed frame: the count is one byte
+constexpr std::size_t max_payload = ethernet::largest_frame - ethernet::header_bytes;
 
 /// Share of the line used by the frames of this link in both directions. Both threads add to it;
 /// the receiving one closes the windows.
@@ -186,10 +186,10 @@ private:
 
     /// Returns the payload bytes a frame may have now; 0: nothing can leave.
     std::size_t room() const noexcept {
-        if (!discipline_) return most_payload;
+        if (!discipline_) return max_payload;
         std::size_t room = 0;
         discipline_->with([&](const ethernet::Discipline& d) {
-            room = std::min(d.room(*settings_.slot), most_payload);
+            room = std::min(d.room(*settings_.slot), max_payload);
         });
         return room;
     }
@@ -285,7 +285,7 @@ private:
             bool is_full = false;
             for (std::size_t q = 0; q < 2 && !is_full; ++q) {
                 while (const Frame* f = (q == 0 ? process_data_ : service_data_).at(counts[q])) {
-                    const auto more = counts[0] + counts[1] < most_messages
+                    const auto more = counts[0] + counts[1] < max_messages
                                           ? put_packed(*f, space.subspan(bytes))
                                           : 0;
                     if (more == 0) {
@@ -326,8 +326,8 @@ private:
     bool refill(std::int64_t now_ns) noexcept {
         next_ = filled_ = 0;
         // per call: a babbling station must not delay the cycle without limit
-        constexpr unsigned most_frames = 256;
-        for (unsigned n = 0; n < most_frames; ++n) {
+        constexpr unsigned max_frames = 256;
+        for (unsigned n = 0; n < max_frames; ++n) {
             const auto arrival = port_->receive(now_ns);
             if (!arrival) break;
             take(*arrival);
@@ -451,7 +451,7 @@ private:
     Guard guard_;
     Rejections rejections_;
     Replays replays_;
-    std::array<Frame, most_messages> buffer_;
+    std::array<Frame, max_messages> buffer_;
     std::size_t next_ = 0;
     std::size_t filled_ = 0;
     std::int64_t looked_at_ = ethernet::unclocked;
@@ -496,7 +496,7 @@ Opened open(const std::string& place, const Options& options) {
         std::size_t room = 0;
         discipline->with([&](const ethernet::Discipline& d) { room = d.room(*settings.slot); });
         if (room <
-            packed_header + longest_message + (settings.key ? counter_bytes + tag_bytes : 0)) {
+            packed_header + max_message_size + (settings.key ? counter_bytes + tag_bytes : 0)) {
             return {nullptr, "TDMA on " + settings.segment + " has no slot " +
                                  std::to_string(*settings.slot) + " of at least " +
                                  (settings.key ? "60" : "46") +

@@ -15,7 +15,7 @@ namespace hal::can::cane {
 inline constexpr std::uint16_t ether_type = 0x9023;
 inline constexpr std::size_t single_bytes = 5;       ///< header of a single message
 inline constexpr std::size_t packed_header = 10;     ///< header of a packed payload
-inline constexpr std::size_t longest_message = 15;   ///< longest packed message
+inline constexpr std::size_t max_message_size = 15;   ///< longest packed message
 /// of a signed frame: after its header, after its messages
 inline constexpr std::size_t counter_bytes = 8;
 inline constexpr std::size_t tag_bytes = 8;

@@ -25,10 +25,10 @@ bool is_in(const auto& keys, std::string_view key) {
     return std::find(std::begin(keys), std::end(keys), key) != std::end(keys);
 }
 
-std::optional<unsigned> number(std::string_view text, unsigned least, unsigned most) {
+std::optional<unsigned> number(std::string_view text, unsigned min, unsigned max) {
     unsigned value = 0;
     const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (wrong != std::errc{} || end != text.data() + text.size() || value < least || value > most) {
+    if (wrong != std::errc{} || end != text.data() + text.size() || value < min || value > max) {
         return std::nullopt;
     }
     return value;
@@ -97,9 +97,9 @@ std::string apply(std::string_view key, std::string_view value, Settings& s, boo
         return one_of("0", "1", [&](bool first) { s.learns = !first; });
     }
     if (key == "slot" || key == "priority") {
-        const unsigned most = key == "slot" ? 255 : 30;
-        const auto n = number(value, 0, most);
-        if (!n) return is(key, value, "a whole number up to " + std::to_string(most));
+        const unsigned max = key == "slot" ? 255 : 30;
+        const auto n = number(value, 0, max);
+        if (!n) return is(key, value, "a whole number up to " + std::to_string(max));
         if (key == "slot") {
             s.slot = n;
         } else {

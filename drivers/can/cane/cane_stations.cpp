@@ -121,7 +121,7 @@ Streams::Verdict Streams::take(const Address& from, bool to_all, Stamp stamp,
     auto& stream = s->stream[to_all ? 1 : 0];
     const auto ahead =
         static_cast<std::int16_t>(static_cast<std::uint16_t>(stamp.sequence - stream.last));
-    if (stream.begun && ahead <= 0 && stream.stale < stale_most) {
+    if (stream.begun && ahead <= 0 && stream.stale < max_stale) {
         ++stream.stale;
         return Verdict{false, 0};
     }

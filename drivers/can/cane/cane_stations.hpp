@@ -70,7 +70,7 @@ private:
     /// sessions, one or two per sender; the least recently used is replaced
     static constexpr unsigned most = 128;
     /// consecutive stale frames after which the sequence restarts
-    static constexpr unsigned stale_most = 8;
+    static constexpr unsigned max_stale = 8;
     struct Sender {
         std::uint64_t key = 0;
         std::int64_t heard_ns = INT64_MIN;

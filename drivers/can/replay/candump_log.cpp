@@ -117,7 +117,7 @@ bool parse_remote(std::string_view text, Frame& f) {
 }
 
 bool parse_bytes(std::string_view text, Frame& f) {
-    const std::size_t most = f.fd ? 64 : 8;
+    const std::size_t max = f.fd ? 64 : 8;
     while (!text.empty()) {
         if (text[0] == '.') {
             text.remove_prefix(1);  // a separator, as cansend accepts it
@@ -125,7 +125,7 @@ bool parse_bytes(std::string_view text, Frame& f) {
         // the raw DLC; it has no byte
         if (!f.fd && f.length == 8 && text.size() == 2 && text[0] == '_') return true;
         std::uint32_t byte = 0;
-        if (f.length >= most || text.size() < 2 || !hex(text.substr(0, 2), byte)) return false;
+        if (f.length >= max || text.size() < 2 || !hex(text.substr(0, 2), byte)) return false;
         f.data[f.length++] = static_cast<std::uint8_t>(byte);
         text.remove_prefix(2);
     }

@@ -13,7 +13,7 @@ namespace hal::can::simbus {
 namespace {
 
 constexpr std::size_t most_disturbances = 64;
-constexpr std::size_t most_filters = 1024;
+constexpr std::size_t max_filters = 1024;
 
 class SimulatedLink final : public Link, public Simulation {
 public:
@@ -103,7 +103,7 @@ public:
     void restart() noexcept override { node_.wants_restart.store(true); }
 
     bool set_filters(std::span<const Filter> filters) override {
-        if (filters.size() > most_filters) return false;
+        if (filters.size() > max_filters) return false;
         std::vector<Filter> wanted(filters.begin(), filters.end());
         bus_->exclusively([&] { node_.filters.swap(wanted); });
         return true;

@@ -100,7 +100,7 @@ public:
 
     /// A bus at 10 kbit/s needs seconds for what is queued, the safe values at its end among it.
     std::int64_t closing_ns() const noexcept override {
-        constexpr std::int64_t least_bits = 47;
+        constexpr std::int64_t min_bits = 47;
         constexpr std::int64_t most_ns = 50'000'000'000;  // frame without data
         constexpr std::int64_t shortest_line = 6;  // "t1230\r"
         if (state() == State::down) return 0;
@@ -109,8 +109,8 @@ public:
             (static_cast<std::int64_t>(text_size_) + held_by_kernel()) / shortest_line;
         if (lines == 0) return 0;
         const std::int64_t rate =
-            counting_.bit_rate != 0 ? static_cast<std::int64_t>(counting_.bit_rate) : slowest_rate;
-        return std::min(most_ns, 1'000'000'000 + lines * 4 * least_bits * 1'000'000'000 / rate);
+            counting_.bit_rate != 0 ? static_cast<std::int64_t>(counting_.bit_rate) : min_rate;
+        return std::min(most_ns, 1'000'000'000 + lines * 4 * min_bits * 1'000'000'000 / rate);
     }
 
     Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
@@ -130,7 +130,7 @@ public:
     void flush(std::int64_t) noexcept override {
         if (state() == State::down) return forget();
         for (;;) {
-            while (text_size_ + longest_line <= sizeof text_) {
+            while (text_size_ + max_line_length <= sizeof text_) {
                 const Frame* f = outgoing_.front();
                 if (f == nullptr) break;
                 Line line;
@@ -204,7 +204,7 @@ public:
     int descriptor() const noexcept override { return line_.get(); }
 
 private:
-    static constexpr std::int64_t slowest_rate = 10'000;
+    static constexpr std::int64_t min_rate = 10'000;
 
     /// Returns the number of bytes that the line has not sent yet.
     std::int64_t held_by_kernel() const noexcept {
@@ -218,12 +218,12 @@ private:
     /// Writes what is queued until then, as long as the adapter takes some. What remains is
     /// discarded: closing a line would wait for it.
     void drain(std::int64_t until_ns) noexcept {
-        constexpr std::int64_t most_idle_ns = 2'000'000'000;
+        constexpr std::int64_t max_idle_ns = 2'000'000'000;
         flush(0);
         std::int64_t left = unsent();
         for (std::int64_t moved_ns = link::monotonic_ns(); state() != State::down && left != 0;) {
             const std::int64_t now_ns = link::monotonic_ns();
-            if (now_ns >= until_ns || now_ns - moved_ns >= most_idle_ns) break;
+            if (now_ns >= until_ns || now_ns - moved_ns >= max_idle_ns) break;
             const bool full = outgoing_.size() != 0 || text_size_ != 0;
             pollfd p{line_.get(), static_cast<short>(full ? POLLOUT : 0), 0};
             ::poll(&p, 1, 10);

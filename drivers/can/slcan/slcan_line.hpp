@@ -12,8 +12,8 @@
 namespace hal::can::slcan {
 
 // letter, identifier, length, data, time stamp, end
-inline constexpr std::size_t longest_line = 1 + 8 + 1 + 128 + 8 + 1;
-using Line = std::array<char, longest_line>;
+inline constexpr std::size_t max_line_length = 1 + 8 + 1 + 128 + 8 + 1;
+using Line = std::array<char, max_line_length>;
 
 /// Encodes a valid frame with its end of line. Returns the number of characters. [realtime]
 std::size_t encode(const Frame&, Line&) noexcept;
@@ -33,7 +33,7 @@ public:
 
 private:
     Found line(std::string_view) noexcept;
-    std::array<char, longest_line> text_{};
+    std::array<char, max_line_length> text_{};
     std::size_t size_ = 0;
     bool too_long_ = false;
     Frame frame_;

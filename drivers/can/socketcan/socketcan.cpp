@@ -25,7 +25,7 @@ namespace hal::can::socketcan {
 namespace {
 
 constexpr std::size_t batch = 32;  // frames per system call
-constexpr std::size_t most_filters = CAN_RAW_FILTER_MAX;
+constexpr std::size_t max_filters = CAN_RAW_FILTER_MAX;
 // of a waiting receive; the kernel adds up to a tick of its timer, 1 to 10 ms
 constexpr timeval receive_timeout{0, 20'000};
 constexpr std::int64_t receive_timeout_ns = receive_timeout.tv_usec * 1000LL;
@@ -214,7 +214,7 @@ public:
         monitor_.nudge();
     }
     bool set_filters(std::span<const Filter> filters) override {
-        if (filters.size() > most_filters) return false;
+        if (filters.size() > max_filters) return false;
         std::vector<can_filter> kernel;
         for (const auto& f : filters) {
             const auto whole = f.extended ? CAN_EFF_MASK : CAN_SFF_MASK;
@@ -280,14 +280,14 @@ private:
     }
 
     /// Does one system call. Returns the number of frames, or -1 with errno set.
-    int take_batch(int flags, std::size_t most, std::int64_t now_ns) noexcept {
+    int take_batch(int flags, std::size_t max, std::int64_t now_ns) noexcept {
         for (; used_ > 0; --used_) {
             in_[used_ - 1].msg_hdr.msg_controllen = options_.stamps ? sizeof control_[0] : 0;
         }
         next_ = filled_ = 0;
-        const int got = ::recvmmsg(socket_.get(), in_, static_cast<unsigned>(most), flags, nullptr);
+        const int got = ::recvmmsg(socket_.get(), in_, static_cast<unsigned>(max), flags, nullptr);
         const int error = errno;
-        last_batch_short_ = got < static_cast<int>(most);
+        last_batch_short_ = got < static_cast<int>(max);
         if (got < 0 && (error == ENETDOWN || error == ENODEV || error == ENXIO)) {
             lose_interface();
         }

@@ -11,9 +11,9 @@ namespace hal::ethernet::simbus {
 
 namespace {
 
-constexpr std::size_t most_events = 8192;
+constexpr std::size_t max_events = 8192;
 constexpr std::size_t most_disturbances = 64;
-constexpr std::size_t most_stations = 256;
+constexpr std::size_t max_stations = 256;
 // memory of a small switch per line; frames beyond it are lost
 constexpr std::size_t egress_bytes = 65536;
 
@@ -48,9 +48,9 @@ Switch::Switch(std::string its_name, const Options& o)
     : name(std::move(its_name)),
       speed(o.speed != 0 ? o.speed : 100),
       forward_ns(o.forward_ns >= 0 ? o.forward_ns : 2000) {
-    events_.reserve(most_events);
+    events_.reserve(max_events);
     disturbances.reserve(most_disturbances);
-    stations.reserve(most_stations);
+    stations.reserve(max_stations);
 }
 
 std::shared_ptr<Switch> Switch::find(const std::string& name, const Options& options,
@@ -97,8 +97,8 @@ bool Switch::add(User& user, const std::string& wanted, const Options& options,
     const auto same = [&](const auto& s) { return !wanted.empty() && s->name == wanted; };
     auto found = std::find_if(stations.begin(), stations.end(), same);
     if (found == stations.end()) {
-        if (stations.size() == most_stations) {
-            problem = "too many stations: the segment already has " + std::to_string(most_stations);
+        if (stations.size() == max_stations) {
+            problem = "too many stations: the segment already has " + std::to_string(max_stations);
 
             return false;
         }
@@ -435,7 +435,7 @@ bool Switch::disturbed(Event& e, bool only_one) noexcept {
 }
 
 bool Switch::add_event(const Event& e) noexcept {
-    if (events_.size() == most_events) return false;
+    if (events_.size() == max_events) return false;
     events_.push_back(e);
     events_.back().sequence = sequence_++;
     ++e.from->places[e.place].references;

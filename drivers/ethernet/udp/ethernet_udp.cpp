@@ -19,8 +19,8 @@ namespace hal::ethernet {
 namespace {
 
 constexpr std::uint32_t ip_and_udp_bytes = 28;
-constexpr std::uint32_t most_payload = largest_frame - header_bytes;
-constexpr std::size_t most_peers = 8;
+constexpr std::uint32_t max_payload = largest_frame - header_bytes;
+constexpr std::size_t max_peers = 8;
 constexpr std::int64_t peer_timeout_ns = 2'000'000'000;
 constexpr std::int64_t announce_every_ns = 500'000'000;
 /// in which a host answers that nothing listens there
@@ -81,7 +81,7 @@ public:
         socklen_t size = sizeof mtu;
         if (getsockopt(socket_.get(), IPPROTO_IP, IP_MTU, &mtu, &size) == 0 &&
             mtu > static_cast<int>(ip_and_udp_bytes)) {
-            mtu_ = std::min(static_cast<std::uint32_t>(mtu) - ip_and_udp_bytes, most_payload);
+            mtu_ = std::min(static_cast<std::uint32_t>(mtu) - ip_and_udp_bytes, max_payload);
         }
         name_station();
         announce(link::monotonic_ns());
@@ -338,7 +338,7 @@ private:
     link::Descriptor socket_;
     Address address_{};
     Description description_;
-    std::uint32_t mtu_ = most_payload;
+    std::uint32_t mtu_ = max_payload;
     Count sent_{0};
     Count sent_bytes_{0};
     Count received_{0};
@@ -350,7 +350,7 @@ private:
     Count downs_{0};
     std::atomic<bool> up_{true};
     std::atomic<std::int64_t> last_sent_ns_{0};
-    std::array<Peer, most_peers> peers_;
+    std::array<Peer, max_peers> peers_;
     std::array<std::uint8_t, largest_frame> frame_{};  ///< used by the receiving thread
 };
 

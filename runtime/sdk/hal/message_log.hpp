@@ -148,7 +148,7 @@ private:
             others.hold(message);
         }
     };
-    static constexpr unsigned most_early = 3;
+    static constexpr unsigned max_early = 3;
 
     static bool is_digit(char c) { return c >= '0' && c <= '9'; }
     static bool is_hex_digit(char c) {
@@ -202,7 +202,7 @@ private:
     void print_held_early(std::int64_t now_ns) {
         for (Kind& k : kinds_) {
             for (Entry& e : k.entries) {
-                if (e.held != 0 && e.early < most_early) {
+                if (e.held != 0 && e.early < max_early) {
                     ++e.early;
                     write_held(e, now_ns);
                 }

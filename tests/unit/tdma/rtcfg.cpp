@@ -60,7 +60,7 @@ struct Cell : Bed {
 
     static StationSetup unknown() {
         StationSetup s;
-        s.slot_capacity = most_slots;
+        s.slot_capacity = max_slots;
         s.configured = false;
         return s;
     }

@@ -19,7 +19,7 @@ namespace hal::tools {
 namespace {
 
 constexpr std::int64_t redraw_ns = 250'000'000;
-constexpr std::size_t most_emergencies = 3;  // shown per node
+constexpr std::size_t max_emergencies = 3;  // shown per node
 
 struct Emergency {
     std::uint16_t code = 0;
@@ -57,7 +57,7 @@ void take(Nodes& nodes, const can::Frame& f) {
         ++n.emergencies;
         n.newest.push_front(
             {static_cast<std::uint16_t>(f.data[0] | f.data[1] << 8), f.data[2], f.time_ns});
-        if (n.newest.size() > most_emergencies) {
+        if (n.newest.size() > max_emergencies) {
             n.newest.pop_back();
         }
     }

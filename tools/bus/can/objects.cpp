@@ -38,13 +38,13 @@ std::string plain(std::string_view name) {
     return out;
 }
 
-bool hex_number(std::string_view text, unsigned most, unsigned& value) {
+bool hex_number(std::string_view text, unsigned max, unsigned& value) {
     if (text.starts_with("0x") || text.starts_with("0X")) {
         text.remove_prefix(2);
     }
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
     return !text.empty() && error == std::errc() && end == text.data() + text.size() &&
-           value <= most;
+           value <= max;
 }
 
 Type basic(std::uint16_t code) {
@@ -276,13 +276,13 @@ std::string value_text(std::span<const std::uint8_t> bytes, Type type) {
             "{} ({}{}{})", raw, natural(bytes), integer < 0 ? fmt::format(", or {}", integer) : "",
             looks_like_text(bytes) ? fmt::format(", or \"{}\"", text_in(bytes)) : "");
     }
-    constexpr std::size_t most = 32;
+    constexpr std::size_t max = 32;
     const std::string no_such =
         canopen::bits_of(type) != 0
             ? fmt::format("; {} has {}", type_word(type), canopen::bytes_of(type))
             : "";
-    return fmt::format("{}{} ({}{})", hex_bytes(bytes.first(std::min(bytes.size(), most)), " "),
-                       bytes.size() > most ? " …" : "", count(), no_such);
+    return fmt::format("{}{} ({}{})", hex_bytes(bytes.first(std::min(bytes.size(), max)), " "),
+                       bytes.size() > max ? " …" : "", count(), no_such);
 }
 
 std::string value_json(std::span<const std::uint8_t> bytes, Type type) {

@@ -43,7 +43,7 @@ int send_periodically(Bus& bus, const PeriodicOptions& options, std::int64_t eve
 }
 
 /// Parses `181` or `100-1FF`, hexadecimal.
-bool parse_range(const std::string& text, std::uint32_t most, std::uint32_t& first,
+bool parse_range(const std::string& text, std::uint32_t max, std::uint32_t& first,
                  std::uint32_t& last) {
     const char* const end = text.data() + text.size();
     const auto one = std::from_chars(text.data(), end, first, 16);
@@ -54,7 +54,7 @@ bool parse_range(const std::string& text, std::uint32_t most, std::uint32_t& fir
         const auto two = std::from_chars(one.ptr + 1, end, last, 16);
         if (two.ec != std::errc() || two.ptr != end) return false;
     }
-    return first <= last && last <= most;
+    return first <= last && last <= max;
 }
 
 }  // namespace
@@ -64,13 +64,13 @@ int run_can_generate(const GenerateOptions& options) {
         return fail(options, fmt::format("nothing is expected at '{}'; see: hal help can generate",
                                          options.words[1]));
     }
-    const std::uint32_t most = options.extended ? 0x1fffffff : 0x7ff;
+    const std::uint32_t max = options.extended ? 0x1fffffff : 0x7ff;
     std::uint32_t first = 0;
-    std::uint32_t last = most;
-    if (!options.id.empty() && !parse_range(options.id, most, first, last)) {
+    std::uint32_t last = max;
+    if (!options.id.empty() && !parse_range(options.id, max, first, last)) {
         return fail(options, fmt::format("invalid --id '{}'; write an identifier or a range in "
                                          "hex, at most {:X}: 181 or 100-1FF",
-                                         options.id, most));
+                                         options.id, max));
     }
     if (options.counting && options.length >= 0 && options.seed >= 0) {
         return fail(options,

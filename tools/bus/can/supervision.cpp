@@ -18,7 +18,7 @@ namespace {
 
 constexpr int heartbeats_per_timeout = 5;
 // long enough to receive other instances of this program
-constexpr std::int64_t longest_heartbeat_ns = 100'000'000;
+constexpr std::int64_t max_heartbeat_ns = 100'000'000;
 constexpr std::int64_t listening_ns = 250'000'000;
 constexpr std::uint8_t first_own = 112;
 constexpr std::uint8_t last_own = 126;  // 127 is the default of masters
@@ -54,7 +54,7 @@ void Supervision::send_heartbeat(std::int64_t now) {
     f.data[0] = static_cast<std::uint8_t>(canopen::NmtState::operational);
     if (station_.out.push(f)) {
         next_heartbeat_ =
-            now + std::min(settings_.limit_ns / heartbeats_per_timeout, longest_heartbeat_ns);
+            now + std::min(settings_.limit_ns / heartbeats_per_timeout, max_heartbeat_ns);
     }
 }
 

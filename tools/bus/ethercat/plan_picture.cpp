@@ -17,7 +17,7 @@ constexpr double width = 850;
 constexpr double top = 58;
 constexpr double row = 30;
 constexpr double bar = 18;
-constexpr std::size_t most_rows = 16;  // of slaves
+constexpr std::size_t max_rows = 16;  // of slaves
 constexpr const char *ink = "#223344", *thread_colour = "#ffcf99", *wire_colour = "#9ec5fe",
                      *slave_colour = "#a3d9a5", *sync_colour = "#b02a37";
 
@@ -40,7 +40,7 @@ public:
 
     std::string draw() {
         const auto& slaves = bus_.setup.slaves;
-        const std::size_t shown = std::min(slaves.size(), most_rows);
+        const std::size_t shown = std::min(slaves.size(), max_rows);
         const double bottom = y(2 + shown);
         for (int k = 0; k <= cycles_; ++k) {
             const double at = x(k * plan_.cycle_ns);

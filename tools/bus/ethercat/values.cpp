@@ -112,9 +112,9 @@ std::optional<Bytes> value_bytes(const std::string& text, const ValueType& type)
                               : std::bit_cast<std::uint64_t>(value);
     } else if (type.form == Form::sign) {
         const std::int64_t value = std::strtoll(text.c_str(), &end, 0);
-        const std::int64_t least = bits == 64 ? INT64_MIN : -(std::int64_t{1} << (bits - 1));
-        if (end == text.c_str() || *end != '\0' || errno != 0 || value < least ||
-            value > -(least + 1)) {
+        const std::int64_t min = bits == 64 ? INT64_MIN : -(std::int64_t{1} << (bits - 1));
+        if (end == text.c_str() || *end != '\0' || errno != 0 || value < min ||
+            value > -(min + 1)) {
             return std::nullopt;
         }
         raw = static_cast<std::uint64_t>(value);

@@ -89,7 +89,7 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link,
     if (by_rtcfg) {
         tdma::StationSetup unknown;
         unknown.configured = false;
-        unknown.slot_capacity = tdma::most_slots;
+        unknown.slot_capacity = tdma::max_slots;
         made.reset(new TdmaStation(unknown, {}, segment, std::move(opened.port), *skew, *drift));
         if (std::string problem = made->take_schedule(options, ended); !problem.empty()) {
             return problem;

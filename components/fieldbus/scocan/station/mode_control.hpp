@@ -57,7 +57,7 @@ private:
         bool agreed = false;
         std::uint32_t mode = 0;
         std::uint64_t at = 0;  // cycle of the switch
-        std::array<bool, most_nodes> ready{};
+        std::array<bool, max_nodes> ready{};
     };
     struct Armed {  // prepared in every node
         bool prepared = false;

@@ -46,7 +46,7 @@ private:
     const ModeControl& modes_;
     std::array<std::uint32_t, 2048> foreign_{};
     /// slots of this cycle with a frame, with an announcement
-    std::array<bool, most_slots> seen_{}, announced_{};
+    std::array<bool, max_slots> seen_{}, announced_{};
     std::uint32_t foreign_in_cycle_ = 0;
     std::uint32_t foreign_id_ = 0;
     std::uint32_t unannounced_cycles_ = 0;

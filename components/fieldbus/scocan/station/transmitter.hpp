@@ -81,7 +81,7 @@ private:
     SlotIndex next_{0, 0};  // to be planned
     SlotIndex announced_;  // of the current cycle
     Time last_call_ = INT64_MIN;  // of transmit(), on the clock of the link
-    std::array<std::uint8_t, most_slots> last_index_{};  // by slot: identifier sent last
+    std::array<std::uint8_t, max_slots> last_index_{};  // by slot: identifier sent last
     std::array<Value, identifiers> values_{};
     std::array<bool, identifiers> not_allowed_{};  // by identifier: reported
 };

@@ -35,9 +35,9 @@ inline constexpr std::uint32_t identifiers = 0x800;
 /// Returns whether the discipline itself uses the identifier: 0x000..0x00F, 0x780..0x7FF.
 /// [realtime]
 constexpr bool is_reserved(std::uint32_t id) noexcept { return id < 0x10 || id >= request_id; }
-inline constexpr std::size_t most_nodes = 126;
-inline constexpr std::size_t most_slots = 256;
-inline constexpr std::size_t most_modes = 16;
+inline constexpr std::size_t max_nodes = 126;
+inline constexpr std::size_t max_slots = 256;
+inline constexpr std::size_t max_modes = 16;
 
 inline constexpr std::size_t counter_cycles = 64;
 /// An error flag with its delimiter: bits that the bus is busy after a disturbed frame.
@@ -155,7 +155,7 @@ struct Table {
     /// [realtime]
     const Use* owner(std::uint32_t mode, std::uint32_t id) const noexcept;
     bool has_mode(std::uint32_t mode) const noexcept {
-        return mode < most_modes && index_[mode] >= 0;
+        return mode < max_modes && index_[mode] >= 0;
     }
     const Mode* mode(std::uint32_t number) const noexcept {
         return has_mode(number) ? &modes[static_cast<std::size_t>(index_[number])] : nullptr;
@@ -166,7 +166,7 @@ struct Table {
     void index();  ///< [setup] after a change of `modes`
 
 private:
-    std::array<int, most_modes> index_{};
+    std::array<int, max_modes> index_{};
     /// by mode and identifier: the first private slot that carries it; no_owner: none
     std::vector<std::uint16_t> owner_slots_;
 };

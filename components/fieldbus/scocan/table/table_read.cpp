@@ -127,7 +127,7 @@ private:
                       "; choose another name");
             return false;
         }
-        if (table().nodes.size() < most_nodes) return true;
+        if (table().nodes.size() < max_nodes) return true;
         error(Topic::line, w[0].at, "more than 126 nodes", "split the bus");
         return false;
     }
@@ -166,7 +166,7 @@ private:
         Mode m{.name = w[2].text, .at = w[1].at};
         mode_ = nullptr;
         bad_mode_ = true;
-        if (!number(w[1], m.number, 0, most_modes - 1) || !name(w[2])) return true;
+        if (!number(w[1], m.number, 0, max_modes - 1) || !name(w[2])) return true;
         for (const Mode& other : table().modes) {
             if (other.number == m.number || other.name == m.name) {
                 error(Topic::value, w[other.number == m.number ? 1 : 2].at, "duplicate mode",
@@ -488,7 +488,7 @@ const bus::KeyTable<Reader>& Reader::keys() {
         {"bitrate", bus::bit_rate(of_table(&Table::bit_rate), 10e3, 1e6), "`1M`", "The bit rate."},
         {"cycle", bus::time(of_table(&Table::cycle), 100 * us, 10 * second), "`10ms`",
          "The cycle of the bus."},
-        {"slots", bus::number(of_table(&Table::slots), 2, most_slots), "`20`",
+        {"slots", bus::number(of_table(&Table::slots), 2, max_slots), "`20`",
          "The number of slots of a cycle. All slots have the same length."},
         {"guard", bus::time(of_table(&Table::guard), 1, second), "the minimum, in whole us",
          "The gap between two slots, for the clock errors of two nodes. It is at least 3 bits + "

@@ -52,7 +52,7 @@ bool decode(const can::Frame& f, Request& r) noexcept {
     if (!is_plain(f, request_id) || f.length != 5 || f.data[0] > 4 || f.data[4] >= counter_cycles) {
         return false;
     }
-    if (f.data[1] >= (f.data[0] >= 3 ? most_nodes : most_modes)) return false;
+    if (f.data[1] >= (f.data[0] >= 3 ? max_nodes : max_modes)) return false;
     r = {static_cast<Request::What>(f.data[0]), f.data[1],
          static_cast<std::uint16_t>(f.data[2] | f.data[3] << 8), f.data[4]};
     return true;
@@ -66,7 +66,7 @@ can::Frame encode(const Answer& a) noexcept {
 
 bool decode(const can::Frame& f, Answer& a) noexcept {
     if (f.id < answer_id || f.id > 0x7ff || !is_plain(f, f.id) || f.length != 4 || f.data[0] > 1 ||
-        f.data[1] >= most_modes) {
+        f.data[1] >= max_modes) {
         return false;
     }
     a = {f.id - answer_id, f.data[1], static_cast<Answer::Reason>(f.data[0]),

@@ -44,16 +44,16 @@ StationSetup setup_of(const Schedule& s, std::size_t index) {
     out.rounds = s.rounds;
     out.speed = s.speed;
     // Twice what the slots of anybody hold of the shortest frames, with syncs and replies.
-    Time most = 0;
+    Time max = 0;
     for (const StationEntry& other : s.stations) {
         Time share = static_cast<Time>(s.stations.size()) + 2;
         for (const SlotEntry& slot : other.slots) {
             share +=
                 s.wire(ethernet::header_bytes + slot.setup.size) / s.wire(ethernet::smallest_frame);
         }
-        most = std::max(most, share);
+        max = std::max(max, share);
     }
-    out.babble_limit = static_cast<std::uint32_t>(std::max<Time>(64, 2 * most));
+    out.babble_limit = static_cast<std::uint32_t>(std::max<Time>(64, 2 * max));
     out.backup_from = s.cycle;
     for (const StationEntry& other : s.stations) {
         if (other.role == Role::backup) {

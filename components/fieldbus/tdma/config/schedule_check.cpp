@@ -8,7 +8,7 @@ namespace hal::tdma::config {
 
 namespace {
 
-constexpr std::size_t smallest_ip_mtu = 68;  // RFC 791
+constexpr std::size_t min_ip_mtu = 68;  // RFC 791
 
 class ScheduleCheck {
 public:
@@ -120,12 +120,12 @@ private:
                    "phase + lead must be less than the cycle");
         }
         for (const SlotEntry& slot : e.slots) {
-            if (slot.setup.id == tunnel_slot && slot.setup.size < smallest_ip_mtu + rtmac_bytes) {
+            if (slot.setup.id == tunnel_slot && slot.setup.size < min_ip_mtu + rtmac_bytes) {
                 report(Severity::error, slot.at,
                        "slot 1 carries IP packets, but its " + std::to_string(slot.setup.size) +
-                           " bytes are too few: IP needs " + std::to_string(smallest_ip_mtu) +
+                           " bytes are too few: IP needs " + std::to_string(min_ip_mtu) +
                            " and the RTmac header " + std::to_string(rtmac_bytes),
-                       "use a size of at least " + std::to_string(smallest_ip_mtu + rtmac_bytes) +
+                       "use a size of at least " + std::to_string(min_ip_mtu + rtmac_bytes) +
                            ", or another slot number");
             }
         }

@@ -237,9 +237,9 @@ private:
                   "first in line " + std::to_string(other->at.line) + "; use another number");
             return false;
         }
-        if (slots.size() < most_slots) return true;
+        if (slots.size() < max_slots) return true;
         error(Topic::line, w[0].at,
-              "more than " + std::to_string(most_slots) + " slots in one station", "delete some");
+              "more than " + std::to_string(max_slots) + " slots in one station", "delete some");
         return false;
     }
 

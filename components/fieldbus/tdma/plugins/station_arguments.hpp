@@ -136,7 +136,7 @@ struct StationArguments {
         }
         setup.configured = false;
         setup.asks_master = true;
-        setup.slot_capacity = most_slots;
+        setup.slot_capacity = max_slots;
         return true;
     }
 

@@ -10,10 +10,10 @@ namespace hal::tdma::rtcfg {
 
 namespace {
 
-constexpr std::size_t most_accepted = 1000;  // against a server that never stops changing
+constexpr std::size_t max_accepted = 1000;  // against a server that never stops changing
 // reported ones, against a hostile station
-constexpr std::uint32_t most_rejections = 3;
-constexpr std::uint32_t most_dead = 100;
+constexpr std::uint32_t max_rejections = 3;
+constexpr std::uint32_t max_dead = 100;
 
 /// Returns the first error without control characters: the text is untrusted.
 std::string first_error(const config::Reading& reading) {
@@ -31,7 +31,7 @@ Applicant::Applicant(std::string instance, Station& station, Logical own, std::s
       station_(station),
       events_(events),
       client_(station, own, *this, !path_.empty()),
-      spare_(largest_stage_2),
+      spare_(max_stage_2_size),
       log_(std::move(instance)) {}
 
 void Applicant::begin() noexcept {
@@ -81,7 +81,7 @@ void Applicant::on_stage_2(std::vector<std::uint8_t>& file, std::uint32_t length
 }
 
 void Applicant::on_dead_station(const Address& who) noexcept {
-    if (dead_reported_ < most_dead) {
+    if (dead_reported_ < max_dead) {
         ++dead_reported_;
         events_.on_event(Event::reported_dead, who, 0);
     }
@@ -133,9 +133,9 @@ void Applicant::check(const Offer& offer) {
     config::Reading reading = config::read(text);
     const bool one = reading.good() && reading.schedule.stations.size() == 1 &&
                      !reading.schedule.stations[0].slots.empty();
-    if (!one || all_.size() >= most_accepted) {
+    if (!one || all_.size() >= max_accepted) {
         rejected_ = text;
-        if (++rejections_ <= most_rejections) {
+        if (++rejections_ <= max_rejections) {
             std::string why = "it changed too often";
             if (!reading.good()) {
                 why = first_error(reading);
@@ -143,7 +143,7 @@ void Applicant::check(const Offer& offer) {
                 why = "it is not the block of one station with a slot";
             }
             const char* const last =
-                rejections_ == most_rejections ? " (further rejections are not reported)" : "";
+                rejections_ == max_rejections ? " (further rejections are not reported)" : "";
             log("rejected the configuration from " + server + ": " + why + "; waiting for another" +
                 last);
         }

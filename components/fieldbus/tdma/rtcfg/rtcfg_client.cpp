@@ -10,7 +10,7 @@ Client::Client(Station& station, Logical own, ClientEvents& events, bool wants_f
       own_(own),
       events_(events),
       wants_file_(wants_file),
-      file_(largest_stage_2) {}
+      file_(max_stage_2_size) {}
 
 void Client::begin() noexcept {
     step_ = Step::waiting;

@@ -11,7 +11,7 @@
 
 namespace hal::tdma::rtcfg {
 
-inline constexpr std::size_t largest_stage_2 = 65536;  ///< bytes
+inline constexpr std::size_t max_stage_2_size = 65536;  ///< bytes
 
 /// Events of the client. [realtime]
 class ClientEvents {

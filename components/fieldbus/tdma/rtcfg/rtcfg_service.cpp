@@ -61,10 +61,10 @@ std::vector<Server::ClientSetup> Service::clients_of(const config::Schedule& sch
                 if (must) throw std::invalid_argument(which + " cannot be read: " + client.stage_2);
                 client.stage_2.clear();
             }
-            if (client.stage_2.size() > largest_stage_2) {
+            if (client.stage_2.size() > max_stage_2_size) {
                 throw std::invalid_argument(
                     which + " has " + std::to_string(client.stage_2.size()) + " bytes (limit " +
-                    std::to_string(largest_stage_2) + ")");
+                    std::to_string(max_stage_2_size) + ")");
             }
         }
         clients.push_back(std::move(client));

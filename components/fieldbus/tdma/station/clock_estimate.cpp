@@ -10,27 +10,27 @@ namespace {
 
 constexpr double alpha_end = 0.05;
 constexpr double outlier_sigmas = 5.0;
-constexpr double smallest_outlier_ns = 2'000.0;
+constexpr double min_outlier_ns = 2'000.0;
 // Consecutive outliers after which the clock has jumped. Syncs may be delayed, on a busy computer
 // for many cycles, but never arrive early.
-constexpr std::uint32_t most_early = 8;
-constexpr std::uint32_t most_late = 100;
-constexpr double largest_drift = 1e-3;  // 1000 ppm: no crystal
+constexpr std::uint32_t max_early = 8;
+constexpr std::uint32_t max_late = 100;
+constexpr double max_drift = 1e-3;  // 1000 ppm: no crystal
 constexpr double long_ns = 1e9;         // time constant of the long average
 // uncertainty (sigma) of a drift that a master may use
 constexpr double certain = 2e-6;
-constexpr double smallest_noise_ns = 100.0;
+constexpr double min_noise_ns = 100.0;
 constexpr std::uint32_t least_taken = 32;      // syncs for a certain drift
 constexpr double decay_per_ns = 20e-6 / 1e9;
 
-/// Gains of a least-squares line through n points, and not less than `alpha_least`, critically
+/// Gains of a least-squares line through n points, and not less than `alpha_min`, critically
 /// damped.
 struct Gains {
     double alpha, beta;
-    Gains(double n, double alpha_least) noexcept
-        : alpha(std::min(1.0, std::max(alpha_least, 2.0 * (2.0 * n - 1.0) / (n * (n + 1.0))))),
-          beta(std::min(1.0, std::max(alpha_least * alpha_least / (2.0 - alpha_least),
-                                      6.0 / (n * (n + 1.0))))) {}
+    Gains(double n, double alpha_min) noexcept
+        : alpha(std::min(1.0, std::max(alpha_min, 2.0 * (2.0 * n - 1.0) / (n * (n + 1.0))))),
+          beta(std::min(
+              1.0, std::max(alpha_min * alpha_min / (2.0 - alpha_min), 6.0 / (n * (n + 1.0))))) {}
 };
 
 }  // namespace
@@ -81,11 +81,11 @@ bool ClockEstimate::is_certain() const noexcept {
 }
 
 double ClockEstimate::uncertainty() const noexcept {
-    if (long_accepted_ < 3 || interval_ <= 0.0) return largest_drift;
+    if (long_accepted_ < 3 || interval_ <= 0.0) return max_drift;
     // Of the slope of a line through n points; with the final gains n is what they remember.
     const double n = std::min<double>(
         long_accepted_, std::max(static_cast<double>(least_taken), 2.0 * long_ns / interval_));
-    return std::sqrt(12.0) * std::max(jitter(), smallest_noise_ns) / (interval_ * n * std::sqrt(n));
+    return std::sqrt(12.0) * std::max(jitter(), min_noise_ns) / (interval_ * n * std::sqrt(n));
 }
 
 double ClockEstimate::drift() const noexcept {
@@ -108,7 +108,7 @@ void ClockEstimate::accept_long(double measured, double dt) noexcept {
     const double e = measured - predicted;
     const Gains gains(long_accepted_, std::min(alpha_end, 2.0 * dt / long_ns));
     long_offset_ = predicted + gains.alpha * e;
-    long_drift_ = std::clamp(long_drift_ + gains.beta * e / dt, -largest_drift, largest_drift);
+    long_drift_ = std::clamp(long_drift_ + gains.beta * e / dt, -max_drift, max_drift);
     if (is_certain()) {
         held_ = long_drift_;
         holds_ = true;
@@ -133,16 +133,16 @@ bool ClockEstimate::accept(Time sent, Time arrived, Time delay) noexcept {
     const double predicted = offset_ + drift_ * dt;
     const double e = static_cast<double>(measured - base_) - predicted;
     if (accepted_ >= 8) {
-        const double limit = std::max(outlier_sigmas * std::sqrt(square_), smallest_outlier_ns);
+        const double limit = std::max(outlier_sigmas * std::sqrt(square_), min_outlier_ns);
         if (std::abs(e) > limit) {
             const bool early = e > 0.0;
             outliers_ = early == early_ ? outliers_ + 1 : 1;
             early_ = early;
-            if (outliers_ <= (early ? most_early : most_late)) return false;
+            if (outliers_ <= (early ? max_early : max_late)) return false;
             clear();
             return accept(sent, arrived, delay);
         }
-    } else if (std::abs(e) > largest_drift * dt + 1e6) {  // begins with the times of another clock
+    } else if (std::abs(e) > max_drift * dt + 1e6) {  // begins with the times of another clock
         clear();
         return accept(sent, arrived, delay);
     }
@@ -151,7 +151,7 @@ bool ClockEstimate::accept(Time sent, Time arrived, Time delay) noexcept {
     const double n = accepted_;
     const Gains gains(n, alpha_end);
     offset_ = predicted + gains.alpha * e;
-    drift_ = std::clamp(drift_ + gains.beta * e / dt, -largest_drift, largest_drift);
+    drift_ = std::clamp(drift_ + gains.beta * e / dt, -max_drift, max_drift);
     at_ = arrived;
     interval_ = interval_ == 0.0 ? dt : interval_ + (dt - interval_) * std::max(0.01, 1.0 / n);
     if (accepted_ > 4) {

@@ -33,9 +33,9 @@ constexpr std::uint32_t max_unanswered = 20;
 
 void check(const StationSetup& s) {
     if (s.cycle < 1000) throw std::invalid_argument("cycle below 1 us");
-    if (s.slots.size() > most_slots) {
+    if (s.slots.size() > max_slots) {
         throw std::invalid_argument(std::to_string(s.slots.size()) +
-                                    " slots; a station has at most " + std::to_string(most_slots));
+                                    " slots; a station has at most " + std::to_string(max_slots));
     }
     if (s.phase < 0 || s.phase >= s.cycle) throw std::invalid_argument("phase outside the cycle");
     if (s.backup_offset < 0 || s.backup_offset >= s.cycle) {
@@ -65,7 +65,7 @@ Station::Station(const StationSetup& setup, Events* events) {
     check(setup);
     core_.events = events;
     core_.setup = setup;
-    core_.setup.slots.reserve(most_slots);
+    core_.setup.slots.reserve(max_slots);
     slot_monitor_.set_up();
     pings_ = Pings(setup.others.size() + (setup.asks_master ? 1 : 0));
     transmitter_.set_up();

@@ -12,7 +12,7 @@ namespace hal::tdma {
 /// What a station does for the segment (RTnet, Documentation/TDMA).
 enum class Role : std::uint8_t { master, backup, slave };
 
-inline constexpr std::size_t most_slots = 16;    ///< of one station
+inline constexpr std::size_t max_slots = 16;    ///< of one station
 inline constexpr unsigned default_slot = 0;   ///< of real-time frames that name none
 /// of ordinary packets; without it they use slot 0
 inline constexpr unsigned tunnel_slot = 1;

@@ -11,7 +11,7 @@ void Transmitter::set_up() {
     for (const SlotSetup& s : setup.slots) {
         slots_.emplace_back(s, setup.queue);
     }
-    while (slots_.size() < std::min(setup.slot_capacity, most_slots)) {
+    while (slots_.size() < std::min(setup.slot_capacity, max_slots)) {
         slots_.emplace_back(SlotSetup{.id = unused_slot, .size = 0}, setup.queue);
     }
 }

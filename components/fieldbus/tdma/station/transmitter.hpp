@@ -57,7 +57,7 @@ private:
         std::size_t index;  // slots_.size(): the sync
         std::uint32_t cycle;
     };
-    static constexpr std::size_t max_turns = 4 * (most_slots + 1);
+    static constexpr std::size_t max_turns = 4 * (max_slots + 1);
 
     std::span<Turn> due_turns(std::array<Turn, max_turns>&, Time from, Time until) const noexcept;
     bool launch(std::span<const std::uint8_t> frame, const ethernet::Launch&) noexcept;

@@ -9,12 +9,12 @@ namespace hal::tdma {
 
 namespace {
 
-constexpr std::uint16_t smallest_type = 0x0600;
+constexpr std::uint16_t min_type = 0x0600;
 constexpr std::uint16_t ipv4 = 0x0800;
 constexpr std::uint16_t arp = 0x0806;
 constexpr std::uint16_t ipv6 = 0x86dd;
 
-constexpr std::size_t largest_payload =
+constexpr std::size_t max_payload_size =
     ethernet::largest_frame - ethernet::header_bytes - rtmac_bytes;
 
 bool is_group(const Address& a) noexcept { return (a[0] & 1) != 0; }
@@ -44,9 +44,9 @@ bool is_packet(const Decoded& d, const Address& own) noexcept {
         is_group(d.from)) {
         return false;
     }
-    if (d.tunnelled.payload.size() > largest_payload) return false;
+    if (d.tunnelled.payload.size() > max_payload_size) return false;
     const std::uint16_t type = d.tunnelled.type;
-    return type >= smallest_type && type != rtmac_type && type != rtcfg_type && type != cane_type &&
+    return type >= min_type && type != rtmac_type && type != rtcfg_type && type != cane_type &&
            is_whole(type, d.tunnelled.payload);
 }
 
