@@ -212,7 +212,7 @@ public:
     T get() noexcept {
         align(sizeof(T));
         T value{};
-        if (!room(sizeof(T))) return value;
+        if (!has(sizeof(T))) return value;
         std::uint8_t raw[sizeof(T)];
         std::memcpy(raw, bytes_.data() + at_, sizeof(T));
         if (swapped_) {
@@ -225,7 +225,7 @@ public:
     /// Returns the string without its terminating 0; empty if the 0 is missing.
     std::string_view text() noexcept {
         const auto size = get<std::uint32_t>();
-        if (!room(size)) {
+        if (!has(size)) {
             return {};
         }
         const std::string_view all(reinterpret_cast<const char*>(bytes_.data()) + at_, size);
@@ -233,11 +233,11 @@ public:
         return size == 0 ? all : all.substr(0, size - 1);
     }
     void skip(std::size_t size) noexcept {
-        if (room(size)) {
+        if (has(size)) {
             at_ += size;
         }
     }
-    bool room(std::size_t size) noexcept { return good_ = good_ && size <= bytes_.size() - at_; }
+    bool has(std::size_t size) noexcept { return good_ = good_ && size <= bytes_.size() - at_; }
     bool good() const noexcept { return good_; }
     /// Nothing but padding follows.
     bool at_end() const noexcept { return good_ && bytes_.size() - at_ < 4; }
@@ -261,10 +261,10 @@ private:
 void walk_joints(const Schema& schema, Walk& walk, hal_value* to) noexcept {
     const auto ours = schema.names.size();
     const auto count = walk.get<std::uint32_t>();
-    if (!walk.room(std::size_t{count} * 4)) return;
+    if (!walk.has(std::size_t{count} * 4)) return;
     std::array<std::uint16_t, 1024> which;
     if (count > which.size()) {
-        walk.room(SIZE_MAX);
+        walk.has(SIZE_MAX);
         return;
     }
     for (std::uint32_t i = 0; i < count && walk.good(); ++i) {
@@ -275,7 +275,7 @@ void walk_joints(const Schema& schema, Walk& walk, hal_value* to) noexcept {
     for (std::size_t part = 0; part < 3; ++part) {
         const auto values = walk.get<std::uint32_t>();
         if (values != 0 && values != count) {
-            walk.room(SIZE_MAX);
+            walk.has(SIZE_MAX);
             return;
         }
         for (std::uint32_t i = 0; i < values && walk.good(); ++i) {

@@ -28,14 +28,14 @@ struct Item {
 
 /// The characters of one item, in fixed memory.
 struct Text {
-    static constexpr unsigned room = 24;
+    static constexpr unsigned capacity = 24;
     void clear() noexcept { length = 0; }
     void add(char c) noexcept {
-        if (length < room) {
+        if (length < capacity) {
             characters[length++] = c;
         }
     }
-    std::array<char, room> characters{};
+    std::array<char, capacity> characters{};
     unsigned length = 0;
 };
 
@@ -43,7 +43,7 @@ struct Text {
 /// width of the item; asterisks if it does not fit.
 void number(Text& text, const Item& item, std::uint64_t magnitude, bool negative, unsigned base,
             unsigned decimals, char separator) noexcept {
-    std::array<char, Text::room> digits{};  // the last one first
+    std::array<char, Text::capacity> digits{};  // the last one first
     unsigned count = 0;
     while (count < digits.size() &&
            (magnitude != 0 || count < decimals + (decimals > 0 ? 2u : 1u))) {
@@ -58,8 +58,8 @@ void number(Text& text, const Item& item, std::uint64_t magnitude, bool negative
     const char sign = negative ? '-' : plus;
     const unsigned needed = count + (sign ? 1u : 0u);
     const unsigned width = item.width != 0 ? item.width : needed;
-    if (magnitude != 0 || needed > width || needed > Text::room) {
-        for (unsigned i = 0; i < std::max(width < Text::room ? width : 1u, 1u); ++i) {
+    if (magnitude != 0 || needed > width || needed > Text::capacity) {
+        for (unsigned i = 0; i < std::max(width < Text::capacity ? width : 1u, 1u); ++i) {
             text.add('*');
         }
         return;

@@ -32,7 +32,7 @@ public:
     virtual Sent send(std::span<const std::uint8_t> frame, unsigned slot, unsigned priority,
                       Finisher* finisher = nullptr) noexcept = 0;
     /// Returns the payload bytes that a frame in this slot may have; 0: no such slot. [any]
-    virtual std::size_t room(unsigned slot) const noexcept = 0;
+    virtual std::size_t capacity(unsigned slot) const noexcept = 0;
     /// Returns true when the station may send: synchronised and calibrated. [any]
     virtual bool ready() const noexcept = 0;
     /// Returns the address of the station. [any]

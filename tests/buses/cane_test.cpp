@@ -222,7 +222,7 @@ struct Slots final : ethernet::Discipline {
         }
         return ethernet::Sent::queued;
     }
-    std::size_t room(unsigned slot) const noexcept override { return slot == 2 ? 60 : 0; }
+    std::size_t capacity(unsigned slot) const noexcept override { return slot == 2 ? 60 : 0; }
     bool ready() const noexcept override { return is_ready; }
     const Address& address() const noexcept override { return b; }
 };

@@ -47,7 +47,7 @@ TEST(Ethernet, discipline_is_found_through_any_port_of_its_line) {
         Sent send(std::span<const std::uint8_t>, unsigned, unsigned, Finisher*) noexcept override {
             return Sent::queued;
         }
-        std::size_t room(unsigned) const noexcept override { return 46; }
+        std::size_t capacity(unsigned) const noexcept override { return 46; }
         bool ready() const noexcept override { return true; }
         const Address& address() const noexcept override { return broadcast; }
     } one, two;

@@ -160,7 +160,7 @@ void rtcfg_frames(Capture& out) {
     m.heartbeat_ms = 250;
 
     m.length = 700;
-    m.data = std::span(file).first(rtcfg::stage_2_room(400));
+    m.data = std::span(file).first(rtcfg::stage_2_capacity(400));
     rtcfg_frame(out, m,
                 "rtcfg.server_flags.ready=1 rtcfg.active_stations=5 rtcfg.hearbeat_period=250 "
                 "rtcfg.s2_config_length=700 "

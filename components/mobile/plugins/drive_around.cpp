@@ -75,9 +75,9 @@ struct DriveAround : hal::Component {
         if (!go.under_way(1.0)) return rest();
         const double chosen = choose(go.wanted(), go.left());
         // Space in front: no faster than the robot can stop within it.
-        const double room = std::clamp((free_ahead() - body) * 2.0, 0.0, 1.0);
-        const double slowed =
-            go.speed(direction) * (avoiding ? std::fmax(room, 0.15) : std::fmax(room, 0.3));
+        const double free_space = std::clamp((free_ahead() - body) * 2.0, 0.0, 1.0);
+        const double slowed = go.speed(direction) *
+                              (avoiding ? std::fmax(free_space, 0.15) : std::fmax(free_space, 0.3));
         go.linear = blocked ? 0.0 : go.finite(std::fmax(slowed, 0.0));
         go.angular =
             go.finite(std::clamp(heading_gain * chosen, -std::fabs(max_turn), std::fabs(max_turn)));

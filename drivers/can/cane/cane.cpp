@@ -122,11 +122,11 @@ public:
         held_ = process_data_.size();
     }
 
-    std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
+    std::size_t receive(std::span<Frame> frames, std::int64_t now_ns) noexcept override {
         std::size_t count = 0;
-        while (count < room.size()) {
+        while (count < frames.size()) {
             if (next_ == filled_ && !refill(now_ns)) break;
-            room[count++] = buffer_[next_++];
+            frames[count++] = buffer_[next_++];
         }
         return count;
     }
@@ -185,13 +185,13 @@ private:
     }
 
     /// Returns the payload bytes a frame may have now; 0: nothing can leave.
-    std::size_t room() const noexcept {
+    std::size_t capacity() const noexcept {
         if (!discipline_) return max_payload;
-        std::size_t room = 0;
+        std::size_t capacity = 0;
         discipline_->with([&](const ethernet::Discipline& d) {
-            room = std::min(d.room(*settings_.slot), max_payload);
+            capacity = std::min(d.capacity(*settings_.slot), max_payload);
         });
-        return room;
+        return capacity;
     }
     bool is_up() const noexcept {
         bool ready = !discipline_;
@@ -255,8 +255,9 @@ private:
                 const auto to =
                     f->extended ? std::nullopt : nodes_.where(f->id, settings_.produced_to_master);
                 address_to(to.value_or(ethernet::broadcast));
-                const auto bytes = put_single(
-                    *f, settings_.order, std::span(frame_).subspan(ethernet::header_bytes, room()));
+                const auto bytes =
+                    put_single(*f, settings_.order,
+                               std::span(frame_).subspan(ethernet::header_bytes, capacity()));
                 const auto sent = bytes == 0 ? ethernet::Sent::rejected
                                              : launch(ethernet::header_bytes + bytes,
                                                       queue == &service_data_, now_ns);
@@ -270,7 +271,7 @@ private:
     /// them do.
     void flush_packed(std::int64_t now_ns) noexcept {
         while (process_data_.front() != nullptr || service_data_.front() != nullptr) {
-            const auto payload = room();
+            const auto payload = capacity();
             const std::size_t header = packed_header + (settings_.key ? counter_bytes : 0);
 
             const std::size_t tail = settings_.key ? tag_bytes : 0;
@@ -493,9 +494,10 @@ Opened open(const std::string& place, const Options& options) {
             return {nullptr, "no TDMA runs on " + settings.segment +
                                  "; loadrt tdma for it first, or remove slot="};
         }
-        std::size_t room = 0;
-        discipline->with([&](const ethernet::Discipline& d) { room = d.room(*settings.slot); });
-        if (room <
+        std::size_t capacity = 0;
+        discipline->with(
+            [&](const ethernet::Discipline& d) { capacity = d.capacity(*settings.slot); });
+        if (capacity <
             packed_header + max_message_size + (settings.key ? counter_bytes + tag_bytes : 0)) {
             return {nullptr, "TDMA on " + settings.segment + " has no slot " +
                                  std::to_string(*settings.slot) + " of at least " +

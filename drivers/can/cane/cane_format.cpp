@@ -101,16 +101,16 @@ std::uint16_t crc16(std::span<const std::uint8_t> bytes, std::uint16_t crc) noex
     return crc;
 }
 
-std::size_t put_single(const Frame& f, Order order, std::span<std::uint8_t> room) noexcept {
+std::size_t put_single(const Frame& f, Order order, std::span<std::uint8_t> out) noexcept {
     const auto data = f.bytes();
-    if (!f.valid() || f.fd || room.size() < single_bytes + data.size()) return 0;
+    if (!f.valid() || f.fd || out.size() < single_bytes + data.size()) return 0;
     const auto word = word_of(f);
     for (unsigned n = 0; n < 4; ++n) {
-        room[n] = static_cast<std::uint8_t>(word >> 8 * (order == Order::big ? 3 - n : n));
+        out[n] = static_cast<std::uint8_t>(word >> 8 * (order == Order::big ? 3 - n : n));
     }
-    room[4] = f.length;
+    out[4] = f.length;
     if (!data.empty()) {
-        std::memcpy(room.data() + single_bytes, data.data(), data.size());
+        std::memcpy(out.data() + single_bytes, data.data(), data.size());
     }
     return single_bytes + data.size();
 }
@@ -131,21 +131,21 @@ Wrong get_single(std::span<const std::uint8_t> payload, Order order, Frame& f) n
     return Wrong::none;
 }
 
-std::size_t put_packed(const Frame& f, std::span<std::uint8_t> room) noexcept {
+std::size_t put_packed(const Frame& f, std::span<std::uint8_t> out) noexcept {
     const auto data = f.bytes();
     const std::size_t before = f.extended ? 7 : 2;
-    if (!f.valid() || f.fd || room.size() < before + data.size()) return 0;
+    if (!f.valid() || f.fd || out.size() < before + data.size()) return 0;
     if (f.extended) {
         const auto word = word_of(f);
-        put16(room.data(), long_form << 12);
-        put16(room.data() + 2, word & 0xffff);
-        put16(room.data() + 4, word >> 16);
-        room[6] = f.length;
+        put16(out.data(), long_form << 12);
+        put16(out.data() + 2, word & 0xffff);
+        put16(out.data() + 4, word >> 16);
+        out[6] = f.length;
     } else {
-        put16(room.data(), f.id | (f.remote ? remote_flag : 0) | unsigned{f.length} << 12);
+        put16(out.data(), f.id | (f.remote ? remote_flag : 0) | unsigned{f.length} << 12);
     }
     if (!data.empty()) {
-        std::memcpy(room.data() + before, data.data(), data.size());
+        std::memcpy(out.data() + before, data.data(), data.size());
     }
     return before + data.size();
 }

@@ -40,13 +40,13 @@ enum class Wrong : std::uint8_t {
 
 /// Writes one message as the whole payload. Returns the bytes written, which the driver of the
 /// segment pads with zeros; 0 when the frame is not a classic one. [realtime]
-std::size_t put_single(const Frame&, Order, std::span<std::uint8_t> room) noexcept;
+std::size_t put_single(const Frame&, Order, std::span<std::uint8_t> out) noexcept;
 /// Reads a single message. [realtime]
 Wrong get_single(std::span<const std::uint8_t> payload, Order, Frame&) noexcept;
 
 /// Appends one message to a packed payload. Returns the bytes written; 0 when the frame is not a
 /// classic one or does not fit. [realtime]
-std::size_t put_packed(const Frame&, std::span<std::uint8_t> room) noexcept;
+std::size_t put_packed(const Frame&, std::span<std::uint8_t> out) noexcept;
 
 /// Sender and sequence of a packed frame.
 struct Stamp {

@@ -36,21 +36,21 @@ public:
         return Sent::queued;
     }
     void flush(std::int64_t) noexcept override {}
-    std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
+    std::size_t receive(std::span<Frame> batch, std::int64_t now_ns) noexcept override {
         const auto now = now_ns != unclocked ? now_ns : link::monotonic_ns();
         if (next_ == 0 && !begun_) {
             begun_ = true;
             shift_ = now - (frames_.empty() ? 0 : frames_.front().time_ns);
         }
         std::size_t count = 0;
-        for (; count < room.size() && next_ < frames_.size() &&
+        for (; count < batch.size() && next_ < frames_.size() &&
                frames_[next_].time_ns + shift_ <= now;
              ++next_) {
             Frame f = frames_[next_];
             if (f.error ? !options_.error_frames : !filters_.pass(f)) continue;
             f.time_ns += shift_;
             counting_.count_received(f);
-            room[count++] = f;
+            batch[count++] = f;
         }
         counting_.tick(now);
         if (next_ == frames_.size()) {

@@ -96,13 +96,13 @@ public:
         return Sent::queued;
     }
     void flush(std::int64_t) noexcept override {}
-    std::size_t receive(std::span<Frame> room, std::int64_t) noexcept override {
+    std::size_t receive(std::span<Frame> frames, std::int64_t) noexcept override {
         std::size_t count = 0;
-        for (Frame frame; count < room.size() && user_.incoming.pop(frame);) {
+        for (Frame frame; count < frames.size() && user_.incoming.pop(frame);) {
             frame.id = of_user(frame.id);
             if (!filters_.pass(frame)) continue;
             counting_.count_received(frame);
-            room[count++] = frame;
+            frames[count++] = frame;
         }
         return count;
     }

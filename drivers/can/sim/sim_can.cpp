@@ -63,15 +63,15 @@ public:
         bus_->pump(now_ns);
         bus_->sent(bus_->time(now_ns));
     }
-    std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
+    std::size_t receive(std::span<Frame> frames, std::int64_t now_ns) noexcept override {
         bus_->pump(now_ns);
         const auto now = bus_->time(now_ns);
         std::size_t count = 0;
-        while (count < room.size()) {
+        while (count < frames.size()) {
             const Frame* next = node_.incoming.front();
             if (next == nullptr || next->time_ns > now) break;
             trace(link::can_received, *next);
-            room[count++] = *next;
+            frames[count++] = *next;
             node_.incoming.drop();
         }
         return count;

@@ -154,10 +154,10 @@ public:
         }
     }
 
-    std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
+    std::size_t receive(std::span<Frame> frames, std::int64_t now_ns) noexcept override {
         const auto now = now_ns != unclocked ? now_ns : link::monotonic_ns();
         std::size_t count = 0;
-        for (int reads = 0; count < room.size();) {
+        for (int reads = 0; count < frames.size();) {
             if (next_ == filled_) {
                 if (reads++ == 4) {
                     break;  // continue with an endless line in the next cycle
@@ -181,7 +181,7 @@ public:
                 if ((f.fd && !options_.fd) || !filters_.pass(f)) break;
                 f.time_ns = arrived_ns_;
                 counting_.count_received(f);
-                room[count++] = f;
+                frames[count++] = f;
                 break;
             }
             case Decoder::Found::error: Counting::add(counting_.errors); break;

@@ -77,9 +77,10 @@ link::Descriptor make_socket(int index, const Options& o, const std::vector<can_
     }
     set(fd.get(), SOL_SOCKET, SO_RCVTIMEO, receive_timeout);
     // the kernel's cost of a frame
-    const int room = static_cast<int>(std::min<std::size_t>(o.receive_capacity, 65536) * 1024);
-    if (!set(fd.get(), SOL_SOCKET, SO_RCVBUFFORCE, room)) {
-        set(fd.get(), SOL_SOCKET, SO_RCVBUF, room);
+    const int buffer_bytes =
+        static_cast<int>(std::min<std::size_t>(o.receive_capacity, 65536) * 1024);
+    if (!set(fd.get(), SOL_SOCKET, SO_RCVBUFFORCE, buffer_bytes)) {
+        set(fd.get(), SOL_SOCKET, SO_RCVBUF, buffer_bytes);
     }
     sockaddr_can address{};
     address.can_family = AF_CAN;
@@ -189,7 +190,7 @@ public:
         }
     }
 
-    std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
+    std::size_t receive(std::span<Frame> frames, std::int64_t now_ns) noexcept override {
         if (std::exchange(waited_, false)) {
             refilled_at_ = now_ns;
         }
@@ -198,9 +199,9 @@ public:
             return 0;
         }
         std::size_t count = 0;
-        while (count < room.size()) {
+        while (count < frames.size()) {
             if (next_ == filled_ && ((count != 0 && last_batch_short_) || !refill(now_ns))) break;
-            room[count++] = buffer_[next_++];
+            frames[count++] = buffer_[next_++];
         }
         return count;
     }

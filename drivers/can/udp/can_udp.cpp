@@ -98,10 +98,10 @@ link::Descriptor receiver(const Place& p, const Options& o, std::string& problem
     set(fd.get(), SOL_SOCKET, SO_TIMESTAMPNS, yes);
     set(fd.get(), SOL_SOCKET, SO_RXQ_OVFL, yes);
     // the kernel's cost of a datagram
-    const int room =
+    const int buffer_bytes =
         static_cast<int>((o.receive_capacity < 65536 ? o.receive_capacity : 65536) * 1024);
-    if (!set(fd.get(), SOL_SOCKET, SO_RCVBUFFORCE, room)) {
-        set(fd.get(), SOL_SOCKET, SO_RCVBUF, room);
+    if (!set(fd.get(), SOL_SOCKET, SO_RCVBUFFORCE, buffer_bytes)) {
+        set(fd.get(), SOL_SOCKET, SO_RCVBUF, buffer_bytes);
     }
     sockaddr_storage any = p.address;
     bool joined = false;
@@ -210,15 +210,15 @@ public:
         }
     }
 
-    std::size_t receive(std::span<Frame> room, std::int64_t now_ns) noexcept override {
+    std::size_t receive(std::span<Frame> frames, std::int64_t now_ns) noexcept override {
         std::size_t count = 0;
         int useless = 0;
-        while (count < room.size()) {
+        while (count < frames.size()) {
             if (next_ == filled_ && !refill(now_ns)) {
                 if (was_short_ || ++useless == 4) break;
                 continue;  // the whole batch was filtered out
             }
-            room[count++] = buffer_[next_++];
+            frames[count++] = buffer_[next_++];
         }
         return count;
     }

@@ -40,10 +40,10 @@ Interface ask(const std::string& name) {
     alignas(ethtool_link_settings)
         std::array<char,
                    sizeof(ethtool_link_settings) + std::size_t{3} * 127 * sizeof(std::uint32_t)>
-            room{};
-    auto& link = reinterpret_cast<ethtool_link_settings&>(room);
+            buffer{};
+    auto& link = reinterpret_cast<ethtool_link_settings&>(buffer);
     link.cmd = ETHTOOL_GLINKSETTINGS;
-    request.ifr_data = room.data();
+    request.ifr_data = buffer.data();
     if (answered(SIOCETHTOOL) && link.link_mode_masks_nwords < 0) {
         link.cmd = ETHTOOL_GLINKSETTINGS;
         link.link_mode_masks_nwords = static_cast<std::int8_t>(-link.link_mode_masks_nwords);

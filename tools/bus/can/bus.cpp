@@ -98,11 +98,11 @@ void Bus::announce(const Options& options) const {
 void listen(Bus& bus, std::int64_t for_ns,
             const std::function<bool(std::span<const can::Frame>)>& take, std::int64_t slice_ns,
             const std::function<void()>& idle) {
-    std::vector<can::Frame> room(256);
+    std::vector<can::Frame> buffer(256);
     const std::int64_t end = for_ns >= 0 ? monotonic_ns() + for_ns : INT64_MAX;
     for (;;) {
-        const std::size_t count = bus.link->receive(room, can::unclocked);
-        if (count > 0 && !take(std::span(room).first(count))) return;
+        const std::size_t count = bus.link->receive(buffer, can::unclocked);
+        if (count > 0 && !take(std::span(buffer).first(count))) return;
         if (idle) {
             idle();
         }

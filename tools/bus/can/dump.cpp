@@ -43,7 +43,7 @@ struct Source {
     std::uint64_t frames = 0;
     std::int64_t busy = 0;       ///< bus time taken by its frames
     FrameDecoder decoder = {};
-    std::vector<can::Frame> room = std::vector<can::Frame>(256);
+    std::vector<can::Frame> received = std::vector<can::Frame>(256);
 };
 
 std::string line(const can::Frame& f, double time, const std::string& bus,
@@ -138,8 +138,8 @@ void listen_to_all(Bus& bus, std::vector<Source>& sources, std::int64_t for_ns,
         batch.clear();
         bool over = true;
         for (Source& s : sources) {
-            const std::size_t count = s.link->receive(s.room, can::unclocked);
-            for (const can::Frame& f : std::span(s.room).first(count)) {
+            const std::size_t count = s.link->receive(s.received, can::unclocked);
+            for (const can::Frame& f : std::span(s.received).first(count)) {
                 batch.push_back({&f, &s});
             }
             over = over && count == 0 && s.link->description().transport == "capture" &&

@@ -87,11 +87,11 @@ private:
 
     Answer read(std::uint16_t index, std::uint32_t& value) { return read(index, program_, value); }
     Answer read(std::uint16_t index, std::uint8_t sub, std::uint32_t& value) {
-        std::uint8_t room[8] = {};
-        last_ = {.index = index, .sub = sub, .upload = true, .buffer = room};
+        std::uint8_t bytes[8] = {};
+        last_ = {.index = index, .sub = sub, .upload = true, .buffer = bytes};
         const bool ok = station_.transfer(node_, last_);
         if (ok) {
-            std::memcpy(&value, room, sizeof value);
+            std::memcpy(&value, bytes, sizeof value);
         }
         if (ok) return Answer::value;
         if (last_.aborted_by_server) return Answer::refused;

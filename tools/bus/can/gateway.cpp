@@ -208,10 +208,10 @@ private:
         for (unsigned net = 1; net <= links_.size(); ++net) {
             can::Link& link = *links_[net - 1];
             canopen::FrameQueue& out = gateway_.out(net);
-            for (std::size_t count; (count = link.receive(room_, can::unclocked)) > 0;) {
+            for (std::size_t count; (count = link.receive(buffer_, can::unclocked)) > 0;) {
                 for (std::size_t n = 0; n < count; ++n) {
-                    if (!room_[n].own) {
-                        gateway_.handle(net, room_[n], monotonic_ns());
+                    if (!buffer_[n].own) {
+                        gateway_.handle(net, buffer_[n], monotonic_ns());
                     }
                 }
             }
@@ -275,7 +275,7 @@ private:
     StopRequest& stop_;
     Gateway gateway_;
     std::vector<Connection> connections_;
-    std::vector<can::Frame> room_ = std::vector<can::Frame>(256);
+    std::vector<can::Frame> buffer_ = std::vector<can::Frame>(256);
 };
 
 /// --identity, --vendor-name, --product-name, --order-code. False after an error message.

@@ -30,7 +30,7 @@ NodeClient::NodeClient(const Options& options, std::int64_t timeout_ns)
                    : canopen::LssMasterSettings{.timeout = canopen::second, .repeats = 5}),
       options_(options),
       timeout_ns_(timeout_ns),
-      room_(256) {}
+      frames_(256) {}
 
 bool NodeClient::open(const std::string& address) { return bus.open(options_, address, false); }
 
@@ -45,13 +45,13 @@ bool NodeClient::turn(std::int64_t wait_ns) {
         out.drop();
     }
     bus.link->flush(can::unclocked);
-    std::size_t count = bus.link->receive(room_, can::unclocked);
+    std::size_t count = bus.link->receive(frames_, can::unclocked);
     if (count == 0 && wait_ns > 0) {
         bus.link->wait(wait_ns);
-        count = bus.link->receive(room_, can::unclocked);
+        count = bus.link->receive(frames_, can::unclocked);
     }
     for (std::size_t n = 0; n < count; ++n) {
-        const can::Frame& f = room_[n];
+        const can::Frame& f = frames_[n];
         if (f.own || f.error) continue;
         if (lss.listens_to(f)) {
             lss.handle(f, monotonic_ns());

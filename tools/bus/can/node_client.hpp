@@ -42,7 +42,7 @@ public:
 private:
     const Options& options_;
     std::int64_t timeout_ns_;
-    std::vector<can::Frame> room_;
+    std::vector<can::Frame> frames_;
 };
 
 /// Parses `5` or `0x05`. Returns false for an invalid node ID.

@@ -169,9 +169,9 @@ bool parse_item(NodeClient& station, std::uint8_t node, const ObjectNames& names
         item.bits = canopen::bits_of(static_cast<canopen::Type>(item.object.index));
     }
     if (item.bits != 0) return true;
-    std::uint8_t room[8];
+    std::uint8_t buffer_bytes[8];
     SdoRequest request{
-        .index = item.object.index, .sub = item.object.sub, .upload = true, .buffer = room};
+        .index = item.object.index, .sub = item.object.sub, .upload = true, .buffer = buffer_bytes};
     if (station.transfer(node, request) && request.size > 0) {
         item.bits = static_cast<unsigned>(request.size) * 8;
         return true;

@@ -19,10 +19,10 @@ using Source = std::function<Abort(std::uint16_t index, std::uint8_t sub, std::u
 
 Source of_node(NodeClient& station, std::uint8_t node) {
     return [&station, node](std::uint16_t index, std::uint8_t sub, std::uint32_t& value) {
-        std::uint8_t room[8] = {};
-        SdoRequest request{.index = index, .sub = sub, .upload = true, .buffer = room};
+        std::uint8_t buffer_bytes[8] = {};
+        SdoRequest request{.index = index, .sub = sub, .upload = true, .buffer = buffer_bytes};
         station.transfer(node, request);
-        value = canopen::load<std::uint32_t>(room);
+        value = canopen::load<std::uint32_t>(buffer_bytes);
         // A missing response is not an abort.
         return request.ok() || request.aborted_by_server ? request.abort : Abort::timeout;
     };

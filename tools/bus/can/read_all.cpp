@@ -98,7 +98,7 @@ int run_can_read_all(const ReadAllOptions& options) {
     }
     NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
-    const auto room = std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes);
+    const auto received = std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes);
     std::string csv = "index,sub,name,type,access,value,data,reason\r\n";
     std::size_t read = 0;
     std::size_t refused = 0;
@@ -113,14 +113,14 @@ int run_can_read_all(const ReadAllOptions& options) {
                 canopen::SdoRequest request{.index = object.index,
                                             .sub = entry.sub,
                                             .upload = true,
-                                            .buffer = {room.get(), most_bytes}};
+                                            .buffer = {received.get(), most_bytes}};
                 const bool good = station.transfer(node, request);
                 if (!good && !request.aborted_by_server) {
                     return station.fail_transfer(node, request, one.object.label());
                 }
                 one.abort = request.abort;
                 if (good) {
-                    one.bytes = {room.get(), request.size};
+                    one.bytes = {received.get(), request.size};
                 }
                 ++(good ? read : refused);
             } else {

@@ -97,17 +97,17 @@ int run_can_sdo_read(const SdoReadOptions& options) {
     }
     NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
-    const auto room = std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes);
+    const auto received = std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes);
     for (const ObjectName& object : objects) {
         SdoRequest request{.index = object.index,
                            .sub = object.sub,
                            .upload = true,
                            .mode = target.mode,
-                           .buffer = {room.get(), most_bytes}};
+                           .buffer = {received.get(), most_bytes}};
         if (!station.transfer(target.node, request)) {
             return station.fail_transfer(target.node, request, object.label());
         }
-        const std::span<const std::uint8_t> bytes(room.get(), request.size);
+        const std::span<const std::uint8_t> bytes(received.get(), request.size);
         const Type type = target.type.value_or(object.type);
         if (!options.output.empty()) return save(options, bytes) ? 0 : 1;
         if (!print(options.json
@@ -125,8 +125,9 @@ namespace {
 /// negative value.
 bool width_of(NodeClient& station, std::uint8_t node, const ObjectName& object,
               const std::string& value, Type& type, std::string& problem) {
-    std::uint8_t room[64];
-    SdoRequest request{.index = object.index, .sub = object.sub, .upload = true, .buffer = room};
+    std::uint8_t received[64];
+    SdoRequest request{
+        .index = object.index, .sub = object.sub, .upload = true, .buffer = received};
     const bool read = station.transfer(node, request);
     const bool negative = value.starts_with('-');
     switch (read ? request.size : 0) {

@@ -59,10 +59,10 @@ void Supervision::send_heartbeat(std::int64_t now) {
 }
 
 Supervision::Read Supervision::read(std::uint16_t index, std::uint8_t sub, std::uint32_t& value) {
-    std::uint8_t room[8] = {};
-    SdoRequest request{.index = index, .sub = sub, .upload = true, .buffer = room};
+    std::uint8_t buffer_bytes[8] = {};
+    SdoRequest request{.index = index, .sub = sub, .upload = true, .buffer = buffer_bytes};
     if (station_.transfer(node_, request)) {
-        std::memcpy(&value, room, sizeof value);
+        std::memcpy(&value, buffer_bytes, sizeof value);
         return Read::value;
     }
     if (request.aborted_by_server) {

@@ -84,7 +84,7 @@ public:
                         ethernet::Finisher* finisher) noexcept override {
         return its_.send(frame, slot, priority, finisher);
     }
-    std::size_t room(unsigned slot) const noexcept override { return its_.room(slot); }
+    std::size_t capacity(unsigned slot) const noexcept override { return its_.capacity(slot); }
     bool ready() const noexcept override { return its_.ready(); }
     const ethernet::Address& address() const noexcept override { return its_.address(); }
     Origin origin(const ethernet::Address& from, std::int64_t arrived_ns,

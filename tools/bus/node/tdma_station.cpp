@@ -206,7 +206,7 @@ void TdmaStation::take_over() noexcept {
     if (tap_) {
         tap_->scheduled(accepted.schedule.stations.front().ip, tdma::tunnel_mtu(accepted.setup));
     }
-    if (slot_ && station_.room(*slot_) == 0) {
+    if (slot_ && station_.capacity(*slot_) == 0) {
         lacks_slot_ = true;
     }
 }

@@ -141,7 +141,7 @@ bool Server::send(Message& m) noexcept {
 bool Server::send_stage_2(Client& c) noexcept {
     const auto& all = c.setup.stage_2;
     const std::span data(reinterpret_cast<const std::uint8_t*>(all.data()), all.size());
-    const std::size_t room = station_.room(default_slot);
+    const std::size_t capacity = station_.capacity(default_slot);
     Message m;
     m.to = c.setup.mac;
     if (!c.began) {
@@ -152,12 +152,12 @@ bool Server::send_stage_2(Client& c) noexcept {
             1 + std::count_if(clients_.begin(), clients_.end(),
                               [](const Client& o) { return o.state == ClientState::ready; }));
         m.length = static_cast<std::uint32_t>(data.size());
-        m.data = data.first(std::min(stage_2_room(room), data.size()));
+        m.data = data.first(std::min(stage_2_capacity(capacity), data.size()));
     } else {
         if (c.sent >= data.size()) return false;
         m.id = Id::stage_2_fragment;
         m.offset = c.sent;
-        m.data = data.subspan(c.sent, std::min(fragment_room(room), data.size() - c.sent));
+        m.data = data.subspan(c.sent, std::min(fragment_capacity(capacity), data.size() - c.sent));
     }
     if (!send(m)) return false;
     c.began = true;
@@ -177,7 +177,7 @@ bool Server::invite(Client& c, Time now) noexcept {
     m.server = own_;
     m.data = std::span(reinterpret_cast<const std::uint8_t*>(c.setup.stage_1.data()),
                        c.setup.stage_1.size());
-    if (stage_1_bytes(m) > station_.room(default_slot)) {
+    if (stage_1_bytes(m) > station_.capacity(default_slot)) {
         if (!c.too_long_reported && now - std::max(c.seen, began_) > long_silence &&
             events_ != nullptr) {
             c.too_long_reported = true;

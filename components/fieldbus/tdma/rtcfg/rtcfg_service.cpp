@@ -11,7 +11,7 @@ namespace hal::tdma::rtcfg {
 namespace {
 
 /// Returns the payload bytes of slot 0.
-std::size_t room_of(const config::StationEntry& e) {
+std::size_t capacity_of(const config::StationEntry& e) {
     for (const config::SlotEntry& slot : e.slots) {
         if (slot.setup.id == default_slot) return slot.setup.size;
     }
@@ -45,7 +45,7 @@ std::vector<Server::ClientSetup> Service::clients_of(const config::Schedule& sch
             first.data = std::span(reinterpret_cast<const std::uint8_t*>(client.stage_1.data()),
                                    client.stage_1.size());
             if (const std::size_t needs = stage_1_bytes(first),
-                has = room_of(schedule.stations[own]);
+                has = capacity_of(schedule.stations[own]);
                 must && needs > has) {
                 throw std::invalid_argument(
                     "slot 0 of the master is too short for station " + e.name +

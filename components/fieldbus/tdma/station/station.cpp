@@ -166,7 +166,7 @@ std::size_t Station::waiting(unsigned slot) const noexcept {
     return s == nullptr ? 0 : s->waiting();
 }
 
-std::size_t Station::room(unsigned slot) const noexcept {
+std::size_t Station::capacity(unsigned slot) const noexcept {
     const Slot* s = transmitter_.find(slot);
     return s == nullptr ? 0 : s->capacity();
 }

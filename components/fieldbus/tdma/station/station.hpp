@@ -98,7 +98,7 @@ public:
                   std::size_t length) const noexcept override {
         return slot_monitor_.origin(from, arrived_ns, length);
     }
-    std::size_t room(unsigned slot) const noexcept override;
+    std::size_t capacity(unsigned slot) const noexcept override;
     bool ready() const noexcept override { return ready_.load(std::memory_order_relaxed); }
     const Address& address() const noexcept override { return core_.address; }
 

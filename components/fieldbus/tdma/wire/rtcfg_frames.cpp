@@ -46,13 +46,13 @@ public:
     explicit Putter(std::span<std::uint8_t> bytes) noexcept : bytes_(bytes) {}
     template <class T>
     void number(T value) noexcept {
-        if (room(sizeof(T))) {
+        if (fits(sizeof(T))) {
             put(bytes_, at_, value);
             at_ += sizeof(T);
         }
     }
     void bytes(std::span<const std::uint8_t> data) noexcept {
-        if (room(data.size())) {
+        if (fits(data.size())) {
             std::copy(data.begin(), data.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(at_));
 
             at_ += data.size();
@@ -61,7 +61,7 @@ public:
     std::size_t length() const noexcept { return good_ ? at_ : 0; }
 
 private:
-    bool room(std::size_t count) noexcept { return good_ = good_ && at_ + count <= bytes_.size(); }
+    bool fits(std::size_t count) noexcept { return good_ = good_ && at_ + count <= bytes_.size(); }
     std::span<std::uint8_t> bytes_;
     std::size_t at_ = 0;
     bool good_ = true;

@@ -75,10 +75,10 @@ inline std::size_t stage_1_bytes(const Message& m) noexcept {
 }
 /// Return the data bytes that fit into a stage 2 frame and into a fragment with `payload` bytes
 /// after the Ethernet header. [any]
-constexpr std::size_t stage_2_room(std::size_t payload) noexcept {
+constexpr std::size_t stage_2_capacity(std::size_t payload) noexcept {
     return payload > 12 ? payload - 12 : 0;
 }
-constexpr std::size_t fragment_room(std::size_t payload) noexcept {
+constexpr std::size_t fragment_capacity(std::size_t payload) noexcept {
     return payload > 5 ? payload - 5 : 0;
 }
 
