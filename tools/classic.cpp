@@ -40,7 +40,7 @@ bool halcmd_letter(int letter, ExecutionOptions& options) {
     }
 }
 
-void take_words(Options& options, int argc, char** argv) {
+void move_words(Options& options, int argc, char** argv) {
     options.words.assign(argv + ::optind, argv + argc);
 }
 
@@ -89,12 +89,12 @@ int halcmd(int argc, char** argv) {
         if (letter == 'R') return 0;
         if (letter == 'C') return complete_word();
         if (letter != 'h') return bad_option;
-        take_words(options, argc, argv);
+        move_words(options, argc, argv);
         if (options.words.empty()) return print(halcmd_usage) ? 0 : 1;
         options.words.insert(options.words.begin(), "help");
         return run_shell(options);
     }
-    take_words(options, argc, argv);
+    move_words(options, argc, argv);
     if (options.words.empty() && !options.from_file) return print(halcmd_usage) ? 0 : 1;
     if (!options.ini.empty() && !options.from_file) {
         fail(options, "-i needs -f");
@@ -142,7 +142,7 @@ int halrun(int argc, char** argv) {
         default: return 1;
         }
     }
-    take_words(options, argc, argv);
+    move_words(options, argc, argv);
     if (options.words.size() > 1) {
         options.arguments.assign(options.words.begin() + 1, options.words.end());
         options.words.resize(1);

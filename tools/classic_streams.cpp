@@ -44,7 +44,7 @@ int sampler_or_streamer(int argc, char** argv, const char* program, const char* 
     return run(options);
 }
 
-bool take_sampler_letter(int letter, std::uint64_t number, RecordOptions& options) {
+bool parse_sampler_letter(int letter, std::uint64_t number, RecordOptions& options) {
     switch (letter) {
     case 'n':
         options.count = number;
@@ -55,16 +55,16 @@ bool take_sampler_letter(int letter, std::uint64_t number, RecordOptions& option
     }
 }
 
-bool take_streamer_letter(int, std::uint64_t, PlayOptions&) { return false; }
+bool parse_streamer_letter(int, std::uint64_t, PlayOptions&) { return false; }
 
 }  // namespace
 
 int halsampler(int argc, char** argv) {
-    return sampler_or_streamer(argc, argv, "halsampler", "c:n:tN:", take_sampler_letter,
+    return sampler_or_streamer(argc, argv, "halsampler", "c:n:tN:", parse_sampler_letter,
                                run_record);
 }
 int halstreamer(int argc, char** argv) {
-    return sampler_or_streamer(argc, argv, "halstreamer", "c:N:", take_streamer_letter, run_play);
+    return sampler_or_streamer(argc, argv, "halstreamer", "c:N:", parse_streamer_letter, run_play);
 }
 
 }  // namespace hal::tools

@@ -132,8 +132,8 @@ struct MotionProfile : hal::Component {
 
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
-        const bool sound = take_limits();
-        take_edges();
+        const bool sound = apply_limits();
+        apply_edges();
         if (mode != last_mode_) {
             forget();
         }
@@ -159,7 +159,7 @@ struct MotionProfile : hal::Component {
     }
 
 private:
-    bool take_limits() noexcept {
+    bool apply_limits() noexcept {
         motion::Limits taken;
         if (!motion::Limits::from(max_velocity, max_acceleration, max_deceleration, max_jerk,
                                   taken) ||
@@ -177,7 +177,7 @@ private:
                    ? quick
                    : limits_;
     }
-    void take_edges() noexcept {
+    void apply_edges() noexcept {
         waiting_ = mode == set_points && new_set_point && (waiting_ || !was_new_);
         was_new_ = new_set_point;
         start_table_ = run_table && !was_run_;
@@ -200,7 +200,7 @@ private:
                 has_goal_ = true;
             }
             break;
-        case set_points: take_set_point(); break;
+        case set_points: apply_set_point(); break;
         case table:
             if (start_table_ && row_count() > 0) {
                 in_table_ = true;
@@ -230,7 +230,7 @@ private:
         generator_.go_to(last_of_flight(), limits);
     }
 
-    void take_set_point() noexcept {
+    void apply_set_point() noexcept {
         if (waiting_ && std::isfinite(target) &&
             (change_immediately || !has_goal_ || !queue_.full())) {
             const double last = has_goal_ ? goal_.position : generator_.end_position();

@@ -81,7 +81,7 @@ struct Client::State {
     }
 
     /// Moves raw bytes that have come to the newest event.
-    bool take_payload() {
+    bool receive_payload() {
         if (payload_left == 0) return false;
         const std::size_t part = std::min(payload_left, in.size() - taken);
         events.back().payload.append(in, taken, part);
@@ -98,14 +98,14 @@ struct Client::State {
         if (got < 0) return;
         const std::size_t searched = in.size();
         in.append(part.data(), static_cast<std::size_t>(got));
-        std::size_t from = take_payload() ? taken : searched;
+        std::size_t from = receive_payload() ? taken : searched;
         for (std::size_t end; payload_left == 0 && (end = in.find('\n', from)) != std::string::npos;
              from = taken) {
             const std::size_t begin = taken;
             taken = end + 1;
             take(std::string_view(in).substr(begin, end - begin));
             if (fd < 0) return;
-            take_payload();
+            receive_payload();
         }
         in.erase(0, taken);
         taken = 0;

@@ -599,7 +599,7 @@ void use_stream(const Program& by, const Json& body, std::string& reply) {
     bool good = true;
     if (!take.is_null()) {
         const auto max_count = static_cast<std::uint64_t>(whole(take, "take", 0, 1'000'000));
-        good = take_records(stream, max_count, reply, why);
+        good = pop_records(stream, max_count, reply, why);
     } else if (!records.is_null()) {
         good = feed_records(stream, rows_of(records), reply, why);
     }

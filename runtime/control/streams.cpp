@@ -47,7 +47,7 @@ void describe_stream(const hal_stream& stream, std::string& to) {
     }
 }
 
-bool take_records(hal_stream& stream, std::uint64_t max, std::string& to, std::string& why) {
+bool pop_records(hal_stream& stream, std::uint64_t max, std::string& to, std::string& why) {
     if (stream.to_machine) {
         why = "this stream is written, not read: use records";
         return false;

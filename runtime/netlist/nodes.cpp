@@ -82,7 +82,7 @@ bool read_line(const Command& command, ParsedLine& line, Diagnostics& diagnostic
 }
 
 /// Sets rate= and deadline= of a node; different values in two lines are an error.
-void take_options(NodeLine& node, const ParsedLine& line, Diagnostics& diagnostics) {
+void parse_options(NodeLine& node, const ParsedLine& line, Diagnostics& diagnostics) {
     const bool again =
         (line.rate_ns != 0 && node.rate_ns != 0 && line.rate_ns != node.rate_ns) ||
         (line.deadline_ns != 0 && node.deadline_ns != 0 && line.deadline_ns != node.deadline_ns);
@@ -134,7 +134,7 @@ void collect_nodes(const std::vector<Command>& commands, std::vector<NodeLine>& 
                     }
                     node = nodes.insert(nodes.end(), NodeLine{token->text, token->span, 0, 0, {}});
                 }
-                take_options(*node, line, diagnostics);
+                parse_options(*node, line, diagnostics);
             }
         }
     }

@@ -7,9 +7,7 @@
 namespace hal::tools {
 namespace {
 
-std::vector<Key> keys(std::string bytes, bool complete = true) {
-    return take_keys(bytes, complete);
-}
+std::vector<Key> keys(std::string bytes, bool complete = true) { return pop_keys(bytes, complete); }
 Key letter(char c) { return {Code::character, c, false}; }
 
 TEST(Keys, letters_and_controls) {
@@ -32,19 +30,19 @@ TEST(Keys, unknown_sequences_are_skipped_whole) {
 
 TEST(Keys, a_sequence_in_two_reads_is_one_key) {
     std::string bytes = "a\033[1;";
-    EXPECT_EQ(take_keys(bytes, false), std::vector<Key>{letter('a')});
+    EXPECT_EQ(pop_keys(bytes, false), std::vector<Key>{letter('a')});
     EXPECT_EQ(bytes, "\033[1;");
     bytes += "2A";
-    EXPECT_EQ(take_keys(bytes, false), (std::vector<Key>{{Code::up, 0, true}}));
+    EXPECT_EQ(pop_keys(bytes, false), (std::vector<Key>{{Code::up, 0, true}}));
     EXPECT_EQ(bytes, "");
 }
 
 TEST(Keys, a_lone_escape_is_a_key_once_nothing_follows) {
     std::string bytes = "\033";
-    EXPECT_EQ(take_keys(bytes, false), std::vector<Key>{});
-    EXPECT_EQ(take_keys(bytes, true), std::vector<Key>{{Code::escape}});
+    EXPECT_EQ(pop_keys(bytes, false), std::vector<Key>{});
+    EXPECT_EQ(pop_keys(bytes, true), std::vector<Key>{{Code::escape}});
     bytes = "\033[";
-    EXPECT_EQ(take_keys(bytes, true), std::vector<Key>{}) << "cut off: dropped";
+    EXPECT_EQ(pop_keys(bytes, true), std::vector<Key>{}) << "cut off: dropped";
     EXPECT_EQ(bytes, "");
 }
 

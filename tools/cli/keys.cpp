@@ -50,7 +50,7 @@ Sequence read_sequence(std::string_view bytes) {
 
 }  // namespace
 
-std::vector<Key> take_keys(std::string& bytes, bool complete) {
+std::vector<Key> pop_keys(std::string& bytes, bool complete) {
     std::vector<Key> keys;
     std::size_t at = 0;
     while (at < bytes.size()) {

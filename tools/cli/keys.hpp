@@ -32,6 +32,6 @@ struct Key {
 /// Takes the complete keys from the beginning of `bytes`, as terminals send them (CSI and SS3
 /// sequences), and skips unknown sequences.
 /// `complete`: no more bytes came for a while, so a lone Esc is the key Esc.
-std::vector<Key> take_keys(std::string& bytes, bool complete);
+std::vector<Key> pop_keys(std::string& bytes, bool complete);
 
 }  // namespace hal::tools

@@ -68,7 +68,7 @@ std::vector<Key> Screen::keys(bool readable) {
     while (readable && (n = ::read(STDIN_FILENO, block, sizeof block)) > 0) {
         bytes_.append(block, static_cast<std::size_t>(n));
     }
-    return take_keys(bytes_, !readable);
+    return pop_keys(bytes_, !readable);
 }
 
 bool has_screen() {

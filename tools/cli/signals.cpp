@@ -105,7 +105,7 @@ void StopRequest::request() noexcept {
     [[maybe_unused]] const ssize_t n = ::write(event_, &one, sizeof one);
 }
 
-void StopRequest::take_signals() {
+void StopRequest::receive_signals() {
     signalfd_siginfo info{};
     while (::read(signals_, &info, sizeof info) == sizeof info) {
         if (!(info.ssi_signo == SIGINT && spare_)) {
@@ -121,7 +121,7 @@ void StopRequest::take_signals() {
 
 void StopRequest::spare(bool on) {
     const std::lock_guard lock(mutex_);
-    take_signals();
+    receive_signals();
     spare_ = on;
 }
 
@@ -132,7 +132,7 @@ void StopRequest::serve() {
         if (::poll(both, 2, -1) < 0) continue;
         if (both[1].revents != 0) return;
         const std::lock_guard lock(mutex_);
-        take_signals();
+        receive_signals();
     }
 }
 

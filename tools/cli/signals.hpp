@@ -46,7 +46,7 @@ public:
 
 private:
     void serve();
-    void take_signals();
+    void receive_signals();
     int event_ = -1;
     int signals_ = -1;
     int done_ = -1;

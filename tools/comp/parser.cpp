@@ -91,7 +91,7 @@ Tree Parser::parse() {
         }
     }
     if (in_.at_code()) {
-        tree_.code = in_.take_code();
+        tree_.code = in_.read_code();
     }
     return std::move(tree_);
 }
@@ -124,7 +124,7 @@ bool Parser::declaration() {
         return false;
     }
     const bool good = (this->*found->handler)(keyword);
-    if (in_.take_broken() || !good) return false;
+    if (in_.pop_broken() || !good) return false;
     if (!in_.at_code() && in_.take(';')) return true;
     const Span here = in_.at_code() ? in_.behind() : in_.here();
     in_.error(here, "unexpected text in the declaration",

@@ -135,7 +135,7 @@ bool Scanner::at_code() {
     return true;
 }
 
-Span Scanner::take_code() {
+Span Scanner::read_code() {
     at_ = std::min(text_.find('\n', at_), text_.size() - 1) + 1;
     return span(at_, text_.size());
 }

@@ -28,7 +28,7 @@ public:
     /// At a line that consists of `;;`.
     bool at_code();
     /// Past that line: the rest of the file.
-    Span take_code();
+    Span read_code();
 
     /// A word of C: letters, digits, `_`. Empty when none comes next.
     Text word();
@@ -40,7 +40,7 @@ public:
     std::optional<Text> string();
     bool at_string();
     /// Returns true once after an unterminated string: what follows cannot be parsed.
-    bool take_broken() { return std::exchange(broken_, false); }
+    bool pop_broken() { return std::exchange(broken_, false); }
     /// "file.h" or <file.h>
     std::optional<Text> header();
     /// C up to one of `stops` outside of parentheses, a string, `;`, or the word `if`.

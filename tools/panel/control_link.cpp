@@ -64,10 +64,10 @@ void ControlLink::pause(bool on) {
 
 bool ControlLink::received(std::string_view bytes) {
     in_.append(bytes);
-    return in_.size() <= max_line_length && take_lines();
+    return in_.size() <= max_line_length && receive_lines();
 }
 
-bool ControlLink::take_lines() {
+bool ControlLink::receive_lines() {
     std::size_t taken = 0;
     for (std::size_t end;
          (end = in_.find('\n', std::max(taken, searched_))) != std::string::npos;) {

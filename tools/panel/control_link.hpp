@@ -49,7 +49,7 @@ private:
 
 private:
     static constexpr std::size_t max_line_length = 64 << 20;
-    bool take_lines();
+    bool receive_lines();
 
     lws_vhost* host_;
     std::string instance_;

@@ -116,7 +116,7 @@ public:
         }
         if (file.ends_with(".csv")) {
             std::string problem;
-            const std::string types = take_types(problem);
+            const std::string types = apply_types(problem);
             if (!problem.empty()) return fail(options_, problem);
             if (!types.empty()) {
                 commands[0].push_back("types=" + types);
@@ -278,7 +278,7 @@ private:
 
     /// A table has no types: its values get those that the netlist has. Returns them as playback's
     /// argument.
-    std::string take_types(std::string& problem) {
+    std::string apply_types(std::string& problem) {
         mcap::LoadOptions options;
         std::string text;
         {

@@ -145,7 +145,7 @@ std::atomic<std::uint16_t>& Sequences::of(const Address& to) noexcept {
 std::uint16_t Sequences::next(const Address& to) noexcept {
     return of(to).fetch_add(1, std::memory_order_relaxed);
 }
-void Sequences::take_back(const Address& to) noexcept {
+void Sequences::give_back(const Address& to) noexcept {
     of(to).fetch_sub(1, std::memory_order_relaxed);
 }
 void Sequences::clear() noexcept {

@@ -89,7 +89,7 @@ public:
     /// Returns the next number. [realtime] any thread
     std::uint16_t next(const Address& to) noexcept;
     /// Returns an unused number. [realtime] any thread
-    void take_back(const Address& to) noexcept;
+    void give_back(const Address& to) noexcept;
     void clear() noexcept;  ///< Resets all numbers. [setup]
 
 private:

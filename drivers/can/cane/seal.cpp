@@ -43,7 +43,7 @@ void Seal::leaves(std::span<std::uint8_t> frame) noexcept {
 }
 
 void Seal::stayed(std::span<const std::uint8_t> frame) noexcept {
-    sequences_of(frame).take_back(destination(frame));
+    sequences_of(frame).give_back(destination(frame));
 }
 
 std::shared_ptr<Seal> Seal::take(const std::optional<Key>& key, bool simulated) {

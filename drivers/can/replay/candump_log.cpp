@@ -78,7 +78,7 @@ bool date_of(std::string_view text, std::int64_t& ns) {
 }
 
 /// Takes `(TIME)` from the begin of a line.
-bool take_time(std::string_view& line, std::int64_t& ns) {
+bool parse_time(std::string_view& line, std::int64_t& ns) {
     const auto close = line.find(')');
     if (line.empty() || line[0] != '(' || close == line.npos) {
         return false;
@@ -182,7 +182,7 @@ Screen parse_screen_line(std::string_view line, Frame& f) {
     f = {};
     line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
     const bool timed = !line.empty() && line[0] == '(';
-    if (timed && !take_time(line, f.time_ns)) return Screen::other;
+    if (timed && !parse_time(line, f.time_ns)) return Screen::other;
     next_word(line);  // the channel
     std::string_view word = next_word(line);
     if (word == "RX" || word == "TX") {
@@ -298,7 +298,7 @@ bool parse_log_line(std::string_view line, Frame& f) {
         std::string_view("RTrt").find(line.back()) != std::string_view::npos) {
         line.remove_suffix(2);  // direction, as candump -x and python-can write it
     }
-    if (!take_time(line, f.time_ns)) return false;
+    if (!parse_time(line, f.time_ns)) return false;
     const auto space = line.rfind(' ');
     return space != line.npos && space > 0 && parse_frame(line.substr(space + 1), f);
 }

@@ -185,7 +185,7 @@ public:
                 break;
             }
             case Decoder::Found::error: Counting::add(counting_.errors); break;
-            case Decoder::Found::status: take_status(decoder_.status()); break;
+            case Decoder::Found::status: apply_status(decoder_.status()); break;
             case Decoder::Found::nothing: break;
             }
         }
@@ -236,7 +236,7 @@ private:
             tcflush(line_.get(), TCOFLUSH);
         }
     }
-    void take_status(unsigned bits) noexcept {  // Lawicel: 2 warning, 3 overrun, 5 passive
+    void apply_status(unsigned bits) noexcept {  // Lawicel: 2 warning, 3 overrun, 5 passive
         if ((bits & 8) != 0) {
             Counting::add(counting_.lost);
         }

@@ -242,7 +242,7 @@ public:
             const bool many = several_ || ++waits_ % 32 == 0;
             const bool plain = !many && !options_.stamps && !options_.own_frames;
             const unsigned count = many ? batch : 1;
-            const int got = plain ? take_one() : take_batch(MSG_WAITFORONE, count, unclocked);
+            const int got = plain ? receive_one() : receive_batch(MSG_WAITFORONE, count, unclocked);
             if (got > 0) {
                 if (many) {
                     several_ = got > 1;
@@ -272,7 +272,7 @@ private:
             last_batch_short_ = false;
             return false;
         }
-        const int got = take_batch(MSG_DONTWAIT, batch, now_ns);
+        const int got = receive_batch(MSG_DONTWAIT, batch, now_ns);
         refilled_at_ = now_ns;
         if (filled_ == 0 && now_ns != unclocked && got < static_cast<int>(batch)) {
             drained_at_ = now_ns;
@@ -281,7 +281,7 @@ private:
     }
 
     /// Does one system call. Returns the number of frames, or -1 with errno set.
-    int take_batch(int flags, std::size_t max, std::int64_t now_ns) noexcept {
+    int receive_batch(int flags, std::size_t max, std::int64_t now_ns) noexcept {
         for (; used_ > 0; --used_) {
             in_[used_ - 1].msg_hdr.msg_controllen = options_.stamps ? sizeof control_[0] : 0;
         }
@@ -310,7 +310,7 @@ private:
 
     /// Waits for one frame without the kernel's timestamp, half a microsecond cheaper than
     /// take_batch(). Returns 1, or -1 with errno set.
-    int take_one() noexcept {
+    int receive_one() noexcept {
         next_ = filled_ = 0;
         const auto got = ::recv(socket_.get(), &raw_[0], sizeof raw_[0], 0);
         if (got < 0) {

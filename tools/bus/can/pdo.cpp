@@ -183,7 +183,7 @@ bool parse_item(NodeClient& station, std::uint8_t node, const ObjectNames& names
     return false;
 }
 
-bool take_options(const PdoMapOptions& options, PdoSettings& p) {
+bool parse_options(const PdoMapOptions& options, PdoSettings& p) {
     const auto problem = [&](const std::string& text) {
         fail(options, text);
         return false;
@@ -268,7 +268,7 @@ int run_can_pdo_map(const PdoMapOptions& options) {
                 "mapping too long: {} bits, a PDO holds 64; map {} bits less, or use a second PDO",
                 after.bits(), after.bits() - 64));
     }
-    if (!take_options(options, after)) return 1;
+    if (!parse_options(options, after)) return 1;
     after.cob &= ~canopen::cob_invalid;
     if (canopen::cob_id(after.cob) == 0) {
         return fail(options, fmt::format("{} has no identifier; add --id, such as --id {:X}",

@@ -91,7 +91,7 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link,
         unknown.configured = false;
         unknown.slot_capacity = tdma::max_slots;
         made.reset(new TdmaStation(unknown, {}, segment, std::move(opened.port), *skew, *drift));
-        if (std::string problem = made->take_schedule(options, ended); !problem.empty()) {
+        if (std::string problem = made->receive_schedule(options, ended); !problem.empty()) {
             return problem;
         }
         entry = &made->applicant_->accepted()->schedule.stations.front();
@@ -128,8 +128,8 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link,
     return options.tunnel.empty() ? std::string{} : made->open_tunnel(options, *entry);
 }
 
-std::string TdmaStation::take_schedule(const NodeOptions& options,
-                                       const std::function<bool()>& ended) {
+std::string TdmaStation::receive_schedule(const NodeOptions& options,
+                                          const std::function<bool()>& ended) {
     tdma::rtcfg::Logical own;
     if (!options.station.empty()) {
         const auto ip = tdma::config::parse_ip(options.station);

@@ -39,7 +39,7 @@ private:
     TdmaStation(const tdma::StationSetup&, tdma::config::Schedule, std::string segment,
                 std::unique_ptr<ethernet::Port>, double skew, double drift);
     /// Returns the problem, or "".
-    std::string take_schedule(const NodeOptions&, const std::function<bool()>& ended);
+    std::string receive_schedule(const NodeOptions&, const std::function<bool()>& ended);
     /// Returns the problem, or "".
     std::string open_tunnel(const NodeOptions&, const tdma::config::StationEntry&);
     std::int64_t sleep_until(std::int64_t local_ns) const noexcept;  ///< Returns the time after it.

@@ -20,7 +20,7 @@ constexpr double long_ns = 1e9;         // time constant of the long average
 // uncertainty (sigma) of a drift that a master may use
 constexpr double certain = 2e-6;
 constexpr double min_noise_ns = 100.0;
-constexpr std::uint32_t least_taken = 32;      // syncs for a certain drift
+constexpr std::uint32_t min_accepted = 32;      // syncs for a certain drift
 constexpr double decay_per_ns = 20e-6 / 1e9;
 
 /// Gains of a least-squares line through n points, and not less than `alpha_min`, critically
@@ -77,14 +77,14 @@ void ClockEstimate::another_master() noexcept {
 }
 
 bool ClockEstimate::is_certain() const noexcept {
-    return long_accepted_ >= least_taken && uncertainty() <= certain;
+    return long_accepted_ >= min_accepted && uncertainty() <= certain;
 }
 
 double ClockEstimate::uncertainty() const noexcept {
     if (long_accepted_ < 3 || interval_ <= 0.0) return max_drift;
     // Of the slope of a line through n points; with the final gains n is what they remember.
     const double n = std::min<double>(
-        long_accepted_, std::max(static_cast<double>(least_taken), 2.0 * long_ns / interval_));
+        long_accepted_, std::max(static_cast<double>(min_accepted), 2.0 * long_ns / interval_));
     return std::sqrt(12.0) * std::max(jitter(), min_noise_ns) / (interval_ * n * std::sqrt(n));
 }
 

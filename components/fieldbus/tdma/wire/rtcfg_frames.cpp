@@ -69,7 +69,7 @@ private:
 
 constexpr std::size_t physical_bytes = 32;
 
-bool take_logical(Taker& t, std::uint8_t type, Logical& out) noexcept {
+bool parse_logical(Taker& t, std::uint8_t type, Logical& out) noexcept {
     out = {type == 1, {}};
     if (type > 1) return false;
     if (out.by_ip) {
@@ -103,7 +103,7 @@ bool decode(std::span<const std::uint8_t> frame, Message& m) noexcept {
     switch (m.id) {
     case Id::stage_1: {
         const auto type = t.number<std::uint8_t>();
-        if (!take_logical(t, type, m.client) || !take_logical(t, type, m.server)) return false;
+        if (!parse_logical(t, type, m.client) || !parse_logical(t, type, m.server)) return false;
         m.burst = t.number<std::uint8_t>();
         m.length = t.number<std::uint16_t>();
         m.data = t.take(m.length);
@@ -111,7 +111,7 @@ bool decode(std::span<const std::uint8_t> frame, Message& m) noexcept {
     }
     case Id::announce_new:
     case Id::announce_reply:
-        if (!take_logical(t, t.number<std::uint8_t>(), m.client)) return false;
+        if (!parse_logical(t, t.number<std::uint8_t>(), m.client)) return false;
         m.flags = t.number<std::uint8_t>();
         m.burst = t.number<std::uint8_t>();  // of a reply: padding
         break;
@@ -130,7 +130,7 @@ bool decode(std::span<const std::uint8_t> frame, Message& m) noexcept {
     case Id::ready:
     case Id::heartbeat: break;
     case Id::dead_station: {
-        if (!take_logical(t, t.number<std::uint8_t>(), m.client)) return false;
+        if (!parse_logical(t, t.number<std::uint8_t>(), m.client)) return false;
         const auto physical = t.take(physical_bytes);
         if (t.good()) {
             std::copy_n(physical.begin(), 6, m.dead.begin());
