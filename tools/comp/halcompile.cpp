@@ -132,7 +132,7 @@ bool is_count(const char* text) {
     return *text != '\0' && *end == '\0' && number >= 1;
 }
 
-void append_words(std::vector<std::string>& to, const char* text) {
+void append_split(std::vector<std::string>& to, const char* text) {
     const auto given = split_words(text);
     to.insert(to.end(), given.begin(), given.end());
 }
@@ -173,8 +173,8 @@ std::optional<int> parse_options(int argc, char** argv, Mode& mode, CompileOptio
                             fmt::format("--personalities={}: write a number from 1", ::optarg));
             }
             break;
-        case compile_args: append_words(options.compile_args, ::optarg); break;
-        case link_args: append_words(options.link_args, ::optarg); break;
+        case compile_args: append_split(options.compile_args, ::optarg); break;
+        case link_args: append_split(options.link_args, ::optarg); break;
         case modinc:
             return fail(
                 options,

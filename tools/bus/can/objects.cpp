@@ -222,7 +222,7 @@ std::optional<Type> parse_type(std::string_view word) {
     return std::nullopt;
 }
 
-std::string type_words() {
+std::string type_names() {
     return "bool, i8 … i64, u8 … u64, r32, r64, visible_string, octet_string, unicode_string, "
            "domain, time_of_day or time_difference";
 }

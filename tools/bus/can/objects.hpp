@@ -56,7 +56,7 @@ private:
 /// type.
 std::optional<canopen::Type> parse_type(std::string_view word);
 /// Returns the valid types, for messages.
-std::string type_words();
+std::string type_names();
 /// Returns "u16"; "" for none.
 std::string type_word(canopen::Type);
 

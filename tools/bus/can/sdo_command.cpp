@@ -35,7 +35,7 @@ bool parse_target(const SdoOptions& options, SdoTarget& target) {
     }
     if (!options.type.empty() && !(target.type = parse_type(options.type))) {
         fail(options,
-             fmt::format("invalid --type '{}'; write one of: {}", options.type, type_words()));
+             fmt::format("invalid --type '{}'; write one of: {}", options.type, type_names()));
 
         return false;
     }

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <fmt/core.h>
 
-#include "bus/ethercat/datagram_words.hpp"
+#include "bus/ethercat/datagram_text.hpp"
 #include "bus/ethercat/options.hpp"
 #include "bus/ethercat/words.hpp"
 #include "cli/output.hpp"
@@ -37,7 +37,7 @@ public:
         ++frames_;
         std::string text;
         while (const auto d = reader.next()) {
-            const std::string words = datagram_words(*d);
+            const std::string words = datagram_text(*d);
             const std::string address = datagram_address(*d, passed);
             if (!wanted(*d, words, address)) continue;
             text += options_.json ? json(time_ns, passed, *d, words)
@@ -98,7 +98,7 @@ private:
             seconds(time_ns), passed, to_string(d.command),
             is_logical(d.command) ? d.address : d.position(),
             is_logical(d.command) ? "null" : std::to_string(d.register_address()), d.length,
-            d.wkc(), hex_words({d.data, d.length}), words.empty() ? "null" : json_string(words));
+            d.wkc(), hex_text({d.data, d.length}), words.empty() ? "null" : json_string(words));
     }
 
     const EthercatDumpOptions& options_;

@@ -152,7 +152,7 @@ int run_ethercat_foe_read(const EthercatFileOptions& options) {
     if (!transfer_file(options, session, *s, false, session.arguments()[0], bytes)) return 1;
     if (options.json) {
         return print(fmt::format("{{\"position\":{},\"bytes\":{}}}\n", s->position,
-                                 json_string(hex_words(bytes))))
+                                 json_string(hex_text(bytes))))
                    ? 0
                    : 1;
     }

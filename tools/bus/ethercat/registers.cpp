@@ -73,11 +73,11 @@ int run_ethercat_reg_read(const EthercatPositionOptions& options) {
     }
     if (options.json) {
         return print(fmt::format("{{\"position\":{},\"register\":{},\"bytes\":\"{}\"}}\n",
-                                 s->position, *address, hex_words(*bytes)))
+                                 s->position, *address, hex_text(*bytes)))
                    ? 0
                    : 1;
     }
-    return print(hex_words(*bytes) + "\n") ? 0 : 1;
+    return print(hex_text(*bytes) + "\n") ? 0 : 1;
 }
 
 int run_ethercat_reg_write(const EthercatPositionOptions& options) {
@@ -125,7 +125,7 @@ int run_ethercat_sii_read(const EthercatPositionOptions& options) {
     }
     if (options.json) {
         return print(fmt::format("{{\"position\":{},\"bytes\":\"{}\"}}\n", s->position,
-                                 hex_words(*bytes)))
+                                 hex_text(*bytes)))
                    ? 0
                    : 1;
     }

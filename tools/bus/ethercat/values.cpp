@@ -54,7 +54,7 @@ std::uint64_t little_endian(const Bytes& bytes) {
 }
 
 /// Returns the value as `upload` shows it; `plain` is its second half, as JSON.
-std::string value_words(const Bytes& bytes, const ValueType& type, std::string& plain) {
+std::string value_text_of(const Bytes& bytes, const ValueType& type, std::string& plain) {
     if (type.form == Form::text) {
         const auto end = std::find(bytes.begin(), bytes.end(), 0);
         const std::string text(bytes.begin(), end);
@@ -62,8 +62,8 @@ std::string value_words(const Bytes& bytes, const ValueType& type, std::string& 
         return text;
     }
     if (type.form == Form::octets || bytes.size() != type.bytes) {
-        json_quote(plain, hex_words(bytes));
-        return hex_words(bytes);
+        json_quote(plain, hex_text(bytes));
+        return hex_text(bytes);
     }
     const std::uint64_t raw = little_endian(bytes);
     if (type.form == Form::real) {
@@ -236,7 +236,7 @@ int transfer(const EthercatValueOptions& options, bool download) {
                                 bytes.size(), type->name, type->bytes));
     }
     std::string plain;
-    const std::string text = value_words(bytes, *type, plain);
+    const std::string text = value_text_of(bytes, *type, plain);
     if (options.json) {
         return print(fmt::format(
                    "{{\"position\":{},\"index\":{},\"sub\":{},\"type\":\"{}\",\"value\":{}}}\n",

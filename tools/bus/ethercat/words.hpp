@@ -28,7 +28,7 @@ inline std::optional<std::uint64_t> ethercat_number(const std::string& text, std
 }
 
 /// Returns "0x12 0x34". [any]
-inline std::string hex_words(std::span<const std::uint8_t> bytes) {
+inline std::string hex_text(std::span<const std::uint8_t> bytes) {
     std::string text;
     for (const std::uint8_t b : bytes) {
         text += fmt::format("{}0x{:02x}", text.empty() ? "" : " ", b);

@@ -77,7 +77,7 @@ std::unique_ptr<ethernet::Port> open_interface(const Options& options, const std
     return std::move(opened.port);
 }
 
-std::string state_words(std::uint32_t status) {
+std::string state_text(std::uint32_t status) {
     const auto code = static_cast<std::uint16_t>(status >> 16);
     std::string text;
     switch (status & 0xf) {
@@ -97,7 +97,7 @@ std::string state_words(std::uint32_t status) {
 }
 
 /// Returns the terminals of an output device as text; empty for other devices.
-std::string output_words(const devices::Device& device) {
+std::string output_text(const devices::Device& device) {
     auto* io = dynamic_cast<const devices::IoBehaviour*>(&device.firmware->behaviour());
     if (io == nullptr) {
         return {};
@@ -124,7 +124,7 @@ public:
           seen_(line.size(), 1),
           outputs_(line.size()) {
         for (std::size_t n = 0; n < line.size(); ++n) {
-            outputs_[n] = output_words(line[n]);
+            outputs_[n] = output_text(line[n]);
         }
     }
 
@@ -139,11 +139,11 @@ public:
             const std::uint32_t status = status_[n];
             if (status == 0 || status == seen_[n]) continue;
             seen_[n] = status;
-            report(n, state_words(status));
+            report(n, state_text(status));
         }
         if (now - outputs_at_ >= 1'000'000'000) {
             for (std::size_t n = 0; n < line_.size(); ++n) {
-                if (std::string words = output_words(line_[n]); words != outputs_[n]) {
+                if (std::string words = output_text(line_[n]); words != outputs_[n]) {
                     outputs_at_ = now;
                     report(n, "outputs " + (outputs_[n] = std::move(words)));
                 }

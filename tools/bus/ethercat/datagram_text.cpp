@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "bus/ethercat/datagram_words.hpp"
+#include "bus/ethercat/datagram_text.hpp"
 
 #include <algorithm>
 #include <fmt/core.h>
@@ -70,7 +70,7 @@ std::string object(std::uint16_t index, unsigned sub) {
     return fmt::format("0x{:04X}:{}", index, sub);
 }
 
-std::string sdo_words(Bytes payload, bool request) {
+std::string sdo_text(Bytes payload, bool request) {
     const auto sdo = coe::read_sdo(payload);
     if (!sdo) return "SDO";
     namespace command = coe::command;
@@ -91,7 +91,7 @@ std::string sdo_words(Bytes payload, bool request) {
                                                      : "SDO segment downloaded";
 }
 
-std::string coe_words(Bytes payload) {
+std::string coe_text(Bytes payload) {
     if (payload.size() < coe::header_bytes) return "";
     switch (coe::service_of(payload.data())) {
     case coe::Service::emergency:
@@ -99,15 +99,15 @@ std::string coe_words(Bytes payload) {
             return fmt::format("emergency 0x{:04X}", e->code);
         }
         return "emergency";
-    case coe::Service::sdo_request: return sdo_words(payload, true);
-    case coe::Service::sdo_response: return sdo_words(payload, false);
+    case coe::Service::sdo_request: return sdo_text(payload, true);
+    case coe::Service::sdo_response: return sdo_text(payload, false);
     case coe::Service::sdo_information: return "SDO information";
     default:
         return fmt::format("service {}", static_cast<unsigned>(coe::service_of(payload.data())));
     }
 }
 
-std::string foe_words(Bytes payload) {
+std::string foe_text(Bytes payload) {
     const auto m = foe::read(payload);
     if (!m) return "";
     const std::string text(m->text());
@@ -125,12 +125,12 @@ std::string foe_words(Bytes payload) {
 }
 
 /// A mailbox message; empty when the bytes cannot be one.
-std::string mailbox_words(Bytes bytes) {
+std::string mailbox_text(Bytes bytes) {
     const auto m = read_mailbox(bytes);
     if (!m || m->payload.empty() || (bytes[5] & 0x80) != 0 || bytes[4] != 0) return "";
     switch (m->type) {
-    case MailboxType::coe: return "CoE " + coe_words(m->payload);
-    case MailboxType::foe: return "FoE " + foe_words(m->payload);
+    case MailboxType::coe: return "CoE " + coe_text(m->payload);
+    case MailboxType::foe: return "FoE " + foe_text(m->payload);
     case MailboxType::error:
         if (const auto error = read_mailbox_error(m->payload)) {
             return std::string("mailbox error: ") + to_string(*error);
@@ -172,11 +172,11 @@ std::string datagram_address(const DatagramView& d, bool passed) {
     return "";
 }
 
-std::string datagram_words(const DatagramView& d) {
+std::string datagram_text(const DatagramView& d) {
     if (d.command == Command::nop || is_logical(d.command)) return "";
     const std::uint16_t address = d.register_address();
     if (address >= registers::process_data_memory) {
-        return mailbox_words({d.data, d.length});
+        return mailbox_text({d.data, d.length});
     }
     std::string text = register_name(address);
     if (address == registers::al_control && d.length >= 1) {

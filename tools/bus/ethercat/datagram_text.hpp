@@ -15,6 +15,6 @@ std::string datagram_address(const ethercat::DatagramView&, bool passed);
 
 /// Returns "AL status: OP", "CoE SDO upload 0x6041:0" and the like; empty for process data and
 /// memory of the slave. [any]
-std::string datagram_words(const ethercat::DatagramView&);
+std::string datagram_text(const ethercat::DatagramView&);
 
 }  // namespace hal::tools
