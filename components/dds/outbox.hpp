@@ -46,9 +46,9 @@ public:
         if (tail == head_.load(std::memory_order_acquire)) {
             return {};
         }
-        std::uint8_t* place = memory_.data() + (tail & mask_) * stride_;
-        std::memcpy(&time_ns, place, sizeof time_ns);
-        return {place + stamp, size_};
+        std::uint8_t* slot = memory_.data() + (tail & mask_) * stride_;
+        std::memcpy(&time_ns, slot, sizeof time_ns);
+        return {slot + stamp, size_};
     }
     /// Removes the oldest sample. reader
     void take() noexcept {

@@ -145,7 +145,7 @@ private:
         }
     }
     bool absolute() const noexcept { return encoding < Encoding::index; }
-    bool has_place() const noexcept { return absolute() || homed; }
+    bool knows_position() const noexcept { return absolute() || homed; }
     /// Returns `pocket` wrapped to 1..pockets.
     std::int64_t wrapped(std::int64_t pocket) const noexcept {
         return ((pocket - 1) % pockets + pockets) % pockets + 1;
@@ -238,35 +238,35 @@ private:
             homed = true;
             index_enable = false;
             position_ = 1;
-            last_place_ = 0.0;
+            last_pocket_ = 0.0;
         }
         if (!homed) return;
         const double step = scale != 0 ? static_cast<double>(scale) : 1.0;
         const double turned = static_cast<double>(now - zero_);
-        const double place = turned / step;
+        const double pocket = turned / step;
 
-        const double nearest = std::floor(place + 0.5);
+        const double nearest = std::floor(pocket + 0.5);
         if (std::fabs(turned - nearest * step) <= std::fabs(static_cast<double>(width))) {
             reach(nearest);
         }
         // it has passed the centre between two cycles
-        else if (std::floor(place) > std::floor(last_place_)) {
-            reach(std::floor(place));
-        } else if (std::floor(place) < std::floor(last_place_)) {
-            reach(std::floor(place) + 1.0);
+        else if (std::floor(pocket) > std::floor(last_pocket_)) {
+            reach(std::floor(pocket));
+        } else if (std::floor(pocket) < std::floor(last_pocket_)) {
+            reach(std::floor(pocket) + 1.0);
         }
-        last_place_ = place;
+        last_pocket_ = pocket;
         marker_ = true;
     }
-    void reach(double place) noexcept {
-        position_ = wrapped(1 + static_cast<std::int64_t>(std::clamp(place, -1e12, 1e12)));
+    void reach(double pocket) noexcept {
+        position_ = wrapped(1 + static_cast<std::int64_t>(std::clamp(pocket, -1e12, 1e12)));
     }
 
     // ---- what it does
 
     void begin() noexcept {
         ready = false;
-        if (has_place()) return set_out();
+        if (knows_position()) return set_out();
         asked_index_ = false;
         enter(State::homing);
     }
@@ -389,7 +389,7 @@ private:
         homing = state_ == State::homing;
         state = static_cast<std::int32_t>(state_);
         timer = left_;
-        current_position = static_cast<std::int32_t>(has_place() ? position_ : 0);
+        current_position = static_cast<std::int32_t>(knows_position() ? position_ : 0);
     }
 
     State state_ = State::rests;
@@ -408,7 +408,7 @@ private:
     std::int64_t from_ = 0;
     std::int64_t zero_ = 0;
     double left_ = 0.0;
-    double last_place_ = 0.0;
+    double last_pocket_ = 0.0;
 };
 
 }  // namespace

@@ -383,10 +383,10 @@ private:
             *first = high_ && direction_ > 0;
             *second = high_ && direction_ < 0;
         } else {
-            const std::int64_t place = made_ % sequence_.length;
+            const std::int64_t index = made_ % sequence_.length;
             const unsigned state =
                 sequence_
-                    .states[static_cast<std::size_t>(place < 0 ? place + sequence_.length : place)];
+                    .states[static_cast<std::size_t>(index < 0 ? index + sequence_.length : index)];
             for (int i = 0; i < sequence_.phases; ++i) {
                 *phase_[static_cast<std::size_t>(i)] = ((state >> i) & 1u) != 0;
             }

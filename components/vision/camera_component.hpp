@@ -40,7 +40,7 @@ public:
                   {.per_instance = true}),
           worker_(instance_,
                   make_source(source_.get(),
-                              [this](const std::string& place) { return texts_.find(place); }),
+                              [this](const std::string& address) { return texts_.find(address); }),
                   [this](const Frame& frame) { work(frame); },
                   [this](const Status& status) { deliver(status); }),
           background_([this](std::int64_t now, bool may_wait) { turn(now, may_wait); }),

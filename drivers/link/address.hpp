@@ -33,8 +33,8 @@ inline std::string to_flag(std::string_view key, std::string_view value, bool ha
 template <class Opened, class Options, class Description>
 struct Driver {
     AddressForm form;
-    Opened (*open)(const std::string& place, const Options&);
-    Description (*describe)(const std::string& place);
+    Opened (*open)(const std::string& target, const Options&);
+    Description (*describe)(const std::string& target);
     bool (*is_own_option)(std::string_view key) = nullptr;
     std::string (*own_options)() = nullptr;  ///< their names, for a message
     /// common options it does not support, separated by blanks
@@ -83,10 +83,10 @@ Opened open_address(std::string_view address, Options options,
                              "; write " + address_forms(drivers)};
     }
 
-    const auto place = address.substr(colon + 1);
-    const auto question = std::min(place.find('?'), place.size());
-    auto rest = place.substr(std::min(question + 1, place.size()));
-    std::string where(place.substr(0, question));
+    const auto target = address.substr(colon + 1);
+    const auto question = std::min(target.find('?'), target.size());
+    auto rest = target.substr(std::min(question + 1, target.size()));
+    std::string where(target.substr(0, question));
     const char* separator = "?";
     while (!rest.empty()) {
         const auto end = std::min(rest.find('&'), rest.size());
@@ -135,11 +135,11 @@ Description describe_address(std::string_view address,
     if (colon == address.npos || driver == drivers.end()) {
         return Description{.address = std::string(address), .transport = {}};
     }
-    const auto place = address.substr(colon + 1);
-    const auto question = std::min(place.find('?'), place.size());
-    std::string where(place.substr(0, question));
+    const auto target = address.substr(colon + 1);
+    const auto question = std::min(target.find('?'), target.size());
+    std::string where(target.substr(0, question));
     const char* separator = "?";
-    for (auto rest = place.substr(std::min(question + 1, place.size())); !rest.empty();) {
+    for (auto rest = target.substr(std::min(question + 1, target.size())); !rest.empty();) {
         const auto item = rest.substr(0, rest.find('&'));
         rest.remove_prefix(std::min(item.size() + 1, rest.size()));
         if (driver->is_own_option != nullptr &&

@@ -118,12 +118,12 @@ Ini ini_of(const Json& entries) {
             throw RequestError{
                 "an entry of ini must be [SECTION, KEY, VALUE] or [SECTION, KEY, VALUE, PLACE]"};
         }
-        std::string place = entry.size() == 4 ? text_of(entry[3], "a place") : std::string();
+        std::string location = entry.size() == 4 ? text_of(entry[3], "a place") : std::string();
         ini.add({text_of(entry[0], "a section"),
                  text_of(entry[1], "a key"),
                  text_of(entry[2], "a value"),
                  {},
-                 std::move(place)});
+                 std::move(location)});
     }
     return ini;
 }

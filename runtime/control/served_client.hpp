@@ -107,8 +107,8 @@ struct ServedClient {
         const std::string_view text(in.data() + taken, end - taken);
         return text.ends_with('\r') ? text.substr(0, text.size() - 1) : text;
     }
-    void done_up_to(std::size_t place) {
-        taken = place;
+    void done_up_to(std::size_t offset) {
+        taken = offset;
         not_urgent = false;
         halting_since = 0;
         if (taken < in.size()) return;

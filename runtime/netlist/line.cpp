@@ -12,7 +12,7 @@ std::size_t Line::piece_of(std::size_t at) const {
     if (last_piece_ < pieces_.size() && holds(last_piece_)) return last_piece_;
     const auto after =
         std::upper_bound(pieces_.begin(), pieces_.end(), at,
-                         [](std::size_t place, const Piece& piece) { return place < piece.at; });
+                         [](std::size_t offset, const Piece& piece) { return offset < piece.at; });
     return last_piece_ =
                after == pieces_.begin() ? 0 : static_cast<std::size_t>(after - pieces_.begin()) - 1;
 }

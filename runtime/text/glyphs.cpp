@@ -115,11 +115,11 @@ std::string printable(std::string_view text, std::size_t max_word_size) {
             continue;
         }
         // Cut between characters: not in front of a continuation byte.
-        const auto cut = [&](std::size_t place) {
-            while (place > 0 && place < word.size() && (word[place] & 0xC0) == 0x80) {
-                --place;
+        const auto cut = [&](std::size_t offset) {
+            while (offset > 0 && offset < word.size() && (word[offset] & 0xC0) == 0x80) {
+                --offset;
             }
-            return place;
+            return offset;
         };
         append_printable(out, word.substr(0, cut(max_word_size * 2 / 3)));
         out += "…";

@@ -85,8 +85,9 @@ std::vector<std::string> draw_axis(const Scene& scene, bool unicode) {
         farthest = std::max(farthest, std::abs(position));
     }
     constexpr std::size_t columns = 60;
-    const double place = std::isfinite(position) ? (position / farthest + 1.0) / 2.0 : 0.5;
-    const auto at = static_cast<std::size_t>(std::lround(place * static_cast<double>(columns - 5)));
+    const double fraction = std::isfinite(position) ? (position / farthest + 1.0) / 2.0 : 0.5;
+    const auto at =
+        static_cast<std::size_t>(std::lround(fraction * static_cast<double>(columns - 5)));
     std::string rail;
     for (std::size_t i = 0; i < columns; ++i) {
         rail += unicode ? "─" : "-";

@@ -34,7 +34,7 @@ const SectionKind* find_kind(std::span<const SectionKind> kinds, std::string_vie
     return at == kinds.end() ? nullptr : &*at;
 }
 
-bool by_place(const Entry* a, const Entry* b) { return a->key.at.offset < b->key.at.offset; }
+bool by_offset(const Entry* a, const Entry* b) { return a->key.at.offset < b->key.at.offset; }
 
 }  // namespace
 
@@ -62,7 +62,7 @@ std::vector<Entry*> Keys::all_of(std::string_view beginning) const {
             out.push_back(entry);
         }
     }
-    std::sort(out.begin(), out.end(), by_place);
+    std::sort(out.begin(), out.end(), by_offset);
     return out;
 }
 

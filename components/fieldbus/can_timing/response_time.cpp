@@ -347,8 +347,8 @@ std::vector<std::size_t> sufficient_order(std::span<const Message> messages, con
     // deadlines first
     while (!open.empty()) {
         bool found = false;
-        for (std::size_t place = open.size(); place-- > 0 && !found;) {
-            const std::size_t i = open[place];
+        for (std::size_t index = open.size(); index-- > 0 && !found;) {
+            const std::size_t i = open[index];
             std::vector<Item> busy;
             for (const std::size_t other : open) {
                 if (other != i) {
@@ -361,7 +361,7 @@ std::vector<std::size_t> sufficient_order(std::span<const Message> messages, con
             found = true;
             order.push_back(i);
             blocking = std::max(blocking, items[i].c);
-            open.erase(open.begin() + static_cast<std::ptrdiff_t>(place));
+            open.erase(open.begin() + static_cast<std::ptrdiff_t>(index));
         }
         if (!found) {
             return {};

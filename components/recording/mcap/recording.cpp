@@ -397,11 +397,11 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem,
     std::size_t equal_times = 0;
     for (std::size_t number = 2; std::getline(file, line); ++number) {
         const std::vector<std::string> words = csv_words(line);
-        const std::string place = "'" + path + "', line " + std::to_string(number) + ": ";
+        const std::string location = "'" + path + "', line " + std::to_string(number) + ": ";
         double time_s = 0;
         if (words.size() != names.size() || !number_of(words[0], time_s) ||
             !(std::abs(time_s) < 9e9)) {
-            problem = place + "not a row of " + std::to_string(names.size()) + " numbers";
+            problem = location + "not a row of " + std::to_string(names.size()) + " numbers";
             return false;
         }
         for (std::size_t i = 1; i < words.size(); ++i) {
@@ -412,9 +412,9 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem,
             const auto word = std::find_if(std::begin(type_words), std::end(type_words),
                                            [type](const auto& one) { return one.second == type; });
             if (type == HAL_TYPE_FLOAT) {
-                problem = place + "not a row of " + std::to_string(names.size()) + " numbers";
+                problem = location + "not a row of " + std::to_string(names.size()) + " numbers";
             } else {
-                problem = place + "'" + words[i].substr(0, 40) + "' of '" + names[i] +
+                problem = location + "'" + words[i].substr(0, 40) + "' of '" + names[i] +
                           "' is not a value of type " + std::string(word->first);
             }
             return false;

@@ -77,7 +77,7 @@ double noise(const cv::Mat& grey) {
 /// root mean square.
 struct Candidate {
     cv::Matx33d rotation;
-    cv::Vec3d place;
+    cv::Vec3d position;
     double error_px = 0;
 };
 using Candidates = std::array<Candidate, 2>;
@@ -159,7 +159,7 @@ struct MarkerDetector::Inside {
     Candidates candidates(const View& view) const;
     Candidate judged(const View& view, const cv::Mat& r, const cv::Mat& t) const;
     Candidate refined(const View& view, const Candidates& both, std::size_t chosen) const;
-    void place(Marker& marker, double size, bool alone);
+    void position(Marker& marker, double size, bool alone);
 };
 
 MarkerDetector::MarkerDetector(const std::string& dictionary, std::optional<Camera> camera)
@@ -215,7 +215,7 @@ std::vector<Marker> MarkerDetector::find(const Frame& frame, int id, double size
             marker.corners[c] = {corners[i][c].x, corners[i][c].y};
         }
         if (in.camera && size_mm > 0.0) {
-            in.place(marker, size_mm, std::count(ids.begin(), ids.end(), marker.id) == 1);
+            in.position(marker, size_mm, std::count(ids.begin(), ids.end(), marker.id) == 1);
         }
         found.push_back(marker);
     }
@@ -265,7 +265,7 @@ Candidate MarkerDetector::Inside::judged(const View& view, const cv::Mat& r,
     }
     Candidate c;
     cv::Rodrigues(r, c.rotation);
-    c.place = {t.at<double>(0), t.at<double>(1), t.at<double>(2)};
+    c.position = {t.at<double>(0), t.at<double>(1), t.at<double>(2)};
     c.error_px = std::sqrt(sum / 4);
     return c;
 }
@@ -275,7 +275,7 @@ Candidate MarkerDetector::Inside::judged(const View& view, const cv::Mat& r,
 Candidate MarkerDetector::Inside::refined(const View& view, const Candidates& both,
                                           std::size_t chosen) const {
     const Candidate& from = both[chosen];
-    cv::Mat r, t(from.place, true);
+    cv::Mat r, t(from.position, true);
     cv::Rodrigues(from.rotation, r);
     cv::solvePnPRefineLM(view.square, view.seen, k, d, r, t);
     const Candidate to = judged(view, r, t);
@@ -285,7 +285,7 @@ Candidate MarkerDetector::Inside::refined(const View& view, const Candidates& bo
 }
 
 // Two markers of one id in a frame cannot be followed: each is then placed by this frame alone.
-void MarkerDetector::Inside::place(Marker& marker, double size, bool alone) {
+void MarkerDetector::Inside::position(Marker& marker, double size, bool alone) {
     const double h = size / 2;
     View view{{{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}}, {}};
     for (const auto& c : marker.corners) {
@@ -297,9 +297,9 @@ void MarkerDetector::Inside::place(Marker& marker, double size, bool alone) {
     track.add(both, calls);
     const Candidate of = refined(view, both, track.chosen);
     const auto& m = of.rotation;
-    marker.pose.x_mm = of.place[0];
-    marker.pose.y_mm = of.place[1];
-    marker.pose.z_mm = of.place[2];
+    marker.pose.x_mm = of.position[0];
+    marker.pose.y_mm = of.position[1];
+    marker.pose.z_mm = of.position[2];
     marker.pose.roll_deg = degrees(std::atan2(m(2, 1), m(2, 2)));
     marker.pose.pitch_deg = degrees(std::asin(std::clamp(-m(2, 0), -1.0, 1.0)));
     marker.pose.yaw_deg = degrees(std::atan2(m(1, 0), m(0, 0)));

@@ -462,15 +462,15 @@ private:
 
 }  // namespace
 
-Description describe(const std::string& place) {
+Description describe(const std::string& target) {
     Settings settings;
-    (void)parse(place, settings, false);  // open() reports what is wrong with the options
+    (void)parse(target, settings, false);  // open() reports what is wrong with the options
     return describe_settings(settings);
 }
 
-Opened open(const std::string& place, const Options& options) {
+Opened open(const std::string& target, const Options& options) {
     Settings settings;
-    if (auto problem = parse(place, settings); !problem.empty()) {
+    if (auto problem = parse(target, settings); !problem.empty()) {
         return {nullptr, std::move(problem)};
     }
     if (options.fd) {

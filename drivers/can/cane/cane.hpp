@@ -13,10 +13,10 @@ bool is_own_option(std::string_view key);
 /// Returns the names of its own options: "format, order, …". [setup]
 std::string own_options();
 
-/// Opens `cane:IF?key=value`: CAN messages in Ethernet frames. `place` includes the driver's own
+/// Opens `cane:IF?key=value`: CAN messages in Ethernet frames. `target` includes the driver's own
 /// options. [setup]
-Opened open(const std::string& place, const Options&);
+Opened open(const std::string& target, const Options&);
 /// Describes the link that open() would return, as far as the place determines it. [setup]
-Description describe(const std::string& place);
+Description describe(const std::string& target);
 
 }  // namespace hal::can::cane

@@ -148,16 +148,16 @@ bool is_own_option(std::string_view key) {
     return is_in(own_keys, key) || is_in(segment_keys, key) || key.starts_with("node");
 }
 
-std::string parse(std::string_view place, Settings& s, bool reads_key) {
-    const auto question = std::min(place.find('?'), place.size());
-    s.segment = place.substr(0, question);
+std::string parse(std::string_view target, Settings& s, bool reads_key) {
+    const auto question = std::min(target.find('?'), target.size());
+    s.segment = target.substr(0, question);
     if (s.segment.empty()) {
         return "missing interface; write cane:enp3s0, or cane:sim:bus0 for a segment in memory";
     }
     if (s.segment.find(':') == std::string::npos) {
         s.segment.insert(0, "eth:");
     }
-    auto rest = place.substr(std::min(question + 1, place.size()));
+    auto rest = target.substr(std::min(question + 1, target.size()));
     while (!rest.empty()) {
         const auto end = std::min(rest.find('&'), rest.size());
         const auto item = rest.substr(0, end);

@@ -29,8 +29,8 @@ struct Settings {
     std::optional<Key> key;  ///< signs all frames
 };
 
-/// Parses `place` and sets the segment in any case. Returns the problem, or "". With `read_key` it
+/// Parses `target` and sets the segment in any case. Returns the problem, or "". With `read_key` it
 /// also reads the file of `key=`. [setup]
-std::string parse(std::string_view place, Settings&, bool read_key = true);
+std::string parse(std::string_view target, Settings&, bool read_key = true);
 
 }  // namespace hal::can::cane

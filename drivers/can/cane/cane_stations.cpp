@@ -48,25 +48,25 @@ void Nodes::fix(unsigned id, const Address& a) noexcept {
     }
 }
 
-bool Nodes::learn(Place& place, const Address& from, std::int64_t now_ns) noexcept {
-    const auto is = place.is.load(std::memory_order_relaxed);
+bool Nodes::learn(Place& node, const Address& from, std::int64_t now_ns) noexcept {
+    const auto is = node.is.load(std::memory_order_relaxed);
     if ((is & fixed) != 0) return (is & address_bits) == number(from);
     const bool same = (is & known) != 0 && (is & address_bits) == number(from);
     const auto silent = [now_ns](std::int64_t since) { return now_ns - since >= moved_after_ns; };
     if (same) {
-        place.heard_ns = now_ns;
-        if ((is & doubtful) != 0 && silent(place.other_ns)) {
-            place.is.store(is & ~doubtful, std::memory_order_relaxed);
+        node.heard_ns = now_ns;
+        if ((is & doubtful) != 0 && silent(node.other_ns)) {
+            node.is.store(is & ~doubtful, std::memory_order_relaxed);
         }
-        return (is & doubtful) == 0 || silent(place.other_ns);
+        return (is & doubtful) == 0 || silent(node.other_ns);
     }
-    if ((is & known) == 0 || silent(place.heard_ns)) {
-        place.heard_ns = now_ns;
-        place.is.store(number(from) | known, std::memory_order_relaxed);
+    if ((is & known) == 0 || silent(node.heard_ns)) {
+        node.heard_ns = now_ns;
+        node.is.store(number(from) | known, std::memory_order_relaxed);
         return true;
     }
-    place.other_ns = now_ns;
-    place.is.store(is | doubtful, std::memory_order_relaxed);
+    node.other_ns = now_ns;
+    node.is.store(is | doubtful, std::memory_order_relaxed);
     return false;
 }
 
@@ -88,8 +88,8 @@ std::optional<Address> Nodes::where(std::uint32_t id, bool produced_to_master) c
     const std::uint32_t code = id & 0x780;
     const std::uint32_t node = id & 0x7f;
     if (node == 0 || id > 0x7ff) return std::nullopt;
-    const auto of = [](const std::atomic<std::uint64_t>& place) -> std::optional<Address> {
-        const auto is = place.load(std::memory_order_relaxed);
+    const auto of = [](const std::atomic<std::uint64_t>& node) -> std::optional<Address> {
+        const auto is = node.load(std::memory_order_relaxed);
         if ((is & known) == 0 || (is & doubtful) != 0) return std::nullopt;
         return address(is & address_bits);
     };

@@ -39,28 +39,28 @@ struct Place {
 
 Place parse(const std::string& text) {
     const auto question = std::min(text.find('?'), text.size());
-    Place place{text.substr(0, question)};
-    if (question == text.size()) return place;
+    Place target{text.substr(0, question)};
+    if (question == text.size()) return target;
     const std::string option = text.substr(question + 1);
 
     const std::string value = option.substr(std::min(option.find('=') + 1, option.size()));
     const auto [end, wrong] =
-        std::from_chars(value.data(), value.data() + value.size(), place.slot);
-    if (wrong != std::errc{} || end != value.data() + value.size() || place.slot == 0 ||
-        place.slot > 255) {
-        place.problem = "invalid slot '" + value + "'; write the number of a private slot of " +
-                        place.node + ", as in scocan:" + place.node + "?slot=3";
+        std::from_chars(value.data(), value.data() + value.size(), target.slot);
+    if (wrong != std::errc{} || end != value.data() + value.size() || target.slot == 0 ||
+        target.slot > 255) {
+        target.problem = "invalid slot '" + value + "'; write the number of a private slot of " +
+                         target.node + ", as in scocan:" + target.node + "?slot=3";
     }
-    return place;
+    return target;
 }
 
-Description description_of(const Place& place) {
+Description description_of(const Place& target) {
     Description d;
-    d.address = "scocan:" + place.node +
-                (place.slot == SlotFrame::any_slot ? "" : "?slot=" + std::to_string(place.slot));
+    d.address = "scocan:" + target.node +
+                (target.slot == SlotFrame::any_slot ? "" : "?slot=" + std::to_string(target.slot));
     d.transport = "time slots on CAN (SCoCAN)";
     d.in_slots = true;
-    if (const auto exchange = slots_of(place.node)) {
+    if (const auto exchange = slots_of(target.node)) {
         d.bit_rate = exchange->description.bit_rate;
         d.simulated = exchange->description.simulated;
     }
@@ -70,12 +70,12 @@ Description description_of(const Place& place) {
 
 class SlotLink final : public FilteringLink {
 public:
-    SlotLink(const Place& place, std::shared_ptr<SlotExchange> exchange, const Options& options)
-        : place_(place),
+    SlotLink(const Place& target, std::shared_ptr<SlotExchange> exchange, const Options& options)
+        : place_(target),
           options_(options),
           exchange_(std::move(exchange)),
           user_(options.send_capacity, options.receive_capacity) {
-        description_ = description_of(place);
+        description_ = description_of(target);
     }
     ~SlotLink() override { exchange_->remove(user_); }
     bool join() { return exchange_->add(user_); }
@@ -140,31 +140,31 @@ private:
 bool is_own_option(std::string_view key) { return key == "slot"; }
 std::string own_options() { return "slot"; }
 
-Description describe(const std::string& place) { return description_of(parse(place)); }
+Description describe(const std::string& target) { return description_of(parse(target)); }
 
 Opened open(const std::string& text, const Options& options) {
-    const Place place = parse(text);
-    if (place.node.empty()) {
+    const Place target = parse(text);
+    if (target.node.empty()) {
         return {nullptr, "missing name of the node; write scocan:motor"};
     }
-    if (!place.problem.empty()) {
-        return {nullptr, place.problem};
+    if (!target.problem.empty()) {
+        return {nullptr, target.problem};
     }
-    auto exchange = slots_of(place.node);
+    auto exchange = slots_of(target.node);
     if (!exchange) {
         std::string names;
         for (const auto& name : offered_slots()) {
             names += (names.empty() ? "" : ", ") + name;
         }
         return {nullptr,
-                "no node '" + place.node + "' in this process; " +
+                "no node '" + target.node + "' in this process; " +
                     (names.empty()
-                         ? "load it before: loadrt scocan config=FILE.scocan node=" + place.node
+                         ? "load it before: loadrt scocan config=FILE.scocan node=" + target.node
                          : "nodes are " + names)};
     }
-    auto link = std::make_unique<SlotLink>(place, std::move(exchange), options);
+    auto link = std::make_unique<SlotLink>(target, std::move(exchange), options);
     if (!link->join()) {
-        return {nullptr, "node '" + place.node + "' has 16 links already"};
+        return {nullptr, "node '" + target.node + "' has 16 links already"};
     }
     return {std::move(link), {}};
 }

@@ -13,10 +13,10 @@ bool is_own_option(std::string_view key);
 /// Returns the names of its own options. [setup]
 std::string own_options();
 
-/// Opens `scocan:NODE?slot=N`: the slots of a node of this process. `place` includes the driver's
+/// Opens `scocan:NODE?slot=N`: the slots of a node of this process. `target` includes the driver's
 /// own options. [setup]
-Opened open(const std::string& place, const Options&);
+Opened open(const std::string& target, const Options&);
 /// Describes the link that open() would return, as far as the place determines it. [setup]
-Description describe(const std::string& place);
+Description describe(const std::string& target);
 
 }  // namespace hal::can::scocan

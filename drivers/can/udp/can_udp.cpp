@@ -151,14 +151,14 @@ link::Descriptor sender(const Place& p, std::string& problem) {
 
 class UdpLink final : public FilteringLink {
 public:
-    UdpLink(const Place& place, const Options& options, link::Descriptor in, link::Descriptor out)
+    UdpLink(const Place& target, const Options& options, link::Descriptor in, link::Descriptor out)
         : options_(options),
           in_(std::move(in)),
           out_(std::move(out)),
           outgoing_(options.send_capacity) {
         counting_.bit_rate = options.bit_rate != unlimited ? options.bit_rate : 0;
         counting_.data_rate = options.data_rate;
-        description_.address = place.text;
+        description_.address = target.text;
         description_.transport = "CAN over UDP multicast";
         description_.bit_rate = counting_.bit_rate;
         description_.data_rate = counting_.data_rate;
@@ -319,16 +319,16 @@ private:
 
 }  // namespace
 
-Description describe(const std::string& place) {
+Description describe(const std::string& target) {
     std::string problem;
-    const std::string text = parse(place, problem).text;
-    return {.address = problem.empty() ? text : "udp:" + place,
+    const std::string text = parse(target, problem).text;
+    return {.address = problem.empty() ? text : "udp:" + target,
             .transport = "CAN over UDP multicast"};
 }
 
-Opened open(const std::string& place, const Options& options) {
+Opened open(const std::string& target, const Options& options) {
     std::string problem;
-    const Place p = parse(place, problem);
+    const Place p = parse(target, problem);
     if (!problem.empty()) {
         return {nullptr, problem};
     }

@@ -94,9 +94,9 @@ Sent Pacer::send(std::span<const std::uint8_t> frame, const Launch& launch,
     if (unused == nullptr) return sender_.drop(Sent::full);
     const auto number = *unused;
     unused_.drop();
-    Place& place = places_[number];
-    std::memcpy(place.bytes.data(), frame.data(), place.length = frame.size());
-    place.launch = launch;
+    Place& slot = places_[number];
+    std::memcpy(slot.bytes.data(), frame.data(), slot.length = frame.size());
+    slot.launch = launch;
     outgoing_.push(number);  // the queue is as large as the pool
     const auto wanted = spin_ns_ < launch.at_ns ? launch.at_ns - spin_ns_ : 0;
     if (wanted < asleep_until_.fetch_add(0, std::memory_order_acq_rel)) {
@@ -164,12 +164,12 @@ void Pacer::run() noexcept {
         if (!look_until(next.at_ns - nothing_new_ns)) continue;
         std::pop_heap(waiting_.begin(), waiting_.end());
         waiting_.pop_back();
-        const Place& place = places_[next.place];
+        const Place& slot = places_[next.slot];
         const auto began = link::monotonic_ns();
         sender_.await(next.at_ns);
         (void)budget_.spent(began, link::monotonic_ns());
-        sender_.leave({place.bytes.data(), place.length}, place.launch);
-        unused_.push(next.place);
+        sender_.leave({slot.bytes.data(), slot.length}, slot.launch);
+        unused_.push(next.slot);
     }
 }
 

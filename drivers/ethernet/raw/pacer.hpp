@@ -39,7 +39,7 @@ private:
     struct Waiting {
         std::int64_t at_ns;
         std::uint64_t sequence;
-        std::uint32_t place;
+        std::uint32_t slot;
         bool operator<(const Waiting& o) const noexcept {
             return at_ns != o.at_ns ? at_ns > o.at_ns : sequence > o.sequence;
         }

@@ -19,7 +19,7 @@ namespace hal::ethernet::rawether {
 
 namespace {
 
-constexpr std::size_t place_bytes = 2048;
+constexpr std::size_t slot_bytes = 2048;
 constexpr std::size_t block_bytes = 65536;
 
 template <class T>
@@ -35,14 +35,14 @@ std::vector<sock_filter> filter(const std::vector<std::uint16_t>& types, bool pr
         code.push_back({what, static_cast<std::uint8_t>(when_true),
                         static_cast<std::uint8_t>(when_false), value});
     };
-    const auto place = [](int of) { return static_cast<std::uint32_t>(SKF_AD_OFF + of); };
+    const auto ancillary = [](int of) { return static_cast<std::uint32_t>(SKF_AD_OFF + of); };
     if (!promiscuous) {
-        add(BPF_LD | BPF_W | BPF_ABS, place(SKF_AD_PKTTYPE));
+        add(BPF_LD | BPF_W | BPF_ABS, ancillary(SKF_AD_PKTTYPE));
         add(BPF_JMP | BPF_JEQ | BPF_K, PACKET_OTHERHOST, 0, 1);
         add(BPF_RET | BPF_K, 0);
     }
     if (!types.empty()) {
-        add(BPF_LD | BPF_W | BPF_ABS, place(SKF_AD_PROTOCOL));
+        add(BPF_LD | BPF_W | BPF_ABS, ancillary(SKF_AD_PROTOCOL));
         for (std::size_t i = 0; i < types.size(); ++i) {
             add(BPF_JMP | BPF_JEQ | BPF_K, types[i], types.size() - i, 0);
         }
@@ -58,7 +58,7 @@ const std::uint32_t Receiver::user_ = TP_STATUS_USER;
 
 Receiver::~Receiver() {
     if (memory_ != nullptr) {
-        munmap(memory_, frames_ * place_bytes);
+        munmap(memory_, frames_ * slot_bytes);
     }
 }
 
@@ -86,16 +86,16 @@ std::string Receiver::open(const Options& options) {
     }
     frames_ = std::bit_ceil(std::clamp<std::size_t>(options.receive_capacity, 32, 16384));
     tpacket_req ring{};
-    ring.tp_frame_size = place_bytes;
+    ring.tp_frame_size = slot_bytes;
     ring.tp_frame_nr = static_cast<unsigned>(frames_);
-    ring.tp_block_size = static_cast<unsigned>(std::min(block_bytes, frames_ * place_bytes));
-    ring.tp_block_nr = static_cast<unsigned>(frames_ * place_bytes / ring.tp_block_size);
+    ring.tp_block_size = static_cast<unsigned>(std::min(block_bytes, frames_ * slot_bytes));
+    ring.tp_block_nr = static_cast<unsigned>(frames_ * slot_bytes / ring.tp_block_size);
     if (!set(socket_.get(), SOL_PACKET, PACKET_VERSION, version) ||
         !set(socket_.get(), SOL_PACKET, PACKET_RX_RING, ring)) {
         return "cannot create the receive ring: " + link::reason() +
                "; try a smaller one: ?receivequeue=64";
     }
-    void* memory = mmap(nullptr, frames_ * place_bytes, PROT_READ | PROT_WRITE,
+    void* memory = mmap(nullptr, frames_ * slot_bytes, PROT_READ | PROT_WRITE,
                         MAP_SHARED | MAP_POPULATE, socket_.get(), 0);
     if (memory == MAP_FAILED) return "cannot map the receive ring: " + link::reason();
     memory_ = static_cast<std::uint8_t*>(memory);
@@ -119,7 +119,7 @@ bool Receiver::bind(int index) noexcept {
 
 std::atomic_ref<std::uint32_t> Receiver::status(std::size_t frame) noexcept {
     return std::atomic_ref(
-        reinterpret_cast<tpacket2_hdr*>(memory_ + frame * place_bytes)->tp_status);
+        reinterpret_cast<tpacket2_hdr*>(memory_ + frame * slot_bytes)->tp_status);
 }
 
 void Receiver::release() noexcept {
@@ -130,12 +130,12 @@ void Receiver::release() noexcept {
 
 std::optional<Arrival> Receiver::next(RealTime& clock) noexcept {
     while (ready()) {
-        std::uint8_t* place = memory_ + next_ * place_bytes;
-        const auto& header = *reinterpret_cast<const tpacket2_hdr*>(place);
+        std::uint8_t* const slot = memory_ + next_ * slot_bytes;
+        const auto& header = *reinterpret_cast<const tpacket2_hdr*>(slot);
         next_ = (next_ + 1) & (frames_ - 1);
         held_ = true;
         if (header.tp_len != header.tp_snaplen || header.tp_snaplen < header_bytes ||
-            header.tp_mac + header.tp_snaplen > place_bytes) {
+            header.tp_mac + header.tp_snaplen > slot_bytes) {
             errors.fetch_add(1, std::memory_order_relaxed);
             continue;
         }
@@ -143,7 +143,7 @@ std::optional<Arrival> Receiver::next(RealTime& clock) noexcept {
         received_bytes.fetch_add(header.tp_snaplen, std::memory_order_relaxed);
         const auto stamp = header.tp_sec * std::int64_t{1'000'000'000} + header.tp_nsec;
         last_ns_ = clock.to_monotonic(stamp, last_ns_, link::monotonic_ns());
-        return Arrival{{place + header.tp_mac, header.tp_snaplen}, last_ns_};
+        return Arrival{{slot + header.tp_mac, header.tp_snaplen}, last_ns_};
     }
     return std::nullopt;
 }

@@ -136,7 +136,7 @@ void Switch::remove(std::unique_ptr<User> user) {
     auto& waiting = user->waiting;
     for (auto& w : waiting) {
         if (w.at_ns > now) {
-            give_back(*user, w.place);
+            give_back(*user, w.slot);
         }
     }
     std::erase_if(waiting, [&](const auto& w) { return w.at_ns > now; });
@@ -188,13 +188,13 @@ void Switch::collect(std::int64_t now) noexcept {
     if (now == unclocked) return;
     for (auto& s : stations) {
         for (User* u : s->users) {
-            for (const std::uint32_t* place = nullptr; (place = u->outgoing.front()) != nullptr;
+            for (const std::uint32_t* slot = nullptr; (slot = u->outgoing.front()) != nullptr;
                  u->outgoing.drop()) {
-                auto& at = u->places[*place].at_ns;
+                auto& at = u->places[*slot].at_ns;
                 if (at == unclocked) {
                     at = now - 1;  // sent before a time was known
                 }
-                u->waiting.push_back({at, u->sequence++, *place});
+                u->waiting.push_back({at, u->sequence++, *slot});
                 std::push_heap(u->waiting.begin(), u->waiting.end());
             }
         }
@@ -247,7 +247,7 @@ void Switch::launch(Station& s, std::int64_t start) noexcept {
             from = u;
         }
     }
-    std::uint32_t place = 0;
+    std::uint32_t slot = 0;
     const bool babbled =
         s.babble_period > 0 && (from == nullptr || s.babble_at <= from->waiting.front().at_ns);
     if (babbled) {
@@ -255,29 +255,29 @@ void Switch::launch(Station& s, std::int64_t start) noexcept {
         from = s.babbler.get();
         const std::uint32_t* unused = from->unused.front();
         if (unused == nullptr) return;
-        place = *unused;
+        slot = *unused;
         from->unused.drop();
-        Outgoing& f = from->places[place];
+        Outgoing& f = from->places[slot];
         std::memcpy(f.bytes.data(), s.babble.data(), f.length = s.babble_length);
         f.launch = {};
         f.at_ns = start;
     } else {
         if (from == nullptr) return;
-        place = from->waiting.front().place;
+        slot = from->waiting.front().slot;
         std::pop_heap(from->waiting.begin(), from->waiting.end());
         from->waiting.pop_back();
     }
-    Outgoing& f = from->places[place];
+    Outgoing& f = from->places[slot];
     const auto count = [](auto& counter, std::uint64_t by = 1) {
         counter.fetch_add(by, std::memory_order_relaxed);
     };
     if (s.cut.load(std::memory_order_relaxed)) {
         count(from->thrown_away);
-        return give_back(*from, place);
+        return give_back(*from, slot);
     }
     if (f.launch.is_late(start)) {
         count(from->late);
-        return give_back(*from, place);
+        return give_back(*from, slot);
     }
     if (f.launch.at_ns != 0) {
         from->launch_error_ns.store(start - f.launch.at_ns, std::memory_order_relaxed);
@@ -295,7 +295,7 @@ void Switch::launch(Station& s, std::int64_t start) noexcept {
     Event e{s.to_switch_free + (responding != nullptr ? 0 : forward_ns),
             0,
             from,
-            place,
+            slot,
             -1,
             static_cast<std::uint32_t>(f.length),
             -1,
@@ -308,7 +308,7 @@ void Switch::launch(Station& s, std::int64_t start) noexcept {
 
 /// Forwards a frame from the switch to the lines of its receivers.
 void Switch::pass_on(const Event& e) noexcept {
-    const Bytes& bytes = e.from->places[e.place].bytes;
+    const Bytes& bytes = e.from->places[e.slot].bytes;
     if (e.to >= 0) {
         if (Station* s = station(e.to)) {
             deliver(e, *s);
@@ -346,7 +346,7 @@ void Switch::deliver(const Event& e, Station& s) noexcept {
     if (!crowded) {
         s.from_switch_free = cable ? start : start + wire_ns(e.length);
     }
-    const Outgoing& f = e.from->places[e.place];
+    const Outgoing& f = e.from->places[e.slot];
     Address to;
     std::memcpy(to.data(), f.bytes.data(), to.size());
     for (User* u : s.users) {
@@ -369,7 +369,7 @@ void Switch::deliver(const Event& e, Station& s) noexcept {
             u->responder->arrived({bytes.data(), e.length}, e.time_ns - wire_ns(e.length));
             continue;
         }
-        Incoming* in = crowded ? nullptr : u->incoming.place();
+        Incoming* in = crowded ? nullptr : u->incoming.slot();
         if (in == nullptr) {
             count(u->lost);
             continue;
@@ -392,7 +392,7 @@ void Switch::deliver(const Event& e, Station& s) noexcept {
 /// Applies disturbances to the frame. Returns true when nothing of it proceeds unchanged. Those of
 /// one receiver apply at its line, all others where the frame leaves.
 bool Switch::disturbed(Event& e, bool only_one) noexcept {
-    const Bytes& bytes = e.from->places[e.place].bytes;
+    const Bytes& bytes = e.from->places[e.slot].bytes;
     Active* found = nullptr;
     for (auto& d : disturbances) {
         const Disturbance& w = d.what;
@@ -438,18 +438,18 @@ bool Switch::add_event(const Event& e) noexcept {
     if (events_.size() == max_events) return false;
     events_.push_back(e);
     events_.back().sequence = sequence_++;
-    ++e.from->places[e.place].references;
+    ++e.from->places[e.slot].references;
     std::push_heap(events_.begin(), events_.end());
     return true;
 }
 
 void Switch::release(const Event& e) noexcept {
-    if (--e.from->places[e.place].references == 0) {
-        give_back(*e.from, e.place);
+    if (--e.from->places[e.slot].references == 0) {
+        give_back(*e.from, e.slot);
     }
 }
 
-void Switch::give_back(User& user, std::uint32_t place) noexcept { user.unused.push(place); }
+void Switch::give_back(User& user, std::uint32_t slot) noexcept { user.unused.push(slot); }
 
 std::uint64_t Switch::draw() noexcept {  // splitmix64
     random += 0x9e3779b97f4a7c15U;

@@ -58,7 +58,7 @@ struct User {
     struct Waiting {
         std::int64_t at_ns;
         std::uint64_t sequence;
-        std::uint32_t place;
+        std::uint32_t slot;
         bool operator<(const Waiting& o) const noexcept {
             return at_ns != o.at_ns ? at_ns > o.at_ns : sequence > o.sequence;
         }
@@ -160,7 +160,7 @@ private:
         std::int64_t time_ns = 0;
         std::uint64_t sequence = 0;
         User* from = nullptr;
-        std::uint32_t place = 0;
+        std::uint32_t slot = 0;
         std::int32_t to = -1;  ///< to this station only; -1: all
         std::uint32_t length = 0;
         std::int32_t garbled = -1;  ///< index of a garbled byte,
@@ -178,7 +178,7 @@ private:
     bool add_event(const Event&) noexcept;
     bool disturbed(Event&, bool only_one) noexcept;
     void release(const Event&) noexcept;
-    void give_back(User&, std::uint32_t place) noexcept;
+    void give_back(User&, std::uint32_t slot) noexcept;
     std::int64_t wire_ns(std::size_t length) const noexcept {
         return static_cast<std::int64_t>(wire_bytes(length) * 8000 / speed);
     }

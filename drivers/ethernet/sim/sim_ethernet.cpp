@@ -12,7 +12,7 @@ namespace hal::ethernet::simbus {
 namespace {
 
 constexpr std::size_t most_disturbances = 64;
-constexpr std::size_t babbled_places = 256;
+constexpr std::size_t babble_capacity = 256;
 
 class SimulatedPort final : public Port, public Segment {
 public:
@@ -49,9 +49,9 @@ public:
             count(user_.dropped);
             return Sent::full;
         }
-        const auto place = *unused;
+        const auto slot = *unused;
         user_.unused.drop();
-        Outgoing& f = user_.places[place];
+        Outgoing& f = user_.places[slot];
         std::memcpy(f.bytes.data(), frame.data(), frame.size());
         // frames of a station leave in order
         if (launch.finisher != nullptr) {
@@ -62,7 +62,7 @@ public:
         f.launch = launch;
         f.at_ns = std::max(launch.at_ns != 0 ? launch.at_ns : unclocked, now);
         link::trace_frame(link::ethernet_sent, frame);
-        user_.outgoing.push(place);  // the queue is as large as the pool
+        user_.outgoing.push(slot);  // the queue is as large as the pool
         return Sent::queued;
     }
 
@@ -143,7 +143,7 @@ public:
         });
         if (!has_one) {
             Options options;
-            options.send_capacity = babbled_places;
+            options.send_capacity = babble_capacity;
             babbler = std::make_unique<User>(options);
         }
         switch_->exclusively([&] {
@@ -196,23 +196,23 @@ private:
 
 }  // namespace
 
-Description describe(const std::string& place) {
-    const auto slash = place.find('/');
-    return {.address = "sim:" + place,
+Description describe(const std::string& target) {
+    const auto slash = target.find('/');
+    return {.address = "sim:" + target,
             .transport = "segment in memory",
-            .interface = slash + 1 < place.size() ? place.substr(slash + 1) : place,
+            .interface = slash + 1 < target.size() ? target.substr(slash + 1) : target,
             .simulated = true,
             .in_memory = true};
 }
 
-Opened open(const std::string& place, const Options& options) {
-    const auto slash = place.find('/');
-    const auto name = place.substr(0, slash);
-    const auto station = slash == place.npos ? std::string{} : place.substr(slash + 1);
+Opened open(const std::string& target, const Options& options) {
+    const auto slash = target.find('/');
+    const auto name = target.substr(0, slash);
+    const auto station = slash == target.npos ? std::string{} : target.substr(slash + 1);
     if (name.empty()) {
         return {nullptr, "missing name of the segment; write sim:net0"};
     }
-    if (slash != place.npos && station.empty()) {
+    if (slash != target.npos && station.empty()) {
         return {nullptr, "missing name of the station; write sim:" + name + "/master"};
     }
     std::string problem;
@@ -224,7 +224,7 @@ Opened open(const std::string& place, const Options& options) {
     if (!segment->add(*user, station, options, problem)) {
         return {nullptr, problem};
     }
-    return {std::make_unique<SimulatedPort>(std::move(segment), std::move(user), describe(place)),
+    return {std::make_unique<SimulatedPort>(std::move(segment), std::move(user), describe(target)),
             {}};
 }
 

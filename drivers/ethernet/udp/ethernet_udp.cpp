@@ -46,9 +46,9 @@ bool set(int fd, int level, int name, const T& value) {
 
 class UdpPort final : public Port {
 public:
-    UdpPort(const std::string& place, const Options& options, std::uint16_t type)
+    UdpPort(const std::string& target, const Options& options, std::uint16_t type)
         : options_(options), type_(type) {
-        description_ = udp::describe(place);
+        description_ = udp::describe(target);
     }
 
     /// Opens the socket towards a host, or on it. Returns the problem, or "". [setup]
@@ -274,18 +274,18 @@ private:
     }
 
     void remember(std::uint64_t address, std::int64_t now) noexcept {
-        Peer* place = peers_.data();
+        Peer* oldest = peers_.data();
         for (Peer& p : peers_) {
             if (p.address.load(std::memory_order_relaxed) == address) {
                 return p.heard_ns.store(now, std::memory_order_relaxed);
             }
             if (p.heard_ns.load(std::memory_order_relaxed) <
-                place->heard_ns.load(std::memory_order_relaxed)) {
-                place = &p;
+                oldest->heard_ns.load(std::memory_order_relaxed)) {
+                oldest = &p;
             }
         }
-        place->address.store(address, std::memory_order_relaxed);
-        place->heard_ns.store(now, std::memory_order_relaxed);
+        oldest->address.store(address, std::memory_order_relaxed);
+        oldest->heard_ns.store(now, std::memory_order_relaxed);
     }
 
     /// Sends to the listening end, or to all that were heard of. Returns whether the system took a
@@ -358,27 +358,27 @@ private:
 
 namespace udp {
 
-Description describe(const std::string& place) {
-    return {.address = "udp:" + place,
+Description describe(const std::string& target) {
+    return {.address = "udp:" + target,
             .transport = "frames in UDP datagrams",
-            .interface = place,
+            .interface = target,
             .datagrams = true};
 }
 
-Opened open(const std::string& place, const Options& options) {
+Opened open(const std::string& target, const Options& options) {
     if (options.types.size() != 1) {
         return {nullptr,
                 "UDP datagrams carry frames of one type only; write eth:enp3s0 or sim:NAME"};
     }
-    const auto colon = std::min(place.find(':'), place.size());
-    const std::string host = place.substr(0, colon);
+    const auto colon = std::min(target.find(':'), target.size());
+    const std::string host = target.substr(0, colon);
 
-    const std::string port = place.substr(std::min(colon + 1, place.size()));
+    const std::string port = target.substr(std::min(colon + 1, target.size()));
     if (host.empty()) {
         return {nullptr, "missing host; write udp:127.0.0.1 for this machine"};
     }
     unsigned number = options.types.front();
-    if (colon != place.size()) {
+    if (colon != target.size()) {
         const auto [end, wrong] = std::from_chars(port.data(), port.data() + port.size(), number);
         if (wrong != std::errc{} || end != port.data() + port.size() || number == 0 ||
             number > 65535) {
@@ -397,7 +397,7 @@ Opened open(const std::string& place, const Options& options) {
     std::memcpy(&at, found->ai_addr, std::min<std::size_t>(found->ai_addrlen, sizeof at));
     freeaddrinfo(found);
     at.sin_port = htons(static_cast<std::uint16_t>(number));
-    auto opened = std::make_unique<UdpPort>(place, options, options.types.front());
+    auto opened = std::make_unique<UdpPort>(target, options, options.types.front());
     auto problem = opened->open(host, at);
     if (!problem.empty()) {
         return {nullptr, std::move(problem)};

@@ -25,10 +25,10 @@ namespace {
 
 /// Connects a socket; returns -1 after printing the reason.
 int connect_to_gateway(const GatewayOptions& options) {
-    const std::string& place = options.connect;
-    const auto colon = place.rfind(':');
-    const std::string port = colon == place.npos ? "" : place.substr(colon + 1);
-    const bool tcp = !port.empty() && place.find('/') == place.npos &&
+    const std::string& endpoint = options.connect;
+    const auto colon = endpoint.rfind(':');
+    const std::string port = colon == endpoint.npos ? "" : endpoint.substr(colon + 1);
+    const bool tcp = !port.empty() && endpoint.find('/') == endpoint.npos &&
                      port.find_first_not_of("0123456789") == port.npos;
     std::string why;
     int fd = -1;
@@ -36,11 +36,11 @@ int connect_to_gateway(const GatewayOptions& options) {
         addrinfo how{}, *found = nullptr;
         how.ai_socktype = SOCK_STREAM;
         if (const int code =
-                ::getaddrinfo(place.substr(0, colon).c_str(), port.c_str(), &how, &found);
+                ::getaddrinfo(endpoint.substr(0, colon).c_str(), port.c_str(), &how, &found);
             code != 0) {
             fail(options,
                  fmt::format("invalid --connect '{}': {}; write HOST:PORT, such as 127.0.0.1:6000",
-                             place, ::gai_strerror(code)));
+                             endpoint, ::gai_strerror(code)));
 
             return -1;
         }
@@ -59,11 +59,11 @@ int connect_to_gateway(const GatewayOptions& options) {
     } else {
         sockaddr_un at{};
         at.sun_family = AF_UNIX;
-        if (place.size() >= sizeof at.sun_path) {
-            fail(options, fmt::format("path too long for a socket: '{}'", place));
+        if (endpoint.size() >= sizeof at.sun_path) {
+            fail(options, fmt::format("path too long for a socket: '{}'", endpoint));
             return -1;
         }
-        std::memcpy(at.sun_path, place.c_str(), place.size() + 1);
+        std::memcpy(at.sun_path, endpoint.c_str(), endpoint.size() + 1);
         fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
         if (::connect(fd, reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0) {
             why = std::strerror(errno);
@@ -74,7 +74,7 @@ int connect_to_gateway(const GatewayOptions& options) {
     if (fd < 0) {
         fail(options, fmt::format("cannot connect to the gateway at '{}': {}; start one with: hal "
                                   "can gateway ADDRESS {} {}",
-                                  place, why, tcp ? "--listen" : "--socket", place));
+                                  endpoint, why, tcp ? "--listen" : "--socket", endpoint));
     }
     return fd;
 }

@@ -67,11 +67,11 @@ std::string lines_of(const PdoSettings& p) {
     if (p.mapping.empty()) return text + ", empty\n";
     text += '\n';
     for (const auto& item : p.mapping) {
-        const std::string place =
+        const std::string location =
             fmt::format("{:04X}:{:X}/{}", item.object.index, item.object.sub, item.bits);
         text += item.object.name.empty()
-                    ? fmt::format("                  {}\n", place)
-                    : fmt::format("                  {:10} {}\n", place, item.object.name);
+                    ? fmt::format("                  {}\n", location)
+                    : fmt::format("                  {:10} {}\n", location, item.object.name);
     }
     return text;
 }

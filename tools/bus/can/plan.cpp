@@ -350,9 +350,9 @@ int report_plan(const CanopenPlanOptions& options, const std::string& file, cons
     std::size_t late = 0;
     for (std::size_t i = 0; i < messages.size(); ++i) {
         if (a.responses[i].in_time || ++late > 3) continue;
-        const std::string place =
+        const std::string location =
             table.rows[i].line == 0 ? file : fmt::format("{}:{}", file, table.rows[i].line);
-        text += fmt::format("{}: {}\n", place, why_late(table, messages, a, i));
+        text += fmt::format("{}: {}\n", location, why_late(table, messages, a, i));
     }
     if (late > 3) {
         text += fmt::format("{}: {} more are late\n", file, late - 3);

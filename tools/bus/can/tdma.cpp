@@ -60,7 +60,7 @@ std::string timeline_text(const config::Schedule& s, const plan::Plan& p) {
     constexpr std::string_view letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
     std::string line(places, '.');
     for (const plan::Entry& e : p.entries) {
-        const auto place = [&](Time t) {
+        const auto column = [&](Time t) {
             return std::min(static_cast<std::size_t>(t * static_cast<Time>(places) / s.cycle),
                             places - 1);
         };
@@ -68,8 +68,8 @@ std::string timeline_text(const config::Schedule& s, const plan::Plan& p) {
                           : e.what == plan::Entry::What::backup_sync
                               ? '\''
                               : letters[e.station % letters.size()];
-        for (std::size_t i = place(e.at); i <= place(e.until - 1); ++i) {
-            if (i == place(e.at) || line[i] == '.') {
+        for (std::size_t i = column(e.at); i <= column(e.until - 1); ++i) {
+            if (i == column(e.at) || line[i] == '.') {
                 line[i] = mark;
             }
         }

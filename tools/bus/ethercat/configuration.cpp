@@ -119,10 +119,11 @@ int run_ethercat_pdos(const EthercatOptions& options) {
         for (const bool outputs : {true, false}) {
             const char* const direction = outputs ? "outputs" : "inputs";
             for (const auto& pdo : outputs ? c.rx : c.tx) {
-                const std::string place = pdo.sync_manager == 0xff
-                                              ? "not assigned"
-                                              : fmt::format("sync manager {}", pdo.sync_manager);
-                text += fmt::format("  {:04X} {}, {}  {}\n", pdo.index, direction, place, pdo.name);
+                const std::string assignment =
+                    pdo.sync_manager == 0xff ? "not assigned"
+                                             : fmt::format("sync manager {}", pdo.sync_manager);
+                text += fmt::format("  {:04X} {}, {}  {}\n", pdo.index, direction, assignment,
+                                    pdo.name);
                 json += fmt::format(
                     R"({}{{"position":{},"index":{},"direction":"{}","sync_manager":{},"name":{},"entries":[)",
                     json.empty() ? "[" : ",\n ", n, pdo.index, direction,

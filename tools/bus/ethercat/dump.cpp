@@ -72,9 +72,9 @@ private:
     }
     std::string line(std::int64_t time_ns, bool passed, const DatagramView& d,
                      const std::string& words, const std::string& address) const {
-        const std::string place = is_logical(d.command) || d.command == Command::nop
-                                      ? ""
-                                      : fmt::format(" {:04X}", d.register_address());
+        const std::string location = is_logical(d.command) || d.command == Command::nop
+                                         ? ""
+                                         : fmt::format(" {:04X}", d.register_address());
         std::string bytes;
         for (std::size_t i = 0; i < std::min<std::size_t>(d.length, most_bytes); ++i) {
             bytes += fmt::format(" {:02X}", d.data[i]);
@@ -83,8 +83,8 @@ private:
             bytes += " …";
         }
         std::string text = fmt::format("{:12.6f}  {}  {:4} {}{}  [{}]{}  WKC {}", seconds(time_ns),
-                                       passed ? "<-" : "->", to_string(d.command), address, place,
-                                       d.length, bytes, d.wkc());
+                                       passed ? "<-" : "->", to_string(d.command), address,
+                                       location, d.length, bytes, d.wkc());
         if (!words.empty()) {
             text += "  " + words;
         }

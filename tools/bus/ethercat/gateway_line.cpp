@@ -42,14 +42,14 @@ GatewayLine::~GatewayLine() {
 }
 
 std::string GatewayLine::open(const std::string& address) {
-    const std::string place = address.substr(address.find(':') + 1);
-    const std::size_t colon = place.find(':');
-    const std::string host = place.substr(0, colon);
+    const std::string endpoint = address.substr(address.find(':') + 1);
+    const std::size_t colon = endpoint.find(':');
+    const std::string host = endpoint.substr(0, colon);
     sockaddr_in at{};
     at.sin_family = AF_INET;
     at.sin_port = htons(gateway_port);
     const auto port = colon == std::string::npos ? std::optional<std::uint64_t>(gateway_port)
-                                                 : parse_natural(place.substr(colon + 1));
+                                                 : parse_natural(endpoint.substr(colon + 1));
     if (inet_pton(AF_INET, host.c_str(), &at.sin_addr) != 1 || !port || *port == 0 ||
         *port > 65535) {
         return fmt::format(

@@ -280,7 +280,7 @@ int run_ethercat_crc(const EthercatOptions& options) {
                 continue;  // forwarded ones happened before
             }
             const int other = s.neighbour[port];
-            std::string place =
+            std::string location =
                 n == 0 && port == s.entry_port ? "the master" : "nothing (open now)";
             if (other >= 0) {
                 const BusSlave& peer = wire.slave(static_cast<std::size_t>(other));
@@ -288,10 +288,10 @@ int run_ethercat_crc(const EthercatOptions& options) {
                 while (at < 3 && peer.neighbour[at] != static_cast<int>(n)) {
                     ++at;
                 }
-                place = fmt::format("slave {} port {}", other, at);
+                location = fmt::format("slave {} port {}", other, at);
             }
             const std::string cable =
-                fmt::format("check the cable between slave {} port {} and {}", n, port, place);
+                fmt::format("check the cable between slave {} port {} and {}", n, port, location);
             text += "      " + cable + "\n";
             cables += (cables.empty() ? "" : ",") + json_string(cable);
         }

@@ -177,13 +177,13 @@ bool read_devices(const Options& options, std::vector<devices::Device>& to) {
         devices::read_line(text, ethercat::devices::beside(path));
     bool good = true;
     for (const auto& message : description.messages) {
-        const std::string place =
+        const std::string location =
             message.at.line == 0
                 ? path
                 : fmt::format("{}:{}:{}", path, message.at.line, message.at.column);
         const bool is_error = message.severity == Severity::error;
         good = good && !is_error;
-        fail(options, fmt::format("{}: {}{}; {}", place,
+        fail(options, fmt::format("{}: {}{}; {}", location,
                                   is_error ? "" : "warning: ", message.sentence, message.help));
     }
     if (good) {

@@ -50,8 +50,8 @@ Time next(Time phase, Time cycle, Time t) {
 }
 
 /// When a frame leaves that was handed over by the transmit of a thread that began at `begun`.
-Time leaves(const Schedule& s, const StationEntry& e, Time begun, std::size_t place = 0) {
-    const SlotSetup& slot = e.slots[place].setup;
+Time leaves(const Schedule& s, const StationEntry& e, Time begun, std::size_t index = 0) {
+    const SlotSetup& slot = e.slots[index].setup;
     const Time at = e.role == Role::master ? std::max(slot.offset, s.wire(60)) : slot.offset;
     Time t = next(at, s.cycle, begun + e.lead + 1);
     return t + static_cast<Time>(slot.period - 1) * s.cycle;
@@ -68,8 +68,8 @@ std::optional<std::size_t> loops_of(const Schedule& s) {
     return {};
 }
 
-std::size_t longest(const StationEntry& e, std::size_t place = 0) {
-    return ethernet::header_bytes + std::max<std::size_t>(e.slots[place].setup.size, 46);
+std::size_t longest(const StationEntry& e, std::size_t index = 0) {
+    return ethernet::header_bytes + std::max<std::size_t>(e.slots[index].setup.size, 46);
 }
 
 }  // namespace
