@@ -233,7 +233,8 @@ private:
 
     void look_at_counts() noexcept {
         const std::int64_t now = counts;
-        if (state_ == State::homing && strobe && (sense[0] || (asked_index_ && !index_enable))) {
+        if (state_ == State::homing && strobe &&
+            (sense[0] || (requested_index_ && !index_enable))) {
             zero_ = now + home_offset;
             homed = true;
             index_enable = false;
@@ -267,7 +268,7 @@ private:
     void begin() noexcept {
         ready = false;
         if (knows_position()) return set_out();
-        asked_index_ = false;
+        requested_index_ = false;
         enter(State::homing);
     }
 
@@ -309,8 +310,8 @@ private:
 
     void step_homing() noexcept {
         direction_ = 1;
-        if (encoding == Encoding::counts && !asked_index_) {
-            asked_index_ = true;
+        if (encoding == Encoding::counts && !requested_index_) {
+            requested_index_ = true;
             index_enable = true;
         }
         if (!homed) return;
@@ -399,7 +400,7 @@ private:
     bool was_pulse_ = false;
     bool marker_ = false;  // at the centre of a pocket
     bool moved_ = false;
-    bool asked_index_ = false;
+    bool requested_index_ = false;
     int direction_ = 1;
     std::uint32_t stable_ = 0;
     std::int64_t reading_ = -1;

@@ -192,11 +192,11 @@ struct Furuta : hal::Component {
     }
 
     void update(hal::Cycle cycle) noexcept {
-        const bool asked = reset;
-        if (asked && !asked_) {
+        const bool is_reset = reset;
+        if (is_reset && !was_reset_) {
             rest();
         }
-        asked_ = asked;
+        was_reset_ = is_reset;
 
         const sim::FurutaConstants now = constants();
         if (const double given = push; given != 0.0) {
@@ -271,7 +271,7 @@ private:
     }
 
     sim::FurutaRig rig_;
-    bool asked_ = false;
+    bool was_reset_ = false;
 };
 
 }  // namespace

@@ -17,7 +17,7 @@ namespace hal::tools {
 namespace {
 
 /// Returns false after printing the error.
-bool read_wish(const GraphOptions& options, GraphWish& wish) {
+bool parse_request(const GraphOptions& options, GraphRequest& request) {
     static constexpr std::pair<std::string_view, Cluster> kinds[] = {
         {"none", Cluster::none},
         {"component", Cluster::component},
@@ -43,13 +43,13 @@ bool read_wish(const GraphOptions& options, GraphWish& wish) {
                          options.depth));
         return false;
     }
-    wish.cluster = kind->second;
+    request.cluster = kind->second;
     if (!options.pins.empty()) {
-        wish.all_pins = options.pins == "all";
+        request.all_pins = options.pins == "all";
     }
-    wish.around = options.around;
+    request.around = options.around;
     if (options.depth >= 0) {
-        wish.depth = static_cast<std::size_t>(options.depth);
+        request.depth = static_cast<std::size_t>(options.depth);
     }
     return true;
 }
@@ -63,8 +63,8 @@ int run_graph(const GraphOptions& options) {
         return fail(options, fmt::format("'{}' is neither .svg nor .dot; type: -o {}.svg",
                                          options.output, options.words.front()));
     }
-    GraphWish wish;
-    if (!read_wish(options, wish)) return 1;
+    GraphRequest request;
+    if (!parse_request(options, request)) return 1;
     auto nodes = requested_nodes(options);
     if (!nodes) return 1;
     Session session(offline());
@@ -82,7 +82,7 @@ int run_graph(const GraphOptions& options) {
         return 1;
     }
     const Session& drawn = options.part.empty() ? session : cell.session(cell.find(options.part));
-    const GraphView view(drawn.model(), drawn.sources, wish);
+    const GraphView view(drawn.model(), drawn.sources, request);
     if (!view.problem().empty()) return fail(options, view.problem());
     const std::string dot = as_dot(drawn.model(), view, options.words.front());
     if (options.output.empty()) return print(dot) ? 0 : 1;

@@ -43,8 +43,8 @@ const Pin* source_of(const Signal& signal) {
 
 bool is_hub(const Signal& signal) { return signal.pins.size() > max_edges + 1; }
 
-GraphView::GraphView(const Model& model, const Sources& sources, const GraphWish& wish) {
-    const bool whole = wish.around.empty();
+GraphView::GraphView(const Model& model, const Sources& sources, const GraphRequest& request) {
+    const bool whole = request.around.empty();
     if (whole) {
         for (const auto& component : model.components) {
             for (const auto& item : component->instances) {
@@ -52,12 +52,12 @@ GraphView::GraphView(const Model& model, const Sources& sources, const GraphWish
             }
         }
     } else {
-        select_around(model, wish);
+        select_around(model, request);
     }
     if (!problem_.empty()) return;
-    all_pins_ = wish.all_pins.value_or(whole && shown_.size() <= max_with_all_pins);
+    all_pins_ = request.all_pins.value_or(whole && shown_.size() <= max_with_all_pins);
     select_signals(model, whole);
-    make_clusters(model, sources, wish.cluster);
+    make_clusters(model, sources, request.cluster);
 }
 
 bool GraphView::shows(const Pin& pin) const {
@@ -66,7 +66,7 @@ bool GraphView::shows(const Pin& pin) const {
 
 // A breadth-first search over instances. A step follows all signals of an instance, the first one
 // only the named signal.
-void GraphView::select_around(const Model& model, const GraphWish& wish) {
+void GraphView::select_around(const Model& model, const GraphRequest& request) {
     std::vector<const Instance*> border;
     const auto reach = [&](const Signal& signal) {
         for (const Pin* pin : signal.pins) {
@@ -84,12 +84,12 @@ void GraphView::select_around(const Model& model, const GraphWish& wish) {
             }
         }
     };
-    std::size_t steps = wish.depth;
-    if (const Instance* const instance = model.find_instance(wish.around)) {
+    std::size_t steps = request.depth;
+    if (const Instance* const instance = model.find_instance(request.around)) {
         centre_ = instance;
         shown_.insert(instance);
         border.push_back(instance);
-    } else if (const Pin* const pin = model.find_pin(wish.around)) {
+    } else if (const Pin* const pin = model.find_pin(request.around)) {
         centre_ = pin;
         if (pin->instance) {
             shown_.insert(pin->instance);
@@ -101,11 +101,11 @@ void GraphView::select_around(const Model& model, const GraphWish& wish) {
                 border.push_back(pin->instance);
             }
         }
-    } else if (const Signal* const signal = model.find_signal(wish.around)) {
+    } else if (const Signal* const signal = model.find_signal(request.around)) {
         centre_ = signal;
         reach(*signal);
     } else {
-        problem_ = unknown_name(model, wish.around);
+        problem_ = unknown_name(model, request.around);
     }
     for (; steps > 0 && !border.empty(); --steps) {
         const auto from = std::move(border);

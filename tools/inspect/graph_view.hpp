@@ -18,7 +18,7 @@ namespace hal::tools {
 enum class Cluster { none, component, file, thread };
 
 /// What the user asked for.
-struct GraphWish {
+struct GraphRequest {
     Cluster cluster = Cluster::none;
     /// a pin, signal or instance: draw its neighbourhood only; empty: the whole netlist
     std::string around;
@@ -34,8 +34,8 @@ constexpr std::size_t max_edges = 8;
 /// The selection of a drawing. References the model.
 class GraphView {
 public:
-    /// Selects what `wish` asks for. On failure nothing is selected and problem() is the reason.
-    GraphView(const Model& model, const Sources& sources, const GraphWish& wish);
+    /// Selects what `request` asks for. On failure nothing is selected and problem() is the reason.
+    GraphView(const Model& model, const Sources& sources, const GraphRequest& request);
 
     const std::string& problem() const { return problem_; }
     /// Returns the clusters in the order of the netlist with their instances; one without a name
@@ -60,7 +60,7 @@ public:
     }
 
 private:
-    void select_around(const Model& model, const GraphWish& wish);
+    void select_around(const Model& model, const GraphRequest& request);
     void select_signals(const Model& model, bool whole);
     void make_clusters(const Model& model, const Sources& sources, Cluster cluster);
 

@@ -50,8 +50,8 @@ public:
     /// Returns the outcome of a ping; none: no more can be sent, and `problem` is the reason.
     Outcome ask(const StopRequest& stop, std::string& problem) {
         if (!look(problem)) return Outcome::none;
-        const auto wish = static_cast<std::uint32_t>(number(pins_, "ping")) + 1;
-        if (const auto answer = client_.run({"setp", pin_, fmt::format("{}", wish)});
+        const auto requested = static_cast<std::uint32_t>(number(pins_, "ping")) + 1;
+        if (const auto answer = client_.run({"setp", pin_, fmt::format("{}", requested)});
             answer.status != 0) {
             problem = answer.err;
             while (!problem.empty() && problem.back() == '\n') {
@@ -63,13 +63,13 @@ public:
         while (Clock::now() < until) {
             if (stop.wait_ns(look_ns)) return Outcome::none;
             if (!look(problem)) return Outcome::none;
-            if (static_cast<std::uint32_t>(number(pins_, "ping-done")) == wish) {
+            if (static_cast<std::uint32_t>(number(pins_, "ping-done")) == requested) {
                 if (!look(problem)) {
                     return Outcome::none;  // now all of them are of that ping
                 }
                 return static_cast<Outcome>(static_cast<int>(number(pins_, "ping-result")));
             }
-            if (static_cast<std::uint32_t>(number(pins_, "ping")) != wish) {
+            if (static_cast<std::uint32_t>(number(pins_, "ping")) != requested) {
                 problem = fmt::format("another client is pinging {} ({} is set); try again",
                                       station_, pin_);
                 return Outcome::none;

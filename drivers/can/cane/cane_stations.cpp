@@ -54,14 +54,14 @@ bool Nodes::learn(Place& node, const Address& from, std::int64_t now_ns) noexcep
     const bool same = (is & known) != 0 && (is & address_bits) == number(from);
     const auto silent = [now_ns](std::int64_t since) { return now_ns - since >= moved_after_ns; };
     if (same) {
-        node.heard_ns = now_ns;
+        node.last_received_ns = now_ns;
         if ((is & doubtful) != 0 && silent(node.other_ns)) {
             node.is.store(is & ~doubtful, std::memory_order_relaxed);
         }
         return (is & doubtful) == 0 || silent(node.other_ns);
     }
-    if ((is & known) == 0 || silent(node.heard_ns)) {
-        node.heard_ns = now_ns;
+    if ((is & known) == 0 || silent(node.last_received_ns)) {
+        node.last_received_ns = now_ns;
         node.is.store(number(from) | known, std::memory_order_relaxed);
         return true;
     }
@@ -106,18 +106,18 @@ Streams::Verdict Streams::take(const Address& from, bool to_all, Stamp stamp,
     const auto key = number(from) << 16 | stamp.session;
     Sender* s = nullptr;
     for (auto& candidate : senders_) {
-        if (candidate.heard_ns != INT64_MIN && candidate.key == key) {
+        if (candidate.last_received_ns != INT64_MIN && candidate.key == key) {
             s = &candidate;
         }
     }
     if (s == nullptr) {
         s = &*std::min_element(senders_.begin(), senders_.end(), [](const auto& a, const auto& b) {
-            return a.heard_ns < b.heard_ns;
+            return a.last_received_ns < b.last_received_ns;
         });
         *s = {};
         s->key = key;
     }
-    s->heard_ns = now_ns;
+    s->last_received_ns = now_ns;
     auto& stream = s->stream[to_all ? 1 : 0];
     const auto ahead =
         static_cast<std::int16_t>(static_cast<std::uint16_t>(stamp.sequence - stream.last));

@@ -46,7 +46,7 @@ private:
     struct Place {
         std::atomic<std::uint64_t> is{0};
         // receiver: last message from there, and from elsewhere
-        std::int64_t heard_ns = 0;
+        std::int64_t last_received_ns = 0;
         std::int64_t other_ns = 0;
     };
     bool learn(Place&, const Address&, std::int64_t now_ns) noexcept;
@@ -73,7 +73,7 @@ private:
     static constexpr unsigned max_stale = 8;
     struct Sender {
         std::uint64_t key = 0;
-        std::int64_t heard_ns = INT64_MIN;
+        std::int64_t last_received_ns = INT64_MIN;
         struct Stream {
             std::uint16_t last = 0;
             std::uint8_t stale = 0;

@@ -55,10 +55,10 @@ public:
         if (!learns_) return true;
         // this station is the master
         if (own != INT64_MIN && now_ns - own < alive_ns) return false;
-        if (known_ && from != master_ && now_ns - heard_ns_ < alive_ns) return false;
+        if (known_ && from != master_ && now_ns - last_received_ns_ < alive_ns) return false;
         known_ = true;
         master_ = from;
-        heard_ns_ = now_ns;
+        last_received_ns_ = now_ns;
         return true;
     }
     /// Forgets a learnt master. [realtime] receiver
@@ -81,7 +81,7 @@ private:
     bool known_ = false;
     bool fixed_ = false;
     bool learns_ = true;
-    std::int64_t heard_ns_ = 0;
+    std::int64_t last_received_ns_ = 0;
     std::atomic<std::int64_t> own_ns_{INT64_MIN};
 };
 

@@ -232,7 +232,7 @@ public:
 private:
     bool refill(std::int64_t now_ns) noexcept {
         // one system call per cycle unless the batch was full
-        if (now_ns != unclocked && was_short_ && now_ns == asked_at_) return false;
+        if (now_ns != unclocked && was_short_ && now_ns == requested_at_) return false;
         mmsghdr messages[batch]{};
         iovec parts[batch]{};
         sockaddr_storage from[batch];
@@ -249,7 +249,7 @@ private:
         }
         const int got = ::recvmmsg(in_.get(), messages, batch, MSG_DONTWAIT, nullptr);
         next_ = filled_ = 0;
-        asked_at_ = now_ns;
+        requested_at_ = now_ns;
         was_short_ = got < static_cast<int>(batch);
         counting_.tick(now_ns != unclocked ? now_ns : link::monotonic_ns());
         const auto offset = got > 0 ? link::real_to_monotonic_ns() : 0;
@@ -312,7 +312,7 @@ private:
     Frame buffer_[batch];
     std::size_t next_ = 0;
     std::size_t filled_ = 0;
-    std::int64_t asked_at_ = unclocked;
+    std::int64_t requested_at_ = unclocked;
     bool was_short_ = false;
     std::uint32_t lost_before_ = 0;
 };

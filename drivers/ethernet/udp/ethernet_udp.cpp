@@ -228,7 +228,7 @@ private:
     static void add(Count& counter) noexcept { counter.fetch_add(1, std::memory_order_relaxed); }
     struct Peer {
         std::atomic<std::uint64_t> address{0};  ///< 0: none; written by the receiving thread
-        std::atomic<std::int64_t> heard_ns{0};
+        std::atomic<std::int64_t> last_received_ns{0};
     };
 
     /// Derives the own address and the header of received frames. Frames of the listening end
@@ -277,15 +277,15 @@ private:
         Peer* oldest = peers_.data();
         for (Peer& p : peers_) {
             if (p.address.load(std::memory_order_relaxed) == address) {
-                return p.heard_ns.store(now, std::memory_order_relaxed);
+                return p.last_received_ns.store(now, std::memory_order_relaxed);
             }
-            if (p.heard_ns.load(std::memory_order_relaxed) <
-                oldest->heard_ns.load(std::memory_order_relaxed)) {
+            if (p.last_received_ns.load(std::memory_order_relaxed) <
+                oldest->last_received_ns.load(std::memory_order_relaxed)) {
                 oldest = &p;
             }
         }
         oldest->address.store(address, std::memory_order_relaxed);
-        oldest->heard_ns.store(now, std::memory_order_relaxed);
+        oldest->last_received_ns.store(now, std::memory_order_relaxed);
     }
 
     /// Sends to the listening end, or to all that were heard of. Returns whether the system took a
@@ -299,7 +299,7 @@ private:
         for (const Peer& p : peers_) {
             const auto address = p.address.load(std::memory_order_relaxed);
             if (address == 0 ||
-                now - p.heard_ns.load(std::memory_order_relaxed) > peer_timeout_ns) {
+                now - p.last_received_ns.load(std::memory_order_relaxed) > peer_timeout_ns) {
                 continue;
             }
             const sockaddr_in to = unpack(address);

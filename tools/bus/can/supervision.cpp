@@ -36,7 +36,7 @@ Supervision::Supervision(const Options& options, NodeClient& station, std::uint8
       began_(monotonic_ns()) {
     station_.on_frame = [this](const can::Frame& f) {
         if (f.extended || f.remote || f.length < 1 || f.id <= 0x700 || f.id >= 0x780) return;
-        heard_[f.id & 0x7f] = true;
+        heartbeat_seen_[f.id & 0x7f] = true;
         if (way_ == Way::heartbeat && (f.id & 0x7f) == own_) {
             collided_ = true;
         }
@@ -138,7 +138,7 @@ bool Supervision::by_heartbeat(std::string& why_not) {
         return (entry & 0xffff) == 0 ? 0U : entry >> 16 & 0xff;
     };
     if (settings_.own_node != 0) {
-        if (heard_[settings_.own_node]) {
+        if (heartbeat_seen_[settings_.own_node]) {
             fail(options_, fmt::format("node {} is on this bus: our heartbeat needs a free "
                                        "node ID; choose another --heartbeat-id",
                                        settings_.own_node));
@@ -152,7 +152,7 @@ bool Supervision::by_heartbeat(std::string& why_not) {
         const auto start = static_cast<unsigned>(::getpid()) % all;
         for (unsigned n = 0; n < all && own_ == 0; ++n) {
             if (const auto id = static_cast<std::uint8_t>(first_own + (start + n) % all);
-                !heard_[id] && id != node_) {
+                !heartbeat_seen_[id] && id != node_) {
                 own_ = id;
             }
         }
@@ -171,8 +171,8 @@ bool Supervision::by_heartbeat(std::string& why_not) {
     }
     for (unsigned n = 1; n <= count; ++n) {  // left by a killed instance of this program
         if (const auto id = node_in(entries[n]);
-            id == own_ ||
-            (settings_.own_node == 0 && id >= first_own && id <= last_own && !heard_[id])) {
+            id == own_ || (settings_.own_node == 0 && id >= first_own && id <= last_own &&
+                           !heartbeat_seen_[id])) {
             sub = n;
             own_ = static_cast<std::uint8_t>(id);
             entries[n] = 0;

@@ -64,7 +64,7 @@ private:
     const std::uint8_t node_;
     const SupervisionSettings settings_;
     const std::int64_t began_;
-    std::array<bool, 128> heard_{};  // heartbeats of others
+    std::array<bool, 128> heartbeat_seen_{};  // heartbeats of others
     Way way_ = Way::none;
     bool tried_ = false;
     bool collided_ = false;
