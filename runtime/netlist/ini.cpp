@@ -94,7 +94,7 @@ private:
     }
 
     void warn(Span at, std::string message) {
-        if (++warned_ <= text::most_errors + 1) {
+        if (++warned_ <= text::max_errors + 1) {
             diagnostics_.warning("bad-ini-line", at, std::move(message));
         }
     }

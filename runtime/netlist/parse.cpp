@@ -13,7 +13,7 @@ namespace hal {
 
 namespace {
 
-constexpr std::size_t most_errors = 20;                     // shown of one source
+constexpr std::size_t max_errors = 20;                     // shown of one source
 constexpr std::size_t max_words = 5'000'000;               // of one source: a million nets
 // bytes of values in one source: a value may be long, and named often
 constexpr std::size_t max_substituted = std::size_t{32} << 20;
@@ -49,10 +49,10 @@ public:
                                  "the lines of this file end in CR LF (DOS line endings)", "",
                                  "harmless here; `hal fmt` converts them to LF");
         }
-        if (errors_ > most_errors) {
+        if (errors_ > max_errors) {
             diagnostics_.error(
                 "too-many-errors", last_error_,
-                std::to_string(errors_ - most_errors) + " more errors in this file are not shown",
+                std::to_string(errors_ - max_errors) + " more errors in this file are not shown",
                 "the last of them");
         }
         if (given_up_) {
@@ -65,14 +65,14 @@ private:
     void error(Code code, Span at, std::string message, std::string label = "",
                std::string help = "") {
         last_error_ = at;
-        if (++errors_ <= most_errors) {
+        if (++errors_ <= max_errors) {
             diagnostics_.error(code, at, std::move(message), std::move(label), std::move(help));
         }
     }
 
     /// Counts an error that will not be shown: no work for its text and suggestions.
     bool hidden(Span at) {
-        if (errors_ < most_errors) return false;
+        if (errors_ < max_errors) return false;
         ++errors_;
         last_error_ = at;
         return true;

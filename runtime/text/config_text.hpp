@@ -46,7 +46,7 @@ struct Message {
 };
 
 /// Errors kept per file. One more is kept, so that the host reports that there are more.
-inline constexpr std::size_t most_errors = 100;
+inline constexpr std::size_t max_errors = 100;
 
 /// Collects the messages about one file.
 template <class Topic>
@@ -54,7 +54,7 @@ class Messages {
 public:
     void add(Severity severity, Topic topic, Span at, std::string sentence, std::string help = {},
              std::string label = {}) {
-        if (severity == Severity::error && ++errors_ > most_errors + 1) return;
+        if (severity == Severity::error && ++errors_ > max_errors + 1) return;
         all.push_back(
             {severity, topic, at, std::move(sentence), std::move(help), std::move(label)});
     }
@@ -176,7 +176,7 @@ struct Problem {
 
 /// Adds a problem, as long as there are not more than errors of a file.
 inline void add(std::vector<Problem>& problems, Problem problem) {
-    if (problems.size() <= most_errors) {
+    if (problems.size() <= max_errors) {
         problems.push_back(std::move(problem));
     }
 }

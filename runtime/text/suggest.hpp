@@ -14,9 +14,9 @@
 namespace hal {
 
 /// Returns the names of `candidates` close to `name` (edit distance, prefixes, swapped separators),
-/// best first, at most `most`.
+/// best first, at most `max_count`.
 std::vector<std::string> similar(std::string_view name, const std::vector<std::string>& candidates,
-                                 std::size_t most = 3);
+                                 std::size_t max_count = 3);
 
 /// Many names, indexed for many searches. Once all are added, any thread may search; the first
 /// search sorts them. Sorting and searching end early once their `stop` is requested; an index that
@@ -73,7 +73,7 @@ std::string did_you_mean(std::string_view name, const NameIndex& candidates,
                          std::uint32_t before = NameIndex::all, const std::stop_token& stop = {});
 
 /// Joins names with commas, cut to the width of a line: "a, b, c, … (17 more)".
-std::string listed(const std::vector<std::string>& names, std::size_t most = 12);
+std::string listed(const std::vector<std::string>& names, std::size_t max_count = 12);
 
 /// The same, but offers all names if none is close: "did you mean 'x'?" or "KINDS: a, b, c".
 std::string suggestion(std::string_view name, const std::vector<std::string>& candidates,

@@ -293,6 +293,7 @@ def check_language(root):
             "b.py": "refused = 1  # mend it\nprint('it refused')\n",
             "c.hal": "# a pin that is none\n",
             "e.expected": "error: x lacks y\n",
+            "runtime/sdk/hal/f.hpp": SPDX + "int most_names;\nint max_names; // `most_names`\n",
         },
     )
     expect(
@@ -307,6 +308,7 @@ def check_language(root):
         "e.expected:1:",
         "runtime/a.cpp:2:",
         "runtime/a.cpp:3:",
+        "runtime/sdk/hal/f.hpp:2:",
     )
 
 

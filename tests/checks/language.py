@@ -3,8 +3,8 @@
 """language.py ROOT [PATH...]: no string, page or comment uses a paraphrase where the field has a term.
 
 Each rule is a pattern and the term to use. Checked are string literals and comments of sources, whole pages, netlists and expected outputs.
-Not checked are identifiers: in code, in backticks, with a hyphen (thread-refused), or as the only word of a string (a key, a pin).
-A line that quotes somebody else's output ends with the comment `language: quoted`."""
+Not checked are identifiers: in code, in backticks, with a hyphen (thread-refused), or as the only word of a string (a key, a pin); except those of
+the installed headers, whose parts have a vocabulary of their own. A line that quotes somebody else's output ends with the comment `language: quoted`."""
 import re
 import sys
 from pathlib import Path
@@ -68,6 +68,25 @@ RULES = [
 ]
 COMPILED = [(re.compile(pattern, re.IGNORECASE), term) for pattern, term in RULES]
 
+# Parts of identifiers in the installed headers. Names of the ABI stay: other programs use them.
+PUBLIC_HEADERS = ("runtime/abi/hal/", "runtime/sdk/hal/", "runtime/text/")
+PARTS = [
+    (r"most|longest|largest", "max"),
+    (r"least|smallest", "min"),
+    (r"room", "capacity, space"),
+    (r"places?", "index, slot, offset, address"),
+    (r"take", "parse, apply, receive, accept, pop"),
+    (r"wish|asked|heard|patience|rubbish", "name the job"),
+]
+IDENTIFIERS = [
+    (
+        re.compile(rf"(?<![A-Za-z0-9])(?:[a-z0-9]+_)*(?:{part})(?:_[a-z0-9]+)*_?(?![A-Za-z0-9_])"),
+        term,
+    )
+    for part, term in PARTS
+]
+ABI_NAMES = {"room", "place", "take", "write_in_place", "in_place"}
+
 C_LIKE = {".c", ".h", ".cpp", ".hpp"}
 HASH = {".py", ".sh", ".cmake", ".hal", ".ini", ".awk", ".comp"}
 PAGES = {".md", ".expected", ".txt"}
@@ -109,6 +128,17 @@ def is_identifier(text, match):
     return alone or before == "-" or after == "-" or text[: match.start()].endswith("self.")
 
 
+def identifiers(name, source):
+    """(offset, identifier, term) of the names in an installed header that use a paraphrase."""
+    if not name.startswith(PUBLIC_HEADERS) or not name.endswith((".h", ".hpp")):
+        return
+    code = C_TEXT.sub(lambda text: re.sub(r"[^\n]", " ", text.group()), source)
+    for pattern, term in IDENTIFIERS:
+        for match in pattern.finditer(code):
+            if match.group() not in ABI_NAMES:
+                yield match.start(), match.group(), term
+
+
 def violations(root, only=()):
     for path in tracked(root):
         name = path.as_posix()
@@ -119,6 +149,8 @@ def violations(root, only=()):
         except (UnicodeDecodeError, OSError):
             continue
         lines = source.splitlines()
+        for offset, identifier, term in identifiers(name, source):
+            yield name, source.count("\n", 0, offset) + 1, identifier, term
         for offset, text in texts(path, source):
             for pattern, term in COMPILED:
                 for match in pattern.finditer(text):

@@ -83,9 +83,9 @@ TEST_F(MessageLogTest, Subjects_beyond_the_limit_are_counted) {
     for (int i = 0; i < 100'000; ++i) {
         log.print(std::to_string(i), "subject " + std::to_string(i), 0);
     }
-    EXPECT_EQ(lines.size(), MessageLog::most_subjects);
+    EXPECT_EQ(lines.size(), MessageLog::max_subjects);
     log.flush(1000 * ms);
-    ASSERT_EQ(lines.size(), MessageLog::most_subjects + 1);
+    ASSERT_EQ(lines.size(), MessageLog::max_subjects + 1);
     EXPECT_EQ(lines.back(), "it.0: 99744 messages about further subjects not shown\n");
 }
 
@@ -96,10 +96,10 @@ TEST_F(MessageLogTest,
         log.print(hal::MessageSubject{"emergency 3", std::to_string(i)},
                   "node 3: emergency " + std::to_string(i), i * ms);
     }
-    ASSERT_EQ(lines.size(), MessageLog::most_details + 2);
+    ASSERT_EQ(lines.size(), MessageLog::max_details + 2);
     EXPECT_EQ(lines[0], "it.0: node 3: emergency 0\n");
-    EXPECT_EQ(lines[MessageLog::most_details - 1], "it.0: node 3: emergency 7\n");
-    EXPECT_EQ(lines[MessageLog::most_details],
+    EXPECT_EQ(lines[MessageLog::max_details - 1], "it.0: node 3: emergency 7\n");
+    EXPECT_EQ(lines[MessageLog::max_details],
               "it.0: node 3: emergency 1007 (999 similar messages in 1.0 s not shown)\n");
     EXPECT_EQ(lines.back(),
               "it.0: node 3: emergency 2007 (999 similar messages in 1.0 s not shown)\n");
@@ -138,7 +138,7 @@ TEST_F(MessageLogTest, Endless_subjects_get_few_lines_after_the_first_second) {
         log.print(std::to_string(i), "subject", i * ms);
     }
     EXPECT_LE(lines.size(),
-              MessageLog::most_subjects + 5 * (MessageLog::most_subjects_of_a_storm + 1));
+              MessageLog::max_subjects + 5 * (MessageLog::max_subjects_of_a_storm + 1));
 }
 
 TEST_F(MessageLogTest, Lines_go_to_the_journal_of_the_machine_while_it_is_set) {

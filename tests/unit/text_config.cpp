@@ -40,7 +40,7 @@ TEST(ConfigMessages, keep_a_hundred_errors_and_one_more) {
         messages.error(0, {}, "wrong");
     }
     messages.note(0, {}, "still kept");
-    EXPECT_EQ(messages.all.size(), most_errors + 2);
+    EXPECT_EQ(messages.all.size(), max_errors + 2);
     EXPECT_TRUE(messages.failed());
 }
 

@@ -20,7 +20,7 @@ public:
         return sources_.add(std::move(name), std::move(text));
     }
     void add(Span at, std::string sentence, std::string help = "") {
-        if (found_.errors() <= text::most_errors) {
+        if (found_.errors() <= text::max_errors) {
             found_.error(code_, at, std::move(sentence), "", std::move(help));
         }
     }

@@ -22,7 +22,7 @@ public:
     explicit LcecXml(std::string_view text) : text_(text) {}
 
     void error(Topic topic, const Xml& at, std::string sentence, std::string help = {}) {
-        if (!report_.failed() || report_.all.size() <= text::most_errors) {
+        if (!report_.failed() || report_.all.size() <= text::max_errors) {
             report_.error(topic, esi::span_of(at, text_), std::move(sentence), std::move(help));
         }
     }

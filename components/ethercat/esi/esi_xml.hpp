@@ -44,13 +44,13 @@ struct Context {
     hal::text::Messages<Topic> report{};
 
     void warn(const Xml& at, std::string sentence) {
-        if (report.all.size() < hal::text::most_errors) {
+        if (report.all.size() < hal::text::max_errors) {
             report.warning(Topic::value, span_of(at, text), std::move(sentence));
         }
     }
 
     void error(const Xml& at, std::string sentence, std::string help) {
-        if (report.all.size() < hal::text::most_errors) {
+        if (report.all.size() < hal::text::max_errors) {
             report.error(Topic::value, span_of(at, text), std::move(sentence), std::move(help));
         }
     }

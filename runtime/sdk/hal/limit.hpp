@@ -57,14 +57,13 @@ public:
 
 private:
     /// Defaults beyond this mean that there is no limit.
-    static constexpr double largest_limit = 1e9;
+    static constexpr double max_limit = 1e9;
 
     /// Where the value of `valid_` comes from.
     enum class Applies : std::uint8_t { last_value, initial_value, nothing };
 
     static bool is_limit(double initial) noexcept {
-        return std::fabs(initial) < largest_limit &&
-               !(zero == ZeroLimit::disables && initial == 0.0);
+        return std::fabs(initial) < max_limit && !(zero == ZeroLimit::disables && initial == 0.0);
     }
     static double first_limit(double initial) noexcept {
         if (is_limit(initial)) return initial;

@@ -36,11 +36,11 @@ class MessageLog {
 public:
     static constexpr std::int64_t interval_ns = 1'000'000'000;
     /// of one kind that are printed individually in a second
-    static constexpr std::size_t most_details = 8;
+    static constexpr std::size_t max_details = 8;
     /// of all kinds in a second; the messages about further ones are only counted
-    static constexpr std::size_t most_subjects = 256;
+    static constexpr std::size_t max_subjects = 256;
     /// the same in the seconds after one with more
-    static constexpr std::size_t most_subjects_of_a_storm = 16;
+    static constexpr std::size_t max_subjects_of_a_storm = 16;
     using Sink = std::function<void(const std::string& line)>;
 
     /// Lines are "INSTANCE: MESSAGE", or the message alone without an instance; `sink` gets them,
@@ -62,11 +62,11 @@ public:
         Kind* kind = find(subject.kind);
         if (kind != nullptr) {
             if (Entry* const known = find(*kind, subject.detail)) return known->hold(message);
-            if (kind->storming || kind->entries.size() >= most_details) {
+            if (kind->storming || kind->entries.size() >= max_details) {
                 return kind->hold_other(message, now_ns);
             }
         }
-        if (subjects() >= (overflowed_ ? most_subjects_of_a_storm : most_subjects)) {
+        if (subjects() >= (overflowed_ ? max_subjects_of_a_storm : max_subjects)) {
             if (suppressed_++ == 0) {
                 suppressed_since_ns_ = now_ns;
             }
@@ -296,7 +296,7 @@ private:
     std::uint64_t suppressed_ = 0;
     std::int64_t suppressed_since_ns_ = 0;
     std::int64_t last_ns_ = 0;
-    // there were more than most_subjects, in this second or the one before
+    // there were more than max_subjects, in this second or the one before
     bool overflowed_ = false;
 };
 

@@ -30,9 +30,9 @@ inline bool names_descriptor(std::string_view path) {
            path.starts_with("/proc/self/fd/");
 }
 
-/// Reads a whole regular file of at most `most` bytes. False: `bytes` is the reason. With
+/// Reads a whole regular file of at most `max_bytes` bytes. False: `bytes` is the reason. With
 /// `descriptors`, a file that was opened for this process (/dev/fd/N) may be a pipe, too. [setup]
-inline bool read_regular_file(const std::string& path, std::size_t most, std::string& bytes,
+inline bool read_regular_file(const std::string& path, std::size_t max_bytes, std::string& bytes,
                               bool descriptors = false) {
     const bool any = descriptors && names_descriptor(path);
     const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | (any ? 0 : O_NONBLOCK));
@@ -46,9 +46,9 @@ inline bool read_regular_file(const std::string& path, std::size_t most, std::st
         problem = special_kind(about.st_mode);
     }
     if (problem.empty() && S_ISREG(about.st_mode) && about.st_size > 0) {
-        bytes.reserve(static_cast<std::size_t>(about.st_size) < most
+        bytes.reserve(static_cast<std::size_t>(about.st_size) < max_bytes
                           ? static_cast<std::size_t>(about.st_size) + 1
-                          : most);
+                          : max_bytes);
     }
     char part[65536];
     while (problem.empty()) {
@@ -57,8 +57,8 @@ inline bool read_regular_file(const std::string& path, std::size_t most, std::st
         if (got < 0 && errno == EINTR) continue;
         if (got < 0) {
             problem = std::strerror(errno);
-        } else if (bytes.size() + static_cast<std::size_t>(got) > most) {
-            problem = "it is longer than " + std::to_string(most) + " bytes";
+        } else if (bytes.size() + static_cast<std::size_t>(got) > max_bytes) {
+            problem = "it is longer than " + std::to_string(max_bytes) + " bytes";
         } else {
             bytes.append(part, static_cast<std::size_t>(got));
         }

@@ -28,8 +28,12 @@ public:
 
     /// Sentences are "INSTANCE: SENTENCE". Without `subject`, sentences that differ only in their
     /// numbers are about the same. [setup]
-    Reporter(const std::string& instance, Words words, std::size_t room = 256, Subject subject = {})
-        : words_(std::move(words)), subject_(std::move(subject)), events_(room), log_(instance) {}
+    Reporter(const std::string& instance, Words format, std::size_t capacity = 256,
+             Subject subject = {})
+        : format_(std::move(format)),
+          subject_(std::move(subject)),
+          events_(capacity),
+          log_(instance) {}
     ~Reporter() { stop(); }
 
     /// In the component's start(). [setup]
@@ -55,7 +59,7 @@ private:
     void print(std::int64_t now_ns) noexcept {
         now_ns_ = now_ns;
         for (Event e; events_.pop(e);) {
-            if (const std::string sentence = words_(e); !sentence.empty()) {
+            if (const std::string sentence = format_(e); !sentence.empty()) {
                 log_.print(subject_ ? subject_(e, sentence)
                                     : MessageSubject{MessageLog::without_numbers(sentence)},
                            sentence, now_ns);
@@ -75,7 +79,7 @@ private:
         }
     }
 
-    const Words words_;
+    const Words format_;
     const Subject subject_;
     Queue<Event> events_;
     std::atomic<std::uint64_t> lost_{0};  // written by the cycle

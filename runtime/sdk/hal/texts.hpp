@@ -26,14 +26,14 @@ public:
     /// Returns the content of `file`, the value of `argument`. Throws if it cannot be read or is
     /// longer than 64 KiB. [setup]
     std::string read(const char* argument, const std::string& file) const {
-        constexpr std::size_t most = 65536;
+        constexpr std::size_t max_bytes = 65536;
         const std::string path = find(file);
         std::string text;
-        if (!read_regular_file(path, 16 * most, text)) {
+        if (!read_regular_file(path, 16 * max_bytes, text)) {
             throw ArgumentError(argument, std::string(argument) + "=" + file + ": the file '" +
                                               path + "' cannot be read: " + text);
         }
-        if (text.size() > most) {
+        if (text.size() > max_bytes) {
             throw ArgumentError(argument, std::string(argument) + "=" + file + ": the file '" +
                                               path +
                                               "' is longer than 64 KiB; is it the right one?");

@@ -18,7 +18,7 @@ public:
     void run() {
         for (std::size_t i = 0; i < entries_.size(); ++i) {
             within(entries_[i]);
-            for (std::size_t k = i + 1; k < entries_.size() && out_.all.size() <= text::most_errors;
+            for (std::size_t k = i + 1; k < entries_.size() && out_.all.size() <= text::max_errors;
                  ++k) {
                 apart(entries_[i], entries_[k]);
             }
