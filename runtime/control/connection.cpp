@@ -15,7 +15,7 @@
 #include "control/program_requests.hpp"
 #include "control/request.hpp"
 #include "control/value_requests.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 #include "machine/session.hpp"
 #include "paths.hpp"
 

@@ -7,7 +7,7 @@
 
 #include "hal/clock.hpp"
 #include "linuxcnc/leftovers.hpp"
-#include "machine/programs.hpp"
+#include "machine/processes/programs.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::tools {
