@@ -231,11 +231,11 @@ TEST(LiveProbes, Attached_and_detached_under_load_they_lose_nothing_and_disturb_
         "names=a,b,c\naddf a fast\naddf b slow");
     machine.start();
     std::atomic<bool> over{false};
-    std::atomic<int> edits{0};
+    std::atomic<int> edits_made{0};
     std::thread editor([&] {
-        for (; !over; ++edits) {
+        for (; !over; ++edits_made) {
             auto lock = machine.session.lock();
-            machine.must(edits % 2 ? "delf c fast" : "addf c fast 1");
+            machine.must(edits_made % 2 ? "delf c fast" : "addf c fast 1");
             lock.unlock();
             // others want the lock, too
             std::this_thread::sleep_for(std::chrono::microseconds(500));
@@ -273,7 +273,7 @@ TEST(LiveProbes, Attached_and_detached_under_load_they_lose_nothing_and_disturb_
     }
     over = true;
     editor.join();
-    EXPECT_GT(edits, 0);
+    EXPECT_GT(edits_made, 0);
 }
 
 }  // namespace

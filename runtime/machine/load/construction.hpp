@@ -46,7 +46,7 @@ struct Construction {
     std::size_t list_length = 0;
     std::size_t declared_count = 0;  ///< instances by hal_naming::count; precedes the lists
     std::vector<std::string> texts;      // keeps what argument() gave
-    Failure failure;
+    Failure failure = {};
     bool no_memory = false;
     std::string serial = {};             // of an instance that is named after its component
     bool whole_function_names = false;

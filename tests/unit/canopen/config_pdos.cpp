@@ -76,8 +76,8 @@ TEST(CanopenConfig, a_multiplexed_PDO_carries_its_objects_one_at_a_time) {
               "arm:5:9: error: object 'read-inputs-1' is in two PDOs, one of them multiplexed; "
               "remove it from one of them");
     std::string many = "mpdo 0x2000:1 u8";
-    for (int n = 2; n <= 100; ++n) {
-        many += ", 0x2000:" + std::to_string(n) + " u8";
+    for (int sub = 2; sub <= 100; ++sub) {
+        many += ", 0x2000:" + std::to_string(sub) + " u8";
     }
     EXPECT_EQ(good(node + "tpdo2 = " + many + "\n").nodes[0].pdos[0].objects.size(), 100U);
     EXPECT_EQ(said("[bus]\n[node 5]\neds = mpdo.eds\ntpdo1 = default\n"),
