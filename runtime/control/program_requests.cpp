@@ -12,6 +12,7 @@
 #include "control/streams.hpp"
 #include "machine/processes/programs.hpp"
 #include "machine/session.hpp"
+#include "text/netlist_name.hpp"
 
 namespace hal {
 namespace {
@@ -57,11 +58,19 @@ hal_value value_of(const Json& value, hal_type type, const std::string& of) {
     return parsed.value;
 }
 
-bool good_pin_name(const std::string& name) {
-    return !name.empty() && name.size() <= max_name_size &&
-           std::all_of(name.begin(), name.end(), [](unsigned char c) {
-        return c > ' ' && c != 127 && c != '"' && c != '\\';
-    });
+/// Throws when a netlist cannot contain the name of a pin, its prefix, or a stream.
+void check_name(const std::string& name, const char* kind) {
+    std::string problem = name_problem(name);
+    if (problem.empty() && name.size() > max_name_size) {
+        problem = "it has more than " + std::to_string(max_name_size) + " bytes";
+    }
+    if (problem.empty() && name.find_first_of("\"'\\") != name.npos) {
+        problem = "a quote or a backslash is not a character of names";
+    }
+    if (!problem.empty()) {
+        throw RequestError{"'" + shown_name(name) + "' is not a valid " + kind + ": " + problem +
+                           "; use letters, digits and - _ . :"};
+    }
 }
 
 ProgramPin pin_of(const Json& given, const std::string& prefix) {
@@ -70,9 +79,7 @@ ProgramPin pin_of(const Json& given, const std::string& prefix) {
     }
     ProgramPin pin;
     const std::string& name = text_of(member(given, "name"), "the name of a pin");
-    if (!good_pin_name(name)) {
-        throw RequestError{"'" + name.substr(0, 60) + "' is not a valid pin name"};
-    }
+    check_name(name, "pin name");
     pin.name = prefix + "." + name;
     const auto type = type_named(text_of(member(given, "type"), "the type of a pin"));
     if (!type) {
@@ -220,9 +227,7 @@ Declaration declaration_of(const Json& body) {
         throw RequestError{"ready must be true or false"};
     }
     const std::string before = prefix.is_null() ? to.name : text_of(prefix, "prefix");
-    if (!good_pin_name(before)) {
-        throw RequestError{"'" + before.substr(0, 60) + "' is not a valid prefix"};
-    }
+    check_name(before, "prefix");
     if (!ready.is_null()) {
         to.ready = ready.get<bool>();
     }
@@ -520,9 +525,7 @@ void create_stream(const Program& by, const std::string& name, const Json& wante
                                "' is not a valid column type; valid types: b f s u l k"};
         }
     }
-    if (!good_pin_name(name)) {
-        throw RequestError{"'" + name.substr(0, 60) + "' is not a valid stream name"};
-    }
+    check_name(name, "stream name");
     if (by.session.host().find_stream(name) || by.session.programs().find_stream(name)) {
         throw RequestError{"stream '" + name + "' already exists"};
     }

@@ -393,6 +393,7 @@ bool Edit::replace(LoadedComponent& component, std::unique_ptr<LoadedComponent>&
 // --- functions and threads ---
 
 Thread* Edit::add_thread(Word name, const ThreadOptions& options) {
+    if (!check_name("thread", name)) return nullptr;
     if (const Thread* const there = model_.find_thread(name.text)) {
         fail("name-taken", name.span, "thread " + hal::quoted(name.text) + " already exists",
              "second time", Other{there->made, "created here"});

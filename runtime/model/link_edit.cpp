@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "text/netlist_name.hpp"
 #include "text/quoting.hpp"
 
 namespace hal {
@@ -144,7 +145,17 @@ Thread* LinkEdit::thread(Word name) {
     return nullptr;
 }
 
+bool LinkEdit::check_name(const char* kind, Word name) {
+    const std::string problem = name_problem(name.text);
+    if (problem.empty()) return true;
+    return fail("invalid-name", name.span,
+                "a netlist cannot contain the " + std::string(kind) + " name " +
+                    hal::quoted(shown_name(name.text)) + ": " + problem,
+                "", "use letters, digits and - _ . :");
+}
+
 Signal* LinkEdit::add_signal(Word name, hal_type type, Span typed_at) {
+    if (!check_name("signal", name)) return nullptr;
     if (const Signal* const there = model_.find_signal(name.text)) {
         fail("name-taken", name.span, "signal " + hal::quoted(name.text) + " already exists",
              "second time", Other{there->made, "created here"});
@@ -489,7 +500,7 @@ void LinkEdit::change_alias(Pin& pin, std::string alias) {
 
 bool LinkEdit::alias(Word name, Word second) {
     Pin* const target = pin(name);
-    if (!target) return false;
+    if (!target || !check_name("alias", second)) return false;
     if (model_.find_pin(second.text)) {
         return fail("name-taken", second.span,
                     "pin or alias " + hal::quoted(second.text) + " already exists");

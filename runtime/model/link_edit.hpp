@@ -33,6 +33,10 @@ public:
     /// Removes the second name; a pin that has none stays as it is.
     bool unalias(Word name);
 
+    /// Checks that a netlist can contain the name of a new signal, alias, thread or instance.
+    /// Returns false after reporting.
+    bool check_name(const char* kind, Word name);
+
     // --- look-ups that report ---
     Pin* pin(Word name);
     Signal* signal(Word name);

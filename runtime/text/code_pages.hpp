@@ -250,6 +250,13 @@ inline constexpr CodePage code_pages[] = {
      "A command that was waiting (loadusr -w, loadusr -W, waitusr, advance) was cancelled, or its "
      "client disconnected.\n\n"
      "Commands executed before it remain in effect."},
+    {"invalid-name",
+     "The name of a signal, an alias, a thread or an instance is one word of a netlist. A name that "
+     "the parser would read "
+     "otherwise (a blank or a line end in it, '#', '$', '[' or '{', an open quote) could be made by "
+     "a program, but no netlist "
+     "could use it, and what `save` prints could not be loaded.\n\n"
+     "Use letters, digits, '-', '_', '.' and ':'."},
     {"is-a-program",
      "unloadrt unloads components from this process. This component is a program of its own: it "
      "was started by loadusr, or registered "

@@ -248,6 +248,51 @@ except hal.error as problem:
             ),
         )
 
+    def test_an_argument_stays_one_word(self):
+        self.machine()
+        attacks = ["1\\nsetp adder.in1 9", "1\\tadder.in1", "1 # x", '1"', "1'", "1\\\\", "$HOME", "[0..2]"]
+        self.assertEqual(
+            "9.0\n" + "error\n" * len(attacks) + "3.0\n" + "True\n" * 10,
+            self.python(
+                "import hal, sys, os\n"
+                "sys.stderr = open(os.devnull, 'w')\n"
+                "hal.set_p('adder.in0', 9); print(hal.get_value('adder.in0'))\n"
+                "def attack(value):\n"
+                "    try: hal.set_p('adder.in0', value)\n"
+                "    except hal.error: print('error')\n"
+                "for value in ["
+                + ", ".join(f"'{one}'" if "'" not in one else f'"{one}"' for one in attacks)
+                + "]: attack(value)\n"
+                "print(hal.get_value('adder.in1'))\n"
+                "for name in 'a b', 'a\\nb', 'a\\tb', 'a#b', 'a$b', 'a[0]', 'a{b}', 'a\\\\', '': print(hal.new_sig(name, hal.HAL_BIT))\n"
+                "print(hal.connect('adder.in1\\nunload all', 'total'))\n"
+            ),
+        )
+        self.assertEqual(" total\n".split(), self.shell("list", "sig").stdout.split())
+
+    def test_a_name_that_no_netlist_can_contain_is_rejected(self):
+        self.machine()
+        self.assertEqual(
+            "'a#b' is not a valid pin name: '#' begins a comment; use letters, digits and - _ . :\n"
+            "'a b' is not a valid pin name: a blank ends the word; use letters, digits and - _ . :\n"
+            "'a b' is not a valid pin name: it contains a line end or another control character; use letters, digits and - _ . :\n"
+            "'a[1]' is not a valid pin name: '[' begins a range or a reference to an INI file; use letters, digits and - _ . :\n"
+            "'it's' is not a valid pin name: the quote ' is not closed; use letters, digits and - _ . :\n"
+            "'a b' is not a valid prefix: it contains a line end or another control character; use letters, digits and - _ . :\n"
+            "'a#' is not a valid name for a component; use 1 to 64 letters, digits and - _ . with no . at the beginning\n"
+            "'a$' is not a valid prefix: '$' begins a variable; use letters, digits and - _ . :\n",
+            self.python(
+                "import hal\nc = hal.component('c')\n"
+                "def fails(action):\n"
+                "    try: action()\n"
+                "    except hal.error as problem: print(problem)\n"
+                "for name in 'a#b', 'a b', 'a\\nb', 'a[1]', \"it's\": fails(lambda: c.newpin(name, hal.HAL_BIT, hal.HAL_IN))\n"
+                "fails(lambda: hal.component('a\\nb'))\n"
+                "fails(lambda: hal.component('a#', 'a'))\n"
+                "fails(lambda: hal.component('d', 'a$'))\n"
+            ),
+        )
+
     def test_the_writes_of_two_components_arrive_in_their_order(self):
         machine = self.machine(
             SERVO

@@ -130,6 +130,8 @@ bool read_request(Elaboration& on, const Token& name, Origin origin, Args args,
                     on.diagnostics.error("bad-argument", token.span, "names= lists an empty name",
                                          "", "write names=first,second without blanks");
                     good = false;
+                } else {
+                    good = on.edit.check_name("instance", {one, token.span}) && good;
                 }
             }
         } else if (says_instances && key != "personality") {

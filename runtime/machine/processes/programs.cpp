@@ -8,7 +8,8 @@
 
 #include "execute/core.hpp"
 #include "machine/processes/address.hpp"
-#include "machine/run/running_model.hpp"
+#include "machine/session.hpp"
+#include "text/netlist_name.hpp"
 
 namespace hal {
 namespace {
@@ -233,7 +234,11 @@ Programs::Entry& Programs::enter(Entry* of_process, pid_t pid, const std::string
 
 std::string Programs::announce(pid_t pid, const std::string& name, std::uint64_t owner,
                                bool ready) {
-    if (!good_instance_name(name)) return "'" + name + "' is not a valid name for a component";
+    if (!good_instance_name(name)) {
+        return "'" + shown_name(name) +
+               "' is not a valid name for a component; use 1 to 64 letters, digits and - _ . with "
+               "no . at the beginning";
+    }
     Entry* entry = find(name);
     if (entry) {
         std::string conflict = conflict_with(*entry, pid);

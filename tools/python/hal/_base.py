@@ -100,12 +100,14 @@ def _ask(**body):
 
 
 def _run(command, *words):
-    """Runs one command of the shell and returns its output; raises its error."""
-
-    def quoted(word):
-        return f'"{word}"' if any(c in word for c in " \t$[]{}#'") else word
-
-    reply = _ask(run=" ".join([command, *(quoted(str(word)) for word in words)]), name="<python>")
+    """Runs one command of the shell and returns its output; raises its error. Each argument stays one word, whatever is in it."""
+    words = [str(word) for word in words]
+    for word in words:
+        if "[" in word or "{" in word:
+            raise InvalidArgument(
+                f"'{word}' is not a name or a value: '[' and '{{' begin a range or a set of names, which only netlists have"
+            )
+    reply = _ask(run=[command, *words], name="<python>")
     if reply["status"] != 0:
         raise error(reply["err"].strip() or f"{command} failed")
     return reply["out"]
