@@ -36,6 +36,16 @@ struct Connection::State {
                            "'begin': commit or abort it first"};
     }
 
+    /// A component would keep a connection that is reserved for commands, such as `stop`.
+    void reject_if_reserved() const {
+        const std::size_t max_clients = reserved_beyond;
+        if (max_clients == 0) return;
+        throw RequestError{"no connection is left for a component: " + std::to_string(max_clients) +
+                           " clients are connected, and further connections are reserved for "
+                           "commands; end a program ('show comp' lists them), or give one "
+                           "component the pins of several"};
+    }
+
     /// While a request is being executed.
     class Engaged {
     public:
@@ -59,6 +69,8 @@ struct Connection::State {
     std::atomic<std::uint64_t> invalid_requests{0};
     /// the client has declared one since idle() last found none
     std::atomic<bool> has_component{false};
+    /// it is reserved for commands, because so many clients are connected; 0: it is not
+    std::atomic<std::size_t> reserved_beyond{0};
     /// a request is being executed, or `begin` is open since the last one
     std::atomic<bool> engaged{false};
     // What follows belongs to the thread in handle().
@@ -121,6 +133,7 @@ struct Verb {
 
 void declare(Connection::State& s, const Json& body, std::string& reply) {
     s.reject_in_transaction("component");
+    s.reject_if_reserved();
     s.has_component = true;
     declare_component(s.program(), body, reply);
 }
@@ -240,6 +253,10 @@ Connection::~Connection() {
 
 void Connection::on_event(std::function<void(std::string)> take) {
     state_->commands.event = std::move(take);
+}
+
+void Connection::reserve(std::size_t max_clients) {
+    state_->reserved_beyond = max_clients;
 }
 
 bool Connection::idle() const {

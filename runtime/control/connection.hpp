@@ -10,6 +10,7 @@
 // is in a member.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -66,6 +67,9 @@ public:
     /// Where lines go that a command which waits has for the client meanwhile; called in the thread
     /// that is in handle().
     void on_event(std::function<void(std::string line)> take);
+    /// Keeps the connection for commands: it is beyond the `max_clients` that may have components. 0
+    /// makes it an ordinary one. [any]
+    void reserve(std::size_t max_clients);
     /// True while nothing depends on this connection: no request being executed, no subscription,
     /// no component, no open `begin`. Never waits; may be false while the session's lock is held.
     /// [any]

@@ -392,6 +392,7 @@ void Server::State::give_turn(ServedClient& client) {
         client.done_up_to(end);
     }
     turn.congested = client.waiting() > slow_reader;
+    client.connection->reserve(client.reserved ? options.max_clients : 0);
     client.has_turn = true;
     client.turn_over = false;
     pool.give(client);

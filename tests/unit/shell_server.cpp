@@ -313,6 +313,38 @@ TEST_F(ServerTest, idle_clients_are_closed_first_and_are_told_why) {
         << operator_->closed_because();
 }
 
+TEST_F(ServerTest, a_reserved_place_is_not_kept_by_a_component) {
+    ServerOptions options;
+    options.max_clients = 2;
+    options.reserved = 1;
+    serve(options);
+    Wire first(server->path()), second(server->path());
+    first.line();
+    second.line();
+    first.send("{\"component\":\"first\"}\n");
+    second.send("{\"component\":\"second\"}\n");
+    EXPECT_EQ(Json::parse(first.line())["ok"], true);
+    EXPECT_EQ(Json::parse(second.line())["ok"], true);
+    {
+        Wire third(server->path());
+        third.line();
+        third.send("{\"component\":\"third\"}\n");
+        EXPECT_EQ(Json::parse(third.line())["error"],
+                  "no connection is left for a component: 2 clients are connected, and further "
+                  "connections are reserved for commands; end a program ('show comp' lists them), "
+                  "or give one component the pins of several");
+        third.send("{\"run\":\"getp a.out\"}\n");
+        EXPECT_EQ(Json::parse(third.line())["out"], "FALSE\n") << "it serves commands";
+    }
+    first.shut();
+    EXPECT_TRUE(eventually([&] { return server->counts().clients == 1; }));
+    Wire fourth(server->path());
+    fourth.line();
+    fourth.send("{\"component\":\"fourth\"}\n");
+    EXPECT_EQ(Json::parse(fourth.line())["ok"], true) << "a place is free again";
+    EXPECT_EQ(client()->run("stop").status, 0);
+}
+
 TEST_F(ServerTest, a_reserved_place_is_not_kept_by_a_subscription) {
     ServerOptions options;
     options.max_clients = 1;
