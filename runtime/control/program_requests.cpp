@@ -484,6 +484,7 @@ void use_port(const Program& by, const Json& body, std::string& reply) {
     const bool takes = !read.is_null() || !peek.is_null();
     const auto lock = by.session.lock();
     const Pin& pin = find_port(by, name, takes, !write.is_null());
+    by.session.programs().note_alive(owned(by, pin.instance->component->name));
     PortEnd port(pin.signal ? pin.signal->port.get() : nullptr);
     bool done = false;
     if (takes) {

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Python's module hal: components, their death and their return, functions of the module, streams."""
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -248,9 +249,34 @@ except hal.error as problem:
             ),
         )
 
+    def test_every_access_to_a_pin_is_a_sign_of_life(self):
+        self.machine()
+        access = "7.0 7.0\n"  # never the safe value
+        self.assertEqual(
+            access * 2,
+            self.python(
+                "import hal, time\nc = hal.component('echo', every=0.2, timeout=0.2)\n"
+                "c.newpin('out', hal.HAL_FLOAT, hal.HAL_OUT, safe=-1.0)\nport = c.newpin('port', hal.HAL_PORT, hal.HAL_OUT)\nc.ready()\n"
+                "c['out'] = 7\n"
+                "for access in (lambda: c['out']), port.size:\n"
+                "    seen, end = [], time.monotonic() + 1.5\n"
+                "    while time.monotonic() < end: access(); seen.append(hal.get_value('echo.out')); time.sleep(0.005)\n"
+                "    print(min(seen), max(seen))\n"
+            ),
+        )
+
     def test_an_argument_stays_one_word(self):
         self.machine()
-        attacks = ["1\\nsetp adder.in1 9", "1\\tadder.in1", "1 # x", '1"', "1'", "1\\\\", "$HOME", "[0..2]"]
+        attacks = [
+            "1\\nsetp adder.in1 9",
+            "1\\tadder.in1",
+            "1 # x",
+            '1"',
+            "1'",
+            "1\\\\",
+            "$HOME",
+            "[0..2]",
+        ]
         self.assertEqual(
             "9.0\n" + "error\n" * len(attacks) + "3.0\n" + "True\n" * 10,
             self.python(

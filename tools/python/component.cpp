@@ -150,11 +150,13 @@ long Component::find(const std::string& name) const {
 
 py::object Component::get(std::size_t i) {
     std::unique_lock lock(mutex_, std::try_to_lock);
-    if (!lock || stale(items_[i])) {
+    if (!lock || stale(items_[i]) || report_due()) {
         const py::gil_scoped_release release_gil;
         acquire(lock);
         if (stale(items_[i])) {
             exchange(true);
+        } else if (report_due()) {
+            report();
         }
     }
     check_usable();
@@ -214,9 +216,7 @@ void Component::alive() {
     const py::gil_scoped_release release_gil;
     std::unique_lock lock(mutex_, std::defer_lock);
     acquire(lock);
-    if (client_->connected()) {
-        client_->request({{"exchange", name_}});
-    }
+    report();
 }
 
 void Component::invalidate() {
@@ -297,6 +297,17 @@ bool Component::stale(const Item& item) const {
     return (dirty_ && loops_) || Clock::now() - fetched_ > 1ms;
 }
 
+bool Component::report_due() const {
+    const std::chrono::microseconds every(std::int64_t{every_ms_} * 1000);
+    return every_ms_ > 0 && !dirty_ && Clock::now() - reported_ > every / 4;
+}
+
+void Component::report() {
+    if (!client_->connected()) return;
+    client_->request({{"exchange", name_}});
+    reported_ = Clock::now();
+}
+
 void Component::exchange(bool read) {
     if (!client_->connected() || (!dirty_ && !read)) return;
     Json body{{"exchange", name_}};
@@ -325,6 +336,7 @@ void Component::exchange(bool read) {
         lost_ = reply.value("error", "the machine sent no reply");
         throw Problem(lost_);
     }
+    reported_ = Clock::now();
     if (!read) return;
     const Json& values = reply.at("values");
     std::size_t k = 0;

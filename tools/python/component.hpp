@@ -89,6 +89,10 @@ private:
     void check_process() const;
     void check_usable() const;
     bool stale(const Item& item) const;
+    /// Returns true when the machine is to know that the program accesses its pins, although this
+    /// access needs nothing from it.
+    bool report_due() const;
+    void report();
     /// Sends what another component of this process has written before, so that the machine sees
     /// the writes in their order. The caller holds the GIL and no lock.
     void send_earlier_writes();
@@ -123,6 +127,7 @@ private:
     std::string lost_;  // why the instance rejected the last exchange
     std::atomic<bool> forked_{false};
     std::chrono::steady_clock::time_point fetched_{};
+    std::chrono::steady_clock::time_point reported_{};  // of the last sign of life
     std::thread flusher_;
 };
 
