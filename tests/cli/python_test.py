@@ -170,6 +170,22 @@ except hal.error as problem:
         self.python(text)
         wait_until(lambda: self.state() == "", "it leaves at its end")
 
+    def test_each_component_of_a_killed_program_reports_the_signal(self):
+        self.write(
+            "two.py",
+            "import hal, time\ncomponents = [hal.component(name) for name in ('one', 'two')]\n"
+            "for c in reversed(components): c.newpin('out', hal.HAL_BIT, hal.HAL_OUT), c.ready()\n"
+            "while True: time.sleep(1)\n",
+        )
+        self.machine(SERVO + f"start\nloadusr -Wn one {sys.executable} two.py\n")
+        wait_until(lambda: self.state("one") == "ready", "both are ready")
+        os.kill(self.pid("two"), signal.SIGKILL)
+        for name in "one", "two":
+            wait_until(
+                lambda: re.fullmatch(r"dead since [\d:]+ \(SIGKILL\)", self.state(name)),
+                f"{name} reports the signal",
+            )
+
     def test_restart_on_failure(self):
         self.write("echo.py", ECHO)
         self.machine(

@@ -377,11 +377,14 @@ void Programs::child_ended(pid_t pid, int status) {
     }
 }
 
-/// The process of a second component of it has ended; the connection may end a moment later.
+/// The process of a second component of it has ended; the connection ends a moment earlier or later.
 void Programs::end_component(Entry& entry, int status) {
+    constexpr std::int64_t between_ns = 1'000'000'000;
+    const Entry::Dead* const dead = entry.death();
+    const bool just_died = dead && monotonic_ns() - dead->since_ns < between_ns;
     if (entry.stopping) {
         leave(entry);
-    } else if (has_pins(entry) && !entry.dead()) {
+    } else if (has_pins(entry) && (!dead || just_died)) {
         die(entry, exit_text(status));
     }
 }

@@ -84,6 +84,8 @@ public:
     std::string refusal_of(pid_t pid) const;
     std::vector<std::string> names() const;
     bool idle() const { return entries_.empty(); }  ///< no program is known
+    /// Returns true while the process is a child whose exit status is still to come.
+    bool runs_as_child(pid_t pid) const;
     /// Removes the entry of a waited child.
     void collect(pid_t pid);
     /// Nobody waits for it any more.
@@ -110,7 +112,6 @@ private:
 
     bool any_child_runs() const;
     void signal_children(int signal);
-    bool runs_as_child(pid_t pid) const;
     std::string reject(pid_t pid, std::string why);
     std::string conflict_with(const Entry& entry, pid_t pid) const;
     Entry* find_newcomer(const Entry& dead, pid_t pid);
