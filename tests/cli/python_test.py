@@ -380,6 +380,20 @@ except hal.error as problem:
             ),
         )
 
+    def test_a_stream_without_depth_or_columns_is_rejected(self):
+        self.machine()
+        self.assertEqual(
+            "[Errno 22] invalid depth 0 of stream streamer.5; use 1 or more\n"
+            "[Errno 22] invalid depth -5 of stream streamer.5; use 1 or more\n"
+            "a stream needs at least one column; its types are letters of b, f, s, u, l, k\n",
+            self.python(
+                "import hal\nc = hal.component('s')\n"
+                "for words in (0, 'f'), (-5, 'f'), (3, ''):\n"
+                "    try: hal.stream(c, hal.streamer_base + 5, *words)\n"
+                "    except (OSError, ValueError) as problem: print(problem)\n"
+            ),
+        )
+
     def test_a_child_process_does_not_use_its_parents_component(self):
         self.machine()
         self.assertEqual(

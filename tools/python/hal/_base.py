@@ -25,6 +25,7 @@ class WrongKind(error, AttributeError):
 
 class StreamError(error, OSError):
     __module__ = "hal"
+    __init__, __str__ = OSError.__init__, OSError.__str__  # with the number of the error, if any
 
 
 class Type(enum.IntEnum):

@@ -21,6 +21,10 @@ class stream:
         for letter in types or "":
             if letter.lower() not in "bfsulk":
                 raise ValueError(f"invalid column type {letter!r}; use b, f, s, u, l or k")
+        if types == "":
+            raise ValueError(
+                "a stream needs at least one column; its types are letters of b, f, s, u, l, k"
+            )
         types = types.lower() if types else None
         base = next(
             (
@@ -38,6 +42,10 @@ class stream:
         self._comp, self._waiting, self._taken = comp._core, [], 0
         self.num_overruns = self.num_underruns = self.sampleno = 0
         self._shared = None
+        if depth is not None and depth < 1:
+            raise StreamError(
+                errno.EINVAL, f"invalid depth {depth} of stream {self._name}; use 1 or more"
+            )
         if depth is not None:  # one record stays free, as in LinuxCNC
             about = self._ask(create={"types": types, "depth": max(depth - 1, 1)}, owner=comp._name)
         else:
