@@ -118,6 +118,16 @@ class Devices(Node):
                 f"axis 0 switch on disabled, profile position; axis 1 {state}, profile position",
             )
 
+    def test_each_change_has_a_line_with_its_time(self):
+        drive = self.node("drive", "--id", 2, "--axes", 1, "--motor", "endless:1")
+        self.good("can", "nmt", self.bus, "start", "2")
+        for command in ("6", "7", "0xf"):
+            self.write_object(2, "6040:0", "u16", command)
+        self.expect(drive, "operation enabled")
+        text = self.ended(drive)
+        for state in ("ready to switch on", "switched on", "operation enabled"):
+            self.assertRegex(text, rf"(?m)^ +\d+\.\d{{3}} s  {state}, profile position$")
+
     def test_force_sensor_reads_what_acts_on_it(self):
         self.node("jr3", "--set", "fz=-20")
         wait_until(lambda: abs(self.read(80, "6130:3", "r32") + 20) < 0.05, "the force is measured")

@@ -116,25 +116,25 @@ class Rtcfg(Segment):
             "m", NETLIST.format("config=cell.tdma station=m").replace("5000000", "2000000")
         )
         self.wait_for_words(
-            "node", f"hal node: configured by {self.mac('m')} as station x: 1 slot, cycle 2000 us\n"
+            "node", f" s  configured by {self.mac('m')} as station x: 1 slot, cycle 2000 us\n"
         )
         self.wait_for_words("m", f"tdma.0: station x ({self.mac('x')}) is configured\n")
         self.wait_for("m", "stations", "1")
-        self.wait_for_words("node", "hal node: runs: its slots may be used\n")
+        self.wait_for_words("node", " s  runs: its slots may be used\n")
         # The master begins anew with another schedule, and with another cycle.
         self.stop(master)
         self.wait_for_words(
             "node",
-            f"hal node: lost the sync of {self.mac('m')}; this station stops sending until the next sync\n",
+            f" s  lost the sync of {self.mac('m')}; this station stops sending until the next sync\n",
         )
         self.write(
             "cell.tdma", CELL.format(self.mac("x"))
         )  # here its slot is far behind the beginning of its cycle
         self.station("m", NETLIST.format("config=cell.tdma station=m"))
         self.wait_for_words(
-            "node", f"hal node: configured by {self.mac('m')} as station x: 1 slot, cycle 5000 us\n"
+            "node", f" s  configured by {self.mac('m')} as station x: 1 slot, cycle 5000 us\n"
         )
-        self.wait_for_words("node", "hal node: runs: its slots may be used\n", 2)
+        self.wait_for_words("node", " s  runs: its slots may be used\n", 2)
         self.wait_for("m", "stations", "1")
         self.stop(node)
         self.assertIn("TDMA: running, ", self.said("node"))

@@ -24,6 +24,16 @@ TEST_F(MessageLogTest, First_message_of_each_subject_is_printed_at_once) {
     EXPECT_EQ(lines, (Lines{"it.0: node 5 is lost\n", "it.0: node 6 is lost\n"}));
 }
 
+TEST(MessageLogOfAProgram, Each_line_has_the_time_of_what_it_reports) {
+    std::vector<std::string> lines;
+    MessageLog log{hal::LinePrefix::time_since(1000 * ms),
+                   [&lines](const std::string& line) { lines.push_back(line); }};
+    log.print("a", "first", 1001 * ms);
+    log.print("a", "second", 1500 * ms);
+    log.flush(2600 * ms);
+    EXPECT_EQ(lines, (std::vector<std::string>{"    0.001 s  first\n", "    0.500 s  second\n"}));
+}
+
 TEST_F(MessageLogTest, Storm_is_one_line_per_second_with_the_newest_message_and_a_count) {
     for (int i = 0; i < 3000; ++i) {
         log.print("storm", "latency " + std::to_string(i) + " us", i * ms);

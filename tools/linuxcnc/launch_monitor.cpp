@@ -14,6 +14,20 @@ namespace hal::tools {
 
 using namespace std::chrono_literals;
 
+namespace {
+
+// from the end of a program's connection to its exit status
+constexpr std::int64_t exit_status_timeout_ns = 200'000'000;
+
+/// True while only the connection of a dead program is known to have ended, and its exit status,
+/// which states why it died, is still to come.
+bool exit_status_follows(Programs& programs, const Programs::Entry& entry) {
+    const bool may_follow = monotonic_ns() - entry.death()->since_ns < exit_status_timeout_ns;
+    return may_follow && programs.runs_as_child(entry.pid);
+}
+
+}  // namespace
+
 LaunchMonitor::LaunchMonitor(const Configuration& configuration, HostedMachine& machine,
                              LaunchPrograms& programs)
     : configuration_(configuration),
@@ -23,8 +37,9 @@ LaunchMonitor::LaunchMonitor(const Configuration& configuration, HostedMachine& 
 
 std::string LaunchMonitor::death_of(const std::string& component, const std::string& program) {
     const auto lock = machine_.session.lock();
-    const auto* const entry = machine_.session.programs().find(component);
-    if (entry && !entry->dead()) {
+    Programs& programs = machine_.session.programs();
+    const auto* const entry = programs.find(component);
+    if (entry && (!entry->dead() || exit_status_follows(programs, *entry))) {
         return {};
     }
     const std::string who = component == program

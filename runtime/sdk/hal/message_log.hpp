@@ -26,6 +26,34 @@ struct MessageSubject {
     std::string kind, detail = {};
 };
 
+/// How the lines of a log begin: "INSTANCE: ", or, in a program of its own, the time since its start,
+/// "    1.234 s  ".
+class LinePrefix {
+public:
+    LinePrefix(std::string_view instance)
+        : instance_(instance.empty() ? std::string() : std::string(instance) + ": ") {}
+    LinePrefix(const std::string& instance) : LinePrefix(std::string_view(instance)) {}
+    LinePrefix(const char* instance) : LinePrefix(std::string_view(instance)) {}
+    static LinePrefix time_since(std::int64_t begin_ns) {
+        LinePrefix prefix("");
+        prefix.begin_ns_ = begin_ns;
+        return prefix;
+    }
+    /// The beginning of the line about what happened at this time.
+    std::string at(std::int64_t now_ns) const {
+        if (begin_ns_ == no_time) return instance_;
+        char text[32];
+        std::snprintf(text, sizeof text, "%9.3f s  ",
+                      static_cast<double>(now_ns - begin_ns_) * 1e-9);
+        return text;
+    }
+
+private:
+    static constexpr std::int64_t no_time = INT64_MIN;
+    std::string instance_;
+    std::int64_t begin_ns_ = no_time;
+};
+
 /// The first message about a subject is printed at once. Those that follow within a second are
 /// counted, and flush() prints the newest of them with the count when the second is over, or before
 /// the first message about another subject, so that lines come in the order of what happened. Of a
@@ -43,10 +71,10 @@ public:
     static constexpr std::size_t max_subjects_of_a_storm = 16;
     using Sink = std::function<void(const std::string& line)>;
 
-    /// Lines are "INSTANCE: MESSAGE", or the message alone without an instance; `sink` gets them,
-    /// with their newline, instead of standard error. [setup]
-    explicit MessageLog(const std::string& instance, Sink sink = {})
-        : prefix_(instance.empty() ? instance : instance + ": "), sink_(std::move(sink)) {}
+    /// Lines are the prefix and the message; `sink` gets them, with their newline, instead of
+    /// standard error. [setup]
+    explicit MessageLog(LinePrefix prefix, Sink sink = {})
+        : prefix_(std::move(prefix)), sink_(std::move(sink)) {}
     /// Lines also go to the journal of the machine until it is called with nullptr. Not while
     /// another thread prints. [setup]
     void journal(const hal_messages* to) noexcept { journal_ = to; }
@@ -59,11 +87,12 @@ public:
                std::int64_t now_ns = monotonic_ns()) {
         const std::lock_guard lock(mutex_);
         flush_all(now_ns, false);
+        const std::string line = prefix_.at(now_ns) + message;
         Kind* kind = find(subject.kind);
         if (kind != nullptr) {
-            if (Entry* const known = find(*kind, subject.detail)) return known->hold(message);
+            if (Entry* const known = find(*kind, subject.detail)) return known->hold(line);
             if (kind->storming || kind->entries.size() >= max_details) {
-                return kind->hold_other(message, now_ns);
+                return kind->hold_other(line, now_ns);
             }
         }
         if (subjects() >= (overflowed_ ? max_subjects_of_a_storm : max_subjects)) {
@@ -74,7 +103,7 @@ public:
             return;
         }
         print_held_early(now_ns);
-        write(message);
+        write(line);
         if (kind == nullptr) {
             kind = &kinds_.emplace_back(Kind{subject.kind, {}, {}, false});
         }
@@ -123,14 +152,14 @@ public:
 private:
     /// What was printed of a subject, and what was only counted since.
     struct Entry {
-        std::string detail, newest;
+        std::string detail, newest;  // newest: with its prefix
         std::int64_t since_ns = 0;  // of the line printed last
         std::uint64_t held = 0;  // messages since then
         unsigned early = 0;  // lines in this second before it was over
 
-        void hold(const std::string& message) {
+        void hold(const std::string& line) {
             ++held;
-            newest = message;
+            newest = line;
         }
         bool over(std::int64_t now_ns) const { return now_ns - since_ns >= interval_ns; }
     };
@@ -140,12 +169,12 @@ private:
         Entry others;  // further details, which have no entry of their own
         bool storming = false;  // there were such in this second or the one before
 
-        void hold_other(const std::string& message, std::int64_t now_ns) {
+        void hold_other(const std::string& line, std::int64_t now_ns) {
             if (!storming) {
                 others.since_ns = now_ns;
             }
             storming = true;
-            others.hold(message);
+            others.hold(line);
         }
     };
     static constexpr unsigned max_early = 3;
@@ -220,8 +249,8 @@ private:
             overflowed_ = false;
         }
         if (suppressed_ == 0 || !(all || now_ns - suppressed_since_ns_ >= interval_ns)) return;
-        write(std::to_string(suppressed_) + (suppressed_ == 1 ? " message" : " messages") +
-              " about further subjects not shown");
+        write(prefix_.at(now_ns) + std::to_string(suppressed_) +
+              (suppressed_ == 1 ? " message" : " messages") + " about further subjects not shown");
         suppressed_ = 0;
         suppressed_since_ns_ = now_ns;
     }
@@ -276,8 +305,8 @@ private:
                       static_cast<unsigned long long>(times), seconds(in_ns));
         return text;
     }
-    void write(const std::string& message) const {
-        const std::string line = prefix_ + message + "\n";
+    void write(std::string line) const {
+        line += '\n';
         if (sink_) {
             sink_(line);
         } else {
@@ -288,7 +317,7 @@ private:
         }
     }
 
-    const std::string prefix_;
+    const LinePrefix prefix_;
     const Sink sink_;
     const hal_messages* journal_ = nullptr;
     std::mutex mutex_;  // of the rest

@@ -141,8 +141,8 @@ int run_ethercat_sii_write(const EthercatPositionOptions& options) {
     if (options.words.size() != address_words + 1) {
         return fail(options, "type: hal ethercat sii-write ADDRESS -p N FILE");
     }
-    constexpr std::size_t least = 128;
-    constexpr std::size_t most = 128 * 1024;
+    constexpr std::size_t min = 128;
+    constexpr std::size_t max = 128 * 1024;
     constexpr std::size_t max_image_file = std::size_t{16} << 20;
     std::string content;
     if (!read_regular_file(options.words.back(), max_image_file, content)) {

@@ -8,6 +8,7 @@
 #include <fmt/core.h>
 #include <memory>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "cli/signals.hpp"
@@ -16,6 +17,7 @@
 #include "ethercat/esc/responder.hpp"
 #include "ethercat/wire/al_status_codes.hpp"
 #include "ethercat/wire/registers.hpp"
+#include "hal/message_log.hpp"
 #include "link/ethernet.hpp"
 #include "link/system.hpp"
 #include "text/numbers.hpp"
@@ -113,14 +115,16 @@ std::string output_text(const devices::Device& device) {
     return text;
 }
 
-/// Prints what changes on the line: states at once, outputs at most once per second.
+/// Prints what changes on the line, each change with its time; of outputs that change all the time
+/// the newest, with the number of the others.
 class LineReporter {
 public:
     LineReporter(const std::vector<devices::Device>& line, const StatusCopy& status,
                  std::int64_t began)
         : line_(line),
           status_(status),
-          began_(began),
+          log_(hal::LinePrefix::time_since(began),
+               [this](const std::string& changed) { text_ += changed; }),
           seen_(line.size(), 1),
           outputs_(line.size()) {
         for (std::size_t n = 0; n < line.size(); ++n) {
@@ -130,35 +134,43 @@ public:
 
     /// Returns false when standard output is closed.
     bool look(std::int64_t now) {
-        std::string text;
-        const auto report = [&](std::size_t n, const std::string& what) {
-            text += fmt::format("{:9.3f} s  slave {} ({}): {}\n",
-                                static_cast<double>(now - began_) / 1e9, n, line_[n].name, what);
+        const auto report = [&](std::size_t n, const char* kind, const std::string& what) {
+            log_.print(hal::MessageSubject{fmt::format("{} of {}", kind, n), what},
+                       fmt::format("slave {} ({}): {}", n, line_[n].name, what), now);
         };
         for (std::size_t n = 0; n < line_.size(); ++n) {
             const std::uint32_t status = status_[n];
             if (status == 0 || status == seen_[n]) continue;
             seen_[n] = status;
-            report(n, state_text(status));
+            report(n, "state", state_text(status));
         }
-        if (now - outputs_at_ >= 1'000'000'000) {
-            for (std::size_t n = 0; n < line_.size(); ++n) {
-                if (std::string words = output_text(line_[n]); words != outputs_[n]) {
-                    outputs_at_ = now;
-                    report(n, "outputs " + (outputs_[n] = std::move(words)));
-                }
+        for (std::size_t n = 0; n < line_.size(); ++n) {
+            if (std::string words = output_text(line_[n]); words != outputs_[n]) {
+                outputs_[n] = std::move(words);
+                report(n, "outputs", "outputs " + outputs_[n]);
             }
         }
-        return text.empty() || print(text);
+        log_.flush(now);
+        return print_changes();
+    }
+    /// Prints what was only counted so far. Returns false when standard output is closed.
+    bool finish() {
+        log_.close();
+        return print_changes();
     }
 
 private:
+    bool print_changes() {
+        const std::string text = std::exchange(text_, {});
+        return text.empty() || print(text);
+    }
+
     const std::vector<devices::Device>& line_;
     const StatusCopy& status_;
-    const std::int64_t began_;
+    std::string text_;  // to be printed
+    hal::MessageLog log_;
     std::vector<std::uint32_t> seen_;  // INIT is not reported at the start
     std::vector<std::string> outputs_;
-    std::int64_t outputs_at_ = INT64_MIN / 2;
 };
 
 /// Reads the description of the line. Returns false after printing what is wrong.
@@ -313,7 +325,7 @@ int run_node_ethercat(const EthercatLineOptions& options) {
     server.join();
     if (!is_read) return 1;
     const std::int64_t now = link::monotonic_ns();
-    if (!reporter.look(now)) return 1;
+    if (!reporter.look(now) || !reporter.finish()) return 1;
     const ethernet::Statistics s = primary->statistics();
     return print(fmt::format("{:.1f} s: {} frames passed, {} sent, {} lost here\n",
                              static_cast<double>(now - began) / 1e9, line.frames(),

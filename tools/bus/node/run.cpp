@@ -118,13 +118,17 @@ std::string eds_text(const NodeKind& kind, const canopen::Program& program) {
 class Reporter {
 public:
     Reporter(canopen::Node& node, const canopen::Program& program, std::int64_t began,
-             std::function<bool(const std::string&)> print)
-        : node_(node), program_(program), began_(began), print_(std::move(print)) {}
+             hal::LinePrefix prefix, std::function<bool(const std::string&)> print)
+        : node_(node),
+          program_(program),
+          began_(began),
+          print_(std::move(print)),
+          log_(std::move(prefix), [this](const std::string& line) { text_ += line; }) {}
 
     /// Returns false when standard output is closed.
     bool look(std::int64_t now) {
         auto& device = node_.device();
-        const auto log = [&](const std::string& what) { log_.print(what, timed(what, now), now); };
+        const auto log = [&](const std::string& what) { log_.print(what, what, now); };
         if (device.state() != state_ || device.node_id() != id_) {
             state_ = device.state();
             id_ = device.node_id();
@@ -139,12 +143,10 @@ public:
                     ? "error reset"
                     : fmt::format("error 0x{:04X}: {}", code, canopen::emergency_text(code)));
         }
-        // outputs can change with every SYNC: print the newest once per second
-        if (now - news_at_ >= 1'000'000'000) {
-            if (std::string news = program_.news(); news != news_) {
-                news_at_ = now;
-                text_ += timed(news_ = std::move(news), now) + "\n";
-            }
+        // of outputs that change with every SYNC the log prints the newest, and counts the others
+        if (std::string news = program_.news(); news != news_) {
+            news_ = std::move(news);
+            log_.print(hal::MessageSubject{"program", news_}, news_, now);
         }
         for (can::Rejected what; node_.link().rejected(what);) {
             log(can::to_string(what));
@@ -173,10 +175,10 @@ public:
         for (unsigned n = 1; n <= canopen::Pdos::max_pdos; ++n) {
             pdos += device.pdos().tpdo(n).count;
         }
-        log_.close();
         if (std::string news = program_.news(); news != news_) {
-            text_ += timed(news, now) + "\n";
+            log_.print(hal::MessageSubject{"program", news}, news, now);
         }
+        log_.close();
         std::string text = std::exchange(text_, {});
         text += fmt::format(
             "{:.1f} s: {} frames sent, {} received, {} dropped, {} lost in transit, {} lost here, "
@@ -196,20 +198,15 @@ public:
     }
 
 private:
-    std::string timed(const std::string& what, std::int64_t now) const {
-        return fmt::format("{:9.3f} s  {}", static_cast<double>(now - began_) / 1e9, what);
-    }
-
     canopen::Node& node_;
     const canopen::Program& program_;
     const std::int64_t began_;
     const std::function<bool(const std::string&)> print_;
     std::string text_;  // to be printed
-    hal::MessageLog log_{"", [this](const std::string& line) { text_ += line; }};
+    hal::MessageLog log_;
     canopen::NmtState state_ = canopen::NmtState::initialising;
     std::uint8_t id_ = 0;
     std::uint8_t errors_ = 0;
-    std::int64_t news_at_ = INT64_MIN / 2;
     std::string news_;
     can::State bus_ = can::State::active;
 };
@@ -260,7 +257,7 @@ private:
         if (options_.tdma.empty()) return {};
         const std::int64_t give_up = end_of(monotonic_ns());
         const auto ended = [&] { return stop_.wait_ns(5'000'000) || monotonic_ns() >= give_up; };
-        return TdmaStation::make(options_, link, ended, station);
+        return TdmaStation::make(options_, link, prefix_, ended, station);
     }
 
     bool announce(std::uint8_t id, const can::Description& about) const {
@@ -292,7 +289,7 @@ private:
 
     int run_on_segment(canopen::Node& node, TdmaStation& station) {
         std::optional<BackgroundWriter> writer(std::in_place);
-        Reporter reporter(node, program_, began_ns_,
+        Reporter reporter(node, program_, began_ns_, prefix_,
                           [&](const std::string& text) { return writer->write(text); });
         station.run([&](std::int64_t local_ns, bool) {
             apply_settings();
@@ -308,7 +305,7 @@ private:
     }
 
     int run_on_link(canopen::Node& node, bool simulated) {
-        Reporter reporter(node, program_, began_ns_,
+        Reporter reporter(node, program_, began_ns_, prefix_,
                           [](const std::string& text) { return print(text); });
         while (!over()) {
             apply_settings();
@@ -327,6 +324,7 @@ private:
     }
 
     StopRequest stop_;
+    const hal::LinePrefix prefix_ = hal::LinePrefix::time_since(monotonic_ns());
     const NodeOptions& options_;
     const NodeKind& kind_;
     canopen::Program& program_;

@@ -48,7 +48,7 @@ std::optional<double> parts_per_million(std::string_view text) {
 }  // namespace
 
 std::string TdmaStation::make(const NodeOptions& options, std::string& link,
-                              const std::function<bool()>& ended,
+                              const hal::LinePrefix& prefix, const std::function<bool()>& ended,
                               std::unique_ptr<TdmaStation>& made) {
     const auto question = link.find('?');
     const std::string segment = can::describe(link).segment;
@@ -89,9 +89,16 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link,
     if (by_rtcfg) {
         tdma::StationSetup unknown;
         unknown.configured = false;
+<<<<<<< HEAD
         unknown.slot_capacity = tdma::max_slots;
         made.reset(new TdmaStation(unknown, {}, segment, std::move(opened.port), *skew, *drift));
         if (std::string problem = made->receive_schedule(options, ended); !problem.empty()) {
+=======
+        unknown.slot_capacity = tdma::most_slots;
+        made.reset(
+            new TdmaStation(unknown, {}, segment, std::move(opened.port), *skew, *drift, prefix));
+        if (std::string problem = made->take_schedule(options, ended); !problem.empty()) {
+>>>>>>> 094aa236 (node: Print each change with its own time)
             return problem;
         }
         entry = &made->applicant_->accepted()->schedule.stations.front();
@@ -115,8 +122,8 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link,
                                entry->name, options.tdma);
         }
         made.reset(new TdmaStation(tdma::config::setup_of(reading.schedule, *which),
-                                   reading.schedule, segment, std::move(opened.port), *skew,
-                                   *drift));
+                                   reading.schedule, segment, std::move(opened.port), *skew, *drift,
+                                   prefix));
     }
     if (link.find("slot=") == std::string::npos) {
         made->slot_ = entry->slots.front().setup.id;
@@ -139,7 +146,7 @@ std::string TdmaStation::receive_schedule(const NodeOptions& options,
         }
         own = {true, *ip};
     }
-    applicant_ = std::make_unique<tdma::rtcfg::Applicant>("hal node", station_, own, "",
+    applicant_ = std::make_unique<tdma::rtcfg::Applicant>(prefix_, station_, own, "",
                                                           static_cast<tdma::Events&>(*this));
     station_.accompany(&applicant_->client(), nullptr);
     const std::string who =
@@ -168,8 +175,7 @@ std::string TdmaStation::open_tunnel(const NodeOptions& options,
             "block of {}",
             options.tunnel, entry.name, options.tdma);
     }
-    auto opened =
-        tdma::open_tap(*tunnel_, {options.tunnel, station_.address(), entry.ip}, "hal node");
+    auto opened = tdma::open_tap(*tunnel_, {options.tunnel, station_.address(), entry.ip}, prefix_);
     if (!opened.tap) return "--tunnel: " + opened.problem;
     tap_ = std::move(opened.tap);
     station_.accompany(applicant_ ? &applicant_->client() : nullptr, tunnel_.get());
@@ -178,8 +184,9 @@ std::string TdmaStation::open_tunnel(const NodeOptions& options,
 
 TdmaStation::TdmaStation(const tdma::StationSetup& setup, tdma::config::Schedule schedule,
                          std::string segment, std::unique_ptr<ethernet::Port> port, double skew,
-                         double drift)
+                         double drift, hal::LinePrefix prefix)
     : schedule_(std::move(schedule)),
+      prefix_(std::move(prefix)),
       clock_(link::monotonic_ns(), skew, drift),
       segment_(std::move(segment)),
       port_(std::move(port), clock_),

@@ -26,8 +26,9 @@ public:
     /// Creates the station named by options and schedule on the interface of the link, and offers
     /// its slots to `cane:` links. Adds its slot to `link` if it names none. With `--tdma auto` it
     /// waits for the schedule from the master and calls `ended` every few milliseconds to see
-    /// whether to give up. Returns the problem, or "". [setup]
-    static std::string make(const NodeOptions&, std::string& link,
+    /// whether to give up. `prefix` begins each line about the segment. Returns the problem, or
+    /// "". [setup]
+    static std::string make(const NodeOptions&, std::string& link, const hal::LinePrefix& prefix,
                             const std::function<bool()>& ended, std::unique_ptr<TdmaStation>& made);
 
     /// Turns until `turn` returns false: once a cycle, shortly before the slot, with the time of
@@ -37,7 +38,7 @@ public:
 
 private:
     TdmaStation(const tdma::StationSetup&, tdma::config::Schedule, std::string segment,
-                std::unique_ptr<ethernet::Port>, double skew, double drift);
+                std::unique_ptr<ethernet::Port>, double skew, double drift, hal::LinePrefix prefix);
     /// Returns the problem, or "".
     std::string receive_schedule(const NodeOptions&, const std::function<bool()>& ended);
     /// Returns the problem, or "".
@@ -52,7 +53,8 @@ private:
     const tdma::config::Schedule schedule_;  // empty if received from the master
     const tdma::EventTexts texts_{schedule_, "start this node again"};
     hal::Queue<tdma::Happened> reported_{64};  // filled by the loop
-    hal::MessageLog log_{"hal node"};
+    const hal::LinePrefix prefix_;
+    hal::MessageLog log_{prefix_};
     std::optional<unsigned> slot_;  // slot of its frames, if chosen by the station
     std::atomic<bool> lacks_slot_{false};
     const SkewedClock clock_;

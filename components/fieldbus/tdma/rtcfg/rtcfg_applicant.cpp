@@ -25,14 +25,14 @@ std::string first_error(const config::Reading& reading) {
 
 }  // namespace
 
-Applicant::Applicant(std::string instance, Station& station, Logical own, std::string file,
+Applicant::Applicant(hal::LinePrefix prefix, Station& station, Logical own, std::string file,
                      Events& events)
     : path_(std::move(file)),
       station_(station),
       events_(events),
       client_(station, own, *this, !path_.empty()),
       spare_(max_stage_2_size),
-      log_(std::move(instance)) {}
+      log_(std::move(prefix)) {}
 
 void Applicant::begin() noexcept {
     client_.begin();

@@ -32,7 +32,7 @@ struct Accepted {
 class Applicant final : private ClientEvents {
 public:
     /// `file`: where stage 2 is written; empty: not requested. The station must outlive it. [setup]
-    Applicant(std::string instance, Station& station, Logical own, std::string file,
+    Applicant(hal::LinePrefix prefix, Station& station, Logical own, std::string file,
               Events& events);
 
     /// Returns the protocol client, for Station::accompany(). [setup]

@@ -26,7 +26,7 @@ constexpr std::size_t at_once = 64;  // packets in one direction before the othe
 
 class TapDevice final : public Tap {
 public:
-    TapDevice(Tunnel& tunnel, std::string instance) : tunnel_(tunnel), log_(std::move(instance)) {}
+    TapDevice(Tunnel& tunnel, hal::LinePrefix prefix) : tunnel_(tunnel), log_(std::move(prefix)) {}
     ~TapDevice() override {
         ended_.store(true);
         if (thread_.joinable()) {
@@ -163,8 +163,8 @@ private:
 
 }  // namespace
 
-OpenedTap open_tap(Tunnel& tunnel, const TapSetup& setup, const std::string& instance) {
-    auto tap = std::make_unique<TapDevice>(tunnel, instance);
+OpenedTap open_tap(Tunnel& tunnel, const TapSetup& setup, const hal::LinePrefix& prefix) {
+    auto tap = std::make_unique<TapDevice>(tunnel, prefix);
     if (auto problem = tap->open(setup); !problem.empty()) {
         return {nullptr, std::move(problem)};
     }

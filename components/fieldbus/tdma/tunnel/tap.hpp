@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "fieldbus/tdma/config/schedule.hpp"
+#include "hal/message_log.hpp"
 #include "tunnel.hpp"
 
 namespace hal::tdma {
@@ -42,7 +43,7 @@ public:
 
 /// Creates the interface, or opens an existing one that no other process uses, and starts the
 /// thread. The tunnel must outlive it. [setup]
-OpenedTap open_tap(Tunnel&, const TapSetup&, const std::string& instance);
+OpenedTap open_tap(Tunnel&, const TapSetup&, const hal::LinePrefix& prefix);
 
 /// Returns why `name` is not a valid interface name; empty: it is valid. [setup]
 std::string wrong_name(std::string_view name);
