@@ -59,6 +59,17 @@ bool read_unit(PinTarget& to, const Line& line) {
     return true;
 }
 
+/// A real of another width is not a number of the object, and would reach into the next one.
+void reject_real(PinTarget& to, const Line& line, DataType type) {
+    const std::string object = object_text(to.entry.index, to.entry.sub);
+    const std::string bits = counted(to.entry.bits, "bit");
+    to.in.report.error(Topic::value, line.value.at,
+                       "type '" + line.value.text + "' has " + counted(type.bits, "bit") +
+                           ", object " + object + " has " + bits,
+                       "write an integer type with at least " + bits +
+                           ", or float for an integer that is shown as a float");
+}
+
 bool read_type(PinTarget& to, const Line& line) {
     master::Entry& entry = to.entry;
     if (same_word(line.value.text, "float")) {
@@ -66,6 +77,10 @@ bool read_type(PinTarget& to, const Line& line) {
         return true;
     }
     const auto type = parse_type(line.value, to.in.report);
+    if (type && is_real(type->type) && type->bits != entry.bits) {
+        reject_real(to, line, *type);
+        return true;
+    }
     const bool fits =
         type && type->bits >= entry.bits && (type->type != Type::bit || entry.bits == 1);
     if (!fits) {

@@ -72,8 +72,11 @@ private:
         double offset = 0.0;
     };
 
-    static bool is_real(master::Type type) noexcept {
-        return type == master::Type::real32 || type == master::Type::real64;
+    /// Returns true for a real type that fills the entry: only then the cycle reads and writes the
+    /// bits of a real.
+    static bool is_real(const master::Entry& e) noexcept {
+        return (e.type == master::Type::real32 && e.bits == 32) ||
+               (e.type == master::Type::real64 && e.bits == 64);
     }
     static bool is_signed(const master::Entry& e) noexcept {
         return e.is_signed || e.type == master::Type::s8 || e.type == master::Type::s16 ||
@@ -81,7 +84,7 @@ private:
     }
     static PinCodec codec_of(const master::Entry& e) noexcept {
         using Format = PinCodec::Format;
-        if (is_real(e.type)) return {Format::real, e.type == master::Type::real32 ? 32U : 64U};
+        if (is_real(e)) return {Format::real, e.bits};
         return {is_signed(e) ? Format::signed_integer : Format::unsigned_integer, e.bits};
     }
     void add(const std::string& name, const master::Entry& e, hal_type type, bool output,

@@ -187,6 +187,20 @@ TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
               "m.ethercat:6:8: error: unknown type 'q'; write [type q]");
 }
 
+TEST(EthercatConfig, Real_type_needs_the_bits_of_its_object) {
+    const std::string slave =
+        "[bus]\n[slave 0 a]\ndevice = cia402\noutputs = 7010:1 u16, 7020:1 u32\n";
+    EXPECT_EQ(errors(slave + "7010:1.type = f32\n7020:1.type = f64\n"),
+              "m.ethercat:5:15: error: type 'f32' has 32 bits, object 0x7010:1 has 16 bits; write "
+              "an integer type with at least 16 bits, or float for an integer that is shown as a "
+              "float\n"
+              "m.ethercat:6:15: error: type 'f64' has 64 bits, object 0x7020:1 has 32 bits; write "
+              "an integer type with at least 32 bits, or float for an integer that is shown as a "
+              "float");
+    const Bus bus = good(slave + "7020:1.type = f32\n");
+    EXPECT_EQ(bus.setup.slaves[0].sync_managers[0].pdos[0].entries[1].type, master::Type::real32);
+}
+
 TEST(EthercatConfig, Plan_shows_the_arithmetic) {
     const Plan p = plan(good(servo));
     EXPECT_EQ(

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+#include "ethercat/plugins/entry_pins.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <map>
+#include <memory>
+#include <vector>
+
+namespace hal::ethercat {
+namespace {
+
+/// A host that gives memory and finds the pins again by their names.
+class Host {
+public:
+    const hal_host* get() const noexcept { return &host_; }
+    template <class T>
+    T& value(const std::string& pin) {
+        return *reinterpret_cast<T*>(pins_.at(pin)->slot);
+    }
+
+private:
+    static Host& of(const hal_host* host) { return *static_cast<Host*>(host->data); }
+    static bool pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
+        of(host).pins_[decl->name] = memory;
+        return true;
+    }
+    static bool function(const hal_host*, const hal_function_decl*) { return true; }
+    static void* allocate(const hal_host* host, std::size_t bytes, std::size_t) {
+        return of(host).memory_.emplace_back(std::calloc(1, bytes), &std::free).get();
+    }
+
+    std::map<std::string, hal_pin*> pins_;
+    std::vector<std::unique_ptr<void, void (*)(void*)>> memory_;
+    hal_host host_ = [this] {
+        hal_host host{};
+        host.size = sizeof host;
+        host.data = this;
+        host.pin = &pin;
+        host.function = &function;
+        host.allocate = &allocate;
+        return host;
+    }();
+};
+
+struct Entries : Component {
+    using Component::Component;
+    Function receive{*this, "receive", &Entries::nothing, "shows inputs"};
+    Function transmit{*this, "transmit", &Entries::nothing, "takes outputs"};
+    EntryPins pins{*this, receive, transmit};
+
+    void nothing(Cycle) noexcept {}
+    void declare(unsigned bits, master::Type type, bool output, std::size_t at = 0) {
+        master::Entry entry;
+        entry.index = 0x7010;
+        entry.bits = static_cast<std::uint16_t>(bits);
+        entry.type = type;
+        entry.name = output ? "out" : "in";
+        pins.declare("", entry, output, 0, at);
+    }
+};
+
+TEST(EthercatEntryPins, Real_wider_than_its_entry_leaves_the_bits_behind_it) {
+    for (const master::Type type : {master::Type::real32, master::Type::real64}) {
+        Host host;
+        Entries entries(host.get());
+        entries.declare(16, type, true);
+        entries.declare(16, type, false);
+        host.value<std::uint32_t>("out") = 0x12345678;
+        // ends with the entry: ASan reports an access behind it
+        const auto image = std::make_unique<std::uint8_t[]>(2);
+        const std::span<std::uint8_t> areas[] = {{image.get(), 2}};
+        entries.pins.take(areas);
+        entries.pins.show(areas);
+        EXPECT_EQ(host.value<std::uint32_t>("in"), 0xffffU);
+    }
+}
+
+TEST(EthercatEntryPins, Real_of_the_width_of_its_entry_is_a_float) {
+    Host host;
+    Entries entries(host.get());
+    entries.declare(32, master::Type::real32, true);
+    entries.declare(32, master::Type::real32, false);
+    host.value<double>("out") = -1.5;
+    std::array<std::uint8_t, 4> image{};
+    const std::span<std::uint8_t> areas[] = {image};
+    entries.pins.take(areas);
+    entries.pins.show(areas);
+    EXPECT_EQ(image, (std::array<std::uint8_t, 4>{0, 0, 0xc0, 0xbf}));
+    EXPECT_EQ(host.value<double>("in"), -1.5);
+}
+
+}  // namespace
+}  // namespace hal::ethercat
