@@ -300,19 +300,23 @@ Finding idle_states() {
             Verdict::good, "idle states",
             fmt::format("{}, held shallow through /dev/cpu_dma_latency while threads run", states)};
     }
+    const std::string access =
+        "sudo groupadd -f realtime; sudo usermod -aG realtime $USER; sudo chgrp realtime "
+        "/dev/cpu_dma_latency; sudo chmod 0660 /dev/cpu_dma_latency";
+    const std::string rule =
+        "; echo 'KERNEL==\"cpu_dma_latency\", GROUP=\"realtime\", MODE=\"0660\"' | sudo tee "
+        "/etc/udev/rules.d/99-cpu-dma-latency.rules";
+    const bool has_udev = std::filesystem::is_directory("/etc/udev/rules.d");
     return {
         Verdict::fair,
         "idle states",
         fmt::format(
             "{}, and /dev/cpu_dma_latency is not writable: leaving a deep state takes up to 0.2 ms",
             states),
-        "sudo groupadd -f realtime; sudo usermod -aG realtime $USER; sudo chgrp realtime "
-        "/dev/cpu_dma_latency; "
-        "sudo chmod 0660 /dev/cpu_dma_latency; "
-        "echo 'KERNEL==\"cpu_dma_latency\", GROUP=\"realtime\", MODE=\"0660\"' | sudo tee "
-        "/etc/udev/rules.d/99-cpu-dma-latency.rules",
+        access + (has_udev ? rule : ""),
         {},
-        "log in again"};
+        has_udev ? "log in again"
+                 : "log in again; udev is not installed, so repeat chgrp and chmod after each boot"};
 }
 
 /// System-management interrupts stop all processors unseen; Intel counts them in a register.
