@@ -369,7 +369,7 @@ void Switch::deliver(const Event& e, Station& s) noexcept {
             u->responder->arrived({bytes.data(), e.length}, e.time_ns - wire_ns(e.length));
             continue;
         }
-        Incoming* in = crowded ? nullptr : u->incoming.slot();
+        Incoming* in = crowded ? nullptr : u->incoming.place();
         if (in == nullptr) {
             count(u->lost);
             continue;
