@@ -27,7 +27,9 @@ function folder_of(path) {
     return path ~ /\// ? substr(path, 1, match(path, /\/[^\/]*$/)) : ""
 }
 
+# Whether a file exists. Closes it, so a file that is being read is not asked: it would be read from its beginning again.
 function there(path,    line, result) {
+    if (path in seen) return 1
     result = (getline line < path)
     close(path)
     return result >= 0

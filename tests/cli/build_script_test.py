@@ -337,6 +337,7 @@ class Needs(unittest.TestCase):
             cwd=cwd,
             capture_output=True,
             text=True,
+            timeout=60,
             check=True,
         )
         self.assertEqual("", done.stderr)
@@ -399,6 +400,13 @@ class Needs(unittest.TestCase):
             {"node", "dds_publish", "dds_subscribe"},
             self.needs("run", "nothing.hal", "--node", "cell"),
         )
+
+    def test_a_netlist_that_sources_itself_is_read_once(self):
+        with tempfile.TemporaryDirectory() as folder:
+            Path(folder, "m.hal").write_text("source m.hal\nloadrt pid\nsource n.hal\n")
+            Path(folder, "n.hal").write_text("source m.hal\nloadrt sum2\n")
+            self.assertEqual({"pid", "sum2"}, self.needs("run", "m.hal", cwd=folder))
+            self.assertEqual({"pid", "sum2"}, self.needs("run", f"{folder}/m.hal", cwd=folder))
 
     def test_a_folder_with_the_name_of_an_argument_is_not_a_netlist(self):
         with tempfile.TemporaryDirectory() as folder:
