@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Views, their place in the URL (#/view?state), the banner and the role.
+// Views, their place in the URL (#/view?state), the banner and the role. Each view is a module with
+// a class View: its constructor draws it, end() leaves it.
 import {connect, on, state, tell} from './link.js';
 import {h, announce} from './dom.js';
 import {enter, isShown, parse} from './place.js';
@@ -14,7 +15,7 @@ const views = {
     log: ['Log', () => import('./log.js')],
 };
 
-let leave = null;
+let view = null;
 const main = document.getElementById('main'), nav = document.getElementById('views');
 
 const place = () => parse(location.hash, Object.keys(views));
@@ -23,15 +24,15 @@ async function show() {
     if (/[#&]t=/.test(location.hash) || location.hash === '#main' || isShown(location.hash)) return;
     enter(location.hash);
     const {name, query} = place();
-    if (leave) leave();
-    leave = null;
+    view?.end();
+    view = null;
     drawNav();
     main.replaceChildren(h('p', {class: 'dim'}, 'Loading …'));
     const module = await views[name][1]();
     if (place().name !== name) return;
     main.replaceChildren();
     document.title = `${views[name][0]} · ${state.instance || 'Halcyon'}`;
-    leave = module.show(main, query) ?? null;
+    view = new module.View(main, query);
 }
 
 function drawNav() {

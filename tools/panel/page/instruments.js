@@ -1,12 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Widgets that are drawn: bar, meter, chart, dial and jog wheel.
 import {colour, h, number, surface} from './dom.js';
-import {follow, formatted} from './widgets.js';
-
-const nice = size => {
-    const e = 10 ** Math.floor(Math.log10(size));
-    return e * (size / e <= 1 ? 1 : size / e <= 2 ? 2 : size / e <= 5 ? 5 : 10);
-};
+import {follow, formatted, nice} from './widget_values.js';
 
 /// The ranges of a bar or meter as [low, high, colour]: PyVCP's, or from `warn` and `alarm` of a
 /// .panel file.
@@ -34,7 +29,7 @@ function drawn(node, pins, width, height, draw) {
 export function makeBar(node, pins) {
     const options = node.options ?? {}, low = options.min_ ?? options.min ?? 0,
           high = options.max_ ?? options.max ?? 100,
-          unit = options.unit ?? pins.panel.pins[node.pin]?.unit ?? '';
+          unit = options.unit ?? pins.unit(node.pin);
     let now = 0;
     const words = value => options.format || !node.kind ?
         formatted(value, options.format ?? '3.1f') :
@@ -77,7 +72,7 @@ export function makeBar(node, pins) {
 export function makeMeter(node, pins) {
     const options = node.options ?? {}, low = options.min_ ?? options.min ?? 0,
           high = options.max_ ?? options.max ?? 100, size = options.size ?? (node.kind ? 170 : 200);
-    const unit = options.unit ?? pins.panel.pins[node.pin]?.unit ?? '',
+    const unit = options.unit ?? pins.unit(node.pin),
           major = options.majorscale ?? (node.kind ? nice((high - low) / 8) : (high - low) / 10),
           minor = options.minorscale ?? 0;
     let now = 0;
@@ -141,7 +136,7 @@ export function makeMeter(node, pins) {
 
 export function makeChart(node, pins) {
     const options = node.options ?? {}, keep = (options.seconds ?? 30) * 1000,
-          unit = options.unit ?? pins.panel.pins[node.pin]?.unit ?? '', points = [];
+          unit = options.unit ?? pins.unit(node.pin), points = [];
     const {canvas, picture} = drawn(node, pins, '100%', 120, (context, width, height) => {
         const now = performance.now();
         while (points.length > 2 && points[1][0] < now - keep)

@@ -5,75 +5,106 @@ import {h} from './dom.js';
 import {remember} from './place.js';
 
 const kinds = ['fault', 'write', 'edit', 'command', 'message', 'client', 'panel', 'machine'];
+const maxLines = 500;
 
-export function show(main, query) {
-    const hidden = new Set((query.get('hide') ?? '').split(',').filter(kind => kind)),
-          list = h('ul', {class: 'plain log', id: 'log'});
-    const filter = h('input', {
-        type: 'search',
-        class: 'grow',
-        placeholder: 'Filter',
-        'aria-label': 'Filter',
-        value: query.get('filter') ?? ''
-    });
-    const buttons = kinds.map(
-        kind =>
-            h('button', {
-                'aria-pressed': String(!hidden.has(kind)),
-                onclick: event => {
-                    if (!hidden.delete(kind)) hidden.add(kind);
-                    event.currentTarget.setAttribute('aria-pressed', String(!hidden.has(kind)));
-                    remember({hide: [...hidden].join(',')});
-                    draw();
-                }
-            },
-              kind));
-    main.append(
-        h('div', {class: 'bar'}, filter,
-          h('span', {class: 'bar tight', role: 'group', 'aria-label': 'Kinds to show'}, buttons)),
-        h('div', {class: 'card'}, list));
-    let faults = [];
-    function draw() {
-        const word = filter.value.toLowerCase();
-        const all =
-            [...state.log.filter(one => one.kind !== 'fault' || faults.length === 0), ...faults]
-                .filter(one => !hidden.has(one.kind) && one.text.toLowerCase().includes(word))
-                .sort((a, b) => b.unix_ms - a.unix_ms)
-                .slice(0, 500);
-        list.replaceChildren(...(
-            all.length === 0 ?
-                [h('li', {class: 'dim'}, 'Nothing happened since this page was opened.')] :
-                all.map(
-                    one => h(
-                        'li', {class: one.kind === 'fault' ? 'bad' : ''},
-                        h('time', {},
-                          new Date(one.unix_ms).toLocaleTimeString([], {hour12: false})),
-                        h('span', {class: 'dim kind'}, `${one.kind} `), h('span', {}, one.text)))));
+/**
+ * @typedef {object} Line
+ * @property {string} kind
+ * @property {number} unix_ms
+ * @property {string} text
+ */
+
+/// A row of `show fault` as a line of the log.
+const faultLine = row => ({
+    kind: 'fault',
+    unix_ms: Date.now() - row.age_ns / 1e6,
+    text: row.sentence + (row.count > 1 ? ` (${row.count} times)` : '')
+});
+
+const element = ({kind, unix_ms, text}) =>
+    h('li', {class: kind === 'fault' ? 'bad' : ''},
+      h('time', {}, new Date(unix_ms).toLocaleTimeString([], {hour12: false})),
+      h('span', {class: 'dim kind'}, `${kind} `), h('span', {}, text));
+
+/** The view of the log. */
+export class View {
+    /**
+     * @param {HTMLElement} main
+     * @param {URLSearchParams} query
+     */
+    constructor(main, query) {
+        this.hidden = new Set((query.get('hide') ?? '').split(',').filter(kind => kind));
+        /** @type {Line[]} */
+        this.faults = [];
+        this.list = h('ul', {class: 'plain log', id: 'log'});
+        this.filter = h('input', {
+            type: 'search',
+            class: 'grow',
+            placeholder: 'Filter',
+            'aria-label': 'Filter',
+            value: query.get('filter') ?? '',
+            oninput: () => {
+                remember({filter: this.filter.value});
+                this.draw();
+            }
+        });
+        const buttons = kinds.map(kind => this.button(kind));
+        main.append(
+            h('div', {class: 'bar'}, this.filter,
+              h('span', {class: 'bar tight', role: 'group', 'aria-label': 'Kinds to show'},
+                buttons)),
+            h('div', {class: 'card'}, this.list));
+        this.draw();
+        this.readFaults();
+        this.timer = setInterval(() => this.readFaults(), 2000);
+        this.unsubscribe = on('logged', () => this.draw());
     }
-    async function readFaults() {
+
+    end() {
+        clearInterval(this.timer);
+        this.unsubscribe();
+    }
+
+    /// Makes the button that shows and hides a kind.
+    button(kind) {
+        return h('button', {
+            'aria-pressed': String(!this.hidden.has(kind)),
+            onclick: event => {
+                if (!this.hidden.delete(kind)) this.hidden.add(kind);
+                event.currentTarget.setAttribute('aria-pressed', String(!this.hidden.has(kind)));
+                remember({hide: [...this.hidden].join(',')});
+                this.draw();
+            }
+        },
+                 kind);
+    }
+
+    /// The lines to show, newest first. The machine's own faults replace those of the server.
+    lines() {
+        const word = this.filter.value.toLowerCase();
+        const own = state.log.filter(one => one.kind !== 'fault' || this.faults.length === 0);
+        return [...own, ...this.faults]
+            .filter(one => !this.hidden.has(one.kind) && one.text.toLowerCase().includes(word))
+            .sort((a, b) => b.unix_ms - a.unix_ms)
+            .slice(0, maxLines);
+    }
+
+    draw() {
+        const lines = this.lines();
+        this.list.replaceChildren(...lines.map(element));
+        if (lines.length === 0)
+            this.list.append(
+                h('li', {class: 'dim'}, 'Nothing happened since this page was opened.'));
+    }
+
+    async readFaults() {
         const reply = await request({run: ['show', 'fault']});
         if (!reply.ok) return;
         try {
-            faults = JSON.parse(reply.out).map(
-                row => ({
-                    kind: 'fault',
-                    unix_ms: Date.now() - row.age_ns / 1e6,
-                    text: row.sentence + (row.count > 1 ? ` (${row.count} times)` : '')
-                }));
+            this.faults = JSON.parse(reply.out).map(faultLine);
         } catch {
-            faults = [];
+            this.faults = [];
         }
-        draw();
+        this.draw();
     }
-    filter.addEventListener('input', () => {
-        remember({filter: filter.value});
-        draw();
-    });
-    draw();
-    readFaults();
-    const timer = setInterval(readFaults, 2000), ends = [on('logged', draw)];
-    return () => {
-        clearInterval(timer);
-        ends.forEach(end => end());
-    };
 }

@@ -74,137 +74,186 @@ const shown = [
     'crc-errors', 'dc-sync-diff', 'al-status-code'
 ];
 
-export function show(main, query) {
-    const content = h('div', {class: 'cards'}), wanted = query.get('bus') ?? '';
-    main.append(content);
-    let end = null, open = true;
-    async function load() {
-        const all = await objects(true), found = new Map();
-        for (const pin of all.values()) {
-            if (pin.kind !== 'pin' || !buses[pin.component] || !pin.instance) continue;
-            if (!found.has(pin.instance))
-                found.set(
-                    pin.instance, {kind: buses[pin.component], own: new Map(), nodes: new Map()});
-            const bus = found.get(pin.instance),
-                  rest = pin.name.startsWith(pin.instance + '.') ?
-                pin.name.slice(pin.instance.length + 1) :
-                pin.name,
-                  dot = rest.indexOf('.');
-            if (dot < 0) bus.own.set(rest, pin);
-        }
-        for (const [instance, bus] of found)
-            for (const name of all.keys()) {
-                if (!name.startsWith(instance + '.') || !name.endsWith('.online')) continue;
-                const node = name.slice(instance.length + 1, -'.online'.length), pins = new Map();
-                for (const what of shown) {
-                    const pin = all.get(`${instance}.${node}.${what}`);
-                    if (pin) pins.set(what, pin);
-                }
-                bus.nodes.set(node, pins);
-            }
-        if (open) draw(found);
+/// The words for a value of a pin.
+function wordsFor(name, value, names, unit) {
+    if (name === 'emcy' || name === 'error-code') return emergency(value);
+    if (name === 'error-register') return register(value);
+    if (names.size > 1 && typeof value === 'number') return names.get(value) ?? String(value);
+    if (typeof value === 'boolean') return value ? 'yes' : 'no';
+    const shortened = typeof value === 'number' ? Number(value.toPrecision(5)) : value;
+    return `${number(shortened)}${unit ? ` ${unit}` : ''}`;
+}
+
+/// The buses of the machine by their instances: their own pins, and those of their stations.
+function busesIn(all) {
+    const found = new Map();
+    for (const pin of all.values()) {
+        if (pin.kind !== 'pin' || !buses[pin.component] || !pin.instance) continue;
+        if (!found.has(pin.instance))
+            found.set(
+                pin.instance, {kind: buses[pin.component], own: new Map(), nodes: new Map()});
+        const prefix = pin.instance + '.',
+              rest = pin.name.startsWith(prefix) ? pin.name.slice(prefix.length) : pin.name;
+        if (!rest.includes('.')) found.get(pin.instance).own.set(rest, pin);
     }
-    function draw(found) {
-        const watched = [], act = [];
-        const cell = (pin, paint) => {
-            const element = h('td', {class: 'n'}, '–');
-            if (!pin || watched.length >= most) return element;
-            const name = pin.name.split('.').pop(),
-                  names = /(state|step|result)$/.test(name) ? meanings(pin.doc) : new Map();
-            watched.push(pin.name);
-            act.push(value => {
-                const words = name === 'emcy' || name === 'error-code' ?
-                    emergency(value) :
-                    name === 'error-register' ?
-                    register(value) :
-                    names.size > 1 && typeof value === 'number' ?
-                    names.get(value) ?? String(value) :
-                    typeof value === 'boolean' ?
-                    value ? 'yes' : 'no' :
-                    `${number(typeof value === 'number' ? Number(value.toPrecision(5)) : value)}${
-                        pin.unit ? ` ${pin.unit}` : ''}`;
-                text(element, words);
-                paint?.(value, element);
-            });
-            return element;
-        };
-        content.replaceChildren(...(
-            found.size === 0 ?
-                [h('p', {class: 'dim'},
-                   'This machine has no CANopen, TDMA or EtherCAT component.')] :
-                [...found].map(([instance, bus]) => {
-                    const columns =
-                        shown.filter(what => [...bus.nodes.values()].some(pins => pins.has(what)));
-                    const line =
-                        h('div', {
-                            class: 'bus',
-                            role: 'img',
-                            'aria-label': `stations of ${instance}; the table has their states`
-                        },
-                          h('span', {class: 'station master'}, instance));
-                    const rows = [...bus.nodes].map(([node, pins]) => {
-                        const chip = h('span', {class: 'station'}, node), causes = new Set();
-                        line.append(chip);
-                        const paint = what => (value, element) => {
-                            if (what === 'online') {
-                                chip.classList.toggle('online', Boolean(value));
-                                if (!pins.has('operational'))
-                                    chip.classList.toggle('operational', Boolean(value));
-                            }
-                            if (what === 'operational')
-                                chip.classList.toggle('operational', Boolean(value));
-                            if (what === 'fault' || what === 'emcy') {
-                                causes[value ? 'add' : 'delete'](what);
-                                chip.classList.toggle('faulty', causes.size > 0);
-                                element.classList.toggle('bad', Boolean(value));
-                            }
-                            if (what === 'online') element.className = value ? 'n good' : 'n bad';
-                        };
-                        return h(
-                            'tr', {'data-node': node}, h('td', {class: 'mono'}, node),
-                            columns.map(what => cell(pins.get(what), paint(what))));
-                    });
-                    const own =
-                        [...bus.own]
-                            .filter(
-                                ([, pin]) =>
-                                    pin.dir === 'OUT' && !/(^|[.-])(time|tmax)$/.test(pin.name))
-                            .map(
-                                ([name, pin]) =>
-                                    h('tr', {title: pin.doc ?? ''}, h('td', {}, name), cell(pin)));
-                    return h(
-                        'section', {class: 'card wide', id: `bus-${instance}`},
-                        h('h2', {}, `${bus.kind} ${instance}`), line,
-                        rows.length > 0 ?
-                            h('div', {class: 'scroll'},
-                              h('table', {},
-                                h('thead', {},
-                                  h('tr', {}, h('th', {}, 'Station'),
-                                    columns.map(
-                                        what =>
-                                            h('th', {class: 'n', 'data-what': what},
-                                              what.replace(/-ms$/, '').replaceAll('-', ' '))))),
-                                h('tbody', {}, rows))) :
-                            h('p', {class: 'dim'}, 'no stations'),
-                        h('details', {
-                            open: wanted === instance,
-                            ontoggle: event => remember({bus: event.target.open ? instance : ''})
-                        },
-                          h('summary', {}, 'The bus itself'),
-                          h('table', {class: 'narrow'}, h('tbody', {}, own))));
-                })));
-        if (end) end();
-        end = watched.length === 0 ?
-            null :
-            subscribe(watched, 250, values => values.forEach((value, i) => {
-                if (value !== null) act[i](value);
+    for (const [instance, bus] of found)
+        for (const name of all.keys()) {
+            if (!name.startsWith(instance + '.') || !name.endsWith('.online')) continue;
+            const node = name.slice(instance.length + 1, -'.online'.length);
+            const pins = new Map();
+            for (const what of shown) {
+                const pin = all.get(`${instance}.${node}.${what}`);
+                if (pin) pins.set(what, pin);
+            }
+            bus.nodes.set(node, pins);
+        }
+    return found;
+}
+
+/** The mark of a station on the line of its bus. */
+class Chip {
+    constructor(node, pins) {
+        this.element = h('span', {class: 'station'}, node);
+        this.pins = pins;
+        this.causes = new Set();
+    }
+
+    /// Shows a value, in its cell too.
+    paint(what, value, cell) {
+        const on = Boolean(value), marks = this.element.classList;
+        if (what === 'online') {
+            marks.toggle('online', on);
+            if (!this.pins.has('operational')) marks.toggle('operational', on);
+            cell.className = on ? 'n good' : 'n bad';
+        }
+        if (what === 'operational') marks.toggle('operational', on);
+        if (what === 'fault' || what === 'emcy') {
+            this.causes[on ? 'add' : 'delete'](what);
+            marks.toggle('faulty', this.causes.size > 0);
+            cell.classList.toggle('bad', on);
+        }
+    }
+}
+
+/** The view of buses. */
+export class View {
+    /**
+     * @param {HTMLElement} main
+     * @param {URLSearchParams} query
+     */
+    constructor(main, query) {
+        this.content = h('div', {class: 'cards'});
+        this.wanted = query.get('bus') ?? '';
+        this.open = true;
+        this.stopFollowing = () => {};
+        /** @type {{name: string, act: (value: any) => void}[]} */
+        this.watched = [];
+        main.append(this.content);
+        this.load();
+        this.unsubscribe = on('machine', () => this.load());
+    }
+
+    end() {
+        this.open = false;
+        this.unsubscribe();
+        this.stopFollowing();
+    }
+
+    async load() {
+        const found = busesIn(await objects(true));
+        if (this.open) this.draw(found);
+    }
+
+    draw(found) {
+        this.watched = [];
+        this.content.replaceChildren(
+            ...[...found].map(([instance, bus]) => this.busCard(instance, bus)));
+        if (found.size === 0)
+            this.content.append(
+                h('p', {class: 'dim'},
+                  'This machine has no CANopen, TDMA or EtherCAT component.'));
+        this.follow();
+    }
+
+    follow() {
+        this.stopFollowing();
+        this.stopFollowing = () => {};
+        const watched = this.watched;
+        if (watched.length === 0) return;
+        this.stopFollowing =
+            subscribe(watched.map(({name}) => name), 250, values => values.forEach((value, i) => {
+                if (value !== null) watched[i].act(value);
             }));
     }
-    load();
-    const ends = [on('machine', load)];
-    return () => {
-        open = false;
-        ends.forEach(one => one());
-        if (end) end();
-    };
+
+    /// Makes the cell of a pin, which follows its value.
+    cell(pin, paint = null) {
+        const cell = h('td', {class: 'n'}, '–');
+        if (!pin || this.watched.length >= most) return cell;
+        const name = pin.name.split('.').pop(),
+              names = /(state|step|result)$/.test(name) ? meanings(pin.doc) : new Map();
+        this.watched.push({
+            name: pin.name,
+            act: value => {
+                text(cell, wordsFor(name, value, names, pin.unit));
+                paint?.(value, cell);
+            }
+        });
+        return cell;
+    }
+
+    busCard(instance, bus) {
+        const line =
+            h('div', {
+                class: 'bus',
+                role: 'img',
+                'aria-label': `stations of ${instance}; the table has their states`
+            },
+              h('span', {class: 'station master'}, instance));
+        return h(
+            'section', {class: 'card wide', id: `bus-${instance}`},
+            h('h2', {}, `${bus.kind} ${instance}`), line, this.stations(bus, line),
+            this.busItself(instance, bus));
+    }
+
+    /// Makes the table of the stations, and puts their marks on the line.
+    stations(bus, line) {
+        if (bus.nodes.size === 0) return h('p', {class: 'dim'}, 'no stations');
+        const columns = shown.filter(what => [...bus.nodes.values()].some(pins => pins.has(what)));
+        const rows = [...bus.nodes].map(([node, pins]) => {
+            const chip = new Chip(node, pins);
+            line.append(chip.element);
+            return h(
+                'tr', {'data-node': node}, h('td', {class: 'mono'}, node),
+                columns.map(
+                    what => this.cell(
+                        pins.get(what), (value, cell) => chip.paint(what, value, cell))));
+        });
+        const titles = columns.map(
+            what =>
+                h('th', {class: 'n', 'data-what': what},
+                  what.replace(/-ms$/, '').replaceAll('-', ' ')));
+        return h(
+            'div', {class: 'scroll'},
+            h('table', {}, h('thead', {}, h('tr', {}, h('th', {}, 'Station'), titles)),
+              h('tbody', {}, rows)));
+    }
+
+    /// Makes the list of the bus's own outputs.
+    busItself(instance, bus) {
+        const rows =
+            [...bus.own]
+                .filter(
+                    ([, pin]) => pin.dir === 'OUT' && !/(^|[.-])(time|tmax)$/.test(pin.name))
+                .map(
+                    ([name, pin]) =>
+                        h('tr', {title: pin.doc ?? ''}, h('td', {}, name), this.cell(pin)));
+        return h(
+            'details', {
+                open: this.wanted === instance,
+                ontoggle: event => remember({bus: event.target.open ? instance : ''})
+            },
+            h('summary', {}, 'The bus itself'),
+            h('table', {class: 'narrow'}, h('tbody', {}, rows)));
+    }
 }

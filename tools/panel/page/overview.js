@@ -50,33 +50,6 @@ function drawHistograms(context, width, height, histograms, period) {
     context.textAlign = 'left';
 }
 
-function threadCard(thread) {
-    const card = {thread, histograms: null};
-    card.values = figures.map(() => h('dd'));
-    card.times = times.map(() => quantiles.map(() => h('td', {class: 'n'})));
-    card.state = h('p');
-    card.policy = h('p', {class: 'dim'});
-    const canvas = h('canvas', {
-        role: 'img',
-        'aria-label': `Histograms of thread ${thread.name}; the figures are in the table above`
-    });
-    canvas.style.height = '150px';
-    card.element = h(
-        'section', {class: 'card', 'data-thread': thread.name},
-        h('h2', {}, `Thread ${thread.name}`), card.state,
-        h('dl', {class: 'figures'},
-          figures.map(([name], i) => [h('dt', {}, name), card.values[i]])),
-        h('table', {class: 'times'},
-          h('thead', {}, h('tr', {}, h('th'), quantiles.map(name => h('th', {class: 'n'}, name)))),
-          h('tbody', {}, times.map(([name], i) => h('tr', {}, h('td', {}, name), card.times[i])))),
-        canvas, card.policy);
-    card.surface = surface(
-        canvas,
-        (context, width, height) =>
-            drawHistograms(context, width, height, card.histograms, card.thread.period_ns));
-    return card;
-}
-
 function stateOf(thread) {
     if (thread.hung)
         return [
@@ -89,93 +62,152 @@ function stateOf(thread) {
     return ['running, no period missed', 'good'];
 }
 
-function update(card, thread, histograms) {
-    card.thread = thread;
-    card.histograms = histograms;
-    figures.forEach(([, of], i) => text(card.values[i], of(thread)));
-    times.forEach(
-        ([, of], i) => quantiles.forEach(
-            (name, k) => text(card.times[i][k], duration(thread[`${of}_${name}_ns`]))));
-    const [words, kind] = stateOf(thread);
-    text(card.state, words);
-    card.state.className = kind;
-    const unprivileged = /no privilege/.test(thread.policy);
-    text(
-        card.policy,
-        `${thread.policy}${thread.cpu >= 0 ? `, CPU ${thread.cpu}` : ''}${
-            unprivileged ? '. To grant real-time priority, see: hal doctor' : ''}`);
-    card.policy.className = unprivileged ? 'warn' : 'dim';
-    card.surface.request();
+/** The card of a thread: figures, histograms, its scheduling. */
+class ThreadCard {
+    constructor(thread) {
+        this.thread = thread;
+        this.histograms = null;
+        this.values = figures.map(() => h('dd'));
+        this.times = times.map(() => quantiles.map(() => h('td', {class: 'n'})));
+        this.state = h('p');
+        this.policy = h('p', {class: 'dim'});
+        const canvas = h('canvas', {
+            role: 'img',
+            'aria-label':
+                `Histograms of thread ${thread.name}; the figures are in the table above`
+        });
+        canvas.style.height = '150px';
+        this.element = h(
+            'section', {class: 'card', 'data-thread': thread.name},
+            h('h2', {}, `Thread ${thread.name}`), this.state,
+            h('dl', {class: 'figures'},
+              figures.map(([name], i) => [h('dt', {}, name), this.values[i]])), this.timeTable(),
+            canvas, this.policy);
+        this.surface = surface(
+            canvas,
+            (context, width, height) => drawHistograms(
+                context, width, height, this.histograms, this.thread.period_ns));
+    }
+
+    end() {
+        this.element.remove();
+        this.surface.end();
+    }
+
+    timeTable() {
+        const titles = quantiles.map(name => h('th', {class: 'n'}, name));
+        const rows = times.map(([name], i) => h('tr', {}, h('td', {}, name), this.times[i]));
+        return h(
+            'table', {class: 'times'}, h('thead', {}, h('tr', {}, h('th'), titles)),
+            h('tbody', {}, rows));
+    }
+
+    update(thread, histograms) {
+        this.thread = thread;
+        this.histograms = histograms;
+        figures.forEach(([, of], i) => text(this.values[i], of(thread)));
+        times.forEach(
+            ([, of], i) => quantiles.forEach(
+                (name, k) => text(this.times[i][k], duration(thread[`${of}_${name}_ns`]))));
+        const [words, kind] = stateOf(thread);
+        text(this.state, words);
+        this.state.className = kind;
+        this.showPolicy();
+        this.surface.request();
+    }
+
+    showPolicy() {
+        const {policy, cpu} = this.thread, unprivileged = /no privilege/.test(policy);
+        text(
+            this.policy,
+            `${policy}${cpu >= 0 ? `, CPU ${cpu}` : ''}${
+                unprivileged ? '. To grant real-time priority, see: hal doctor' : ''}`);
+        this.policy.className = unprivileged ? 'warn' : 'dim';
+    }
 }
 
-export function show(main) {
-    const cards = h('div', {class: 'cards'}), faults = h('ul', {class: 'plain'}),
-          summary = h('p', {class: 'dim'});
-    const clear =
-        h('button', {onclick: () => request({run: ['fault', 'clear']}).then(faultsNow)},
-          'Acknowledge faults');
-    const faultCard = h('section', {class: 'card wide'}, h('h2', {}, 'Faults'), faults, clear);
-    main.append(summary, h('div', {class: 'cards first'}, faultCard), cards);
-    const known = new Map();
-    let busy = false, open = true;
+const faultElement = row =>
+    h('li', {class: 'bad'}, `${row.sentence}${row.count > 1 ? ` (${row.count} times)` : ''} `,
+      h('span', {class: 'dim'}, `${duration(row.age_ns)} ago`));
 
-    async function faultsNow() {
+function summaryOf(threads) {
+    const count = `${threads.length} thread${threads.length === 1 ? '' : 's'}`,
+          leader = threads[0]?.clock_leader;
+    return `${state.instance}, Halcyon ${state.version}, process ${state.pid}; ${count}` +
+        (leader ? `, synchronised to ${leader}` : '');
+}
+
+/** The view of threads and faults. */
+export class View {
+    /** @param {HTMLElement} main */
+    constructor(main) {
+        this.cards = h('div', {class: 'cards'});
+        this.faults = h('ul', {class: 'plain'});
+        this.summary = h('p', {class: 'dim'});
+        this.clear = h('button', {onclick: () => this.acknowledge()}, 'Acknowledge faults');
+        const faultCard =
+            h('section', {class: 'card wide'}, h('h2', {}, 'Faults'), this.faults, this.clear);
+        main.append(this.summary, h('div', {class: 'cards first'}, faultCard), this.cards);
+        /** @type {Map<string, ThreadCard>} */
+        this.known = new Map();
+        this.busy = false;
+        this.open = true;
+        this.readAll();
+        this.timer = setInterval(() => this.readAll(), 500);
+        this.unsubscribe = on('machine', () => this.readAll());
+    }
+
+    end() {
+        this.open = false;
+        clearInterval(this.timer);
+        this.unsubscribe();
+        this.known.forEach(card => card.surface.end());
+    }
+
+    async acknowledge() {
+        await request({run: ['fault', 'clear']});
+        await this.readFaults();
+    }
+
+    async readFaults() {
         const reply = await request({run: ['show', 'fault']});
-        if (!reply.ok || !open) return;
+        if (!reply.ok || !this.open) return;
         let rows = [];
         try {
             rows = JSON.parse(reply.out);
         } catch {
             return;
         }
-        faults.replaceChildren(
-            ...(rows.length === 0 ?
-                    [h('li', {class: 'good'}, 'No faults')] :
-                    rows.slice(-20).reverse().map(
-                        row =>
-                            h('li', {class: 'bad'},
-                              `${row.sentence}${row.count > 1 ? ` (${row.count} times)` : ''} `,
-                              h('span', {class: 'dim'}, `${duration(row.age_ns)} ago`)))));
-        clear.hidden = rows.length === 0 || !state.held;
+        this.faults.replaceChildren(...rows.slice(-20).reverse().map(faultElement));
+        if (rows.length === 0) this.faults.append(h('li', {class: 'good'}, 'No faults'));
+        this.clear.hidden = rows.length === 0 || !state.held;
     }
 
-    async function now() {
-        if (busy || !state.machine) return;
-        busy = true;
+    async readAll() {
+        if (this.busy || !state.machine) return;
+        this.busy = true;
         const reply = await request({describe: 'thread', histograms: true});
-        busy = false;
-        if (!open) return;
-        if (reply.ok) {
-            const names = new Set(reply.objects.map(thread => thread.name));
-            for (const [name, card] of known)
-                if (!names.has(name)) {
-                    card.element.remove();
-                    card.surface.end();
-                    known.delete(name);
-                }
-            for (const thread of reply.objects) {
-                if (!known.has(thread.name)) {
-                    known.set(thread.name, threadCard(thread));
-                    cards.append(known.get(thread.name).element);
-                }
-                update(known.get(thread.name), thread, reply.histograms?.[thread.name]);
-            }
-            text(
-                summary,
-                `${state.instance}, Halcyon ${state.version}, process ${state.pid}; ${
-                    reply.objects.length} thread${reply.objects.length === 1 ? '' : 's'}` +
-                    (reply.objects[0]?.clock_leader ?
-                         `, synchronised to ${reply.objects[0].clock_leader}` :
-                         ''));
-        }
-        await faultsNow();
+        this.busy = false;
+        if (!this.open) return;
+        if (reply.ok) this.showThreads(reply.objects, reply.histograms ?? {});
+        await this.readFaults();
     }
-    now();
-    const timer = setInterval(now, 500), end = on('machine', now);
-    return () => {
-        open = false;
-        clearInterval(timer);
-        end();
-        known.forEach(card => card.surface.end());
-    };
+
+    showThreads(threads, histograms) {
+        const names = new Set(threads.map(thread => thread.name));
+        for (const [name, card] of this.known) {
+            if (names.has(name)) continue;
+            card.end();
+            this.known.delete(name);
+        }
+        for (const thread of threads) {
+            if (!this.known.has(thread.name)) {
+                const card = new ThreadCard(thread);
+                this.known.set(thread.name, card);
+                this.cards.append(card.element);
+            }
+            this.known.get(thread.name).update(thread, histograms[thread.name]);
+        }
+        text(this.summary, summaryOf(threads));
+    }
 }

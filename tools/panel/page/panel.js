@@ -2,55 +2,9 @@
 // User panels: the tree of widgets from the server, with the values of its pins.
 import {on, state, subscribe, tell} from './link.js';
 import {h, text} from './dom.js';
+import {Pins} from './panel_pins.js';
 import {applyStyle, cellStyle, packStyle} from './panel_style.js';
 import {makers} from './widgets.js';
-
-/// What widgets see of the panel: pins with values, and functions that are called when they change.
-export class Pins {
-    constructor(panel) {
-        this.panel = panel;
-        this.values = new Map(Object.entries(panel.pins).map(([name, pin]) => [name, pin.value]));
-        this.bound = new Map();
-        this.sources = new Map();
-        this.waiting = {};
-        this.ready = false;
-        this.release = [];  // called when the page is hidden or left
-        this.ends = [];     // called when the view is left
-    }
-    value(name) { return this.values.get(name); }
-    /// Calls act(value) now and at each change.
-    bind(name, act) {
-        if (!name) return;
-        if (!this.bound.has(name)) this.bound.set(name, []);
-        this.bound.get(name).push(act);
-        act(this.values.get(name));
-    }
-    /// The same for a name of the machine, without a pin of the panel.
-    source(name, act) {
-        if (!this.sources.has(name)) this.sources.set(name, []);
-        this.sources.get(name).push(act);
-    }
-    set(name, value) {
-        this.values.set(name, value);
-        for (const act of this.bound.get(name) ?? [])
-            act(value);
-    }
-    /// Sets an output; all that is set until the next frame is one message.
-    write(values) {
-        if (!state.held) return;
-        for (const [name, value] of Object.entries(values))
-            this.set(name, value);
-        if (Object.keys(this.waiting).length === 0)
-            queueMicrotask(() => {
-                tell({panel: {write: this.waiting}});
-                this.waiting = {};
-                this.ready = false;
-                this.release = [];  // called when the page is hidden or left
-                this.ends = [];     // called when the view is left
-            });
-        Object.assign(this.waiting, values);
-    }
-}
 
 function container(node, pins, path) {
     const horizontal = node.widget === 'hbox' || node.horizontal, options = node.options ?? {};
@@ -134,62 +88,88 @@ function build(node, pins, path) {
     return element;
 }
 
-export function show(main) {
-    const panel = state.panel;
-    if (!panel) {
-        main.append(h('p', {}, 'No user panel is loaded. Start with: hal panel FILE.panel'));
-        return null;
+/// What keeps this page from operating the panel; empty: nothing does.
+function obstacle() {
+    if (state.held) return '';
+    if (!state.write) return 'Read-only: restart hal panel with --write to operate this panel.';
+    if (state.token) return 'Take control to operate this panel.';
+    return 'Read-only: open the address with the token.';
+}
+
+/** The view of the user panel. */
+export class View {
+    /** @param {HTMLElement} main */
+    constructor(main) {
+        const panel = state.panel;
+        this.subscriptions = [];
+        this.stop = () => {};
+        if (!panel) {
+            main.append(h('p', {}, 'No user panel is loaded. Start with: hal panel FILE.panel'));
+            return;
+        }
+        this.pins = new Pins(panel.pins, values => {
+            if (state.held) tell({panel: {write: values}});
+        }, () => state.held);
+        this.note = h('p', {class: 'dim', role: 'status'});
+        this.root = build(panel.root, this.pins, 'p');
+        this.root.classList.add('w-root');
+        this.root.classList.toggle('w-pyvcp', Boolean(panel.root.pyvcp));
+        main.append(panel.root.title ? h('h2', {}, panel.root.title) : '', this.note, this.root);
+        this.subscriptions = [
+            on('panel', event => this.update(event)), on('state', () => this.enable()),
+            ...this.followSources()
+        ];
+        this.enable();
+        this.watchAbsence(panel.timeout_ms);
     }
-    const pins = new Pins(panel), note = h('p', {class: 'dim', role: 'status'});
-    const root = build(panel.root, pins, 'p');
-    root.classList.add('w-root');
-    root.classList.toggle('w-pyvcp', Boolean(panel.root.pyvcp));
-    main.append(panel.root.title ? h('h2', {}, panel.root.title) : '', note, root);
-    const ends = [
-        on('panel',
-           event => {
-               for (const [name, value] of Object.entries(event.values))
-                   if (pins.value(name) !== value) pins.set(name, value);
-               pins.ready = event.ready;
-               enable();
-           }),
-        on('state', () => enable())
-    ];
-    // Values of the machine that are shown without a pin.
-    const names = [...pins.sources.keys()];
-    if (names.length > 0)
-        ends.push(subscribe(
-            names, 100,
-            values =>
-                names.forEach((name, i) => pins.sources.get(name).forEach(act => act(values[i])))));
-    function enable() {
-        for (const element of root.querySelectorAll('[data-output]')) {
+
+    end() {
+        this.pins?.releaseAll();
+        this.stop();
+        this.subscriptions.forEach(unsubscribe => unsubscribe());
+        this.pins?.ends.forEach(end => end());
+    }
+
+    update(event) {
+        for (const [name, value] of Object.entries(event.values))
+            if (this.pins.value(name) !== value) this.pins.set(name, value);
+        this.pins.ready = event.ready;
+        this.enable();
+    }
+
+    /// Follows values of the machine that are shown without a pin.
+    followSources() {
+        const {sources} = this.pins, names = [...sources.keys()];
+        if (names.length === 0) return [];
+        const show = values =>
+            names.forEach((name, i) => sources.get(name).forEach(act => act(values[i])));
+        return [subscribe(names, 100, show)];
+    }
+
+    enable() {
+        for (const element of
+             /** @type {NodeListOf<any>} */ (this.root.querySelectorAll('[data-output]'))) {
             if ('disabled' in element) element.disabled = !state.held;
             element.setAttribute('aria-disabled', String(!state.held));
         }
-        text(
-            note,
-            state.held       ? '' :
-                !state.write ? 'Read-only: restart hal panel with --write to operate this panel.' :
-                state.token  ? 'Take control to operate this panel.' :
-                               'Read-only: open the address with the token.');
+        text(this.note, obstacle());
     }
-    enable();
-    // The server sets the safe values when these messages stop.
-    const beat = setInterval(() => {
-        if (state.held) tell({panel: {}});
-    }, Math.max(50, panel.timeout_ms / 4));
-    const release = event => {
-        if (event.type === 'blur' || document.hidden) pins.release.forEach(act => act());
-    };
-    document.addEventListener('visibilitychange', release);
-    addEventListener('blur', release);
-    return () => {
-        pins.release.forEach(act => act());
-        clearInterval(beat);
-        document.removeEventListener('visibilitychange', release);
-        removeEventListener('blur', release);
-        ends.forEach(end => end());
-        pins.ends.forEach(end => end());
-    };
+
+    /// The server sets the safe values when the messages of this page stop; buttons are released
+    /// when the page is hidden or loses the focus.
+    watchAbsence(timeout_ms) {
+        const beat = setInterval(() => {
+            if (state.held) tell({panel: {}});
+        }, Math.max(50, timeout_ms / 4));
+        const release = event => {
+            if (event.type === 'blur' || document.hidden) this.pins.releaseAll();
+        };
+        document.addEventListener('visibilitychange', release);
+        addEventListener('blur', release);
+        this.stop = () => {
+            clearInterval(beat);
+            document.removeEventListener('visibilitychange', release);
+            removeEventListener('blur', release);
+        };
+    }
 }

@@ -2,36 +2,7 @@
 // The widgets of user panels. Each maker returns an element that follows its pins.
 import {h, text, number} from './dom.js';
 import {knob, makeBar, makeChart, makeMeter} from './instruments.js';
-
-/// A number by Python's % format without the %: 2.1f, d, +4.3e.
-export function formatted(value, format) {
-    const [, flags = '', width = '', digits, kind = 'f'] =
-        /^([-+ 0#]*)(\d*)(?:\.(\d+))?([a-zA-Z]?)/.exec(format ?? '') ?? [];
-    let out;
-    if (kind === 'd' || kind === 'i' || kind === 'u')
-        out = String(Math.trunc(value));
-    else if (kind === 'x' || kind === 'X' || kind === 'o')
-        out = Math.trunc(value).toString(kind === 'o' ? 8 : 16);
-    else if (kind === 'e' || kind === 'E')
-        out = Number(value).toExponential(Number(digits ?? 6)).replace(/e([-+])(\d)$/, 'e$10$2');
-    else if (kind === 'g' || kind === 'G')
-        out = String(Number(Number(value).toPrecision(Number(digits ?? 6) || 1)));
-    else
-        out = Number(value).toFixed(Number(digits ?? 6));
-    if (kind === 'X' || kind === 'E') out = out.toUpperCase();
-    if (flags.includes('+') && value >= 0) out = '+' + out;
-    return flags.includes('0') ? out.padStart(Number(width), '0') : out;
-}
-
-/// Follows the pin of a node, or the name of the machine in its `of`.
-export function follow(node, pins, act) {
-    if (node.of)
-        pins.source(node.of, value => {
-            if (value !== null) act(value);
-        });
-    else
-        pins.bind(node.pin, act);
-}
+import {follow, formatted} from './widget_values.js';
 
 function disabled(node, pins, element) {
     pins.bind(node.disable, value => {
@@ -159,16 +130,14 @@ function radiobutton(node, pins, path) {
 
 function value(node, pins) {
     const options = node.options ?? {}, element = h('span', {class: 'w-number mono'});
-    const pin = pins.panel.pins[node.pin], unit = options.unit ?? pin?.unit ?? '';
-    const format = options.format ?? (node.kind ? null : node.widget === 'number' ? '2.1f' : 'd');
-    follow(
-        node, pins,
-        now => text(
-            element,
-            `${
-                format                           ? formatted(now, format) :
-                    options.digits !== undefined ? Number(now).toFixed(options.digits) :
-                                                   number(now)}${unit ? ` ${unit}` : ''}`));
+    const unit = options.unit ?? pins.unit(node.pin);
+    const usual = node.widget === 'number' ? '2.1f' : 'd',
+          format = options.format ?? (node.kind ? null : usual);
+    const digits = now => {
+        if (format) return formatted(now, format);
+        return options.digits !== undefined ? Number(now).toFixed(options.digits) : number(now);
+    };
+    follow(node, pins, now => text(element, `${digits(now)}${unit ? ` ${unit}` : ''}`));
     return node.kind ?
         h('div', {class: 'w-line'}, h('span', {}, options.text ?? node.pin), element) :
         element;
