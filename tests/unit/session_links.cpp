@@ -20,30 +20,37 @@ TEST_F(Links, Net_makes_the_signal_with_the_type_of_its_first_pin) {
     EXPECT_EQ(machine.session.model().find_signal("a")->type, HAL_TYPE_S64);
 }
 
-TEST_F(Links, A_signal_has_one_output) {
-    machine.rejected("net a x.bit-out y.bit-out", "two-writers");
+struct Rejection {
+    const char* name;
+    const char* before;  ///< edits of the transaction before; empty: none
+    const char* text;
+    const char* code;
+};
+struct RejectedLinks : Links, testing::WithParamInterface<Rejection> {};
+
+TEST_P(RejectedLinks, change_nothing) {
+    const Rejection& row = GetParam();
+    machine.must(row.before);
+    machine.rejected(row.text, row.code);
 }
-TEST_F(Links, A_signal_with_an_output_takes_no_io_pin) {
-    machine.rejected("net a x.bit-out y.bit-io", "two-writers");
-}
-TEST_F(Links, A_signal_with_io_pins_takes_no_output) {
-    machine.rejected("net a x.bit-io y.bit-out", "two-writers");
-}
-TEST_F(Links, Types_must_be_equal) {
-    machine.rejected("net a x.s32-out y.u32-in", "type-mismatch");
-}
-TEST_F(Links, A_pin_is_in_one_signal_only) {
-    machine.rejected("net a x.bit-in\nnet b x.bit-in", "pin-linked");
-}
-TEST_F(Links, Parameters_are_not_linked) {
-    machine.rejected("net a x.float-param", "parameter-link");
-}
-TEST_F(Links, A_signal_is_not_named_like_a_pin) {
-    machine.rejected("net x.bit-in y.bit-in", "signal-named-like-pin");
-}
-TEST_F(Links, Net_without_pins_makes_no_signal) {
-    machine.rejected("net nothing", "wrong-arguments");
-}
+
+INSTANTIATE_TEST_SUITE_P(
+    Rules, RejectedLinks,
+    testing::Values(
+        Rejection{"two_outputs", "", "net a x.bit-out y.bit-out", "two-writers"},
+        Rejection{"io_pin_beside_an_output", "", "net a x.bit-out y.bit-io", "two-writers"},
+        Rejection{"output_beside_an_io_pin", "", "net a x.bit-io y.bit-out", "two-writers"},
+        Rejection{"unequal_types", "", "net a x.s32-out y.u32-in", "type-mismatch"},
+        Rejection{"pin_in_two_signals", "", "net a x.bit-in\nnet b x.bit-in", "pin-linked"},
+        Rejection{"parameter", "", "net a x.float-param", "parameter-link"},
+        Rejection{"signal_named_like_a_pin", "", "net x.bit-in y.bit-in", "signal-named-like-pin"},
+        Rejection{"net_without_pins", "", "net nothing", "wrong-arguments"},
+        Rejection{"setp_of_an_output", "", "setp x.bit-out 1", "output-set"},
+        Rejection{"setp_of_a_linked_pin", "net a x.bit-in", "setp x.bit-in 1", "linked-set"},
+        Rejection{"setp_of_nothing", "", "setp x.bit-inn 1", "no-such-pin"},
+        Rejection{"sets_beside_a_writer", "", "net a x.bit-out\nsets a 1", "writer-set"},
+        Rejection{"sets_of_nothing", "", "sets nowhere 1", "no-such-signal"}),
+    [](const auto& row) { return row.param.name; });
 
 TEST_F(Links, Io_pins_share_one_value_within_a_thread) {
     machine.must("net a x.s32-io y.s32-io => z.s32-in\nsets a 5");
@@ -79,63 +86,73 @@ TEST_F(Links, Linkps_linksp_and_linkpp_link_as_net_does) {
 
 // --- which value a fresh link has ------------------------------------------------------------------------------------
 
-TEST_F(Links, The_first_reader_hands_its_value_to_a_signal_without_writer) {
-    machine.must("setp x.s32-in 7\nnewsig a s32\nsets a 3");
-    machine.must("net a x.s32-in");
-    EXPECT_EQ(machine.get("a"), "7");
-    EXPECT_EQ(machine.get("x.s32-in"), "7");
+/// What a pin has after it was linked.
+struct FreshLink {
+    const char* name;
+    const char* before;  ///< a transaction of its own
+    bool ran;            ///< for a cycle, after that transaction
+    const char* linking;
+    std::vector<std::pair<const char*, const char*>> expected;
+};
+struct FreshLinks : Links, testing::WithParamInterface<FreshLink> {};
+
+TEST_P(FreshLinks, have_the_value) {
+    const FreshLink& row = GetParam();
+    machine.must(row.before);
+    if (row.ran) {
+        machine.start();
+        machine.cycles(1);
+        machine.stop();
+    }
+    machine.must(row.linking);
+    for (const auto& [name, value] : row.expected) {
+        EXPECT_EQ(machine.get(name), value) << name;
+    }
 }
 
-TEST_F(Links, A_second_reader_takes_the_signals_value) {
-    machine.must("setp x.s32-in 7\nsetp y.s32-in 8\nnet a x.s32-in");
-    machine.must("net a y.s32-in");
-    EXPECT_EQ(machine.get("a"), "7");
-    EXPECT_EQ(machine.get("y.s32-in"), "7");
-}
-
-TEST_F(Links, Both_readers_in_one_line_take_the_first_ones_value) {
-    machine.must("setp x.s32-in 7\nsetp y.s32-in 8\nnet a x.s32-in y.s32-in");
-    EXPECT_EQ(machine.get("y.s32-in"), "7");
-}
-
-TEST_F(Links, A_writer_hands_its_value_to_the_signal) {
-    machine.must("setp x.s32-in 41");
-    machine.start();
-    machine.cycles(1);
-    machine.stop();
-    machine.must("setp y.s32-in 9\nnet a y.s32-in");
-    machine.must("net a x.s32-out");
-    EXPECT_EQ(machine.get("a"), "41");
-    EXPECT_EQ(machine.get("y.s32-in"), "41");
-}
-
-TEST_F(Links, An_io_pin_hands_its_value_to_a_signal_without_writer) {
-    machine.must("setp x.s32-io 12\nsetp y.s32-in 9\nnet a y.s32-in");
-    machine.must("net a x.s32-io");
-    EXPECT_EQ(machine.get("a"), "12");
-}
-
-TEST_F(Links, A_second_io_pin_takes_the_signals_value) {
-    machine.must("setp x.s32-io 12\nsetp y.s32-io 13\nnet a x.s32-io");
-    machine.must("net a y.s32-io");
-    EXPECT_EQ(machine.get("a"), "12");
-    EXPECT_EQ(machine.get("y.s32-io"), "12");
-}
-
-TEST_F(Links, A_reader_of_a_written_signal_takes_its_value) {
-    machine.must("setp x.s32-in 41\nsetp y.s32-in 5\nnet a x.s32-out");
-    machine.start();
-    machine.cycles(1);
-    machine.stop();
-    machine.must("net a y.s32-in");
-    EXPECT_EQ(machine.get("y.s32-in"), "41");
-}
-
-TEST_F(Links, A_value_set_after_the_link_in_one_transaction_wins) {
-    machine.must("setp x.s32-in 7\nnet a x.s32-in\nsets a 99");
-    EXPECT_EQ(machine.get("a"), "99");
-    EXPECT_EQ(machine.get("x.s32-in"), "99");
-}
+INSTANTIATE_TEST_SUITE_P(
+    Rules, FreshLinks,
+    testing::Values(FreshLink{"of_the_first_reader",
+                              "setp x.s32-in 7\nnewsig a s32\nsets a 3",
+                              false,
+                              "net a x.s32-in",
+                              {{"a", "7"}, {"x.s32-in", "7"}}},
+                    FreshLink{"of_the_signal_for_a_second_reader",
+                              "setp x.s32-in 7\nsetp y.s32-in 8\nnet a x.s32-in",
+                              false,
+                              "net a y.s32-in",
+                              {{"a", "7"}, {"y.s32-in", "7"}}},
+                    FreshLink{"of_the_first_of_two_readers_in_a_line",
+                              "setp x.s32-in 7\nsetp y.s32-in 8",
+                              false,
+                              "net a x.s32-in y.s32-in",
+                              {{"y.s32-in", "7"}}},
+                    FreshLink{"of_the_writer",
+                              "setp x.s32-in 41\nsetp y.s32-in 9\nnet a y.s32-in",
+                              true,
+                              "net a x.s32-out",
+                              {{"a", "41"}, {"y.s32-in", "41"}}},
+                    FreshLink{"of_an_io_pin",
+                              "setp x.s32-io 12\nsetp y.s32-in 9\nnet a y.s32-in",
+                              false,
+                              "net a x.s32-io",
+                              {{"a", "12"}}},
+                    FreshLink{"of_the_signal_for_a_second_io_pin",
+                              "setp x.s32-io 12\nsetp y.s32-io 13\nnet a x.s32-io",
+                              false,
+                              "net a y.s32-io",
+                              {{"a", "12"}, {"y.s32-io", "12"}}},
+                    FreshLink{"of_the_signal_for_its_reader",
+                              "setp x.s32-in 41\nsetp y.s32-in 5\nnet a x.s32-out",
+                              true,
+                              "net a y.s32-in",
+                              {{"y.s32-in", "41"}}},
+                    FreshLink{"that_sets_gave_in_the_same_transaction",
+                              "",
+                              false,
+                              "setp x.s32-in 7\nnet a x.s32-in\nsets a 99",
+                              {{"a", "99"}, {"x.s32-in", "99"}}}),
+    [](const auto& row) { return row.param.name; });
 
 TEST_F(Links, A_pin_set_before_its_link_in_one_transaction_brings_that_value) {
     machine.must("net b y.s32-in");  // x.s32-in is owned by a thread by now
@@ -208,17 +225,6 @@ TEST_F(Links, Linked_and_unlinked_in_one_transaction_keeps_what_was_inherited) {
 }
 
 // --- setp and sets -----------------------------------------------------------------------------------------------------
-
-TEST_F(Links, Setp_rejects_outputs) { machine.rejected("setp x.bit-out 1", "output-set"); }
-TEST_F(Links, Sets_rejects_signals_with_a_writer) {
-    machine.rejected("net a x.bit-out\nsets a 1", "writer-set");
-}
-TEST_F(Links, Setp_of_nothing_is_an_error) { machine.rejected("setp x.bit-inn 1", "no-such-pin"); }
-TEST_F(Links, Sets_of_nothing_is_an_error) { machine.rejected("sets nowhere 1", "no-such-signal"); }
-TEST_F(Links, Setp_rejects_linked_pins) {
-    machine.must("net a x.bit-in");
-    machine.rejected("setp x.bit-in 1", "linked-set");
-}
 
 TEST_F(Links, Setp_takes_parameters_io_pins_and_the_equals_sign) {
     machine.must("setp x.float-param 2.5\nsetp x.s32-io -3\ny.s32-in = 6");
