@@ -24,7 +24,7 @@ changed_before=$build/.changed-before
 sh "$root/tests/checks/clean_tree.sh" "$root" >"$changed_before"
 
 need gtest/gtest.h=libgtest-dev python3=python3 git=git python3-config=python3-dev pybind11/pybind11.h=pybind11-dev pugixml.hpp=libpugixml-dev zstd.h=libzstd-dev lz4frame.h=liblz4-dev \
-    libwebsockets.h=libwebsockets-dev chromium=chromium \
+    libwebsockets.h=libwebsockets-dev chromium=chromium node=nodejs tsc=node-typescript \
     cmark-gfm.h=libcmark-gfm-dev cmark-gfm-core-extensions.h=libcmark-gfm-extensions-dev \
     /usr/lib/python3/dist-packages/can=python3-can /usr/lib/python3/dist-packages/msgpack=python3-msgpack \
     /usr/lib/python3/dist-packages/serial=python3-serial "$(python3 -c 'import os; print(os.__file__[:-6])' 2>/dev/null)/ensurepip=python3-venv" \
@@ -51,6 +51,36 @@ peers() {
 peers
 lap preparing
 
+# test_progress TREE: reads ctest's output, which goes to the log. Prints one updated line in a terminal, elsewhere one line every half minute, with
+# the tests that have run and that failed so far. Fails when ctest failed.
+test_progress() {
+    result=1 ran=0 all= bad=0 began=$(date +%s) next=30
+    while IFS= read -r line; do
+        case $line in
+            "hal: ctest ended with "*)
+                if [ "${line##* }" -eq 0 ]; then result=0; fi
+                continue
+                ;;
+        esac
+        printf '%s\n' "$line" >&4
+        case $line in
+            *[0-9]/[0-9]*" Test "*"#"*)
+                ran=$((ran + 1)) all=${line%% Test *} all=${all#*/}
+                case $line in *"***Failed"* | *"***Timeout"* | *"***Exception"*) bad=$((bad + 1)) ;; esac
+                now="testing build/$1: $ran of $all tests$([ $bad -eq 0 ] || echo ", $bad failed")"
+                if [ -t 2 ]; then
+                    printf '\r%s\033[K' "hal: $now" >&2
+                elif [ $(($(date +%s) - began)) -ge $next ]; then
+                    say "$now"
+                    next=$((next + 30))
+                fi
+                ;;
+        esac
+    done
+    if [ -t 2 ]; then printf '\r\033[K' >&2; fi
+    return $result
+}
+
 # run_tests TREE CTEST-ARGUMENT...: prints the closing lines of ctest and the whole output of what failed. What failed beside other tests
 # runs once more alone: on a shared machine, a test with real processes and real threads may get no CPU for seconds. It is listed when that
 # passes. A report of a sanitizer counts at the first time.
@@ -58,7 +88,10 @@ run_tests() {
     tree=$1 log=$build/$1-tests.log
     shift
     say "testing build/$tree"
-    if ctest --test-dir "$build/$tree" --output-on-failure --no-tests=error -j "$((3 * $(nproc)))" --output-junit "$log.xml" "$@" >"$log" 2>&1 </dev/null; then
+    if {
+        ctest --test-dir "$build/$tree" --output-on-failure --no-tests=error -j "$((3 * $(nproc)))" --output-junit "$log.xml" "$@" 2>&1 </dev/null
+        echo "hal: ctest ended with $?"
+    } | test_progress "$tree" 4>"$log"; then
         sed -n '/tests passed/,/^Total Test time/p' "$log"
     else
         grep -vE '^ *(Start +[0-9]+:|[0-9]+/[0-9]+ .* (Passed|Skipped) )|\(Skipped\)$|\*\*\*Skipped ' "$log"
