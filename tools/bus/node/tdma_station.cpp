@@ -89,16 +89,10 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link,
     if (by_rtcfg) {
         tdma::StationSetup unknown;
         unknown.configured = false;
-<<<<<<< HEAD
         unknown.slot_capacity = tdma::max_slots;
-        made.reset(new TdmaStation(unknown, {}, segment, std::move(opened.port), *skew, *drift));
-        if (std::string problem = made->receive_schedule(options, ended); !problem.empty()) {
-=======
-        unknown.slot_capacity = tdma::most_slots;
         made.reset(
             new TdmaStation(unknown, {}, segment, std::move(opened.port), *skew, *drift, prefix));
-        if (std::string problem = made->take_schedule(options, ended); !problem.empty()) {
->>>>>>> 094aa236 (node: Print each change with its own time)
+        if (std::string problem = made->receive_schedule(options, ended); !problem.empty()) {
             return problem;
         }
         entry = &made->applicant_->accepted()->schedule.stations.front();
