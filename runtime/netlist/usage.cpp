@@ -34,8 +34,8 @@ std::vector<UsageWord> words_of(std::string_view text) {
         if (end == text.npos) {
             end = text.size();
         }
-        const std::size_t begin = optional ? at + 1 : at;
-        std::string_view inner = text.substr(begin, end - begin);
+        const std::size_t inner_begin = optional ? at + 1 : at;
+        std::string_view inner = text.substr(inner_begin, end - inner_begin);
         if (optional) {
             ++end;
         }

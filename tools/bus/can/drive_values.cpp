@@ -28,7 +28,7 @@ struct Setting {
     const char* what;
 };
 using enum Setting::Unit;
-constexpr Setting settings[] = {
+constexpr Setting drive_settings[] = {
     {"max-speed", object::profile_velocity, 0, 4, false, velocity, "profile velocity (6081h)"},
     {"max-acceleration", object::profile_acceleration, 0, 4, false, acceleration,
      "profile acceleration (6083h)"},
@@ -55,9 +55,9 @@ constexpr Setting settings[] = {
 constexpr const char* factors[] = {"position-factor", "velocity-factor", "acceleration-factor"};
 
 const Setting* find_setting(const std::string& name) {
-    const auto* s = std::find_if(std::begin(settings), std::end(settings),
+    const auto* s = std::find_if(std::begin(drive_settings), std::end(drive_settings),
                                  [&](const Setting& each) { return name == each.name; });
-    return s == std::end(settings) ? nullptr : s;
+    return s == std::end(drive_settings) ? nullptr : s;
 }
 
 double factor_of(const SdoAxis& a, Setting::Unit unit) {
@@ -128,7 +128,7 @@ bool parse_real(const std::string& text, double& value) {
 
 std::vector<std::string> value_names(bool reading) {
     std::vector<std::string> names(std::begin(factors), std::end(factors));
-    for (const Setting& s : settings) {
+    for (const Setting& s : drive_settings) {
         names.emplace_back(s.name);
     }
     if (reading) {
@@ -141,7 +141,7 @@ std::vector<std::string> value_names(bool reading) {
 
 std::string value_help() {
     std::string text;
-    for (const Setting& s : settings) {
+    for (const Setting& s : drive_settings) {
         text += fmt::format("    {:36} {}\n", s.name, s.what);
     }
     for (const char* name : factors) {

@@ -182,9 +182,9 @@ int run_tdma_plan(const TdmaPlanOptions& options) {
         const std::string why = write_file(options.svg, picture);
         return why.empty() ? 0 : fail(options, why);
     }
-    const std::string text =
+    const std::string output =
         options.json ? json_text(reading.schedule, p) : text_of(reading.schedule, p);
-    return print(text) ? 0 : 1;
+    return print(output) ? 0 : 1;
 }
 
 }  // namespace hal::tools
