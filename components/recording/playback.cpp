@@ -32,6 +32,11 @@ struct Playback : hal::Component {
     hal::TextArgument file, values, types;
     hal::In<bool> enable{*this, "enable", "FALSE holds the time and the values", {.initial = true}};
     hal::In<bool> restart{*this, "restart", "a rising edge starts again at the beginning"};
+    hal::Param<std::int64_t> begin{*this,
+                                   "begin",
+                                   "when the recording begins, on the machine's clock; 0: in the "
+                                   "first cycle",
+                                   {.unit = "ns"}};
     hal::Param<bool> loop{*this, "loop", "TRUE starts again after the end"};
     hal::Out<double> time{
         *this, "time", "time since the beginning of the recording", {.unit = "s"}};
@@ -48,6 +53,8 @@ struct Playback : hal::Component {
         if (!enable) return;
         if (begun_) {
             elapsed_ns_ += cycle.period_ns();
+        } else if (begin != 0 && !rewound_) {
+            elapsed_ns_ = cycle.start_ns() - begin;
         }
         begun_ = true;
         bool more = false;
@@ -130,10 +137,18 @@ private:
                                      "file=" + file.get() + ": the recording has no rows" +
                                          (recording.unread.empty() ? "" : "; " + recording.unread));
         }
+        warn(texts, recording);
         begin_ns_ = recording.begin_ns();
         for (hal::mcap::Table& table : recording.tables) {
             tracks_.push_back({std::move(table)});
         }
+    }
+
+    void warn(const hal::Texts& texts, const hal::mcap::Recording& recording) const {
+        if (recording.missing.empty()) return;
+        texts.begin("", "");
+        texts.report(HAL_SEVERITY_WARNING, "incomplete-recording", 0, 0, recording.missing, "",
+                     "what it has is played");
     }
 
     // A value that several tables have, because an edit moved it to another thread, is one pin.
@@ -143,7 +158,7 @@ private:
             if (!wanted(column.name)) continue;
             const bool own = column.name == "enable" || column.name == "restart" ||
                              column.name == "loop" || column.name == "time" ||
-                             column.name == "done";
+                             column.name == "done" || column.name == "begin";
             const std::string name = own ? "value-" + column.name : column.name;
             const auto [at, made] = by_name_.try_emplace(name, values_.size());
             if (made) {
@@ -180,6 +195,7 @@ private:
         }
         elapsed_ns_ = 0;
         begun_ = false;
+        rewound_ = true;
     }
 
     std::vector<Track> tracks_;
@@ -189,6 +205,7 @@ private:
     std::int64_t begin_ns_ = 0;
     std::int64_t elapsed_ns_ = 0;
     bool begun_ = false;
+    bool rewound_ = false;  // it no longer begins at `begin`
     bool was_restart_ = false;
 };
 
@@ -198,6 +215,7 @@ HAL_COMPONENT(Playback, "playback", "Plays a recording into pins", R"(
 The file is one that `hal record` wrote, or another MCAP file with ROS 2 messages: their numbers are played, texts and arrays of any length are skipped. Each recorded value becomes an output of its own name and
 type: `x-pid.error` is `playback.0.x-pid.error`. In each cycle the outputs have the values that were recorded at that time after the first row; a
 recording of a thread of the same period is played row by row. The whole file is read when the component is loaded, at most 1 GiB of values.
+A file that was cut off or damaged is played as far as it goes, and a warning states what is missing.
 
 A table (.csv) has no types: its values are float, but for those that `types` names, as in `types=on:bit,count:s32`.
 

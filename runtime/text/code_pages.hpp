@@ -237,6 +237,12 @@ inline constexpr CodePage code_pages[] = {
      "and sections are case-sensitive. `POSTGUI_HALFILE` alone is not enough: only a display loads "
      "it. A file that has only values for other netlists is given "
      "with `hal run --ini FILE.ini FILE.hal`."},
+    {"incomplete-recording",
+     "A recording was cut off, as by a power failure or an incomplete copy, or is damaged. What it "
+     "has is played; the message "
+     "states from which time on rows are missing, and of which values.\n\n"
+     "Copy the file again, or record again. An .mcap that ends without a summary can be used up to "
+     "its last complete second."},
     {"init-done",
      "initf functions run once, in a cycle of their own before the first cyclic pass of their "
      "thread. This thread has already made "
@@ -251,9 +257,11 @@ inline constexpr CodePage code_pages[] = {
      "client disconnected.\n\n"
      "Commands executed before it remain in effect."},
     {"invalid-name",
-     "The name of a signal, an alias, a thread or an instance is one word of a netlist. A name that "
+     "The name of a signal, an alias, a thread or an instance is one word of a netlist. A name "
+     "that "
      "the parser would read "
-     "otherwise (a blank or a line end in it, '#', '$', '[' or '{', an open quote) could be made by "
+     "otherwise (a blank or a line end in it, '#', '$', '[' or '{', an open quote) could be made "
+     "by "
      "a program, but no netlist "
      "could use it, and what `save` prints could not be loaded.\n\n"
      "Use letters, digits, '-', '_', '.' and ':'."},

@@ -179,6 +179,83 @@ setp io.fault-emcy-storm 1
             self.bad("replay", "run.mcap", "whole.hal", "--", "GAIN=1"),
         )
 
+    def test_a_replay_of_two_threads_is_equal(self):
+        threads = "loadrt threads name1=fast period1=1000000 name2=slow period2=10000000\n"
+        control = (
+            CONTROL.replace("servo", "fast").replace("$(GAIN)", "20")
+            + "loadrt lowpass names=filter\nsetp filter.gain 0.1\n"
+            "net command => loop.command\nnet feedback => filter.in\nnet slowly filter.out\naddf filter slow\n"
+        )
+        source = (
+            "loadrt siggen names=target\nsetp target.frequency 2\nnet command target.sine\n"
+            "addf target.update slow\n"
+        )
+        self.write("whole.hal", threads + PLANT.replace("servo", "fast") + source + control)
+        self.write("control.hal", threads + control)
+        self.write("late.hal", threads + control + "start\nadvance 3ms\n")
+        for ending in "csv", "mcap":
+            run = f"run.{ending}"
+            values = "command,effort,feedback,slowly"
+            self.good("sim", "whole.hal", "-q", "--for", "1s", "--record", run, "--values", values)
+            for netlist in "control.hal", "late.hal":
+                self.assertRegex(
+                    self.good("replay", run, netlist, "--tolerance", "1e-9"),
+                    r"effort +equal in \d+ rows\n(.|\n)*: 2 inputs driven, 2 values compared, none differs\n$",
+                )
+                self.assertRegex(self.good("replay", run, netlist), r"slowly +equal in \d+ rows\n")
+        # a recording that began between two cycles of the slow thread
+        rows = (self.folder / "run.csv").read_text().splitlines(keepends=True)
+        (self.folder / "later.csv").write_text("".join([rows[0], *rows[25:]]))
+        out = self.good("replay", "later.csv", "control.hal")
+        self.assertNotIn("no row at the same time", out)
+
+    def test_what_is_missing_of_a_recording_is_reported(self):
+        threads = "loadrt threads name1=servo period1=1000000\n"
+        self.write("whole.hal", threads + PLANT + CONTROL + "setp loop.command 1\n")
+        self.write("control.hal", threads + CONTROL + "setp loop.command 1\n")
+        for ending in "csv", "mcap":
+            self.good(
+                "sim",
+                "whole.hal",
+                "-q",
+                "--for",
+                "3s",
+                "--record",
+                f"whole.{ending}",
+                "--values",
+                "effort,feedback",
+                "--",
+                "GAIN=1",
+            )
+        whole = (self.folder / "whole.csv").read_bytes()
+        rows = whole.splitlines(keepends=True)
+        (self.folder / "cut.csv").write_bytes(b"".join(rows[:101]) + rows[101][:8])
+        whole = (self.folder / "whole.mcap").read_bytes()
+        (self.folder / "cut.mcap").write_bytes(whole[: len(whole) // 2])
+        sentences = {
+            "cut.csv": r"'cut\.csv', line 102: the line is cut off; rows after 0\.099 s are missing, of effort, feedback",
+            "cut.mcap": r"'cut\.mcap' ends without a summary; rows after 0\.999 s are missing, of '/hal/servo' \(effort, feedback\)",
+        }
+        for name, sentence in sentences.items():
+            done = self.run_program("replay", name, "control.hal", "--", "GAIN=1")
+            self.assertEqual(0, done.returncode)
+            self.assertRegex(done.stderr, rf"^hal replay: {sentence}\n$")
+            self.assertRegex(
+                done.stdout, r" equal in \d+ rows\n0\.\d+ s of an incomplete recording: "
+            )
+            self.write(
+                "play.hal", threads + f"loadrt playback file={name}\naddf playback.0.update servo\n"
+            )
+            for words in ("check", "play.hal"), ("sim", "play.hal", "--for", "1ms"):
+                done = self.run_program(*words)
+                self.assertEqual(0, done.returncode)
+                self.assertRegex(
+                    done.stderr,
+                    rf"^play\.hal:2:8: warning: {sentence} \[incomplete-recording\]\n",
+                )
+                self.assertIn("help: what it has is played\n", done.stderr)
+            self.assertRegex(self.run_program("plot", name).stderr, sentence)
+
     def test_a_replay_of_a_table_has_the_types_of_the_netlist(self):
         logic = "loadrt threads name1=servo period1=1000000\nloadrt and2 names=both\nloadrt conv_s32_float names=to\naddf both servo\naddf to servo\nnet a => both.in0\nnet b => both.in1\nnet y both.out\nnet n => to.in\nnet x to.out\n"
         self.write("logic.hal", logic)

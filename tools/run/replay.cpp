@@ -56,6 +56,25 @@ struct Compared {
     std::int64_t at_ns = 0;
 };
 
+/// An instance of playback, for the values that one thread recorded.
+struct Player {
+    std::string name;
+    std::int64_t period_ns;  // of its thread
+    const mcap::Table* table;
+};
+
+/// Returns the usual time between two rows; 0 for a single row.
+std::int64_t median_period_ns(const mcap::Table& table) {
+    std::vector<std::int64_t> periods;
+    for (std::size_t row = 1; row < table.rows(); ++row) {
+        periods.push_back(table.times_ns[row] - table.times_ns[row - 1]);
+    }
+    if (periods.empty()) return 0;
+    const auto middle = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
+    std::nth_element(periods.begin(), middle, periods.end());
+    return *middle;
+}
+
 /// A time without rows, counted from the first row.
 struct Gap {
     std::int64_t begin_ns = 0;
@@ -109,8 +128,7 @@ public:
 
     /// Connects the player to what has no writer. Returns the exit status.
     int connect(const std::string& file) {
-        std::vector<std::vector<std::string>> commands{
-            {"loadrt", "playback", "names=" + std::string(player), "file=" + file}};
+        std::vector<std::vector<std::string>> commands{{"loadrt", "playback", "", "file=" + file}};
         if (const std::string unknown = unknown_name(); !unknown.empty()) {
             return fail(options_, unknown);
         }
@@ -126,11 +144,17 @@ public:
             const auto lock = machine_.session.lock();
             const Model& model = machine_.session.model();
             if (model.threads.empty()) return fail(options_, "the netlist has no thread");
-            const std::string thread = thread_name(model);
-            if (thread.empty()) {
+            if (!options_.thread.empty() && !model.find_thread(options_.thread)) {
                 return fail(options_, fmt::format("unknown thread '{}'", options_.thread));
             }
-            commands.push_back({"addf", std::string(player) + ".update", thread, "1"});
+            assign_players(model);
+            std::string names;
+            for (const auto& [thread, one] : players_) {
+                names += (names.empty() ? "" : ",") + one.name;
+                commands.push_back({"setp", one.name + ".begin", std::to_string(origin_ns_)});
+                commands.push_back({"addf", one.name + ".update", thread, "1"});
+            }
+            commands[0][2] = "names=" + names;
             for (const mcap::Table& table : recording_.tables) {
                 for (std::size_t c = 0; c < table.columns.size(); ++c) {
                     use(model, table, c, commands);
@@ -143,8 +167,12 @@ public:
                         "signal without a writer, or an input pin "
                         "without a signal");
         }
-        ProcessOutput output;
-        return machine_.shell.execute(commands, output, "<replay>");
+        TextOutput output;  // its warnings about the file have been printed
+        const int status = machine_.shell.execute(commands, output, "<replay>");
+        if (status != 0) {
+            write_all(STDERR_FILENO, output.err_text);
+        }
+        return status;
     }
 
     /// Runs the netlist over the recording and compares.
@@ -168,10 +196,11 @@ public:
         constexpr std::int64_t step_ns = 200'000'000;
         warn_of_gap(wanted_ns);
         Progress progress(options_.program, wanted_ns);
-        for (std::int64_t left_ns = wanted_ns + period_ns_;
+        const std::int64_t until_ns = origin_ns_ + wanted_ns;
+        for (std::int64_t left_ns = until_ns - machine_.session.threads().now_ns();
              left_ns > 0 && !machine_.stop.requested(); left_ns -= step_ns) {
             machine_.advance(std::min(step_ns, left_ns), 0);
-            replayed_ns_ = std::min(wanted_ns, wanted_ns - left_ns + step_ns);
+            replayed_ns_ = std::clamp<std::int64_t>(wanted_ns - left_ns + step_ns, 0, wanted_ns);
             progress.report(replayed_ns_);
             if (!probe) continue;
             const auto lock = machine_.session.lock();
@@ -218,10 +247,11 @@ public:
         const bool nothing = options_.tolerance >= 0 && rows == 0;  // a test that tests nothing
         if (!options_.quiet || different != 0 || nothing) {
             text += fmt::format(
-                "{} s of recording: {} driven, {} compared{}\n",
+                "{} s of {}: {} driven, {} compared{}\n",
                 machine_.stop.requested()
                     ? fmt::format("interrupted after {:.6g} s of {:.6g}", replayed, wanted)
                     : fmt::format("{:.6g}", wanted),
+                recording_.missing.empty() ? "recording" : "an incomplete recording",
                 counted(driven_.size(), "input"), counted(compared_.size(), "value"),
                 options_.tolerance < 0 ? ""
                 : nothing ? ": nothing was tested; record values that the netlist computes too"
@@ -250,14 +280,19 @@ private:
                         options_.program, begin, static_cast<double>(gap.end_ns) * 1e-9, begin));
     }
 
-    /// States which name or pattern of --names the recording does not have; "" when it has all.
-    std::string unknown_name() const {
+    std::vector<std::string> recorded_names() const {
         std::vector<std::string> names;
         for (const mcap::Table& table : recording_.tables) {
             for (const mcap::Column& column : table.columns) {
                 names.push_back(column.name);
             }
         }
+        return names;
+    }
+
+    /// States which name or pattern of --names the recording does not have; "" when it has all.
+    std::string unknown_name() const {
+        const std::vector<std::string> names = recorded_names();
         for (const std::string& one : names_in({options_.names})) {
             if (std::any_of(names.begin(), names.end(),
                             [&](const std::string& name) { return matches(one, name); })) {
@@ -284,14 +319,14 @@ private:
         {
             const auto lock = machine_.session.lock();
             const Model& model = machine_.session.model();
-            for (const mcap::Column& column : recording_.tables.front().columns) {
-                const hal_type type = type_of(model, column.name);
+            for (const std::string& name : recorded_names()) {
+                const hal_type type = type_of(model, name);
                 if (type == HAL_TYPE_FLOAT || type == HAL_TYPE_PORT ||
-                    !matches(options_.names, column.name)) {
+                    !matches(options_.names, name)) {
                     continue;
                 }
-                options.types[column.name] = type;
-                text += (text.empty() ? "" : ",") + column.name + ":" + hal::name(type);
+                options.types[name] = type;
+                text += (text.empty() ? "" : ",") + name + ":" + hal::name(type);
             }
         }
         mcap::Recording typed;
@@ -301,25 +336,53 @@ private:
         return text;
     }
 
-    std::string thread_name(const Model& model) {
-        const Thread* thread = nullptr;
-        if (!options_.thread.empty()) {
-            thread = model.find_thread(options_.thread);
-            if (!thread) return "";
-        }
+    /// The thread that recorded a table: the one that an .mcap names, or the only one with the
+    /// period of the rows; otherwise the fastest one. A value must be played in its thread: others
+    /// get it as late as they did in the machine.
+    const Thread& thread_of(const Model& model, const mcap::Table& table) const {
+        if (!options_.thread.empty()) return *model.find_thread(options_.thread);
+        const std::string topic = table.topic.starts_with("/hal/") ? table.topic.substr(5) : "";
+        const Thread* const named = model.find_thread(table.thread.empty() ? topic : table.thread);
+        if (named) return *named;
+        const std::int64_t period_ns = median_period_ns(table);
+        const auto same = [period_ns](const auto& thread) {
+            return thread->options.period_ns == period_ns;
+        };
+        const auto found = std::ranges::find_if(model.threads, same);
+        const bool one = std::ranges::count_if(model.threads, same) == 1;
+        return one ? **found : *model.threads.front();
+    }
+
+    /// Assigns a player to each thread that recorded something.
+    void assign_players(const Model& model) {
         for (const mcap::Table& table : recording_.tables) {
-            const std::string topic = table.topic.starts_with("/hal/") ? table.topic.substr(5) : "";
-            const Thread* const own =
-                model.find_thread(table.thread.empty() ? topic : table.thread);
-            if (!thread && own) {
-                thread = own;
-            }
+            const Thread& thread = thread_of(model, table);
+            const std::string name =
+                players_.empty() ? player : fmt::format("{}-{}", player, thread.name);
+            players_.try_emplace(thread.name, Player{name, thread.options.period_ns, &table});
         }
-        if (!thread) {
-            thread = model.threads.front().get();
-        }
-        period_ns_ = thread->options.period_ns;
-        return thread->name;
+        origin_ns_ = origin_ns(machine_.session.threads().now_ns());
+    }
+
+    /// Returns the time of the machine at which the first row is due: all rows are due in a cycle
+    /// of their thread, if the periods allow it, or else those of the fastest thread.
+    std::int64_t origin_ns(std::int64_t now_ns) const {
+        const auto first_ns = [this](const Player& one) {
+            return one.table->times_ns.front() - recording_.begin_ns();
+        };
+        const auto origin_for = [&](const Player& one) {
+            const std::int64_t cycles = (now_ns + first_ns(one)) / one.period_ns + 1;
+            return cycles * one.period_ns - first_ns(one);
+        };
+        const auto by_period = [](const auto& a, const auto& b) {
+            return a.second.period_ns < b.second.period_ns;
+        };
+        const auto [fastest, slowest] = std::ranges::minmax_element(players_, by_period);
+        const std::int64_t origin = origin_for(slowest->second);
+        const bool fits = std::ranges::all_of(players_, [&](const auto& one) {
+            return (origin + first_ns(one.second)) % one.second.period_ns == 0;
+        });
+        return fits ? origin : origin_for(fastest->second);
     }
 
     void use(const Model& model, const mcap::Table& table, std::size_t c,
@@ -330,7 +393,8 @@ private:
         const Signal* const signal = pin ? pin->signal : model.find_signal(column.name);
         // times are never the same
         if ((!pin && !signal) || (pin && (pin->of_thread || pin->function))) return;
-        const std::string source = fmt::format("{}.{}", player, column.name);
+        const std::string source =
+            fmt::format("{}.{}", players_.at(thread_of(model, table).name).name, column.name);
         const bool parameter = pin && pin->dir == HAL_DIR_PARAM;
         if (signal && !signal->writer && signal->ios == 0) {
             if (driven_.insert(signal->name).second) {
@@ -347,7 +411,7 @@ private:
         }
     }
 
-    // Both times count from the first row. A recorded row is compared with the row of the same
+    // Recorded times count from the first row, replayed ones from when it is due. A recorded row is compared with the row of the same
     // time.
     void compare(const ProbeRows& rows, std::int64_t wanted_ns) {
         if (rows.layout) {
@@ -360,10 +424,7 @@ private:
             for (std::size_t i = 0; i < part.rows; ++i, at += words * 8) {
                 std::vector<std::uint64_t> row(words);
                 std::memcpy(row.data(), rows.bytes.data() + at, words * 8);
-                if (begin_ns_ < 0) {
-                    begin_ns_ = static_cast<std::int64_t>(row[1]);
-                }
-                const std::int64_t time_ns = static_cast<std::int64_t>(row[1]) - begin_ns_;
+                const std::int64_t time_ns = static_cast<std::int64_t>(row[1]) - origin_ns_;
                 if (time_ns > wanted_ns) continue;
                 for (std::size_t k = 0; k < columns.size(); ++k) {
                     compare(compared_[columns[k]], time_ns, row[k + 2]);
@@ -378,6 +439,9 @@ private:
             ++one.row;
         }
         if (one.row >= times.size() || times[one.row] - recording_.begin_ns() != time_ns) return;
+        while (one.row + 1 < times.size() && times[one.row + 1] == times[one.row]) {
+            ++one.row;  // the newest of this time
+        }
         const hal_type type = one.table->columns[one.column].type;
         const double recorded = one.table->real(one.row, one.column);
 
@@ -401,8 +465,8 @@ private:
     std::set<std::string> driven_, seen_;
     std::vector<Compared> compared_;
     ProbeLayout layout_;
-    std::int64_t begin_ns_ = -1;
-    std::int64_t period_ns_ = 0;
+    std::map<std::string, Player> players_;  // by the name of their thread
+    std::int64_t origin_ns_ = 0;  // of the machine's clock, at the first row
     std::int64_t replayed_ns_ = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -251,6 +252,38 @@ private:
     std::size_t bytes_ = 0;
 };
 
+/// Returns "0.25 s" for a time since the first row.
+std::string seconds(std::int64_t ns) {
+    char text[40];
+    std::snprintf(text, sizeof text, "%.9g s", static_cast<double>(ns) * 1e-9);
+    return text;
+}
+
+std::vector<std::string> names_of(const Table& table) {
+    std::vector<std::string> names;
+    for (const Column& column : table.columns) {
+        names.push_back(column.name);
+    }
+    return names;
+}
+
+/// Returns "rows after 0.25 s are missing, of '/hal/servo' (x, y)": what a file does not have that
+/// is not read to its end.
+std::string missing_rows(const Recording& recording) {
+    const bool any = std::any_of(recording.tables.begin(), recording.tables.end(),
+                                 [](const Table& table) { return table.rows() != 0; });
+    std::string text =
+        any ? "rows after " + seconds(recording.end_ns() - recording.begin_ns()) + " are missing"
+            : std::string("all rows are missing");
+    std::vector<std::string> tables;
+    for (const Table& table : recording.tables) {
+        const std::string values = listed(names_of(table));
+        tables.push_back(
+            table.topic.empty() ? values : "'" + table.topic.substr(0, 60) + "' (" + values + ")");
+    }
+    return tables.empty() ? text : text + ", of " + listed(tables);
+}
+
 bool load_mcap(const std::string& path, Recording& to, std::string& problem,
                const LoadOptions& options) {
     Reader reader;
@@ -260,10 +293,6 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem,
         problem = "'" + path + "': " + reader.problem();
         return false;
     }
-    if (reader.unfinished()) {
-        to.note = "'" + path +
-                  "' ends without a summary: it was read up to its last complete chunk or message";
-    }
     McapLoader loader(reader, to, options.most_bytes);
     loader.add_channels();
     const auto begin = static_cast<std::uint64_t>(std::max<std::int64_t>(options.begin_ns, 0));
@@ -271,7 +300,9 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem,
         options.end_ns == INT64_MAX ? UINT64_MAX : static_cast<std::uint64_t>(options.end_ns);
     const auto visit = [&](const Message& message) { return loader.add(message); };
     if (!reader.each(visit, begin, end)) {
-        to.note = "'" + path + "': " + reader.problem() + "; it was read up to there";
+        to.missing = "'" + path + "': " + reader.problem() + "; " + missing_rows(to);
+    } else if (reader.unfinished()) {
+        to.missing = "'" + path + "' ends without a summary; " + missing_rows(to);
     }
     loader.finish();
     if (loader.too_large()) {
@@ -350,17 +381,68 @@ constexpr std::pair<std::string_view, hal_type> type_words[] = {
     {"u32", HAL_TYPE_U32}, {"s64", HAL_TYPE_S64},     {"u64", HAL_TYPE_U64}};
 
 /// What a reader of a table must know, though it was read; empty: nothing.
-std::string note_of_csv(std::size_t equal_times, bool ends_with_line) {
-    std::string note;
-    if (!ends_with_line) {
-        note = "the last line has no line end, so that its last value may be cut";
+std::string note_of_csv(std::size_t equal) {
+    if (equal == 0) return "";
+    return std::to_string(equal) + (equal == 1 ? " row has" : " rows have") +
+           " the time of the row before";
+}
+
+/// Columns of which a row has values together: those of one thread. Columns that share a row, or are
+/// connected by such columns, are a group.
+class ColumnGroups {
+public:
+    explicit ColumnGroups(std::size_t columns) : parents_(columns) {
+        std::iota(parents_.begin(), parents_.end(), std::size_t{0});
     }
-    if (equal_times != 0) {
-        note += note.empty() ? "" : "; ";
-        note += std::to_string(equal_times) + (equal_times == 1 ? " row has" : " rows have") +
-                " the time of the row before";
+    void join(std::size_t a, std::size_t b) { parents_[group(b)] = group(a); }
+    /// Returns the group of a column: one of its columns.
+    std::size_t group(std::size_t column) {
+        while (parents_[column] != column) {
+            parents_[column] = parents_[parents_[column]];
+            column = parents_[column];
+        }
+        return column;
     }
-    return note;
+
+private:
+    std::vector<std::size_t> parents_;
+};
+
+/// Returns a table per group. `first_filled` has, for each row, a column that it has a value of; a
+/// row without any is in the first table.
+std::vector<Table> split(const Table& whole, const std::vector<std::size_t>& first_filled,
+                         ColumnGroups& groups) {
+    std::vector<Table> tables;
+    std::vector<std::vector<std::size_t>> columns;  // of each table, in the whole
+    std::map<std::size_t, std::size_t> table_of;  // group to table
+    for (std::size_t c = 0; c < whole.columns.size(); ++c) {
+        const auto [at, added] = table_of.try_emplace(groups.group(c), tables.size());
+        if (added) {
+            tables.push_back({whole.topic, {}, {}, {}});
+            columns.emplace_back();
+        }
+        tables[at->second].columns.push_back(whole.columns[c]);
+        columns[at->second].push_back(c);
+    }
+    for (std::size_t row = 0; row < whole.rows(); ++row) {
+        const std::size_t t = table_of.at(groups.group(first_filled[row]));
+        tables[t].times_ns.push_back(whole.times_ns[row]);
+        for (const std::size_t c : columns[t]) {
+            tables[t].words.push_back(whole.word(row, c));
+        }
+    }
+    return tables;
+}
+
+/// Returns the number of rows with the time of the row before.
+std::size_t equal_times(const std::vector<Table>& tables) {
+    std::size_t count = 0;
+    for (const Table& table : tables) {
+        for (std::size_t row = 1; row < table.rows(); ++row) {
+            count += table.times_ns[row] == table.times_ns[row - 1];
+        }
+    }
+    return count;
 }
 
 bool load_csv(const std::string& path, Recording& to, std::string& problem,
@@ -394,20 +476,35 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem,
             {names[i], type == options.types.end() ? HAL_TYPE_FLOAT : type->second, ""});
     }
     std::vector<std::uint64_t> held(table.columns.size());
-    std::size_t equal_times = 0;
+    ColumnGroups groups(table.columns.size());
+    std::vector<std::size_t> first_filled;
+    bool cut = false;
     for (std::size_t number = 2; std::getline(file, line); ++number) {
         const std::vector<std::string> words = csv_words(line);
         const std::string location = "'" + path + "', line " + std::to_string(number) + ": ";
         double time_s = 0;
+        cut = file.eof();  // the line has no line end
+        if (cut && words.size() < names.size()) {
+            to.missing = place + "the line is cut off; ";
+            break;
+        }
         if (words.size() != names.size() || !number_of(words[0], time_s) ||
             !(std::abs(time_s) < 9e9)) {
             problem = location + "not a row of " + std::to_string(names.size()) + " numbers";
             return false;
         }
+        std::size_t filled = 0;  // the first one; 0: none
         for (std::size_t i = 1; i < words.size(); ++i) {
             const hal_type type = table.columns[i - 1].type;
-            if (words[i].empty() || word_of(words[i], type, held[i - 1])) {
-                continue;  // empty: as before
+            if (words[i].empty()) continue;  // as before
+            filled = filled == 0 ? i : filled;
+            if (word_of(words[i], type, held[i - 1])) {
+                groups.join(filled - 1, i - 1);
+                continue;
+            }
+            if (cut && i + 1 == words.size()) {
+                to.missing = place + "the line is cut off; ";
+                break;
             }
             const auto word = std::find_if(std::begin(type_words), std::end(type_words),
                                            [type](const auto& one) { return one.second == type; });
@@ -419,9 +516,10 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem,
             }
             return false;
         }
+        if (!to.missing.empty()) break;
         const auto time_ns = static_cast<std::int64_t>(std::llround(time_s * 1e9));
         if (time_ns < options.begin_ns || time_ns >= options.end_ns) continue;
-        equal_times += !table.times_ns.empty() && table.times_ns.back() == time_ns;
+        first_filled.push_back(filled == 0 ? 0 : filled - 1);
         table.times_ns.push_back(time_ns);
         table.words.insert(table.words.end(), held.begin(), held.end());
         if (table.words.size() * 8 <= options.most_bytes) continue;
@@ -429,10 +527,15 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem,
                   " MiB of values; choose a part of it";
         return false;
     }
-    to.tables.push_back(std::move(table));
-    to.note = note_of_csv(equal_times, text.ends_with('\n'));
-    if (!to.note.empty()) {
-        to.note = "'" + path + "': " + to.note;
+    to.tables = split(table, first_filled, groups);
+    if (!to.missing.empty()) {
+        to.missing += missing_rows(to);
+    } else if (cut) {
+        to.missing = "'" + path + "': the last line has no line end; its value of '" +
+                     names.back() + "' may be cut, and rows after it may be missing";
+    }
+    if (const std::string note = note_of_csv(equal_times(to.tables)); !note.empty()) {
+        to.note = "'" + path + "': " + note;
     }
     return true;
 }
@@ -476,8 +579,10 @@ std::int64_t Recording::end_ns() const {
 
 std::vector<std::string> Recording::notes() const {
     std::vector<std::string> all;
-    if (!note.empty()) {
-        all.push_back(note);
+    for (const std::string& sentence : {missing, note}) {
+        if (!sentence.empty()) {
+            all.push_back(sentence);
+        }
     }
     all.insert(all.end(), skipped.begin(), skipped.end());
     return all;

@@ -39,7 +39,9 @@ struct Event {
 struct Recording {
     std::vector<Table> tables;
     std::vector<Event> events;
-    /// what is wrong with the file though it was read; "" when nothing is
+    /// of a file that was cut off or damaged: which rows of which values are missing; else ""
+    std::string missing;
+    /// what else is wrong with the file though it was read; "" when nothing is
     std::string note;
     /// of a file without rows: the reason, such as which of its topics is not read, and why; else
     /// ""
@@ -49,7 +51,7 @@ struct Recording {
 
     std::int64_t begin_ns() const;
     std::int64_t end_ns() const;
-    /// Returns the sentences for the user of the file: `note` and `skipped`.
+    /// Returns the sentences for the user of the file: `missing`, `note` and `skipped`.
     std::vector<std::string> notes() const;
 };
 

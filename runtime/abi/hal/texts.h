@@ -31,7 +31,8 @@ typedef struct hal_texts {
     /* Returns the path of `file`: beside the netlist that loads the component, or else as written. Valid until create
      * returns. [setup] */
     const char *(*find)(const hal_host *, const char *file);
-    /* Sets the text, and its name, to which the following messages refer. [setup] */
+    /* Sets the text, and its name, to which the following messages refer. Without a name they refer to the command that
+     * loads the component. [setup] */
     void (*begin)(const hal_host *, const char *name, const char *text, size_t bytes);
     /* Reports a message. After an error create must fail; fail() is then unnecessary. [setup] */
     void (*report)(const hal_host *, const hal_text_message *);

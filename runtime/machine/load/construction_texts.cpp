@@ -44,17 +44,17 @@ void report_in_text(const hal_host* host, const hal_text_message* message) {
             return refuse(c, "unsupported hal_text_message of " + std::to_string(message->size) +
                                  " bytes; rebuild the component");
         }
-        if (c.text_source == 0) {
+        if (c.text_source == 0 && !c.text_name.empty()) {
             c.text_source = c.sources->add(c.text_name, c.text);
         }
         const auto size = static_cast<std::uint32_t>(c.text.size());
         const std::uint32_t begin = std::min(message->begin, size);
-
         const std::uint32_t end = std::clamp(message->end, begin, size);
+        const Span at = c.text_source == 0 ? c.request.at : Span{c.text_source, begin, end};
         constexpr std::size_t most = 99;  // with the sentence behind them as many as are rendered
         if (++c.said > most) {
             if (c.said == most + 1) {
-                c.diagnostics->error("construct-failed", {c.text_source, begin, end},
+                c.diagnostics->error("construct-failed", at,
                                      "there are more errors in '" + c.text_name + "' than the " +
                                          std::to_string(most) + " shown; fix these first");
             }
@@ -67,7 +67,7 @@ void report_in_text(const hal_host* host, const hal_text_message* message) {
         Diagnostic d{severity,
                      failure_code(message->code, "construct-failed"),
                      message->sentence,
-                     {{{c.text_source, begin, end}, message->label}}};
+                     {{at, message->label}}};
         if (*message->help) {
             d.help.emplace_back(message->help);
         }

@@ -142,8 +142,17 @@ TEST(Recording, A_file_without_its_end_is_read_up_to_its_last_chunk) {
         Recording recording;
         std::string problem;
         ASSERT_TRUE(load(folder.file("cut.mcap"), recording, problem)) << problem;
-        EXPECT_NE(recording.note, "");
         const std::size_t rows = recording.tables.empty() ? 0 : recording.tables[0].rows();
+        std::string last_row = "all rows are missing";
+        if (rows != 0) {
+            char text[60];
+            std::snprintf(text, sizeof text, "rows after %.9g s are missing",
+                          static_cast<double>(recording.end_ns() - recording.begin_ns()) * 1e-9);
+            last_row = text;
+        }
+        EXPECT_NE(recording.missing.find("' ends without a summary; " + last_row),
+                  std::string::npos)
+            << recording.missing;
         EXPECT_GE(rows, last);
         last = rows;
     }
@@ -161,7 +170,10 @@ TEST(Recording, A_damaged_chunk_is_noticed) {
     put_file(folder.file("b.mcap"), bytes);
     Recording recording;
     ASSERT_TRUE(load(folder.file("b.mcap"), recording, problem));
-    EXPECT_NE(recording.note.find("chunk"), std::string::npos) << recording.note;
+    EXPECT_NE(recording.missing.find("': a chunk is damaged: its CRC is wrong; rows after 1.999 s "
+                                     "are missing, of '"),
+              std::string::npos)
+        << recording.missing;
 }
 
 TEST(Recording, On_a_full_disk_the_file_is_complete_up_to_there) {
@@ -269,7 +281,7 @@ TEST(Recording, Messages_without_a_chunk_are_read) {
     Recording recording;
     std::string problem;
     ASSERT_TRUE(load(folder.file("a.mcap"), recording, problem)) << problem;
-    EXPECT_EQ(recording.note, "") << "such a file is whole";
+    EXPECT_EQ(recording.missing, "") << "such a file is whole";
     ASSERT_EQ(recording.tables.size(), 1u);
     ASSERT_EQ(recording.tables[0].rows(), 100u);
     EXPECT_EQ(recording.tables[0].real(99, 0), 1.5);
@@ -277,7 +289,7 @@ TEST(Recording, Messages_without_a_chunk_are_read) {
     put_file(folder.file("cut.mcap"), std::string_view(whole).substr(0, whole.size() - 500));
     Recording cut;
     ASSERT_TRUE(load(folder.file("cut.mcap"), cut, problem)) << problem;
-    EXPECT_NE(cut.note, "");
+    EXPECT_NE(cut.missing, "");
     ASSERT_EQ(cut.tables.size(), 1u);
     EXPECT_GT(cut.tables[0].rows(), 80u);
     EXPECT_LT(cut.tables[0].rows(), 100u);
@@ -410,6 +422,23 @@ TEST(Recording, A_table_has_the_types_that_are_given) {
         << problem;
 }
 
+TEST(Recording, Values_of_two_threads_are_two_tables) {
+    const Folder folder;
+    const std::string path = folder.file("a.csv");
+    put_file(path, "time_s,a,b,c\n0.001,1,,2\n0.002,3,,4\n0.002,,5,\n0.003,,,6\n0.003,7,,\n");
+    Recording recording;
+    std::string problem;
+    ASSERT_TRUE(load(path, recording, problem)) << problem;
+    ASSERT_EQ(recording.tables.size(), 2u);
+    EXPECT_EQ(recording.tables[0].columns.at(1).name, "c");
+    EXPECT_EQ(recording.tables[0].rows(), 4u);
+    EXPECT_EQ(recording.tables[0].real(3, 0), 7.0);
+    EXPECT_EQ(recording.tables[0].real(3, 1), 6.0) << "an empty value is as before";
+    EXPECT_EQ(recording.tables[1].columns.at(0).name, "b");
+    EXPECT_EQ(recording.tables[1].times_ns, std::vector<std::int64_t>{2'000'000});
+    EXPECT_EQ(recording.note, "'" + path + "': 1 row has the time of the row before");
+}
+
 TEST(Recording, A_table_that_is_cut_or_ambiguous_is_no_secret) {
     const Folder folder;
     const std::string path = folder.file("a.csv");
@@ -418,9 +447,19 @@ TEST(Recording, A_table_that_is_cut_or_ambiguous_is_no_secret) {
     put_file(path, "time_s,a,b\n0.1,1,2\n0.1,1,3\n0.1,1,4\n0.2,5,-0.03");
     ASSERT_TRUE(load(path, recording, problem)) << problem;
     EXPECT_EQ(recording.notes(),
-              std::vector{"'" + path +
-                          "': the last line has no line end, so that its last value may be cut; "
-                          "2 rows have the time of the row before"});
+              (std::vector{"'" + path +
+                               "': the last line has no line end; its value of 'b' may be cut, and "
+                               "rows after it may be missing",
+                           "'" + path + "': 2 rows have the time of the row before"}));
+    for (const char* const last : {"0.2,5", "0.2,5,-", "0."}) {
+        recording = {};
+        put_file(path, std::string("time_s,a,b\n0.1,1,2\n0.15,1,3\n") + last);
+        ASSERT_TRUE(load(path, recording, problem)) << problem;
+        EXPECT_EQ(recording.missing, "'" + path +
+                                         "', line 4: the line is cut off; rows after 0.05 s are "
+                                         "missing, of a, b");
+        EXPECT_EQ(recording.tables.at(0).rows(), 2u) << last;
+    }
     recording = {};
     put_file(path, "time_s,a,b\n0.1,1,2\n");
     ASSERT_TRUE(load(path, recording, problem)) << problem;
