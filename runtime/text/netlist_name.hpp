@@ -42,7 +42,8 @@ inline std::string name_problem(std::string_view name) {
             quote = 0;
         } else if (quote == 0 && (c == '"' || c == '\'')) {
             quote = c;
-        } else if (const char* const meaning = detail::meaning_in_netlist(c); quote == 0 && meaning) {
+        } else if (const char* const meaning = detail::meaning_in_netlist(c);
+                   quote == 0 && meaning) {
             return meaning;
         }
     }
