@@ -26,7 +26,7 @@ namespace fs = std::filesystem;
 
 // @NAME@ is the component's name, @TYPE@ the same as a type, @PACKAGE@ where find_package looks.
 // clang-format off: a template
-constexpr std::string_view source = R"CPP(// SPDX-License-Identifier: MIT
+constexpr std::string_view source_text = R"CPP(// SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
 
@@ -280,7 +280,7 @@ int run_new(const NewOptions& options) {
 
     const std::string package = package_hint();
     const std::array<std::pair<std::string, std::string_view>, 4> files{
-        {{name + ".cpp", source},
+        {{name + ".cpp", source_text},
          {"CMakeLists.txt", project},
          {"test.hal", netlist},
          {"expected", expected}}};

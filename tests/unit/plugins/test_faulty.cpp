@@ -80,9 +80,8 @@ struct Faulty : hal::Component {
     }
     void make_safe(hal::Cycle) noexcept {
         const char text[] = "emergency function called\n";
-        if (dies) [[maybe_unused]] {
-            const auto written = write(STDERR_FILENO, text, sizeof text - 1);
-        }
+        if (!dies) return;
+        [[maybe_unused]] const auto written = write(STDERR_FILENO, text, sizeof text - 1);
     }
 
 private:

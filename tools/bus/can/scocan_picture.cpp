@@ -18,7 +18,7 @@ constexpr double slots_top = 56;
 constexpr double slot_height = 46;
 constexpr double bars_top = 170;
 
-constexpr double row = 24;
+constexpr double row_height = 24;
 constexpr double bar = 8;
 constexpr const char *ink = "#223344", *sync_colour = "#ffcf99", *private_colour = "#9ec5fe",
                      *shared_colour = "#e4f1e4", *plain_colour = "#d98880";
@@ -47,7 +47,7 @@ public:
         double y = bars_top;
         for (const plan::Latency& l : plan_.latencies) {
             bars(l, y);
-            y += row;
+            y += row_height;
         }
         const double height = y + 20;
         return fmt::format(
