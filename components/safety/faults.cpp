@@ -94,6 +94,7 @@ timeout of 200 ms or more is suitable for all machines.
 | 3 | a cycle took longer than its budget |
 | 4 | a thread hangs or gets no CPU time |
 | 5 | raised by a component |
+| 6 | a function changed what is around it: floating-point modes, the process, its thread |
 
     loadrt faults
     loadrt estop_latch

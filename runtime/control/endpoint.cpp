@@ -13,6 +13,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "base/own_descriptors.hpp"
 #include "machine/processes/address.hpp"
 
 namespace hal {
@@ -114,6 +115,7 @@ bool Endpoint::take_lock(std::string_view name, Diagnostics& diagnostics) {
         close(lock_);
     }
     lock_file_ = file;
+    list_descriptor(lock_, "the lock of the instance name");
     const std::string pid = lock_content(getpid());
     if (ftruncate(lock_, 0) != 0 || pwrite(lock_, pid.data(), pid.size(), 0) < 0) {
         diagnostics.error("no-socket", {}, "'" + file + "' cannot be written: " + system_reason());
@@ -133,6 +135,7 @@ bool Endpoint::listen_at(Diagnostics& diagnostics) {
     if (socket_ >= 0 && fchmod(socket_, 0600) == 0 &&
         bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
         listen(socket_, 64) == 0) {
+        list_descriptor(socket_, "the control socket");
         return true;
     }
     diagnostics.error("no-socket", {},
@@ -145,7 +148,7 @@ void Endpoint::stop_listening() {
     // a program that watches the file sees that this instance ends in order
     [[maybe_unused]] const int emptied = ftruncate(lock_, 0);
     unlink(path_.c_str());
-    close(std::exchange(socket_, -1));
+    close_own(std::exchange(socket_, -1));
 }
 
 void Endpoint::close_all() {
@@ -154,7 +157,7 @@ void Endpoint::close_all() {
         if (!lock_file_.empty()) {
             unlink(lock_file_.c_str());
         }
-        close(lock_);
+        close_own(lock_);
     }
     lock_ = -1;
     lock_file_.clear();

@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "base/keep.hpp"
+#include "base/own_descriptors.hpp"
 #include "commands/shell.hpp"
 #include "control/admission.hpp"
 #include "control/client_list.hpp"
@@ -94,7 +95,7 @@ Server::~Server() {
         s.thread.join();
     }
     if (s.wake >= 0) {
-        close(s.wake);
+        close_own(s.wake);
     }
 }
 
@@ -102,6 +103,7 @@ bool Server::start(Diagnostics& diagnostics) {
     State& s = *state_;
     if (!s.endpoint.open(s.shell.session().options().name, diagnostics)) return false;
     s.wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    list_descriptor(s.wake, "the wake-up of the control server");
     // Signals are for the program's own thread.
     sigset_t all, before;
     sigfillset(&all);

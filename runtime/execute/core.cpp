@@ -7,6 +7,8 @@
 
 #include <sched.h>
 
+#include "execute/violation.hpp"
+
 // The real-time guard: the sanitizer's runtime defines these when the program is built with it.
 extern "C" {
 [[gnu::weak]] void __rtsan_realtime_enter();
@@ -94,6 +96,10 @@ Core::Condition Core::condition(const FaultEvent& event) const noexcept {
     case HAL_FAULT_BUDGET: return {this, &in_budget_};
     case HAL_FAULT_NOT_FINITE: return {&info_, event.self};
     case HAL_FAULT_COMPONENT: return {event.self, event.reason};
+    case HAL_FAULT_VIOLATION:
+        if (event.reason == violation::ended_thread) return {this, &stopped_};
+        if (event.reason == violation::float_modes) return {this, &modes_};
+        break;
     case HAL_FAULT_NONE: break;
     }
     return {nullptr, nullptr};
@@ -189,7 +195,7 @@ void Core::warm(std::int64_t until_ns) const noexcept {
         }
         return true;
     };
-    if (!fetch(this, sizeof *this)) return;
+    if (!fetch(this, sizeof *this) || !fetch(stopped_.memory(), 1)) return;
     for (const hal_pin* pin :
          {pins_.time, pins_.tmax, pins_.tmax_increased, pins_.beat, pins_.missed, pins_.wakeup}) {
         fetch(pin, sizeof *pin);
@@ -261,6 +267,7 @@ void Core::take(plan::Plan* plan) noexcept {
         plan->carries[i].to->raw = plan->scratch[i];
     }
     board_.end_all(&info_, &info_ + 1);  // the checks of the new plan begin anew
+    modes_.begin_plan();
     plan_ = plan;
     probes_ = plan->probes.get();
     shown_.store(plan, std::memory_order_release);
@@ -319,39 +326,62 @@ void Core::answer() noexcept {
 void Core::run() noexcept {
     safe_ = false;
     mark_->in_function.store(true, std::memory_order_relaxed);
-    if (setjmp(recover) == 0) {
-        const bool first = !passed_.load(std::memory_order_relaxed);
-        passed_.store(true, std::memory_order_release);
-        if (first && !plan_->init.empty()) {
-            // initf: a cycle of its own, so that the cyclic functions start on a fresh period
-            run_steps(plan_->init_steps.data(), plan_->init_steps.data() + plan_->init.back().end);
-        } else if (const auto& functions = plan_->functions; !functions.empty()) {
-            const plan::Step* const steps = plan_->steps.data();
-            const plan::Row* row = plan_->rows.data();
-            if (!measure_) {
-                run_rows(row, steps, steps + functions.back().end);
-            } else if (profile_every.load(std::memory_order_relaxed) || tracing_) {
-                for (const plan::Function& function : functions) {
-                    run_timed(function, steps);
-                }
-            } else {
-                const plan::Function& function = functions[sampled_];
-                sampled_ = sampled_ + 1 == functions.size() ? 0 : sampled_ + 1;
-                fetch_times(*function.times);  // of many functions, they are in no near cache
-                run_rows(row, steps, steps + function.begin);
-                run_timed(function, steps);
-                run_rows(row, steps + function.end, steps + functions.back().end);
-            }
-        }
+    switch (setjmp(recover)) {
+    case 0:
+        run_functions();
         mark_->in_function.store(false, std::memory_order_relaxed);
-    } else {
-        // An exception left a noexcept function; the terminate handler jumped back here.
-        mark_->in_function.store(false, std::memory_order_relaxed);
-        board_.begin(this, &stopped_);
-        raise({HAL_FAULT_EXCEPTION, current_function(), info_.number, info_.start_ns, 0.0, nullptr,
-               nullptr});
-        stopped_.store(true, std::memory_order_release);  // output() makes the outputs safe
+        break;
+    case ended_thread: stop_at(HAL_FAULT_VIOLATION, violation::ended_thread); break;
+    default: stop_at(HAL_FAULT_EXCEPTION, nullptr);  // the terminate handler jumped back here
     }
+    if (stopped_.in_copy()) [[unlikely]] {
+        end_copy();
+    }
+    settle_modes();
+}
+
+void Core::run_functions() noexcept {
+    const bool first = !passed_.load(std::memory_order_relaxed);
+    passed_.store(true, std::memory_order_release);
+    if (first && !plan_->init.empty()) {
+        // initf: a cycle of its own, so that the cyclic functions start on a fresh period
+        for (const plan::Function& function : plan_->init) {
+            run_steps(plan_->init_steps.data() + function.begin,
+                      plan_->init_steps.data() + function.end);
+            check_modes(function.id);
+        }
+        return;
+    }
+    const auto& functions = plan_->functions;
+    if (functions.empty()) return;
+    if (modes_.each()) return run_checked();
+    const plan::Step* const steps = plan_->steps.data();
+    const plan::Row* row = plan_->rows.data();
+    if (!measure_) {
+        run_rows(row, steps, steps + functions.back().end);
+    } else if (profile_every.load(std::memory_order_relaxed) || tracing_) {
+        for (const plan::Function& function : functions) {
+            run_timed(function, steps);
+        }
+    } else {
+        const plan::Function& function = functions[sampled_];
+        sampled_ = sampled_ + 1 == functions.size() ? 0 : sampled_ + 1;
+        fetch_times(*function.times);  // of many functions, they are in no near cache
+        run_rows(row, steps, steps + function.begin);
+        run_timed(function, steps);
+        run_rows(row, steps + function.end, steps + functions.back().end);
+    }
+    suspect_modes();
+}
+
+// The function that runs did not return to its cycle.
+void Core::stop_at(hal_fault_code code, const char* reason) noexcept {
+    mark_->in_function.store(false, std::memory_order_relaxed);
+    if (stopped_.in_copy()) return;
+    check_modes(current_function());
+    board_.begin(this, &stopped_);
+    raise({code, current_function(), info_.number, info_.start_ns, 0.0, reason, nullptr});
+    stopped_.store(true, std::memory_order_release);  // output() makes the outputs safe
 }
 
 /// `row` is one that begins at or before `first`; left at one that begins at or before `last`.
@@ -477,7 +507,7 @@ std::int64_t Core::account(std::int64_t woke_ns, bool ran) noexcept {
 
 void Core::make_safe() noexcept {
     safe_ = true;
-    if (!plan_) return;
+    if (!plan_ || stopped_.in_copy()) return;
     for (const plan::Safe& safe : plan_->safe) {
         __atomic_store_n(&safe.pin->slot->raw, safe.value.raw, __ATOMIC_RELAXED);
     }

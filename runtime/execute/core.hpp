@@ -11,6 +11,8 @@
 #include "execute/cycle_mark.hpp"
 #include "execute/faults.hpp"
 #include "execute/histogram.hpp"
+#include "execute/mode_check.hpp"
+#include "execute/stop_flag.hpp"
 #include "execute/timeline.hpp"
 #include "execute/trace.hpp"
 #include "hal/abi.h"
@@ -205,8 +207,14 @@ public:
     std::uint32_t interrupted_function() const noexcept;
     std::uint64_t cycle_number() const noexcept { return info_.number; }
     bool in_function() const noexcept { return mark_->in_function.load(std::memory_order_relaxed); }
-    /// where the cycle continues after an exception left a function
+    /// Where the cycle continues when a function does not return to it: Left.
     std::jmp_buf recover;
+    enum Left : int { threw = 1, ended_thread = 2 };
+    /// The running function has copied the process: a fault that names it. [realtime]
+    void note_fork() noexcept;
+    /// A floating-point exception of the running function trapped, and is masked now. In a signal
+    /// handler of the thread
+    void note_trap() noexcept { modes_.note_trap(); }
 
 private:
     void take_over() noexcept;
@@ -224,6 +232,13 @@ private:
     const plan::Step* where() const noexcept;
     std::uint32_t slow_function(std::int64_t woke_ns) const noexcept;
     void run() noexcept;
+    void run_functions() noexcept;
+    void run_checked() noexcept;
+    void stop_at(hal_fault_code code, const char* reason) noexcept;
+    void check_modes(std::uint32_t function) noexcept;
+    void suspect_modes() noexcept;
+    void settle_modes() noexcept;
+    [[noreturn]] static void end_copy() noexcept;
     void run_timed(const plan::Function& function, const plan::Step* steps) noexcept;
     void run_rows(const plan::Row*& row, const plan::Step* first, const plan::Step* last) noexcept;
     void run_steps(const plan::Step* first, const plan::Step* last) noexcept;
@@ -250,7 +265,7 @@ private:
     // written by the session, emptied by the thread
     std::atomic<Observation*> observation_{nullptr};
     // set by the thread and the supervisor, cleared by the session
-    std::atomic<bool> stopped_{false};
+    StopFlag stopped_;
     std::atomic<bool> passed_{false};  // set by the thread
     std::atomic<std::uint64_t> halt_asked_{0};  // written by who stops the machine
     std::atomic<std::uint64_t> halt_seen_{0};  // written by the thread
@@ -292,6 +307,7 @@ private:
     bool safe_ = true;
     std::size_t sampled_ = 0;
     bool in_budget_ = true;
+    ModeCheck modes_;
 };
 
 /// The step that the compiler inserts after a function with a declared-finite output; `self` is a

@@ -11,6 +11,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "base/own_descriptors.hpp"
+
 namespace hal {
 namespace {
 
@@ -39,6 +41,7 @@ std::vector<std::string> prepare() {
     // keeps the CPU out of deep sleep states for as long as the file stays open
     static const int latency = open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC);
     if (latency >= 0) {
+        list_descriptor(latency, "the request for a short wake-up latency");
         const std::int32_t none = 0;
         [[maybe_unused]] const auto written = ::write(latency, &none, sizeof none);
     }

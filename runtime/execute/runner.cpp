@@ -146,6 +146,8 @@ void Runner::call() {
 
 void Runner::set_up() noexcept {
     tid = static_cast<int>(syscall(SYS_gettid));
+    FloatModes::defaults().set();  // a thread inherits those of its creator
+    pthread_setcancelstate(PTHREAD_CANCEL_DISABLE, nullptr);  // a function may ask for it
     if (!options.name.empty()) {
         pthread_setname_np(pthread_self(), options.name.substr(0, 15).c_str());
     }

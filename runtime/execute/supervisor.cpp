@@ -2,6 +2,7 @@
 #include "execute/supervisor.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <ctime>
@@ -12,7 +13,9 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "base/own_descriptors.hpp"
 #include "execute/process_setup.hpp"
+
 namespace hal {
 namespace {
 
@@ -68,7 +71,7 @@ Supervisor::~Supervisor() {
         pthread_join(thread_, nullptr);
     }
     if (wake_ >= 0) {
-        close(wake_);
+        close_own(wake_);
     }
     pthread_mutex_destroy(&mutex_);
 }
@@ -89,6 +92,7 @@ void Supervisor::add(Core& core, pthread_t thread, int tid, int priority, int cp
     }
     if (!started_) {
         wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+        list_descriptor(wake_, "the wake-up of the supervisor");
         looked_ns_ = monotonic_ns();
         sigset_t all, before;  // signals are for the program's own thread; a crash is this one's
         sigfillset(&all);
@@ -412,10 +416,18 @@ bool Supervisor::starved(const Core& core) {
     return of && !of->blocked && kernel_view(of->tid).state == 'R' && got_no_cpu(*of);
 }
 
+namespace {
+
+bool has_ended(int tid) noexcept { return tgkill(getpid(), tid, 0) != 0 && errno == ESRCH; }
+
+}  // namespace
+
 void Supervisor::find_cause(const Watched& watched, Stall& stall) const {
     const KernelView seen = kernel_view(watched.tid);
     stall.tracer = seen.tracer;
-    if (seen.state == 't' || seen.state == 'T') {
+    if (has_ended(watched.tid)) {
+        stall.cause = Stall::Cause::ended;
+    } else if (seen.state == 't' || seen.state == 'T') {
         stall.cause = Stall::Cause::stopped;
     } else if (is_blocked(seen) || (watched.blocked && got_no_cpu(watched))) {
         stall.cause = Stall::Cause::waiting;

@@ -28,6 +28,7 @@ struct Stall {
         starved,  ///< ready to run, but gets no CPU time
         process,  ///< the whole process got no CPU time
         suspended,  ///< the host was suspended
+        ended,  ///< a function ended the thread
     };
     static constexpr std::size_t most_starved = 8;
     Cause cause = Cause::busy;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "execute/virtual_clock.hpp"
 
+#include "execute/float_modes.hpp"
+
 namespace hal {
 
 void VirtualClock::advance(std::int64_t ns) {
@@ -30,7 +32,10 @@ void VirtualClock::advance(std::int64_t ns) {
 
 void VirtualClock::run(Runner& runner) {
     const std::int64_t begun_ns = cycle_limit.limit_ns > 0 ? monotonic_ns() : 0;
-    runner.core.cycle(runner.grid_ns, now_ns_, now_ns_);
+    {
+        const DefaultFloatModes modes;
+        runner.core.cycle(runner.grid_ns, now_ns_, now_ns_);
+    }
     if (cycle_limit.limit_ns == 0) return;
     const std::int64_t took_ns = monotonic_ns() - begun_ns;
     if (took_ns > cycle_limit.limit_ns) {

@@ -27,6 +27,22 @@ inline constexpr CodePage fault_pages[] = {
      "the reaction; the thread continues. `hal doc COMPONENT` describes how to reset the fault.\n\n"
      "`show fault` lists all faults, `fault clear` acknowledges those that are over. The component "
      "`faults` has pins for the safety chain (`ok`, `last-code`)."},
+    {"cycle-violation",
+     "A fault: a function changed something outside of its instance. The message names the function "
+     "and what it did:\n\n"
+     "* It changed the floating-point modes of its thread (rounding, flush to zero, exceptions that "
+     "trap) and did not restore them. They are reset behind the function; the thread continues. A "
+     "function that did so in one cycle only may remain unknown.\n"
+     "* It called `fork()`. The copy of the process is ended at once; the thread continues. Start "
+     "programs with `loadusr`, or by fork and exec in `start` or in a thread of the component's "
+     "own.\n"
+     "* It ended its thread (`pthread_exit`). No function of the thread runs any more, and its "
+     "outputs were set to their safe values; `start` lets them run again. The exit status is then "
+     "1.\n"
+     "* It closed or replaced a file descriptor of the runtime, such as the control socket. Outputs "
+     "are set to their safe values, and the process ends with status 1.\n\n"
+     "The usual cause of a closed descriptor is one that is closed twice: another open file has got "
+     "its number meanwhile."},
     {"exception",
      "A fault: a function threw an exception in its cycle. No function of its thread runs any "
      "more, and the outputs of the thread were "

@@ -2,6 +2,7 @@
 #include "cli/signals.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -15,6 +16,7 @@
 #include <unistd.h>
 #include <utility>
 
+#include "base/own_descriptors.hpp"
 #include "execute/process_setup.hpp"
 #include "hal/clock.hpp"
 
@@ -61,10 +63,16 @@ StopRequest::StopRequest() {
     ::pthread_sigmask(SIG_BLOCK, &set, nullptr);
     event_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     done_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    caught_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     signals_ = ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
-    if (event_ < 0 || done_ < 0 || signals_ < 0) {
+    if (event_ < 0 || done_ < 0 || signals_ < 0 || caught_ < 0) {
         throw std::system_error(errno, std::generic_category(), "cannot wait for signals");
     }
+    list_descriptor(event_, "the request to stop");
+    list_descriptor(done_, "the end of the signal thread");
+    list_descriptor(signals_, "the signals");
+    list_descriptor(caught_, "the signals of unblocked threads");
+    handle_unblocked(true);
     thread_ = std::thread([this] { serve(); });
 }
 
@@ -81,6 +89,7 @@ void StopRequest::release() {
     const std::uint64_t one = 1;
     [[maybe_unused]] const ssize_t n = ::write(done_, &one, sizeof one);
     thread_.join();
+    handle_unblocked(false);
     signalfd_siginfo info{};
     // a second Ctrl-C does not skip the clean-up
     while (::read(signals_, &info, sizeof info) == sizeof info) {
@@ -93,8 +102,8 @@ void StopRequest::release() {
 
 StopRequest::~StopRequest() {
     release();
-    for (const int descriptor : {event_, done_, signals_}) {
-        ::close(descriptor);
+    for (const int descriptor : {event_, done_, signals_, caught_}) {
+        close_own(descriptor);
     }
 }
 
@@ -108,15 +117,56 @@ void StopRequest::request() noexcept {
 void StopRequest::receive_signals() {
     signalfd_siginfo info{};
     while (::read(signals_, &info, sizeof info) == sizeof info) {
-        if (!(info.ssi_signo == SIGINT && spare_)) {
-            int none = 0;
-            signal_.compare_exchange_strong(none, static_cast<int>(info.ssi_signo));
-            request();
-        }
-        if (told_) {
-            told_();
+        receive_signal(static_cast<int>(info.ssi_signo));
+    }
+    eventfd_t ignored;
+    if (::eventfd_read(caught_, &ignored) == 0) {
+        receive_signal(unblocked_.load());
+    }
+}
+
+void StopRequest::receive_signal(int number) {
+    if (number != SIGINT || !spare_) {
+        int none = 0;
+        signal_.compare_exchange_strong(none, number);
+        request();
+    }
+    if (told_) {
+        told_();
+    }
+}
+
+namespace {
+
+std::atomic<StopRequest*> handling{nullptr};  // there is one at a time
+std::array<struct sigaction, NSIG> before_handling;
+
+}  // namespace
+
+void StopRequest::on_unblocked(int number) {
+    const int error = errno;
+    if (StopRequest* const request = handling.load()) {
+        request->unblocked_ = number;
+        ::eventfd_write(request->caught_, 1);
+    }
+    errno = error;
+}
+
+void StopRequest::handle_unblocked(bool on) {
+    struct sigaction action{};
+    action.sa_handler = on_unblocked;
+    action.sa_flags = SA_RESTART;
+    const sigset_t set = ending_signals();
+    for (std::size_t i = 1; i < before_handling.size(); ++i) {
+        const int number = static_cast<int>(i);
+        if (::sigismember(&set, number) != 1) continue;
+        if (on) {
+            ::sigaction(number, &action, &before_handling[i]);
+        } else {
+            ::sigaction(number, &before_handling[i], nullptr);
         }
     }
+    handling = on ? this : nullptr;
 }
 
 void StopRequest::spare(bool on) {
@@ -128,9 +178,9 @@ void StopRequest::spare(bool on) {
 void StopRequest::serve() {
     release_unused_stack();
     for (;;) {
-        pollfd both[2] = {{signals_, POLLIN, 0}, {done_, POLLIN, 0}};
-        if (::poll(both, 2, -1) < 0) continue;
-        if (both[1].revents != 0) return;
+        pollfd all[3] = {{signals_, POLLIN, 0}, {done_, POLLIN, 0}, {caught_, POLLIN, 0}};
+        if (::poll(all, 3, -1) < 0) continue;
+        if (all[1].revents != 0) return;
         const std::lock_guard lock(mutex_);
         receive_signals();
     }

@@ -17,7 +17,8 @@ std::string end_description(int status);
 /// Handles the signals that end a run, during its lifetime: SIGINT, SIGTERM, SIGHUP, SIGQUIT,
 /// SIGXCPU and SIGPWR. Construct it before any other thread. Signals whose default action would end
 /// the process without a report (SIGUSR1, SIGALRM, SIGIO, real-time signals ...) are ignored from
-/// then on. Nothing runs in signal handlers.
+/// then on. Nothing runs in signal handlers, unless a component unblocks one of these signals in a
+/// thread: then a handler requests the end.
 class StopRequest {
 public:
     StopRequest();
@@ -47,9 +48,14 @@ public:
 private:
     void serve();
     void receive_signals();
+    void receive_signal(int number);
+    void handle_unblocked(bool on);
+    static void on_unblocked(int number);
     int event_ = -1;
     int signals_ = -1;
     int done_ = -1;
+    int caught_ = -1;  // eventfd: `unblocked_` was written
+    std::atomic<int> unblocked_{0};  // the newest signal that on_unblocked() was called for
     std::atomic<bool> requested_{false};
     std::atomic<int> signal_{0};
     std::mutex mutex_;  // of taking signals and what they mean

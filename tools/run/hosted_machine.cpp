@@ -120,7 +120,12 @@ HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& n
     : observer_(start_observer(name, virtual_clock)),
       session(session_options(options, name, virtual_clock, observer_.get())),
       shell(session, shell_options(options)),
-      options_(options) {
+      options_(options),
+      descriptor_watch_([this] { halt_ticket_ = session.threads().halt(); },
+                        [this] {
+                            return session.threads().halted(halt_ticket_) !=
+                                   ThreadControl::Halt::pending;
+                        }) {
     export_variables(options, name);
     // a machine that is stopped from the terminal would leave its outputs as they are
     if (!virtual_clock) {

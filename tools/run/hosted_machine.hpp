@@ -11,6 +11,7 @@
 #include "cli/signals.hpp"
 #include "commands/shell.hpp"
 #include "control/server.hpp"
+#include "machine/report/descriptor_watch.hpp"
 #include "machine/report/cycle_guard.hpp"
 #include "machine/report/exit_observer.hpp"
 #include "machine/report/setup_guard.hpp"
@@ -69,6 +70,8 @@ private:
     std::unique_ptr<Server> server_;
     CycleGuard cycle_guard_;
     SetupGuard setup_guard_;
+    std::uint64_t halt_ticket_ = 0;  // of descriptor_watch_
+    DescriptorWatch descriptor_watch_;
 };
 
 /// For netlists and the programs they start: $1 $2 … and NAME=VALUE from behind `--`,

@@ -22,7 +22,7 @@ extern "C" {
 #endif
 
 #define HAL_ABI_MAJOR 1
-#define HAL_ABI_MINOR 2
+#define HAL_ABI_MINOR 3
 
 typedef enum hal_type { HAL_TYPE_BIT, HAL_TYPE_FLOAT, HAL_TYPE_S32, HAL_TYPE_U32, HAL_TYPE_S64, HAL_TYPE_U64, HAL_TYPE_PORT } hal_type;
 typedef enum hal_dir { HAL_DIR_IN, HAL_DIR_OUT, HAL_DIR_IO, HAL_DIR_PARAM } hal_dir;
@@ -217,7 +217,8 @@ typedef struct hal_faults {
 } hal_faults;
 
 typedef enum hal_fault_code {
-    HAL_FAULT_NONE, HAL_FAULT_EXCEPTION, HAL_FAULT_NOT_FINITE, HAL_FAULT_BUDGET, HAL_FAULT_SILENT_THREAD, HAL_FAULT_COMPONENT
+    HAL_FAULT_NONE, HAL_FAULT_EXCEPTION, HAL_FAULT_NOT_FINITE, HAL_FAULT_BUDGET, HAL_FAULT_SILENT_THREAD, HAL_FAULT_COMPONENT,
+    HAL_FAULT_VIOLATION /* since 1.3 */
 } hal_fault_code;
 
 /* Extension "hal.clock/1": lets one instance discipline the deadlines of all threads to an external clock reference. */

@@ -16,6 +16,8 @@
 #include <sys/sendfile.h>
 #include <unistd.h>
 
+#include "linuxcnc/find/modules.hpp"
+#include "machine/load/foreign_code.hpp"
 #include "machine/load/module_library.hpp"
 #include "machine/load/plugin_file.hpp"
 #include "machine/load/source_tree.hpp"
@@ -245,6 +247,7 @@ std::optional<Plugin> open_component(const Plugins& plugins, std::string_view na
     if (!file.problem.empty()) {
         return bad({file.problem});
     }
+    const ForeignCode loading;
     load_own_libraries(file.needed, fs::path(found).parent_path().string());
     std::shared_ptr<void> library = open_copy(found);
     if (!library) {

@@ -13,6 +13,7 @@
 #include <pthread.h>
 
 #include "execute/core.hpp"
+#include "machine/load/foreign_code.hpp"
 
 namespace hal {
 
@@ -38,7 +39,10 @@ public:
         now.thread = pthread_self();
         now.since_ns.store(monotonic_ns(), std::memory_order_release);
     }
-    ~SetupCall() { now.since_ns.store(0, std::memory_order_release); }
+    ~SetupCall() {
+        code_.over();
+        now.since_ns.store(0, std::memory_order_release);
+    }
     SetupCall(const SetupCall&) = delete;
 
     /// Notes that the present call may take `ns`, a minute at most. [setup]
@@ -56,6 +60,7 @@ public:
     }
 
 private:
+    ForeignCode code_;
     static void copy(const std::string& from, char (&to)[128]) noexcept {
         const std::size_t size = from.size() < sizeof to ? from.size() : sizeof to - 1;
         std::memcpy(to, from.data(), size);

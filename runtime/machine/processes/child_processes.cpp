@@ -13,6 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/own_descriptors.hpp"
 #include "execute/core.hpp"
 #include "execute/process_setup.hpp"
 #include "machine/run/running_model.hpp"
@@ -22,7 +23,7 @@ namespace hal {
 ChildProcesses::~ChildProcesses() {
     spawner_.reset();
     if (wake_ >= 0) {
-        close(wake_);
+        close_own(wake_);
     }
     for (const Watched& child : watched_) {
         close(child.pidfd);
@@ -35,6 +36,7 @@ void ChildProcesses::wake() {
         return;
     }
     wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    list_descriptor(wake_, "the wake-up for child processes");
     sigset_t all_signals, before;  // signals are for the program's own thread
     sigfillset(&all_signals);
     pthread_sigmask(SIG_SETMASK, &all_signals, &before);

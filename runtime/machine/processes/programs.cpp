@@ -8,7 +8,7 @@
 
 #include "execute/core.hpp"
 #include "machine/processes/address.hpp"
-#include "machine/session.hpp"
+#include "machine/run/running_model.hpp"
 #include "text/netlist_name.hpp"
 
 namespace hal {

@@ -5,20 +5,21 @@
 #include <atomic>
 #include <csetjmp>
 #include <csignal>
-#include <cstdarg>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <cxxabi.h>
-#include <dlfcn.h>
 #include <exception>
 #include <pthread.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include "base/process_copy.hpp"
 #include "execute/crash_table.hpp"
+#include "linuxcnc/find/modules.hpp"
 #include "machine/load/module_library.hpp"
 #include "machine/load/setup_call.hpp"
+#include "machine/report/process_calls.hpp"
 #include "machine/report/crash.hpp"
 #include "machine/report/exit_observer.hpp"
 #include "model/model.hpp"
@@ -81,7 +82,37 @@ void name_function(const Core* core, std::uint32_t id) noexcept {
 
 std::atomic<bool> reported{false};
 
-void on_signal(int signal) {
+void install_crash_handler(int signal) noexcept;
+
+/// A floating-point exception traps only when a function has unmasked it. Masks it, so that the
+/// instruction gives its default result; the cycle reports the function. Returns false when it is
+/// another exception, or outside of a cycle.
+bool mask_float_exceptions([[maybe_unused]] const siginfo_t& info,
+                           [[maybe_unused]] void* context) noexcept {
+#if defined(__x86_64__)
+    Core* const core = Core::current();
+    const bool is_float = info.si_code >= FPE_FLTDIV && info.si_code <= FPE_FLTINV;
+    if (!core || !core->in_function() || !is_float) return false;
+    constexpr unsigned masks = 0x1f80, vector_flags = 0x3f;
+    constexpr unsigned short x87_masks = 0x3f, x87_flags = 0x80ff;
+    auto& registers = *static_cast<ucontext_t*>(context)->uc_mcontext.fpregs;
+    registers.mxcsr = (registers.mxcsr | masks) & ~vector_flags;
+    registers.cwd = registers.cwd | x87_masks;
+    registers.swd = static_cast<unsigned short>(registers.swd & ~x87_flags);
+    core->note_trap();
+    install_crash_handler(SIGFPE);
+    return true;
+#else
+    return false;
+#endif
+}
+
+void on_signal(int signal, siginfo_t* info, void* context) {
+    if (signal == SIGFPE && mask_float_exceptions(*info, context)) return;
+    if (in_process_copy) {
+        raise(signal);
+        return;
+    }
     if (reported.exchange(true)) {  // by the terminate handler, or a crash while making safe
         raise(signal);
         return;
@@ -107,6 +138,13 @@ void on_signal(int signal) {
     }
     print("; outputs were set to their safe values; the process ends\n");
     raise(signal);  // SA_RESETHAND put the default action back
+}
+
+void install_crash_handler(int signal) noexcept {
+    struct sigaction action{};
+    action.sa_sigaction = on_signal;
+    action.sa_flags = SA_RESETHAND | SA_NODEFER | SA_ONSTACK | SA_SIGINFO;
+    sigaction(signal, &action, nullptr);
 }
 
 std::atomic<pid_t> machine_process{0};  // the process of the machines; one that it forks ends without a word
@@ -136,46 +174,6 @@ void name_caller(const Core* in_function, const char* module) noexcept {
     print("thread '");
     print(name);
     print("'");
-}
-
-// A machine ends by its own orders. Returns false when this is such an end, or one that was
-// reported already.
-bool report_end(const char* call) noexcept {
-    if (machine_process.load() != getpid()) return false;
-    const Core* const core = Core::current();
-    const Core* const in_function = core && core->in_function() ? core : nullptr;
-    const char* const module = in_function ? nullptr : module_of_task();
-    const bool machine = has_machine();
-    if (!in_function && !module && !machine && !SetupCall::is_mine()) return false;
-    if (reported.exchange(true)) return false;
-    ExitObserver::silence();
-    make_all_safe();
-    print("hal: ");
-    name_caller(in_function, module);
-    if (__rtsan_realtime_enter && (in_function || module)) {
-        print(" made the call that the real-time guard prints above");
-        if (in_function) {
-            print(", at cycle ");
-        }
-    } else {
-        print(" called ");
-        print(call);
-        if (in_function) {
-            print(" at cycle ");
-        } else if (SetupCall::is_mine()) {
-            print(" in ");
-        } else if (!module) {
-            print(" while the machine runs");
-        }
-    }
-    if (in_function) {
-        print(in_function->cycle_number());
-    } else if (!module && SetupCall::is_mine()) {
-        print(SetupCall::now.what);
-    }
-    print(machine ? "; outputs were set to their safe values; the process ends\n"
-                  : "; the process ends\n");
-    return true;
 }
 
 int failure(int status) noexcept { return status != 0 ? status : 1; }
@@ -208,7 +206,7 @@ void on_quick_exit() {
         }
         std::longjmp(core->recover, 1);
     }
-    if (reported.exchange(true)) {
+    if (in_process_copy || reported.exchange(true)) {
         std::abort();
     }
     ExitObserver::silence();
@@ -220,6 +218,66 @@ void on_quick_exit() {
 }
 
 }  // namespace
+
+bool is_machine_process() noexcept { return machine_process.load() == getpid(); }
+
+// A machine ends by its own orders.
+bool report_end(const char* call, const char* code) noexcept {
+    if (!is_machine_process()) return false;
+    const Core* const core = Core::current();
+    const Core* const in_function = core && core->in_function() ? core : nullptr;
+    const char* const module = in_function ? nullptr : module_of_task();
+    const bool machine = has_machine();
+    if (!in_function && !module && !machine && !SetupCall::is_mine()) return false;
+    if (reported.exchange(true)) return false;
+    ExitObserver::silence();
+    make_all_safe();
+    print("hal: ");
+    name_caller(in_function, module);
+    if (__rtsan_realtime_enter && (in_function || module)) {
+        print(" made the call that the real-time guard prints above");
+        if (in_function) {
+            print(", at cycle ");
+        }
+    } else {
+        print(" called ");
+        print(call);
+        if (in_function) {
+            print(" at cycle ");
+        } else if (SetupCall::is_mine()) {
+            print(" in ");
+        } else if (!module) {
+            print(" while the machine runs");
+        }
+    }
+    if (in_function) {
+        print(in_function->cycle_number());
+    } else if (!module && SetupCall::is_mine()) {
+        print(SetupCall::now.what);
+    }
+    print(machine ? "; outputs were set to their safe values; the process ends"
+                  : "; the process ends");
+    print(code);
+    print("\n");
+    return true;
+}
+
+void end_copy() noexcept {
+    if (SetupCall::is_mine()) {
+        print("hal: '");
+        print(SetupCall::now.instance);
+        print("' (");
+        print(SetupCall::now.component);
+        print(") called fork() in ");
+        print(SetupCall::now.what);
+    } else {
+        print("hal: a component called fork()");
+    }
+    print(
+        " and let the copy of the process go on; the copy was ended: it must end or execute a "
+        "program [cycle-violation]\n");
+    end_process(1);
+}
 
 void end_process(int status) noexcept {
     reported = true;
@@ -251,6 +309,8 @@ CycleNames names_of(const CycleNow& now) {
 
 void watch_for_exits() {
     machine_process = getpid();
+    in_process_copy = false;
+    contain_process_calls();
     static const bool installed =
         ::on_exit(on_exit_of_process, nullptr) == 0 && std::at_quick_exit(on_quick_exit) == 0;
     (void)installed;
@@ -266,11 +326,9 @@ void watch_for_crashes(const MachineView& machine) {
         alignas(16) static char room[1 << 15];
         const stack_t other{.ss_sp = room, .ss_flags = 0, .ss_size = sizeof room};
         sigaltstack(&other, nullptr);
-        struct sigaction action{};
-        action.sa_handler = on_signal;
-        action.sa_flags = SA_RESETHAND | SA_NODEFER | SA_ONSTACK;
-        for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP})
-            sigaction(signal, &action, nullptr);
+        for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP}) {
+            install_crash_handler(signal);
+        }
 #endif
         return true;
     }();
@@ -289,58 +347,3 @@ void end_watch_for_crashes(const MachineView& machine) {
 }
 
 }  // namespace hal
-
-// The program exports these functions: what a plugin or a library of the process calls by these
-// names ends here, safe and named. A sanitizer has its own.
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-
-namespace {
-
-[[noreturn]] void end_directly(int status, const char* call) noexcept {
-    if (hal::report_end(call)) {
-        hal::end_process(hal::failure(status));
-    }
-    for (;;) {
-        syscall(SYS_exit_group, status);
-    }
-}
-
-using Syscall = long (*)(long, ...);
-Syscall next_syscall() noexcept {
-    // no guarded initialisation: the guard may need a system call
-    static std::atomic<Syscall> next{nullptr};
-    Syscall found = next.load(std::memory_order_relaxed);
-    if (found == nullptr) {
-        found = reinterpret_cast<Syscall>(dlsym(RTLD_NEXT, "syscall"));
-        next.store(found, std::memory_order_relaxed);
-    }
-    return found;
-}
-
-}  // namespace
-
-extern "C" {
-
-[[noreturn, gnu::visibility("default")]] void _exit(int status) { end_directly(status, "_exit()"); }
-[[noreturn, gnu::visibility("default")]] void _Exit(int status) noexcept {
-    end_directly(status, "_Exit()");
-}
-
-[[gnu::visibility("default")]] long syscall(long number, ...) noexcept {
-    va_list list;
-    va_start(list, number);
-    long argument[6];
-    for (long& one : argument) {
-        one = va_arg(list, long);
-    }
-    va_end(list);
-    if (number == SYS_exit_group && hal::report_end("the system call exit_group")) {
-        argument[0] = hal::failure(static_cast<int>(argument[0]));
-    }
-    return next_syscall()(number, argument[0], argument[1], argument[2], argument[3], argument[4],
-                          argument[5]);
-}
-
-}  // extern "C"
-
-#endif

@@ -17,6 +17,16 @@ struct CycleNames {
 /// for the end of the cycle.
 CycleNames names_of(const CycleNow& now);
 
+/// Returns true unless this process was forked by that of the machine. async-signal-safe
+bool is_machine_process() noexcept;
+/// The calling code makes a call that ends the machine or would leave it unsafe, such as "exit()":
+/// sets the outputs to their safe values and names the code, with `code` at the end of the line.
+/// Returns false when it is not code of a component, or an end was reported already.
+/// async-signal-safe
+bool report_end(const char* call, const char* code = "") noexcept;
+/// Ends a copy of the process that returned from the code of a component that had forked it.
+[[noreturn]] void end_copy() noexcept;
+
 /// Ends the process as _exit() does; the caller has reported why. async-signal-safe
 [[noreturn]] void end_process(int status) noexcept;
 

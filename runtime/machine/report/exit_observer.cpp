@@ -20,6 +20,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/own_descriptors.hpp"
 #include "model/model.hpp"
 
 namespace hal {
@@ -167,6 +168,7 @@ ExitObserver::ExitObserver(const std::string& name) {
     if (parent >= 0) {
         ::close(parent);
     }
+    list_descriptor(names_, "the function names for the observer");
     silent_flag = &shared_->silent;
 }
 
@@ -179,7 +181,7 @@ ExitObserver::~ExitObserver() {
         }
     }
     if (names_ >= 0) {
-        ::close(names_);
+        close_own(names_);
     }
     // shared_ stays: a thread that hangs may still use its mark
 }

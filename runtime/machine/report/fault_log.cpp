@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "execute/executor.hpp"
+#include "execute/float_modes.hpp"
+#include "execute/violation.hpp"
 #include "machine/report/cpu_occupant.hpp"
 #include "model/model.hpp"
 #include "text/fault_pages.hpp"
@@ -161,6 +164,45 @@ FaultMessage silent_message(const Model& model, const Thread& thread, const Faul
                                thread.name + ", start"};
 }
 
+/// "rounding, flush to zero"
+std::string modes_text(double differences) {
+    constexpr std::pair<FloatModes::Difference, const char*> names[] = {
+        {FloatModes::rounding, "rounding"},
+        {FloatModes::flush_to_zero, "flush to zero"},
+        {FloatModes::denormals_are_zero, "denormals are zero"},
+        {FloatModes::traps, "exceptions that trap"},
+        {FloatModes::precision, "precision"},
+        {FloatModes::default_nan, "default NaN"}};
+    std::string text;
+    for (const auto& [difference, name] : names) {
+        if ((static_cast<unsigned>(differences) & difference) == 0) continue;
+        text += (text.empty() ? "" : ", ") + std::string(name);
+    }
+    return text;
+}
+
+/// "servo: function 'f' (comp) called fork() at cycle 7; what was done; what to do"
+FaultMessage violation_message(const Model& model, const Thread& thread, const FaultEvent& event,
+                               const std::string& at) {
+    const LoadedFunction* const function = function_with_id(model, event.subject);
+    const std::string who = function ? function_text(*function) : "a function";
+    std::string text = thread.name + ": " + who + " " + event.reason;
+    if (event.reason == violation::float_modes) {
+        text += " (" + modes_text(event.value) + ")" + at + "; they were reset";
+        text += function ? "; the function must restore them before it returns"
+                         : "; it did so in one cycle only, so it is unknown which one it was";
+    } else if (event.reason == violation::forked) {
+        text += at +
+                "; the copy of the process was ended; start programs with `loadusr`, or outside of "
+                "the cycle";
+    } else {
+        text += at +
+                "; the thread's functions are stopped and its outputs were set to their safe "
+                "values; see: show thread, start";
+    }
+    return {"cycle-violation", text};
+}
+
 /// "what happened {}; what was done": the number where the braces are, in {x} hexadecimal, the
 /// cycle before the semicolon.
 FaultMessage component_message(const Model& model, const Thread& thread, const FaultEvent& event,
@@ -193,6 +235,7 @@ FaultMessage message_of(const Model& model, const Thread& thread, const FaultEve
     case HAL_FAULT_BUDGET: return budget_message(model, thread, event, at);
     case HAL_FAULT_SILENT_THREAD: return silent_message(model, thread, event, absence, at);
     case HAL_FAULT_COMPONENT: return component_message(model, thread, event, at);
+    case HAL_FAULT_VIOLATION: return violation_message(model, thread, event, at);
     case HAL_FAULT_NONE: break;
     }
     return {"component", thread.name + ": a fault" + at};
@@ -232,6 +275,9 @@ std::string cause_text(const Model& model, const Stall& stall) {
     if (stall.cause == Stall::Cause::suspended) return "the host was suspended for " + silent;
     const LoadedFunction* const function =
         stall.function != 0 ? function_with_id(model, stall.function) : nullptr;
+    if (stall.cause == Stall::Cause::ended) {
+        return (function ? function_text(*function) : "a function") + " ended its thread";
+    }
     const std::string who = function ? function_text(*function) + " has not returned, " : "";
     return who + "no cycle ended for " + silent + ", " + activity(stall);
 }
@@ -257,6 +303,11 @@ std::string message_of(const MachineView& machine, const Thread& thread, const S
         const std::string user =
             stall.occupant != 0 ? name_of_thread(machine.cores, stall.occupant) : "";
         return starved_text(thread, stall.silent_ns, stall.cpu, at, user);
+    }
+    if (stall.cause == Stall::Cause::ended) {
+        return thread.name + ": " + cause_text(machine.model, stall) + at +
+               "; its outputs were set to their safe values; end the machine: the thread cannot be "
+               "started again";
     }
     return thread.name + ": " + cause_text(machine.model, stall) + limit_of(thread) + at +
            "; the thread's functions are stopped and its outputs were set to their safe values" +
@@ -344,6 +395,9 @@ void FaultLog::collect_stalls() {
         record.thread = of->first->name;
         const bool starved = stall.cause == Stall::Cause::starved;
         record.code = (starved ? FaultCode("starved-thread") : FaultCode("hung-thread")).name();
+        if (stall.cause == Stall::Cause::ended) {
+            record.code = FaultCode("cycle-violation").name();
+        }
         record.kind = record.code + " " + record.thread;
         record.sentence = message_of(machine_, *of->first, stall);
         add({std::move(record), {}, of->second->condition({HAL_FAULT_SILENT_THREAD})});

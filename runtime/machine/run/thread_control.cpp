@@ -9,6 +9,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include "base/own_descriptors.hpp"
 #include "machine/run/state.hpp"
 
 namespace hal {
@@ -133,6 +134,7 @@ bool ThreadControl::attach_watchdog(const std::string& path, std::string& proble
         return false;
     }
     watchdog_ = device;
+    list_descriptor(watchdog_, "the watchdog device");
     s.executor->supervisor().feed(device);
     return true;
 }
@@ -146,7 +148,7 @@ void ThreadControl::disarm_watchdog() {
         watchdog_problem_ = std::strerror(errno);
         return;
     }
-    ::close(watchdog_);
+    close_own(watchdog_);
     watchdog_ = -1;
 }
 

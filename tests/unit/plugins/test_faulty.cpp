@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Does in its cycle, on demand, what a component must not do.
+#include <cfenv>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -27,6 +28,7 @@ struct Faulty : hal::Component {
         *this, "dies",
         "1 bad address, 2 abort, 3 endless recursion, 4 illegal instruction, 5 floating-point "
         "signal, 6 exit(0), 7 _exit(0), 8 quick_exit(0), 9 syscall(), 10 the instruction"};
+    hal::In<bool> rounds{*this, "rounds", "change the rounding mode"};
     hal::Out<double> value{*this, "value", "the number of the run", {.safe = -5.0, .finite = true}};
     hal::Out<bool> on{*this, "on", "TRUE", {.safe = false}};
     hal::Function run{*this, "run", &Faulty::misbehave, "misbehaves"};
@@ -68,6 +70,9 @@ struct Faulty : hal::Component {
         }
         if (sleeps) {
             usleep(1);
+        }
+        if (rounds) {
+            std::fesetround(FE_UPWARD);
         }
         if (slow) {
             const auto end = std::chrono::steady_clock::now() + std::chrono::microseconds(slow);
