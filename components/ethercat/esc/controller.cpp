@@ -2,6 +2,7 @@
 #include "ethercat/esc/controller.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 #include "ethercat/wire/byte_order.hpp"
 #include "ethercat/wire/registers.hpp"
@@ -11,6 +12,7 @@ namespace hal::ethercat::esc {
 
 namespace controller_facts {
 constexpr std::size_t memory_bytes = 0x10000;
+constexpr std::uint16_t first_memory = 0x0f00;  ///< from here on sync managers rule
 constexpr std::int64_t idle_ns = 1'000'000;    ///< the application runs at least this often
 /// without frames; SYNC pulses and idle work of more are skipped
 constexpr std::int64_t longest_pause_ns = 2'000'000'000;
@@ -20,11 +22,63 @@ constexpr std::uint32_t watchdog_event = 0x40;
 constexpr std::uint16_t al_status_event = 0x0008;
 }  // namespace controller_facts
 
+namespace register_facts {
+
+struct Range {
+    std::uint16_t first, length;
+    bool touched(std::uint32_t address, std::size_t count) const noexcept {
+        return address < first + std::uint32_t{length} && address + count > first;
+    }
+};
+/// Registers that only keep what the master writes.
+constexpr Range plain[]{
+    {registers::station_address, 2},        {registers::dl_control, 4},
+    {registers::ecat_event_mask, 2},        {registers::watchdog_divider, 2},
+    {registers::pdi_watchdog, 2},           {registers::process_data_watchdog, 2},
+    {registers::dc_system_time_offset, 8},  {registers::dc_system_time_delay, 4},
+    {registers::dc_speed_counter_start, 2}, {registers::dc_filter_depth, 2},
+    {registers::dc_cyclic_unit_control, 2}, {registers::dc_start_time, 8},
+    {registers::dc_sync0_cycle, 8},         {0x09a8, 2}};
+/// Counters that a write to any of their bytes clears.
+constexpr Range counters[]{{registers::rx_errors, 12},
+                           {registers::processing_unit_errors, 1},
+                           {registers::pdi_errors, 1},
+                           {registers::lost_links, 4},
+                           {registers::process_data_watchdog_counter, 2}};
+constexpr Range dl_control{registers::dl_control, 4};
+constexpr Range dl_status{registers::dl_status, 2};
+
+constexpr Range al_status{registers::al_status, 2};
+constexpr Range al_control{registers::al_control, 2};
+
+constexpr Range eeprom_block{registers::eeprom_configuration, 16};
+constexpr Range eeprom_status{registers::eeprom_control, 2};
+
+constexpr Range fmmus{registers::fmmu, 0x100};
+constexpr Range sync_managers{registers::sync_manager, 0x80};
+
+constexpr Range receive_time{registers::dc_receive_time, 1};
+constexpr Range system_time{registers::dc_system_time, 8};
+
+constexpr Range offset{registers::dc_system_time_offset, 12};
+constexpr Range speed{registers::dc_speed_counter_start, 6};
+
+constexpr Range activation{registers::dc_activation, 1};
+constexpr Range dc{registers::dc_receive_time, 0x100};
+
+constexpr std::uint32_t al_control_event = 0x01;
+constexpr std::uint32_t activation_event = 0x10;
+constexpr std::uint16_t dl_status_event = 0x0004;
+constexpr std::uint16_t al_status_event = 0x0008;
+
+}  // namespace register_facts
+
 Controller::Controller(const Settings& settings, std::vector<std::uint8_t> sii,
                        Application* application)
     : settings_(settings),
       memory_(std::make_unique<std::uint8_t[]>(controller_facts::memory_bytes)),
-      application_(application) {
+      application_(application),
+      unit_(*this, fmmus_) {
     settings_.fmmus = std::min(settings_.fmmus, Fmmus::most);
     settings_.sync_managers = std::min(settings_.sync_managers, SyncManagers::most);
     settings_.ram_kb = std::clamp(settings_.ram_kb, 1U, 60U);
@@ -33,6 +87,8 @@ Controller::Controller(const Settings& settings, std::vector<std::uint8_t> sii,
                     settings_.eeprom_write_ns, settings_.eeprom_reads_8);
     sms_.connect(memory_.get(), settings_.sync_managers);
     fmmus_.connect(memory_.get(), settings_.fmmus);
+    ports_.connect(memory_.get(), settings_.port_kinds);
+    unit_.configure({settings_.lrw, settings_.read_write, settings_.bit_writes});
     dc_.connect(memory_.get(), settings_.dc, settings_.dc_64_bit);
     dc_.clock().set_drift(settings_.drift_ppm, 0);
 }
@@ -44,7 +100,7 @@ void Controller::power_on(std::int64_t now_ns) noexcept {
     dc_.reset(now_ns, settings_.clock_start_ns);
     powered_ = true;
     control_pending_ = false;
-    lost_ = 0;
+    ports_.open_lost();
     last_run_ns_ = now_ns;
     last_frame_ns_ = INT64_MIN;
     watchdog_ns_ = INT64_MAX;
@@ -71,7 +127,11 @@ void Controller::execute(const Frame& frame, std::int64_t first_bit_ns) noexcept
     const auto events =
         static_cast<std::uint16_t>(get<std::uint16_t>(&memory_[registers::ecat_event]) & mask);
     for (const DatagramView& d : frame.datagrams) {
-        datagram(d);
+        const ProcessingUnit::Effect effect = unit_.execute(d);
+        touched_ |= effect.touched || effect.process_data;
+        if (effect.process_data) {
+            last_frame_ns_ = now_ns_;
+        }
         if (events != 0) {
             put(d.header + 8, static_cast<std::uint16_t>(d.event() | events));
         }
@@ -201,6 +261,261 @@ bool Controller::write_sync_manager(unsigned number, std::span<const std::uint8_
 
 bool Controller::watchdog_expired() const noexcept {
     return (memory_[registers::watchdog_status] & 1) == 0;
+}
+
+// What a master does with registers and memory.
+
+void Controller::reset_registers() noexcept {
+    const auto at = [&](std::uint16_t address) { return &memory_[address]; };
+    memory_[registers::type] = settings_.type;
+    memory_[registers::type + 1] = settings_.revision;
+    put(at(registers::type + 2), settings_.build);
+    memory_[registers::fmmus] = static_cast<std::uint8_t>(settings_.fmmus);
+    memory_[registers::sync_managers] = static_cast<std::uint8_t>(settings_.sync_managers);
+    memory_[registers::ram_size] = static_cast<std::uint8_t>(settings_.ram_kb);
+    for (unsigned p = 0; p < ports; ++p) {
+        memory_[registers::port_descriptor] |=
+            static_cast<std::uint8_t>(static_cast<unsigned>(settings_.port_kinds[p]) << 2 * p);
+    }
+    unsigned features = 0;
+    if (settings_.dc) {
+        features |= registers::dc_supported;
+    }
+    if (settings_.dc && settings_.dc_64_bit) {
+        features |= registers::dc_64_bit;
+    }
+    if (!settings_.bit_writes) {
+        features |= registers::fmmu_bytes_only;
+    }
+    if (!settings_.lrw) {
+        features |= registers::no_lrw;
+    }
+    if (!settings_.read_write) {
+        features |= registers::no_brw;
+    }
+    put(at(registers::features), static_cast<std::uint16_t>(features));
+    memory_[registers::dl_control] = 1;
+    put(at(registers::al_status), static_cast<std::uint16_t>(State::init));
+    put(at(registers::al_control), static_cast<std::uint16_t>(State::init));
+    put(at(registers::watchdog_divider), std::uint16_t{0x09c2});
+    put(at(registers::pdi_watchdog), std::uint16_t{0x03e8});
+    put(at(registers::process_data_watchdog), std::uint16_t{0x03e8});
+    memory_[registers::watchdog_status] = 1;
+    if (settings_.dc) {
+        put(at(registers::dc_speed_counter_start), std::uint16_t{0x1000});
+        memory_[registers::dc_filter_depth] = 4;
+        memory_[registers::dc_filter_depth + 1] = 12;
+    }
+}
+
+void Controller::update_ports() noexcept {
+    if (ports_.update(eeprom_.loaded())) {
+        raise_ecat(register_facts::dl_status_event);
+    }
+}
+
+void Controller::set_link(unsigned port, bool up) noexcept {
+    if (ports_.set_link(port, up, powered_)) {
+        update_ports();
+    }
+}
+
+void Controller::frame_at_closed_port(unsigned port) noexcept {
+    if (ports_.frame_at_closed_port(port)) {
+        update_ports();
+    }
+}
+
+std::uint16_t Controller::station_address() const noexcept {
+    return get<std::uint16_t>(&memory_[registers::station_address]);
+}
+
+bool Controller::has_alias(std::uint16_t address) const noexcept {
+    return (memory_[registers::dl_alias_enable] & 1) != 0 &&
+           address == get<std::uint16_t>(&memory_[registers::station_alias]);
+}
+
+void Controller::raise(std::uint32_t al_events) noexcept {
+    put(&memory_[registers::al_event],
+        get<std::uint32_t>(&memory_[registers::al_event]) | al_events);
+}
+void Controller::raise_ecat(std::uint16_t events) noexcept {
+    put(&memory_[registers::ecat_event],
+        static_cast<std::uint16_t>(get<std::uint16_t>(&memory_[registers::ecat_event]) | events));
+}
+
+void Controller::read_registers(std::uint16_t address, std::span<std::uint8_t> to) noexcept {
+    const auto covers = [&](const register_facts::Range& range) {
+        return range.touched(address, to.size());
+    };
+    const bool clock = covers(register_facts::dc);
+    if (clock && covers(register_facts::system_time)) {
+        dc_.show_system_time(now_ns_);
+    }
+    if (covers(register_facts::eeprom_status)) {
+        eeprom_.show_status(now_ns_);
+    }
+    if (covers(register_facts::sync_managers)) {
+        sms_.show_status();
+    }
+    std::memcpy(to.data(), &memory_[address], to.size());
+    if (clock) {
+        dc_.was_read(address, to.size());
+    }
+    if (covers(register_facts::dl_status)) {
+        memory_[registers::ecat_event] &=
+            static_cast<std::uint8_t>(~register_facts::dl_status_event);
+    }
+    if (covers(register_facts::al_status)) {
+        memory_[registers::ecat_event] &=
+            static_cast<std::uint8_t>(~register_facts::al_status_event);
+    }
+}
+
+/// Keeps a write until the end of the frame shows that it is good.
+void Controller::keep_write(std::uint16_t address, std::span<const std::uint8_t> from) noexcept {
+    if (write_count_ == writes_.size() || written_bytes_ + from.size() > written_.size()) {
+        return write_registers(address, from);
+    }
+    std::copy(from.begin(), from.end(),
+              written_.begin() + static_cast<std::ptrdiff_t>(written_bytes_));
+    writes_[write_count_++] = {address, static_cast<std::uint16_t>(from.size()),
+                               static_cast<std::uint16_t>(written_bytes_)};
+    written_bytes_ += from.size();
+}
+
+void Controller::write_registers(std::uint16_t address,
+                                 std::span<const std::uint8_t> from) noexcept {
+    using namespace register_facts;
+    const auto covers = [&](const Range& range) { return range.touched(address, from.size()); };
+    const auto byte = [&](unsigned reg) {
+        return reg >= address && reg < address + from.size() ? from[reg - address] : memory_[reg];
+    };
+    // The part of the written bytes that falls into a range, and where it starts.
+    struct Part {
+        std::uint16_t address;
+        std::span<const std::uint8_t> bytes;
+    };
+    const auto part = [&](const Range& range) {
+        const std::size_t first = std::max<std::size_t>(range.first, address);
+        const std::size_t end =
+            std::min<std::size_t>(range.first + range.length, address + from.size());
+        return Part{static_cast<std::uint16_t>(first), from.subspan(first - address, end - first)};
+    };
+    const auto keep = [&](const Range& range) {
+        const Part p = part(range);
+        std::memcpy(&memory_[p.address], p.bytes.data(), p.bytes.size());
+    };
+    if (covers(dc)) {
+        if (!settings_.dc) return;
+        if (covers(system_time) && address <= registers::dc_system_time) {
+            std::array<std::uint8_t, 8> time{};
+            for (unsigned i = 0; i < time.size(); ++i) {
+                time[i] = byte(registers::dc_system_time + i);
+            }
+            dc_.receive_system_time(get<std::uint64_t>(time.data()), part(system_time).bytes.size(),
+                                    now_ns_);
+        }
+        if (covers(receive_time)) {
+            dc_.latch_receive_times(now_ns_, frame_number_);
+        }
+    }
+    for (const Range& range : plain) {
+        if (covers(range)) {
+            keep(range);
+        }
+    }
+    for (const Range& range : counters) {
+        if (covers(range)) {
+            std::fill_n(&memory_[range.first], range.length, std::uint8_t{0});
+        }
+    }
+    if (covers(dl_control)) {
+        if (covers({registers::loop_control, 1})) {
+            ports_.open_lost();
+        }
+        update_ports();
+    }
+    if (covers(al_control)) {
+        request_state(byte(registers::al_control), byte(registers::al_control + 1));
+    }
+    if (covers(eeprom_block)) {
+        const Part p = part(eeprom_block);
+        eeprom_.write(p.address, p.bytes, now_ns_);
+    }
+    if (covers(fmmus)) {
+        keep(fmmus);
+        fmmus_.configure();
+    }
+    if (covers(sync_managers) && sms_.configure(address, from)) {
+        raise(activation_event);
+        if (!sms_.watched()) {
+            watchdog_ns_ = INT64_MAX;
+            memory_[registers::watchdog_status] |= 1;
+        }
+    }
+    if (covers(offset)) {
+        dc_.clock_changed(now_ns_);
+    }
+    if (covers(speed)) {
+        dc_.clear_filters(now_ns_);
+    }
+    if (covers(activation)) {
+        dc_.activate(now_ns_);
+    }
+}
+
+void Controller::request_state(std::uint8_t low, std::uint8_t high) noexcept {
+    using namespace register_facts;
+    if (emulates_) {
+        memory_[registers::al_control] = low;
+        memory_[registers::al_control + 1] = high;
+        put(&memory_[registers::al_status], static_cast<std::uint16_t>(low & 0x0f));
+        return raise_ecat(al_status_event);
+    }
+    if (control_pending_) {
+        return;  // the firmware has not read the request before
+    }
+    memory_[registers::al_control] = low;
+    memory_[registers::al_control + 1] = high;
+    control_pending_ = true;
+    raise(al_control_event);
+}
+
+bool Controller::read(std::uint32_t address, std::span<std::uint8_t> to) noexcept {
+    bool accepted = false;
+    if (address < controller_facts::first_memory) {
+        const std::size_t count =
+            std::min<std::size_t>(to.size(), controller_facts::first_memory - address);
+        read_registers(static_cast<std::uint16_t>(address), to.first(count));
+        accepted = true;
+        to = to.subspan(count);
+        address += static_cast<std::uint32_t>(count);
+    }
+    if (to.empty() || address >= ram_end_) return accepted;
+    return sms_.read(static_cast<std::uint16_t>(address),
+                     to.first(std::min<std::size_t>(to.size(), ram_end_ - address))) ||
+           accepted;
+}
+
+bool Controller::write(std::uint32_t address, std::span<const std::uint8_t> from,
+                       const std::uint8_t* mask) noexcept {
+    bool accepted = false;
+    touched_ = true;
+    if (address < controller_facts::first_memory) {
+        const std::size_t count =
+            std::min<std::size_t>(from.size(), controller_facts::first_memory - address);
+        keep_write(static_cast<std::uint16_t>(address), from.first(count));
+        accepted = true;
+        from = from.subspan(count);
+        address += static_cast<std::uint32_t>(count);
+        if (mask != nullptr) {
+            mask += count;
+        }
+    }
+    if (from.empty() || address >= ram_end_) return accepted;
+    const std::size_t count = std::min<std::size_t>(from.size(), ram_end_ - address);
+    return sms_.write(static_cast<std::uint16_t>(address), from.first(count), mask) || accepted;
 }
 
 }  // namespace hal::ethercat::esc

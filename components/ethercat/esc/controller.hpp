@@ -17,14 +17,12 @@
 #include "ethercat/esc/eeprom.hpp"
 #include "ethercat/esc/fmmus.hpp"
 #include "ethercat/esc/pdi.hpp"
+#include "ethercat/esc/ports.hpp"
+#include "ethercat/esc/processing_unit.hpp"
 #include "ethercat/esc/sync_managers.hpp"
 #include "ethercat/wire/frames.hpp"
 
 namespace hal::ethercat::esc {
-
-/// What a port is made of, as 0007h codes it.
-enum class PortKind : std::uint8_t { none = 0, unconfigured = 1, ebus = 2, mii = 3 };
-inline constexpr unsigned ports = 4;
 
 /// Properties of a controller. The defaults are those of a common one with two MII ports.
 struct Settings {
@@ -55,7 +53,7 @@ struct Settings {
     bool eeprom_reads_8 = true;  ///< 8 bytes for each read, otherwise 4
 };
 
-class Controller final : public Pdi {
+class Controller final : public Pdi, private DatagramMemory {
 public:
     /// `sii`: the EEPROM's content from word 0 on. `application` is not owned and may be nullptr. Starts without power. [setup]
     Controller(const Settings& settings, std::vector<std::uint8_t> sii, Application* application);
@@ -90,16 +88,11 @@ public:
 
     void set_link(unsigned port, bool up) noexcept;  ///< Takes a change of the link of a port.
     /// Returns whether frames leave at a port.
-    bool is_open(unsigned port) const noexcept { return (open_ & 1U << port) != 0; }
+    bool is_open(unsigned port) const noexcept { return ports_.is_open(port); }
     /// Opens a port that closed by itself and waits for a frame (loop control 1).
     void frame_at_closed_port(unsigned port) noexcept;
-    /// Count a frame with a wrong check sequence: first seen here, marked by a controller before,
-    /// in the processing unit.
-    void count_invalid(unsigned port) noexcept;
-    void count_forwarded(unsigned port) noexcept;
-    void count_unit_error() noexcept;
-    /// Counts a symbol error of the physical layer.
-    void count_symbol_error(unsigned port) noexcept;
+    /// Returns the ports, which count their errors.
+    Ports& error_counters() noexcept { return ports_; }
 
     // Faults and inputs. [realtime]
 
@@ -128,26 +121,20 @@ public:
     std::uint8_t* memory(std::uint16_t address) noexcept override { return &memory_[address]; }
 
 private:
-    static constexpr std::size_t most_writes = 128;
-
-private:
-    static constexpr std::size_t most_written_bytes = 2048;
+    static constexpr std::size_t max_writes = 128;
+    static constexpr std::size_t max_written_bytes = 2048;
     struct RegisterWrite {
         std::uint16_t address, length, offset;
     };
 
-    // datagrams.cpp
-    void datagram(const DatagramView&) noexcept;
-    void physical(const DatagramView&, bool reads, bool writes, bool broadcast) noexcept;
-    void logical(const DatagramView&, bool reads, bool writes) noexcept;
-    bool read_logical(const Fmmus::Unit&, const DatagramView&) noexcept;
-    bool write_logical(const Fmmus::Unit&, const DatagramView&, const std::uint8_t* data) noexcept;
-    bool read(std::uint32_t address, std::span<std::uint8_t> to) noexcept;
+    // DatagramMemory
+    bool read(std::uint32_t address, std::span<std::uint8_t> to) noexcept override;
     bool write(std::uint32_t address, std::span<const std::uint8_t> from,
-               const std::uint8_t* mask) noexcept;
-    void commit(std::int64_t now_ns) noexcept;
+               const std::uint8_t* mask) noexcept override;
+    std::uint16_t station_address() const noexcept override;
+    bool has_alias(std::uint16_t address) const noexcept override;
 
-    // registers.cpp
+    void commit(std::int64_t now_ns) noexcept;
     void reset_registers() noexcept;
     void read_registers(std::uint16_t address, std::span<std::uint8_t> to) noexcept;
     void write_registers(std::uint16_t address, std::span<const std::uint8_t> from) noexcept;
@@ -157,7 +144,6 @@ private:
     void raise_ecat(std::uint16_t events) noexcept;
     void update_ports() noexcept;
 
-    // controller.cpp
     void work_until(std::int64_t now_ns) noexcept;
     void run_application(std::int64_t now_ns) noexcept;
     void find_due() noexcept;
@@ -170,16 +156,13 @@ private:
     SyncManagers sms_;
     Fmmus fmmus_;
     DistributedClock dc_;
+    Ports ports_;
+    ProcessingUnit unit_;
     std::uint32_t ram_end_;
     bool powered_ = false;
     bool emulates_ = false;
     bool control_pending_ = false;
     bool touched_ = false;
-    /// a bit for each port; lost_: closed by itself (loop control 1)
-    std::uint8_t link_ = 0;
-    std::uint8_t open_ = 0;
-    std::uint8_t lost_ = 0;
-
     std::int64_t now_ns_ = 0;  ///< of the frame being executed
     std::uint64_t frame_number_ = 0;
     std::int64_t due_ns_ = INT64_MAX;
@@ -188,8 +171,8 @@ private:
 
     std::int64_t watchdog_ns_ = INT64_MAX;
 
-    std::array<RegisterWrite, most_writes> writes_;
-    std::array<std::uint8_t, most_written_bytes> written_;
+    std::array<RegisterWrite, max_writes> writes_;
+    std::array<std::uint8_t, max_written_bytes> written_;
     std::size_t write_count_ = 0;
     std::size_t written_bytes_ = 0;
 };

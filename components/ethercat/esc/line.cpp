@@ -222,7 +222,9 @@ bool Line::arrive(Walk& w, int slave, unsigned port) noexcept {
         case LineFault::delay: w.time_ns += d.what.delay_ns; break;
         case LineFault::noise:
             if (slave >= 0) {
-                nodes_[static_cast<std::size_t>(slave)].controller->count_symbol_error(port);
+                nodes_[static_cast<std::size_t>(slave)]
+                    .controller->error_counters()
+                    .count_symbol_error(port);
             }
             break;
         }
@@ -232,9 +234,9 @@ bool Line::arrive(Walk& w, int slave, unsigned port) noexcept {
     c.arrive(port, w.time_ns, w.content.number);
     if (w.corrupted) {
         if (w.marked) {
-            c.count_forwarded(port);
+            c.error_counters().count_forwarded(port);
         } else {
-            c.count_invalid(port);
+            c.error_counters().count_invalid(port);
         }
         w.marked = true;
     }
@@ -245,12 +247,12 @@ bool Line::arrive(Walk& w, int slave, unsigned port) noexcept {
 bool Line::pass_unit(Walk& w, std::size_t slave) noexcept {
     Controller& c = *nodes_[slave].controller;
     if (w.corrupted) {
-        c.count_unit_error();
+        c.error_counters().count_unit_error();
     } else if (w.ethercat) {
         w.frame[6] |= 0x02;  // the source address becomes a local one
         c.execute(w.content, w.time_ns);
     } else if (c.destroys_foreign_frames()) {
-        c.count_unit_error();
+        c.error_counters().count_unit_error();
         return false;
     }
     w.time_ns += c.settings().processing_ns;
@@ -280,6 +282,61 @@ int Line::exit_of(Walk& w, std::size_t slave, unsigned port) noexcept {
             }
         }
         if (!pass_unit(w, slave)) return -1;
+    }
+}
+
+// Faults and power on request of other threads.
+
+bool Line::post(const LineCommand& command) noexcept {
+    const std::size_t next = posted_.load(std::memory_order_relaxed);
+    if (next - taken_.load(std::memory_order_acquire) == most_commands) return false;
+    commands_[next % most_commands] = command;
+    posted_.store(next + 1, std::memory_order_release);
+    return true;
+}
+
+void Line::take_commands(std::int64_t now_ns) noexcept {
+    std::size_t next = taken_.load(std::memory_order_relaxed);
+    const std::size_t end = posted_.load(std::memory_order_acquire);
+    if (next == end) return;
+    for (; next != end; ++next) {
+        execute(commands_[next % most_commands], now_ns);
+    }
+    taken_.store(end, std::memory_order_release);
+}
+
+void Line::execute(const LineCommand& command, std::int64_t now_ns) noexcept {
+    using Kind = LineCommand::Kind;
+    if (command.kind == Kind::end_cable) {
+        if (command.port < ends_.size()) {
+            set_cable(static_cast<End>(command.port), command.on);
+        }
+        return;
+    }
+    if (command.kind == Kind::calm) return calm();
+    if (command.kind == Kind::disturb) {
+        disturb(command.disturbance);
+        return;
+    }
+    if (command.slave >= nodes_.size()) return;
+    Controller& c = controller(command.slave);
+    switch (command.kind) {
+    case Kind::power: return set_power(command.slave, command.on, now_ns);
+    case Kind::cable:
+        if (command.port < ports) {
+            set_cable(command.slave, command.port, command.on);
+        }
+        return;
+    case Kind::drift: return c.set_drift(command.value, now_ns);
+    case Kind::jump: return c.jump_clock(static_cast<std::int64_t>(command.value), now_ns);
+    case Kind::eeprom:
+        return c.eeprom().fail(command.value > 0 ? static_cast<unsigned>(command.value) : 0U);
+    case Kind::checksum: return c.eeprom().damage(!command.on);
+    case Kind::identity: return c.eeprom().falsify(!command.on);
+    case Kind::watchdog: return c.expire_watchdog();
+    case Kind::end_cable:
+    case Kind::calm:
+    case Kind::disturb: break;
     }
 }
 

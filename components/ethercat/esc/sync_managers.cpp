@@ -69,7 +69,7 @@ void SyncManagers::activate(unsigned number, bool on) noexcept {
 void SyncManagers::show_status() noexcept {
     for (unsigned n = 0; n < count_; ++n) {
         const Unit& u = units_[n];
-        unsigned status = (u.fresh ? 1U : 0U) | (u.read_event ? 2U : 0U);
+        unsigned status = static_cast<unsigned>(u.fresh) | static_cast<unsigned>(u.read_event) << 1;
         if (u.mailbox) {
             status |= u.full ? 0x08U : 0U;
         } else {
