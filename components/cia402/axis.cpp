@@ -108,6 +108,15 @@ void Axis::observe(const AxisFeedback& in, const AxisRules& rules, Time now) noe
     torque_ = rules.torque.sound() ? rules.torque.to_user(in.torque) : 0.0;
 }
 
+/// Returns the first factor that is 0 or no number; nullptr: all are sound.
+static const Factor* unsound_factor(const AxisRules& rules) noexcept {
+    for (const Factor* factor :
+         {&rules.position, &rules.velocity, &rules.acceleration, &rules.torque, &rules.vl}) {
+        if (!factor->sound()) return factor;
+    }
+    return nullptr;
+}
+
 /// Decides whether the axis is to be enabled.
 void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
     const bool whole = missing_ == Cause::none;
@@ -120,12 +129,7 @@ void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
         }
     }
     if (enable_edge && !failure_) {
-        if (const Factor* const f = !rules.position.sound()       ? &rules.position
-                                    : !rules.velocity.sound()     ? &rules.velocity
-                                    : !rules.acceleration.sound() ? &rules.acceleration
-                                    : !rules.torque.sound()       ? &rules.torque
-                                    : !rules.vl.sound()           ? &rules.vl
-                                                                  : nullptr) {
+        if (const Factor* const f = unsound_factor(rules)) {
             fail(Cause::bad_factor, Request::enable);
             failure_.value = f->ratio();
         } else {
@@ -152,8 +156,17 @@ void Axis::walk(const AxisCommand& command, const AxisRules& rules, Time now) no
         disable_sent_at_ = now;
         return;
     }
-    const State before = walk_.state();
     const State state = state_of(in_.statusword);
+    watch_enabled(state, rules, now);
+    want_state(state, command.quick_stop);
+    orders_.controlword = walk_.step(in_.statusword, in_.error_code, now, rules.limits);
+    take_failures(state);
+    enabled_ = wanted_ && walk_.reached();
+}
+
+/// Fails when an enabled drive left operation enabled by itself.
+void Axis::watch_enabled(State state, const AxisRules& rules, Time now) noexcept {
+    const State before = walk_.state();
     // The drive may still be executing the disable command from before this enabling.
     const bool late = disable_sent_ && now - disable_sent_at_ < rules.limits.step;
     if (enabled_ && wanted_ && state != State::operation_enabled && (in_fault(state) || !late)) {
@@ -167,20 +180,24 @@ void Axis::walk(const AxisCommand& command, const AxisRules& rules, Time now) no
         disable_sent_ = true;
         disable_sent_at_ = now;
     }
+}
+
+/// Gives the state machine the state that the drive is to reach.
+void Axis::want_state(State state, bool quick_stop) noexcept {
     const bool powered = state == State::operation_enabled || state == State::quick_stop_active;
+    const bool failed_in_motion =
+        state == State::operation_enabled && failure_ && failure_.cause != Cause::not_enabled;
     if (wanted_) {
         walk_.want(State::operation_enabled, Request::enable);
-    } else if (powered && command.quick_stop) {
-        walk_.want(State::quick_stop_active, Request::quick_stop);
-    } else if (state == State::operation_enabled && failure_ &&
-               failure_.cause != Cause::not_enabled) {
+    } else if ((powered && quick_stop) || failed_in_motion) {
         walk_.want(State::quick_stop_active, Request::quick_stop);
     } else {
-        walk_.want(State::switch_on_disabled,
-                   command.quick_stop ? Request::quick_stop : Request::disable);
+        walk_.want(State::switch_on_disabled, quick_stop ? Request::quick_stop : Request::disable);
     }
+}
 
-    orders_.controlword = walk_.step(in_.statusword, in_.error_code, now, rules.limits);
+/// Takes over the failures of the state machine, and faults of a drive that was off.
+void Axis::take_failures(State state) noexcept {
     if (walk_.failure() && !failure_) {
         failure_ = walk_.failure();
         wanted_ = false;
@@ -191,15 +208,15 @@ void Axis::walk(const AxisCommand& command, const AxisRules& rules, Time now) no
     if (failure_.cause == Cause::drive_fault && failure_.error_code == 0 && in_fault(state)) {
         failure_.error_code = in_.error_code;  // received later than the statusword
     }
-    enabled_ = wanted_ && walk_.reached();
 }
 
 /// Commands the mode and checks that the drive displays it.
 void Axis::select_mode(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     const bool homing = home_ == Home::entering || home_ == Home::running;
-    const Mode wanted = homing                       ? Mode::homing
-                        : command.mode != Mode::none ? command.mode
-                                                     : in_.mode;
+    Mode wanted = command.mode != Mode::none ? command.mode : in_.mode;
+    if (homing) {
+        wanted = Mode::homing;
+    }
     if (wanted != orders_.mode) {
         mode_since_ = now;
     }

@@ -145,6 +145,9 @@ private:
 
     void decide(const AxisCommand&, const AxisRules&) noexcept;
     void walk(const AxisCommand&, const AxisRules&, Time now) noexcept;
+    void watch_enabled(State, const AxisRules&, Time now) noexcept;
+    void want_state(State, bool quick_stop) noexcept;
+    void take_failures(State) noexcept;
     void select_mode(const AxisCommand&, const AxisRules&, Time now) noexcept;
     void home(const AxisCommand&, const AxisRules&, Time now) noexcept;
     void follow_position(const AxisCommand&, const AxisRules&, Time now) noexcept;

@@ -2,6 +2,7 @@
 #include "axis_walk.hpp"
 
 #include <iterator>
+#include <utility>
 
 namespace hal::canopen::cia402 {
 
@@ -18,10 +19,7 @@ constexpr unsigned column_of(State wanted) noexcept {
     return 0;
 }
 
-struct Transition {
-    Step step;
-    bool there = false;
-};
+using Transition = Walk::Transition;
 constexpr Transition there(Step held) { return {held, true}; }
 
 /// The command in a state (row, in the order of State) that leads to the commanded one (column).
@@ -116,18 +114,36 @@ void Walk::fail(Cause cause, std::uint16_t statusword, std::uint16_t error_code,
 
 std::uint16_t Walk::step(std::uint16_t statusword, std::uint16_t error_code, Time now,
                          const Limits& limits) noexcept {
-    const State before = state_;
-    state_ = state_of(statusword);
-    if (resetting_ && state_ != State::fault && state_ != State::fault_reaction_active) {
+    const bool changed = observe(statusword);
+    const Transition transition = choose(statusword, error_code);
+    edge_low_ = false;  // a cycle with bit 7 low makes the edge
+    reached_ = transition.there && !resetting_;
+    const bool off = wanted_ == State::switch_on_disabled;
+    if (failure_ && !off) return command::disable_voltage;  // gave up; the caller decides
+    if (fresh_ || changed || transition.step != step_) {
+        begin(transition.step, now);
+    } else if (!reached_ && now - since_ >= timeout(limits)) {
+        expire(statusword, error_code, now - since_);
+    }
+    return controlword(step_);
+}
+
+/// Takes the state of the drive. Returns whether it changed.
+bool Walk::observe(std::uint16_t statusword) noexcept {
+    const State before = std::exchange(state_, state_of(statusword));
+    const bool faulty = state_ == State::fault || state_ == State::fault_reaction_active;
+    if (resetting_ && !faulty) {
         resetting_ = false;
         fresh_ = true;
     }
-    if (state_ != before) {
-        forced_ = false;
-    }
-    const bool off = wanted_ == State::switch_on_disabled;
-    const bool in_fault = state_ == State::fault;
+    if (state_ == before) return false;
+    forced_ = false;
+    return true;
+}
 
+/// Returns the command of this cycle; a fault that nobody resets is a failure.
+Walk::Transition Walk::choose(std::uint16_t statusword, std::uint16_t error_code) noexcept {
+    const bool in_fault = state_ == State::fault;
     Transition transition = transitions[static_cast<unsigned>(state_)][column_of(wanted_)];
     if (resetting_ && in_fault) {
         transition = {edge_low_ ? Step::wait : Step::fault_reset};
@@ -137,26 +153,27 @@ std::uint16_t Walk::step(std::uint16_t statusword, std::uint16_t error_code, Tim
     if (forced_ && !transition.there) {
         transition.step = Step::disable_voltage;
     }
-    edge_low_ = false;  // a cycle with bit 7 low makes the edge
-    reached_ = transition.there && !resetting_;
-    if (failure_ && !off) {
-        return command::disable_voltage;  // gave up; the caller decides
-    }
+    return transition;
+}
 
-    if (fresh_ || state_ != before || transition.step != step_) {
-        since_ = now;
-        fresh_ = false;
-        step_ = transition.step;
-        if (step_ != Step::wait) {
-            led_ = step_;
-        }
-        return controlword(step_);
+/// Begins a command, and its timeout.
+void Walk::begin(Step step, Time now) noexcept {
+    since_ = now;
+    fresh_ = false;
+    step_ = step;
+    if (step_ != Step::wait) {
+        led_ = step_;
     }
-    if (reached_) return controlword(step_);
+}
+
+Time Walk::timeout(const Limits& limits) const noexcept {
     const bool brakes = step_ == Step::disable_operation || state_ == State::quick_stop_active ||
                         state_ == State::fault_reaction_active;
-    const Time waited = now - since_;
-    if (waited < (brakes ? limits.stop : limits.step)) return controlword(step_);
+    return brakes ? limits.stop : limits.step;
+}
+
+/// The drive does not follow the command in time.
+void Walk::expire(std::uint16_t statusword, std::uint16_t error_code, Time waited) noexcept {
     // 605Ah may keep the drive there, and transition 16 is optional
     const bool optional = state_ == State::quick_stop_active;
     if (!optional && !failure_) {
@@ -166,11 +183,10 @@ std::uint16_t Walk::step(std::uint16_t statusword, std::uint16_t error_code, Tim
         resetting_ = false;
         fresh_ = true;
     }
-    if (off || optional) {
+    if (optional || wanted_ == State::switch_on_disabled) {
         forced_ = true;
         fresh_ = true;
     }
-    return controlword(step_);
 }
 
 }  // namespace hal::canopen::cia402

@@ -38,7 +38,18 @@ public:
     /// Returns why it does not proceed. It has stopped trying, unless the commanded state is off.
     const Failure& failure() const noexcept { return failure_; }
 
+    /// A command, or the one that holds the drive where it is to be.
+    struct Transition {
+        Step step;
+        bool there = false;
+    };
+
 private:
+    bool observe(std::uint16_t statusword) noexcept;
+    Transition choose(std::uint16_t statusword, std::uint16_t error_code) noexcept;
+    void begin(Step, Time now) noexcept;
+    Time timeout(const Limits&) const noexcept;
+    void expire(std::uint16_t statusword, std::uint16_t error_code, Time waited) noexcept;
     void fail(Cause, std::uint16_t statusword, std::uint16_t error_code, Time waited) noexcept;
 
     State wanted_ = State::switch_on_disabled;
