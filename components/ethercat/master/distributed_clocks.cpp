@@ -104,38 +104,37 @@ int choose_reference(const Bus& bus) noexcept {
 /// Deviation of 092Ch: bit 31 is its sign (not the same in all controllers).
 std::uint32_t magnitude(std::uint32_t difference) noexcept { return difference & 0x7fff'ffff; }
 
-}  // namespace
+/// Returns whether clocks are to be started: some slave wants one and some slave has one, or they
+/// run already.
+bool wants_clocks(const Bus& bus) noexcept {
+    if (bus.reference >= 0) return true;
+    const bool wanted = std::any_of(bus.setup.slaves.begin(), bus.setup.slaves.end(),
+                                    [](const Slave& s) { return s.dc.has_value(); });
+    const auto has_clock = [&bus](std::uint16_t number) {
+        const BusSlave& slave = bus.devices[number]->slave;
+        return slave.present && slave.has_dc();
+    };
+    return wanted && std::any_of(bus.by_position.begin(), bus.by_position.end(), has_clock);
+}
 
-Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
-    bool any = false;
-    bool wanted = false;
-    for (const Slave& s : bus.setup.slaves) {
-        wanted |= s.dc.has_value();
-    }
-    for (const std::uint16_t number : bus.by_position) {
-        any |= bus.devices[number]->slave.present && bus.devices[number]->slave.has_dc();
-    }
-    if (bus.reference < 0 && (!any || !wanted)) co_return;
+const Device& reference_of(const Bus& bus) noexcept {
+    return *bus.devices[static_cast<std::size_t>(bus.reference)];
+}
 
-    const int reference_before = bus.reference;
-    const Answer latched = co_await clear_all(c, registers::dc_receive_time, 4);
-    if (!latched.arrived || latched.wkc == 0) co_return;
-    const std::int64_t latched_ns = c.sent_ns();
-    for (const std::uint16_t number : bus.by_position) {
-        Device& d = *bus.devices[number];
-        if (d.slave.present && d.slave.has_dc()) {
-            co_await start_or_do(c, bus, d, [&d](Channel& on) { return read_times(on, d); });
-        }
-    }
-    co_await wait_for_helpers(c, bus);
-    if (bus.reference < 0 || !bus.devices[static_cast<std::size_t>(bus.reference)]->slave.present) {
-        // a running clock, if there is one, so that the time of the others continues
-        const int chosen = choose_reference(bus);
-        if (chosen < 0) co_return;
-        bus.reference = chosen;
-        const Device& d = *bus.devices[static_cast<std::size_t>(bus.reference)];
-        bus.report(Event::reference_clock, d, d.slave.has_dc64() ? 1 : 0);
-    }
+/// Chooses a reference clock if there is none on the bus. Returns false without any clock.
+bool ensure_reference(Bus& bus) noexcept {
+    if (bus.reference >= 0 && reference_of(bus).slave.present) return true;
+    // a running clock, if there is one, so that the time of the others continues
+    const int chosen = choose_reference(bus);
+    if (chosen < 0) return false;
+    bus.reference = chosen;
+    bus.report(Event::reference_clock, reference_of(bus), reference_of(bus).slave.has_dc64());
+    return true;
+}
+
+/// Finds the delays of all slaves from the times that their ports latched. Returns the number of
+/// slaves on the line.
+std::size_t measure_delays(Bus& bus) noexcept {
     std::array<BusSlave*, 1024> line{};
     std::size_t count = 0;
     std::size_t reference = 0;
@@ -146,44 +145,75 @@ Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
         }
         line[count++] = &bus.devices[number]->slave;
     }
+    if (!bus.engine.redundant()) {
+        find_delays({line.data(), count}, reference);
+        return count;
+    }
     // On a ring no frame returns to a port, so that nothing can be measured: the usual delay of a
     // hop is taken. The error is some 100 ns for each.
-    if (bus.engine.redundant()) {
-        for (std::size_t n = 0; n < count; ++n) {
-            line[n]->delay_ns =
-                n > reference ? static_cast<std::uint32_t>(n - reference) * usual_hop_ns : 0;
-        }
-    } else {
-        find_delays({line.data(), count}, reference);
+    for (std::size_t n = 0; n < count; ++n) {
+        const std::size_t hops = n > reference ? n - reference : 0;
+        line[n]->delay_ns = static_cast<std::uint32_t>(hops) * usual_hop_ns;
     }
+    return count;
+}
 
+/// Latches the time at which a frame passes each port, and reads the times of all clocks. Returns
+/// when the frame was sent; negative: it was lost.
+Task<std::int64_t> latch_times(Channel& c, Bus& bus) noexcept {
+    const Answer latched = co_await clear_all(c, registers::dc_receive_time, 4);
+    if (!latched.arrived || latched.wkc == 0) co_return -1;
+    const std::int64_t latched_ns = c.sent_ns();
     for (const std::uint16_t number : bus.by_position) {
         Device& d = *bus.devices[number];
-        BusSlave& s = d.slave;
+        if (d.slave.present && d.slave.has_dc()) {
+            co_await start_or_do(c, bus, d, [&d](Channel& on) { return read_times(on, d); });
+        }
+    }
+    co_await wait_for_helpers(c, bus);
+    co_return latched_ns;
+}
+
+/// Sets the clocks that are not set yet, on a line of `count` slaves.
+Task<void> set_clocks(Channel& c, Bus& bus, std::int64_t latched_ns, std::size_t count) noexcept {
+    const std::int64_t to_system = bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns;
+    for (const std::uint16_t number : bus.by_position) {
+        Device& d = *bus.devices[number];
+        const BusSlave& s = d.slave;
         // never those of running slaves
         if (!s.present || !s.has_dc() || d.clock_set || !has_valid_delay(bus, d, count)) continue;
         // The frame with the latch passed this slave a delay after it passed the reference clock.
-        const auto system = static_cast<std::uint64_t>(
-                                latched_ns + (bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns)) +
-                            s.delay_ns;
+        const auto system = static_cast<std::uint64_t>(latched_ns + to_system) + s.delay_ns;
         const std::uint64_t offset = system - s.local_time;
         co_await start_or_do(c, bus, d,
                              [&d, offset](Channel& on) { return set_clock(on, d, offset); });
     }
     co_await wait_for_helpers(c, bus);
-    // A slave before the reference clock does not get its time, because a frame passes it first:
-    // the first clock leads again once it is set. Not in a ring, where the order depends on the
-    // side that a frame comes from.
-    if (!bus.setup.reference_slave && !bus.engine.redundant()) {
-        if (const int first = choose_reference(bus); first >= 0 && first != bus.reference) {
-            const Device& d = *bus.devices[static_cast<std::size_t>(first)];
-            if (d.clock_set && d.slave.has_dc64()) {
-                bus.reference = first;
-                bus.report(Event::reference_clock, d, 1);
-            }
-        }
-    }
-    const BusSlave& leader = bus.devices[static_cast<std::size_t>(bus.reference)]->slave;
+}
+
+/// Lets the first clock of the line lead again. A slave before the reference clock does not get its
+/// time, because a frame passes it first. Not in a ring, where the order depends on the side that a
+/// frame comes from.
+void lead_with_first(Bus& bus) noexcept {
+    if (bus.setup.reference_slave || bus.engine.redundant()) return;
+    const int first = choose_reference(bus);
+    if (first < 0 || first == bus.reference) return;
+    const Device& d = *bus.devices[static_cast<std::size_t>(first)];
+    if (!d.clock_set || !d.slave.has_dc64()) return;
+    bus.reference = first;
+    bus.report(Event::reference_clock, d, 1);
+}
+
+}  // namespace
+
+Task<void> start_clocks(Channel& c, Bus& bus) noexcept {
+    if (!wants_clocks(bus)) co_return;
+    const int reference_before = bus.reference;
+    const std::int64_t latched_ns = co_await latch_times(c, bus);
+    if (latched_ns < 0 || !ensure_reference(bus)) co_return;
+    co_await set_clocks(c, bus, latched_ns, measure_delays(bus));
+    lead_with_first(bus);
+    const BusSlave& leader = reference_of(bus).slave;
     bus.image.set_reference(leader.station, bus.setup.lead == ClockLead::thread);
     bus.status.dc_active = true;
     // Until now this slave followed other times. What its filter made of them, a reference clock

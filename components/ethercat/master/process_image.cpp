@@ -406,9 +406,10 @@ void ProcessImage::settle() noexcept {
     for (DomainStatus& s : domains_) {
         if (!s.fresh) continue;
         ++s.exchanges;
-        const WkcState state = s.ok && s.expected != 0 ? WkcState::complete
-                               : s.wkc == 0            ? WkcState::none
-                                                       : WkcState::part;
+        WkcState state = s.wkc == 0 ? WkcState::none : WkcState::part;
+        if (s.ok && s.expected != 0) {
+            state = WkcState::complete;
+        }
         if (state == WkcState::complete) {
             if (!s.was_complete) {
                 s.was_complete = true;

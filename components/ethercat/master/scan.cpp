@@ -15,7 +15,7 @@ enum Category : std::uint16_t {
     sync_manager_category = 41,
     end_category = 0xffff
 };
-constexpr unsigned most_categories = 64;
+constexpr unsigned max_categories = 64;
 constexpr std::int64_t device_id_timeout_ns = 100 * millisecond;
 
 /// Explicit device identification: AL control with bit 5, the number appears in the AL status code.
@@ -34,12 +34,11 @@ Task<void> read_device_id(Channel& c, BusSlave& s) noexcept {
     co_await write(c, s, registers::al_control, state);
 }
 
-}  // namespace
-
 /// 0502h: wrong checksum, or not loaded; its application does not run
 constexpr std::uint16_t eeprom_not_loaded = 0x1800;
 
-Task<bool> identify(Channel& c, Bus& bus, BusSlave& s) noexcept {
+/// Reads what the controller is, and the links of its ports.
+Task<bool> read_controller(Channel& c, BusSlave& s) noexcept {
     Answer a = co_await read(c, s, registers::type, 10);
     if (a.wkc != 1) co_return false;
     s.fmmus = c.data()[4];
@@ -53,23 +52,39 @@ Task<bool> identify(Channel& c, Bus& bus, BusSlave& s) noexcept {
     a = co_await read(c, s, registers::dl_status, 2);
     if (a.wkc != 1) co_return false;
     s.dl_status = get<std::uint16_t>(c.data());
+    co_return true;
+}
 
-    std::uint16_t words[12]{};
+/// Reads words of the SII, four at a time. Returns the last answer.
+Task<SiiData> read_words(Channel& c, const BusSlave& s, std::uint16_t first,
+                         std::span<std::uint16_t> to) noexcept {
     SiiData sii;
-    for (std::uint16_t word = 8; word < 0x10; word = static_cast<std::uint16_t>(word + 4)) {
-        sii = co_await sii_read(c, s.station, word);
+    for (std::size_t n = 0; n < to.size(); n += 4) {
+        sii = co_await sii_read(c, s.station, static_cast<std::uint32_t>(first + n));
         if (!sii.ok) break;
-        std::memcpy(words + (word - 8), sii.words.data(), 8);
+        std::memcpy(to.data() + n, sii.words.data(), 8);
     }
+    co_return sii;
+}
+
+/// Reports, once, that the EEPROM of a position cannot be read.
+void report_unreadable(Bus& bus, std::uint16_t position, std::uint16_t control,
+                       bool unloaded) noexcept {
+    if (position >= bus.unreadable.size()) return;
+    if (!bus.unreadable.test(position)) {
+        bus.events.report(Event::sii_failed, Events::of_position + position, control,
+                          unloaded ? 7 : 8);
+    }
+    bus.unreadable.set(position);
+}
+
+/// Reads vendor, product, revision and serial number.
+Task<bool> read_identity(Channel& c, Bus& bus, BusSlave& s) noexcept {
+    std::uint16_t words[8]{};
+    const SiiData sii = co_await read_words(c, s, 0x08, words);
     const bool unloaded = sii.ok && (sii.control & eeprom_not_loaded) != 0;
     if (!sii.ok || unloaded) {
-        if (s.position < bus.unreadable.size() && !bus.unreadable.test(s.position)) {
-            bus.events.report(Event::sii_failed, Events::of_position + s.position, sii.control,
-                              unloaded ? 7 : 8);
-        }
-        if (s.position < bus.unreadable.size()) {
-            bus.unreadable.set(s.position);
-        }
+        report_unreadable(bus, s.position, sii.control, unloaded);
         co_return false;
     }
     if (s.position < bus.unreadable.size()) {
@@ -77,56 +92,89 @@ Task<bool> identify(Channel& c, Bus& bus, BusSlave& s) noexcept {
     }
     std::memcpy(&s.vendor, words, 4);
     std::memcpy(&s.product, words + 2, 4);
-
     std::memcpy(&s.revision, words + 4, 4);
     std::memcpy(&s.serial, words + 6, 4);
-    for (std::uint16_t word = 0x14; word < 0x20; word = static_cast<std::uint16_t>(word + 4)) {
-        sii = co_await sii_read(c, s.station, word);
-        if (!sii.ok) co_return false;
-        std::memcpy(words + (word - 0x14), sii.words.data(), 8);
-    }
+    co_return true;
+}
+
+/// Reads where the mailboxes are, and their protocols.
+Task<bool> read_mailboxes(Channel& c, BusSlave& s) noexcept {
+    std::uint16_t words[12]{};
+    const SiiData sii = co_await read_words(c, s, 0x14, words);
+    if (!sii.ok) co_return false;
     s.bootstrap = {words[0], words[1], words[2], words[3]};
     s.mailbox = {words[4], words[5], words[6], words[7]};
     s.protocols = words[8];
-    for (const MailboxArea* area :
-         {&s.mailbox, &s.bootstrap}) {  // longer than a datagram, or an erased EEPROM
+    for (MailboxArea* area : {&s.mailbox, &s.bootstrap}) {
+        // longer than a datagram, or an erased EEPROM
         if (area->out_size > Channel::largest || area->in_size > Channel::largest) {
-            (area == &s.mailbox ? s.mailbox : s.bootstrap) = {};
+            *area = {};
         }
     }
+    co_return true;
+}
 
+/// Reads the category of the general properties at a word.
+Task<bool> read_general(Channel& c, BusSlave& s, std::uint32_t at) noexcept {
+    const SiiData sii = co_await sii_read(c, s.station, at + 4);
+    if (!sii.ok) co_return false;
+    s.coe_details = static_cast<std::uint8_t>(sii.words[0] >> 8);  // byte 5
+    s.sii_flags = static_cast<std::uint8_t>(sii.words[3] >> 8);  // byte 11
+    co_return true;
+}
+
+/// Reads the category of the sync managers at a word; `length` in words.
+Task<bool> read_sync_managers(Channel& c, BusSlave& s, std::uint32_t at,
+                              std::uint16_t length) noexcept {
+    for (std::uint32_t word = 0; word + 4 <= length; word += 4) {
+        if (s.sii_sync_managers >= BusSlave::most_sync_managers) break;
+        const SiiData sii = co_await sii_read(c, s.station, at + 2 + word);
+        if (!sii.ok) co_return false;
+        const auto* bytes = reinterpret_cast<const std::uint8_t*>(sii.words.data());
+        s.sii[s.sii_sync_managers++] = {sii.words[0], sii.words[1], bytes[4], bytes[6], bytes[7]};
+    }
+    co_return true;
+}
+
+/// Reads the categories that the master needs.
+Task<bool> read_categories(Channel& c, BusSlave& s) noexcept {
     s.sii_sync_managers = 0;
     s.coe_details = 0;
     s.sii_flags = 0;
     bool general = false;
     bool managers = false;
     std::uint32_t at = 0x40;
-    for (unsigned n = 0; n < most_categories && !(general && managers); ++n) {
-        sii = co_await sii_read(c, s.station, at);
+    for (unsigned n = 0; n < max_categories && !(general && managers); ++n) {
+        const SiiData sii = co_await sii_read(c, s.station, at);
         if (!sii.ok) co_return false;
         const std::uint16_t category = sii.words[0];
         const std::uint16_t length = sii.words[1];
         if (category == end_category || category == 0) break;
+        bool good = true;
         if (category == general_category && length >= 6) {
             general = true;
-            sii = co_await sii_read(c, s.station, at + 4);
-            if (!sii.ok) co_return false;
-            s.coe_details = static_cast<std::uint8_t>(sii.words[0] >> 8);  // byte 5
-            s.sii_flags = static_cast<std::uint8_t>(sii.words[3] >> 8);  // byte 11
+            good = co_await read_general(c, s, at);
         } else if (category == sync_manager_category) {
             managers = true;
-            for (std::uint32_t word = 0;
-                 word + 4 <= length && s.sii_sync_managers < BusSlave::most_sync_managers;
-                 word += 4) {
-                sii = co_await sii_read(c, s.station, at + 2 + word);
-                if (!sii.ok) co_return false;
-                const auto* bytes = reinterpret_cast<const std::uint8_t*>(sii.words.data());
-                s.sii[s.sii_sync_managers++] = {sii.words[0], sii.words[1], bytes[4], bytes[6],
-                                                bytes[7]};
-            }
+            good = co_await read_sync_managers(c, s, at, length);
         }
+        if (!good) co_return false;
         at += 2U + length;
     }
+    co_return true;
+}
+
+}  // namespace
+
+Task<bool> identify(Channel& c, Bus& bus, BusSlave& s) noexcept {
+    bool good = co_await read_controller(c, s);
+    if (!good) co_return false;
+    good = co_await read_identity(c, bus, s);
+    if (!good) co_return false;
+    good = co_await read_mailboxes(c, s);
+    if (!good) co_return false;
+    good = co_await read_categories(c, s);
+    if (!good) co_return false;
     s.device_id = 0;
     const auto wants = [](const Slave& slave) { return slave.identity.device_id.has_value(); };
     if (std::any_of(bus.setup.slaves.begin(), bus.setup.slaves.end(), wants)) {

@@ -201,8 +201,8 @@ Task<void> check(Channel& c, Bus& bus, Device& d) noexcept {
     co_await boot(c, bus, d);
 }
 
-Task<void> supervise(Channel& c, Bus& bus) noexcept {
-    bus.resting = false;
+/// Scans until there are slaves, and starts them.
+static Task<void> start_line(Channel& c, Bus& bus) noexcept {
     while (true) {
         const bool scanned = co_await scan(c, bus);
         if (scanned) break;
@@ -214,60 +214,85 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
     for (const std::uint16_t number : bus.by_position) {
         start(bus, *bus.devices[number]);
     }
+}
 
+/// What one look at the line shows.
+struct Look {
+    unsigned count = 0;         ///< slaves that answer
+    unsigned present = 0;       ///< slaves that are known
+    std::uint16_t states = 0;   ///< the OR of their AL status
+    bool at_rest = true;        ///< no slave is in start-up
+};
+
+/// Counts the slaves that answer and those that are known.
+static Task<Look> look_at_line(Channel& c, Bus& bus) noexcept {
+    std::memset(c.data(), 0, 6);
+    const Answer a = co_await c.exchange(Command::brd, at_position(0, registers::al_status), 6);
+    Look look;
+    look.count = a.arrived ? a.wkc : 0U;
+    look.states = get<std::uint16_t>(c.data());
+    bus.status.responding = static_cast<std::uint16_t>(look.count);
+    if (bus.engine.redundant()) {
+        judge_ring(bus, look.count);
+    }
+    // On a broken ring the delays are others; they are frozen until it is closed.
+    if (bus.clocks_missing() && !bus.status.ring_broken) {
+        // a cable may have been closed without any slave lost
+        co_await find_ports(c, bus, true);
+        co_await start_clocks(c, bus);
+    }
+    // not by position: one that lost its address has none
+    for (const auto& device : bus.devices) {
+        const Device& d = *device;
+        look.present += d.slave.present ? 1 : 0;
+        look.at_rest &= !d.slave.present || d.settled;
+    }
+    co_return look;
+}
+
+/// Returns whether nothing is to be done: all slaves answer, are known and in OP.
+static bool all_fine(const Bus& bus, const Look& look) noexcept {
+    return look.at_rest && look.count == bus.known && look.present == look.count &&
+           look.states == static_cast<std::uint16_t>(State::op) &&
+           bus.status.wkc_state != WkcState::part;
+}
+
+/// Starts a look at each slave that may need one.
+static void check_slaves(Bus& bus, const Look& look) noexcept {
+    for (const auto& device : bus.devices) {
+        Device& d = *device;
+        const bool may_be_missing = d.slave.configured >= 0 || look.count < look.present;
+        if (d.slave.present && !d.channel.busy() && !d.refused && d.identified && may_be_missing) {
+            bus.run(d, [&] { return check(d.channel, bus, d); });
+        }
+    }
+    if (look.count != bus.known) {
+        bus.report(Event::topology_changed, bus.known, look.count);
+        bus.known = look.count;
+    }
+}
+
+Task<void> supervise(Channel& c, Bus& bus) noexcept {
+    bus.resting = false;
+    co_await start_line(c, bus);
     std::int64_t rediscovered = c.now_ns();
     while (true) {
         bus.resting = true;
         if (!bus.suspicious) {
             co_await c.sleep(look_every_ns);
         }
-        bus.resting = bus.suspicious = false;
-        std::memset(c.data(), 0, 6);
-        const Answer a = co_await c.exchange(Command::brd, at_position(0, registers::al_status), 6);
-        const unsigned count = a.arrived ? a.wkc : 0;
-        const auto states = get<std::uint16_t>(c.data());
-        bus.status.responding = static_cast<std::uint16_t>(count);
-        if (bus.engine.redundant()) {
-            judge_ring(bus, count);
-        }
-        // On a broken ring the delays are others; they are frozen until it is closed.
-        if (bus.clocks_missing() && !bus.status.ring_broken) {
-            // a cable may have been closed without any slave lost
-            co_await find_ports(c, bus, true);
-            co_await start_clocks(c, bus);
-        }
-
-        unsigned present = 0;
-        bool at_rest = true;
-        // not by position: one that lost its address has none
-        for (const auto& device : bus.devices) {
-            const Device& d = *device;
-            present += d.slave.present ? 1 : 0;
-            at_rest &= !d.slave.present || d.settled;
-        }
-        const bool all_fine = at_rest && count == bus.known && present == count &&
-                              states == static_cast<std::uint16_t>(State::op);
-        if (all_fine && bus.status.wkc_state != WkcState::part) continue;
-
-        for (const auto& device : bus.devices) {
-            Device& d = *device;
-            if (d.slave.present && !d.channel.busy() && !d.refused && d.identified &&
-                (d.slave.configured >= 0 || count < present)) {
-                bus.run(d, [&] { return check(d.channel, bus, d); });
-            }
-        }
-        if (count != bus.known || present < count) {
-            if (count != bus.known) {
-                bus.report(Event::topology_changed, bus.known, count);
-            }
-            bus.known = count;
-        }
-        const bool somebody_waits = present < count || bus.status.responding > present;
+        bus.resting = false;
+        bus.suspicious = false;
+        const Look look = co_await look_at_line(c, bus);
+        if (all_fine(bus, look)) continue;
+        check_slaves(bus, look);
+        const bool somebody_waits =
+            look.present < look.count || bus.status.responding > look.present;
         if (!somebody_waits || c.now_ns() - rediscovered < rediscover_every_ns) continue;
         rediscovered = c.now_ns();
-        const bool returned = co_await rediscover(
-            c, bus,
-            bus.status.ring_broken ? static_cast<unsigned>(bus.status.break_after + 1) : count);
+        const unsigned reachable =
+            bus.status.ring_broken ? static_cast<unsigned>(bus.status.break_after + 1) : look.count;
+        const bool returned = co_await rediscover(c, bus, reachable);
         if (!returned) continue;
         co_await find_ports(c, bus, true);
         start_returned(bus);
@@ -376,6 +401,68 @@ std::uint32_t neighbour(const Bus& bus, const Device& d, unsigned port) noexcept
                              : Events::of_position + s.position;
 }
 
+/// Adds the changes of the error counters of a port, which the slave reports in `now`. Returns
+/// whether one of them is near its end.
+static bool count_errors(Bus& bus, Device& d, unsigned port,
+                         std::span<const std::uint8_t, 20> now) noexcept {
+    PortErrors& errors = d.status.ports[port];
+    const PortErrors before = errors;
+    std::array<std::uint8_t, 4>& last = d.last_errors[port];
+    const std::array<std::uint8_t, 4> values{now[2 * port], now[2 * port + 1], now[8 + port],
+                                             now[16 + port]};
+    const std::array<std::uint64_t*, 4> sums{&errors.invalid_frames, &errors.rx_errors,
+                                             &errors.forwarded, &errors.lost_links};
+    bool high = false;
+    for (std::size_t n = 0; n < values.size(); ++n) {
+        *sums[n] += values[n] >= last[n] ? values[n] - last[n] : values[n];
+        high |= values[n] > counter_high;
+    }
+    last = values;
+    const std::uint64_t damaged =
+        errors.invalid_frames + errors.rx_errors - before.invalid_frames - before.rx_errors;
+    // forwarded ones were damaged on an earlier cable
+    if (damaged > errors.forwarded - before.forwarded) {
+        bus.report(Event::damaged_frames, d, port | std::int64_t{neighbour(bus, d, port)} << 8,
+                   static_cast<std::int64_t>(damaged));
+    }
+    return high;
+}
+
+/// Reads the error counters of a slave, and clears them before they stop at FFh.
+static Task<void> read_counters(Channel& c, Bus& bus, Device& d) noexcept {
+    const Answer a = co_await read(c, d.slave, registers::rx_errors, 20);
+    if (a.wkc != 1) co_return;
+    std::array<std::uint8_t, 20> now{};
+    std::memcpy(now.data(), c.data(), now.size());
+    bool high = false;
+    for (unsigned port = 0; port < 4; ++port) {
+        high |= count_errors(bus, d, port, now);
+    }
+    if (!high) co_return;
+    std::memset(c.data(), 0, 20);
+    co_await c.exchange(Command::fpwr, at_station(d.slave.station, registers::rx_errors), 20);
+    for (auto& last : d.last_errors) {
+        last.fill(0);
+    }
+}
+
+/// Watches the clocks until `until_ns`.
+static Task<void> watch_clocks(Channel& c, Bus& bus, std::int64_t until_ns) noexcept {
+    while (c.now_ns() < until_ns) {
+        const std::int64_t pause = std::min(clocks_every_ns, until_ns - c.now_ns());
+        co_await c.sleep(pause);
+        const bool any = std::any_of(bus.devices.begin(), bus.devices.end(),
+                                     [](const auto& d) { return d->clock_set; });
+        if (!any || pause < clocks_every_ns) continue;
+        const bool looks = co_await may_drift(c, bus);
+        const bool drifts = std::any_of(bus.devices.begin(), bus.devices.end(),
+                                        [](const auto& d) { return d->drifts_since_ns != 0; });
+        if (looks || drifts) {
+            co_await look_at_clocks(c, bus);
+        }
+    }
+}
+
 Task<void> watch(Channel& c, Bus& bus) noexcept {
     std::uint64_t foreign = bus.status.foreign;
     std::uint64_t control = bus.status.foreign_control;
@@ -385,70 +472,19 @@ Task<void> watch(Channel& c, Bus& bus) noexcept {
         const std::uint64_t more = bus.status.foreign - std::exchange(foreign, bus.status.foreign);
         const std::uint64_t controls =
             bus.status.foreign_control - std::exchange(control, bus.status.foreign_control);
-        const bool was_other = std::exchange(
-            other, controls >= other_master_frames || (other && more >= other_master_frames));
+        const bool was_other = other;
+        other = controls >= other_master_frames || (was_other && more >= other_master_frames);
         if (other && !was_other) {
             bus.report(Event::other_master, static_cast<std::int64_t>(more));
         }
         for (const auto& device : bus.devices) {
             Device& d = *device;
-            if (!d.slave.present || !d.identified) continue;
-            const Answer a = co_await read(c, d.slave, registers::rx_errors, 20);
-            if (a.wkc == 1) {
-                std::array<std::uint8_t, 20> now{};
-                std::memcpy(now.data(), c.data(), now.size());
-                bool high = false;
-                for (unsigned p = 0; p < 4; ++p) {
-                    PortErrors& e = d.status.ports[p];
-                    std::array<std::uint8_t, 4>& last = d.last_errors[p];
-                    const std::array<std::uint8_t, 4> values{now[2 * p], now[2 * p + 1], now[8 + p],
-                                                             now[16 + p]};
-                    const auto add = [&](std::uint64_t& sum, std::size_t n) {
-                        sum += values[n] >= last[n] ? values[n] - last[n] : values[n];
-                        high |= values[n] > counter_high;
-                    };
-                    const PortErrors before = e;
-                    add(e.invalid_frames, 0);
-                    add(e.rx_errors, 1);
-                    add(e.forwarded, 2);
-
-                    add(e.lost_links, 3);
-                    last = values;
-                    const std::uint64_t damaged =
-                        e.invalid_frames + e.rx_errors - before.invalid_frames - before.rx_errors;
-                    if (damaged >
-                        e.forwarded -
-                            before.forwarded) {  // forwarded ones were damaged on an earlier cable
-                        bus.report(Event::damaged_frames, d,
-                                   p | std::int64_t{neighbour(bus, d, p)} << 8,
-                                   static_cast<std::int64_t>(damaged));
-                    }
-                }
-                if (high) {  // they stop at FFh
-                    std::memset(c.data(), 0, 20);
-                    co_await c.exchange(Command::fpwr,
-                                        at_station(d.slave.station, registers::rx_errors), 20);
-                    for (auto& last : d.last_errors) {
-                        last.fill(0);
-                    }
-                }
+            if (d.slave.present && d.identified) {
+                co_await read_counters(c, bus, d);
             }
         }
         co_await look_at_clocks(c, bus);
-        while (c.now_ns() - began < counters_every_ns) {
-            const std::int64_t pause =
-                std::min(clocks_every_ns, began + counters_every_ns - c.now_ns());
-            co_await c.sleep(pause);
-            const bool any = std::any_of(bus.devices.begin(), bus.devices.end(),
-                                         [](const auto& d) { return d->clock_set; });
-            if (!any || pause < clocks_every_ns) continue;
-            const bool looks = co_await may_drift(c, bus);
-            const bool drifts = std::any_of(bus.devices.begin(), bus.devices.end(),
-                                            [](const auto& d) { return d->drifts_since_ns != 0; });
-            if (looks || drifts) {
-                co_await look_at_clocks(c, bus);
-            }
-        }
+        co_await watch_clocks(c, bus, began + counters_every_ns);
     }
 }
 
