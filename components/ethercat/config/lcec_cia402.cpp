@@ -65,8 +65,9 @@ public:
             const unsigned limit =
                 number(output ? "ciaRxPDOEntryLimit" : "ciaTxPDOEntryLimit", 8, 1, 254);
             for (unsigned axis = 0; axis < axes; ++axis) {
+                const unsigned first = zero ? 0 : 1;
                 const std::string prefix =
-                    axes == 1 ? "srv-" : "srv-" + std::to_string(axis + (zero ? 0 : 1)) + "-";
+                    axes == 1 ? "srv-" : "srv-" + std::to_string(axis + first) + "-";
                 std::vector<std::vector<master::Entry>> objects;
                 for (const Feature& f : features) {
                     if (f.output == output && on(f)) {

@@ -81,16 +81,24 @@ private:
     }
     static bool yes(std::string_view text) { return same_word(text, "true") || text == "1"; }
 
+    /// How an initial command of a protocol is written.
+    struct Names {
+        const char* operation;  ///< client command of CoE, operation code of SoE
+        std::int64_t write;     ///< the operation that writes
+        const char* index;
+        const char* sub;
+        std::int64_t max_sub;
+    };
+    static constexpr Names coe_names{"Ccs", 1, "Index", "SubIndex", 0xff};
+    static constexpr Names soe_names{"OpCode", 3, "IDN", "DriveNo", 7};
+
     void take(const Xml& command, bool soe) {
         if (yes(trimmed(command.child_value("Disabled")))) return;
-        // client command of CoE, operation code of SoE
-        constexpr std::int64_t download = 1;
-        constexpr std::int64_t write_request = 3;
-        const auto operation =
-            number(command, soe ? "OpCode" : "Ccs", 255, soe ? write_request : download);
-        const auto index = number(command, soe ? "IDN" : "Index", 0xffff, -1);
-        const auto sub = number(command, soe ? "DriveNo" : "SubIndex", soe ? 7 : 0xff, 0);
-        if (!operation || !index || !sub || *operation != (soe ? write_request : download)) return;
+        const Names& names = soe ? soe_names : coe_names;
+        const auto operation = number(command, names.operation, 255, names.write);
+        const auto index = number(command, names.index, 0xffff, -1);
+        const auto sub = number(command, names.sub, names.max_sub, 0);
+        if (!operation || !index || !sub || *operation != names.write) return;
         const auto data = esi::hex_bytes(command.child_value("Data"));
         if (!data || data->empty()) {
             return error(

@@ -125,8 +125,8 @@ const char* pin_type(const Entry& e) {
 
 std::string pin_line(const Entry& e, bool output, const std::string& slave) {
     const std::string object = bus::object_text(e.index, e.sub).substr(2);
-    return padded(output ? "in" : "out", 4) + padded(pin_type(e), 6) + slave + "." + e.name +
-           "  " + object + "\n";
+    return padded(output ? "in" : "out", 4) + padded(pin_type(e), 6) + slave + "." + e.name + "  " +
+           object + "\n";
 }
 
 std::string netlist(const Bus& bus, const std::string& file, const std::string& segment) {
@@ -147,12 +147,12 @@ std::string netlist(const Bus& bus, const std::string& file, const std::string& 
         text += "loadrt ethercat_segment devices=\"" + segment + "\" link=" + bus.link + "\n";
     }
     text += "loadrt ethercat config=" + file + "\n";
-    if (!axes.empty()) {
-        text += "loadrt cia402 names=";
-    }
+    std::string names;
     for (const Axis& axis : axes) {
-        text +=
-            (&axis == &axes.front() ? "" : ",") + axis.name() + (&axis == &axes.back() ? "\n" : "");
+        names += (names.empty() ? "" : ",") + axis.name();
+    }
+    if (!names.empty()) {
+        text += "loadrt cia402 names=" + names + "\n";
     }
     text += "\n";
 

@@ -35,9 +35,14 @@ public:
             }
             return;
         }
-        const PinCodec codec = codec_of(e);
-        add(name, e, e.scaled ? HAL_TYPE_FLOAT : codec.pin_type(), output,
-            {area, at, codec, e.scaled ? e.scale : 1.0, e.scaled ? e.offset : 0.0});
+        Place place{area, at, codec_of(e)};
+        hal_type type = place.codec.pin_type();
+        if (e.scaled) {
+            type = HAL_TYPE_FLOAT;
+            place.scale = e.scale;
+            place.offset = e.offset;
+        }
+        add(name, e, type, output, place);
     }
 
     /// Copies inputs of the slaves to pins. `areas`: process data by number. [realtime]

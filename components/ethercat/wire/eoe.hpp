@@ -80,9 +80,11 @@ inline std::optional<Header> read(std::span<const std::uint8_t> payload) noexcep
 }
 /// Writes the header. [realtime]
 inline void write(std::uint8_t* to, const Header& h) noexcept {
-    put(to, static_cast<std::uint16_t>(static_cast<unsigned>(h.type) | (h.port & 0x0fU) << 4 |
-                                       (h.last ? 0x100U : 0U) | (h.timestamp ? 0x200U : 0U) |
-                                       (h.timestamp_requested ? 0x400U : 0U)));
+    const unsigned flags = static_cast<unsigned>(h.last) << 8 |
+                           static_cast<unsigned>(h.timestamp) << 9 |
+                           static_cast<unsigned>(h.timestamp_requested) << 10;
+    put(to,
+        static_cast<std::uint16_t>(static_cast<unsigned>(h.type) | (h.port & 0x0fU) << 4 | flags));
     put(to + 2, h.word);
 }
 /// Returns the second word of a fragment. [any]
