@@ -4,7 +4,7 @@
 file(GLOB sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/binary/*.cpp")
 set(map "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/binary/exports.map")
 add_library(halcyon_modules SHARED ${sources})
-target_include_directories(halcyon_modules PRIVATE "${PROJECT_SOURCE_DIR}/runtime" "${PROJECT_SOURCE_DIR}/runtime/sdk")
+target_include_directories(halcyon_modules PRIVATE "${PROJECT_SOURCE_DIR}/runtime" "${PROJECT_SOURCE_DIR}/runtime/sdk" "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/source")
 target_link_libraries(halcyon_modules PRIVATE halcyon_abi Threads::Threads ${CMAKE_DL_LIBS})
 target_compile_features(halcyon_modules PRIVATE cxx_std_20)
 target_compile_options(halcyon_modules PRIVATE "$<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>")

@@ -18,7 +18,7 @@ ROWS = {
     "runtime/execute": ["runtime/plan", "runtime/base"],
     "runtime/linuxcnc/find": [],
     "runtime/linuxcnc/source": ["runtime/abi"],
-    "runtime/linuxcnc/binary": ["runtime/sdk"],
+    "runtime/linuxcnc/binary": ["runtime/sdk", "runtime/linuxcnc/source"],
     "runtime/linuxcnc/binary/guard": [],
     "runtime/linuxcnc/programs": ["runtime/linuxcnc/binary", "runtime/linuxcnc/source"],
     "runtime/machine/load": [

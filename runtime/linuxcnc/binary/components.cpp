@@ -49,7 +49,7 @@ bool add_chunk(std::size_t least) {
 }
 
 int fail(const char* function, const char* name, const char* why) {
-    rtapi_print_msg(1, "%s: '%s': %s\n", function, name ? name : "(null)", why);
+    rtapi_print_msg(RTAPI_MSG_ERR, "%s: '%s': %s\n", function, name ? name : "(null)", why);
     return -EINVAL;
 }
 

@@ -162,7 +162,11 @@ void resolve_general(Spec& spec, double value) noexcept {
     std::from_chars(text + e + (all[e + 1] == '+' ? 2 : 1), end, exponent);
     const bool fixed = exponent >= -4 && exponent < digits;
     spec.precision = fixed ? digits - 1 - exponent : digits - 1;
-    spec.conversion = static_cast<char>((fixed ? 'f' : 'e') - (spec.upper() ? 'a' - 'A' : 0));
+    const bool upper = spec.upper();
+    spec.conversion = fixed ? 'f' : 'e';
+    if (upper) {
+        spec.conversion = static_cast<char>(spec.conversion - ('a' - 'A'));
+    }
 }
 
 std::chars_format format_of(char kind) noexcept {

@@ -100,7 +100,7 @@ int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short ba
         const char* const who = name ? name : "";
         *port = {base, base_hi, -1};
         if (const int why = permit_ports()) {
-            rtapi_print_msg(1, "%s: parallel port at 0x%x: %s\n", who, base,
+            rtapi_print_msg(RTAPI_MSG_ERR, "%s: parallel port at 0x%x: %s\n", who, base,
                             explanation(why).c_str());
             return -why;
         }
@@ -113,7 +113,7 @@ int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short ba
                 return 0;  // a card that the kernel does not know
             }
             rtapi_print_msg(
-                1,
+                RTAPI_MSG_ERR,
                 "%s: the kernel has no parallel port %u; give the address, as in cfg=\"0x378\"\n",
                 who, base);
             return -ENOENT;
@@ -122,7 +122,8 @@ int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short ba
         port->fd = open(file.c_str(), O_RDWR | O_CLOEXEC);
         if (port->fd < 0 || ioctl(port->fd, PPCLAIM) != 0) {
             const int why = errno;
-            rtapi_print_msg(1, "%s: cannot claim %s: %s%s\n", who, file.c_str(), std::strerror(why),
+            rtapi_print_msg(RTAPI_MSG_ERR, "%s: cannot claim %s: %s%s\n", who, file.c_str(),
+                            std::strerror(why),
                             why == EACCES   ? "; type: sudo usermod -aG lp $USER, and log in again"
                             : why == ENOENT ? "; type: sudo modprobe ppdev"
                                             : "");
@@ -132,8 +133,8 @@ int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short ba
         claims[port->fd] = Module::current();
         unsigned possible = ~0U;
         if (ioctl(port->fd, PPGETMODES, &possible) == 0 && (possible & modes) != modes) {
-            rtapi_print_msg(2, "%s: %s does not have all of the modes 0x%x\n", who, file.c_str(),
-                            modes);
+            rtapi_print_msg(RTAPI_MSG_WARN, "%s: %s does not have all of the modes 0x%x\n", who,
+                            file.c_str(), modes);
         }
         port->base = known.base;
         port->base_hi = known.base_hi;
@@ -153,7 +154,7 @@ void rtapi_parport_release(halcyon_parport* port) {
 // reason.
 void rtapi_outb([[maybe_unused]] unsigned char byte, unsigned number) {
     if (const int why = permit_ports(); why != 0) {
-        rtapi_print_msg(1, "rtapi_outb: port 0x%x: %s\n", number,
+        rtapi_print_msg(RTAPI_MSG_ERR, "rtapi_outb: port 0x%x: %s\n", number,
                         in_cycle ? std::strerror(why) : explanation(why).c_str());
     }
 #if defined(__x86_64__) || defined(__i386__)
@@ -164,7 +165,7 @@ void rtapi_outb([[maybe_unused]] unsigned char byte, unsigned number) {
 }
 unsigned char rtapi_inb(unsigned number) {
     if (const int why = permit_ports(); why != 0) {
-        rtapi_print_msg(1, "rtapi_inb: port 0x%x: %s\n", number,
+        rtapi_print_msg(RTAPI_MSG_ERR, "rtapi_inb: port 0x%x: %s\n", number,
                         in_cycle ? std::strerror(why) : explanation(why).c_str());
     }
 #if defined(__x86_64__) || defined(__i386__)

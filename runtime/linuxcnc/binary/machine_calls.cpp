@@ -19,14 +19,14 @@ int fail(const char* function, const char* name, const char* why, int result = -
     if (in_cycle) {
         return result;  // the result is enough, in every cycle
     }
-    rtapi_print_msg(1, "%s: '%s': %s\n", function, name ? name : "(null)", why);
+    rtapi_print_msg(RTAPI_MSG_ERR, "%s: '%s': %s\n", function, name ? name : "(null)", why);
     return result;
 }
 
 constexpr const char* only_while_loaded = "only while a module is loaded, in rtapi_app_main";
 
 void report_afterwards(const char* why) {
-    rtapi_print_msg(1, "what a module wanted when it was unloaded failed: %s\n", why);
+    rtapi_print_msg(RTAPI_MSG_ERR, "what a module wanted when it was unloaded failed: %s\n", why);
 }
 
 /// In rtapi_app_exit(): after the transaction that unloads the module.
@@ -133,7 +133,8 @@ int give_command(const char* function, const char* command,
             all.push_back(word);
         }
         const bool is_alias = all.size() > 2 && std::strstr(command, "alias");
-        const char* const name = all.size() > 1 ? all[is_alias ? 2 : 1] : "";
+        const std::size_t name_index = is_alias ? 2 : 1;
+        const char* const name = all.size() > 1 ? all[name_index] : "";
         if (all.size() > 1 && !*name) return fail(function, name, "the name is empty");
         const Module* const module = Module::current();
         if (!module) return fail(function, name, only_while_loaded, -EPERM);
@@ -141,7 +142,8 @@ int give_command(const char* function, const char* command,
         const int result =
             module->calls().command(module->host(), all.data(), all.size(), why, sizeof why);
         if (result != 0) {
-            rtapi_print_msg(1, *name ? "%s: '%s': %s\n" : "%s: %.0s%s\n", function, name, why);
+            rtapi_print_msg(RTAPI_MSG_ERR, *name ? "%s: '%s': %s\n" : "%s: %.0s%s\n", function,
+                            name, why);
         }
         return result;
     });

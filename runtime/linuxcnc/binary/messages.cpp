@@ -19,8 +19,6 @@ namespace {
 
 constexpr std::size_t line_length = 1024;
 constexpr std::size_t lines_in_flight = 128;
-constexpr int errors = 1;
-constexpr int all = 5;  // levels
 
 // Any cycle fills a line, the printer empties it. `turn` is the owner: n for the writer of message
 // n, n + 1 for the printer of message n; then it is n + lines_in_flight for the next writer. A full
@@ -41,8 +39,8 @@ std::atomic<bool> printing{false};
 bool printer_made = false;
 bool lines_ready = false;
 
-std::atomic<int> message_level{errors};
-std::atomic<halcyon_message_handler> message_handler{nullptr};
+std::atomic<int> message_level{RTAPI_MSG_ERR};
+std::atomic<rtapi_msg_handler_t> message_handler{nullptr};
 
 char capture[8192];
 std::size_t capture_length = 0;
@@ -51,7 +49,7 @@ bool capturing = false;
 thread_local bool captures __attribute__((tls_model("initial-exec"))) = false;
 
 void write_text(int level, const char* text, std::size_t length) noexcept {
-    const int file = level == all ? STDOUT_FILENO : STDERR_FILENO;
+    const int file = level == RTAPI_MSG_ALL ? STDOUT_FILENO : STDERR_FILENO;
     while (length > 0) {
         const ssize_t n = write(file, text, length);
         if (n <= 0) return;
@@ -75,7 +73,7 @@ void report_withheld() noexcept {
         std::snprintf(text, sizeof text,
                       "hal: %llu messages of LinuxCNC modules not printed (limit %u per second)\n",
                       static_cast<unsigned long long>(rate.withheld), most_per_second);
-    write_text(errors, text, static_cast<std::size_t>(length));
+    write_text(RTAPI_MSG_ERR, text, static_cast<std::size_t>(length));
     rate.withheld = 0;
 }
 
@@ -124,7 +122,7 @@ void queue_message(int level, const char* format, va_list arguments) noexcept {
     line->turn.store(mine + 1, std::memory_order_release);
 }
 
-void print_by_default(int level, const char* format, va_list arguments) {
+void print_by_default(msg_level_t level, const char* format, va_list arguments) {
     if (in_cycle) return queue_message(level, format, arguments);
     char text[line_length];
     const int wanted = std::vsnprintf(text, sizeof text, format, arguments);
@@ -133,11 +131,11 @@ void print_by_default(int level, const char* format, va_list arguments) {
     if (!captures) return write_text(level, text, length);
     // as drivers do at this level, to be seen
     const bool announces = std::strstr(text, ": loading ") != nullptr;
-    if (level == errors && !*first_error && !announces) {
+    if (level == RTAPI_MSG_ERR && !*first_error && !announces) {
         std::memcpy(first_error, text, length + 1);
     }
     if (length > sizeof capture - 1 - capture_length) {  // then it prints earlier
-        write_text(errors, capture, capture_length);
+        write_text(RTAPI_MSG_ERR, capture, capture_length);
         capture_length = 0;
     }
     std::memcpy(capture + capture_length, text, length);
@@ -145,8 +143,8 @@ void print_by_default(int level, const char* format, va_list arguments) {
     capture[capture_length] = '\0';
 }
 
-void print_message(int level, const char* format, va_list arguments) {
-    const halcyon_message_handler handler = message_handler.load(std::memory_order_acquire);
+void print_message(msg_level_t level, const char* format, va_list arguments) {
+    const rtapi_msg_handler_t handler = message_handler.load(std::memory_order_acquire);
     (handler ? handler : print_by_default)(level, format, arguments);
 }
 
@@ -166,7 +164,7 @@ void end_capture() noexcept {
 }
 void print_captured() noexcept {
     if (capturing) {
-        write_text(errors, capture, capture_length);
+        write_text(RTAPI_MSG_ERR, capture, capture_length);
     }
     end_capture();
 }
@@ -203,12 +201,12 @@ extern "C" {
 void rtapi_print(const char* format, ...) {
     va_list arguments;
     va_start(arguments, format);
-    print_message(all, format, arguments);
+    print_message(RTAPI_MSG_ALL, format, arguments);
     va_end(arguments);
 }
 
-void rtapi_print_msg(int level, const char* format, ...) {
-    if (level > message_level.load(std::memory_order_relaxed)) return;
+void rtapi_print_msg(msg_level_t level, const char* format, ...) {
+    if (static_cast<int>(level) > message_level.load(std::memory_order_relaxed)) return;
     va_list arguments;
     va_start(arguments, format);
     print_message(level, format, arguments);
@@ -228,15 +226,15 @@ int rtapi_snprintf(char* to, unsigned long size, const char* format, ...) {
 }
 
 int rtapi_set_msg_level(int level) {
-    if (level < 0 || level > all) return -EINVAL;
+    if (level < 0 || level > RTAPI_MSG_ALL) return -EINVAL;
     message_level = level;
     return 0;
 }
 int rtapi_get_msg_level() { return message_level; }
 // A handler calls the one before it, so the default is one as well.
-halcyon_message_handler rtapi_get_msg_handler() {
-    const halcyon_message_handler handler = message_handler;
+rtapi_msg_handler_t rtapi_get_msg_handler() {
+    const rtapi_msg_handler_t handler = message_handler;
     return handler ? handler : print_by_default;
 }
-void rtapi_set_msg_handler(halcyon_message_handler handler) { message_handler = handler; }
+void rtapi_set_msg_handler(rtapi_msg_handler_t handler) { message_handler = handler; }
 }

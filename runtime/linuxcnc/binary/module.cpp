@@ -359,7 +359,7 @@ bool Module::create(const hal_host* host, const hal_modules& extension,
     }
     constructing = this;
     begin_capture();
-    const halcyon_message_handler handler = rtapi_get_msg_handler();
+    const rtapi_msg_handler_t handler = rtapi_get_msg_handler();
     const int level = rtapi_get_msg_level();
     bool good = false;
     library_ = dlopen(path_.c_str(), RTLD_NOW | RTLD_GLOBAL);
@@ -468,7 +468,8 @@ void Module::destroy() {
     exiting = nullptr;
     if (signal != 0) {
         note_broken();
-        rtapi_print_msg(1, "%s: rtapi_app_exit crashed (%s)\n", name_.c_str(), crash_text(signal));
+        rtapi_print_msg(RTAPI_MSG_ERR, "%s: rtapi_app_exit crashed (%s)\n", name_.c_str(),
+                        crash_text(signal));
     }
     print_captured();
     release();

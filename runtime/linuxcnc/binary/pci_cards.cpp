@@ -136,13 +136,14 @@ int rtapi_pci_register_driver(halcyon_pci_driver* driver) {
             Card& card = cards.emplace_back(Card{driver, Module::current(), device});
             const int result = driver->probe(&card.device, id);
             if (result == 0) continue;
-            rtapi_print_msg(1, "%s: the card at %s is not used: its driver declines it (%d)\n",
+            rtapi_print_msg(RTAPI_MSG_ERR,
+                            "%s: the card at %s is not used: its driver declines it (%d)\n",
                             driver->name ? driver->name : "", name.c_str(), result);
             unmap_bars(card.device);
             cards.pop_back();
         }
         if (found > 0) return 0;
-        rtapi_print_msg(1, "%s: no such card in %s\n", driver->name ? driver->name : "",
+        rtapi_print_msg(RTAPI_MSG_ERR, "%s: no such card in %s\n", driver->name ? driver->name : "",
                         folder_of_cards().c_str());
         return -ENODEV;
     });
@@ -176,7 +177,7 @@ int rtapi_pci_enable_device(halcyon_pci_device* device) {
                 close(read_only);
             }
             if (on) return 0;
-            rtapi_print_msg(1, "%s: cannot open %s: %s\n", device->name, file.c_str(),
+            rtapi_print_msg(RTAPI_MSG_ERR, "%s: cannot open %s: %s\n", device->name, file.c_str(),
                             std::strerror(why));
             return -why;
         }
@@ -198,7 +199,7 @@ void* rtapi_pci_ioremap_bar(halcyon_pci_device* device, int number) {
         halcyon_pci_bar& bar = device->bars[number];
         const std::string file = std::string(device->path) + "/resource" + std::to_string(number);
         if ((bar.flags & is_memory) == 0 || bar.end <= bar.start) {
-            rtapi_print_msg(1, "%s: region %d is not memory\n", device->name, number);
+            rtapi_print_msg(RTAPI_MSG_ERR, "%s: region %d is not memory\n", device->name, number);
             return -EINVAL;
         }
         const int opened = open(file.c_str(), O_RDWR | O_SYNC | O_CLOEXEC);
@@ -211,10 +212,11 @@ void* rtapi_pci_ioremap_bar(halcyon_pci_device* device, int number) {
             close(opened);
         }
         if (memory == MAP_FAILED) {
-            rtapi_print_msg(
-                1, "%s: cannot map %s: %s%s\n", device->name, file.c_str(), std::strerror(why),
-                why == EACCES ? "; a rule of udev can permit it (docs/linuxcnc-compatibility.md)"
-                              : "");
+            rtapi_print_msg(RTAPI_MSG_ERR, "%s: cannot map %s: %s%s\n", device->name, file.c_str(),
+                            std::strerror(why),
+                            why == EACCES
+                                ? "; a rule of udev can permit it (docs/linuxcnc-compatibility.md)"
+                                : "");
             return -why;
         }
         mapped[memory] = bytes;

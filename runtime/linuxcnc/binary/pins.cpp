@@ -46,7 +46,7 @@ bool type_of(int type, hal_type& to, std::uint32_t& width) {
 }
 
 int fail(const char* function, const char* name, const char* why) {
-    rtapi_print_msg(1, "%s: '%s': %s\n", function, name, why);
+    rtapi_print_msg(RTAPI_MSG_ERR, "%s: '%s': %s\n", function, name, why);
     return -EINVAL;
 }
 

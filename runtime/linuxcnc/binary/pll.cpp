@@ -27,7 +27,7 @@ void take_clock(Module& module, const hal_host* host) {
     if (clock_of_threads && clock_of_threads->claim(clock_of_threads, host)) {
         leader = &module;
     } else {
-        rtapi_print_msg(2,
+        rtapi_print_msg(RTAPI_MSG_WARN,
                         "%s: the threads follow another component's clock: "
                         "rtapi_task_pll_set_correction() fails\n",
                         module.name().c_str());

@@ -46,7 +46,7 @@ std::uint32_t held_by(const hal_port& port) noexcept {
 }
 
 int fail(const char* name, const char* why) {
-    rtapi_print_msg(1, "hal_pin_port_new: '%s': %s\n", name ? name : "(null)", why);
+    rtapi_print_msg(RTAPI_MSG_ERR, "hal_pin_port_new: '%s': %s\n", name ? name : "(null)", why);
     return -EINVAL;
 }
 
@@ -112,7 +112,7 @@ int new_buffer(unsigned size) {
         why = "all modules together have at most 256 ports";
     }
     if (why) {
-        rtapi_print_msg(1, "hal_port_alloc: %s\n", why);
+        rtapi_print_msg(RTAPI_MSG_ERR, "hal_port_alloc: %s\n", why);
         return 0;
     }
     const hal_host* const host = module->host();

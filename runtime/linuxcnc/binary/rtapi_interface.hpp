@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
 // The functions that LinuxCNC's compiled modules (2.9; those of 2.10 only are in handles.hpp) may
-// call, declared from the documented interface: names, types and sizes. Own text; nothing here
-// comes from LinuxCNC's headers. exports.map makes exactly these visible.
+// call, declared from the documented interface: names, types and sizes. What components that are
+// built from source call as well is in rtapi.h. Own text; nothing here comes from LinuxCNC's
+// headers. exports.map makes exactly these visible.
 #pragma once
 
 #include <cstdarg>
 #include <cstddef>
 #include <cstdint>
 #include <sys/types.h>
+
+#include "linuxcnc/rtapi.h"
 
 extern "C" {
 
@@ -117,34 +120,11 @@ int hal_stream_num_underruns(halcyon_stream* stream);
 int hal_stream_read(halcyon_stream* stream, halcyon_stream_value* to, unsigned* number);
 int hal_stream_write(halcyon_stream* stream, halcyon_stream_value* from);
 
-// messages: [any]. Levels: none 0, error 1, warning 2, information 3, debug 4, all 5
-typedef void (*halcyon_message_handler)(int level, const char* format, va_list arguments);
-void rtapi_print(const char* format, ...) __attribute__((format(printf, 1, 2)));
-void rtapi_print_msg(int level, const char* format, ...) __attribute__((format(printf, 2, 3)));
-int rtapi_snprintf(char* to, unsigned long size, const char* format, ...)
-    __attribute__((format(printf, 3, 4)));
-int rtapi_vsnprintf(char* to, unsigned long size, const char* format, va_list arguments);
-int rtapi_set_msg_level(int level);
-int rtapi_get_msg_level();
-halcyon_message_handler rtapi_get_msg_handler();
-void rtapi_set_msg_handler(halcyon_message_handler handler);
-
-// time: [any]
-long long rtapi_get_time();
-long long rtapi_get_clocks();
-void rtapi_delay(long ns);
-long rtapi_delay_max();
-long rtapi_clock_set_period(long ns);  // [setup]
-int rtapi_is_realtime();  // [setup]
-int rtapi_is_kernelspace();
+// the clock of the threads; other functions about time, and messages: rtapi.h
 long long rtapi_task_pll_get_reference();  // [realtime]
 int rtapi_task_pll_set_correction(long value);  // [realtime]
 
 // tasks of a module's own: new, start and delete are [setup]; the id is positive
-int rtapi_prio_highest();
-int rtapi_prio_lowest();
-int rtapi_prio_next_higher(int priority);
-int rtapi_prio_next_lower(int priority);
 int rtapi_task_new(void (*code)(void*), void* argument, int priority, int owner,
                    unsigned long stack_bytes, int uses_fp);
 int rtapi_task_start(int task, unsigned long period_ns);
@@ -153,10 +133,6 @@ int rtapi_task_pause(int task);  // [any]
 int rtapi_task_resume(int task);  // [any]
 int rtapi_task_self();  // [any] in a thread of the machine's 0; -EINVAL: in none
 void rtapi_wait();  // in a task
-
-// [setup]
-int rtapi_init(const char* name);
-int rtapi_exit(int module);
 
 // shared memory by key: [setup]
 int rtapi_shmem_new(int key, int comp, unsigned long size);

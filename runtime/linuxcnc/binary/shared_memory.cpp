@@ -103,7 +103,7 @@ int rtapi_shmem_new(int key, int comp, unsigned long size) {
     const int id = shmget(key, size, IPC_CREAT | 0600);
     if (id < 0) {
         const int why = errno;
-        rtapi_print_msg(1,
+        rtapi_print_msg(RTAPI_MSG_ERR,
                         "shared memory with key 0x%x, %lu bytes: %s; ipcs -m lists the segments, "
                         "ipcrm -M 0x%x removes this one\n",
                         static_cast<unsigned>(key), size, std::strerror(why),
@@ -111,7 +111,7 @@ int rtapi_shmem_new(int key, int comp, unsigned long size) {
         return -why;
     }
     if (const pid_t other = runs_modules ? other_machine(id) : 0; other != 0) {
-        rtapi_print_msg(1,
+        rtapi_print_msg(RTAPI_MSG_ERR,
                         "shared memory with key 0x%x belongs to another machine, process %ld; end "
                         "that one, or give each a key (motmod: "
                         "key=, [EMCMOT]SHMEM_KEY)\n",

@@ -109,7 +109,7 @@ int rtapi_init(const char*) {
     return guarded([] {
         Module* const module = Module::current();
         if (!module) {
-            rtapi_print_msg(1, "rtapi_init: only while a module is loaded\n");
+            rtapi_print_msg(RTAPI_MSG_ERR, "rtapi_init: only while a module is loaded\n");
             return -EPERM;
         }
         return *module->components.insert(new_id()).first;
@@ -131,7 +131,7 @@ int rtapi_spawn_as_root(pid_t* process, const char* path, const void*, const voi
     for (int i = 1; path && argv && argv[i]; ++i) {
         command += std::string(" ") + argv[i];
     }
-    rtapi_print_msg(2, "not run as root: %s\n", command.c_str());
+    rtapi_print_msg(RTAPI_MSG_WARN, "not run as root: %s\n", command.c_str());
     char name[] = "false";
     char* const words[] = {name, nullptr};
     pid_t made = -1;
@@ -151,7 +151,7 @@ int rtapi_open_as_root(const char* path, int flags) {
     const int file = open(path, flags | O_CLOEXEC);
     if (file >= 0) return file;
     const int why = errno;
-    rtapi_print_msg(1, "cannot open %s: %s\n", path, std::strerror(why));
+    rtapi_print_msg(RTAPI_MSG_ERR, "cannot open %s: %s\n", path, std::strerror(why));
     return -why;
 }
 

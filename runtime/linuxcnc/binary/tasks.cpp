@@ -72,7 +72,7 @@ Task* task_of(int id) noexcept {
 int fail(const char* function, const char* why, int result = -EINVAL) {
     // in a cycle the result is enough
     if (!in_cycle) {
-        rtapi_print_msg(1, "%s: %s\n", function, why);
+        rtapi_print_msg(RTAPI_MSG_ERR, "%s: %s\n", function, why);
     }
     return result;
 }
@@ -154,7 +154,7 @@ bool remove(Task& task) noexcept {
         task.state.store(State::free, std::memory_order_release);
         return true;
     }
-    rtapi_print_msg(1,
+    rtapi_print_msg(RTAPI_MSG_ERR,
                     "%s: task %d has not called rtapi_wait() for 1 s and cannot be ended; its code "
                     "stays in memory until the machine ends\n",
                     task.module->name().c_str(), number_of(task));
@@ -330,7 +330,7 @@ int rtapi_task_self() {
 void rtapi_wait() {
     Task* const task = current;
     if (!task) {
-        rtapi_print_msg(1, "rtapi_wait: only in a task of the module's own\n");
+        rtapi_print_msg(RTAPI_MSG_ERR, "rtapi_wait: only in a task of the module's own\n");
         return;
     }
     leave_cycle();
