@@ -89,7 +89,10 @@ int main(int argc, char** argv) {
     }
     const char* const usual = strncmp(stem, "hal-", 4) == 0 ? stem + 4 : stem;
     const bool single = hal_plugin.flags & HAL_COMPONENT_SINGLETON;
-    const int wanted = single ? 1 : count > 0 ? count : (int)hal_plugin.default_count;
+    int wanted = count > 0 ? count : (int)hal_plugin.default_count;
+    if (single) {
+        wanted = 1;
+    }
     for (int i = 0; names[0] ? i < most_names && names[i] : i < wanted; ++i) {
         if (names[0]) {
             snprintf(halcyon_program_prefix, sizeof halcyon_program_prefix, "%s", names[i]);

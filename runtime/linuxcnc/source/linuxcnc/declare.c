@@ -43,7 +43,12 @@ static bool hal_type_of(hal_type_t type, hal_type* to) {
 }
 
 static size_t width_of(hal_type type) {
-    return type == HAL_TYPE_BIT ? 1 : type == HAL_TYPE_S32 || type == HAL_TYPE_U32 ? 4 : 8;
+    switch (type) {
+    case HAL_TYPE_BIT: return 1;
+    case HAL_TYPE_S32:
+    case HAL_TYPE_U32: return 4;
+    default: return 8;
+    }
 }
 
 static struct pin* new_pin(int comp) {
@@ -57,9 +62,11 @@ static struct pin* new_pin(int comp) {
 /* Returns the name as the runtime takes it; NULL when it is not below the instance's. */
 static const char* local_name(const char* name) {
     const size_t length = strlen(instance_name);
-    if (!name || !*name || length == 0) return name && *name ? name : NULL;
+    if (!name || !*name) return NULL;
+    if (length == 0) return name;
     if (strncmp(name, instance_name, length) != 0) return NULL;
-    return name[length] == '.' ? name + length + 1 : name[length] == '\0' ? name + length : NULL;
+    if (name[length] == '.') return name + length + 1;
+    return name[length] == '\0' ? name + length : NULL;
 }
 
 static int declare(int comp, struct pin* pin, hal_type_t type, hal_pdir_t dir, hal_value initial,

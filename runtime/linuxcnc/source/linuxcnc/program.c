@@ -276,7 +276,10 @@ int halcyon_safe(int comp, const char* pin, double value) {
         rtapi_print_msg(RTAPI_MSG_ERR, "%s: halcyon_safe: unknown pin '%s', or it has no value\n",
                         of->name, pin);
     }
-    return good ? 0 : (fits ? report_rejection(of->name, pin) : false, -EINVAL);
+    if (fits && !good) {
+        report_rejection(of->name, pin);
+    }
+    return good ? 0 : -EINVAL;
 }
 
 bool halcyon_connected(int comp) {

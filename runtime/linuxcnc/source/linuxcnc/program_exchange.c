@@ -70,7 +70,10 @@ bool halcyon_announce(struct halcyon_program* of, bool is_ready, bool whole) {
         halcyon_add_number(of->links[i].type, of->links[i].safe_value);
         first = false;
     }
-    halcyon_add(first ? ",\"ready\":%s}" : "],\"ready\":%s}", is_ready ? "true" : "false");
+    if (!first) {
+        halcyon_add("]");
+    }
+    halcyon_add(",\"ready\":%s}", is_ready ? "true" : "false");
     return halcyon_ask();
 }
 
@@ -125,54 +128,54 @@ static bool own(const struct halcyon_link* one) {
     return one->dir == HAL_DIR_OUT || one->read_only;
 }
 
-void halcyon_exchange(struct halcyon_program* of) {
-    bool read = false;
-    bool write = false;
-    const long long now = rtapi_get_time();
-    halcyon_sync_parameters();
-    uint64_t seen[of->link_count + 1];
-    halcyon_add("{\"exchange\":");
-    halcyon_add_string(of->name);
+/* What a request exchanges. */
+struct exchange {
+    bool reads;
+    bool writes;
+};
+
+/* Adds the values that the program has changed. `seen` takes the present values of all links. */
+static struct exchange add_values(struct halcyon_program* of, uint64_t* seen, long long now) {
+    struct exchange request = {false, false};
     for (size_t i = 0; i < of->link_count; ++i) {
         struct halcyon_link* const one = &of->links[i];
         seen[i] = __atomic_load_n(&one->pin->slot->raw, __ATOMIC_ACQUIRE);
         if (one->type == HAL_TYPE_PORT) continue;
-        read = read || !own(one);
+        request.reads = request.reads || !own(one);
         /* also an input that the program itself has set, as LinuxCNC's task does: an unlinked one keeps that value */
         if (!one->fresh && halcyon_significant(one->type, seen[i]) == one->last) continue;
-        halcyon_add(write ? ",%zu," : ",\"write\":[%zu,", i);
+        halcyon_add(request.writes ? ",%zu," : ",\"write\":[%zu,", i);
         halcyon_add_value(one->type, (hal_value){.raw = seen[i]});
-        write = true;
+        request.writes = true;
         one->fresh = false;
         one->before = one->last;
         one->last = halcyon_significant(one->type, seen[i]);
         one->written_ns = now;
     }
-    if (write) {
+    if (request.writes) {
         halcyon_add("]");
     }
+    return request;
+}
+
+/* Adds that the program is not alive. Returns true when a sign of life is due. */
+static bool add_sign_of_life(struct halcyon_program* of, struct exchange request, long long now) {
     const bool lives = __atomic_exchange_n(&of->alive, false, __ATOMIC_ACQ_REL);
-    const bool reports =
-        of->every_ms > 0 && lives && (read || now - of->alive_ns > of->every_ms * 250000LL);
+    const bool is_due = request.reads || now - of->alive_ns > of->every_ms * 250000LL;
+    const bool reports = of->every_ms > 0 && lives && is_due;
     if (of->every_ms > 0 && !lives) {
         halcyon_add(",\"alive\":false");
     }
-    if (reports || (write && lives)) {
+    if (reports || (request.writes && lives)) {
         of->alive_ns = now;
-    } else if (lives && !write) {
+    } else if (lives && !request.writes) {
         __atomic_store_n(&of->alive, true, __ATOMIC_RELEASE); /* with the next one */
     }
-    halcyon_add(read ? ",\"read\":true}" : "}");
-    if (!read && !write && !reports) {
-        halcyon_drop_request();
-        return;
-    }
-    const char *const answer = halcyon_ask(), *at = answer ? strstr(answer, "\"values\":[") : NULL;
-    if (!answer) {
-        halcyon_disconnect();
-    }
-    if (!at) return;
-    at += 10;
+    return reports;
+}
+
+/* Takes the values of an answer for pins that the program has not set since they were `seen`. */
+static void take_values(struct halcyon_program* of, const char* at, uint64_t* seen, long long now) {
     for (size_t i = 0; i < of->link_count; ++i) {
         struct halcyon_link* const one = &of->links[i];
         if (own(one)) continue;
@@ -186,6 +189,30 @@ void halcyon_exchange(struct halcyon_program* of) {
             one->last = there;
         }
     }
+}
+
+void halcyon_exchange(struct halcyon_program* of) {
+    static const char values[] = "\"values\":[";
+    const long long now = rtapi_get_time();
+    halcyon_sync_parameters();
+    uint64_t seen[of->link_count + 1];
+    halcyon_add("{\"exchange\":");
+    halcyon_add_string(of->name);
+    const struct exchange request = add_values(of, seen, now);
+    const bool reports = add_sign_of_life(of, request, now);
+    halcyon_add(request.reads ? ",\"read\":true}" : "}");
+    if (!request.reads && !request.writes && !reports) {
+        halcyon_drop_request();
+        return;
+    }
+    const char* const answer = halcyon_ask();
+    if (!answer) {
+        halcyon_disconnect();
+        return;
+    }
+    const char* const found = strstr(answer, values);
+    if (!found) return;
+    take_values(of, found + sizeof values - 1, seen, now);
     halcyon_sync_parameters();
 }
 
