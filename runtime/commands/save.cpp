@@ -9,7 +9,7 @@
 #include "commands/table.hpp"
 #include "commands/text_writer.hpp"
 #include "hal/replace_file.hpp"
-#include "model/modules.hpp"
+#include "machine/load/module_library.hpp"
 #include "text/numbers.hpp"
 
 namespace hal {
@@ -164,10 +164,23 @@ void save_loads(Text& text, const LoadedComponent& component, const std::string&
         if (!whole && instances.empty()) continue;
         const auto names = listed_names(arguments);
         const bool complete = names.empty() ? all_numbered : instances.size() == names.size();
-        text.add("loadrt {}{}\n", name,
-                 whole || complete ? (arguments.empty() ? "" : " ") + arguments
-                                   : arguments_for(instances, component.loads[i]));
+        if (!whole && !complete) {
+            text.add("loadrt {}{}\n", name, arguments_for(instances, component.loads[i]));
+        } else if (arguments.empty()) {
+            text.add("loadrt {}\n", name);
+        } else {
+            text.add("loadrt {} {}\n", name, arguments);
+        }
     }
+}
+
+/// Returns true if a loaded LinuxCNC module has made the thread.
+bool made_by_module(const Thread& thread, const Model& model) {
+    if (!thread.made.known()) return false;
+    return std::ranges::any_of(model.components, [&](const auto& component) {
+        return is_module(*component) && component->loaded.source == thread.made.source &&
+               component->loaded.begin == thread.made.begin;
+    });
 }
 
 void save_comp(Context& context, Text& text) {

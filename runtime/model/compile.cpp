@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include "model/compile.hpp"
-#include "model/modules.hpp"
 
 #include <algorithm>
 #include <map>
@@ -33,9 +32,9 @@ class Compiler {
 public:
     Compiler(const Model& model, const CompileInput& input) : model_(model), input_(input) {
         for (const auto& component : model.components) {
-            if (!is_module(*component)) continue;
+            if (!component->shares_pins) continue;
             for (const auto& function : component->functions) {
-                module_functions_.push_back(function.get());
+                sharing_functions_.push_back(function.get());
             }
             for (const auto& instance : component->instances) {
                 if (instance->functions.empty()) {
@@ -103,13 +102,13 @@ private:
         return nullptr;
     }
 
-    // LinuxCNC modules call each other: the pins of one without a function, such as a kinematics
-    // module, are used by functions of others.
+    // The functions that may use a pin without one of its own. Components that call each other
+    // share their pins.
     const std::vector<LoadedFunction*>& users_of(const Pin& pin) const {
-        return pin.instance->functions.empty() && pin.instance->component &&
-                       is_module(*pin.instance->component)
-                   ? module_functions_
-                   : pin.instance->functions;
+        const LoadedComponent* const component = pin.instance->component;
+        const bool is_shared =
+            pin.instance->functions.empty() && component && component->shares_pins;
+        return is_shared ? sharing_functions_ : pin.instance->functions;
     }
 
     // A loose pin whose functions are in two threads, or that threads of its component's own use;
@@ -489,8 +488,8 @@ private:
 
     const Model& model_;
     const CompileInput& input_;
-    std::vector<LoadedFunction*> module_functions_;
-    /// of modules
+    /// of components that share their pins, as are the instances
+    std::vector<LoadedFunction*> sharing_functions_;
     std::vector<const Instance*> instances_without_function_;
     Compiled out_;
     std::unordered_map<Thread*, plan::Plan*> plans_;

@@ -159,6 +159,9 @@ struct LoadedComponent {
     std::vector<Load> loads;  ///< the same, taken apart, for `reload`
     std::vector<std::unique_ptr<Instance>> instances;
     std::vector<std::unique_ptr<LoadedFunction>> functions;
+    /// Pins of its instances without a function are used by the functions of all components that
+    /// have this flag.
+    bool shares_pins = false;
     std::uint32_t next_number = 0;  ///< of the next unnamed instance
     std::uint32_t id = 0;
     /// of a program's component: its process. Its instance, if any, has pins only

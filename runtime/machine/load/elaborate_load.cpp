@@ -7,7 +7,6 @@
 #include "machine/load/construct.hpp"
 #include "machine/load/module_library.hpp"
 #include "machine/load/thread_options.hpp"
-#include "model/modules.hpp"
 #include "text/quoting.hpp"
 
 namespace hal {
@@ -199,6 +198,9 @@ bool make_instances(Elaboration& on, const Token& name, Origin origin, const Loa
         component->plugin = plugin->component;
         component->library = plugin->library;
         component->path = plugin->path;
+        // LinuxCNC's modules call each other: the functions of one use the pins of another, such as
+        // a kinematics module
+        component->shares_pins = is_module(*component);
     }
     Load load;
     for (const auto& [key, given] : request.arguments) {

@@ -6,14 +6,21 @@
 #include <string>
 #include <string_view>
 
+#include "hal/modules.h"
 #include "linuxcnc/find/modules.hpp"
 #include "machine/load/plugins.hpp"
+#include "model/model.hpp"
 
 namespace hal {
 
 /// Plugins::open(), which is for any origin: a LinuxCNC module where there is no plugin.
 std::optional<Plugin> open_component(const Plugins& plugins, std::string_view name, Origin origin,
                                      Span at, Diagnostics& diagnostics);
+
+/// True if a LinuxCNC module was loaded as this component.
+inline bool is_module(const LoadedComponent& component) {
+    return component.plugin && (component.plugin->flags & HAL_COMPONENT_MODULE);
+}
 
 /// Reads the module's file; its code is not mapped before its instance is created. Nothing after
 /// reporting bad-plugin.

@@ -10,7 +10,6 @@
 #include "machine/report/exit_observer.hpp"
 #include "machine/run/plan_adoption.hpp"
 #include "machine/run/state.hpp"
-#include "model/modules.hpp"
 
 namespace hal {
 namespace {
@@ -60,6 +59,14 @@ void take_over(Model& model, Thread& thread) {
 
 bool is_in_model(const Model& model, const Thread* thread) {
     return std::ranges::any_of(model.threads, [&](const auto& one) { return one.get() == thread; });
+}
+
+/// Returns true if an instance uses its pins in threads of its own.
+bool has_own_threads(const Model& model) {
+    return std::ranges::any_of(model.components, [](const auto& component) {
+        return std::ranges::any_of(component->instances,
+                                   [](const auto& instance) { return instance->own_threads; });
+    });
 }
 
 void collect_cells(const std::vector<std::unique_ptr<Signal>>& signals,
