@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 
+#include "commands/completion.hpp"
 #include "commands/files.hpp"
 #include "commands/listing.hpp"
-#include "commands/shell_state.hpp"
 #include "commands/table.hpp"
 #include "machine/processes/programs.hpp"
 #include "text/fault_pages.hpp"
@@ -351,15 +351,16 @@ void add_arguments(Search& search, const std::vector<UsageWord>& words) {
 
 }  // namespace
 
-Completion Shell::complete(std::string_view line, std::size_t cursor) const {
+Completion complete_line(Session& session, const ShellOptions& options, std::string_view line,
+                         std::size_t cursor) {
     line = line.substr(0, std::min(cursor, line.size()));
     Completion completion;
     const auto last = line.find_last_of(" \t");
     completion.begin = last == line.npos ? 0 : last + 1;
 
-    const auto lock = state_->session.lock();
-    Search search{state_->session,
-                  state_->session.programs(),
+    const auto lock = session.lock();
+    Search search{session,
+                  session.programs(),
                   options,
                   {},
                   std::string(line.substr(completion.begin)),

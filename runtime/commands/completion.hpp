@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
-// What completion answers: shared by the shell, which computes it, and the client, which asks for
-// it over the socket.
+// Completion of a line: what the shell computes, and the client asks for over the socket.
 #pragma once
 
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace hal {
+
+class Session;
+struct ShellOptions;
 
 struct Candidate {
     std::string text;  ///< the whole word, to put in place of the one being typed
@@ -18,5 +21,10 @@ struct Completion {
     std::size_t begin = 0;              ///< byte in the line where the word being typed starts
     std::vector<Candidate> candidates;  ///< those that begin with what is typed, sorted by name
 };
+
+/// Returns what could stand at `cursor` (a byte offset) of the line: only what the command would
+/// take there. Takes the session's lock. [setup]
+Completion complete_line(Session& session, const ShellOptions& options, std::string_view line,
+                         std::size_t cursor);
 
 }  // namespace hal

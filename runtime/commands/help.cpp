@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "commands/help.hpp"
 #include "commands/script.hpp"
 #include "commands/table.hpp"
 #include "text/fault_pages.hpp"
@@ -15,6 +16,14 @@ namespace {
 
 std::string names_of(const CommandRow& row) {
     return *row.also ? std::string(row.name) + ", " + row.also : row.name;
+}
+
+/// Returns the page of a diagnostic code; empty: unknown code.
+std::string page_of(std::string_view code) {
+    for (const CodePage& row : all_code_pages()) {
+        if (code == row.name) return row.page;
+    }
+    return "";
 }
 
 }  // namespace
@@ -92,7 +101,7 @@ void command_help(Context& context) {
 
 void command_explain(Context& context) {
     const std::string& code = context.argument(0);
-    const std::string page = Shell::explain(code);
+    const std::string page = page_of(code);
     if (!page.empty() && context.checking()) return;
     if (!page.empty()) return context.output.out(page + "\n");
     std::vector<std::string> codes;
@@ -107,14 +116,7 @@ void command_quit(Context& context) { context.script.quit(); }
 
 void command_nothing(Context&) {}
 
-std::string Shell::explain(std::string_view code) {
-    for (const CodePage& row : all_code_pages()) {
-        if (code == row.name) return row.page;
-    }
-    return "";
-}
-
-std::string Shell::manual() {
+std::string command_manual() {
     std::string text = "# Commands\n";
     for (const auto& row : command_table()) {
         text += fmt::format("\n## {}\n\n    {}\n\n{}{}.\n", names_of(row), to_string(row.usage()),

@@ -4,19 +4,15 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
-#include <iterator>
-#include <sstream>
 #include <utility>
 #include <vector>
 
 #include "commands/files.hpp"
-#include "commands/ini_version.hpp"
+#include "commands/ini_netlists.hpp"
 #include "commands/script.hpp"
 #include "commands/shell_state.hpp"
 #include "commands/table.hpp"
-#include "linuxcnc/find/modules.hpp"
 #include "machine/session.hpp"
 
 namespace hal {
@@ -26,19 +22,6 @@ bool write_all(FILE* file, FILE* other, std::string_view text) {
     std::fflush(other);
     return std::fwrite(text.data(), 1, text.size(), file) == text.size() && std::fflush(file) == 0;
 }
-
-/// A session's own option while a file is run.
-template <class T>
-class Borrowed {
-public:
-    Borrowed(T& where, T value) : where_(where), before_(std::exchange(where, std::move(value))) {}
-    ~Borrowed() { where_ = std::move(before_); }
-    Borrowed(const Borrowed&) = delete;
-
-private:
-    T& where_;
-    T before_;
-};
 
 }  // namespace
 
@@ -136,81 +119,13 @@ int Shell::run_text(std::string name, std::string text, Output& output) {
     return script.run(script.add_text(std::move(name), std::move(text)));
 }
 
-namespace {
-
-int cannot_read(Shell& shell, Output& output, const std::string& path, const std::string& problem,
-                Code code, std::string help) {
-    Diagnostics diagnostics;
-    diagnostics.error(code, {}, "'" + path + "' cannot be read: " + problem, "", std::move(help));
-    const auto lock = shell.session().lock();
-    if (shell.options.level != Level::nothing) {
-        output.err(render(diagnostics, shell.session().sources, shell.options.color));
-    }
-    return 1;
-}
-
-}  // namespace
-
-namespace {
-
-/// The programs that LinuxCNC starts by itself, before the files of [HAL] and between HALFILE and
-/// POSTGUI_HALFILE.
-void note_programs(Session& session, const Ini& ini) {
-    const auto started = [&](const char* section, const char* key, const char* otherwise,
-                             std::vector<std::string> names) {
-        const std::string program = ini.get(section, key).value_or(otherwise);
-        if (!program.empty()) {
-            session.absences().note_program(program.substr(0, program.find(' ')), names);
-        }
-    };
-    started("EMCIO", "EMCIO", "", {"iocontrol"});
-    started("HAL", "HALUI", "", {"halui"});
-    const std::string display = ini.get("DISPLAY", "DISPLAY").value_or("");
-    started(
-        "DISPLAY", "DISPLAY", "",
-        {"axisui", "pyvcp", "gladevcp", "qtvcp", "gmoccapy", display.substr(0, display.find(' '))});
-}
-
-/// `hal check`: whether `hal linuxcnc` would run the configuration. Returns 1 after reporting that it would not.
-int check_version(Shell& shell, const std::string& path, Output& output) {
-    const Ini& ini = shell.session().ini;
-    std::string problem = is_linuxcnc_configuration(ini) ? ini_version_problem(ini) : "";
-    if (problem.empty()) return 0;
-    const Ini::Entry* const version = ini.find("EMC", "VERSION");
-    if (!version) {
-        problem = path + ": " + problem;
-    }
-    Diagnostics diagnostics;
-    diagnostics.error("ini-version", version ? version->at : Span{}, problem, "",
-                      "type: update_ini " + path);
-    const auto lock = shell.session().lock();
-    if (shell.options.level != Level::nothing) {
-        output.err(render(diagnostics, shell.session().sources, shell.options.color));
-    }
-    return 1;
-}
-
-/// Rejects an INI file that names nothing to run.
-int reject_without_netlist(Shell& shell, const std::string& path, Output& output) {
-    Diagnostics diagnostics;
-    diagnostics.error("ini-without-netlist", Span{},
-                      path + ": names no netlist: [HAL] has neither HALFILE nor HALCMD", "",
-                      "write under [HAL]: HALFILE = FILE.hal; to use the file for its values only, "
-                      "type: hal run --ini " +
-                          path + " FILE.hal");
-    const auto lock = shell.session().lock();
-    if (shell.options.level != Level::nothing) {
-        output.err(render(diagnostics, shell.session().sources, shell.options.color));
-    }
-    return 1;
-}
-
-}  // namespace
-
 int Shell::run_file(const std::string& path, Output& output) {
-    if (path.ends_with(".ini")) return run_ini(path, output);
+    if (path.ends_with(".ini")) {
+        if (read_ini(path, output) != 0) return 1;
+        return IniNetlists(*this, *state_, path, output).run();
+    }
     if (path.ends_with(".tcl")) {
-        return cannot_read(
+        return report_unreadable(
             *this, output, path, "it is a Tcl script", "unsupported-file",
             "`hal run` executes it, and `haltcl` on a running machine; here only .hal and .ini "
             "files are supported, with loops as ranges: pid.[0..5].command");
@@ -220,7 +135,7 @@ int Shell::run_file(const std::string& path, Output& output) {
         if (options.check) {
             state_->session.absences().note_missing_text(path);
         }
-        return cannot_read(*this, output, path, problem, "unreadable-file", "");
+        return report_unreadable(*this, output, path, problem, "unreadable-file", "");
     }
     return run_text(path, std::move(text), output);
 }
@@ -230,165 +145,17 @@ int Shell::read_ini(const std::string& path, Output& output) {
     const auto lock = state_->session.lock();
     Ini ini =
         Ini::read(state_->session.sources, resolve_path(path, options.directory), diagnostics);
-    if (!diagnostics.all().empty() && options.level != Level::nothing) {
-        output.err(render(diagnostics, state_->session.sources, options.color));
-    }
+    print_diagnostics(diagnostics, *this, output);
     if (diagnostics.failed()) return 1;
     state_->session.ini = std::move(ini);
     return 0;
 }
 
-/// One netlist named by [HAL]HALFILE or [HAL]POSTGUI_HALFILE.
-struct HalFile {
-    std::string name;  ///< as messages call it; of a script, its path
-    std::string text;
-    bool script = false;
-    std::vector<std::string> arguments = {};  ///< of a script
-};
-
-namespace {
-
-std::vector<std::string> words_of(const std::string& line) {
-    std::istringstream in(line);
-    return {std::istream_iterator<std::string>(in), {}};
+int Shell::run_halfiles(const std::string& path, Output& output) {
+    return IniNetlists(*this, *state_, path, output).run_halfiles();
 }
-
-}  // namespace
 
 void Shell::run_scripts_with(ScriptRunner runner) { state_->run_script = std::move(runner); }
-
-/// Reads the files that a key of [HAL] names, relative to the folder of the INI file. Returns 1
-/// after reporting those that cannot be read.
-int Shell::take_files(const std::string& path, const char* key, std::vector<HalFile>& files,
-                      Output& output) {
-    int status = 0;
-    std::string at;  // of a file named by a relative path
-    for (const std::string& entry : state_->session.ini.all("HAL", key)) {
-        std::vector<std::string> words = words_of(entry);
-        const std::string file = words.empty() ? "" : words[0];
-        std::string text, problem = "it is a Tcl script";
-        const bool script = file.ends_with(".tcl");
-        if ((!script || state_->run_script) &&
-            read_netlist(file, options.directory, at, text, problem)) {
-            // Messages name it as the INI file was named.
-            const std::string beside = resolve_path(file, options.directory);
-            if (script) {
-                files.push_back({at, "", true, {words.begin() + 1, words.end()}});
-            } else {
-                files.push_back(
-                    {at == beside ? resolve_path(file, folder_of(path)) : at, std::move(text)});
-            }
-            continue;
-        }
-        if (options.check) {
-            state_->session.absences().note_missing_text(file);
-        }
-        status = script && !state_->run_script
-                     ? cannot_read(*this, output, file, problem, "unsupported-file",
-                                   "`hal run " + path +
-                                       "` executes it; or rewrite it as a .hal file, where loops "
-                                       "become ranges: pid.[0..5].command")
-                     : cannot_read(*this, output, file, problem, "unreadable-file",
-                                   "named by [HAL]" + std::string(key) + " in " + path +
-                                       "; HALLIB_PATH and HALLIB_DIR are further search paths");
-    }
-    return status;
-}
-
-int Shell::run_halfiles(const std::string& path, Output& output) {
-    const Borrowed in_folder(options.directory,
-                             folder_of(absolute_path(resolve_path(path, options.directory))));
-    std::vector<HalFile> files;
-    const int status = take_files(path, "HALFILE", files, output);
-    if (status != 0 && !options.keep_going) return status;
-    bool quit = false;
-    return status | run_taken(files, quit, output);
-}
-
-/// Runs netlists that were read, with [HAL]TWOPASS. Sets `quit` when a `quit` in them ends the
-/// loading.
-int Shell::run_taken(std::vector<HalFile>& files, bool& quit, Output& output) {
-    int status = 0;
-    const auto over = [&] {
-        return quit || (status != 0 && !options.keep_going && !options.check);
-    };
-    const bool two_pass = !state_->session.ini.get("HAL", "TWOPASS").value_or("").empty();
-    if (!two_pass) {
-        for (HalFile& file : files) {
-            status |= file.script
-                          ? state_->run_script(file.name, file.arguments, Pass::both, output)
-                          : run_text(file.name, std::move(file.text), output);
-            if (over()) break;
-        }
-        return status;
-    }
-    const bool scripts =
-        std::any_of(files.begin(), files.end(), [](const HalFile& file) { return file.script; });
-    std::vector<Command> module_loads;
-    for (const Pass pass : scripts || prefers_modules() ? std::vector{Pass::loads, Pass::rest}
-                                                        : std::vector{Pass::both}) {
-        state_->module_loads = pass == Pass::loads ? &module_loads : nullptr;
-        for (auto file = files.begin(); file != files.end() && !over();) {
-            if (file->script) {
-                status |= state_->run_script(file->name, file->arguments, pass, output);
-                ++file;
-                continue;
-            }
-            Script script(*this, *state_, output);
-            std::vector<std::uint32_t> sources;
-            for (; file != files.end() && !file->script; ++file) {
-                sources.push_back(script.add_text(file->name, file->text));
-            }
-            status |= script.run_two_pass(sources, pass);
-            quit = quit || script.quit_seen();
-        }
-        state_->module_loads = nullptr;
-        if (pass == Pass::loads && !over()) {
-            status |= Script(*this, *state_, output).run(module_loads);
-        }
-    }
-    const auto lock = state_->session.lock();
-    for (const std::uint32_t text : std::exchange(state_->module_load_texts, {})) {
-        state_->session.sources.release(text);
-    }
-    return status;
-}
-
-int Shell::run_ini(const std::string& path, Output& output) {
-    if (read_ini(path, output) != 0) return 1;
-    const Ini& ini = state_->session.ini;
-    // As LinuxCNC does, everything named in the file is relative to its folder.
-    const Borrowed in_folder(options.directory,
-                             folder_of(absolute_path(resolve_path(path, options.directory))));
-    if (options.check) {
-        note_programs(state_->session, ini);
-    }
-    std::vector<HalFile> files, after_display;
-    int status = options.check ? check_version(*this, path, output) : 0;
-    status |= take_files(path, "HALFILE", files, output);
-    // for `hal check` only: no user interface runs here
-    if (options.check) {
-        status |= take_files(path, "POSTGUI_HALFILE", after_display, output);
-    }
-    if (status != 0 && !options.keep_going) return status;
-    std::string commands;
-    for (const std::string& command : ini.all("HAL", "HALCMD")) {
-        commands += command + "\n";
-    }
-    if (status == 0 && files.empty() && commands.empty()) {
-        return reject_without_netlist(*this, path, output);
-    }
-    bool quit = false;
-    status |= run_taken(files, quit, output);
-    if (quit || (status != 0 && !options.keep_going && !options.check)) return status;
-    if (!commands.empty()) {
-        status |= run_text(path + " [HAL]HALCMD", std::move(commands), output);
-    }
-    for (HalFile& file : after_display) {
-        status |= run_text(file.name, std::move(file.text), output);
-    }
-    return status;
-}
 
 namespace {
 
@@ -430,9 +197,11 @@ void Shell::warn_when_nothing_ran(Output& output) {
     Diagnostics diagnostics;
     const auto lock = state_->session.lock();
     check_that_something_ran(state_->session, diagnostics);
-    if (!diagnostics.all().empty() && options.level != Level::nothing) {
-        output.err(render(diagnostics, state_->session.sources, options.color));
-    }
+    print_diagnostics(diagnostics, *this, output);
+}
+
+Completion Shell::complete(std::string_view line, std::size_t cursor) const {
+    return complete_line(state_->session, options, line, cursor);
 }
 
 bool Shell::may_wait(std::string_view text) {

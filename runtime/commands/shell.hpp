@@ -21,7 +21,6 @@ namespace hal {
 class Ini;
 class Session;
 struct Command;
-struct HalFile;
 
 /// Where the text of commands goes.
 class Output {
@@ -134,14 +133,8 @@ public:
     /// needs a thread for it.
     static bool may_wait(std::string_view text);
 
-    /// What could stand at `cursor` (a byte offset) of the line: only what the command would take
-    /// there.
+    /// As complete_line().
     Completion complete(std::string_view line, std::size_t cursor) const;
-
-    /// The manual of all commands in Markdown, made from the command table.
-    static std::string manual();
-    /// The page of a diagnostic code for `hal explain CODE`; empty when there is no such code.
-    static std::string explain(std::string_view code);
 
     /// What $NAME means in commands; empty: the environment of this process. A client of the socket
     /// brings its own.
@@ -159,10 +152,6 @@ public:
     struct State;
 
 private:
-    int run_ini(const std::string& path, Output& output);
-    int take_files(const std::string& path, const char* key, std::vector<HalFile>& files,
-                   Output& output);
-    int run_taken(std::vector<HalFile>& files, bool& quit, Output& output);
     std::unique_ptr<State> state_;
 };
 

@@ -18,10 +18,10 @@ bool is_include(const Command& command) {
 
 /// Adds an argument of a further `loadrt` of the same module: numbers of instances are added, lists
 /// are joined.
-void merge_argument(Command& command, const Token& argument) {
+void merge_argument(Command& loadrt, const Token& argument) {
     const auto equals = argument.text.find('=');
     const std::string key = argument.text.substr(0, equals + 1);
-    for (Token& there : command.args) {
+    for (Token& there : loadrt.args) {
         if (equals == std::string::npos || !there.text.starts_with(key)) continue;
         const auto first = parse_natural(there.text.substr(key.size()));
 
@@ -33,11 +33,11 @@ void merge_argument(Command& command, const Token& argument) {
         }
         return;
     }
-    command.args.push_back(argument);
+    loadrt.args.push_back(argument);
 }
 
 /// Returns the index of the argument that is the module's name.
-std::size_t name_at(const Command& command) { return command.args[0].text == "--linuxcnc" ? 1 : 0; }
+std::size_t name_at(const Command& loadrt) { return loadrt.args[0].text == "--linuxcnc" ? 1 : 0; }
 
 }  // namespace
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Which commands form a transaction, when it takes effect, and what the user reads about it.
+#include "commands/help.hpp"
 #include "commands/table.hpp"
 #include "shell_machine.hpp"
 
@@ -219,7 +220,7 @@ TEST(Script, every_row_of_the_table_is_found_by_its_name_and_has_a_summary) {
 TEST(Script,
      the_usage_of_every_row_is_the_one_in_its_error_its_help_the_manual_and_its_completion) {
     ShellMachine machine;
-    const std::string manual = Shell::manual();
+    const std::string manual = command_manual();
     for (const CommandRow& row : command_table()) {
         const std::string usage = to_string(row.usage());
         const std::string name = row.name;
@@ -289,7 +290,7 @@ TEST(Script, help_knows_every_command) {
     EXPECT_TRUE(has(machine.err, "did you mean 'net'")) << machine.err;
     EXPECT_TRUE(has(machine.says("explain two-writers"), "one writer")) << machine.out;
     EXPECT_EQ(machine.line("explain two-writer"), 1);
-    EXPECT_TRUE(has(Shell::manual(), "\n## net\n\n    net SIGNAL PIN...\n")) << Shell::manual();
+    EXPECT_TRUE(has(command_manual(), "\n## net\n\n    net SIGNAL PIN...\n")) << command_manual();
 }
 
 TEST(Script, arguments_are_counted_and_the_usage_shown) {
