@@ -256,10 +256,10 @@ namespace {
 void report_lasting(const std::vector<FaultRecord>& lasting, Span span, Diagnostics& diagnostics) {
     constexpr std::size_t max_named = 8;
     if (lasting.empty()) return;
-    const bool one = lasting.size() == 1;
-    std::string text = fmt::format(
-        "{} and {} not acknowledged:",
-        one ? "1 fault lasts" : fmt::format("{} faults last", lasting.size()), one ? "is" : "are");
+    std::string text = fmt::format("{} faults last and are not acknowledged:", lasting.size());
+    if (lasting.size() == 1) {
+        text = "1 fault lasts and is not acknowledged:";
+    }
     for (std::size_t i = 0; i < std::min(lasting.size(), max_named); ++i) {
         text += (i == 0 ? " " : "; ") + lasting[i].subject();
     }

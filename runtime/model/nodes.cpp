@@ -57,7 +57,13 @@ private:
     void one_signal(const std::vector<Seen>& seen) {
         std::vector<Seen> writers, readers, shared;
         for (const Seen& one : seen) {
-            (one.signal->writer ? writers : one.signal->ios != 0 ? shared : readers).push_back(one);
+            if (one.signal->writer) {
+                writers.push_back(one);
+            } else if (one.signal->ios != 0) {
+                shared.push_back(one);
+            } else {
+                readers.push_back(one);
+            }
         }
         if (readers.empty() && shared.empty()) {
             return;  // each node has its own

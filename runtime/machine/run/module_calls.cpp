@@ -81,7 +81,8 @@ int carry_out(const hal_host* host, const char* const* words, std::size_t count,
             return -EPERM;
         }
         if (!row->elaborate) {
-            return take_later(c, row->name, count > 1 ? words[1] : "0") ? 0 : -EINVAL;
+            const char* const number = count > 1 ? words[1] : "0";
+            return take_later(c, row->name, number) ? 0 : -EINVAL;
         }
         if (!enter_declared(c)) {
             c.said_why = true;

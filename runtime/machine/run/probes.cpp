@@ -74,6 +74,10 @@ private:
         return moved == homes_.end() ? pin.home : moved->second;
     }
 
+    const Thread* fastest_thread() const {
+        return model_.threads.empty() ? nullptr : model_.threads.front().get();
+    }
+
     // The writer's slot; without a writer in a thread, a slot that a thread reads; a cell is seen
     // from any thread.
     Place of(const Signal& signal, const Thread* reader) const {
@@ -84,11 +88,8 @@ private:
         }
         const auto& copies = next ? next->copies : signal.copies;
         if (const auto& cell = next ? next->cell : signal.cell) {
-            return {cell.get(),
-                    reader ? reader
-                    : copies.empty()
-                        ? model_.threads.empty() ? nullptr : model_.threads.front().get()
-                        : copies.front().first};
+            if (reader) return {cell.get(), reader};
+            return {cell.get(), copies.empty() ? fastest_thread() : copies.front().first};
         }
         if (!copies.empty()) {
             return {copies.front().second, copies.front().first};
