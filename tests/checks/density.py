@@ -24,7 +24,7 @@ ASSIGNMENT = r"[\w.\->\[\]()*]+ (?:=|\+=|-=|\|=) "
 COMMA = re.compile(
     rf"^\s*{ASSIGNMENT}[^;{{]*, {ASSIGNMENT}[^;]*;|return [\w.\->\[\]]+ = [^;]*, [^;]+;"
 )
-MEMBER = re.compile(r"^(?! )[\w:<>&*, ]*?\b([A-Z]\w+)::~?\w+\s*\(", re.MULTILINE)
+MEMBER = re.compile(r"^(?=\S)[\w:<>&*,\s]*?\b([A-Z]\w+)::~?\w+\s*\(", re.MULTILINE)
 
 
 def plain(text):
