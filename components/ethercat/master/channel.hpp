@@ -8,8 +8,8 @@
 #include <array>
 #include <cstdint>
 
-#include "ethercat/master/task.hpp"
 #include "ethercat/wire/frames.hpp"
+#include "hal/task.hpp"
 
 namespace hal::ethercat::master {
 
@@ -21,13 +21,18 @@ struct Answer {
 };
 
 /// See the top of this file. All functions [realtime], in the thread of the master's cycle.
-class Channel {
+///
+///     Task<bool> set_address(Channel& channel, std::uint16_t position, std::uint16_t address) {
+///         put(channel.data(), address);
+///         const Answer answer = co_await channel.exchange(
+///             Command::apwr, at_position(position, registers::station_address), 2);
+///         co_return answer.wkc == 1;
+///     }
+class Channel : public TaskChannel {
 public:
     static constexpr std::size_t largest = 1486;  ///< data bytes of a datagram
 
-    explicit Channel(std::size_t task_bytes = 16 * 1024) : memory_(task_bytes) {}
-    Channel(const Channel&) = delete;
-    Channel& operator=(const Channel&) = delete;
+    explicit Channel(std::size_t task_bytes = 16 * 1024) : TaskChannel(task_bytes) {}
 
     /// Returns the data of the next datagram, and after exchange() the answer.
     std::uint8_t* data() noexcept { return data_.data(); }
@@ -36,7 +41,7 @@ public:
     struct Exchange {
         Channel& channel;
         bool await_ready() const noexcept { return false; }
-        void await_suspend(std::coroutine_handle<> task) const noexcept { channel.resume_ = task; }
+        void await_suspend(std::coroutine_handle<> task) const noexcept { channel.suspend(task); }
         Answer await_resume() const noexcept { return channel.answer_; }
     };
     /// Sends a datagram with `length` bytes of data() to an address from at_position(),
@@ -70,17 +75,14 @@ public:
     template <class Make>
     void start(Make&& make) noexcept {
         stop();
-        task_ = make();
-        task_.begin();
+        TaskChannel::start(std::forward<Make>(make));
     }
     /// Ends the task where it waits. A datagram under way is ignored when it arrives.
     void stop() noexcept {
         stage_ = Stage::idle;
-        resume_ = {};
         generation_++;
-        task_.reset();
+        TaskChannel::stop();
     }
-    bool busy() const noexcept { return !task_.done(); }  ///< Returns whether a task is running.
 
     // For the engine.
     enum class Stage : std::uint8_t { idle, waiting, sent, sleeping };
@@ -114,16 +116,12 @@ public:
     void wake() noexcept { finish({}); }
 
 private:
-    friend TaskMemory& detail::memory_of(Channel&) noexcept;
     void finish(Answer answer) noexcept {
         answer_ = answer;
         stage_ = Stage::idle;
-        std::exchange(resume_, {}).resume();
+        resume();
     }
 
-    TaskMemory memory_;
-    Task<void> task_;
-    std::coroutine_handle<> resume_;
     std::array<std::uint8_t, largest> data_{};
     std::uint32_t address_ = 0;
     std::uint32_t generation_ = 0;
@@ -138,7 +136,5 @@ private:
     Command command_{};
     Stage stage_ = Stage::idle;
 };
-
-inline TaskMemory& detail::memory_of(Channel& channel) noexcept { return channel.memory_; }
 
 }  // namespace hal::ethercat::master

@@ -8,7 +8,6 @@
 
 #include "ethercat/master/bus_slave.hpp"
 #include "ethercat/master/channel.hpp"
-#include "ethercat/master/task.hpp"
 
 namespace hal::ethercat::master {
 

@@ -19,7 +19,6 @@
 #include "ethercat/master/bus_slave.hpp"
 #include "ethercat/master/channel.hpp"
 #include "ethercat/master/coe_access.hpp"
-#include "ethercat/master/task.hpp"
 #include "ethercat/wire/mailbox.hpp"
 
 namespace hal::ethercat::master {

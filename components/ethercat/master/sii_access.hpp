@@ -6,7 +6,6 @@
 #include <cstdint>
 
 #include "ethercat/master/channel.hpp"
-#include "ethercat/master/task.hpp"
 
 namespace hal::ethercat::master {
 

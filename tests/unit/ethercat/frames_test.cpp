@@ -51,6 +51,7 @@ TEST(EthercatFrame, Datagram_beyond_the_frame_is_not_read) {
 }
 
 using namespace hal::ethercat::master;
+using hal::Task;
 
 struct Two {
     Task<int> inner(Channel& channel, int by) {

@@ -10,6 +10,7 @@ namespace {
 
 using namespace hal::ethercat;
 using namespace hal::ethercat::master;
+using hal::Task;
 using hal::ethercat::tests::Bytes;
 using hal::ethercat::tests::MailboxSlave;
 

@@ -16,6 +16,7 @@ namespace master_world {
 
 using namespace hal::ethercat;
 using namespace hal::ethercat::master;
+using hal::Task;
 
 /// Follows every request; in SAFE-OP and OP it returns its outputs, plus one, as inputs.
 struct Firmware : esc::Application {
