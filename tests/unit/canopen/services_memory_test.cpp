@@ -6,6 +6,7 @@
 #include <new>
 
 #include "canopen/device/drive/drive.hpp"
+#include "canopen/master/boot/boot_channel.hpp"
 #include "canopen/master/boot/nmt_master.hpp"
 #include "canopen/protocol/device.hpp"
 
@@ -195,6 +196,8 @@ TEST(Memory, Is_not_taken_while_a_master_boots_loses_and_restarts_nodes) {
     EXPECT_EQ(taken, 0);
     EXPECT_TRUE(was_operational && was_lost && came_back);
     EXPECT_EQ(master.status(6).result, BootResult::update);
+    EXPECT_GT(master.max_task_memory(), 0U);
+    EXPECT_LT(master.max_task_memory(), BootChannel::task_bytes * 3 / 4);
     EXPECT_EQ(master.status().state, NetworkState::stopped);
 }
 

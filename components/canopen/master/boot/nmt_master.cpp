@@ -37,6 +37,14 @@ const NodeSetup* Master::setup(std::uint8_t id) const noexcept {
     return id < by_id_.size() && by_id_[id] != nullptr ? &by_id_[id]->setup : nullptr;
 }
 
+std::size_t Master::max_task_memory() const noexcept {
+    std::size_t used = 0;
+    for (const auto& n : nodes_) {
+        used = std::max(used, n->max_task_memory());
+    }
+    return used;
+}
+
 void Master::start(Time now) noexcept {
     now_ = now;
     status_.resets = 0;
@@ -50,14 +58,14 @@ void Master::start(Time now) noexcept {
 }
 
 void Master::boot_all(bool reset) noexcept {
-    auto how = reset ? Node::How::reset : Node::How::in_unknown_state;
+    auto how = reset ? BootStart::reset : BootStart::in_unknown_state;
     status_.operational_since = 0;
     started_together_ = false;
     was_operational_ = false;
     commands_waiting_ = 0;
-    if (how == Node::How::reset && !keeps_some_) {
+    if (how == BootStart::reset && !keeps_some_) {
         send(NmtCommand::reset_communication, 0);
-        how = Node::How::was_reset;
+        how = BootStart::was_reset;
     }
     for (auto& n : nodes_) {
         if (!n->removed) {
@@ -116,7 +124,9 @@ void Master::stand_by(Time now) noexcept {
 bool Master::command(NmtCommand command, std::uint8_t id, Time now) noexcept {
     now_ = now;
     if (id != 0) {
-        return id < by_id_.size() && by_id_[id] != nullptr && by_id_[id]->command(command, false);
+        if (setup(id) == nullptr) return false;
+        by_id_[id]->command(command, false);
+        return true;
     }
     send(command, 0);
     halted_ = false;
@@ -134,12 +144,13 @@ bool Master::restart(std::uint8_t id, Time now) noexcept {
     auto& node = *by_id_[id];
     node.removed = false;
     node.leave(Step::queued, Cause::none);
-    node.begin(Node::How::reset);
+    node.begin(BootStart::reset);
     if (halted_) {
         halted_ = false;
         set_state(NetworkState::booting, 0);
     }
-    return dirty_ = true;
+    dirty_ = true;
+    return true;
 }
 
 bool Master::remove(std::uint8_t id, Time now) noexcept {
@@ -149,7 +160,8 @@ bool Master::remove(std::uint8_t id, Time now) noexcept {
     send(NmtCommand::stop, id);
     node.removed = true;
     node.leave(Step::off, Cause::commanded);
-    return dirty_ = true;
+    dirty_ = true;
+    return true;
 }
 
 bool Master::handle(const Frame& f, Time now) noexcept {
@@ -212,35 +224,15 @@ void Master::on_emergency(std::uint8_t id, const Emergency& e) noexcept {
     events_.on_emergency(id, e);
 }
 
-/// Starts the nodes that are ready, in their start order.
+/// CiA 302-2, figure 2: starts the nodes that are ready.
 void Master::schedule() noexcept {
     if (ready_ == 0) return;
-    bool all = setup_.start_all_at_once && !started_together_;
-    bool reach = true;
+    if (setup_.start_all_at_once && !started_together_) return start_together();
     unsigned lowest = UINT_MAX;  // lowest start order that is not settled
     for (auto& n : nodes_) {
-        if (n->removed) continue;
-        const auto step = n->status.step;
-        if (step == Step::ready ? !n->setup.start : !n->missing && step != Step::running) {
-            reach = false;
-        }
-        if (step != Step::ready && (n->setup.mandatory || n->booting() || step == Step::queued)) {
-            all = false;
-        }
         if (!n->settled()) {
             lowest = std::min(lowest, n->setup.start_order);
         }
-    }
-    if (setup_.start_all_at_once && !started_together_) {
-        if (!all) return;
-        started_together_ = true;
-        if (reach && !send(NmtCommand::start, 0)) return;
-        for (auto& n : nodes_) {
-            if (n->status.step == Step::ready) {
-                n->start(reach);
-            }
-        }
-        return;
     }
     for (auto& n : nodes_) {
         if (n->status.step == Step::ready && n->setup.start_order <= lowest) {
@@ -249,42 +241,71 @@ void Master::schedule() noexcept {
     }
 }
 
-void Master::update() noexcept {
-    dirty_ = false;
-    auto& s = status_;
-    s.operational = s.mandatory_operational = s.booting = s.failed = s.mandatory = 0;
-    std::uint8_t culprit = 0;
-    bool culprit_failed = false;
+/// Starts all nodes that are ready as soon as no other node is waited for: by one command, unless
+/// that would start a node that is not to be started.
+void Master::start_together() noexcept {
+    bool by_one_command = true;
     for (auto& n : nodes_) {
         if (n->removed) continue;
-        const auto& status = n->status;
-        const bool bad = status.step == Step::failed || status.step == Step::waiting;
-        if (status.operational) {
-            ++s.operational;
-        }
-        if (n->booting() || status.step == Step::queued) {
-            ++s.booting;
-        }
-        if (bad) {
-            ++s.failed;
-        }
-        if (!n->setup.mandatory) continue;
-        ++s.mandatory;
-        if (status.operational) {
-            ++s.mandatory_operational;
-        }
-        if (!status.operational && (culprit == 0 || (bad && !culprit_failed))) {
-            culprit = status.id;
-            culprit_failed = bad;
+        const Step step = n->status.step;
+        const bool is_ready = step == Step::ready;
+        if (!is_ready && (n->setup.mandatory || n->booting() || step == Step::queued)) return;
+        const bool may_be_started = is_ready ? n->setup.start : n->missing || step == Step::running;
+        by_one_command = by_one_command && may_be_started;
+    }
+    started_together_ = true;
+    if (by_one_command && !send(NmtCommand::start, 0)) return;
+    for (auto& n : nodes_) {
+        if (n->status.step == Step::ready) {
+            n->start(by_one_command);
         }
     }
-    if (halted_ || s.state == NetworkState::off) return;
-    if (s.mandatory_operational != s.mandatory) {
+}
+
+void Master::count_nodes() noexcept {
+    const auto count = [](std::uint16_t& nodes, bool counts) {
+        if (counts) {
+            ++nodes;
+        }
+    };
+    auto& s = status_;
+    s.operational = s.mandatory_operational = s.booting = s.failed = s.mandatory = 0;
+    for (auto& n : nodes_) {
+        if (n->removed) continue;
+        const bool operational = n->status.operational;
+        const bool mandatory = n->setup.mandatory;
+        count(s.operational, operational);
+        count(s.booting, n->booting() || n->status.step == Step::queued);
+        count(s.failed, n->has_failed());
+        count(s.mandatory, mandatory);
+        count(s.mandatory_operational, mandatory && operational);
+    }
+}
+
+/// Returns the mandatory node that prevents the network from being operational: one that failed
+/// before one that boots; 0: none.
+std::uint8_t Master::find_culprit() const noexcept {
+    std::uint8_t booting = 0;
+    for (const auto& n : nodes_) {
+        if (n->removed || !n->setup.mandatory || n->status.operational) continue;
+        if (n->has_failed()) return n->status.id;
+        if (booting == 0) {
+            booting = n->status.id;
+        }
+    }
+    return booting;
+}
+
+void Master::update() noexcept {
+    dirty_ = false;
+    count_nodes();
+    if (halted_ || status_.state == NetworkState::off) return;
+    if (status_.mandatory_operational != status_.mandatory) {
         return set_state(was_operational_ ? NetworkState::degraded : NetworkState::booting,
-                         culprit);
+                         find_culprit());
     }
-    if (s.state != NetworkState::operational) {
-        s.operational_since = now_;
+    if (status_.state != NetworkState::operational) {
+        status_.operational_since = now_;
     }
     was_operational_ = true;
     set_state(NetworkState::operational, 0);

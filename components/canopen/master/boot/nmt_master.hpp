@@ -26,7 +26,8 @@
 namespace hal::canopen {
 
 /// Notifications of the master, besides Events::on_node() and on_emergency(). All calls come from
-/// poll(), handle() or a command. [realtime]
+/// poll(), handle() or a command, in the middle of a boot: they must not command the master.
+/// [realtime]
 class MasterEvents : public Events {
 public:
     /// NodeStatus::step changed; other members may have changed as well.
@@ -80,6 +81,9 @@ public:
     Network& network() noexcept { return network_; }
     /// Returns the time of the last call. [realtime]
     Time now() const noexcept { return now_; }
+    /// Returns the largest use of the memory of a node's tasks so far, in bytes, of the
+    /// BootChannel::task_bytes that each node has. [any]
+    std::size_t max_task_memory() const noexcept;
     /// Returns the state of a node as a sentence; see node_status.hpp. [setup]
     std::string sentence(std::uint8_t id) const;
     /// Returns the state of the network as a sentence. [setup]
@@ -98,6 +102,9 @@ private:
     void halt(NetworkState, std::uint8_t because_of) noexcept;
     void reset_all(std::uint8_t because_of) noexcept;
     void schedule() noexcept;
+    void start_together() noexcept;
+    void count_nodes() noexcept;
+    std::uint8_t find_culprit() const noexcept;
     void update() noexcept;
     void set_state(NetworkState, std::uint8_t node) noexcept;
     void own_state(NmtState) noexcept;
