@@ -5,6 +5,17 @@
 
 namespace hal::canopen {
 
+namespace {
+
+/// Returns the most significant `bits` of a number.
+std::uint32_t leading_bits(std::uint32_t number, unsigned bits) noexcept {
+    if (bits == 0) return 0;
+    if (bits == 32) return number;
+    return number & ~(0xffffffffU >> bits);
+}
+
+}  // namespace
+
 bool LssMaster::send(std::uint8_t command, std::uint32_t value) noexcept {
     Frame f = make_frame(lss_master_to_slave, 8);
     f.data[0] = command;
@@ -14,7 +25,7 @@ bool LssMaster::send(std::uint8_t command, std::uint32_t value) noexcept {
 
 bool LssMaster::expect(std::uint8_t command, std::uint32_t value, Time now) noexcept {
     if (busy() || !send(command, value)) return false;
-    job_ = Job::expect;
+    expecting_ = true;
     expected_ = command;
     result_ = {};
     asked_ = now_ = now;
@@ -65,100 +76,80 @@ bool LssMaster::identify_unconfigured(Time now) noexcept {
     return true;
 }
 
-// Fastscan asks bit by bit whether a slave exists whose number continues with 0; no response means
-// 1.
-
 bool LssMaster::scan(Time now, const Identity& known,
                      const std::array<std::uint8_t, 4>& known_bits) noexcept {
     if (busy()) return false;
     known_ = known;
     known_bits_ = known_bits;
     result_ = {};
-    part_ = 0;
-    repeats_left_ = settings_.repeats;
     now_ = now;
-    job_ = Job::scan_reset;
-    send_scan(0x80, 0);
+    channel_.start([&] { return fastscan(channel_); });
     return true;
 }
 
-void LssMaster::send_scan(std::uint8_t bit, std::uint8_t next) noexcept {
+/// CiA 305, fastscan: asks bit by bit whether a slave without node ID exists whose number continues
+/// with 0; no response means 1. A contradiction means that a response was lost or late: the step is
+/// repeated with a longer timeout.
+Task<> LssMaster::fastscan(Channel& channel) noexcept {
+    constexpr std::uint8_t reset = 0x80;
+    unsigned repeat = 0;
+    for (;; ++repeat) {
+        const bool any = co_await ask(reset, 0, 0, repeat);
+        if (any) break;
+        if (repeat == settings_.repeats) co_return;
+    }
+    for (std::uint8_t part = 0; part < 4; ++part) {
+        for (;; ++repeat) {
+            const bool confirmed = co_await scan_part(channel, part, repeat);
+            if (confirmed) break;
+            if (repeat >= settings_.repeats) co_return;
+        }
+        repeat = 0;
+    }
+    result_.answered = true;
+}
+
+/// Finds one part of the identity. Returns true if a slave confirms it.
+Task<bool> LssMaster::scan_part(Channel&, std::uint8_t part, unsigned repeat) noexcept {
+    const unsigned given = std::min<unsigned>(known_bits_[part], 32);
+    result_.identity[part] = leading_bits(known_[part], given);
+    for (unsigned bit = 32 - given; bit-- > 0;) {
+        const bool zero = co_await ask(static_cast<std::uint8_t>(bit), part, part, repeat);
+        if (!zero) {
+            result_.identity[part] |= 1U << bit;
+        }
+    }
+    const auto next = static_cast<std::uint8_t>(part == 3 ? 0 : part + 1);
+    const bool confirmed = co_await ask(0, part, next, repeat);
+    co_return confirmed;
+}
+
+/// Asks all slaves; those whose number agrees down to `bit_checked` respond. `next` becomes their
+/// part if they do. The timeout doubles with each repetition.
+LssMaster::Question LssMaster::ask(std::uint8_t bit_checked, std::uint8_t part, std::uint8_t next,
+                                   unsigned repeat) noexcept {
     frame_ = make_frame(lss_master_to_slave, 8);
     frame_.data[0] = 0x51;
-    store(frame_.data.data() + 1, bit == 0x80 ? 0U : result_.identity[part_]);
-    frame_.data[5] = bit;
-    frame_.data[6] = part_;
+    store(frame_.data.data() + 1, bit_checked == 0x80 ? 0U : result_.identity[part]);
+    frame_.data[5] = bit_checked;
+    frame_.data[6] = part;
     frame_.data[7] = next;
     unsent_ = !out_.push(frame_);
     heard_ = false;
+    wait_ = settings_.scan_timeout << std::min(repeat, 5U);
     asked_ = now_;
-}
-
-void LssMaster::scan_part() noexcept {
-    const auto given = std::min<unsigned>(known_bits_[part_], 32);
-    result_.identity[part_] =
-        given == 0 ? 0 : known_[part_] & (given == 32 ? 0xffffffffU : ~(0xffffffffU >> given));
-    if (given == 32) {
-        job_ = Job::scan_confirm;
-        return send_scan(0, static_cast<std::uint8_t>(part_ == 3 ? 0 : part_ + 1));
-    }
-    job_ = Job::scan_bit;
-    bit_ = static_cast<std::uint8_t>(31 - given);
-    send_scan(bit_, part_);
-}
-
-/// Doubles with each repetition: the responses may have been late.
-Time LssMaster::scan_wait() const noexcept {
-    return settings_.scan_timeout << std::min(settings_.repeats - repeats_left_, 5U);
-}
-
-void LssMaster::scan_answer(bool yes) noexcept {
-    switch (job_) {
-    case Job::scan_reset:
-        if (yes) return scan_part();
-        if (repeats_left_ != 0) {
-            --repeats_left_;
-            return send_scan(0x80, 0);
-        }
-        job_ = Job::none;
-        return;
-    case Job::scan_bit:
-        if (!yes) {
-            result_.identity[part_] |= 1U << bit_;
-        }
-        if (bit_ != 0) return send_scan(--bit_, part_);
-        job_ = Job::scan_confirm;
-        return send_scan(0, static_cast<std::uint8_t>(part_ == 3 ? 0 : part_ + 1));
-    case Job::scan_confirm:
-        if (!yes) {  // a response was lost, or an earlier one was invalid
-            if (repeats_left_ != 0) {
-                --repeats_left_;
-                return scan_part();
-            }
-            job_ = Job::none;
-            return;
-        }
-        repeats_left_ = settings_.repeats;
-        if (part_ == 3) {
-            result_.answered = true;
-            job_ = Job::none;
-            return;
-        }
-        ++part_;
-        return scan_part();
-    default: return;
-    }
+    return {*this};
 }
 
 void LssMaster::handle(const Frame& f, Time now) noexcept {
     now_ = now;
     if (!busy() || f.length != 8) return;
-    if (job_ != Job::expect) {
+    if (!expecting_) {
         // All matching slaves respond one after the other: the next request waits for the last of
         // them.
         if (f.data[0] == 0x4f && !unsent_ && !heard_) {
             heard_ = true;
-            asked_ = now - scan_wait() + settings_.scan_timeout / 4;
+            asked_ = now - wait_ + settings_.scan_timeout / 4;
         }
         return;
     }
@@ -172,25 +163,24 @@ void LssMaster::handle(const Frame& f, Time now) noexcept {
     } else if (expected_ == 0x5e) {
         result_.value = f.data[1];
     }
-    job_ = Job::none;
+    expecting_ = false;
 }
 
 void LssMaster::poll(Time now) noexcept {
     now_ = now;
-    if (!busy()) return;
-    if (job_ == Job::expect) {
-        if (now - asked_ >= settings_.timeout) {
-            job_ = Job::none;
-        }
-        return;
+    if (expecting_) {
+        expecting_ = now - asked_ < settings_.timeout;
+    } else if (channel_.busy()) {
+        poll_scan(now);
     }
+}
+
+void LssMaster::poll_scan(Time now) noexcept {
     if (unsent_) {
         unsent_ = !out_.push(frame_);
         asked_ = now;
-        return;
-    }
-    if (now - asked_ >= scan_wait()) {
-        scan_answer(heard_);
+    } else if (now - asked_ >= wait_) {
+        channel_.resume();
     }
 }
 

@@ -9,6 +9,7 @@
 #pragma once
 
 #include "frames.hpp"
+#include "hal/task.hpp"
 #include "lss.hpp"
 
 namespace hal::canopen {
@@ -46,7 +47,7 @@ public:
     /// Returns the settings; changes apply from the next job on. [realtime]
     LssMasterSettings& settings() noexcept { return settings_; }
     /// Returns true while a job is in progress. [realtime]
-    bool busy() const noexcept { return job_ != Job::none; }
+    bool busy() const noexcept { return expecting_ || channel_.busy(); }
     /// Returns the result of the last job. [realtime]
     const Result& result() const noexcept { return result_; }
     /// Returns true for frames that handle() must get. [any]
@@ -86,30 +87,47 @@ public:
     bool scan(Time now, const Identity& known = {},
               const std::array<std::uint8_t, 4>& known_bits = {}) noexcept;
     /// Ends the job without a result.
-    void cancel() noexcept { job_ = Job::none; }
+    void cancel() noexcept {
+        expecting_ = false;
+        channel_.stop();
+    }
 
 private:
-    enum class Job : std::uint8_t { none, expect, scan_reset, scan_bit, scan_confirm };
+    /// The tasks of a scan; each waits for the answers to one question.
+    struct Channel : TaskChannel {
+        Channel() : TaskChannel(1024) {}
+        using TaskChannel::resume;
+        using TaskChannel::suspend;
+    };
+    struct Question {
+        LssMaster& master;
+        bool await_ready() const noexcept { return false; }
+        void await_suspend(std::coroutine_handle<> task) const noexcept {
+            master.channel_.suspend(task);
+        }
+        bool await_resume() const noexcept { return master.heard_; }
+    };
     bool send(std::uint8_t command, std::uint32_t value = 0) noexcept;
     bool expect(std::uint8_t command, std::uint32_t value, Time now) noexcept;
-    void send_scan(std::uint8_t bit, std::uint8_t next) noexcept;
-    void scan_part() noexcept;
-    void scan_answer(bool yes) noexcept;
-    Time scan_wait() const noexcept;
+    Task<> fastscan(Channel&) noexcept;
+    Task<bool> scan_part(Channel&, std::uint8_t part, unsigned repeat) noexcept;
+    Question ask(std::uint8_t bit_checked, std::uint8_t part, std::uint8_t next,
+                 unsigned repeat) noexcept;
+    void poll_scan(Time now) noexcept;
 
     FrameQueue& out_;
     LssMasterSettings settings_;
-    Job job_ = Job::none;
+    bool expecting_ = false;  // the answer `expected_` to a single request
     std::uint8_t expected_ = 0;
     Result result_;
     Identity known_{};
     std::array<std::uint8_t, 4> known_bits_{};
-    std::uint8_t part_ = 0;
-    std::uint8_t bit_ = 0;
-    unsigned repeats_left_ = 0;
+    Channel channel_;
+    // of the question of a scan
+    Frame frame_;
     bool unsent_ = false;
     bool heard_ = false;
-    Frame frame_;
+    Time wait_ = 0;
     Time asked_ = 0;
     Time now_ = 0;
 };
