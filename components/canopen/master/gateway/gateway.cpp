@@ -22,22 +22,43 @@ std::string upper(const char* text) {
             c = '_';
         } else if (c >= 'a' && c <= 'z') {
             c = static_cast<char>(c - 'a' + 'A');
-        } else {
-            c = c;
         }
     }
     return out;
 }
 
+NmtCommand nmt_command(Verb verb) {
+    switch (verb) {
+    case Verb::start: return NmtCommand::start;
+    case Verb::stop: return NmtCommand::stop;
+    case Verb::preoperational: return NmtCommand::enter_pre_operational;
+    case Verb::reset_node: return NmtCommand::reset_node;
+    default: return NmtCommand::reset_communication;
+    }
+}
+
+struct Range {
+    std::uint32_t min = 0;
+    std::uint32_t max = UINT32_MAX;
+    std::string text() const { return std::to_string(min) + " to " + std::to_string(max); }
+};
+
+/// Returns the values that a setting may have.
+Range range_of(Verb setting) {
+    switch (setting) {
+    case Verb::set_heartbeat: return {0, 65535};
+    case Verb::set_id: return {1, 127};
+    case Verb::set_command_size: return {1, 16 << 20};
+    case Verb::set_sdo_timeout: return {1, 600'000};
+    case Verb::set_sdo_block: return {0, 1};
+    default: return {};
+    }
+}
+
 }  // namespace
 
 Gateway::Net::Net(Gateway& owner, unsigned n)
-    : gateway(owner),
-      number(n),
-      network(out, *this),
-      lss(out),
-      pdos(out),
-      own(own_objects(owner.identity_)) {
+    : gateway(owner), number(n), network(out, *this), lss(out), pdos(out), own(owner.identity_) {
     for (std::uint8_t node = 1; node <= 127; ++node) {
         network.add(node);
     }
@@ -45,18 +66,25 @@ Gateway::Net::Net(Gateway& owner, unsigned n)
 
 void Gateway::Net::on_node(std::uint8_t node, NodeEvent event, NmtState state, Time) noexcept {
     const std::string who = std::to_string(number) + " " + std::to_string(node) + " ";
-    const bool guarded = watches[node];
-    if (event == NodeEvent::boot_up) {
+    switch (event) {
+    case NodeEvent::boot_up:
         if (boot_up) {
-            gateway.send_event(who + "BOOT_UP");
+            gateway.clients_.send_event(who + "BOOT_UP");
         }
-    } else if (event == NodeEvent::lost) {
-        const Error what =
-            network.node(node)->guarded() ? Error::lost_guarding : Error::lost_heartbeat;
-        gateway.send_event(who + "ERROR " + std::to_string(static_cast<unsigned>(what)) + " #" +
-                           to_string(what));
-    } else if (guarded) {
-        gateway.send_event(who + upper(canopen::to_string(state)));
+        return;
+    case NodeEvent::lost: {
+        const bool guarded = network.node(node)->guarded();
+        const Error what = guarded ? Error::lost_guarding : Error::lost_heartbeat;
+        gateway.clients_.send_event(who + "ERROR " + std::to_string(static_cast<unsigned>(what)) +
+                                    " #" + to_string(what));
+        return;
+    }
+    case NodeEvent::alive:
+    case NodeEvent::changed:
+        if (watches[node]) {
+            gateway.clients_.send_event(who + upper(canopen::to_string(state)));
+        }
+        return;
     }
 }
 
@@ -66,7 +94,7 @@ void Gateway::Net::on_emergency(std::uint8_t node, const Emergency& e) noexcept 
     for (const auto byte : e.manufacturer) {
         text += " " + std::to_string(byte);
     }
-    gateway.send_event(text + " #" + emergency_text(e.code));
+    gateway.clients_.send_event(text + " #" + emergency_text(e.code));
 }
 
 Gateway::Gateway(unsigned nets, Identity identity) : identity_(std::move(identity)) {
@@ -85,169 +113,180 @@ void Gateway::handle(unsigned net, const Frame& f, Time now) {
     Net& n = *nets_[net - 1];
     if (n.lss.listens_to(f)) return n.lss.handle(f, now);
     n.network.handle(f, now);
-    n.pdos.handle(f,
-                  [&](const std::string& text) { send_event(std::to_string(net) + " " + text); });
+    n.pdos.handle(
+        f, [&](const std::string& text) { clients_.send_event(std::to_string(net) + " " + text); });
 }
 
 void Gateway::poll(Time now) {
     for (auto& net : nets_) {
         net->network.poll(now);
         net->lss.poll(now);
-        if (net->heartbeat == 0 || net->id == 0 || now < net->next_heartbeat) continue;
-        Frame beat = make_frame(0x700U + net->id, 1);
-        beat.data[0] = static_cast<std::uint8_t>(NmtState::operational);
-        if (net->out.push(beat)) {
-            net->next_heartbeat = std::max(net->next_heartbeat + net->heartbeat, now);
-        }
+        net->own.poll(net->out, now);
     }
     for (auto p = pending_.begin(); p != pending_.end();) {
         if (!proceed(*p, now)) {
             ++p;
             continue;
         }
-        Client& client = clients_[static_cast<std::size_t>(p->client)];
-        if (client.pending > 0) {
-            --client.pending;
-        }
+        clients_.remove_pending(p->client);
         p = pending_.erase(p);
     }
 }
 
-void Gateway::line(int client, std::string_view text, Time now) {
+int Gateway::connect() { return clients_.connect({.net = nets_.size() == 1 ? 1U : 0U}); }
+
+void Gateway::disconnect(int client) {
+    for (auto p = pending_.begin(); p != pending_.end();) {
+        if (p->client != client) {
+            ++p;
+            continue;
+        }
+        cancel(*p);
+        p = pending_.erase(p);
+    }
+    clients_.disconnect(client);
+}
+
+void Gateway::receive(int client, std::string_view bytes, Time now) {
+    clients_.receive(client, bytes,
+                     [&](const std::string& text) { execute_line(client, text, now); });
+}
+
+void Gateway::configure(std::string_view commands, Time now) {
+    const int client = connect();
+    receive(client, commands, now);
+    disconnect(client);
+}
+
+void Gateway::execute_line(int client, std::string_view text, Time now) {
     Parsed parsed = parse(text);
     if (parsed.error != Error::none) {
-        return reject(client, parsed.command.sequence, parsed.error, parsed.why);
+        return reject(client, parsed.command, parsed.error, parsed.why);
     }
     execute(client, std::move(parsed.command), now);
 }
 
-/// Determines net and node of a command, or the defaults of the client. Returns false after
-/// rejecting the command.
-bool Gateway::address(Client& c, const Command& command, int client, bool with_node, unsigned& net,
-                      std::uint8_t& node) {
-    net = command.net.value_or(c.net);
-    if (net == 0 && !command.net) {
-        reject(client, command.sequence, Error::no_net);
-        return false;
-    }
-    if (net < 1 || net > nets_.size()) {
-        reject(client, command.sequence, Error::bad_net);
-        return false;
-    }
-    if (!with_node) return true;
-    if (!command.node && c.node == 0) {
-        reject(client, command.sequence, Error::no_node);
-        return false;
-    }
-    const auto id = command.node.value_or(c.node);
-    if (id > 127) {
-        reject(client, command.sequence, Error::bad_node);
-        return false;
-    }
+/// Determines net and node of a command, or the defaults of the client.
+Error Gateway::find_address(int client, const Command& command, unsigned& net, std::uint8_t& node) {
+    const Clients::Defaults& defaults = clients_.defaults(client);
+    net = command.net.value_or(defaults.net);
+    if (net == 0 && !command.net) return Error::no_net;
+    if (net < 1 || net > nets_.size()) return Error::bad_net;
+    const bool to_node = command.verb == Verb::read || command.verb == Verb::write ||
+                         (command.verb >= Verb::start && command.verb <= Verb::disable_heartbeat);
+    if (!to_node) return Error::none;
+    if (!command.node && defaults.node == 0) return Error::no_node;
+    const auto id = command.node.value_or(defaults.node);
+    if (id > 127) return Error::bad_node;
     node = static_cast<std::uint8_t>(id);
-    return true;
+    return Error::none;
+}
+
+/// Executes a command that is for no net. Returns false if it is for one.
+bool Gateway::execute_in_gateway(int client, const Command& command) {
+    switch (command.verb) {
+    case Verb::none: return true;
+    case Verb::help: help(client, command); return true;
+    case Verb::set_network: {
+        const unsigned net = command.numbers[0];
+        if (net < 1 || net > nets_.size()) {
+            reject(client, command, Error::bad_net);
+            return true;
+        }
+        clients_.defaults(client).net = net;
+        answer(client, command, "OK");
+        return true;
+    }
+    default: return false;
+    }
+}
+
+void Gateway::help(int client, const Command& command) {
+    std::string text = "OK";
+    for (const char letter : help_text()) {
+        text += letter == '\n' ? std::string("\r\n# ") : std::string(1, letter);
+    }
+    answer(client, command, text.insert(2, "\r\n# ").substr(0, text.size() - 4));
+}
+
+void Gateway::set_default_node(int client, const Command& command, const Net& net) {
+    const unsigned node = command.numbers[0];
+    if (node < 1 || node > 127) return reject(client, command, Error::bad_node);
+    clients_.defaults(client) = {.net = net.number, .node = node};
+    answer(client, command, "OK");
 }
 
 void Gateway::execute(int client, Command&& command, Time now) {
-    Client& c = clients_[static_cast<std::size_t>(client)];
-    unsigned net = 0;
+    if (execute_in_gateway(client, command)) return;
+    unsigned net_number = 0;
     std::uint8_t node = 0;
-    const bool to_node = command.verb == Verb::read || command.verb == Verb::write ||
-                         (command.verb >= Verb::start && command.verb <= Verb::disable_heartbeat);
+    const Error error = find_address(client, command, net_number, node);
+    if (error != Error::none) return reject(client, command, error);
+    const Address to{*nets_[net_number - 1], node};
     switch (command.verb) {
-    case Verb::none: return;
-    case Verb::help: {
-        std::string text = "OK";
-        for (const char letter : help_text()) {
-            text += letter == '\n' ? std::string("\r\n# ") : std::string(1, letter);
-        }
-        return answer(client, command.sequence,
-                      text.insert(2, "\r\n# ").substr(0, text.size() - 4));
-    }
-    case Verb::set_network:
-        if (command.numbers[0] < 1 || command.numbers[0] > nets_.size()) {
-            return reject(client, command.sequence, Error::bad_net);
-        }
-        c.net = command.numbers[0];
-        return answer(client, command.sequence, "OK");
-    default: break;
-    }
-    if (!address(c, command, client, to_node, net, node)) return;
-    Net& n = *nets_[net - 1];
-    switch (command.verb) {
-    case Verb::set_node:
-        if (command.numbers[0] < 1 || command.numbers[0] > 127) {
-            return reject(client, command.sequence, Error::bad_node);
-        }
-        c.net = net;
-        c.node = command.numbers[0];
-        return answer(client, command.sequence, "OK");
+    case Verb::set_node: return set_default_node(client, command, to.net);
     case Verb::read:
-    case Verb::write: return start_transfer(client, std::move(command), n, node, now);
-    case Verb::read_pdo:
+    case Verb::write: return start_transfer(client, std::move(command), to, now);
+    case Verb::read_pdo: return read_pdo(client, std::move(command), to.net, now);
     case Verb::write_pdo:
     case Verb::set_rpdo:
-    case Verb::set_tpdo: return pdo_command(client, std::move(command), n, now);
+    case Verb::set_tpdo: return pdo_command(client, command, to.net);
     case Verb::start:
     case Verb::stop:
     case Verb::preoperational:
     case Verb::reset_node:
-    case Verb::reset_communication: return network_command(client, command, n, node, now);
+    case Verb::reset_communication: return network_command(client, command, to);
     case Verb::enable_guarding:
     case Verb::disable_guarding:
     case Verb::enable_heartbeat:
-    case Verb::disable_heartbeat: return error_control(client, command, n, node, now);
+    case Verb::disable_heartbeat: return error_control(client, command, to, now);
     default: break;
     }
     if (command.verb >= Verb::lss_switch_global) {
-        return start_lss(client, std::move(command), n, now);
+        return start_lss(client, std::move(command), to.net, now);
     }
-    setting(client, command, n, now);
+    setting(client, command, to.net, now);
 }
 
-void Gateway::network_command(int client, const Command& c, Net& net, std::uint8_t node, Time) {
-    const NmtCommand what = c.verb == Verb::start            ? NmtCommand::start
-                            : c.verb == Verb::stop           ? NmtCommand::stop
-                            : c.verb == Verb::preoperational ? NmtCommand::enter_pre_operational
-                            : c.verb == Verb::reset_node     ? NmtCommand::reset_node
-                                                             : NmtCommand::reset_communication;
-    if (node != 0 && node == net.id) {
+void Gateway::network_command(int client, const Command& c, const Address& to) {
+    if (to.node != 0 && to.node == to.net.own.id()) {
         return reject(
-            client, c.sequence, Error::state,
-            "node " + std::to_string(node) + " is the gateway itself, always operational");
+            client, c, Error::state,
+            "node " + std::to_string(to.node) + " is the gateway itself, always operational");
     }
-    if (!net.network.command(what, node)) {
-        return reject(client, c.sequence, Error::no_memory, "the bus does not take it");
+    if (!to.net.network.command(nmt_command(c.verb), to.node)) {
+        return reject(client, c, Error::no_memory, "the bus does not take it");
     }
-    answer(client, c.sequence, "OK");
+    answer(client, c, "OK");
 }
 
-void Gateway::error_control(int client, const Command& c, Net& net, std::uint8_t node, Time now) {
-    if (node == 0) return reject(client, c.sequence, Error::bad_node);
-    if (node == net.id) {
-        return reject(client, c.sequence, Error::state,
-                      "node " + std::to_string(node) +
+void Gateway::error_control(int client, const Command& c, const Address& to, Time now) {
+    if (to.node == 0) return reject(client, c, Error::bad_node);
+    if (to.node == to.net.own.id()) {
+        return reject(client, c, Error::state,
+                      "node " + std::to_string(to.node) +
                           " is the gateway itself, which does not monitor itself");
     }
-    RemoteNode& remote = *net.network.node(node);
+    const auto fits = [&](std::size_t n, std::uint32_t max) {
+        return c.numbers[n] >= 1 && c.numbers[n] <= max;
+    };
+    RemoteNode& remote = *to.net.network.node(to.node);
     switch (c.verb) {
     case Verb::enable_guarding:
-        if (c.numbers[0] < 1 || c.numbers[0] > 65535 || c.numbers[1] < 1 || c.numbers[1] > 255) {
-            return reject(client, c.sequence, Error::syntax, "1 to 65535 ms, factor 1 to 255");
+        if (!fits(0, 65535) || !fits(1, 255)) {
+            return reject(client, c, Error::syntax, "1 to 65535 ms, factor 1 to 255");
         }
         remote.guard(c.numbers[0] * millisecond, static_cast<std::uint8_t>(c.numbers[1]), now);
         break;
     case Verb::disable_guarding: remote.guard(0, 0, now); break;
     case Verb::enable_heartbeat:
-        if (c.numbers[0] < 1 || c.numbers[0] > 65535) {
-            return reject(client, c.sequence, Error::syntax, "1 to 65535 ms");
-        }
+        if (!fits(0, 65535)) return reject(client, c, Error::syntax, "1 to 65535 ms");
         remote.expect_heartbeat(c.numbers[0] * millisecond);
         break;
     default: remote.expect_heartbeat(0); break;
     }
-    net.watches[node] = c.verb == Verb::enable_guarding || c.verb == Verb::enable_heartbeat;
-    answer(client, c.sequence, "OK");
+    to.net.watches[to.node] = c.verb == Verb::enable_guarding || c.verb == Verb::enable_heartbeat;
+    answer(client, c, "OK");
 }
 
 void Gateway::reset(Net& net, Time now) {
@@ -257,11 +296,8 @@ void Gateway::reset(Net& net, Time now) {
             continue;
         }
         cancel(*p);
-        reject(p->client, p->command.sequence, Error::state, "ended by init");
-        Client& client = clients_[static_cast<std::size_t>(p->client)];
-        if (client.pending > 0) {
-            --client.pending;
-        }
+        reject(p->client, p->command, Error::state, "ended by init");
+        clients_.remove_pending(p->client);
         p = pending_.erase(p);
     }
     net.pdos.clear();
@@ -279,10 +315,10 @@ std::string Gateway::commands() const {
         const auto line = [&](const char* what, std::uint64_t value) {
             text += to + what + " " + std::to_string(value) + "\n";
         };
-        if (net->id != 0) {
-            line("id", net->id);
+        if (net->own.id() != 0) {
+            line("id", net->own.id());
         }
-        line("heartbeat", static_cast<std::uint64_t>(net->heartbeat / millisecond));
+        line("heartbeat", static_cast<std::uint64_t>(net->own.heartbeat() / millisecond));
         line("command_timeout", static_cast<std::uint64_t>(net->command_timeout / millisecond));
         line("command_size", net->command_size);
         line("sdo_timeout", static_cast<std::uint64_t>(net->sdo_timeout / millisecond));
@@ -294,132 +330,129 @@ std::string Gateway::commands() const {
 }
 
 void Gateway::setting(int client, const Command& c, Net& net, Time now) {
-    const std::uint32_t value = c.numbers.empty() ? 0 : c.numbers[0];
-    const auto range = [&](std::uint32_t least, std::uint32_t most) {
-        if (value >= least && value <= most) return true;
-        reject(client, c.sequence, Error::syntax,
-               std::to_string(least) + " to " + std::to_string(most));
-
-        return false;
-    };
     switch (c.verb) {
-    case Verb::init:
-        if (!range(0, 9)) return;
-        if (!initialise(net.number, value)) {
-            return reject(client, c.sequence, Error::init_failed,
-                          "the bus runs at another bit rate");
-        }
-        reset(net, now);
-        break;
-    case Verb::set_heartbeat:
-        if (!range(0, 65535)) return;
-        net.heartbeat = value * millisecond;
-        net.next_heartbeat = now;
-        break;
-    case Verb::set_id:
-        if (!range(1, 127)) return;
-        net.id = static_cast<std::uint8_t>(value);
-        break;
-    case Verb::set_command_timeout: net.command_timeout = value * millisecond; break;
-    case Verb::set_command_size:
-        if (!range(1, 16 << 20)) return;
-        net.command_size = value;
-        break;
+    case Verb::init: return initialise_net(client, c, net, now);
+    case Verb::store: return save(client, c, commands());
+    case Verb::restore: return save(client, c, "");
+    case Verb::info_version: return info_version(client, c);
+    default: break;
+    }
+    const Range range = range_of(c.verb);
+    const std::uint32_t value = c.numbers.empty() ? 0 : c.numbers[0];
+    if (value < range.min || value > range.max) {
+        return reject(client, c, Error::syntax, range.text());
+    }
+    apply_setting(c.verb, value, net, now);
+    answer(client, c, "OK");
+}
+
+void Gateway::apply_setting(Verb verb, std::uint32_t value, Net& net, Time now) {
+    switch (verb) {
+    case Verb::set_heartbeat: net.own.set_heartbeat(value * millisecond, now); return;
+    case Verb::set_id: net.own.set_id(static_cast<std::uint8_t>(value)); return;
+    case Verb::set_command_timeout: net.command_timeout = value * millisecond; return;
+    case Verb::set_command_size: net.command_size = value; return;
     case Verb::set_sdo_timeout:
-        if (!range(1, 600'000)) return;
         net.sdo_timeout = value * millisecond;
         for (std::uint8_t node = 1; node <= 127; ++node) {
             net.network.node(node)->sdo().settings().timeout = net.sdo_timeout;
         }
-        break;
-    case Verb::set_sdo_block:
-        if (!range(0, 1)) return;
-        net.block = value != 0;
-        break;
-    case Verb::boot_up_indication: net.boot_up = value != 0; break;
-    case Verb::store:
-        if (!keep(commands())) {
-            return reject(client, c.sequence, Error::state, "there is no place to store in");
-        }
-        break;
-    case Verb::restore: {
-        if (!keep("")) {
-            return reject(client, c.sequence, Error::state, "there is no place to store in");
-        }
-        break;
+        return;
+    case Verb::set_sdo_block: net.block = value != 0; return;
+    case Verb::boot_up_indication: net.boot_up = value != 0; return;
+    default: return;
     }
-    case Verb::info_version:
-        // vendor, product, revision, serial, class, CiA 309, ours
-        return answer(
-            client, c.sequence,
-            format_text("%u %u %u.%u %u 3 3.0 1.0", identity_.vendor, identity_.product,
-                        identity_.revision >> 16, identity_.revision & 0xffff, identity_.serial));
-    default: return reject(client, c.sequence, Error::not_supported);
-    }
-    answer(client, c.sequence, "OK");
 }
 
-bool Gateway::enqueue(int client, Command&& command, Net& net, std::uint8_t node, Time now) {
-    Client& c = clients_[static_cast<std::size_t>(client)];
-    if (c.pending >= most_pending) {
-        reject(client, command.sequence, Error::no_memory,
-               "too many commands wait for their answers");
+void Gateway::initialise_net(int client, const Command& c, Net& net, Time now) {
+    const Range range{0, 9};
+    const std::uint32_t bit_rate = c.numbers[0];
+    if (bit_rate > range.max) return reject(client, c, Error::syntax, range.text());
+    if (!initialise(net.number, bit_rate)) {
+        return reject(client, c, Error::init_failed, "the bus runs at another bit rate");
+    }
+    reset(net, now);
+    answer(client, c, "OK");
+}
 
+void Gateway::save(int client, const Command& c, const std::string& settings) {
+    if (!keep(settings)) {
+        return reject(client, c, Error::state, "there is no place to store in");
+    }
+    answer(client, c, "OK");
+}
+
+/// Vendor, product, revision, serial, class, CiA 309, ours.
+void Gateway::info_version(int client, const Command& c) {
+    answer(client, c,
+           format_text("%u %u %u.%u %u 3 3.0 1.0", identity_.vendor, identity_.product,
+                       identity_.revision >> 16, identity_.revision & 0xffff, identity_.serial));
+}
+
+bool Gateway::enqueue(int client, Command&& command, const Address& to, Time now) {
+    if (!clients_.add_pending(client)) {
+        reject(client, command, Error::no_memory, "too many commands wait for their answers");
         return false;
     }
-    ++c.pending;
     Pending& p = pending_.emplace_back();
     p.client = client;
-    p.net = net.number;
-    p.node = node;
+    p.net = to.net.number;
+    p.node = to.node;
     p.command = std::move(command);
     p.since = now;
-    p.limit = net.command_timeout;
+    p.limit = to.net.command_timeout;
     return true;
 }
 
-void Gateway::start_transfer(int client, Command&& command, Net& net, std::uint8_t node, Time now) {
-    if (node == 0) return reject(client, command.sequence, Error::bad_node);
+void Gateway::start_transfer(int client, Command&& command, const Address& to, Time now) {
+    Net& net = to.net;
+    if (to.node == 0) return reject(client, command, Error::bad_node);
     if (command.value.size() > net.command_size) {
-        return reject(client, command.sequence, Error::no_memory,
+        return reject(client, command, Error::no_memory,
                       "set command_size allows " + std::to_string(net.command_size) + " bytes");
     }
-    if (node == net.id) return own_transfer(client, command, net, now);
-    if (!enqueue(client, std::move(command), net, node, now)) return;
+    if (to.node == net.own.id()) return answer(client, command, net.own.transfer(command, now));
+    if (!enqueue(client, std::move(command), to, now)) return;
     Pending& p = pending_.back();
     p.request.index = p.command.index;
     p.request.sub = p.command.sub;
     p.request.upload = p.command.verb == Verb::read;
     p.request.mode = net.block ? SdoMode::block : SdoMode::segmented;
     if (p.request.upload) {
-        p.room = std::make_unique_for_overwrite<std::uint8_t[]>(net.command_size);
-        p.request.buffer = {p.room.get(), net.command_size};
+        p.buffer = std::make_unique_for_overwrite<std::uint8_t[]>(net.command_size);
+        p.request.buffer = {p.buffer.get(), net.command_size};
     } else {
         p.request.data = p.command.value;
     }
-    net.network.node(node)->sdo().submit(p.request);
+    net.network.node(to.node)->sdo().submit(p.request);
 }
 
-void Gateway::pdo_command(int client, Command&& c, Net& net, Time now) {
-    std::string text;
-    Error error = Error::none;
-    switch (c.verb) {
-    case Verb::set_rpdo:
-    case Verb::set_tpdo: error = net.pdos.configure(c.verb == Verb::set_rpdo, c); break;
-    case Verb::write_pdo: error = net.pdos.write(c, text); break;
-    default:
-        if (net.pdos.request(c.numbers[0])) {
-            enqueue(client, std::move(c), net, 0, now);
-            return;
-        }
-        error = net.pdos.read(c.numbers[0], text);
-        if (error == Error::none) {
-            return answer(client, c.sequence, std::to_string(net.number) + " " + text);
-        }
-        text = "nothing has come yet, or set rpdo is missing";
+void Gateway::start_lss(int client, Command&& command, Net& net, Time now) {
+    const Error error = lss_argument_error(command);
+    if (error != Error::none) return reject(client, command, error);
+    enqueue(client, std::move(command), {net}, now);
+}
+
+void Gateway::pdo_command(int client, const Command& c, Net& net) {
+    std::string why;
+    const Error error = c.verb == Verb::write_pdo ? net.pdos.write(c, why)
+                                                  : net.pdos.configure(c.verb == Verb::set_rpdo, c);
+    if (error != Error::none) return reject(client, c, error, why);
+    answer(client, c, "OK");
+}
+
+/// Answers with the newest value, or requests a PDO of type `rtr` and waits for it.
+void Gateway::read_pdo(int client, Command&& c, Net& net, Time now) {
+    if (net.pdos.request(c.numbers[0])) {
+        enqueue(client, std::move(c), {net}, now);
+        return;
     }
-    if (error != Error::none) return reject(client, c.sequence, error, text);
-    answer(client, c.sequence, "OK");
+    std::string text;
+    const Error error = net.pdos.read(c.numbers[0], text);
+    if (error != Error::none) {
+        return reject(client, c, error, "nothing has come yet, or set rpdo is missing");
+    }
+    answer(client, c, std::to_string(net.number) + " " + text);
 }
 
 void Gateway::cancel(Pending& p) {
@@ -428,7 +461,7 @@ void Gateway::cancel(Pending& p) {
         if (!p.request.done()) {
             net.network.node(p.node)->sdo().cancel(p.request);
         }
-    } else if (p.lss_started) {
+    } else if (p.lss.uses_master()) {
         net.lss.cancel();
         net.lss_owner = nullptr;
     }
@@ -437,36 +470,55 @@ void Gateway::cancel(Pending& p) {
 bool Gateway::proceed(Pending& p, Time now) {
     if (p.limit != 0 && now - p.since >= p.limit && !p.request.done()) {
         cancel(p);
-        reject(p.client, p.command.sequence, Error::timeout);
+        reject(p.client, p.command, Error::timeout);
         return true;
     }
     switch (p.command.verb) {
     case Verb::read:
-    case Verb::write: return proceed_transfer(p, now);
-    case Verb::read_pdo: {
-        Net& net = *nets_[p.net - 1];
-        std::string text;
-        if (net.pdos.read(p.command.numbers[0], text) == Error::none) {
-            answer(p.client, p.command.sequence, std::to_string(p.net) + " " + text);
-            return true;
-        }
-        if (now - p.since < net.sdo_timeout) return false;
-        reject(p.client, p.command.sequence, Error::timeout);
-        return true;
-    }
+    case Verb::write: return proceed_transfer(p);
+    case Verb::read_pdo: return proceed_pdo(p, now);
     default: return proceed_lss(p, now);
     }
 }
 
-bool Gateway::proceed_transfer(Pending& p, Time) {
+bool Gateway::proceed_transfer(Pending& p) {
     if (!p.request.done()) return false;
     if (p.request.abort != Abort::none) {
-        answer(p.client, p.command.sequence, abort_text(p.request.abort));
+        answer(p.client, p.command, abort_text(p.request.abort));
     } else if (p.command.verb == Verb::write) {
-        answer(p.client, p.command.sequence, "OK");
+        answer(p.client, p.command, "OK");
     } else {
-        const Format* f = p.command.format ? p.command.format : format("hex");
-        answer(p.client, p.command.sequence, text_of({p.room.get(), p.request.size}, *f));
+        answer(p.client, p.command, value_text({p.buffer.get(), p.request.size}, p.command.format));
+    }
+    return true;
+}
+
+bool Gateway::proceed_pdo(Pending& p, Time now) {
+    const Net& net = *nets_[p.net - 1];
+    std::string text;
+    if (net.pdos.read(p.command.numbers[0], text) == Error::none) {
+        answer(p.client, p.command, std::to_string(p.net) + " " + text);
+        return true;
+    }
+    if (now - p.since < net.sdo_timeout) return false;
+    reject(p.client, p.command, Error::timeout);
+    return true;
+}
+
+bool Gateway::proceed_lss(Pending& p, Time now) {
+    Net& net = *nets_[p.net - 1];
+    const bool in_use = net.lss_owner != nullptr && net.lss_owner != &p;
+    const auto response = p.lss.proceed(p.command, net.lss, in_use, now);
+    if (!response && p.lss.uses_master()) {
+        net.lss_owner = &p;
+    } else if (net.lss_owner == &p) {
+        net.lss_owner = nullptr;
+    }
+    if (!response) return false;
+    if (response->error != Error::none) {
+        reject(p.client, p.command, response->error);
+    } else {
+        answer(p.client, p.command, response->text);
     }
     return true;
 }

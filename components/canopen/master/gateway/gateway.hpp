@@ -9,6 +9,7 @@
 //     ... send gateway.output(client) to the client, gateway.out(1) to the bus ...
 #pragma once
 
+#include <array>
 #include <functional>
 #include <list>
 #include <memory>
@@ -17,41 +18,20 @@
 #include <vector>
 
 #include "canopen/master/network.hpp"
-#include "canopen/protocol/dictionary.hpp"
+#include "gateway_clients.hpp"
 #include "gateway_command.hpp"
+#include "gateway_lss.hpp"
+#include "gateway_own_node.hpp"
 #include "gateway_pdo.hpp"
 
 namespace hal::canopen::gateway {
 
-/// Returns the response to an SDO abort: `ERROR:0x06020000 #object does not exist …`.
-std::string abort_text(Abort);
-/// The identity of a gateway in `info version`, and in its own node as 1018h, 1008h (product name)
-/// and 2000h (the three names).
-struct Identity {
-    static constexpr std::size_t most_name = 200;  ///< bytes of a name
-    /// as registered with CiA; 0: none. revision: major << 16 | minor
-    std::uint32_t vendor = 0;
-    std::uint32_t product = 0;
-    std::uint32_t revision = 0;
-    std::uint32_t serial = 0;
-    std::string vendor_name = "Halcyon";
-    std::string product_name = "Halcyon CiA 309-3 gateway";
-
-    std::string order_code = "";
-};
-/// Returns the objects of the own node of a gateway.
-Description own_objects(const Identity&);
-
 /// The gateway: nets count from 1, clients are numbers from connect().
 class Gateway {
 public:
-    static constexpr std::size_t most_line = 4 << 20;
-
-public:
+    static constexpr std::size_t most_line = Clients::max_line;
     static constexpr std::size_t most_output = 32 << 20;
-
-public:
-    static constexpr std::size_t most_pending = 64;
+    static constexpr std::size_t most_pending = Clients::max_pending;
 
     /// Creates a gateway with `nets` networks. A single net is the default of every client.
     explicit Gateway(unsigned nets, Identity identity = {});
@@ -77,13 +57,9 @@ public:
     void receive(int client, std::string_view bytes, Time now);
     /// Returns the output for a client; the caller removes what it sent. A client whose output
     /// exceeds most_output does not read and should be disconnected.
-    std::string& output(int client) { return clients_[static_cast<std::size_t>(client)].out; }
-
+    std::string& output(int client) { return clients_.output(client); }
     /// Returns true when all commands of a client are done and the caller has sent the output.
-    bool is_served(int client) const {
-        const Client& c = clients_[static_cast<std::size_t>(client)];
-        return c.pending == 0 && c.out.empty();
-    }
+    bool is_served(int client) const { return clients_.is_served(client); }
 
     /// Returns the transmit queue of a net.
     FrameQueue& out(unsigned net) { return nets_[net - 1]->out; }
@@ -95,15 +71,6 @@ public:
     bool idle() const { return pending_.empty(); }
 
 private:
-    struct Client {
-        /// skips: discards the rest of a line that was too long
-        bool connected = false;
-        bool skips = false;
-        std::string in, out;
-        unsigned net = 0;
-        unsigned node = 0;  ///< defaults; 0: none
-        std::size_t pending = 0;
-    };
     struct Pending;
     struct Net final : Events {
         Net(Gateway& gateway, unsigned number);
@@ -116,15 +83,13 @@ private:
         Network network;
         LssMaster lss;
         Pdos pdos;
-        std::uint8_t id = 0;  ///< own node; 0: none
-        /// its objects, for clients of this gateway only, not for the bus
-        Dictionary own;
-        Time heartbeat = 0;
-        Time next_heartbeat = 0;
+        OwnNode own;
         Time command_timeout = 0;
         Time sdo_timeout = 500 * millisecond;
         std::size_t command_size = 1 << 20;
-        bool block = false, boot_up = true, watches[128] = {};
+        bool block = false;  ///< SDO block transfer
+        bool boot_up = true;  ///< reports boot-up messages
+        std::array<bool, 128> watches = {};  ///< nodes with error control
         const Pending* lss_owner = nullptr;  ///< the command that uses the LSS master
     };
     /// A command without a response yet.
@@ -134,42 +99,54 @@ private:
         std::uint8_t node = 0;
         Command command = {};
         SdoRequest request = {};
-        std::unique_ptr<std::uint8_t[]> room = {};
+        std::unique_ptr<std::uint8_t[]> buffer = {};  ///< of a read
         Time since = 0;
         Time limit = 0;
-        bool lss_started = false;
-        unsigned part = 0;  ///< of lss_inquire_addr
-        std::string text = {};
+        LssJob lss = {};
     };
 
-    void line(int client, std::string_view text, Time now);
+    /// Net and node that a command is for.
+    struct Address {
+        Net& net;
+        std::uint8_t node = 0;
+    };
+    void execute_line(int client, std::string_view text, Time now);
     void execute(int client, Command&&, Time now);
-    bool address(Client&, const Command&, int client, bool node, unsigned& net_number,
-                 std::uint8_t& node_id);
-    void answer(int client, std::uint32_t sequence, const std::string& text);
-    void reject(int client, std::uint32_t sequence, Error, const std::string& why = "");
-    void send_event(const std::string& event);
+    bool execute_in_gateway(int client, const Command&);
+    Error find_address(int client, const Command&, unsigned& net, std::uint8_t& node);
+    void help(int client, const Command&);
+    void set_default_node(int client, const Command&, const Net&);
 
-    void network_command(int client, const Command&, Net&, std::uint8_t node, Time now);
-    void error_control(int client, const Command&, Net&, std::uint8_t node, Time now);
+    void network_command(int client, const Command&, const Address&);
+    void error_control(int client, const Command&, const Address&, Time now);
     void setting(int client, const Command&, Net&, Time now);
-    void pdo_command(int client, Command&&, Net&, Time now);
-    void start_transfer(int client, Command&&, Net&, std::uint8_t node, Time now);
+    static void apply_setting(Verb, std::uint32_t value, Net&, Time now);
+    void initialise_net(int client, const Command&, Net&, Time now);
+    void save(int client, const Command&, const std::string& settings);
+    void info_version(int client, const Command&);
+    void pdo_command(int client, const Command&, Net&);
+    void read_pdo(int client, Command&&, Net&, Time now);
+    void start_transfer(int client, Command&&, const Address&, Time now);
     void start_lss(int client, Command&&, Net&, Time now);
-    void own_transfer(int client, const Command&, Net&, Time now);
-    bool enqueue(int client, Command&&, Net&, std::uint8_t node, Time now);
+    bool enqueue(int client, Command&&, const Address&, Time now);
     /// Returns true once the command has its response.
     bool proceed(Pending&, Time now);
-    bool proceed_transfer(Pending&, Time now);
+    bool proceed_transfer(Pending&);
+    bool proceed_pdo(Pending&, Time now);
     bool proceed_lss(Pending&, Time now);
-    bool begin_lss(Pending&, Net&, Time now);
     void cancel(Pending&);
     void reset(Net&, Time now);
     std::string commands() const;
+    void answer(int client, const Command& c, const std::string& text) {
+        clients_.answer(client, c.sequence, text);
+    }
+    void reject(int client, const Command& c, Error error, const std::string& why = "") {
+        clients_.reject(client, c.sequence, error, why);
+    }
 
     const Identity identity_;
     std::vector<std::unique_ptr<Net>> nets_;
-    std::vector<Client> clients_;
+    Clients clients_;
     std::list<Pending> pending_;
 };
 

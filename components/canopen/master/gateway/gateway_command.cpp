@@ -176,10 +176,9 @@ struct Reader {
             type = on_event;
         } else if (word == "rtr") {
             type = on_request;
-        } else if (word.starts_with("sync") &&
-                   (word.size() == 4 || number(word.substr(4), 240, type))) {
-            type = word.size() == 4 ? 1 : type;
-        } else {
+        } else if (word == "sync") {
+            type = 1;
+        } else if (!word.starts_with("sync") || !number(word.substr(4), 240, type)) {
             return fail("invalid transmission type '" + word.substr(0, 40) +
                         "': use event, rtr, sync0 to sync240");
         }
@@ -232,68 +231,81 @@ struct Reader {
         ++at;
         return end();
     }
+    bool next_is(std::string_view a, std::string_view b) const {
+        return more() && (same_word(words[at], a) || same_word(words[at], b));
+    }
+    std::vector<std::uint32_t> address();
+    bool transfer(bool writes, const std::vector<std::uint32_t>& before);
+    bool simple(const std::string& first, const std::vector<std::uint32_t>& before);
     bool command();
 };
 
-bool Reader::command() {
-    Command& c = out.command;
-    std::vector<std::uint32_t> before;
+/// The numbers before the command: net and node. One too many is kept, for the message.
+std::vector<std::uint32_t> Reader::address() {
+    std::vector<std::uint32_t> numbers;
     std::uint32_t value = 0;
-    while (more() && before.size() < 3 && number(words[at], UINT32_MAX, value)) {
-        before.push_back(value);
+    while (more() && numbers.size() < 3 && number(words[at], UINT32_MAX, value)) {
+        numbers.push_back(value);
         ++at;
     }
-    if (!more()) return fail("the command is missing");
-    const std::string first = words[at++];
-    const auto is = [&](const char* a, const char* b) {
-        return same_word(first, a) || same_word(first, b);
-    };
-    const auto next_is = [&](const char* a, const char* b) {
-        return more() && (same_word(words[at], a) || same_word(words[at], b));
-    };
-    if (is("read", "r") || is("write", "w")) {
-        const bool writes = is("write", "w");
-        const bool pdo = next_is("pdo", "p");
-        c.verb = pdo      ? writes ? Verb::write_pdo : Verb::read_pdo
-                 : writes ? Verb::write
-                          : Verb::read;
-        if (!scope(pdo ? Scope::net : Scope::node, before)) return false;
-        if (pdo) {
-            ++at;
-        }
-        return pdo ? pdo_values(writes) : object(writes);
+    return numbers;
+}
+
+/// `read` and `write`, of an object or of a PDO.
+bool Reader::transfer(bool writes, const std::vector<std::uint32_t>& before) {
+    const bool is_pdo = next_is("pdo", "p");
+    if (!is_pdo) {
+        out.command.verb = writes ? Verb::write : Verb::read;
+        return scope(Scope::node, before) && object(writes);
     }
-    if (is("set", "set") && next_is("rpdo", "tpdo")) {
-        c.verb = same_word(words[at], "rpdo") ? Verb::set_rpdo : Verb::set_tpdo;
-        ++at;
-        return scope(Scope::net, before) && pdo_setup();
-    }
-    if (is("boot_up_indication", "boot_up_indication")) {
-        c.verb = Verb::boot_up_indication;
-        return scope(Scope::net, before) && flag();
-    }
-    if (is("help", "help")) {
-        c.verb = Verb::help;
-        return true;
-    }
+    out.command.verb = writes ? Verb::write_pdo : Verb::read_pdo;
+    if (!scope(Scope::net, before)) return false;
+    ++at;
+    return pdo_values(writes);
+}
+
+/// A command of the table of rows.
+bool Reader::simple(const std::string& first, const std::vector<std::uint32_t>& before) {
     bool known = false;
     for (const Row& row : rows) {
         if (!same_word(first, row.first)) continue;
         known = true;
-        if (!row.second.empty() && !(more() && same_word(words[at], row.second))) continue;
         if (!row.second.empty()) {
+            if (!next_is(row.second, row.second)) continue;
             ++at;
         }
-        c.verb = row.verb;
+        out.command.verb = row.verb;
         return scope(row.scope, before) && numbers(row.least, row.most);
     }
-    if (known) {
-        return fail("what to " + first +
-                        (more() ? " is not '" + words[at].substr(0, 40) + "'" : " is missing") +
-                        "; see: help",
+    if (!known) {
+        return fail("unknown command '" + first.substr(0, 40) + "'; see: help",
                     Error::not_supported);
     }
-    return fail("unknown command '" + first.substr(0, 40) + "'; see: help", Error::not_supported);
+    const std::string found = more() ? " is not '" + words[at].substr(0, 40) + "'" : " is missing";
+    return fail("what to " + first + found + "; see: help", Error::not_supported);
+}
+
+bool Reader::command() {
+    const std::vector<std::uint32_t> before = address();
+    if (!more()) return fail("the command is missing");
+    const std::string first = words[at++];
+    const auto is = [&](std::string_view word) { return same_word(first, word); };
+    if (is("read") || is("r")) return transfer(false, before);
+    if (is("write") || is("w")) return transfer(true, before);
+    if (is("set") && next_is("rpdo", "tpdo")) {
+        out.command.verb = same_word(words[at], "rpdo") ? Verb::set_rpdo : Verb::set_tpdo;
+        ++at;
+        return scope(Scope::net, before) && pdo_setup();
+    }
+    if (is("boot_up_indication")) {
+        out.command.verb = Verb::boot_up_indication;
+        return scope(Scope::net, before) && flag();
+    }
+    if (is("help")) {
+        out.command.verb = Verb::help;
+        return true;
+    }
+    return simple(first, before);
 }
 
 }  // namespace

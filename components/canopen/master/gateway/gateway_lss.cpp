@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The LSS commands of the gateway: one at a time on each net, in the order in which they came.
-#include <cstdio>
+#include "gateway_lss.hpp"
 
-#include "gateway.hpp"
+#include <cstdio>
 
 namespace hal::canopen::gateway {
 
@@ -11,6 +10,14 @@ namespace {
 std::string hexadecimal(std::uint32_t value) {
     char text[16];
     std::snprintf(text, sizeof text, "0x%08X", static_cast<unsigned>(value));
+    return text;
+}
+
+std::string identity_text(const canopen::Identity& identity) {
+    std::string text;
+    for (const std::uint32_t part : identity) {
+        text += (text.empty() ? "" : " ") + hexadecimal(part);
+    }
     return text;
 }
 
@@ -37,29 +44,24 @@ bool fits(const Command& c) {
 
 }  // namespace
 
-void Gateway::start_lss(int client, Command&& c, Net& net, Time now) {
-    if (fits(c)) {
-        enqueue(client, std::move(c), net, 0, now);
-    } else {
-        reject(client, c.sequence,
-               c.verb == Verb::lss_bit_rate   ? Error::lss_bit_rate
-               : c.verb == Verb::lss_set_node ? Error::lss_node_id
-                                              : Error::syntax);
-    }
+Error lss_argument_error(const Command& c) {
+    if (fits(c)) return Error::none;
+    if (c.verb == Verb::lss_bit_rate) return Error::lss_bit_rate;
+    if (c.verb == Verb::lss_set_node) return Error::lss_node_id;
+    return Error::syntax;
 }
 
 /// Returns false while the transmit queue is full.
-bool Gateway::begin_lss(Pending& p, Net& net, Time now) {
-    LssMaster& lss = net.lss;
-    const auto& n = p.command.numbers;
-    switch (p.command.verb) {
+bool LssJob::begin(const Command& c, LssMaster& lss, Time now) const {
+    const auto& n = c.numbers;
+    switch (c.verb) {
     case Verb::lss_switch_global: return lss.switch_global(n[0] != 0);
     case Verb::lss_switch_selective: return lss.select({n[0], n[1], n[2], n[3]}, now);
     case Verb::lss_set_node: return lss.configure_node_id(static_cast<std::uint8_t>(n[0]), now);
     case Verb::lss_bit_rate: return lss.configure_bit_timing(static_cast<std::uint8_t>(n[1]), now);
     case Verb::lss_activate: return lss.activate_bit_timing(static_cast<std::uint16_t>(n[0]));
     case Verb::lss_store: return lss.store_configuration(now);
-    case Verb::lss_inquire: return lss.inquire(n.empty() ? p.part : n[0], now);
+    case Verb::lss_inquire: return lss.inquire(n.empty() ? part_ : n[0], now);
     case Verb::lss_get_node: return lss.inquire(4, now);
     case Verb::lss_identify:
         return lss.identify({n[0], n[1], n[2], n[4]}, {n[0], n[1], n[3], n[5]}, now);
@@ -73,43 +75,27 @@ bool Gateway::begin_lss(Pending& p, Net& net, Time now) {
     }
 }
 
-bool Gateway::proceed_lss(Pending& p, Time now) {
-    Net& net = *nets_[p.net - 1];
-    if (!p.lss_started) {
-        if (net.lss_owner != nullptr || net.lss.busy() || !begin_lss(p, net, now)) return false;
-        net.lss_owner = &p;
-        p.lss_started = true;
+std::optional<LssJob::Response> LssJob::proceed(const Command& c, LssMaster& lss, bool in_use,
+                                                Time now) {
+    if (!started_) {
+        if (in_use || lss.busy() || !begin(c, lss, now)) return {};
+        started_ = true;
     }
-    if (net.lss.busy()) return false;
-    const LssMaster::Result& r = net.lss.result();
-    const auto end = [&](Error error, const std::string& text = "OK") {
-        net.lss_owner = nullptr;
-        if (error != Error::none) {
-            reject(p.client, p.command.sequence, error);
-        } else {
-            answer(p.client, p.command.sequence, text);
-        }
-        return true;
-    };
-    // nobody answers these
-    if (p.command.verb == Verb::lss_switch_global || p.command.verb == Verb::lss_activate) {
-        return end(Error::none);
-    }
-    if (!r.answered) return end(Error::timeout);
-    switch (p.command.verb) {
+    if (lss.busy()) return {};
+    const LssMaster::Result& result = lss.result();
+    const bool has_no_answer = c.verb == Verb::lss_switch_global || c.verb == Verb::lss_activate;
+    if (has_no_answer) return Response{};
+    if (!result.answered) return Response{Error::timeout};
+    switch (c.verb) {
     case Verb::lss_inquire:
-        p.text += (p.text.empty() ? "" : " ") + hexadecimal(r.value);
-        if (!p.command.numbers.empty() || p.part == 3) return end(Error::none, p.text);
-        ++p.part;
-        net.lss_owner = nullptr;
-        p.lss_started = false;
-        return false;
-    case Verb::lss_get_node: return end(Error::none, std::to_string(r.value));
-    case Verb::lss_fastscan:
-        return end(Error::none, hexadecimal(r.identity[0]) + " " + hexadecimal(r.identity[1]) +
-                                    " " + hexadecimal(r.identity[2]) + " " +
-                                    hexadecimal(r.identity[3]));
-    default: return end(error_of(p.command.verb, r));
+        text_ += (text_.empty() ? "" : " ") + hexadecimal(result.value);
+        if (!c.numbers.empty() || part_ == 3) return Response{Error::none, text_};
+        ++part_;
+        started_ = false;  // for the next part
+        return {};
+    case Verb::lss_get_node: return Response{Error::none, std::to_string(result.value)};
+    case Verb::lss_fastscan: return Response{Error::none, identity_text(result.identity)};
+    default: return Response{error_of(c.verb, result)};
     }
 }
 

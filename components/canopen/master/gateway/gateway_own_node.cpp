@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The gateway's own node: a few objects that its clients read and write, and the bus does not
-// reach.
-#include <cstdio>
+#include "gateway_own_node.hpp"
 
-#include "gateway.hpp"
+#include <algorithm>
+#include <cstdio>
 
 namespace hal::canopen::gateway {
 
@@ -40,26 +39,34 @@ Description own_objects(const Identity& identity) {
     return d;
 }
 
-/// The gateway's own node answers at once.
-void Gateway::own_transfer(int client, const Command& c, Net& net, Time now) {
-    net.own.set(0x1017, 0, static_cast<std::uint16_t>(net.heartbeat / millisecond));
-    if (c.verb == Verb::write) {
-        if (const Abort abort = net.own.write(c.index, c.sub, c.value); abort != Abort::none) {
-            return answer(client, c.sequence, abort_text(abort));
-        }
-        if (c.index == 0x1017) {
-            net.heartbeat = net.own.get<std::uint16_t>(0x1017, 0) * millisecond;
+std::string value_text(std::span<const std::uint8_t> value, const Format* wanted) {
+    return text_of(value, wanted != nullptr ? *wanted : *format("hex"));
+}
 
-            net.next_heartbeat = now;
+std::string OwnNode::transfer(const Command& c, Time now) {
+    dictionary_.set(0x1017, 0, static_cast<std::uint16_t>(heartbeat_ / millisecond));
+    if (c.verb == Verb::write) {
+        const Abort abort = dictionary_.write(c.index, c.sub, c.value);
+        if (abort != Abort::none) return abort_text(abort);
+        if (c.index == 0x1017) {
+            set_heartbeat(dictionary_.get<std::uint16_t>(0x1017, 0) * millisecond, now);
         }
-        return answer(client, c.sequence, "OK");
+        return "OK";
     }
-    std::uint8_t room[Identity::most_name];  // as long as the longest of own_objects()
+    std::uint8_t value[Identity::most_name];  // as long as the longest of own_objects()
     std::size_t size = 0;
-    const Abort abort = net.own.read(c.index, c.sub, room, size);
-    answer(client, c.sequence,
-           abort != Abort::none ? abort_text(abort)
-                                : text_of({room, size}, c.format ? *c.format : *format("hex")));
+    const Abort abort = dictionary_.read(c.index, c.sub, value, size);
+    if (abort != Abort::none) return abort_text(abort);
+    return value_text({value, size}, c.format);
+}
+
+void OwnNode::poll(FrameQueue& out, Time now) {
+    if (heartbeat_ == 0 || id_ == 0 || now < next_heartbeat_) return;
+    Frame beat = make_frame(0x700U + id_, 1);
+    beat.data[0] = static_cast<std::uint8_t>(NmtState::operational);
+    if (out.push(beat)) {
+        next_heartbeat_ = std::max(next_heartbeat_ + heartbeat_, now);
+    }
 }
 
 }  // namespace hal::canopen::gateway

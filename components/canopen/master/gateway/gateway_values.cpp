@@ -84,31 +84,42 @@ std::string quoted(std::span<const std::uint8_t> bytes) {
     return out + "\"";
 }
 
-bool number(std::string_view text, const Format& format, std::vector<std::uint8_t>& bytes) {
+/// Returns the largest magnitude of a number: a hexadecimal one may have all bits of its type.
+std::uint64_t max_magnitude(const Format& format, bool negative, bool hexadecimal) {
     const unsigned bits = bits_of(format.type);
-    std::uint64_t value = 0;
-    if (is_real(format.type)) {
-        double real = 0;
-        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), real);
-        if (text.empty() || error != std::errc() || end != text.data() + text.size()) return false;
-        if (format.type == Type::real32) {
-            store(&value, static_cast<float>(real));
-        } else {
-            store(&value, real);
-        }
+    const std::uint64_t all_ones = bits == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
+    if (negative) return is_signed(format.type) ? (all_ones >> 1) + 1 : 0;
+    return is_signed(format.type) && !hexadecimal ? all_ones >> 1 : all_ones;
+}
+
+bool real(std::string_view text, const Format& format, std::uint64_t& value) {
+    double number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (text.empty() || error != std::errc() || end != text.data() + text.size()) return false;
+    if (format.type == Type::real32) {
+        store(&value, static_cast<float>(number));
     } else {
-        bool negative = false;
-        if (!read_number(text, negative, value)) return false;
-        const std::uint64_t top = bits == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
-        const std::uint64_t most = negative ? (top >> 1) + 1
-                                   : is_signed(format.type) && !text.starts_with("0x") ? top >> 1
-                                                                                       : top;
-        if (value > most || (negative && !is_signed(format.type) && value != 0)) return false;
-        if (negative) {
-            value = ~value + 1;
-        }
+        store(&value, number);
     }
-    bytes.resize((bits + 7) / 8);
+    return true;
+}
+
+bool integer(std::string_view text, const Format& format, std::uint64_t& value) {
+    bool negative = false;
+    if (!read_number(text, negative, value)) return false;
+    if (value > max_magnitude(format, negative, text.starts_with("0x"))) return false;
+    if (negative) {
+        value = ~value + 1;
+    }
+    return true;
+}
+
+bool number(std::string_view text, const Format& format, std::vector<std::uint8_t>& bytes) {
+    std::uint64_t value = 0;
+    const bool valid =
+        is_real(format.type) ? real(text, format, value) : integer(text, format, value);
+    if (!valid) return false;
+    bytes.resize((bits_of(format.type) + 7) / 8);
     std::copy_n(reinterpret_cast<const std::uint8_t*>(&value), bytes.size(), bytes.begin());
     return true;
 }
