@@ -8,6 +8,12 @@ namespace hal::canopen::eds {
 
 namespace {
 
+/// Returns the COB-ID of a PDO before it is configured (CiA 301, predefined connection set).
+std::string default_cob(unsigned n, bool receive) {
+    if (n >= 4) return "0x80000000";
+    return "$NODEID+" + hex((receive ? 0x200u : 0x180u) + 0x100u * n, 3);
+}
+
 Object communication(std::uint16_t index, std::uint8_t mask, bool receive, unsigned n) {
     Object object;
     object.index = index;
@@ -31,10 +37,7 @@ Object communication(std::uint16_t index, std::uint8_t mask, bool receive, unsig
         entry.name = subs[i].name;
         entry.data_type = subs[i].type;
         entry.access = Access::rw;
-        entry.default_value =
-            i == 0 ? n < 4 ? "$NODEID+" + hex((receive ? 0x200u : 0x180u) + 0x100u * n, 3)
-                           : "0x80000000"
-                   : "";
+        entry.default_value = i == 0 ? default_cob(n, receive) : std::string();
         object.entries.push_back(entry);
     }
     object.entries.front().default_value = std::to_string(object.entries.back().sub);

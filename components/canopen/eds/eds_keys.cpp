@@ -38,54 +38,57 @@ std::string label(std::uint16_t index, unsigned sub) {
     return label(index) + "sub" + hex(sub, 1).substr(2);
 }
 
+namespace {
+
+/// Removes "0x"; returns whether it was there.
+bool remove_hex_prefix(std::string_view& text) {
+    const bool is_there = text.size() > 2 && text[0] == '0' && (text[1] == 'x' || text[1] == 'X');
+    if (is_there) {
+        text.remove_prefix(2);
+    }
+    return is_there;
+}
+
+std::string without_blanks(std::string_view text) {
+    std::string out(text);
+    std::erase_if(out, [](char c) { return c == ' ' || c == '\t'; });
+    return out;
+}
+
+/// The meaning of what follows the index in a section name, except for sub-indices.
+SectionName::What what_of(std::string_view word) {
+    using What = SectionName::What;
+    if (word.empty()) return What::object;
+    if (same_word(word, "Name")) return What::names;
+    if (same_word(word, "Value")) return What::values;
+    if (same_word(word, "Denotation")) return What::denotations;
+    if (same_word(word, "ObjectLinks")) return What::links;
+    return What::other;
+}
+
+}  // namespace
+
 SectionName section_name(std::string_view name) {
     SectionName out;
-    std::string squeezed;
-    for (const char c : name) {
-        if (c != ' ' && c != '\t') {
-            squeezed += c;
-        }
-    }
-    out.odd = squeezed.size() != name.size();
+    const std::string squeezed = without_blanks(name);
     std::string_view rest = squeezed;
-    if (rest.size() > 2 && rest[0] == '0' && (rest[1] == 'x' || rest[1] == 'X')) {
-        rest.remove_prefix(2);
-        out.odd = true;
-    }
-    std::size_t digits = 0;
-    while (digits < rest.size() && digits < 4 && is_hex(rest[digits])) {
-        ++digits;
-    }
-    if (digits < 4) {
-        return {};
-    }
-    out.index = static_cast<std::uint16_t>(hex_value(rest.substr(0, 4)));
+    out.odd = squeezed.size() != name.size();
+    out.odd = remove_hex_prefix(rest) || out.odd;
+    const std::string_view index = rest.substr(0, 4);
+    if (index.size() < 4 || !std::all_of(index.begin(), index.end(), is_hex)) return {};
+    out.index = static_cast<std::uint16_t>(hex_value(index));
     rest.remove_prefix(4);
-    using What = SectionName::What;
-    if (rest.empty()) {
-        out.what = What::object;
-    } else if (same_word(rest.substr(0, 3), "sub")) {
-        rest.remove_prefix(3);
-        if (rest.size() > 2 && rest[0] == '0' && (rest[1] == 'x' || rest[1] == 'X')) {
-            rest.remove_prefix(2);
-            out.odd = true;
-        }
-        if (rest.empty() || rest.size() > 4 || !std::all_of(rest.begin(), rest.end(), is_hex)) {
-            return {};
-        }
-        out.what = What::sub;
-        out.sub = hex_value(rest);
-    } else if (same_word(rest, "Name")) {
-        out.what = What::names;
-    } else if (same_word(rest, "Value")) {
-        out.what = What::values;
-    } else if (same_word(rest, "Denotation")) {
-        out.what = What::denotations;
-    } else if (same_word(rest, "ObjectLinks")) {
-        out.what = What::links;
-    } else {
-        return {};
+    if (!same_word(rest.substr(0, 3), "sub")) {
+        out.what = what_of(rest);
+        return out.what != SectionName::What::other ? out : SectionName{};
     }
+    rest.remove_prefix(3);
+    out.odd = remove_hex_prefix(rest) || out.odd;
+    const bool is_number =
+        !rest.empty() && rest.size() <= 4 && std::all_of(rest.begin(), rest.end(), is_hex);
+    if (!is_number) return {};
+    out.what = SectionName::What::sub;
+    out.sub = hex_value(rest);
     return out;
 }
 
@@ -193,11 +196,12 @@ bool Keys::flag(IniSection& section, std::string_view key, bool otherwise) {
         return yes;
     }
     const bool yes = number && number->magnitude != 0;
+    const char* help = otherwise ? "read as 1, the default" : "read as 0";
+    if (yes) {
+        help = "read as 1";
+    }
     report(Severity::warning, Topic::value, found->value_at,
-           "'" + found->name + "' is 0 or 1, not '" + found->value.substr(0, 60) + "'",
-           yes         ? "read as 1"
-           : otherwise ? "read as 1, the default"
-                       : "read as 0");
+           "'" + found->name + "' is 0 or 1, not '" + found->value.substr(0, 60) + "'", help);
     return number ? yes : otherwise;
 }
 

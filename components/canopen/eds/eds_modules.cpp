@@ -92,8 +92,7 @@ Module module(Ini& ini, Keys& keys, unsigned n, std::vector<OtherSection>& other
             one.object.index = static_cast<std::uint16_t>(*index);
             one.count = keys.bare(*section, "Count");
             one.object_extend = keys.bare(*section, "ObjExtend");
-            one.object.entries.push_back(
-                ObjectReader(ini, keys, prefix).entry(*section, section->name, true));
+            one.object.entries.push_back(EntryReader(keys).read(*section, section->name, true));
             one.object.name = one.object.entries[0].name;
             one.object.at = section->at;
             out.extensions.push_back(std::move(one));

@@ -9,94 +9,26 @@ namespace hal::canopen::eds {
 
 namespace {
 
-const std::initializer_list<std::string_view> known_keys{
-    "ParameterName",  "ObjectType", "DataType",     "AccessType", "PDOMapping",
-    "DefaultValue",   "LowLimit",   "HighLimit",    "SubNumber",  "CompactSubObj",
-    "ParameterValue", "Denotation", "DownloadFile", "UploadFile", "ObjFlags"};
+/// Returns the object type that a section gives as a number, if objects of it have sub-indices;
+/// else VAR.
+ObjectType structured_type(IniSection& section) {
+    IniKey* key = section.find("ObjectType");
+    if (key == nullptr) return ObjectType::var;
+    const auto number = parse_number(key->value);
+    if (!number) return ObjectType::var;
+    switch (number->magnitude) {
+    case 6:
+    case 8:
+    case 9: return static_cast<ObjectType>(number->magnitude);
+    default: return ObjectType::var;
+    }
+}
 
-constexpr std::size_t longest_name = 241;
+bool has_sub_indices(ObjectType type) {
+    return type == ObjectType::array || type == ObjectType::record || type == ObjectType::defstruct;
+}
 
 }  // namespace
-
-Entry ObjectReader::entry(IniSection& section, const std::string& what, bool is_sub) {
-    Entry out;
-    section.used = true;
-    out.at = section.at;
-    out.name = keys_.text(section, "ParameterName");
-    if (out.name.empty()) {
-        keys_.report(Severity::warning, Topic::missing, section.at,
-                     "'ParameterName' of " + what + " is " +
-                         (section.find("ParameterName") != nullptr ? "empty" : "missing"),
-                     "give the object a name");
-    }
-    if (out.name.size() > longest_name) {
-        keys_.report(
-            Severity::note, Topic::value, section.find("ParameterName")->value_at,
-            "the name of " + what + " has " + std::to_string(out.name.size()) + " characters",
-            "the limit is 241");
-    }
-    bool given = false;
-    out.type = object_type(section, what, given);
-    if (is_sub && (out.type == ObjectType::array || out.type == ObjectType::record ||
-                   out.type == ObjectType::defstruct)) {
-        keys_.report(
-            Severity::warning, Topic::object, section.find("ObjectType")->value_at,
-            what + " is a sub-index and cannot be of type " + std::string(name_of(out.type)),
-            "read as VAR; write ObjectType=0x7");
-        out.type = ObjectType::var;
-    }
-    const bool is_value = out.type == ObjectType::var;
-    out.data_type = type_of(section, what, is_value);
-    if (out.data_type == 0 && out.type == ObjectType::domain) {
-        out.data_type = 0x0F;
-    }
-    if (const DataType* type = data_type(out.data_type);
-        is_value && type != nullptr && type->kind == Kind::structure) {
-        keys_.report(Severity::warning, Topic::object, section.find("DataType")->value_at,
-                     "data type " + hex(out.data_type) + " of " + what +
-                         " is a record, but a single value is required",
-                     "");
-    }
-    out.access = access_of(section, what, is_value);
-    out.pdo_mapping = keys_.flag(section, "PDOMapping");
-    value(section, "DefaultValue", out.default_value, out.data_type, what);
-    value(section, "LowLimit", out.low_limit, out.data_type, what);
-    value(section, "HighLimit", out.high_limit, out.data_type, what);
-    value(section, "ParameterValue", out.parameter_value, out.data_type, what);
-    out.denotation = keys_.text(section, "Denotation");
-    out.upload_file = keys_.text(section, "UploadFile");
-    out.download_file = keys_.text(section, "DownloadFile");
-    out.flags =
-        static_cast<std::uint32_t>(keys_.number(section, "ObjFlags", 0xFFFFFFFF).value_or(0));
-    if (is_sub) {
-        if (keys_.number(section, "SubNumber", 0xFF).value_or(0) != 0) {
-            keys_.report(Severity::note, Topic::object, section.find("SubNumber")->at,
-                         "'SubNumber' of " + what + " ignored: a sub-index has no sub-indices", "");
-        }
-        out.extras = keys_.rest(section, known_keys);
-    }
-    const auto low = comparable(out.low_limit, out.data_type, 1);
-
-    const auto high = comparable(out.high_limit, out.data_type, 1);
-    if (low && high && *low > *high) {
-        keys_.report(Severity::warning, Topic::value, section.find("LowLimit")->value_at,
-                     "empty range of " + what + ": " + out.low_limit + ".." + out.high_limit,
-                     "are LowLimit and HighLimit exchanged?");
-    } else {
-        for (const auto& [key, text] :
-             {std::pair<const char*, const std::string*>{"DefaultValue", &out.default_value},
-              {"ParameterValue", &out.parameter_value}}) {
-            const auto number = comparable(*text, out.data_type, 1);
-            if (number && ((low && *number < *low) || (high && *number > *high))) {
-                keys_.report(Severity::warning, Topic::value, section.find(key)->value_at,
-                             "'" + std::string(key) + "' of " + what + " is out of range: " + *text,
-                             "the range is " + (low ? out.low_limit : "any") + ".." +
-                                 (high ? out.high_limit : "any"));
-            }
-        }
-    }
-    return out;
-}
 
 void ObjectReader::spread(Object& out, IniSection* list, std::string Entry::* field,
                           const char* what) {
@@ -137,7 +69,7 @@ void ObjectReader::spread(Object& out, IniSection* list, std::string Entry::* fi
 }
 
 void ObjectReader::expand(Object& out, IniSection& section, unsigned count) {
-    Entry each = entry(section, label(out.index), false);
+    Entry each = entries_.read(section, label(out.index), false);
     each.type = ObjectType::var;
     each.denotation.clear();
     const std::string name = each.name;
@@ -206,95 +138,107 @@ void ObjectReader::check_entries(const Object& out, IniSection& section) {
 Object ObjectReader::object(std::uint16_t index, Draft& draft) {
     Object out;
     out.index = index;
-    const std::string what = label(index);
-    if (draft.object == nullptr) {
+    if (draft.object != nullptr) {
+        head(out, *draft.object, !draft.subs.empty());
+    } else {
         out.type = ObjectType::record;
         out.at = !draft.subs.empty() ? draft.subs.begin()->second->at : Span{};
-        keys_.report(Severity::warning, Topic::missing, out.at,
-                     "missing section [" + prefix_ + what + "]: only its sub-indices are described",
-                     "read as RECORD");
-    } else {
-        IniSection& section = *draft.object;
-        section.used = true;
-        out.at = section.at;
-        bool given = false;
-        const std::size_t said = draft.subs.empty() ? 0 : 1;
-        const ObjectType written = [&] {
-            IniKey* key = section.find("ObjectType");
-            const auto number = key != nullptr ? parse_number(key->value) : std::nullopt;
-            if (number &&
-                (number->magnitude == 8 || number->magnitude == 9 || number->magnitude == 6)) {
-                return static_cast<ObjectType>(number->magnitude);
-            }
-            return ObjectType::var;
-        }();
-        const auto compact = keys_.number(section, "CompactSubObj", 0xFE).value_or(0);
-        if (compact != 0) {
-            expand(out, section, static_cast<unsigned>(compact));
-            out.type = written == ObjectType::var ? ObjectType::array : written;
-            out.name = keys_.text(section, "ParameterName");
-            out.data_type = out.entries.back().data_type;
-            if (!draft.subs.empty()) {
-                keys_.report(
-                    Severity::note, Topic::object, section.at,
-                    "object " + what + " has CompactSubObj and sections for some sub-indices",
-                    "the sections take precedence");
-            }
-        } else if (written == ObjectType::var && said == 0) {
-            Entry only = entry(section, what, false);
-            out.type = only.type == ObjectType::array || only.type == ObjectType::record ||
-                               only.type == ObjectType::defstruct
-                           ? ObjectType::var
-                           : only.type;
-            if (out.type != only.type) {  // spelled as a word
-                out.type = only.type;
-                out.name = only.name;
-                check_entries(out, section);
-            } else {
-                if (const auto subs = keys_.number(section, "SubNumber", 0xFF); subs && *subs > 1) {
-                    keys_.report(Severity::warning, Topic::count,
-                                 section.find("SubNumber")->value_at,
-                                 "'SubNumber' of " + what + " is " + std::to_string(*subs) +
-                                     ", but it is a " + std::string(name_of(only.type)) +
-                                     " without sub-indices",
-                                 "delete SubNumber, or write ObjectType=0x9 and the sub-indices");
-                }
-                out.name = only.name;
-                out.denotation = only.denotation;
-                only.denotation.clear();
-                out.flags = only.flags;
-                only.flags = 0;
-                out.entries.push_back(std::move(only));
-            }
-        } else {
-            out.name = keys_.text(section, "ParameterName");
-            if (out.name.empty()) {
-                keys_.report(Severity::warning, Topic::missing, section.at,
-                             "'ParameterName' of " + what + " is missing or empty",
-                             "give the object a name");
-            }
-            out.type = object_type(section, what, given);
-            if (out.single()) {
-                keys_.report(Severity::warning, Topic::object,
-                             given ? section.find("ObjectType")->value_at : section.at,
-                             "object " + what + " is a " + std::string(name_of(out.type)) +
-                                 ", but the file describes sub-indices",
-                             "read as RECORD; write ObjectType=0x9");
-                out.type = ObjectType::record;
-            }
-            out.data_type = type_of(section, what, false);
-        }
-        if (out.denotation.empty()) {
-            out.denotation = keys_.text(section, "Denotation");
-        }
-        if (out.flags == 0) {
-            out.flags = static_cast<std::uint32_t>(
-                keys_.number(section, "ObjFlags", 0xFFFFFFFF).value_or(0));
-        }
-        keys_.number(section, "SubNumber", 0xFFFF);
+        keys_.report(
+            Severity::warning, Topic::missing, out.at,
+            "missing section [" + prefix_ + label(index) + "]: only its sub-indices are described",
+            "read as RECORD");
     }
+    add_subs(out, draft);
+    if (draft.object != nullptr) {
+        finish(out, *draft.object);
+    }
+    spread(out, draft.names, &Entry::name, "name");
+    spread(out, draft.values, &Entry::parameter_value, "value");
+    spread(out, draft.denotations, &Entry::denotation, "denotation");
+    add_links(out, draft.links);
+    if (!compactable(out)) {
+        out.compact = 0;
+    }
+    return out;
+}
+
+/// Reads the section of the object itself. `has_subs`: other sections describe sub-indices.
+void ObjectReader::head(Object& out, IniSection& section, bool has_subs) {
+    section.used = true;
+    out.at = section.at;
+    const ObjectType type = structured_type(section);
+    const auto compact = keys_.number(section, "CompactSubObj", 0xFE).value_or(0);
+    if (compact != 0) {
+        expand(out, section, static_cast<unsigned>(compact));
+        out.type = type == ObjectType::var ? ObjectType::array : type;
+        out.name = keys_.text(section, "ParameterName");
+        out.data_type = out.entries.back().data_type;
+        if (has_subs) {
+            keys_.report(Severity::note, Topic::object, section.at,
+                         "object " + label(out.index) +
+                             " has CompactSubObj and sections for some sub-indices",
+                         "the sections take precedence");
+        }
+    } else if (type == ObjectType::var && !has_subs) {
+        single(out, section);
+    } else {
+        structure(out, section);
+    }
+    if (out.denotation.empty()) {
+        out.denotation = keys_.text(section, "Denotation");
+    }
+    if (out.flags == 0) {
+        out.flags =
+            static_cast<std::uint32_t>(keys_.number(section, "ObjFlags", 0xFFFFFFFF).value_or(0));
+    }
+    keys_.number(section, "SubNumber", 0xFFFF);
+}
+
+/// An object without sections of sub-indices: a single value, unless its type is spelled as a word.
+void ObjectReader::single(Object& out, IniSection& section) {
+    const std::string what = label(out.index);
+    Entry only = entries_.read(section, what, false);
+    out.type = only.type;
+    out.name = only.name;
+    if (has_sub_indices(only.type)) return check_entries(out, section);
+    if (const auto subs = keys_.number(section, "SubNumber", 0xFF); subs && *subs > 1) {
+        keys_.report(Severity::warning, Topic::count, section.find("SubNumber")->value_at,
+                     "'SubNumber' of " + what + " is " + std::to_string(*subs) + ", but it is a " +
+                         std::string(name_of(only.type)) + " without sub-indices",
+                     "delete SubNumber, or write ObjectType=0x9 and the sub-indices");
+    }
+    out.denotation = only.denotation;
+    only.denotation.clear();
+    out.flags = only.flags;
+    only.flags = 0;
+    out.entries.push_back(std::move(only));
+}
+
+/// An object whose sub-indices have sections.
+void ObjectReader::structure(Object& out, IniSection& section) {
+    const std::string what = label(out.index);
+    out.name = keys_.text(section, "ParameterName");
+    if (out.name.empty()) {
+        keys_.report(Severity::warning, Topic::missing, section.at,
+                     "'ParameterName' of " + what + " is missing or empty",
+                     "give the object a name");
+    }
+    bool given = false;
+    out.type = entries_.object_type(section, what, given);
+    if (out.single()) {
+        keys_.report(Severity::warning, Topic::object,
+                     given ? section.find("ObjectType")->value_at : section.at,
+                     "object " + what + " is a " + std::string(name_of(out.type)) +
+                         ", but the file describes sub-indices",
+                     "read as RECORD; write ObjectType=0x9");
+        out.type = ObjectType::record;
+    }
+    out.data_type = entries_.data_type_of(section, what, false);
+}
+
+void ObjectReader::add_subs(Object& out, Draft& draft) {
     for (auto& [sub, section] : draft.subs) {
-        Entry one = entry(*section, label(index, sub), true);
+        Entry one = entries_.read(*section, label(out.index, sub), true);
         one.sub = static_cast<std::uint8_t>(sub);
         if (Entry* old = out.find(one.sub)) {
             *old = std::move(one);
@@ -304,97 +248,97 @@ Object ObjectReader::object(std::uint16_t index, Draft& draft) {
     }
     std::sort(out.entries.begin(), out.entries.end(),
               [](const Entry& a, const Entry& b) { return a.sub < b.sub; });
-    if (draft.object != nullptr) {
-        if (!out.single()) {
-            check_entries(out, *draft.object);
-        }
-        out.extras = keys_.rest(*draft.object, known_keys);
-        if (!out.single() &&
-            out.compact ==
-                0) {  // keys of a RECORD that repeat those of its entries have no meaning
-            std::erase_if(out.extras, [](const auto& extra) {
-                return same_word(extra.first, "AccessType") ||
-                       same_word(extra.first, "PDOMapping") ||
-                       (same_word(extra.first, "DefaultValue") && extra.second.empty());
-            });
-        }
+}
+
+/// Checks the entries, and keeps the keys that were not read.
+void ObjectReader::finish(Object& out, IniSection& section) {
+    if (!out.single()) {
+        check_entries(out, section);
     }
-    spread(out, draft.names, &Entry::name, "name");
-    spread(out, draft.values, &Entry::parameter_value, "value");
-    spread(out, draft.denotations, &Entry::denotation, "denotation");
-    if (draft.links != nullptr) {
-        draft.links->used = true;
-        for (const auto& [number, key] : keys_.list(*draft.links, "ObjectLinks")) {
-            if (const auto link = keys_.parse(*draft.links, *key, 0xFFFF)) {
-                out.links.push_back(static_cast<std::uint16_t>(*link));
-            }
+    out.extras = keys_.rest(section, entry_keys);
+    if (out.single() || out.compact != 0) return;
+    // keys of a RECORD that repeat those of its entries have no meaning
+    std::erase_if(out.extras, [](const auto& extra) {
+        return same_word(extra.first, "AccessType") || same_word(extra.first, "PDOMapping") ||
+               (same_word(extra.first, "DefaultValue") && extra.second.empty());
+    });
+}
+
+void ObjectReader::add_links(Object& out, IniSection* links) {
+    if (links == nullptr) return;
+    links->used = true;
+    for (const auto& [number, key] : keys_.list(*links, "ObjectLinks")) {
+        if (const auto link = keys_.parse(*links, *key, 0xFFFF)) {
+            out.links.push_back(static_cast<std::uint16_t>(*link));
         }
     }
-    if (!compactable(out)) {
-        out.compact = 0;
+}
+
+/// Sorts a section into the draft of its object.
+void ObjectReader::sort(IniSection& section, std::map<std::uint16_t, Draft>& drafts) {
+    using What = SectionName::What;
+    const std::string_view name = section.name;
+    if (name.size() < prefix_.size() || !same_word(name.substr(0, prefix_.size()), prefix_)) return;
+    const SectionName means = section_name(name.substr(prefix_.size()));
+    if (means.what == What::other) return;
+    if (means.odd) {
+        const std::string right =
+            means.what == What::sub ? label(means.index, means.sub) : label(means.index);
+        keys_.report(Severity::warning, Topic::syntax, section.at,
+                     "misspelt object section [" + section.name + "]",
+                     "write [" + prefix_ + right + "]");
     }
-    return out;
+    if (means.what == What::sub && means.sub > 0xFF) {
+        keys_.report(Severity::warning, Topic::object, section.at,
+                     "invalid sub-index " + hex(means.sub, 1),
+                     "the range is 0..FF; the section was kept unchanged");
+        return;
+    }
+    IniSection*& slot = drafts[means.index].slot(means);
+    if (slot != nullptr) {
+        keys_.report(Severity::warning, Topic::conflict, section.at,
+                     "duplicate section [" + section.name + "]: line " +
+                         std::to_string(slot->at.line) + " describes the same",
+                     "the first one is used, this one was kept unchanged");
+        return;
+    }
+    slot = &section;
+}
+
+IniSection*& ObjectReader::Draft::slot(const SectionName& means) {
+    switch (means.what) {
+    case SectionName::What::object: return object;
+    case SectionName::What::names: return names;
+    case SectionName::What::values: return values;
+    case SectionName::What::denotations: return denotations;
+    case SectionName::What::links: return links;
+    default: return subs[means.sub];
+    }
+}
+
+/// Reports the lists of an object without a section of its own.
+void ObjectReader::report_lists_alone(std::uint16_t index, const Draft& draft) {
+    for (IniSection* section : {draft.names, draft.values, draft.denotations, draft.links}) {
+        if (section == nullptr) continue;
+        keys_.report(
+            Severity::warning, Topic::missing, section->at,
+            "[" + section->name + "] belongs to an object that is not described",
+            "missing section [" + prefix_ + label(index) + "]; this one was kept unchanged");
+    }
 }
 
 std::vector<Object> ObjectReader::read() {
     std::map<std::uint16_t, Draft> drafts;
     for (IniSection& section : ini_.sections()) {
-        std::string_view name = section.name;
-        if (name.size() < prefix_.size() || !same_word(name.substr(0, prefix_.size()), prefix_)) {
-            continue;
-        }
-        const SectionName means = section_name(name.substr(prefix_.size()));
-        using What = SectionName::What;
-        if (means.what == What::other) continue;
-        if (means.odd) {
-            keys_.report(
-                Severity::warning, Topic::syntax, section.at,
-                "misspelt object section [" + section.name + "]",
-                "write [" + prefix_ +
-                    (means.what == What::sub ? label(means.index, means.sub) : label(means.index)) +
-                    "]");
-        }
-        if (means.what == What::sub && means.sub > 0xFF) {
-            keys_.report(Severity::warning, Topic::object, section.at,
-                         "invalid sub-index " + hex(means.sub, 1),
-                         "the range is 0..FF; the section was kept unchanged");
-            continue;
-        }
-        Draft& draft = drafts[means.index];
-        IniSection** place = nullptr;
-        switch (means.what) {
-        case What::object: place = &draft.object; break;
-        case What::names: place = &draft.names; break;
-        case What::values: place = &draft.values; break;
-        case What::denotations: place = &draft.denotations; break;
-        case What::links: place = &draft.links; break;
-        default: place = &draft.subs[means.sub];
-        }
-        if (*place != nullptr) {
-            keys_.report(Severity::warning, Topic::conflict, section.at,
-                         "duplicate section [" + section.name + "]: line " +
-                             std::to_string((*place)->at.line) + " describes the same",
-                         "the first one is used, this one was kept unchanged");
-            continue;
-        }
-        *place = &section;
+        sort(section, drafts);
     }
     std::vector<Object> out;
     for (auto& [index, draft] : drafts) {
         if (draft.object == nullptr && draft.subs.empty()) {
-            for (IniSection* section :
-                 {draft.names, draft.values, draft.denotations, draft.links}) {
-                if (section != nullptr) {
-                    keys_.report(
-                        Severity::warning, Topic::missing, section->at,
-                        "[" + section->name + "] belongs to an object that is not described",
-                        "missing section [" + prefix_ + label(index) +
-                            "]; this one was kept unchanged");
-                }
-            }
-            continue;
+            report_lists_alone(index, draft);
+        } else {
+            out.push_back(object(index, draft));
         }
-        out.push_back(object(index, draft));
     }
     return out;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <string>
@@ -70,35 +71,67 @@ struct ValueRemark {
 std::optional<ValueRemark> remark_on_value(const std::string& it, const std::string& text,
                                            std::uint16_t type);
 
+/// The keys of an object section.
+extern const std::initializer_list<std::string_view> entry_keys;
+
+/// The section of a value: a VAR or a sub-index. `what` names it in messages.
+class EntryReader {
+public:
+    explicit EntryReader(Keys& keys) : keys_(keys) {}
+
+    Entry read(IniSection& section, const std::string& what, bool is_sub);
+    /// `given` is set to whether the section has a valid type.
+    ObjectType object_type(IniSection& section, const std::string& what, bool& given);
+    /// Returns 0 if the section has no valid type; `needed`: that is reported.
+    std::uint16_t data_type_of(IniSection& section, const std::string& what, bool needed);
+
+private:
+    void read_name(IniSection& section, const std::string& what, Entry& out);
+    void read_types(IniSection& section, const std::string& what, bool is_sub, Entry& out);
+    Access access_of(IniSection& section, const std::string& what, bool needed);
+    void value(IniSection& section, const char* key, std::string& out, std::uint16_t type,
+               const std::string& what);
+    void check_range(IniSection& section, const std::string& what, const Entry& entry);
+
+    Keys& keys_;
+};
+
 /// Objects of the main part or of a module, in its section-name prefix.
 class ObjectReader {
 public:
     ObjectReader(Ini& ini, Keys& keys, std::string prefix)
-        : ini_(ini), keys_(keys), prefix_(std::move(prefix)) {}
+        : ini_(ini), keys_(keys), entries_(keys), prefix_(std::move(prefix)) {}
 
     /// Reads all objects whose sections begin with the prefix.
     std::vector<Object> read();
-    /// Reads a section as a value: a VAR or a sub-index. `what` names it in messages.
-    Entry entry(IniSection& section, const std::string& what, bool is_sub);
 
 private:
+    /// The sections of one object.
     struct Draft {
-        IniSection *object = nullptr, *names = nullptr, *values = nullptr, *denotations = nullptr,
-                   *links = nullptr;
+        IniSection* object = nullptr;
+        IniSection* names = nullptr;
+        IniSection* values = nullptr;
+        IniSection* denotations = nullptr;
+        IniSection* links = nullptr;
         std::map<unsigned, IniSection*> subs = {};
+        IniSection*& slot(const SectionName& means);
     };
+    void sort(IniSection& section, std::map<std::uint16_t, Draft>& drafts);
+    void report_lists_alone(std::uint16_t index, const Draft& draft);
     Object object(std::uint16_t index, Draft& draft);
+    void head(Object& out, IniSection& section, bool has_subs);
+    void single(Object& out, IniSection& section);
+    void structure(Object& out, IniSection& section);
+    void add_subs(Object& out, Draft& draft);
+    void finish(Object& out, IniSection& section);
+    void add_links(Object& out, IniSection* links);
     void expand(Object& out, IniSection& section, unsigned count);
     void spread(Object& out, IniSection* list, std::string Entry::* field, const char* what);
     void check_entries(const Object& out, IniSection& section);
-    void value(IniSection& section, const char* key, std::string& out, std::uint16_t type,
-               const std::string& what);
-    ObjectType object_type(IniSection& section, const std::string& what, bool& given);
-    std::uint16_t type_of(IniSection& section, const std::string& what, bool needed);
-    Access access_of(IniSection& section, const std::string& what, bool needed);
 
     Ini& ini_;
     Keys& keys_;
+    EntryReader entries_;
     std::string prefix_;
 };
 

@@ -226,108 +226,110 @@ IniSection* Ini::find(std::string_view name) {
     return found == by_name_.end() ? nullptr : &sections_[found->second];
 }
 
-void Ini::parse(std::string_view text, std::vector<Message>& messages) {
-    std::uint32_t number = 0;
-    IniSection* section = nullptr;
-    std::unordered_map<std::string, std::size_t> keys;  // of the section being read
-    bool said_outside = false;
-    for (std::size_t start = 0; start < text.size();) {
-        const std::size_t stop = std::min(text.find('\n', start), text.size());
-        const std::string_view whole = text.substr(start, stop - start);
-        const std::string_view line = trimmed(whole);
-        ++number;
-        const std::size_t line_start = start;
-        start = stop + 1;
-        if (line.empty()) continue;
+/// Reads the lines of a file into its sections.
+class Ini::Parser {
+public:
+    Parser(Ini& ini, std::string_view text, std::vector<Message>& messages)
+        : ini_(ini), text_(text), messages_(messages) {}
 
-        const auto place = [&](std::string_view part) {
-            const auto offset = static_cast<std::size_t>(part.data() - text.data());
-            std::uint32_t column = 1;
-            for (std::size_t i = line_start; i < offset; ++i) {
-                column += (text[i] & 0xC0) != 0x80;
-            }
-            return Span{number, column, static_cast<std::uint32_t>(offset),
-                        static_cast<std::uint32_t>(part.size())};
-        };
-        const auto report_as = [&](Severity severity, Topic topic, std::string_view part,
-                                   std::string sentence, std::string help) {
-            messages.push_back(
-                {severity, topic, place(part), std::move(sentence), std::move(help)});
-        };
-        const auto report = [&](Severity severity, std::string_view part, std::string sentence,
-                                std::string help = "") {
-            report_as(severity, Topic::syntax, part, std::move(sentence), std::move(help));
-        };
-        const auto keep = [&](std::string comment) {
-            (section != nullptr ? section->comments : preamble_).push_back(std::move(comment));
-        };
-
-        if (line.size() > most_line) {
-            report(Severity::warning, line.substr(0, 1),
-                   "line of " + std::to_string(line.size()) + " bytes ignored",
-                   "the limit is 255 characters");
-            continue;
+    void parse() {
+        for (std::size_t start = 0; start < text_.size();) {
+            const std::size_t stop = std::min(text_.find('\n', start), text_.size());
+            ++number_;
+            line_start_ = start;
+            is_cut_ = stop == text_.size();
+            line(trimmed(text_.substr(start, stop - start)));
+            start = stop + 1;
         }
-        using Parts = text::IniLine::Kind;
+    }
+
+private:
+    Span place(std::string_view part) const {
+        const auto offset = static_cast<std::size_t>(part.data() - text_.data());
+        std::uint32_t column = 1;
+        for (std::size_t i = line_start_; i < offset; ++i) {
+            column += (text_[i] & 0xC0) != 0x80;
+        }
+        return Span{number_, column, static_cast<std::uint32_t>(offset),
+                    static_cast<std::uint32_t>(part.size())};
+    }
+    void report_as(Severity severity, Topic topic, std::string_view part, std::string sentence,
+                   std::string help) {
+        messages_.push_back({severity, topic, place(part), std::move(sentence), std::move(help)});
+    }
+    void report(Severity severity, std::string_view part, std::string sentence, std::string help) {
+        report_as(severity, Topic::syntax, part, std::move(sentence), std::move(help));
+    }
+    void keep(std::string comment) {
+        auto& comments = section_ != nullptr ? section_->comments : ini_.preamble_;
+        comments.push_back(std::move(comment));
+    }
+
+    void line(std::string_view line) {
+        if (line.empty()) return;
+        if (line.size() > most_line) {
+            return report(Severity::warning, line.substr(0, 1),
+                          "line of " + std::to_string(line.size()) + " bytes ignored",
+                          "the limit is 255 characters");
+        }
+        using Kind = text::IniLine::Kind;
         const text::IniLine parts = text::ini_line(line);
         const std::string_view name = trimmed(parts.name);
-        const std::string_view value = parts.value;
-        if (parts.kind == Parts::comment) {
-            if (line[0] == '#' && line.find('=') != std::string_view::npos) {
-                report(Severity::note, line.substr(0, 1),
-                       "line that begins with '#' read as a comment",
-                       "comments of an EDS begin with ';'");
-            }
-            keep(std::string(line));
-            continue;
-        }
-        if (parts.kind == Parts::section || parts.kind == Parts::open_section) {
-            const bool closed = parts.kind == Parts::section;
-            if (!closed) {
-                report(Severity::warning, line, "section name without ']'",
-                       "write [" + std::string(name) + "]");
-            } else if (!value.empty() && value[0] != ';') {
-                report(value[0] == '#' ? Severity::note : Severity::warning, value,
+        switch (parts.kind) {
+        case Kind::comment: return comment(line);
+        case Kind::section:
+            if (!parts.value.empty() && parts.value[0] != ';') {
+                report(parts.value[0] == '#' ? Severity::note : Severity::warning, parts.value,
                        "text after the section name ignored",
                        "write comments on lines of their own");
             }
-            keys.clear();
-            const auto [at, fresh] = by_name_.try_emplace(lower(name), sections_.size());
-            if (fresh) {
-                sections_.push_back({std::string(name),
-                                     place(closed ? line.substr(0, line.find(']') + 1) : line),
-                                     {},
-                                     {}});
-                section = &sections_.back();
-            } else {
-                section = &sections_[at->second];
-                report(Severity::warning, line, "duplicate section [" + std::string(name) + "]",
-                       "first in line " + std::to_string(section->at.line) +
-                           "; keys that are here again replace those");
-                for (std::size_t i = 0; i < section->keys.size(); ++i) {
-                    keys.emplace(lower(section->keys[i].name), i);
-                }
-            }
-            continue;
+            return section(line, name, line.substr(0, line.find(']') + 1));
+        case Kind::open_section:
+            report(Severity::warning, line, "section name without ']'",
+                   "write [" + std::string(name) + "]");
+            return section(line, name, line);
+        case Kind::other: return invalid(line);
+        default: return key(line, name, parts.value);
         }
-        if (parts.kind == Parts::other) {
-            report(Severity::warning, line,
-                   line[0] == '=' ? "missing key before '='"
-                                  : "invalid line: neither a [section] nor Key=Value",
-                   "the line was kept as a comment; comments begin with ';'");
-            keep("; " + std::string(line));
-            continue;
+    }
+
+    void comment(std::string_view line) {
+        if (line[0] == '#' && line.find('=') != std::string_view::npos) {
+            report(Severity::note, line.substr(0, 1), "line that begins with '#' read as a comment",
+                   "comments of an EDS begin with ';'");
         }
-        if (section == nullptr) {
-            if (!said_outside) {
-                report(Severity::warning, line, "key before the first section",
-                       "the lines before the first section were kept as comments");
-            }
-            said_outside = true;
-            keep("; " + std::string(line));
-            continue;
+        keep(std::string(line));
+    }
+
+    void invalid(std::string_view line) {
+        report(Severity::warning, line,
+               line[0] == '=' ? "missing key before '='"
+                              : "invalid line: neither a [section] nor Key=Value",
+               "the line was kept as a comment; comments begin with ';'");
+        keep("; " + std::string(line));
+    }
+
+    /// `heading`: the part of the line with the name.
+    void section(std::string_view line, std::string_view name, std::string_view heading) {
+        keys_.clear();
+        const auto [at, fresh] = ini_.by_name_.try_emplace(lower(name), ini_.sections_.size());
+        if (fresh) {
+            ini_.sections_.push_back({std::string(name), place(heading), {}, {}});
+            section_ = &ini_.sections_.back();
+            return;
         }
-        if (stop == text.size()) {
+        section_ = &ini_.sections_[at->second];
+        report(Severity::warning, line, "duplicate section [" + std::string(name) + "]",
+               "first in line " + std::to_string(section_->at.line) +
+                   "; keys that are here again replace those");
+        for (std::size_t i = 0; i < section_->keys.size(); ++i) {
+            keys_.emplace(lower(section_->keys[i].name), i);
+        }
+    }
+
+    void key(std::string_view line, std::string_view name, std::string_view value) {
+        if (section_ == nullptr) return key_outside(line);
+        if (is_cut_) {
             report_as(
                 Severity::warning, Topic::truncated, line,
                 "the file ends within a line: the value of '" + std::string(name) + "' may be cut",
@@ -335,21 +337,48 @@ void Ini::parse(std::string_view text, std::vector<Message>& messages) {
         }
         IniKey key{std::string(name), std::string(value), place(name),
                    place(value.empty() ? line : value)};
-        const auto [at, fresh] = keys.try_emplace(lower(name), section->keys.size());
+        const auto [at, fresh] = keys_.try_emplace(lower(name), section_->keys.size());
         if (fresh) {
-            section->keys.push_back(std::move(key));
+            section_->keys.push_back(std::move(key));
         } else {
-            IniKey& old = section->keys[at->second];
-            const bool same = old.value == key.value;
-            report_as(same ? Severity::note : Severity::warning,
-                      same ? Topic::syntax : Topic::conflict, name,
-                      "duplicate key '" + key.name + "' in [" + section->name + "]",
-                      same ? "both have the same value"
-                           : "line " + std::to_string(old.at.line) + " has '" + old.value + "'; '" +
-                                 key.value + "' is used");
-            old = std::move(key);
+            replace(section_->keys[at->second], std::move(key), name);
         }
     }
+
+    void key_outside(std::string_view line) {
+        if (!said_outside_) {
+            report(Severity::warning, line, "key before the first section",
+                   "the lines before the first section were kept as comments");
+        }
+        said_outside_ = true;
+        keep("; " + std::string(line));
+    }
+
+    void replace(IniKey& old, IniKey&& key, std::string_view name) {
+        const std::string sentence = "duplicate key '" + key.name + "' in [" + section_->name + "]";
+        if (old.value == key.value) {
+            report(Severity::note, name, sentence, "both have the same value");
+        } else {
+            report_as(Severity::warning, Topic::conflict, name, sentence,
+                      "line " + std::to_string(old.at.line) + " has '" + old.value + "'; '" +
+                          key.value + "' is used");
+        }
+        old = std::move(key);
+    }
+
+    Ini& ini_;
+    std::string_view text_;
+    std::vector<Message>& messages_;
+    IniSection* section_ = nullptr;
+    std::unordered_map<std::string, std::size_t> keys_;  // of the section being read
+    std::uint32_t number_ = 0;
+    std::size_t line_start_ = 0;
+    bool is_cut_ = false;  // the file ends within the line
+    bool said_outside_ = false;
+};
+
+void Ini::parse(std::string_view text, std::vector<Message>& messages) {
+    Parser(*this, text, messages).parse();
 }
 
 }  // namespace hal::canopen::eds

@@ -78,6 +78,7 @@ public:
     const std::vector<std::string>& preamble() const { return preamble_; }
 
 private:
+    class Parser;
     std::vector<IniSection> sections_;
     std::unordered_map<std::string, std::size_t> by_name_;
     std::vector<std::string> preamble_;

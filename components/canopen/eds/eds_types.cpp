@@ -108,62 +108,89 @@ std::vector<std::uint8_t> little(std::uint64_t value, unsigned bytes) {
     return out;
 }
 
+/// A number in sign and magnitude.
+struct Signed {
+    bool negative = false;
+    std::uint64_t magnitude = 0;
+};
+
+/// Returns the number with the node ID added where it has one; nothing: it overflows.
+std::optional<Signed> with_node_id(const Number& number, unsigned node_id) {
+    Signed out{number.negative && number.magnitude != 0, number.magnitude};
+    if (!number.node_id) return out;
+    if (!out.negative) {
+        if (__builtin_add_overflow(out.magnitude, std::uint64_t{node_id}, &out.magnitude)) {
+            return {};
+        }
+    } else if (out.magnitude > node_id) {
+        out.magnitude -= node_id;
+    } else {
+        out = {false, node_id - out.magnitude};
+    }
+    return out;
+}
+
+/// How a number relates to the range of a type.
+enum class Fit : std::uint8_t {
+    no,
+    yes,
+    as_bits,  // -1 for 0xFF…, or 0xFF… for -1: the bits are clear
+};
+Fit fit_of(const Signed& value, const DataType& type) {
+    const std::uint64_t top = type.bits == 64 ? ~0ull : (1ull << type.bits) - 1;
+    const std::uint64_t half = top >> 1;
+    if (type.kind == Kind::integer) {
+        if (value.negative) return value.magnitude <= half + 1 ? Fit::yes : Fit::no;
+        if (value.magnitude <= half) return Fit::yes;
+        return value.magnitude <= top ? Fit::as_bits : Fit::no;
+    }
+    if (!value.negative) return value.magnitude <= top ? Fit::yes : Fit::no;
+    return type.kind == Kind::natural && value.magnitude <= half + 1 ? Fit::as_bits : Fit::no;
+}
+
+/// Returns a fraction that is whole, as 12.0 is 12; nothing for any other text.
+std::optional<Number> whole_fraction(std::string_view text) {
+    const auto real = parse_real(text);
+    if (!real || *real != std::floor(*real) || std::fabs(*real) > 9e15) return {};
+    return Number{*real < 0, static_cast<std::uint64_t>(std::fabs(*real)), false, false,
+                  Spelling::number_as_real};
+}
+
 Encoded integer(std::string_view text, const DataType& type, unsigned node_id) {
     Encoded out;
     std::optional<Number> number = parse_number(text);
     if (!number) {
-        if (type.kind == Kind::boolean && (same_word(text, "true") || same_word(text, "false"))) {
-            return {little(same_word(text, "true"), 1), false, Spelling::words, {}};
+        const bool is_true = same_word(text, "true");
+        if (type.kind == Kind::boolean && (is_true || same_word(text, "false"))) {
+            return {little(is_true ? 1 : 0, 1), false, Spelling::words, {}};
         }
-        // 12.0 is 12
-        const auto real = parse_real(text);
-        if (!real || *real != std::floor(*real) || std::fabs(*real) > 9e15) {
-            out.error = quoted(text) + " is not a number of type " + std::string(type.name);
-            return out;
-        }
-        number = Number{*real < 0, static_cast<std::uint64_t>(std::fabs(*real)), false, false,
-                        Spelling::number_as_real};
+        number = whole_fraction(text);
+    }
+    if (!number) {
+        out.error = quoted(text) + " is not a number of type " + std::string(type.name);
+        return out;
     }
     out.spelling = number->spelling;
     out.node_id = number->node_id;
-    // The sum with the node-id, in sign and magnitude.
-    std::uint64_t magnitude = number->magnitude;
-    bool negative = number->negative && magnitude != 0;
-    bool overflow = false;
-    if (number->node_id) {
-        if (!negative) {
-            overflow = __builtin_add_overflow(magnitude, std::uint64_t{node_id}, &magnitude);
-        } else if (magnitude > node_id) {
-            magnitude -= node_id;
-        } else {
-            magnitude = node_id - magnitude;
-            negative = false;
-        }
-    }
-    const std::uint64_t top = type.bits == 64 ? ~0ull : (1ull << type.bits) - 1;
-    const std::uint64_t half = top >> 1;
-    bool fits = !overflow;
-    if (type.kind != Kind::integer) {
-        if (negative && type.kind == Kind::natural && magnitude <= half + 1) {
-            // -1 for 0xFF…: the bits are clear
-            out.spelling = Spelling::unsigned_for_negative;
-            out.bytes = little(~magnitude + 1, type.bytes());
-            return out;
-        }
-        fits = fits && !negative && magnitude <= top;
-    } else if (negative) {
-        fits = fits && magnitude <= half + 1;
-    } else if (magnitude > half && magnitude <= top) {
-        out.spelling = Spelling::unsigned_for_negative;
-    } else {
-        fits = fits && magnitude <= half;
-    }
-    if (!fits) {
+    const std::optional<Signed> value = with_node_id(*number, node_id);
+    const Fit fit = value ? fit_of(*value, type) : Fit::no;
+    if (fit == Fit::no) {
         out.error = unfitting(text, type);
         return out;
     }
-    out.bytes = little(negative ? ~magnitude + 1 : magnitude, type.bytes());
+    if (fit == Fit::as_bits) {
+        out.spelling = Spelling::unsigned_for_negative;
+    }
+    out.bytes = little(value->negative ? ~value->magnitude + 1 : value->magnitude, type.bytes());
     return out;
+}
+
+/// Returns the value of a hexadecimal digit; -1 for another character.
+int hexadecimal_digit(char c) {
+    if (c >= '0' && c <= '9') return c - '0';
+    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+    if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+    return -1;
 }
 
 Encoded octets(std::string_view text) {
@@ -174,10 +201,7 @@ Encoded octets(std::string_view text) {
     int high = -1;
     for (const char c : text) {
         if (c == ' ' || c == '\t' || c == ',') continue;
-        const int digit = c >= '0' && c <= '9'   ? c - '0'
-                          : c >= 'a' && c <= 'f' ? c - 'a' + 10
-                          : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                                 : -1;
+        const int digit = hexadecimal_digit(c);
         if (digit < 0) {
             out.error = quoted(text) + " is not a sequence of hexadecimal bytes";
             out.bytes.clear();
@@ -200,6 +224,67 @@ Encoded octets(std::string_view text) {
     return out;
 }
 
+/// A manufacturer's type: a number as large as it needs, or nothing that could be encoded.
+Encoded without_spelling() {
+    Encoded out;
+    out.error = "values of this data type have no spelling in CiA 306";
+    return out;
+}
+
+/// Days and milliseconds, with a blank between them. Nothing: all 48 bits are one number.
+std::optional<Encoded> days_and_ms(std::string_view text) {
+    const std::size_t gap = text.find(' ');
+    if (gap == std::string_view::npos) return {};
+    const auto days = parse_number(text.substr(0, gap));
+    const auto ms = parse_number(text.substr(gap));
+    if (!days || !ms || days->negative || ms->negative) return {};
+    if (days->magnitude > 0xFFFF || ms->magnitude >= 1u << 28) return {};
+    return Encoded{little(ms->magnitude | days->magnitude << 32, 6), false, Spelling::plain, {}};
+}
+
+/// Returns true if the text has the bits of a real number in hexadecimal, as some tools write them:
+/// a hexadecimal number of their size is nothing else.
+bool is_bit_pattern(const Number& number, std::string_view text, const DataType& type) {
+    if (!number.hex || number.negative || number.node_id || number.magnitude <= 0xFFFF) {
+        return false;
+    }
+    const unsigned digits = type.bits / 4;
+    return number.magnitude >> (type.bits - 1) <= 1 && text.size() <= digits + 2;
+}
+
+Encoded real(std::string_view text, const DataType& type) {
+    constexpr double max_real32 = 3.4028234663852886e38;
+    Encoded out;
+    const auto bits = parse_number(text);
+    if (bits && is_bit_pattern(*bits, text, type)) {
+        out.bytes = little(bits->magnitude, type.bytes());
+        out.spelling = Spelling::real_as_bits;
+        return out;
+    }
+    const auto value = parse_real(text);
+    if (!value) {
+        out.error = quoted(text) + " is not a number of type " + std::string(type.name);
+        return out;
+    }
+    if (type.bits != 32) {
+        out.bytes = little(std::bit_cast<std::uint64_t>(*value), 8);
+        return out;
+    }
+    if (std::isfinite(*value) && std::fabs(*value) > max_real32) {
+        out.error = quoted(text) + " does not fit into REAL32";
+        return out;
+    }
+    out.bytes = little(std::bit_cast<std::uint32_t>(static_cast<float>(*value)), 4);
+    return out;
+}
+
+/// Returns the bytes of a UTF-8 character by its first one.
+std::size_t utf8_bytes(unsigned char first) {
+    if (first < 0x80) return 1;
+    if (first < 0xE0) return 2;
+    return first < 0xF0 ? 3 : 4;
+}
+
 std::vector<std::uint8_t> utf16(std::string_view text) {
     std::vector<std::uint8_t> out;
     const auto unit = [&](std::uint32_t u) {
@@ -209,7 +294,7 @@ std::vector<std::uint8_t> utf16(std::string_view text) {
     };
     for (std::size_t i = 0; i < text.size();) {
         const auto first = static_cast<unsigned char>(text[i]);
-        const std::size_t n = first < 0x80 ? 1 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
+        const std::size_t n = utf8_bytes(first);
         std::uint32_t c = n == 1 ? first : first & (0xFFu >> (n + 1));
         for (std::size_t k = 1; k < n && i + k < text.size(); ++k) {
             c = c << 6 | (static_cast<unsigned char>(text[i + k]) & 0x3Fu);
@@ -336,57 +421,27 @@ Encoded encode(std::string_view text, std::uint16_t code, unsigned node_id) {
         return {};
     }
     const DataType* type = data_type(code);
-    Encoded out;
-    if (type == nullptr || type->kind == Kind::structure) {
-        // A manufacturer's type: a number as large as it needs, or nothing that could be encoded.
-        out.error = "values of this data type have no spelling in CiA 306";
-        return out;
-    }
+    if (type == nullptr) return without_spelling();
     switch (type->kind) {
-    case Kind::time:
-        // Days and milliseconds, with a blank between them; or all 48 bits as one number.
-        if (const std::size_t gap = text.find(' '); gap != std::string_view::npos) {
-            const auto days = parse_number(text.substr(0, gap));
-
-            const auto ms = parse_number(text.substr(gap));
-            if (days && ms && !days->negative && !ms->negative && days->magnitude <= 0xFFFF &&
-                ms->magnitude < 1u << 28) {
-                return {
-                    little(ms->magnitude | days->magnitude << 32, 6), false, Spelling::plain, {}};
-            }
-        }
-        [[fallthrough]];
+    case Kind::time: {
+        const auto parts = days_and_ms(text);
+        return parts ? *parts : integer(text, *type, node_id);
+    }
     case Kind::boolean:
     case Kind::integer:
     case Kind::natural: return integer(text, *type, node_id);
-    case Kind::real: {
-        // Some tools write the bits in hexadecimal. A hexadecimal number of their size is nothing
-        // else.
-        const auto bits = parse_number(text);
-        const unsigned digits = type->bits / 4;
-        if (bits && bits->hex && !bits->negative && !bits->node_id && bits->magnitude > 0xFFFF &&
-            bits->magnitude >> (type->bits - 1) <= 1 && text.size() <= digits + 2) {
-            out.bytes = little(bits->magnitude, type->bytes());
-            out.spelling = Spelling::real_as_bits;
-            return out;
-        }
-        const auto value = parse_real(text);
-        if (!value) {
-            out.error = quoted(text) + " is not a number of type " + std::string(type->name);
-        } else if (type->bits == 32) {
-            const double largest = 3.4028234663852886e38;
-            if (std::isfinite(*value) && std::fabs(*value) > largest) {
-                out.error = quoted(text) + " does not fit into REAL32";
-                return out;
-            }
-            out.bytes = little(std::bit_cast<std::uint32_t>(static_cast<float>(*value)), 4);
-        } else {
-            out.bytes = little(std::bit_cast<std::uint64_t>(*value), 8);
-        }
+    case Kind::real: return real(text, *type);
+    case Kind::text: {
+        Encoded out;
+        out.bytes.assign(text.begin(), text.end());
         return out;
     }
-    case Kind::text: out.bytes.assign(text.begin(), text.end()); return out;
-    case Kind::unicode: out.bytes = utf16(text); return out;
+    case Kind::unicode: {
+        Encoded out;
+        out.bytes = utf16(text);
+        return out;
+    }
+    case Kind::structure: return without_spelling();
     default: return octets(text);
     }
 }

@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: MIT
-// Object types, data types, access types and values of an object section.
+// The section of a value: object type, data type, access type, values and their range.
 #include <algorithm>
 
 #include "eds_reader.hpp"
 
 namespace hal::canopen::eds {
+
+const std::initializer_list<std::string_view> entry_keys{
+    "ParameterName",  "ObjectType", "DataType",     "AccessType", "PDOMapping",
+    "DefaultValue",   "LowLimit",   "HighLimit",    "SubNumber",  "CompactSubObj",
+    "ParameterValue", "Denotation", "DownloadFile", "UploadFile", "ObjFlags"};
 
 namespace {
 
@@ -68,7 +73,7 @@ std::string_view name_of(Access access) {
     return "?";
 }
 
-ObjectType ObjectReader::object_type(IniSection& section, const std::string& what, bool& given) {
+ObjectType EntryReader::object_type(IniSection& section, const std::string& what, bool& given) {
     IniKey* key = section.find("ObjectType");
     given = key != nullptr;
     if (key == nullptr) return ObjectType::var;
@@ -101,7 +106,7 @@ ObjectType ObjectReader::object_type(IniSection& section, const std::string& wha
     return ObjectType::var;
 }
 
-std::uint16_t ObjectReader::type_of(IniSection& section, const std::string& what, bool needed) {
+std::uint16_t EntryReader::data_type_of(IniSection& section, const std::string& what, bool needed) {
     IniKey* key = section.find("DataType");
     if (key != nullptr) {
         key->used = true;
@@ -134,7 +139,7 @@ std::uint16_t ObjectReader::type_of(IniSection& section, const std::string& what
     return code;
 }
 
-Access ObjectReader::access_of(IniSection& section, const std::string& what, bool needed) {
+Access EntryReader::access_of(IniSection& section, const std::string& what, bool needed) {
     IniKey* key = section.find("AccessType");
     if (key != nullptr) {
         key->used = true;
@@ -206,8 +211,8 @@ std::optional<ValueRemark> remark_on_value(const std::string& it, const std::str
     return {};
 }
 
-void ObjectReader::value(IniSection& section, const char* name, std::string& out,
-                         std::uint16_t type, const std::string& what) {
+void EntryReader::value(IniSection& section, const char* name, std::string& out, std::uint16_t type,
+                        const std::string& what) {
     IniKey* key = section.find(name);
     if (key == nullptr) return;
     key->used = true;
@@ -224,6 +229,101 @@ void ObjectReader::value(IniSection& section, const char* name, std::string& out
     const auto remark = remark_on_value("'" + key->name + "' of " + what, out, type);
     if (!remark) return;
     keys_.report(remark->severity, Topic::value, key->value_at, remark->sentence, remark->help);
+}
+
+void EntryReader::read_name(IniSection& section, const std::string& what, Entry& out) {
+    constexpr std::size_t max_name = 241;
+    const IniKey* key = section.find("ParameterName");
+    out.name = keys_.text(section, "ParameterName");
+    if (out.name.empty()) {
+        keys_.report(Severity::warning, Topic::missing, section.at,
+                     "'ParameterName' of " + what + " is " + (key != nullptr ? "empty" : "missing"),
+                     "give the object a name");
+    }
+    if (out.name.size() > max_name) {
+        keys_.report(
+            Severity::note, Topic::value, key->value_at,
+            "the name of " + what + " has " + std::to_string(out.name.size()) + " characters",
+            "the limit is 241");
+    }
+}
+
+void EntryReader::read_types(IniSection& section, const std::string& what, bool is_sub,
+                             Entry& out) {
+    bool given = false;
+    out.type = object_type(section, what, given);
+    const bool has_sub_indices = out.type == ObjectType::array || out.type == ObjectType::record ||
+                                 out.type == ObjectType::defstruct;
+    if (is_sub && has_sub_indices) {
+        keys_.report(
+            Severity::warning, Topic::object, section.find("ObjectType")->value_at,
+            what + " is a sub-index and cannot be of type " + std::string(name_of(out.type)),
+            "read as VAR; write ObjectType=0x7");
+        out.type = ObjectType::var;
+    }
+    const bool is_value = out.type == ObjectType::var;
+    out.data_type = data_type_of(section, what, is_value);
+    if (out.data_type == 0 && out.type == ObjectType::domain) {
+        out.data_type = 0x0F;
+    }
+    const DataType* type = data_type(out.data_type);
+    if (is_value && type != nullptr && type->kind == Kind::structure) {
+        keys_.report(Severity::warning, Topic::object, section.find("DataType")->value_at,
+                     "data type " + hex(out.data_type) + " of " + what +
+                         " is a record, but a single value is required",
+                     "");
+    }
+    out.access = access_of(section, what, is_value);
+}
+
+/// Reports an empty range, or values outside of it.
+void EntryReader::check_range(IniSection& section, const std::string& what, const Entry& entry) {
+    const auto low = comparable(entry.low_limit, entry.data_type, 1);
+    const auto high = comparable(entry.high_limit, entry.data_type, 1);
+    if (low && high && *low > *high) {
+        keys_.report(Severity::warning, Topic::value, section.find("LowLimit")->value_at,
+                     "empty range of " + what + ": " + entry.low_limit + ".." + entry.high_limit,
+                     "are LowLimit and HighLimit exchanged?");
+        return;
+    }
+    const auto check = [&](const char* key, const std::string& text) {
+        const auto number = comparable(text, entry.data_type, 1);
+        const bool outside = number && ((low && *number < *low) || (high && *number > *high));
+        if (!outside) return;
+        keys_.report(Severity::warning, Topic::value, section.find(key)->value_at,
+                     "'" + std::string(key) + "' of " + what + " is out of range: " + text,
+                     "the range is " + (low ? entry.low_limit : "any") + ".." +
+                         (high ? entry.high_limit : "any"));
+    };
+    check("DefaultValue", entry.default_value);
+    check("ParameterValue", entry.parameter_value);
+}
+
+Entry EntryReader::read(IniSection& section, const std::string& what, bool is_sub) {
+    Entry out;
+    section.used = true;
+    out.at = section.at;
+    read_name(section, what, out);
+    read_types(section, what, is_sub, out);
+    out.pdo_mapping = keys_.flag(section, "PDOMapping");
+    value(section, "DefaultValue", out.default_value, out.data_type, what);
+    value(section, "LowLimit", out.low_limit, out.data_type, what);
+    value(section, "HighLimit", out.high_limit, out.data_type, what);
+    value(section, "ParameterValue", out.parameter_value, out.data_type, what);
+    out.denotation = keys_.text(section, "Denotation");
+    out.upload_file = keys_.text(section, "UploadFile");
+    out.download_file = keys_.text(section, "DownloadFile");
+    out.flags =
+        static_cast<std::uint32_t>(keys_.number(section, "ObjFlags", 0xFFFFFFFF).value_or(0));
+    if (is_sub) {
+        if (keys_.number(section, "SubNumber", 0xFF).value_or(0) != 0) {
+            keys_.report(Severity::note, Topic::object, section.find("SubNumber")->at,
+                         "'SubNumber' of " + what + " ignored: a sub-index has no sub-indices", "");
+        }
+        out.extras = keys_.rest(section, entry_keys);
+    }
+    check_range(section, what, out);
+    return out;
 }
 
 }  // namespace hal::canopen::eds

@@ -235,80 +235,108 @@ private:
         return Access::rw;
     }
 
+    /// Returns the parameter that an object refers to; nullptr: it has none.
+    const Parameter* parameter_of(const Node& node, const std::string& what) {
+        const std::string id = attribute(node, "uniqueIDRef");
+        const auto found = parameters_.find(id);
+        if (found != parameters_.end()) return &found->second;
+        if (!id.empty()) {
+            report(Severity::warning, Topic::missing, node,
+                   what + " refers to parameter '" + id + "', which is not described");
+        }
+        return nullptr;
+    }
+
+    /// Returns an attribute of the object, or else the field of its parameter.
+    std::string either(const Node& node, const Parameter* parameter, const char* name,
+                       const std::string Parameter::* field) {
+        std::string text = attribute(node, name);
+        return text.empty() && parameter != nullptr ? parameter->*field : text;
+    }
+
+    ObjectType object_type(const Node& node) {
+        const auto number_of_type = number(node, "objectType", 9);
+        if (!number_of_type) return ObjectType::var;
+        const auto type = static_cast<ObjectType>(*number_of_type);
+        if (name_of(type) != "?") return type;
+        report(Severity::warning, Topic::object, node,
+               "there is no object type " + attribute(node, "objectType"), "taken for 7, a VAR");
+        return ObjectType::var;
+    }
+
+    void read_data_type(const Node& node, const Parameter* parameter, const std::string& what,
+                        Entry& out) {
+        const std::uint16_t otherwise =
+            parameter != nullptr ? parameter->data_type : std::uint16_t{0};
+        out.data_type =
+            static_cast<std::uint16_t>(number(node, "dataType", 0xFFFF, true).value_or(otherwise));
+        if (out.data_type != 0) return;
+        if (out.type == ObjectType::var) {
+            report(Severity::warning, Topic::missing, node,
+                   "the data type of " + what + " is missing",
+                   "it can be sent and received as bytes only");
+        } else if (out.type == ObjectType::domain) {
+            out.data_type = 0x0F;
+        }
+    }
+
+    void read_access(const Node& node, const Parameter* parameter, const std::string& what,
+                     Entry& out) {
+        const bool has_attribute = !attribute(node, "accessType").empty();
+        if (out.type != ObjectType::var && !has_attribute) return;
+        // CiA 311 in XML has it optional for a parameter, with this default; the attribute of an
+        // object has none.
+        const bool is_default = !has_attribute && parameter != nullptr && parameter->access.empty();
+        out.access = access(
+            node, is_default ? "read" : either(node, parameter, "accessType", &Parameter::access),
+            what);
+    }
+
+    void check_values(const Node& node, const std::string& what, const Entry& entry) {
+        const DataType* known = data_type(entry.data_type);
+        if (known == nullptr || known->kind == Kind::structure || known->kind == Kind::domain) {
+            return;
+        }
+        const auto check = [&](const char* name, const std::string& text) {
+            if (text.empty()) return;
+            const auto remark =
+                remark_on_value("'" + std::string(name) + "' of " + what, text, entry.data_type);
+            if (!remark) return;
+            report(remark->severity, Topic::value, node, remark->sentence, remark->help);
+        };
+        check("defaultValue", entry.default_value);
+        check("actualValue", entry.parameter_value);
+        check("lowLimit", entry.low_limit);
+        check("highLimit", entry.high_limit);
+    }
+
     Entry entry(const Node& node, const std::string& what, std::string& denotation) {
         Entry out;
         out.at = place(node);
-        const auto found = parameters_.find(attribute(node, "uniqueIDRef"));
-        const Parameter* parameter = found == parameters_.end() ? nullptr : &found->second;
-        if (parameter == nullptr && !attribute(node, "uniqueIDRef").empty()) {
-            report(Severity::warning, Topic::missing, node,
-                   what + " refers to parameter '" + attribute(node, "uniqueIDRef") +
-                       "', which is not described");
-        }
-        const auto either = [&](const char* name, const std::string Parameter::* field) {
-            std::string text = attribute(node, name);
-            return text.empty() && parameter != nullptr ? parameter->*field : text;
+        const Parameter* parameter = parameter_of(node, what);
+        const auto text = [&](const char* name, const std::string Parameter::* field) {
+            return either(node, parameter, name, field);
         };
-        // CiA 311 in XML has it optional for a parameter, with this default; the attribute of an
-        // object has none.
-        const std::string allowed = attribute(node, "accessType").empty() && parameter != nullptr &&
-                                            parameter->access.empty()
-                                        ? "read"
-                                        : either("accessType", &Parameter::access);
-        out.name = either("name", &Parameter::name);
+        out.name = text("name", &Parameter::name);
         if (out.name.empty()) {
             report(Severity::warning, Topic::missing, node, "the name of " + what + " is missing",
                    "give the object a name");
         }
-        const auto type = number(node, "objectType", 9);
-        out.type = type ? static_cast<ObjectType>(*type) : ObjectType::var;
-        if (name_of(out.type) == "?") {
-            report(Severity::warning, Topic::object, node,
-                   "there is no object type " + attribute(node, "objectType"),
-                   "taken for 7, a VAR");
-            out.type = ObjectType::var;
-        }
-        const bool value = out.type == ObjectType::var;
-        out.data_type = static_cast<std::uint16_t>(
-            number(node, "dataType", 0xFFFF, true)
-                .value_or(parameter != nullptr ? parameter->data_type : 0));
-        if (value && out.data_type == 0) {
-            report(Severity::warning, Topic::missing, node,
-                   "the data type of " + what + " is missing",
-                   "it can be sent and received as bytes only");
-        }
-        if (out.type == ObjectType::domain && out.data_type == 0) {
-            out.data_type = 0x0F;
-        }
-        if (value || !attribute(node, "accessType").empty()) {
-            out.access = access(node, allowed, what);
-        }
+        out.type = object_type(node);
+        read_data_type(node, parameter, what, out);
+        read_access(node, parameter, what, out);
         const std::string mapping = lower(attribute(node, "PDOmapping"));
         out.pdo_mapping = !mapping.empty() && mapping != "no";
-        out.default_value = either("defaultValue", &Parameter::default_value);
-        out.low_limit = either("lowLimit", &Parameter::low);
-        out.high_limit = either("highLimit", &Parameter::high);
-        out.parameter_value = either("actualValue", &Parameter::actual_value);
-        denotation = either("denotation", &Parameter::denotation);
-        if (const std::string bits = attribute(node, "objFlags"); !bits.empty()) {
+        out.default_value = text("defaultValue", &Parameter::default_value);
+        out.low_limit = text("lowLimit", &Parameter::low);
+        out.high_limit = text("highLimit", &Parameter::high);
+        out.parameter_value = text("actualValue", &Parameter::actual_value);
+        denotation = text("denotation", &Parameter::denotation);
+        if (!attribute(node, "objFlags").empty()) {
             out.flags =
                 static_cast<std::uint32_t>(number(node, "objFlags", 0xFFFFFFFF, true).value_or(0));
         }
-        const DataType* known = data_type(out.data_type);
-        if (known == nullptr || known->kind == Kind::structure || known->kind == Kind::domain) {
-            return out;
-        }
-        for (const auto& [name, text] :
-             {std::pair<const char*, const std::string*>{"defaultValue", &out.default_value},
-              {"actualValue", &out.parameter_value},
-              {"lowLimit", &out.low_limit},
-              {"highLimit", &out.high_limit}}) {
-            if (text->empty()) continue;
-            const auto remark =
-                remark_on_value("'" + std::string(name) + "' of " + what, *text, out.data_type);
-            if (!remark) continue;
-            report(remark->severity, Topic::value, node, remark->sentence, remark->help);
-        }
+        check_values(node, what, out);
         return out;
     }
 
