@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: MIT
-// The parameters of PDOs: reading them, and checking what is written to them. pdo_receive.cpp and
-// pdo_send.cpp carry the data.
 #include "pdo.hpp"
 
 #include <algorithm>
@@ -170,11 +168,10 @@ Abort Pdos::check_communication(const Entry& e, std::span<const std::uint8_t> va
         const auto cob = load<std::uint32_t>(value.data());
         if ((cob & cob_invalid) != 0) return Abort::none;
         if (p.valid() && ((cob ^ p.cob) & 0x3fffffff) != 0) return Abort::value;
+        if ((cob & cob_extended) != 0) return Abort::none;
         const auto id = cob_id(cob);
-        return (cob & cob_extended) == 0 &&
-                       (restricted(id) || id == 0x80 || (cob & 0x1ffff800) != 0)
-                   ? Abort::value
-                   : Abort::none;
+        const bool reserved = restricted(id) || id == 0x80 || (cob & 0x1ffff800) != 0;
+        return reserved ? Abort::value : Abort::none;
     }
     case 2:
         if (value[0] > 240 && value[0] < (received ? 254 : 252)) return Abort::value;
@@ -233,28 +230,35 @@ void Pdos::written(Entry& e) noexcept {
     const bool received = e.index < tpdo_base;
     const bool mapping = (e.index & mapping_offset) != 0;
     const unsigned number = ((e.index - (received ? rpdo_base : tpdo_base)) & 0x1ff) + 1U;
-    if (received) {
-        if (auto* p = find_rpdo(number); p != nullptr) {
-            if (mapping) {
-                read_mapping(*p, true);
-            } else {
-                read_communication(*p);
-                p->supervised = p->late = p->fresh = false;
-            }
-        }
-    } else if (auto* p = find_tpdo(number); p != nullptr) {
-        const bool was_valid = p->valid();
-        if (mapping) {
-            read_mapping(*p, false);
-        } else {
-            read_communication(*p);
-        }
-        if (e.sub == 2 || (p->valid() && !was_valid)) {
-            restart(*p, now_);
-        }
+    if (Rpdo* p = received ? find_rpdo(number) : nullptr; p != nullptr) {
+        apply_parameter(*p, mapping);
+    }
+    if (Tpdo* p = received ? nullptr : find_tpdo(number); p != nullptr) {
+        apply_parameter(*p, mapping, e.sub);
     }
     if (!mapping && e.sub == 1) {
         index_identifiers();
+    }
+}
+
+void Pdos::apply_parameter(Rpdo& p, bool mapping) noexcept {
+    if (mapping) {
+        read_mapping(p, true);
+        return;
+    }
+    read_communication(p);
+    p.supervised = p.late = p.fresh = false;
+}
+
+void Pdos::apply_parameter(Tpdo& p, bool mapping, std::uint8_t sub) noexcept {
+    const bool was_valid = p.valid();
+    if (mapping) {
+        read_mapping(p, false);
+    } else {
+        read_communication(p);
+    }
+    if (sub == 2 || (p.valid() && !was_valid)) {
+        restart(p, now_);
     }
 }
 
@@ -277,6 +281,386 @@ void Pdos::read_scanner_list() noexcept {
         }
     }
 }
+
+// Reception.
+
+bool Pdos::handle(const Frame& f, Time now) noexcept {
+    now_ = now;
+    if (!f.extended && f.id >= extended_slot) return false;
+    const auto slot = f.extended ? extended_slot : f.id;
+    return f.remote ? handle_request(f, slot, now) : handle_data(f, slot, now);
+}
+
+bool Pdos::handle_request(const Frame& f, std::size_t slot, Time now) noexcept {
+    bool ours = false;
+    for (auto n = tpdo_heads_[slot]; n >= 0; n = tpdos_[static_cast<std::size_t>(n)].next) {
+        auto& p = tpdos_[static_cast<std::size_t>(n)];
+        if (cob_id(p.cob) != f.id) continue;
+        ours = true;
+        const bool answers = operational_ && !p.held && (p.cob & cob_flag30) == 0 &&
+                             p.kind == Kind::plain && !p.synchronous();
+        if (!answers) continue;
+        if (p.transmission != 252) {
+            send(p, p.mapping.pack(), now);
+        } else if (p.sampled) {
+            send(p, p.image, now);
+        }
+    }
+    return ours;
+}
+
+bool Pdos::handle_data(const Frame& f, std::size_t slot, Time now) noexcept {
+    bool ours = false;
+    for (auto n = rpdo_heads_[slot]; n >= 0; n = rpdos_[static_cast<std::size_t>(n)].next) {
+        auto& p = rpdos_[static_cast<std::size_t>(n)];
+        if (cob_id(p.cob) != f.id) continue;
+        ours = true;
+        if (!operational_ || p.held) continue;
+        const bool good =
+            p.kind == Kind::plain ? receive(p, f, now) : receive_multiplexed(p, f, now);
+        if (!good) {
+            ++p.errors;
+        }
+    }
+    return ours;
+}
+
+/// Returns false if the PDO is too short. A wrong length is reported by an emergency.
+bool Pdos::check_length(Rpdo& p, const Frame& f, Time now) noexcept {
+    const auto bytes = p.mapping.bytes();
+    if (f.length == bytes && !p.wrong_length) return true;
+    const Emcy::Bytes details{static_cast<std::uint8_t>(p.number),
+                              static_cast<std::uint8_t>(p.number >> 8), f.length, bytes};
+    if (f.length < bytes) {
+        if (!std::exchange(p.wrong_length, true)) {
+            events_.on_rpdo_short(p.number, f.length, now);
+        }
+        emcy_.raise(0x8210, error_communication, details);
+        return false;
+    }
+    if (f.length > bytes && settings_.report_too_long) {
+        p.wrong_length = true;
+        emcy_.raise(0x8220, error_communication, details);
+    }
+    if (f.length > bytes) return true;
+    p.wrong_length = false;
+    const bool none_wrong =
+        std::none_of(rpdos_.begin(), rpdos_.end(), [](const Rpdo& r) { return r.wrong_length; });
+    if (none_wrong) {
+        emcy_.clear(0x8210);
+        emcy_.clear(0x8220);
+    }
+    return true;
+}
+
+bool Pdos::receive(Rpdo& p, const Frame& f, Time now) noexcept {
+    if (!check_length(p, f, now)) return false;
+    restart_deadline(p, now);
+    if (!p.synchronous()) {
+        apply(p, load<std::uint64_t>(f.data.data()), now);
+        return true;
+    }
+    // arrived after the synchronous window
+    if (window_ != 0 && synced_ != 0 && now - synced_ > window_) return false;
+    p.image = load<std::uint64_t>(f.data.data());
+    p.fresh = true;
+    return true;
+}
+
+/// Restarts the deadline of the RPDO.
+void Pdos::restart_deadline(Rpdo& p, Time now) noexcept {
+    p.last = now;
+    p.supervised = true;
+    if (!std::exchange(p.late, false)) return;
+    if (std::none_of(rpdos_.begin(), rpdos_.end(), [](const Rpdo& r) { return r.late; })) {
+        emcy_.clear(0x8250);
+    }
+}
+
+void Pdos::apply(Rpdo& p, std::uint64_t image, Time now) noexcept {
+    p.mapping.unpack(image);
+    ++p.count;
+    events_.on_rpdo(p.number, now);
+}
+
+bool Pdos::receive_multiplexed(Rpdo& p, const Frame& f, Time now) noexcept {
+    if (f.length != 8) return false;
+    const bool addressed = (f.data[0] & 0x80) != 0;
+    const Kind kind = addressed ? Kind::destination_address : Kind::source_address;
+    if (p.kind != kind) return false;
+    const auto node = static_cast<std::uint8_t>(f.data[0] & 0x7f);
+    if (addressed) {
+        if (node != 0 && node != node_id_) return true;
+        if (!write_multiplexed(f, load<std::uint16_t>(f.data.data() + 1), f.data[3])) {
+            emcy_.raise(0x8230, error_communication, {f.data[1], f.data[2], f.data[3]});
+            return false;
+        }
+        emcy_.clear(0x8230);
+    } else if (!dispatch(node, f)) {
+        return true;
+    }
+    restart_deadline(p, now);
+    ++p.count;
+    events_.on_rpdo(p.number, now);
+    return true;
+}
+
+/// Writes the value of a multiplexed PDO to an object of this node.
+bool Pdos::write_multiplexed(const Frame& f, std::uint16_t index, std::uint8_t sub) noexcept {
+    const Entry* e = dictionary_.find(index, sub);
+    return e != nullptr && e->rpdo && e->size <= 4 &&
+           dictionary_.write(index, sub, {f.data.data() + 4, e->size}) == Abort::none;
+}
+
+/// Writes the value of a SAM-MPDO where the dispatching list has it. The list is 1FD0h–1FFFh; a row
+/// has, from the most significant byte: block size, object of this node, node ID and object of the
+/// producer (CiA 301). Returns false if the object is not in it, or could not be written.
+bool Pdos::dispatch(std::uint8_t node, const Frame& f) noexcept {
+    const auto index = load<std::uint16_t>(f.data.data() + 1);
+    const unsigned sub = f.data[3];
+    const auto first_sub = [](std::uint64_t row) { return static_cast<unsigned>(row >> 8 & 0xff); };
+    const auto has_object = [&](std::uint64_t row) {
+        const auto block = std::max(static_cast<unsigned>(row >> 56), 1U);
+        return (row & 0xff) == node && (row >> 16 & 0xffff) == index && sub >= first_sub(row) &&
+               sub < first_sub(row) + block;
+    };
+    for (unsigned list = 0x1fd0; list <= 0x1fff; ++list) {
+        for (const auto& e : dictionary_.object(static_cast<std::uint16_t>(list))) {
+            if (e.sub == 0 || e.size != 8) continue;
+            const auto row = load<std::uint64_t>(e.data);
+            if (!has_object(row)) continue;
+            const auto to_sub = static_cast<unsigned>(row >> 32 & 0xff) + sub - first_sub(row);
+            if (write_multiplexed(f, static_cast<std::uint16_t>(row >> 40),
+                                  static_cast<std::uint8_t>(to_sub))) {
+                return true;
+            }
+            break;
+        }
+    }
+    return false;
+}
+
+bool Pdos::request(unsigned number) noexcept {
+    const auto* p = find_rpdo(number);
+    if (p == nullptr || !p->valid() || (p->cob & cob_flag30) != 0 || !operational_) return false;
+    Frame f = make_frame(p->cob, p->mapping.bytes());
+    f.remote = true;
+    return out_.push(f);
+}
+
+void Pdos::hold_rpdo(unsigned number, bool on) noexcept {
+    auto* p = find_rpdo(number);
+    if (p == nullptr || p->held == on) return;
+    p->held = on;
+    p->fresh = p->supervised = p->late = p->wrong_length = false;
+}
+
+void Pdos::on_sync(Time now, Time window) noexcept {
+    now_ = now;
+    window_ = window;
+    synced_ = now;
+    if (!operational_) return;
+    for (auto& p : rpdos_) {
+        if (!p.fresh) continue;
+        p.fresh = false;
+        if (p.synchronous()) {
+            apply(p, p.image, now);
+        }
+    }
+}
+
+// Transmission.
+
+bool Pdos::send(Tpdo& p, std::uint64_t image, Time now) noexcept {
+    const auto bytes = p.mapping.bytes();
+    if (bytes == 0) return true;
+    Frame f = make_frame(p.cob, bytes);
+    store(f.data.data(), image);
+    if (!out_.push(f)) {
+        ++p.errors;
+        return false;
+    }
+    p.last_sent = image;
+    p.last = now;
+    p.sent_once = true;
+    p.pending = p.retry = false;
+    ++p.count;
+    return true;
+}
+
+bool Pdos::trigger(unsigned number) noexcept {
+    auto* p = find_tpdo(number);
+    if (p == nullptr) return false;
+    p->pending = true;
+    return true;
+}
+void Pdos::trigger(const Entry& e) noexcept {
+    for (auto& p : tpdos_) {
+        if ((p.event_driven() || p.transmission == 0) && p.valid() && p.mapping.maps(e)) {
+            p.pending = true;
+        }
+    }
+}
+bool Pdos::send_on_change(unsigned number, bool on) noexcept {
+    auto* p = find_tpdo(number);
+    if (p != nullptr) {
+        p->on_change = on;
+    }
+    return p != nullptr;
+}
+
+void Pdos::hold_tpdo(unsigned number, bool on) noexcept {
+    auto* p = find_tpdo(number);
+    if (p == nullptr || p->held == on) return;
+    p->held = on;
+    restart(*p, now_);
+}
+
+void Pdos::send_synchronous(std::uint8_t counter, bool counted, Time now) noexcept {
+    if (!operational_) return;
+    for (auto& p : tpdos_) {
+        if (!p.valid() || p.held || p.kind != Kind::plain) continue;
+        p.retry = false;  // too late for the previous SYNC
+        if (p.transmission == 252) {
+            p.image = p.mapping.pack();
+            p.sampled = true;
+            continue;
+        }
+        if (!p.synchronous() || !is_due_at_sync(p, counter, counted)) continue;
+        p.image = p.mapping.pack();
+        if (!send(p, p.image, now)) {
+            p.retry = true;
+        }
+    }
+}
+
+/// Counts the SYNC for a TPDO; returns true if it is sent with this one.
+bool Pdos::is_due_at_sync(Tpdo& p, std::uint8_t counter, bool counted) const noexcept {
+    if (p.transmission == 0) {
+        const bool changed = p.on_change && p.mapping.pack() != p.last_sent;
+        p.pending = p.pending || changed;
+        return p.pending;
+    }
+    if (p.waits_for_start && counted && p.sync_start != 0) {
+        if (counter != p.sync_start) return false;
+        p.syncs = static_cast<std::uint8_t>(p.transmission - 1);
+    }
+    p.waits_for_start = false;
+    if (++p.syncs < p.transmission) return false;
+    p.syncs = 0;
+    return true;
+}
+
+void Pdos::poll(Time now) noexcept {
+    poll_interval_ = polled_ ? now - polled_at_ : 0;
+    polled_ = true;
+    polled_at_ = now;
+    now_ = now;
+    if (!operational_) return;
+    for (auto& p : tpdos_) {
+        if (!p.held && p.valid()) {
+            poll(p, now);
+        }
+    }
+    for (auto& p : rpdos_) {
+        check_deadline(p, now);
+    }
+}
+
+/// Polls are a little early or late, because an external clock reference adjusts the caller's cycle:
+/// a timer has expired if the next poll would be later than its end, not only after its last
+/// nanosecond. `part`: of the interval between polls.
+bool Pdos::has_expired(Time since, Time timer, Time part, Time now) const noexcept {
+    return now - since + std::min(poll_interval_ / part, timer / 4) >= timer;
+}
+
+void Pdos::poll(Tpdo& p, Time now) noexcept {
+    if (p.kind == Kind::source_address && p.event_driven()) {
+        scan(p, now);
+    }
+    if (p.kind != Kind::plain) return;
+    if (p.retry && p.synchronous()) {
+        if (window_ != 0 && now - synced_ > window_) {
+            p.retry = false;
+        } else {
+            send(p, p.image, now);
+        }
+        return;
+    }
+    if (!p.event_driven()) return;
+    if (p.on_change && !p.pending && p.mapping.pack() != p.last_sent) {
+        p.pending = true;
+    }
+    const bool due = p.pending || (p.event != 0 && has_expired(p.last, p.event, 2, now));
+    if (due && (!p.sent_once || has_expired(p.last, p.inhibit, 16, now))) {
+        send(p, p.mapping.pack(), now);
+    }
+}
+
+void Pdos::check_deadline(Rpdo& p, Time now) noexcept {
+    if (!p.supervised || p.late || p.event == 0 || !p.valid() || now - p.last < p.event) return;
+    p.late = true;
+    p.supervised = false;
+    emcy_.raise(0x8250, error_communication,
+                {static_cast<std::uint8_t>(p.number), static_cast<std::uint8_t>(p.number >> 8)});
+    events_.on_rpdo_late(p.number, now);
+}
+
+bool Pdos::send_dam(unsigned number, std::uint8_t destination, std::uint16_t index,
+                    std::uint8_t sub, std::uint32_t value) noexcept {
+    auto* p = find_tpdo(number);
+    if (p == nullptr || !p->valid() || !operational_ || p->kind != Kind::destination_address) {
+        return false;
+    }
+    Frame f = make_frame(p->cob, 8);
+    f.data[0] = static_cast<std::uint8_t>(0x80 | (destination & 0x7f));
+    store(f.data.data() + 1, index);
+    f.data[3] = sub;
+    store(f.data.data() + 4, value);
+    if (!out_.push(f)) return false;
+    ++p->count;
+    p->last = now_;
+    return true;
+}
+
+bool Pdos::send_sam(unsigned number, std::uint16_t index, std::uint8_t sub) noexcept {
+    auto* p = find_tpdo(number);
+    const Entry* e = dictionary_.find(index, sub);
+    if (p == nullptr || e == nullptr || !p->valid() || !operational_ ||
+        p->kind != Kind::source_address || !e->tpdo || e->size > 4) {
+        return false;
+    }
+    Frame f = make_frame(p->cob, 8);
+    f.data[0] = node_id_;
+    store(f.data.data() + 1, index);
+    f.data[3] = sub;
+    std::memcpy(f.data.data() + 4, e->data, e->size);
+    if (!out_.push(f)) return false;
+    ++p->count;
+    p->last = now_;
+    return true;
+}
+
+/// Round robin, so that an object that changes in every cycle does not block the others.
+void Pdos::scan(Tpdo& p, Time now) noexcept {
+    for (std::size_t n = scanned_.size(); n > 0;
+         --n, next_scanned_ = (next_scanned_ + 1) % scanned_.size()) {
+        auto& s = scanned_[next_scanned_ % scanned_.size()];
+        std::uint32_t value = 0;
+        if (s.entry->handler != nullptr) {
+            s.entry->handler->reading(*s.entry);
+        }
+        std::memcpy(&value, s.entry->data, s.entry->size);
+        if (s.sent && value == s.last_sent) continue;
+        if (p.sent_once && now - p.last < p.inhibit) return;
+        if (!send_sam(p.number, s.entry->index, s.entry->sub)) return;
+        s.last_sent = value;
+        s.sent = p.sent_once = true;
+        p.last = now;
+    }
+}
+
+// State.
 
 Pdos::Status Pdos::rpdo(unsigned number) const noexcept {
     const auto* p = const_cast<Pdos*>(this)->find_rpdo(number);

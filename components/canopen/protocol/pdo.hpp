@@ -162,8 +162,19 @@ private:
     Abort read_mapping(Pdo&, bool received) noexcept;
     void restart(Tpdo&, Time now) noexcept;
     void index_identifiers() noexcept;
+    void apply_parameter(Rpdo&, bool mapping) noexcept;
+    void apply_parameter(Tpdo&, bool mapping, std::uint8_t sub) noexcept;
+    bool handle_request(const Frame&, std::size_t slot, Time now) noexcept;
+    bool handle_data(const Frame&, std::size_t slot, Time now) noexcept;
+    bool check_length(Rpdo&, const Frame&, Time now) noexcept;
     bool receive(Rpdo&, const Frame&, Time now) noexcept;
     bool receive_multiplexed(Rpdo&, const Frame&, Time now) noexcept;
+    bool write_multiplexed(const Frame&, std::uint16_t index, std::uint8_t sub) noexcept;
+    bool dispatch(std::uint8_t node, const Frame&) noexcept;
+    void check_deadline(Rpdo&, Time now) noexcept;
+    bool is_due_at_sync(Tpdo&, std::uint8_t counter, bool counted) const noexcept;
+    bool has_expired(Time since, Time timer, Time part, Time now) const noexcept;
+    void poll(Tpdo&, Time now) noexcept;
     void apply(Rpdo&, std::uint64_t image, Time now) noexcept;
     void restart_deadline(Rpdo&, Time now) noexcept;
     void read_scanner_list() noexcept;
@@ -185,6 +196,7 @@ private:
     Time window_ = 0;
     Time synced_ = 0;
     Time polled_at_ = 0;
+    Time poll_interval_ = 0;
     std::vector<Rpdo> rpdos_;
     std::vector<Tpdo> tpdos_;
     std::vector<Scanned> scanned_;  // capacity reserved in setup if there is a scanner list
