@@ -5,6 +5,8 @@
 #include <time.h>
 #include <utility>
 
+#include "hal/clock.hpp"
+
 namespace hal::canopen {
 
 namespace {
@@ -14,6 +16,10 @@ constexpr Time start_transient = 100 * millisecond;
 
 void set_value(Entry& e, std::uint64_t value) noexcept {
     std::memcpy(e.data, &value, e.size < 8 ? e.size : 8);
+}
+
+std::uint64_t low_bits(std::uint64_t value, unsigned bits) noexcept {
+    return bits >= 64 ? value : value & ((std::uint64_t{1} << bits) - 1);
 }
 
 DeviceSettings device_settings(const config::MasterConfig& config) {
@@ -35,46 +41,9 @@ Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
       master_(config.setup(), device_.out(), *this),
       master_objects_(device_.dictionary(), master_),
       flying_(config.flying, device_.out()) {
-    place_.fill(255);
-    for (std::size_t n = 0; n < config.nodes.size(); ++n) {
-        const std::uint8_t id = config.nodes[n].setup.id;
-        place_[id] = static_cast<std::uint8_t>(n);
-        statuses_.push_back(&master_.status(id));
-        if (config.at_stop == config::AtStop::nothing) continue;
-        can::Frame f(0, {static_cast<std::uint8_t>(config.at_stop == config::AtStop::stopped
-                                                       ? NmtCommand::stop
-                                                       : NmtCommand::enter_pre_operational),
-                         id});
-        farewell_.push_back(f);
-    }
-    for (const Placed& p : own_.placed) {
-        Slot s;
-        s.entry = device_.dictionary().find(p.index, p.sub);
-        s.node = static_cast<std::uint16_t>(p.node);
-        s.to_node = p.to_node;
-        s.object = p.object;
-        s.has_safe = p.object->safe.has_value();
-        s.safe = p.object->safe.value_or(0);
-        if (s.to_node && s.has_safe) {
-            set_value(*s.entry, s.safe);
-        }
-        slots_.push_back(s);
-    }
-    for (const Sent& sent : own_.sent) {
-        if (!sent.pdo->synchronous() || sent.pdo->transmission == 0) {
-            device_.pdos().send_on_change(sent.number);
-        }
-        outputs_.push_back(
-            {&sent, make_frame(sent.pdo->cob, static_cast<std::uint8_t>(sent.pdo->bytes()))});
-    }
-    for (const Sent& sent : own_.sent) {
-        if (sent.pdo->multiplexed()) {
-            for (const Sent::Part& part : sent.parts) {
-                alone_.push_back(
-                    {sent.number, part.placed, sent.pdo->inhibit_100us * 100 * microsecond});
-            }
-        }
-    }
+    add_nodes();
+    add_slots();
+    add_outputs();
     for (const Received& r : own_.received) {
         if (r.pdo->request != 0) {
             asked_.push_back({r.number, r.node, r.pdo->request});
@@ -91,24 +60,73 @@ Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
     ever_operational_.assign(statuses_.size(), 0);
     produces_ = config.sync == config::SyncMode::cycle || config.sync == config::SyncMode::timed;
     sync_frame_ = make_frame(config.sync_cob, config.sync_counter != 0 ? 1 : 0);
-    foreign_.resize(ours_.size());
+    add_own_identifiers();
+}
+
+void Runner::add_nodes() {
+    place_.fill(255);
+    const bool stops = config_.at_stop == config::AtStop::stopped;
+    const NmtCommand command = stops ? NmtCommand::stop : NmtCommand::enter_pre_operational;
+    for (std::size_t n = 0; n < config_.nodes.size(); ++n) {
+        const std::uint8_t id = config_.nodes[n].setup.id;
+        place_[id] = static_cast<std::uint8_t>(n);
+        statuses_.push_back(&master_.status(id));
+        if (config_.at_stop != config::AtStop::nothing) {
+            farewell_.emplace_back(
+                0U, std::initializer_list<std::uint8_t>{static_cast<std::uint8_t>(command), id});
+        }
+    }
+}
+
+void Runner::add_slots() {
+    for (const Placed& p : own_.placed) {
+        Slot s;
+        s.entry = device_.dictionary().find(p.index, p.sub);
+        s.node = static_cast<std::uint16_t>(p.node);
+        s.to_node = p.to_node;
+        s.object = p.object;
+        s.has_safe = p.object->safe.has_value();
+        s.safe = p.object->safe.value_or(0);
+        if (s.to_node && s.has_safe) {
+            set_value(*s.entry, s.safe);
+        }
+        slots_.push_back(s);
+    }
+}
+
+void Runner::add_outputs() {
+    for (const Sent& sent : own_.sent) {
+        if (!sent.pdo->synchronous() || sent.pdo->transmission == 0) {
+            device_.pdos().send_on_change(sent.number);
+        }
+        outputs_.push_back(
+            {&sent, make_frame(sent.pdo->cob, static_cast<std::uint8_t>(sent.pdo->bytes()))});
+        if (!sent.pdo->multiplexed()) continue;
+        for (const Sent::Part& part : sent.parts) {
+            alone_.push_back(
+                {sent.number, part.placed, sent.pdo->inhibit_100us * 100 * microsecond});
+        }
+    }
+}
+
+/// The identifiers that only this master may send.
+void Runner::add_own_identifiers() {
     if (produces_) {
-        ours_.set(sync_frame_.id);
+        foreign_.add_sync(sync_frame_.id);
     }
-    if (config.time_period > 0) {
-        ours_.set(0x100);
+    if (config_.time_period > 0) {
+        foreign_.add(0x100);
     }
-    if (!config.flying.enabled) {
-        ours_.set(0);
+    if (!config_.flying.enabled) {
+        foreign_.add(0);
     }
-    ours_.set(0x80U + config.node_id);
-    for (const config::Node& n : config.nodes) {
-        ours_.set(0x600U + n.setup.id);
+    foreign_.add(0x80U + config_.node_id);
+    for (const config::Node& n : config_.nodes) {
+        foreign_.add(0x600U + n.setup.id);
     }
     for (const Output& out : outputs_) {
         if (!out.frame.extended) {
-            ours_.set(out.frame.id);
-            ours_to_nodes_.set(out.frame.id);
+            foreign_.add_rpdo(out.frame.id);
         }
     }
 }
@@ -129,7 +147,7 @@ void Runner::begin(Time now) noexcept {
     if (std::exchange(begun_, true)) {
         drop_backlog(now);
     }
-    foreign_from_ = now + start_transient;
+    foreign_.begin(now + start_transient);
     if (!config_.flying.enabled) return boot(now);
     device_.out().clear();
     device_.start(now);
@@ -178,6 +196,22 @@ void Runner::note_sync(const can::Frame& f, Time now) noexcept {
     sync_ours_ = f.own;
 }
 
+void Runner::note_bus_state(Time now) noexcept {
+    const auto out_of_order = [](can::State s) {
+        return s == can::State::bus_off || s == can::State::down;
+    };
+    had_bus_ = had_bus_ || !out_of_order(statistics_.state);
+    if (statistics_.state == bus_state_) return;
+    if (out_of_order(statistics_.state) && !out_of_order(bus_state_)) {
+        device_.bus_off(now);
+    }
+    if (!out_of_order(statistics_.state) && out_of_order(bus_state_)) {
+        device_.bus_recovered();
+    }
+    bus_state_ = statistics_.state;
+    events_.on_bus_state(bus_state_);
+}
+
 void Runner::receive(Time now) noexcept {
     if (link_ == nullptr) return;
     now_ = now;
@@ -189,20 +223,7 @@ void Runner::receive(Time now) noexcept {
     for (can::Rejected what; link_->rejected(what);) {
         events_.on_rejected(what);
     }
-    const auto out_of_order = [](can::State s) {
-        return s == can::State::bus_off || s == can::State::down;
-    };
-    had_bus_ = had_bus_ || !out_of_order(statistics_.state);
-    if (statistics_.state != bus_state_) {
-        if (out_of_order(statistics_.state) && !out_of_order(bus_state_)) {
-            device_.bus_off(now);
-        }
-        if (!out_of_order(statistics_.state) && out_of_order(bus_state_)) {
-            device_.bus_recovered();
-        }
-        bus_state_ = statistics_.state;
-        events_.on_bus_state(bus_state_);
-    }
+    note_bus_state(now);
     if (config_.flying.enabled) {
         fly(now);
     }
@@ -244,7 +265,9 @@ void Runner::take(const can::Frame& f, Time now) noexcept {
     note_sync(f, now);
     if (config_.flying.enabled && flying_.handle(f, now)) return;
     if (!f.own && active()) {
-        note_foreign(f, now);
+        if (const auto report = foreign_.count(f, now)) {
+            events_.on_foreign(*report);
+        }
     }
     device_.handle(f, now);
     if (!active()) return;
@@ -255,27 +278,73 @@ void Runner::take(const can::Frame& f, Time now) noexcept {
     open_and_close();  // what follows in this cycle may be the node's first PDO
 }
 
+// Process data.
+
+/// CiA 302-2: no process data is sent to a node before it is configured, and its own PDOs have an
+/// unknown mapping until then. After a loss its outputs get their safe values until it is reset.
+void Runner::open_and_close() noexcept {
+    if (!std::exchange(steps_changed_, false)) return;
+    for (std::size_t n = 0; n < statuses_.size(); ++n) {
+        const NodeStatus& s = *statuses_[n];
+        if (s.step >= Step::watching && s.step <= Step::running) {
+            open_[n] = 1;
+        } else if (s.step < Step::watching || s.cause == Cause::boot_up) {
+            open_[n] = 0;
+        }
+        // One that is kept alive may be operational before we know.
+        const bool asked =
+            s.step == Step::queued || s.step == Step::identifying || s.step == Step::checking_state;
+        if (config_.nodes[n].setup.keep_alive && ever_operational_[n] == 0 && asked) {
+            open_[n] = 1;
+        }
+    }
+    for (Output& out : outputs_) {
+        out.open = std::any_of(
+            out.sent->parts.begin(), out.sent->parts.end(),
+            [&](const Sent::Part& part) { return open_[slots_[part.placed].node] != 0; });
+        device_.pdos().hold_tpdo(out.sent->number, !out.open);
+    }
+    for (const Received& r : own_.received) {
+        device_.pdos().hold_rpdo(r.number, open_[r.node] == 0);
+    }
+}
+
+bool Runner::mandatory_are_configured() const noexcept {
+    for (std::size_t n = 0; n < statuses_.size(); ++n) {
+        if (const Step step = statuses_[n]->step; statuses_[n]->mandatory && step != Step::off &&
+                                                  (step < Step::ready || step > Step::running)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/// A node that has become operational has not heard what was sent on a change before.
+void Runner::send_all_to(std::size_t node) noexcept {
+    for (const Output& out : outputs_) {
+        const auto& parts = out.sent->parts;
+        const bool carries = std::any_of(parts.begin(), parts.end(), [&](const Sent::Part& part) {
+            return slots_[part.placed].node == node;
+        });
+        if (carries) {
+            device_.pdos().trigger(out.sent->number);
+        }
+    }
+    for (Alone& a : alone_) {
+        if (slots_[a.slot].node == node) {
+            a.sent = false;
+        }
+    }
+}
+
 void Runner::take_wishes() noexcept {
     for (std::size_t n = 0; n < statuses_.size(); ++n) {
-        const bool now = statuses_[n]->operational;
-        if (now && was_operational_[n] == 0) {  // it has not heard what was sent on a change before
-            for (const Output& out : outputs_) {
-                for (const Sent::Part& part : out.sent->parts) {
-                    if (slots_[part.placed].node == n) {
-                        device_.pdos().trigger(out.sent->number);
-                    }
-                }
-            }
+        const bool operational = statuses_[n]->operational;
+        if (operational && was_operational_[n] == 0) {
+            send_all_to(n);
         }
-        if (now && was_operational_[n] == 0) {
-            for (Alone& a : alone_) {
-                if (slots_[a.slot].node == n) {
-                    a.sent = false;
-                }
-            }
-        }
-        was_operational_[n] = now ? 1 : 0;
-        if (now) {
+        was_operational_[n] = operational ? 1 : 0;
+        if (operational) {
             ever_operational_[n] = 1;
         }
     }
@@ -363,6 +432,35 @@ void Runner::transmit(Time now, Time period, bool leads) noexcept {
     if (boots_.load()) {
         safe_.store(false);
     }
+}
+
+/// A request to a node is followed by the next when it was answered: one in a cycle, when only
+/// cycles look for answers. While the network boots and no set-point counts yet, a slow thread
+/// looks for them for up to a quarter of its period. Not in time slots: nothing leaves during the
+/// wait, and afterwards the slot of this cycle may have passed.
+void Runner::serve_boot(Time now, Time period) noexcept {
+    constexpr Time slow = 2 * millisecond;
+    constexpr Time longest_wait = millisecond;
+    constexpr unsigned most_vain_waits = 5;
+    const NetworkStatus& network = master_.status();
+    if (period < slow || !active() || network.state != NetworkState::booting ||
+        network.booting == 0 || vain_waits_ >= most_vain_waits || link_->description().simulated ||
+        link_->description().in_slots) {
+        return;
+    }
+    const Time begun = monotonic_ns();
+    bool any = false;
+    for (Time at = begun, heard = begun; at - begun < period / 4 && at - heard < longest_wait;
+         at = monotonic_ns()) {
+        const Time then = now + (at - begun);
+        if (take_frames(then) == 0) continue;
+        any = true;
+        heard = at;
+        master_.poll(then);
+        open_and_close();
+        send(then);
+    }
+    vain_waits_ = any ? 0 : vain_waits_ + 1;
 }
 
 void Runner::produce_sync(Time now, Time period) noexcept {
@@ -466,6 +564,126 @@ bool Runner::is_process_data(const can::Frame& f) const noexcept {
            std::any_of(outputs_.begin(), outputs_.end(),
                        [&](const Output& o) { return same(o.frame); });
 }
+
+// A thread that stops, and what arrived until it runs again.
+
+void Runner::make_safe() noexcept {
+    if (link_ == nullptr) return;
+    boots_.store(true);
+    if (safe_.exchange(true)) {
+        return;  // nothing was started, or the safe values were sent
+    }
+    if (!active()) {
+        return;  // the network is another one's
+    }
+    if (!send_safe_values()) {
+        safe_.store(false);
+    }
+}
+
+/// Returns the safe value of an object; one without has its last value.
+std::uint64_t Runner::safe_value(const Slot& s) noexcept {
+    return s.has_safe ? s.safe : number_in(*s.entry);
+}
+
+/// Returns the safe values of a PDO to a node.
+std::uint64_t Runner::safe_image(const Sent& sent) const noexcept {
+    std::uint64_t image = 0;
+    for (const Sent::Part& part : sent.parts) {
+        image |= low_bits(safe_value(slots_[part.placed]), part.bits) << part.first;
+    }
+    return image;
+}
+
+/// Returns the safe values of an SRDO to a node.
+std::uint64_t Runner::safe_image(const OwnSrdo& srdo) const noexcept {
+    std::uint64_t image = 0;
+    unsigned bit = 0;
+    for (const std::size_t n : srdo.placed) {
+        const unsigned bits = slots_[n].object->bits;
+        image |= low_bits(safe_value(slots_[n]), bits) << bit;
+        bit += bits;
+    }
+    return image;
+}
+
+/// Returns whether the link took all of them.
+bool Runner::send_safe_values() noexcept {
+    bool all = true;
+    bool synchronous = false;
+    const auto send = [&](const can::Frame& f) {
+        if (link_->send(f, now_) != can::Sent::queued) {
+            all = false;
+        }
+    };
+    for (const Output& out : outputs_) {
+        if (!out.open) continue;
+        if (out.sent->pdo->multiplexed()) {
+            all = make_safe_alone(out) && all;
+            continue;
+        }
+        can::Frame f = out.frame;
+        store(f.data.data(), safe_image(*out.sent));
+        send(f);
+        synchronous = synchronous || out.sent->pdo->synchronous();
+    }
+    if (synchronous && produces_) {
+        send(sync_frame_);
+    }
+    for (const OwnSrdo& srdo : own_.srdos) {  // silence alone would take the node its SCT
+        if (!srdo.pdo->to_node) continue;
+        const std::uint64_t image = safe_image(srdo);
+        can::Frame f = make_frame(srdo.pdo->cob, static_cast<std::uint8_t>(srdo.pdo->bytes()));
+        store(f.data.data(), image);
+        send(f);
+        f.id = srdo.pdo->cob + 1;
+        store(f.data.data(), ~image);
+        send(f);
+    }
+    for (const can::Frame& f : farewell_) {
+        send(f);
+    }
+    link_->flush(now_);
+    return all;
+}
+
+/// Returns whether the link took all of them.
+bool Runner::make_safe_alone(const Output& out) noexcept {
+    bool all = true;
+    for (const Sent::Part& part : out.sent->parts) {
+        const Slot& s = slots_[part.placed];
+        can::Frame f = out.frame;
+        f.data[0] = static_cast<std::uint8_t>(0x80 | statuses_[s.node]->id);
+        store(f.data.data() + 1, s.object->index);
+        f.data[3] = s.object->sub;
+        store(f.data.data() + 4, static_cast<std::uint32_t>(safe_value(s)));
+        if (link_->send(f, now_) != can::Sent::queued) {
+            all = false;
+        }
+    }
+    return all;
+}
+
+/// Drops the frames that arrived while no cycles ran: their values and answers are old. Emergencies
+/// are still reported.
+void Runner::drop_backlog(Time now) noexcept {
+    constexpr std::size_t max_frames = 8192;
+    std::array<can::Frame, 32> frames;
+    for (std::size_t dropped = 0; dropped < max_frames; dropped += frames.size()) {
+        const std::size_t count = link_->receive(frames, now);
+        for (std::size_t i = 0; i < count; ++i) {
+            const can::Frame& f = frames[i];
+            const bool is_data = !f.extended && !f.remote && !f.error;
+            const bool is_emergency = is_data && f.id > 0x80 && f.id < 0x100;
+            if (is_emergency && active()) {
+                master_.handle(f, now);
+            }
+        }
+        if (count < frames.size()) return;
+    }
+}
+
+// Events of the master.
 
 void Runner::on_step(const NodeStatus& status) noexcept {
     steps_changed_ = true;

@@ -11,7 +11,6 @@
 
 #include <array>
 #include <atomic>
-#include <bitset>
 #include <memory>
 #include <span>
 #include <vector>
@@ -20,6 +19,7 @@
 #include "canopen/master/boot/master_objects.hpp"
 #include "canopen/master/boot/nmt_master.hpp"
 #include "canopen/protocol/device.hpp"
+#include "foreign_senders.hpp"
 #include "link/can.hpp"
 #include "master_node.hpp"
 
@@ -57,15 +57,8 @@ public:
     /// It came with fewer bytes than its objects have; they keep their values. `place` is that in
     /// OwnNode::received.
     virtual void on_short(std::size_t place, unsigned bytes) noexcept { (void)place, (void)bytes; }
-    /// Another device sends what only this master may send. `begins`: after a second without it.
-    struct Foreign {
-        std::uint16_t id = 0;
-        std::array<std::uint8_t, 2> data{};
-        std::uint32_t frames = 0;  ///< since the last report
-        bool sync = false;
-        bool rpdo = false;
-        bool begins = false;
-    };
+    /// Another device sends what only this master may send.
+    using Foreign = ForeignFrames;
     virtual void on_foreign(const Foreign&) noexcept {}
     /// Another device has the master's own node-id.
     virtual void on_own_id_collision() noexcept {}
@@ -157,13 +150,20 @@ private:
         std::uint32_t announced = 0;
         bool sent = false;  // since the node is operational
     };
+    void add_nodes();
+    void add_slots();
+    void add_outputs();
+    void add_own_identifiers();
     void begin(Time now) noexcept;
     void drop_backlog(Time now) noexcept;
     bool send_safe_values() noexcept;
+    static std::uint64_t safe_value(const Slot&) noexcept;
+    std::uint64_t safe_image(const Sent&) const noexcept;
+    std::uint64_t safe_image(const OwnSrdo&) const noexcept;
     void boot(Time now) noexcept;
+    void note_bus_state(Time now) noexcept;
     std::size_t take_frames(Time now) noexcept;
     void take(const can::Frame&, Time now) noexcept;
-    void note_foreign(const can::Frame&, Time now) noexcept;
     void open_and_close() noexcept;
     bool mandatory_are_configured() const noexcept;
     void serve_boot(Time now, Time period) noexcept;
@@ -174,6 +174,7 @@ private:
     bool is_process_data(const can::Frame&) const noexcept;
     void produce_sync(Time now, Time period) noexcept;
     void produce_time(Time now) noexcept;
+    void send_all_to(std::size_t node) noexcept;
     void take_wishes() noexcept;
     void tell_alone(Time now) noexcept;
     void ask(Time now) noexcept;
@@ -207,16 +208,7 @@ private:
     std::vector<std::uint8_t> open_;  // by node: it is configured, so PDOs go to and fro
     bool steps_changed_ = true;
     bool sync_open_ = false;
-    /// What others sent under an identifier of ours.
-    struct ForeignCount {
-        Time last = 0;
-        Time sent = 0;
-        std::uint32_t frames = 0;
-    };
-    std::vector<ForeignCount> foreign_;  // by identifier
-    Time foreign_from_ = 0;
-    // identifiers that only we send; RPDOs among them
-    std::bitset<2048> ours_, ours_to_nodes_;
+    ForeignSenders foreign_;
     unsigned vain_waits_ = 0;  // of serve_boot(), in a row
     // by node; ever: since the network was booted
     std::vector<std::uint8_t> was_operational_, ever_operational_;
