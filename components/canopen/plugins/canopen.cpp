@@ -277,55 +277,45 @@ private:
     // Events of the runner. [realtime]
     void on_step(std::size_t place, const NodeStatus& s) noexcept override {
         NodePins& pins = nodes_[place];
-        const NodeFaultMessages& w = messages_[place];
-        const double silence =
-            s.last_heard == 0
-                ? not_a_number
-                : static_cast<double>((now_ - s.last_heard + millisecond / 2) / millisecond) * 1e-3;
-        if (s.losses != pins.losses) {
-            pins.losses = s.losses;
-            pins.is_faulty = true;
-            switch (s.cause) {
-            case Cause::guarding: node_fault(place, w.guarding, silence); break;
-            case Cause::guard_toggle: node_fault(place, w.toggle); break;
-            case Cause::boot_up:
-                node_fault(place, s.foreign_command != 0 ? w.reset : w.rebooted);
-                break;
-            case Cause::left_operational:
-                node_fault(place, s.foreign_command != 0 ? w.commanded : w.left);
-                break;
-            case Cause::not_started: node_fault(place, w.not_started); break;
-            case Cause::duplicate_id: node_fault(place, w.duplicate); break;
-            default: node_fault(place, w.no_heartbeat, silence); break;
-            }
-            reporter_->node(s);
-            return;
+        const bool is_lost = s.losses != pins.losses;
+        pins.losses = s.losses;
+        if (is_lost) return on_lost(place, s);
+        switch (s.step) {
+        case Step::waiting:
+        case Step::failed: return on_boot_failed(place, s);
+        case Step::running: return on_running(place, s);
+        default: return;
         }
-        const bool given_up = s.step == Step::waiting || s.step == Step::failed;
-        const bool failed = given_up && s.result != BootResult::none && !booted(s.result);
-        if (given_up && s.cause == Cause::not_started && !pins.is_faulty) {
-            pins.is_faulty = true;
-            node_fault(place, w.not_started);
-            reporter_->node(s);
-        } else if (failed && !pins.is_faulty) {
-            const NodeSetup& setup = config_.nodes[place].setup;
-            // An absent node may still be powered up.
-            const bool absent = s.result == BootResult::no_answer &&
-                                (s.cause == Cause::no_response || s.cause == Cause::not_sent);
-            if (absent &&
-                (!setup.mandatory || now_ - runner_->network().begun < setup.boot_limit)) {
-                return;
-            }
-            pins.is_faulty = true;
-            const std::string& why = s.cause == Cause::duplicate_id
-                                         ? w.duplicate
-                                         : w.boot[(static_cast<std::size_t>(s.result) - 'A') & 15];
-            node_fault(place, why);
-            reporter_->node(s);
-        } else if (s.step == Step::running && pins.is_faulty) {
+    }
+    void on_lost(std::size_t place, const NodeStatus& s) noexcept {
+        const NodeFaultMessages& messages = messages_[place];
+        nodes_[place].is_faulty = true;
+        node_fault(place, messages.lost(s),
+                   NodeFaultMessages::has_silence(s.cause) ? silence(s) : not_a_number);
+        reporter_->node(s);
+    }
+    /// Raises a fault for a node that did not boot or start, once until it runs.
+    void on_boot_failed(std::size_t place, const NodeStatus& s) noexcept {
+        const bool not_started = s.cause == Cause::not_started;
+        const bool not_booted = s.result != BootResult::none && !booted(s.result);
+        if (nodes_[place].is_faulty || !(not_started || not_booted)) return;
+        if (!not_started && may_be_powering_up(place, s)) return;
+        nodes_[place].is_faulty = true;
+        node_fault(place, messages_[place].not_booted(s));
+        reporter_->node(s);
+    }
+    /// Returns true for an absent node that need not be there yet.
+    bool may_be_powering_up(std::size_t place, const NodeStatus& s) const noexcept {
+        const NodeSetup& setup = config_.nodes[place].setup;
+        const bool is_absent = s.result == BootResult::no_answer &&
+                               (s.cause == Cause::no_response || s.cause == Cause::not_sent);
+        return is_absent &&
+               (!setup.mandatory || now_ - runner_->network().begun < setup.boot_limit);
+    }
+    void on_running(std::size_t place, const NodeStatus& s) noexcept {
+        if (nodes_[place].is_faulty) {
             reporter_->node(s);
         }
-        if (s.step != Step::running) return;
         end(node_faults_[place]);
         tell_notes(place, s);
         for (std::size_t n = 0; n < pdo_messages_.size(); ++n) {
@@ -333,6 +323,11 @@ private:
             pdo_messages_[n].short_raised = false;
             end(short_faults_[n]);
         }
+    }
+    /// Returns the time since the last frame of the node in seconds.
+    double silence(const NodeStatus& s) const noexcept {
+        if (s.last_heard == 0) return not_a_number;
+        return static_cast<double>((now_ - s.last_heard + millisecond / 2) / millisecond) * 1e-3;
     }
     /// A fault of a node lasts until it runs again. [realtime]
     void node_fault(std::size_t place, const std::string& reason,

@@ -45,6 +45,37 @@ struct NodeFaultMessages {
                 " (result " + letter + ")";
         }
     }
+
+    /// Returns the message for a node that is lost. [realtime]
+    const std::string& lost(const NodeStatus& s) const noexcept {
+        const bool commanded_by_other = s.foreign_command != 0;
+        switch (s.cause) {
+        case Cause::guarding: return guarding;
+        case Cause::guard_toggle: return toggle;
+        case Cause::boot_up: return commanded_by_other ? reset : rebooted;
+        case Cause::left_operational: return commanded_by_other ? commanded : left;
+        case Cause::not_started: return not_started;
+        case Cause::duplicate_id: return duplicate;
+        default: return no_heartbeat;
+        }
+    }
+    /// Returns true if the message for a loss has the time without a sign of life. [realtime]
+    static bool has_silence(Cause cause) noexcept {
+        switch (cause) {
+        case Cause::guard_toggle:
+        case Cause::boot_up:
+        case Cause::left_operational:
+        case Cause::not_started:
+        case Cause::duplicate_id: return false;
+        default: return true;
+        }
+    }
+    /// Returns the message for a node that did not boot or start. [realtime]
+    const std::string& not_booted(const NodeStatus& s) const noexcept {
+        if (s.cause == Cause::not_started) return not_started;
+        if (s.cause == Cause::duplicate_id) return duplicate;
+        return boot[(static_cast<std::size_t>(s.result) - 'A') & 15];
+    }
 };
 
 /// Fault messages of a TPDO of a node. [setup]
