@@ -58,12 +58,20 @@ static_assert([] {
     return true;
 }(), "the table is in the order of the enumeration");
 
+/// Returns 0 for an unknown unit.
+double nanoseconds_of(std::string_view unit) {
+    if (unit == "s") return 1e9;
+    if (unit == "ms") return 1e6;
+    if (unit == "us") return 1e3;
+    return 0.0;
+}
+
 /// "20ms", "1.5s", "200us".
 bool parse_time(std::string_view text, Time& time) {
     double value = 0;
     const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
     const auto unit = text.substr(static_cast<std::size_t>(end - text.data()));
-    const double factor = unit == "s" ? 1e9 : unit == "ms" ? 1e6 : unit == "us" ? 1e3 : 0.0;
+    const double factor = nanoseconds_of(unit);
     if (wrong != std::errc{} || factor == 0.0 || !(value >= 0.0 && value * factor <= 1e15)) {
         return false;
     }
@@ -227,18 +235,23 @@ bool Faults::swallows(const Frame& f, std::uint8_t node, Time now) noexcept {
 }
 
 void Faults::identity(Frame& f) noexcept {
+    struct Row {
+        std::uint16_t index;
+        std::uint8_t sub;
+        Fault fault;
+    };
+    static constexpr Row objects[] = {
+        {0x1000, 0, Fault::wrong_type},    {0x1018, 1, Fault::wrong_vendor},
+        {0x1018, 2, Fault::wrong_product}, {0x1018, 3, Fault::wrong_revision},
+        {0x1018, 4, Fault::wrong_serial},  {0x1f56, 1, Fault::wrong_software},
+    };
     if ((f.data[0] >> 5) != 2 || (f.data[0] & 2) == 0) return;
-    const auto object = load<std::uint16_t>(f.data.data() + 1);
-    const auto sub = f.data[3];
-    const auto wrong = object == 0x1000   ? hit(Fault::wrong_type)
-                       : object == 0x1f56 ? sub == 1 && hit(Fault::wrong_software)
-                       : object != 0x1018 ? false
-                       : sub == 1         ? hit(Fault::wrong_vendor)
-                       : sub == 2         ? hit(Fault::wrong_product)
-                       : sub == 3         ? hit(Fault::wrong_revision)
-                                          : sub == 4 && hit(Fault::wrong_serial);
-    if (wrong) {
-        f.data[4] ^= 0xff;
+    const auto index = load<std::uint16_t>(f.data.data() + 1);
+    for (const Row& row : objects) {
+        const bool is_it = row.index == index && (row.sub == f.data[3] || index == 0x1000);
+        if (is_it && hit(row.fault)) {
+            f.data[4] ^= 0xff;
+        }
     }
 }
 
@@ -329,34 +342,42 @@ void Faults::send(Frame f, std::uint8_t node, FrameQueue& bus, Time now) noexcep
     Time late = 0;
     if (!f.extended && f.id == 0x580U + node && f.length == 8) {
         if (!answer(f, bus)) return;
-        if (hit(Fault::late_sdo)) {
-            late = time(Fault::late_sdo);
-        }
+        late = hit(Fault::late_sdo) ? time(Fault::late_sdo) : 0;
     } else if (!f.extended && f.id == 0x700U + node && f.length == 1) {
-        const bool boot_up = f.data[0] == 0;
-        if (boot_up ? hit(Fault::no_boot_up) : hit(Fault::no_heartbeat)) return;
-        if (!boot_up && hit(Fault::wrong_state)) {
-            f.data[0] = static_cast<std::uint8_t>((f.data[0] & 0x80) | 0x04);
-        }
-        if (!boot_up && hit(Fault::guard_toggle)) {
-            f.data[0] ^= 0x80;
-        }
+        if (!error_control(f)) return;
     } else if (is_srdo(f)) {
         if (!safety(f, late, bus)) return;
     } else if (is_pdo(f, node)) {
-        if (f.length > 0 && hit(Fault::short_pdo)) {
-            --f.length;
-        } else if (f.length < 8 && hit(Fault::long_pdo)) {
-            f.data[f.length++] = 0;
-        }
-        if (hit(Fault::late_pdo)) {
-            late = time(Fault::late_pdo);
-        }
+        process_data(f);
+        late = hit(Fault::late_pdo) ? time(Fault::late_pdo) : 0;
     }
     if (late != 0) return hold(f, now + late, bus);
     bus.push(f);
     if (hit(Fault::twice)) {
         bus.push(f);
+    }
+}
+
+/// Alters a heartbeat or boot-up message. Returns false when it must not be sent.
+bool Faults::error_control(Frame& f) noexcept {
+    if (f.data[0] == 0) return !hit(Fault::no_boot_up);
+    if (hit(Fault::no_heartbeat)) return false;
+    if (hit(Fault::wrong_state)) {
+        f.data[0] = static_cast<std::uint8_t>((f.data[0] & 0x80) | 0x04);
+    }
+    if (hit(Fault::guard_toggle)) {
+        f.data[0] ^= 0x80;
+    }
+    return true;
+}
+
+/// Alters the length of a PDO.
+void Faults::process_data(Frame& f) noexcept {
+    if (f.length > 0 && hit(Fault::short_pdo)) {
+        --f.length;
+    } else if (f.length < 8 && hit(Fault::long_pdo)) {
+        f.data[f.length] = 0;
+        ++f.length;
     }
 }
 

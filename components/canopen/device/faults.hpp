@@ -118,6 +118,8 @@ private:
     void start(Time now) noexcept;
     void hold(const Frame&, Time due, FrameQueue& bus) noexcept;
     bool answer(Frame&, FrameQueue& bus) noexcept;
+    bool error_control(Frame&) noexcept;
+    void process_data(Frame&) noexcept;
     void identity(Frame&) noexcept;
     bool safety(Frame&, Time& late, FrameQueue& bus) noexcept;
 

@@ -112,9 +112,10 @@ void add_pdo(Description& d, std::uint16_t communication, std::uint32_t predefin
 
     const auto mapping = static_cast<std::uint16_t>(index + 0x200);
     const bool has_default = pdo.cob == 0 && number <= 4;
-    const std::uint32_t cob = pdo.cob != 0  ? pdo.cob
-                              : has_default ? predefined + (number - 1) * 0x100
-                                            : cob_invalid;
+    std::uint32_t cob = pdo.cob != 0 ? pdo.cob : cob_invalid;
+    if (has_default) {
+        cob = predefined + (number - 1) * 0x100;
+    }
     d.add(index, 0, u8, fixed, sends ? 6 : 5, "Highest sub-index");
     d.add(index, 1, u32, rw, cob, "COB-ID").plus_node_id = has_default || pdo.plus_node_id;
     d.add(index, 2, u8, rw, pdo.transmission, "Transmission type");

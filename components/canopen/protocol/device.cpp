@@ -187,13 +187,7 @@ bool Device::produce_sync(Time now) noexcept {
 void Device::handle(const Frame& f, Time now) noexcept {
     if (!started_ || f.error || f.fd) return;
     now_ = now;
-    if (f.id == 0 && !f.extended) {
-        if (f.remote || f.length != 2 || !settings_.nmt_slave || !usable(node_id_)) return;
-        if (f.data[1] == 0 || f.data[1] == node_id_) {
-            command(static_cast<NmtCommand>(f.data[0]), now);
-        }
-        return;
-    }
+    if (f.id == 0 && !f.extended) return handle_nmt(f, now);
     if (settings_.lss && lss_.handle(f)) {
         if (lss_.wants_reset()) {
             command(NmtCommand::reset_communication, now);
@@ -207,7 +201,20 @@ void Device::handle(const Frame& f, Time now) noexcept {
         }
         return;
     }
-    if (state_ == NmtState::stopped) return;
+    if (state_ != NmtState::stopped) {
+        handle_service(f, now);
+    }
+}
+
+void Device::handle_nmt(const Frame& f, Time now) noexcept {
+    if (f.remote || f.length != 2 || !settings_.nmt_slave || !usable(node_id_)) return;
+    if (f.data[1] == 0 || f.data[1] == node_id_) {
+        command(static_cast<NmtCommand>(f.data[0]), now);
+    }
+}
+
+/// The services of a node that is not stopped.
+void Device::handle_service(const Frame& f, Time now) noexcept {
     if (sync_.handle(f, now)) return take_sync(now);
     if (srdos_.handle(f, now)) return;
     for (auto& s : servers_) {

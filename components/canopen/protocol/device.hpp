@@ -105,6 +105,8 @@ private:
     void reset_communication(Time now) noexcept;
     void enter(NmtState, Time now) noexcept;
     void communication_error(std::uint16_t code, std::uint8_t node, Time now) noexcept;
+    void handle_nmt(const Frame&, Time now) noexcept;
+    void handle_service(const Frame&, Time now) noexcept;
     void take_sync(Time now) noexcept;
     void configure_channel(std::uint16_t index) noexcept;
 

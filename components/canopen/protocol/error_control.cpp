@@ -70,31 +70,42 @@ bool ErrorControl::handle(const Frame& f, Time now, Events& events) noexcept {
     if (f.remote) {
         // The heartbeat excludes guarding (CiA 301), and nothing is sent before the boot-up
         // message.
-        if (node != node_id_ || !booted_ || boot_pending_ || period_ != 0) return true;
-        Frame answer = make_frame(0x700U + node_id_, 1);
-        answer.data[0] = static_cast<std::uint8_t>(static_cast<std::uint8_t>(state_) | toggle_);
-        if (out_.push(answer)) {
-            toggle_ ^= 0x80;
-        }
-        if (life_time_ != 0) {
-            guarding_ = true;
-            guarded_ = now;
-        }
-        if (life_lost_) {
-            life_lost_ = false;
-            events.on_life_guarding(false, now);
+        const bool answers = node == node_id_ && booted_ && !boot_pending_ && period_ == 0;
+        if (answers) {
+            answer_guarding(now, events);
         }
         return true;
     }
     if (f.length < 1) return true;
-    if (node == node_id_) {
-        if (!collided_) {
-            events.on_id_collision(now);
-        }
-        collided_ = true;
+    if (node != node_id_) {
+        on_heartbeat(node, static_cast<NmtState>(f.data[0] & 0x7f), now, events);
         return true;
     }
-    const auto state = static_cast<NmtState>(f.data[0] & 0x7f);
+    if (!collided_) {
+        events.on_id_collision(now);
+    }
+    collided_ = true;
+    return true;
+}
+
+void ErrorControl::answer_guarding(Time now, Events& events) noexcept {
+    Frame answer = make_frame(0x700U + node_id_, 1);
+    answer.data[0] = static_cast<std::uint8_t>(static_cast<std::uint8_t>(state_) | toggle_);
+    if (out_.push(answer)) {
+        toggle_ ^= 0x80;
+    }
+    if (life_time_ != 0) {
+        guarding_ = true;
+        guarded_ = now;
+    }
+    if (life_lost_) {
+        life_lost_ = false;
+        events.on_life_guarding(false, now);
+    }
+}
+
+void ErrorControl::on_heartbeat(std::uint8_t node, NmtState state, Time now,
+                                Events& events) noexcept {
     for (std::size_t n = 1; n <= highest_; ++n) {
         auto& c = consumers_[n];
         if (c.node != node || c.limit == 0) continue;
@@ -103,22 +114,20 @@ bool ErrorControl::handle(const Frame& f, Time now, Events& events) noexcept {
         if (c.lost) {
             --lost_;
         }
-        c.watching = true;
+        c.watching = state != NmtState::initialising;
         c.lost = false;
         c.heard = now;
         c.state = state;
         // After a boot-up the timeout starts with the first heartbeat.
         if (state == NmtState::initialising) {
-            c.watching = false;
             events.on_node(node, NodeEvent::boot_up, state, now);
         } else if (first) {
             events.on_node(node, NodeEvent::alive, state, now);
         } else if (changed) {
             events.on_node(node, NodeEvent::changed, state, now);
         }
-        break;
+        return;
     }
-    return true;
 }
 
 ErrorControl::Change ErrorControl::poll(Time now, Events& events) noexcept {

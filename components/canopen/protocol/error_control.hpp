@@ -56,6 +56,8 @@ private:
     void read_consumer(const Entry&) noexcept;
     void read_producer() noexcept;
     void send_boot_up() noexcept;
+    void answer_guarding(Time now, Events&) noexcept;
+    void on_heartbeat(std::uint8_t node, NmtState, Time now, Events&) noexcept;
 
     Dictionary& dictionary_;
     FrameQueue& out_;

@@ -45,6 +45,13 @@ private:
     void identify(unsigned step, std::uint32_t value) noexcept;
     void fastscan(const Frame&) noexcept;
     void configure_bit_timing(const Frame&) noexcept;
+    void configure_node_id(std::uint8_t id) noexcept;
+    void activate_bit_timing(std::uint16_t delay_ms) noexcept;
+    void switch_global(std::uint8_t mode) noexcept;
+    bool is_unconfigured() const noexcept;
+    bool is_in_bound(unsigned step, std::uint32_t value) const noexcept;
+    bool handle_in_any_state(const Frame&) noexcept;
+    void handle_configuration(const Frame&) noexcept;
 
     FrameQueue& out_;
     Events& events_;

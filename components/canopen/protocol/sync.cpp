@@ -85,7 +85,8 @@ bool Sync::lost(Time now) noexcept {
         now - last_ < period_ + period_ / 2) {
         return false;
     }
-    return lost_reported_ = true;
+    lost_reported_ = true;
+    return true;
 }
 
 Abort Sync::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {

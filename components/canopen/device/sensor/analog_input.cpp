@@ -97,6 +97,25 @@ std::int32_t cut(double value, unsigned bits) noexcept {
                : static_cast<std::int32_t>(std::llround(std::clamp(value, -most - 1, most)));
 }
 
+/// Returns the initial value of an object that all channels have.
+std::uint32_t initial_value(std::uint16_t index, const AnalogChannel& c) {
+    switch (index) {
+    case sensor_type: return c.sensor_type;
+    case mode: return 1;
+    case unit: return c.unit;
+    case digits: return c.digits;
+    default: return 0;
+    }
+}
+
+/// Returns where a value is: -1 below the lower limit, 1 above the upper one, 0 between. Limits that
+/// are equal are off.
+std::int8_t zone_of(double value, double lower, double upper) noexcept {
+    if (!(lower < upper)) return 0;
+    if (value < lower) return -1;
+    return value > upper ? std::int8_t{1} : std::int8_t{0};
+}
+
 }  // namespace
 
 void add_analog_inputs(Description& d, std::span<const AnalogChannel> channels) {
@@ -111,10 +130,11 @@ void add_analog_inputs(Description& d, std::span<const AnalogChannel> channels) 
             const bool one =
                 part.part == fv2_part || part.part == pv2_part || part.part == factor_part;
             for (std::uint8_t n = 1; n <= count; ++n) {
+                const std::string& name = channels[n - 1U].name;
+                const double initial = one ? 1.0 : 0.0;
                 auto& e = family.type == Type::real32
-                              ? d.add_real(index, n, family.type, access, one ? 1.0 : 0.0,
-                                           channels[n - 1U].name)
-                              : d.add(index, n, family.type, access, 0, channels[n - 1U].name);
+                              ? d.add_real(index, n, family.type, access, initial, name)
+                              : d.add(index, n, family.type, access, 0, name);
                 e.tpdo = !part.written;
             }
         }
@@ -124,11 +144,7 @@ void add_analog_inputs(Description& d, std::span<const AnalogChannel> channels) 
         d.add(row.index, 0, Type::unsigned8, Access::constant, count, "Highest sub-index");
         for (std::uint8_t n = 1; n <= count; ++n) {
             const auto& c = channels[n - 1U];
-            const std::uint32_t value = row.index == sensor_type ? c.sensor_type
-                                        : row.index == mode      ? 1
-                                        : row.index == unit      ? c.unit
-                                        : row.index == digits    ? c.digits
-                                                                 : 0;
+            const std::uint32_t value = initial_value(row.index, c);
             auto& e = d.add(row.index, n, row.type, row.access, value, c.name);
             if (row.index == digits) {
                 e.limited(0, 6);
@@ -219,11 +235,7 @@ void AnalogInputs::sample(unsigned n, double field, std::int32_t counts, std::ui
     show(n);
     const double value = process(n);
     const double delta = c.delta;
-    const bool limits = c.lower < c.upper;  // both 0: no limits
-    c.zone = static_cast<std::int8_t>(!limits                   ? 0
-                                      : value < double{c.lower} ? -1
-                                      : value > double{c.upper} ? 1
-                                                                : 0);
+    c.zone = zone_of(value, double{c.lower}, double{c.upper});
     // Compared in units of the last displayed digit, so that noise below it is not a change.
     const double scale = power(c.digits);
     const double moved = std::abs(std::round(value * scale) - std::round(c.sent * scale));
@@ -237,20 +249,25 @@ void AnalogInputs::mark_sent(unsigned n) noexcept {
     c.sent_zone = c.zone;
 }
 
+/// Returns a part of a channel in units of its last displayed digit; the field value in counts.
+double AnalogInputs::displayed(unsigned n, std::uint8_t part) noexcept {
+    auto& c = channels_[n];
+    switch (part) {
+    case field_part: return c.counts;
+    case process_part: return process(n) * power(c.digits);
+    case net_part: return net(n) * power(c.digits);
+    default: return double{*value(c, part)} * power(c.digits);
+    }
+}
+
 Abort AnalogInputs::reading(Entry& e) noexcept {
     const unsigned n = e.sub - 1U;
     if (e.sub == 0 || n >= channels_.size()) return Abort::none;
-    auto& c = channels_[n];
     if (e.index < 0x7000) {
         show(n);
         return Abort::none;
     }
-    const auto part = static_cast<std::uint8_t>(e.index);
-    const std::int32_t whole = part == field_part     ? cut(c.counts, e.bits)
-                               : part == process_part ? cut(process(n) * power(c.digits), e.bits)
-                               : part == net_part
-                                   ? cut(net(n) * power(c.digits), e.bits)
-                                   : cut(double{*value(c, part)} * power(c.digits), e.bits);
+    const std::int32_t whole = cut(displayed(n, static_cast<std::uint8_t>(e.index)), e.bits);
     std::memcpy(e.data, &whole, e.size);
     return Abort::none;
 }

@@ -56,6 +56,7 @@ public:
 
     double field(unsigned n) const noexcept { return channels_[n].field; }
     double process(unsigned n) const noexcept;
+    double displayed(unsigned n, std::uint8_t part) noexcept;
     double net(unsigned n) const noexcept { return process(n) - double{channels_[n].tare}; }
 
     Abort reading(Entry&) noexcept override;

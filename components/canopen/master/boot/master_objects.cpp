@@ -21,7 +21,8 @@ constexpr std::uint8_t to_pre_operational = 127;
 }  // namespace
 
 std::uint32_t startup_of(const MasterSetup& s) {
-    std::uint32_t value = 1U | (s.start_all_at_once ? 1U << 1 : 0U) | (s.start_self ? 0U : 1U << 2);
+    const auto bit = [](bool value, unsigned number) { return value ? 1U << number : 0U; };
+    std::uint32_t value = 1U | bit(s.start_all_at_once, 1) | bit(!s.start_self, 2);
     bool nobody = !s.nodes.empty();
     for (const auto& n : s.nodes) {
         nobody = nobody && !n.start;
@@ -33,7 +34,7 @@ std::uint32_t startup_of(const MasterSetup& s) {
             value |= 1U << 6;
         }
     }
-    return value | (nobody ? 1U << 3 : 0U);
+    return value | bit(nobody, 3);
 }
 
 std::uint32_t assignment_of(const NodeSetup& n) {

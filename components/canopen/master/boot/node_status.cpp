@@ -77,10 +77,10 @@ std::string print(const char* format, T... values) {
     return text.data();
 }
 std::string hex(std::uint64_t value) {
-    return print(value > 0xffffffff ? "%016llXh"
-                 : value > 0xffff   ? "%08llXh"
-                                    : "%04llXh",
-                 static_cast<unsigned long long>(value));
+    const auto number = static_cast<unsigned long long>(value);
+    if (value > 0xffffffff) return print("%016llXh", number);
+    if (value > 0xffff) return print("%08llXh", number);
+    return print("%04llXh", number);
 }
 std::string seconds(Time t) { return print("%.2f s", static_cast<double>(t) / second); }
 std::string text(std::uint64_t value) {
@@ -177,38 +177,71 @@ std::string aborted(const NodeSetup& n, const NodeStatus& s) {
     return "rejects object " + object(n, s) + ' ' + during(s.failed_in) + ": " + abort;
 }
 
+std::string unresponsive(const NodeSetup& n, const NodeStatus& s) {
+    if (s.result == BootResult::no_answer) {
+        return "does not respond (" + object(n, s) +
+               "): check its power, cable, bit rate and node ID; 'hal can scan' lists the "
+               "nodes that respond";
+    }
+    return "stopped responding at " + object(n, s) + ' ' + during(s.failed_in) +
+           ": check its power and cable";
+}
+
+std::string mismatch(const NodeSetup& n, const NodeStatus& s) {
+    if (s.failed_in == Step::checking_program) {
+        return "runs program " + program(n, s) +
+               ", and updates are not allowed: update it by hand or allow the update";
+    }
+    return "is another device: its " + std::string(identity(s.index, s.sub)) + " (" + object(n, s) +
+           ") is " + hex(s.found) + " where " + hex(s.expected) +
+           " is expected; connect the right device or correct its configuration";
+}
+
+std::string not_retained(const NodeSetup& n, const NodeStatus& s) {
+    if (s.failed_in == Step::checking_program) {
+        return "still runs program " + program(n, s) + " after the download; check the file";
+    }
+    return "accepted " + hex(s.expected) + " for object " + object(n, s) + " but holds " +
+           hex(s.found) + "; write a value it can hold, or remove the object";
+}
+
+/// When a sign of life is missing.
+std::string when_silent(const NodeStatus& s) {
+    return s.failed_in >= Step::ready ? "within its timeout" : during(s.failed_in);
+}
+
+std::string rebooted(const NodeStatus& s) {
+    if (s.foreign_command != 0) {
+        return std::string("rebooted after another device sent ") +
+               command_text(s.foreign_command) + ": remove the second NMT master";
+    }
+    return "rebooted without a command from this master: check its supply voltage, and the bus "
+           "for another NMT master";
+}
+
+std::string left_operational(const NodeStatus& s) {
+    if (s.foreign_command != 0) {
+        return "left the operational state after another device sent " +
+               std::string(command_text(s.foreign_command)) + " and is " + to_string(s.state) +
+               ": remove the second NMT master";
+    }
+    return "left the operational state without a command from this master and is " +
+           std::string(to_string(s.state)) + emergency(s) +
+           ": check the node, and the bus for another NMT master";
+}
+
 /// The predicate of the sentence whose subject is the node.
 std::string predicate(const NodeSetup& n, const NodeStatus& s) {
-    const bool of_program = s.failed_in == Step::checking_program;
     switch (s.cause) {
     case Cause::none: return {};
-    case Cause::no_response:
-        if (s.result == BootResult::no_answer) {
-            return "does not respond (" + object(n, s) +
-                   "): check its power, cable, bit rate and node ID; 'hal can scan' lists the "
-                   "nodes that respond";
-        }
-        return "stopped responding at " + object(n, s) + ' ' + during(s.failed_in) +
-               ": check its power and cable";
+    case Cause::no_response: return unresponsive(n, s);
     case Cause::not_sent:
         return "could not be asked for " + object(n, s) + ' ' + during(s.failed_in) +
                ": the bus accepts no frames from the master; check the master's cable, the bit "
                "rate, and that another node is connected";
     case Cause::aborted: return aborted(n, s);
-    case Cause::mismatch:
-        if (of_program) {
-            return "runs program " + program(n, s) +
-                   ", and updates are not allowed: update it by hand or allow the update";
-        }
-        return "is another device: its " + std::string(identity(s.index, s.sub)) + " (" +
-               object(n, s) + ") is " + hex(s.found) + " where " + hex(s.expected) +
-               " is expected; connect the right device or correct its configuration";
-    case Cause::not_retained:
-        if (of_program) {
-            return "still runs program " + program(n, s) + " after the download; check the file";
-        }
-        return "accepted " + hex(s.expected) + " for object " + object(n, s) + " but holds " +
-               hex(s.found) + "; write a value it can hold, or remove the object";
+    case Cause::mismatch: return mismatch(n, s);
+    case Cause::not_retained: return not_retained(n, s);
     case Cause::duplicate_id:
         return "has a duplicate node ID: two devices respond, object " + object(n, s) + " is " +
                hex(s.expected) + " and " + hex(s.found) + "; change the node ID of one of them";
@@ -229,35 +262,16 @@ std::string predicate(const NodeSetup& n, const NodeStatus& s) {
         return "reports its flash busy for more than " + seconds(n.program.limit) + " (" +
                object(n, s) + ')';
     case Cause::heartbeat:
-        return "sent no heartbeat " +
-               std::string(s.failed_in >= Step::ready ? "within its timeout"
-                                                      : during(s.failed_in)) +
-               ": check its power and cable";
+        return "sent no heartbeat " + when_silent(s) + ": check its power and cable";
     case Cause::guarding:
-        return "did not respond to node guarding " +
-               std::string(s.failed_in >= Step::ready ? "within its timeout"
-                                                      : during(s.failed_in)) +
+        return "did not respond to node guarding " + when_silent(s) +
                ": check its power and cable, and that it supports node guarding";
     case Cause::guard_toggle:
         return "responded to node guarding with a toggle bit that did not alternate: supervise it "
                "by heartbeat, or look for a second device "
                "with this node ID";
-    case Cause::boot_up:
-        if (s.foreign_command != 0) {
-            return std::string("rebooted after another device sent ") +
-                   command_text(s.foreign_command) + ": remove the second NMT master";
-        }
-        return "rebooted without a command from this master: check its supply voltage, and the bus "
-               "for another NMT master";
-    case Cause::left_operational:
-        if (s.foreign_command != 0) {
-            return "left the operational state after another device sent " +
-                   std::string(command_text(s.foreign_command)) + " and is " + to_string(s.state) +
-                   ": remove the second NMT master";
-        }
-        return "left the operational state without a command from this master and is " +
-               std::string(to_string(s.state)) + emergency(s) +
-               ": check the node, and the bus for another NMT master";
+    case Cause::boot_up: return rebooted(s);
+    case Cause::left_operational: return left_operational(s);
     case Cause::not_started:
         return "did not become operational after NMT start and is " +
                std::string(to_string(s.state)) +
@@ -290,9 +304,12 @@ std::string sentence(const MasterSetup& setup, const NetworkStatus& s, const Nod
     if (node == setup.nodes.end()) return result + "cause unknown";
     const auto of = sentence(*node, of_node);
     const bool idle = of_node.step == Step::running && !of_node.operational;
-    result += of.empty() ? node_name(*node) + " is " +
-                               (idle ? to_string(of_node.state) : to_string(of_node.step))
-                         : of;
+    if (of.empty()) {
+        result += node_name(*node) + " is ";
+        result += idle ? to_string(of_node.state) : to_string(of_node.step);
+    } else {
+        result += of;
+    }
     if (s.state == NetworkState::failed) {
         result += "; all nodes were stopped";
     } else if (of_node.step == Step::waiting) {
