@@ -97,7 +97,8 @@ ROWS = {
     "components/bus/component": ["runtime/sdk", "drivers/link"],
     "components/bus/config": ["runtime/text"],
     "components/bus/events": [],
-    "components/cia402": ["runtime/sdk"],
+    "components/cia301": [],
+    "components/cia402": ["runtime/sdk", "components/cia301"],
     "components/canopen/protocol": [
         "runtime/sdk",
         "runtime/text",
@@ -114,7 +115,7 @@ ROWS = {
         "components/canopen/eds",
         "components/sim",
     ],  # sim: the plants behind simulated devices
-    "components/ethercat/wire": ["runtime/text"],
+    "components/ethercat/wire": ["runtime/text", "components/cia301"],
     "components/ethercat/esi": ["components/ethercat/wire"],
     "components/ethercat/esc": ["components/ethercat/wire", "drivers/link"],
     "components/ethercat/devices": [

@@ -78,7 +78,7 @@ class Slaves(Ethercat):
     def test_a_missing_comma_is_named(self):
         self.assertEqual(
             "hal ethercat slaves: --emulate, device 1: 'digital_in' is a device of its own; write it on the next line, or after a comma; options of servo: "
-            "axes dc modes alias serial\n",
+            "axes dc modes motor alias serial\n",
             self.refused("slaves", line="servo digital_in"),
         )
 
@@ -332,7 +332,7 @@ class Configuration(Ethercat):
         self.assertEqual("0x01 1\n", self.on("upload", "-p", 1, "0x60c2", 1, line=line))
         self.on("download", "-p", 1, "0x60c2", 1, 2, line=line)
         self.assertIn(
-            "code 0x06010002: object is read-only",
+            "code 0x06010002: attempt to write a read-only object",
             self.refused("download", "-p", 1, "0x6041", 0, 2, line=line),
         )
         self.assertIn("607A:0 DINT, 32 bit  Target position\n", self.on("pdos", line=line))

@@ -56,7 +56,7 @@ class Gateway(Case):
         )
         self.assertIn("0x6041 ", self.good("ethercat", "sdos", self.address, "-p", "0"))
         self.assertEqual(
-            "hal ethercat upload: slave 0: 0x6999:0: SDO transfer aborted with code 0x06020000: object does not exist\n",
+            "hal ethercat upload: slave 0: 0x6999:0: SDO transfer aborted with code 0x06020000: object does not exist in the object dictionary\n",
             self.bad("ethercat", "upload", self.address, "-p", "0", "0x6999", "0"),
         )
         self.assertEqual(

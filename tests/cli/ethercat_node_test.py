@@ -122,7 +122,7 @@ class Line(Case):
         self.bad("ethercat", "upload", "eth:m0", "-p", "1", "0x2fff", "0")
         self.expect(
             dump,
-            r"  <-  FPRD station 0x1002 1100  \[256\] 0A 00 .* WKC 1  CoE SDO abort 0x2FFF:0: 0x06020000, object does not exist\n",
+            r"  <-  FPRD station 0x1002 1100  \[256\] 0A 00 .* WKC 1  CoE SDO abort 0x2FFF:0: 0x06020000, object does not exist in the object dictionary\n",
         )
         self.expect(
             dump, r"  <-  BWR  all slaves 0120  \[2\] 11 00  WKC 2  AL control: INIT, acknowledge\n"

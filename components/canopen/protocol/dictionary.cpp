@@ -57,7 +57,7 @@ constexpr Layout one_u16{{}, unsigned16};
 constexpr Layout one_u32{{}, unsigned32};
 constexpr Layout list_of_u32{{unsigned8}, unsigned32};
 constexpr Layout sdo_parameter{{unsigned8, unsigned32, unsigned32}, unsigned8};
-constexpr Layout pdo_parameter{
+constexpr Layout pdo_communication{
     {unsigned8, unsigned32, unsigned8, unsigned16, unsigned8, unsigned16}, unsigned8};
 
 /// The objects of this library whose type CiA 301 prescribes.
@@ -66,14 +66,29 @@ struct Row {
     const Layout& layout;
 };
 constexpr Row rows[] = {
-    {0x1000, 0x1000, one_u32},       {0x1001, 0x1001, one_u8},      {0x1002, 0x1002, one_u32},
-    {0x1003, 0x1003, list_of_u32},   {0x1005, 0x1007, one_u32},     {0x100c, 0x100c, one_u16},
-    {0x100d, 0x100d, one_u8},        {0x1010, 0x1011, list_of_u32}, {0x1012, 0x1012, one_u32},
-    {0x1014, 0x1014, one_u32},       {0x1015, 0x1015, one_u16},     {0x1016, 0x1016, list_of_u32},
-    {0x1017, 0x1017, one_u16},       {0x1018, 0x1018, list_of_u32}, {0x1019, 0x1019, one_u8},
-    {0x1028, 0x1028, list_of_u32},   {0x1029, 0x1029, one_u8},      {0x1200, 0x12ff, sdo_parameter},
-    {0x1400, 0x15ff, pdo_parameter}, {0x1600, 0x17ff, list_of_u32}, {0x1800, 0x19ff, pdo_parameter},
-    {0x1a00, 0x1bff, list_of_u32},   {0x1f80, 0x1f80, one_u32},
+    {0x1000, 0x1000, one_u32},
+    {0x1001, 0x1001, one_u8},
+    {0x1002, 0x1002, one_u32},
+    {0x1003, 0x1003, list_of_u32},
+    {0x1005, 0x1007, one_u32},
+    {0x100c, 0x100c, one_u16},
+    {0x100d, 0x100d, one_u8},
+    {0x1010, 0x1011, list_of_u32},
+    {0x1012, 0x1012, one_u32},
+    {0x1014, 0x1014, one_u32},
+    {0x1015, 0x1015, one_u16},
+    {0x1016, 0x1016, list_of_u32},
+    {0x1017, 0x1017, one_u16},
+    {0x1018, 0x1018, list_of_u32},
+    {0x1019, 0x1019, one_u8},
+    {0x1028, 0x1028, list_of_u32},
+    {0x1029, 0x1029, one_u8},
+    {0x1200, 0x12ff, sdo_parameter},
+    {0x1400, 0x15ff, pdo_communication},
+    {0x1600, 0x17ff, list_of_u32},
+    {0x1800, 0x19ff, pdo_communication},
+    {0x1a00, 0x1bff, list_of_u32},
+    {0x1f80, 0x1f80, one_u32},
 };
 
 }  // namespace standard
@@ -89,16 +104,6 @@ Type standard_type(std::uint16_t index, std::uint8_t sub) noexcept {
     return Type::none;
 }
 
-std::int64_t integer(const Entry& e, std::span<const std::uint8_t> bytes) noexcept {
-    std::uint64_t raw = 0;
-    std::memcpy(&raw, bytes.data(), std::min<std::size_t>(bytes.size(), 8));
-    const unsigned bits = e.bits == 1 ? 8 : e.bits;
-    if (is_signed(e.type) && bits < 64 && (raw >> (bits - 1) & 1) != 0) {
-        raw |= ~std::uint64_t{0} << bits;
-    }
-    return static_cast<std::int64_t>(raw);
-}
-
 Abort check_range(const Entry& e, std::span<const std::uint8_t> bytes) noexcept {
     if (is_real(e.type)) {
         const double value = e.type == Type::real32 ? static_cast<double>(load<float>(bytes.data()))
@@ -107,7 +112,7 @@ Abort check_range(const Entry& e, std::span<const std::uint8_t> bytes) noexcept 
         if (!(value <= std::bit_cast<double>(e.high))) return Abort::too_high;
         return value < std::bit_cast<double>(e.low) ? Abort::too_low : Abort::none;
     }
-    const auto value = integer(e, bytes);
+    const auto value = cia301::integer_of(e.type, bytes);
     if (e.type == Type::unsigned64) {
         if (static_cast<std::uint64_t>(value) > static_cast<std::uint64_t>(e.high)) {
             return Abort::too_high;

@@ -6,22 +6,22 @@
 #include <array>
 #include <cstdint>
 
+#include "cia301/error_register.hpp"
 #include "dictionary.hpp"
 #include "events.hpp"
 #include "frames.hpp"
 
 namespace hal::canopen {
 
-/// Bits of the error register 1001h (CiA 301).
-enum ErrorRegister : std::uint8_t {
-    error_generic = 0x01,
-    error_current = 0x02,
-    error_voltage = 0x04,
-    error_temperature = 0x08,
-    error_communication = 0x10,
-    error_profile = 0x20,
-    error_manufacturer = 0x80,
-};
+using cia301::error_communication;
+using cia301::error_current;
+using cia301::error_generic;
+using cia301::error_manufacturer;
+using cia301::error_profile;
+using cia301::error_temperature;
+using cia301::error_voltage;
+using cia301::ErrorRegister;
+
 /// Returns the description of the class of the error code (CiA 301); "error reset or no error" for
 /// 0. [any]
 const char* emergency_text(std::uint16_t code) noexcept;

@@ -13,9 +13,15 @@ struct FaultRow {
     bool controllable;
 };
 constexpr FaultRow fault_rows[AxisFaults::causes] = {
-    {error::over_current, false},    {error::over_voltage, true},     {error::under_voltage, true},
-    {error::over_temperature, true}, {error::position_sensor, false}, {error::over_speed, true},
-    {error::heartbeat, true},        {error::following_error, true},
+    {error::over_current, false},
+    {error::over_voltage, true},
+    {error::under_voltage, true},
+    {error::over_temperature, true},
+    {error::position_sensor, false},
+    {error::over_speed, true},
+    {error::heartbeat, true},
+    {error::following_error, true},
+    {0, true},  // its code is that of the device
 };
 constexpr const FaultRow& row_of(DriveFault cause) noexcept {
     return fault_rows[static_cast<unsigned>(cause)];
@@ -29,6 +35,10 @@ constexpr double max_heat_at_reset = 1.0;
 constexpr double max_speed = 1.2;
 
 }  // namespace
+
+std::uint16_t AxisFaults::code_of(DriveFault cause) const noexcept {
+    return cause == DriveFault::device ? device_code_ : row_of(cause).code;
+}
 
 bool AxisFaults::controllable(DriveFault cause) noexcept { return row_of(cause).controllable; }
 
@@ -54,7 +64,8 @@ bool AxisFaults::present(DriveFault cause) const noexcept {
         return std::abs(train_.plant().speed()) >
                max_speed * motor.highest_speed * std::numbers::pi / 30;
     case DriveFault::connection: return bus_ != nullptr && !bus_->master_alive();
-    case DriveFault::following_error: return false;
+    case DriveFault::following_error:
+    case DriveFault::device: return false;
     }
     return false;
 }
@@ -62,9 +73,9 @@ bool AxisFaults::present(DriveFault cause) const noexcept {
 bool AxisFaults::latch(DriveFault cause, std::int32_t detail) noexcept {
     if (latched(cause)) return false;
     latched_ = static_cast<std::uint16_t>(latched_ | 1U << static_cast<unsigned>(cause));
-    values_.error_code = row_of(cause).code;
+    values_.error_code = code_of(cause);
     if (bus_ != nullptr) {
-        bus_->raise(row_of(cause).code, detail);
+        bus_->raise(code_of(cause), detail);
     }
     return true;
 }
@@ -75,8 +86,9 @@ bool AxisFaults::reset() noexcept {
         if (latched(cause) && present(cause)) return false;
     }
     for (unsigned n = 0; n < causes; ++n) {
-        if (latched(static_cast<DriveFault>(n)) && bus_ != nullptr) {
-            bus_->clear(fault_rows[n].code);
+        const auto cause = static_cast<DriveFault>(n);
+        if (latched(cause) && bus_ != nullptr) {
+            bus_->clear(code_of(cause));
         }
     }
     latched_ = 0;

@@ -15,6 +15,7 @@ enum class DriveFault : std::uint8_t {
     over_speed,
     connection,
     following_error,
+    device,  ///< one that the maker of the drive defines
 };
 
 /// The bus of an axis: it reports faults to the master. [realtime]
@@ -33,14 +34,14 @@ public:
 struct Surroundings {
     double load = 0;  ///< N·m
     double dc_link = 0;  ///< V
-    std::uint32_t inputs = 0;  ///< inputs 16 to 31
+    std::uint32_t inputs = 0;  ///< of 60FDh
     bool encoder_cut = false;
 };
 
 /// The faults. [realtime]
 class AxisFaults {
 public:
-    static constexpr unsigned causes = 8;
+    static constexpr unsigned causes = 9;
 
     /// All must outlive it. [setup]
     AxisFaults(const Drivetrain& train, AxisValues& values, const Surroundings& around) noexcept
@@ -48,6 +49,8 @@ public:
 
     void connect(AxisBus& bus) noexcept { bus_ = &bus; }  ///< [setup]
     void power_up() noexcept { latched_ = 0; }
+    /// Sets the code of the next DriveFault::device.
+    void set_device_code(std::uint16_t code) noexcept { device_code_ = code; }
     bool present(DriveFault) const noexcept;
     bool has_voltage() const noexcept;
     /// Returns true when the motor can still be braked by a ramp.
@@ -59,6 +62,7 @@ public:
     bool reset() noexcept;
 
 private:
+    std::uint16_t code_of(DriveFault) const noexcept;
     bool latched(DriveFault cause) const noexcept {
         return (latched_ >> static_cast<unsigned>(cause) & 1) != 0;
     }
@@ -68,6 +72,7 @@ private:
     const Surroundings& around_;
     AxisBus* bus_ = nullptr;
     std::uint16_t latched_ = 0;  // a bit for each DriveFault
+    std::uint16_t device_code_ = 0;
 };
 
 }  // namespace hal::canopen::cia402

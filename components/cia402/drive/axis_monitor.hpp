@@ -19,7 +19,7 @@ public:
     /// Watches the following error. Returns true when it lasts for the time of 6066h.
     bool watch_following(double dt, bool torque_on) noexcept;
     void watch_speed(double dt) noexcept;
-    /// Reads switches and probes along the travel; `external` are inputs 16 to 31.
+    /// Reads switches and probes along the travel; `external` are further inputs.
     void read_inputs(std::uint32_t external) noexcept;
 
     const MotionModes::Monitored& result() const noexcept { return result_; }

@@ -28,7 +28,9 @@ struct MotorSettings {
     std::uint32_t resolution = 4096;  ///< encoder increments per revolution
     /// one per revolution, where the increments are a multiple of the resolution
     bool index_pulse = true;
-    double start = 0;  ///< place at power-on, where the encoder counts 0
+    /// the encoder keeps its count without power, and counts 0 at place 0
+    bool absolute_encoder = false;
+    double start = 0;  ///< place at power-on, where another encoder counts 0
     double negative_limit = -204800;
     double positive_limit = 204800;  ///< limit switches are active beyond
     double negative_stop = -208896;

@@ -293,6 +293,12 @@ void DriveAxis::raise(DriveFault cause, std::int32_t detail) noexcept {
     }
 }
 
+void DriveAxis::fail(std::uint16_t code) noexcept {
+    if (state_ == State::fault || state_ == State::fault_reaction_active) return;
+    faults_.set_device_code(code);
+    raise(DriveFault::device);
+}
+
 /// Transition 13; if there is nothing to brake, or no way to, 14 follows with the next step.
 void DriveAxis::react(DriveFault cause) noexcept {
     const bool had_torque = torque_on();

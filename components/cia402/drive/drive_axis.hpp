@@ -45,6 +45,8 @@ public:
     void step(double dt) noexcept;
     /// Handles the loss of the master as configured in 6007h.
     void lose_connection() noexcept;
+    /// Raises a fault of the device with its code (603Fh), until the next reset.
+    void fail(std::uint16_t code) noexcept;
 
     /// The values of the objects, to be bound to a dictionary.
     AxisValues& values() noexcept { return values_; }
@@ -55,7 +57,8 @@ public:
 
     AxisStatus status() const noexcept;
     void set_load_torque(double torque) noexcept { around_.load = torque; }
-    void set_inputs(std::uint32_t bits) noexcept { around_.inputs = bits & 0xffff0000; }
+    /// Sets inputs of 60FDh, besides those of the switches along the travel.
+    void set_inputs(std::uint32_t bits) noexcept { around_.inputs = bits; }
     void set_dc_link(double volts) noexcept { around_.dc_link = volts; }
     void set_encoder_broken(bool broken) noexcept { around_.encoder_cut = broken; }
 

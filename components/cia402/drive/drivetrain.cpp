@@ -17,7 +17,7 @@ Drivetrain::Drivetrain(const AxisSettings& settings, const AxisValues& values)
       scale_(values, settings.motor) {}
 
 void Drivetrain::power_up() noexcept {
-    encoder_zero_ = std::floor(plant_.place());
+    encoder_zero_ = motor().absolute_encoder ? 0 : std::floor(plant_.place());
     measured_ = plant_.place() - encoder_zero_;
     scale_.set_origin(0);
     saturated_ = false;

@@ -136,25 +136,23 @@ std::string rejected_mapping_words(std::int64_t first, std::int64_t code, bool l
     if (code == 0) return text + "; power-cycle it";
     const bool assignment = index >= 0x1c00;
     const bool input = index >= 0x1a00;
+    std::string element = input ? "<syncManager dir=\"in\">" : "<syncManager dir=\"out\">";
+    std::string key = input ? "inputs" : "outputs";
+    if (assignment) {
+        element = "<syncManager>";
+        key = "outputs` or `inputs` or their `sync-manager";
+    }
     if (lcec) {
-        text += std::string("; correct its ") +
-                (assignment ? "<syncManager>"
-                 : input    ? "<syncManager dir=\"in\">"
-                            : "<syncManager dir=\"out\">") +
-                " or its <modParam>";
+        text += "; correct its " + element + " or its <modParam>";
     } else {
-        text += std::string("; correct `") +
-                (assignment ? "outputs` or `inputs` or their `sync-manager"
-                 : input    ? "inputs"
-                            : "outputs") +
-                "` in its section";
+        text += "; correct `" + key + "` in its section";
     }
     const auto number = static_cast<std::uint32_t>(code);
     // Slaves report a full PDO in several ways; few entries fit into any.
-    const bool full =
-        number == coe::abort::pdo_too_long ||
-        (entry == 0 && (number == coe::abort::range || number == coe::abort::too_high)) ||
-        (entry > 4 && number == coe::abort::no_sub);
+    const bool full = number == code_of(coe::Abort::pdo_length) ||
+                      (entry == 0 && (number == code_of(coe::Abort::value) ||
+                                      number == code_of(coe::Abort::too_high))) ||
+                      (entry > 4 && number == code_of(coe::Abort::no_sub));
     const std::int64_t fits = entry == 0 ? (value & 0xff) - 1 : entry - 1;
     if (full && !assignment && fits > 0) {
         text += ", or, if the PDO is full, write " +
@@ -524,9 +522,12 @@ std::string slave_words(std::uint32_t slave, const master::Setup& setup) {
     }
     if (slave >= setup.slaves.size()) return "slave " + std::to_string(slave);
     const master::Slave& s = setup.slaves[slave];
-    const std::string where = s.identity.device_id ? "id=" + std::to_string(*s.identity.device_id)
-                              : s.identity.alias   ? "alias=" + std::to_string(*s.identity.alias)
-                                                   : std::to_string(s.position);
+    std::string where = std::to_string(s.position);
+    if (s.identity.device_id) {
+        where = "id=" + std::to_string(*s.identity.device_id);
+    } else if (s.identity.alias) {
+        where = "alias=" + std::to_string(*s.identity.alias);
+    }
     return "slave " + where + (s.name.empty() ? "" : " (" + s.name + ")");
 }
 

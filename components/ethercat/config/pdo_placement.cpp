@@ -66,7 +66,7 @@ void PdoPlacement::place(const Line& line, master::SyncManager& sm,
 std::string PdoPlacement::fixed_reason() const {
     if (device_ == nullptr) return {};
     const std::string fixed = "the PDOs of '" + in_.info.type + "' are fixed: ";
-    if (!device_->mailbox || !device_->mailbox->coe) {
+    if (!device_->mailbox || !device_->mailbox->has(MailboxType::coe)) {
         return fixed + "it has no CoE mailbox to map objects with";
     }
     return device_->mailbox->pdo_config ? "" : fixed + "its description has no PdoConfig";

@@ -137,7 +137,7 @@ void check_pdos(const esi::Device& device, const std::string& type,
                   "write it as well: " + key + " = " + pdo_text(p.index));
         }
     }
-    const bool coe = device.mailbox && device.mailbox->coe;
+    const bool coe = device.mailbox && device.mailbox->has(MailboxType::coe);
     for (const auto& sm : managers) {
         if (const std::string sentence = too_long(device, type, sm); !sentence.empty()) {
             error(sentence, "leave out objects");

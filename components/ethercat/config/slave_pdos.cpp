@@ -128,7 +128,8 @@ master::SyncManager SlavePdos::manager(bool output) {
     master::SyncManager sm;
     sm.output = output;
     sm.number = manager_number(output);
-    const bool has_coe = device_ != nullptr && device_->mailbox && device_->mailbox->coe;
+    const bool has_coe =
+        device_ != nullptr && device_->mailbox && device_->mailbox->has(MailboxType::coe);
     if (device_ != nullptr && sm.number < device_->sync_managers.size()) {
         const esi::SyncManager& s = device_->sync_managers[sm.number];
         sm.start = s.start;

@@ -36,7 +36,12 @@ DesignBuilder::DesignBuilder(std::string name, std::uint32_t product, std::uint3
     design_.coe = false;
 }
 
-void DesignBuilder::mailbox(std::size_t bytes, std::uint16_t protocols, bool boot) {
+void DesignBuilder::service(std::unique_ptr<MailboxService> service) {
+    design_.sii.protocols |= bit_of(service->type());
+    design_.services.push_back(std::move(service));
+}
+
+void DesignBuilder::mailbox(std::size_t bytes, bool boot) {
     mailbox_bytes_ = bytes;
     auto& s = design_.sii;
     const auto size = static_cast<std::uint16_t>(bytes);
@@ -44,13 +49,10 @@ void DesignBuilder::mailbox(std::size_t bytes, std::uint16_t protocols, bool boo
     if (boot) {
         s.boot = s.mailboxes;
     }
-    s.protocols = protocols;
+    s.protocols = bit_of(MailboxType::coe);
     s.sync_managers.push_back(
         {s.mailboxes.receive.start, size, 0x26, 0, 1, sii::SmType::mailbox_out});
     s.sync_managers.push_back({s.mailboxes.send.start, size, 0x22, 0, 1, sii::SmType::mailbox_in});
-    s.general.foe = (protocols & sii::foe) != 0;
-    s.general.eoe = (protocols & sii::eoe) != 0;
-    if ((protocols & sii::coe) == 0) return;
     design_.coe = true;
     s.general.coe_details = sii::coe_sdo | sii::coe_sdo_info | sii::coe_complete_access;
     auto& d = dictionary();
@@ -150,18 +152,20 @@ void DesignBuilder::assignment(bool output, std::uint16_t sm) {
 }
 
 Design DesignBuilder::finish(std::uint16_t alias, std::uint32_t serial,
-                             std::size_t most_output_bytes, std::size_t most_input_bytes) {
+                             std::size_t max_output_bytes, std::size_t max_input_bytes) {
     namespace access = coe::access;
     auto& s = design_.sii;
     auto& d = dictionary();
     s.configuration[4] = alias;
+    s.general.foe = (s.protocols & bit_of(MailboxType::foe)) != 0;
+    s.general.eoe = (s.protocols & bit_of(MailboxType::eoe)) != 0;
     s.serial = serial;
     design_.device_id = alias;
     const std::size_t out = bytes_of(s.rx);
     const std::size_t in = bytes_of(s.tx);
-    design_.most_output_bytes = std::max(out, most_output_bytes);
+    design_.max_output_bytes = std::max(out, max_output_bytes);
 
-    design_.most_input_bytes = std::max(in, most_input_bytes);
+    design_.max_input_bytes = std::max(in, max_input_bytes);
     std::size_t at = 0x1000 + 2 * mailbox_bytes_;
     if (!s.rx.empty()) {
         const auto sm = static_cast<std::uint16_t>(s.sync_managers.size());
@@ -169,7 +173,7 @@ Design DesignBuilder::finish(std::uint16_t alias, std::uint32_t serial,
                                    0x64, 0, 1, sii::SmType::outputs});
         assignment(true, sm);
         s.fmmus.push_back(sii::FmmuUse::outputs);
-        at += (3 * design_.most_output_bytes + 127) / 128 * 128;
+        at += (3 * design_.max_output_bytes + 127) / 128 * 128;
     } else if (mailbox_bytes_ != 0) {
         s.sync_managers.push_back(
             {static_cast<std::uint16_t>(at), 0, 0x64, 0, 0, sii::SmType::outputs});

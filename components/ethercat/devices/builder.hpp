@@ -3,6 +3,7 @@
 #pragma once
 
 #include <initializer_list>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -26,8 +27,10 @@ public:
     Dictionary& dictionary() noexcept { return *design_.dictionary; }
     Design& design() noexcept { return design_; }
 
-    /// Adds the mailbox with its sync managers 0 and 1; `bytes` for both directions.
-    void mailbox(std::size_t bytes, std::uint16_t protocols, bool boot = false);
+    /// Adds the mailbox with CoE and its sync managers 0 and 1; `bytes` for both directions.
+    void mailbox(std::size_t bytes, bool boot = false);
+    /// Adds a further protocol of the mailbox.
+    void service(std::unique_ptr<MailboxService>);
     /// Adds a PDO whose entries are in the dictionary already. Fixed PDOs cannot be mapped anew;
     /// others hold up to `most` entries.
     void pdo(bool output, std::uint16_t index, std::string name,
@@ -36,8 +39,8 @@ public:
     void dc(bool required, bool sync1 = true);
     /// Completes sync managers, assignment, SII; `most_*` are the largest process data, 0: as
     /// assigned.
-    Design finish(std::uint16_t alias, std::uint32_t serial, std::size_t most_output_bytes = 0,
-                  std::size_t most_input_bytes = 0);
+    Design finish(std::uint16_t alias, std::uint32_t serial, std::size_t max_output_bytes = 0,
+                  std::size_t max_input_bytes = 0);
 
 private:
     void assignment(bool output, std::uint16_t sm);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "cia301/values.hpp"
 #include "ethercat/devices/bits.hpp"
 
 namespace hal::ethercat::devices {
@@ -12,38 +13,19 @@ namespace {
 /// Returns the bit of an access right in a state; `right` is coe::access::read_preop or
 /// write_preop.
 std::uint16_t in_state(std::uint16_t right, State state) noexcept {
-    return static_cast<std::uint16_t>(state == State::op       ? right << 2
-                                      : state == State::safeop ? right << 1
-                                                               : right);
+    switch (state) {
+    case State::op: return static_cast<std::uint16_t>(right << 2);
+    case State::safeop: return static_cast<std::uint16_t>(right << 1);
+    default: return right;
+    }
 }
 
-bool is_signed(std::uint16_t type) noexcept {
-    return type == coe::type::s8 || type == coe::type::s16 || type == coe::type::s32 ||
-           type == coe::type::s64;
+/// Returns the bits of a basic type; 0 for texts and unknown types.
+std::uint16_t bits_of(std::uint16_t type) noexcept {
+    return static_cast<std::uint16_t>(cia301::bits_of(static_cast<cia301::Type>(type)));
 }
 
 }  // namespace
-
-std::uint16_t bits_of(std::uint16_t type) noexcept {
-    namespace t = coe::type;
-    switch (type) {
-    case t::boolean: return 1;
-    case t::s8:
-    case t::u8: return 8;
-    case t::s16:
-    case t::u16: return 16;
-    case t::s32:
-    case t::u32:
-    case t::real32: return 32;
-    case t::s64:
-    case t::u64:
-    case t::real64: return 64;
-    default:
-        return type >= t::bit1 && type < t::bit1 + 8
-                   ? static_cast<std::uint16_t>(type - t::bit1 + 1)
-                   : 0;
-    }
-}
 
 DictionaryEntry& Dictionary::add(DictionaryObject& o, std::uint8_t sub, std::string name,
                                  std::uint16_t type, std::size_t bits, std::uint16_t access) {
@@ -143,8 +125,27 @@ void Dictionary::finish() {
     initial_ = memory_;
 }
 
+void Dictionary::bind(std::uint16_t index, std::uint8_t sub, std::uint8_t* value,
+                      std::size_t bytes) {
+    const auto at = std::find_if(objects_.begin(), objects_.end(),
+                                 [&](const DictionaryObject& o) { return o.index == index; });
+    if (at == objects_.end()) return;
+    for (DictionaryEntry& e : at->entries) {
+        if (e.sub == sub && e.bytes() == bytes) {
+            e.bound = value;
+        }
+    }
+}
+
 void Dictionary::power_on() noexcept {
     std::copy(initial_.begin(), initial_.end(), memory_.begin());
+    for (const DictionaryObject& o : objects_) {
+        for (const DictionaryEntry& e : o.entries) {
+            if (e.bound != nullptr) {
+                std::memcpy(e.bound, initial_.data() + e.offset, e.bytes());
+            }
+        }
+    }
 }
 
 const DictionaryObject* Dictionary::find(std::uint16_t index) const noexcept {
@@ -167,121 +168,136 @@ std::uint8_t* Dictionary::at(std::uint16_t index, std::uint8_t sub) noexcept {
     return e != nullptr ? data(*e) : nullptr;
 }
 
-std::uint32_t Dictionary::read(std::uint16_t index, std::uint8_t sub, bool complete, State state,
-                               std::span<std::uint8_t> to, std::size_t& length) const noexcept {
+coe::Abort Dictionary::read(std::uint16_t index, std::uint8_t sub, bool complete, State state,
+                            std::span<std::uint8_t> to, std::size_t& length) const noexcept {
     length = 0;
     const auto* o = find(index);
-    if (o == nullptr) return coe::abort::no_object;
-    const std::uint16_t right = in_state(coe::access::read_preop, state);
-    if (!complete || o->code == coe::ObjectCode::variable) {
-        const auto* e = find(index, sub);
-        if (e == nullptr) return coe::abort::no_sub;
-        if ((e->access & coe::access::read) == 0) return coe::abort::write_only;
-        if ((e->access & right) == 0) return coe::abort::state;
-        if (e->bytes() > to.size()) return coe::abort::memory;
-        std::memcpy(to.data(), data(*e), length = e->bytes());
-        return 0;
+    if (o == nullptr) return coe::Abort::no_object;
+    if (complete && o->code != coe::ObjectCode::variable) {
+        return read_complete(*o, sub, state, to, length);
     }
-    if (sub > 1) return coe::abort::no_complete_access;
+    const auto* e = find(index, sub);
+    if (e == nullptr) return coe::Abort::no_sub;
+    if ((e->access & coe::access::read) == 0) return coe::Abort::write_only;
+    if ((e->access & in_state(coe::access::read_preop, state)) == 0) {
+        return coe::Abort::device_state;
+    }
+    if (e->bytes() > to.size()) return coe::Abort::memory;
+    length = e->bytes();
+    std::memcpy(to.data(), data(*e), length);
+    return coe::Abort::none;
+}
+
+coe::Abort Dictionary::read_complete(const DictionaryObject& o, std::uint8_t sub, State state,
+                                     std::span<std::uint8_t> to,
+                                     std::size_t& length) const noexcept {
+    if (sub > 1) return coe::Abort::no_complete_access;
+    const std::uint16_t right = in_state(coe::access::read_preop, state);
     std::size_t bit = 0;
-    for (const auto& e : o->entries) {
-        if (e.sub < sub || e.sub > count(*o)) continue;
+    for (const auto& e : o.entries) {
+        if (e.sub < sub || e.sub > count(o)) continue;
         const std::size_t bits = e.sub == 0 ? 16 : e.bits;  // sub-index 0 is padded to 16 bits
-        if ((bit + bits + 7) / 8 > to.size()) return coe::abort::memory;
-        for (std::size_t i = (bit + 7) / 8; i < (bit + bits + 7) / 8; ++i) {
-            to[i] = 0;
-        }
+        const std::size_t end = (bit + bits + 7) / 8;
+        if (end > to.size()) return coe::Abort::memory;
+        std::fill(to.begin() + static_cast<std::ptrdiff_t>((bit + 7) / 8),
+                  to.begin() + static_cast<std::ptrdiff_t>(end), std::uint8_t{0});
         if ((e.access & right) != 0) {
             copy_bits(to.data(), bit, data(e), 0, e.bits);
         }
         bit += bits;
     }
     length = (bit + 7) / 8;
-    return 0;
+    return coe::Abort::none;
 }
 
-std::uint32_t Dictionary::check_write(std::uint16_t index, std::uint8_t sub, bool complete,
-                                      State state, std::size_t bytes) const noexcept {
+coe::Abort Dictionary::check_write(std::uint16_t index, std::uint8_t sub, bool complete,
+                                   State state, std::size_t bytes) const noexcept {
     const auto* o = find(index);
-    if (o == nullptr) return coe::abort::no_object;
+    if (o == nullptr) return coe::Abort::no_object;
     if (complete && o->code != coe::ObjectCode::variable) {
-        return sub > 1 ? coe::abort::no_complete_access : 0;
+        return sub > 1 ? coe::Abort::no_complete_access : coe::Abort::none;
     }
     const auto* e = find(index, sub);
-    if (e == nullptr) return coe::abort::no_sub;
-    if ((e->access & coe::access::write) == 0) return coe::abort::read_only;
-    if ((e->access & in_state(coe::access::write_preop, state)) == 0) return coe::abort::state;
-    if (bytes > e->bytes()) return coe::abort::too_long;
-    if (bytes < e->bytes() && !e->text()) return coe::abort::too_short;
-    return 0;
+    if (e == nullptr) return coe::Abort::no_sub;
+    if ((e->access & coe::access::write) == 0) return coe::Abort::read_only;
+    if ((e->access & in_state(coe::access::write_preop, state)) == 0) {
+        return coe::Abort::device_state;
+    }
+    if (bytes > e->bytes()) return coe::Abort::too_long;
+    if (bytes < e->bytes() && !e->text()) return coe::Abort::too_short;
+    return coe::Abort::none;
 }
 
-std::uint32_t Dictionary::write_entry(const DictionaryObject& o, const DictionaryEntry& e,
-                                      State state, std::span<const std::uint8_t> from) noexcept {
-    if (const auto code = check_write(o.index, e.sub, false, state, from.size())) return code;
+coe::Abort Dictionary::write_entry(const DictionaryObject& o, const DictionaryEntry& e, State state,
+                                   std::span<const std::uint8_t> from) noexcept {
+    const auto access = check_write(o.index, e.sub, false, state, from.size());
+    if (access != coe::Abort::none) return access;
     if (e.limited) {
-        std::int64_t value = 0;
-        std::memcpy(&value, from.data(), std::min<std::size_t>(from.size(), 8));
-        if (is_signed(e.type) && e.bits < 64 && (value >> (e.bits - 1) & 1) != 0) {
-            value -= std::int64_t{1} << e.bits;
-        }
-        if (value > e.high) return coe::abort::too_high;
-        if (value < e.low) return coe::abort::too_low;
+        const auto value = cia301::integer_of(static_cast<cia301::Type>(e.type), from);
+        if (value > e.high) return coe::Abort::too_high;
+        if (value < e.low) return coe::Abort::too_low;
     }
     if (guard_ != nullptr) {
-        if (const auto code = guard_->check(o, e, from)) return code;
+        const auto code = guard_->check(o, e, from);
+        if (code != coe::Abort::none) return code;
     }
     std::memcpy(data(e), from.data(), from.size());
     if (from.size() < e.bytes()) {
         std::memset(data(e) + from.size(), 0, e.bytes() - from.size());
     }
-    return 0;
+    if (guard_ != nullptr) {
+        guard_->written(o, e);
+    }
+    return coe::Abort::none;
 }
 
-std::uint32_t Dictionary::write_complete(const DictionaryObject& o, std::uint8_t sub, State state,
-                                         std::span<const std::uint8_t> from) noexcept {
+coe::Abort Dictionary::write_complete(const DictionaryObject& o, std::uint8_t sub, State state,
+                                      std::span<const std::uint8_t> from) noexcept {
     const auto& sub0 = o.entries.front();
     std::size_t bit = 0;
     std::uint8_t count_after = 0;
     const bool sets_count = sub == 0 && (sub0.access & coe::access::write) != 0;
     if (sub == 0) {
-        if (from.size() < 2) return coe::abort::too_short;
+        if (from.size() < 2) return coe::Abort::too_short;
         count_after = from[0];
         bit = 16;
     }
     if (sets_count) {  // entries can be written only while the count is 0
         const std::uint8_t none = 0;
-        if (const auto code = write_entry(o, sub0, state, {&none, 1})) return code;
+        const auto code = write_entry(o, sub0, state, {&none, 1});
+        if (code != coe::Abort::none) return code;
     }
     for (const auto& e : o.entries) {
         if (e.sub == 0 || (sub == 0 && e.sub > count_after)) continue;
-        if (bit + e.bits > from.size() * 8) {
-            if (bit == from.size() * 8) break;
-            return coe::abort::length;
-        }
-        // longer entries of records are texts, which are not written this way
-        if (e.bytes() <= 8) {
-            std::uint8_t value[8] = {};
-            copy_bits(value, 0, from.data(), bit, e.bits);
-            if ((e.access & coe::access::write) != 0) {
-                if (const auto code = write_entry(o, e, state, {value, e.bytes()})) return code;
-            }
-        }
+        if (bit == from.size() * 8) break;
+        if (bit + e.bits > from.size() * 8) return coe::Abort::length;
+        const auto code = write_part(o, e, state, from, bit);
+        if (code != coe::Abort::none) return code;
         bit += e.bits;
     }
-    if (bit < from.size() * 8 && from.size() * 8 - bit >= 8) return coe::abort::too_long;
-    return sets_count ? write_entry(o, sub0, state, {&count_after, 1}) : 0;
+    if (bit < from.size() * 8 && from.size() * 8 - bit >= 8) return coe::Abort::too_long;
+    return sets_count ? write_entry(o, sub0, state, {&count_after, 1}) : coe::Abort::none;
 }
 
-std::uint32_t Dictionary::write(std::uint16_t index, std::uint8_t sub, bool complete, State state,
-                                std::span<const std::uint8_t> from) noexcept {
+/// Writes the entry whose value starts at a bit of the data of complete access. Read-only entries
+/// are left out; so are texts, which are not written this way.
+coe::Abort Dictionary::write_part(const DictionaryObject& o, const DictionaryEntry& e, State state,
+                                  std::span<const std::uint8_t> from, std::size_t bit) noexcept {
+    std::uint8_t value[8] = {};
+    if (e.bytes() > sizeof value || (e.access & coe::access::write) == 0) return coe::Abort::none;
+    copy_bits(value, 0, from.data(), bit, e.bits);
+    return write_entry(o, e, state, {value, e.bytes()});
+}
+
+coe::Abort Dictionary::write(std::uint16_t index, std::uint8_t sub, bool complete, State state,
+                             std::span<const std::uint8_t> from) noexcept {
     const auto* o = find(index);
-    if (o == nullptr) return coe::abort::no_object;
+    if (o == nullptr) return coe::Abort::no_object;
     if (complete && o->code != coe::ObjectCode::variable) {
-        return sub > 1 ? coe::abort::no_complete_access : write_complete(*o, sub, state, from);
+        return sub > 1 ? coe::Abort::no_complete_access : write_complete(*o, sub, state, from);
     }
     const auto* e = find(index, sub);
-    return e == nullptr ? coe::abort::no_sub : write_entry(*o, *e, state, from);
+    return e == nullptr ? coe::Abort::no_sub : write_entry(*o, *e, state, from);
 }
 
 }  // namespace hal::ethercat::devices

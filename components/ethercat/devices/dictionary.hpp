@@ -25,6 +25,7 @@ struct DictionaryEntry {
     std::uint16_t bits = 0;
     std::uint16_t access = 0;
     std::uint32_t offset = 0;  ///< of its data
+    std::uint8_t* bound = nullptr;  ///< the value of a device that holds the data instead
     std::string name;
     bool limited = false;
     std::int64_t low = 0;
@@ -48,10 +49,12 @@ struct DictionaryObject {
 class DictionaryGuard {
 public:
     virtual ~DictionaryGuard() = default;
-    /// Returns an abort code, or 0 to accept the value. Called after the checks of the dictionary.
-    /// [realtime]
-    virtual std::uint32_t check(const DictionaryObject&, const DictionaryEntry&,
-                                std::span<const std::uint8_t> value) noexcept = 0;
+    /// Returns why the value is rejected, or Abort::none to accept it. Called after the checks of
+    /// the dictionary. [realtime]
+    virtual coe::Abort check(const DictionaryObject&, const DictionaryEntry&,
+                             std::span<const std::uint8_t> value) noexcept = 0;
+    /// Called after an accepted value was written. [realtime]
+    virtual void written(const DictionaryObject&, const DictionaryEntry&) noexcept {}
 };
 
 class Dictionary {
@@ -81,6 +84,12 @@ public:
     void limit(std::int64_t low, std::int64_t high);
     /// Sorts the objects. Nothing may be added after it.
     void finish();
+    /// Makes `value`, which outlives the dictionary, the data of an entry; nothing without the
+    /// entry. After finish(). The initial value is written to it at power-on.
+    template <class T>
+    void bind(std::uint16_t index, std::uint8_t sub, T& value) {
+        bind(index, sub, reinterpret_cast<std::uint8_t*>(&value), sizeof value);
+    }
 
     // Run time.
     /// Restores the initial values. [realtime]
@@ -91,9 +100,11 @@ public:
     /// nullptr: missing. [realtime]
     const DictionaryEntry* find(std::uint16_t index, std::uint8_t sub) const noexcept;
     /// [realtime]
-    std::uint8_t* data(const DictionaryEntry& e) noexcept { return memory_.data() + e.offset; }
+    std::uint8_t* data(const DictionaryEntry& e) noexcept {
+        return e.bound != nullptr ? e.bound : memory_.data() + e.offset;
+    }
     const std::uint8_t* data(const DictionaryEntry& e) const noexcept {
-        return memory_.data() + e.offset;
+        return e.bound != nullptr ? e.bound : memory_.data() + e.offset;
     }
     /// Returns the data of an entry; nullptr: missing. [realtime]
     std::uint8_t* at(std::uint16_t index, std::uint8_t sub) noexcept;
@@ -102,33 +113,34 @@ public:
         return *data(o.entries.front());
     }
 
-    /// Reads an entry, or all entries from `sub` on, into `to`; returns an abort code, 0 with
-    /// `length` if it succeeded. [realtime]
-    std::uint32_t read(std::uint16_t index, std::uint8_t sub, bool complete, State state,
-                       std::span<std::uint8_t> to, std::size_t& length) const noexcept;
-    /// Writes an entry, or all entries from `sub` on; returns an abort code or 0. [realtime]
-    std::uint32_t write(std::uint16_t index, std::uint8_t sub, bool complete, State state,
-                        std::span<const std::uint8_t> from) noexcept;
-    /// Returns the abort code that a write of `bytes` would have before its data is known.
-    /// [realtime]
-    std::uint32_t check_write(std::uint16_t index, std::uint8_t sub, bool complete, State state,
-                              std::size_t bytes) const noexcept;
+    /// Reads an entry, or all entries from `sub` on, into `to`; returns why it failed, or
+    /// Abort::none with `length`. [realtime]
+    coe::Abort read(std::uint16_t index, std::uint8_t sub, bool complete, State state,
+                    std::span<std::uint8_t> to, std::size_t& length) const noexcept;
+    /// Writes an entry, or all entries from `sub` on; returns why it failed. [realtime]
+    coe::Abort write(std::uint16_t index, std::uint8_t sub, bool complete, State state,
+                     std::span<const std::uint8_t> from) noexcept;
+    /// Returns why a write of `bytes` would fail, before its data is known. [realtime]
+    coe::Abort check_write(std::uint16_t index, std::uint8_t sub, bool complete, State state,
+                           std::size_t bytes) const noexcept;
     void guard_with(DictionaryGuard* guard) noexcept { guard_ = guard; }  ///< [setup]
 
 private:
     DictionaryEntry& add(DictionaryObject&, std::uint8_t sub, std::string name, std::uint16_t type,
                          std::size_t bits, std::uint16_t access);
-    std::uint32_t write_entry(const DictionaryObject&, const DictionaryEntry&, State,
+    void bind(std::uint16_t index, std::uint8_t sub, std::uint8_t* value, std::size_t bytes);
+    coe::Abort write_entry(const DictionaryObject&, const DictionaryEntry&, State,
+                           std::span<const std::uint8_t> from) noexcept;
+    coe::Abort write_part(const DictionaryObject&, const DictionaryEntry&, State,
+                          std::span<const std::uint8_t> from, std::size_t bit) noexcept;
+    coe::Abort read_complete(const DictionaryObject&, std::uint8_t sub, State,
+                             std::span<std::uint8_t> to, std::size_t& length) const noexcept;
+    coe::Abort write_complete(const DictionaryObject&, std::uint8_t sub, State,
                               std::span<const std::uint8_t> from) noexcept;
-    std::uint32_t write_complete(const DictionaryObject&, std::uint8_t sub, State,
-                                 std::span<const std::uint8_t> from) noexcept;
 
     std::vector<DictionaryObject> objects_;
     std::vector<std::uint8_t> memory_, initial_;
     DictionaryGuard* guard_ = nullptr;
 };
-
-/// Returns the bits of a basic type; 0 for texts and unknown types. [any]
-std::uint16_t bits_of(std::uint16_t type) noexcept;
 
 }  // namespace hal::ethercat::devices

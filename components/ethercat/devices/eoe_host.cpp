@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Ethernet over EtherCAT of the device with every protocol: ARP (RFC 826) and echo (RFC 792), no
 // options and no fragments of IP.
+#include "ethercat/devices/eoe_host.hpp"
+
 #include <algorithm>
 #include <cstring>
-
-#include "ethercat/devices/mailbox_device.hpp"
 
 namespace hal::ethercat::devices {
 

@@ -43,9 +43,10 @@ void add_objects(const esi::Device& device, Plan& plan) {
 
         to.code = static_cast<coe::ObjectCode>(o.code);
         for (const esi::Value& v : o.values) {
-            unsigned rights = (v.readable ? access::read : 0U) | (v.writable ? access::write : 0U);
-            rights |= (v.rx_mappable ? access::rx_mappable : 0U) |
-                      (v.tx_mappable ? access::tx_mappable : 0U);
+            const auto when = [](bool is, unsigned right) { return is ? right : 0U; };
+            const unsigned rights =
+                when(v.readable, access::read) | when(v.writable, access::write) |
+                when(v.rx_mappable, access::rx_mappable) | when(v.tx_mappable, access::tx_mappable);
             to.entries[v.sub] = {v.name, sii::type_number(v.type),
                                  static_cast<std::uint16_t>(std::min(v.bits, 0xffffU)),
                                  static_cast<std::uint16_t>(rights), v.initial};
@@ -255,7 +256,7 @@ Parts make_esi_device(const DeviceOptions& o) {
     if (s.general.ports == std::array<std::uint8_t, 4>{}) {
         s.general.ports = {1, 1, 0, 0};
     }
-    design.coe = s.has_mailbox() && (s.protocols & sii::coe) != 0;
+    design.coe = s.has_mailbox() && (s.protocols & bit_of(MailboxType::coe)) != 0;
     design.dc = device.has_dc;
     const bool configurable = design.coe && (s.general.coe_details & sii::coe_pdo_config) != 0;
     const bool assignable = design.coe && (s.general.coe_details & sii::coe_pdo_assign) != 0;
@@ -286,7 +287,7 @@ Parts make_esi_device(const DeviceOptions& o) {
         const std::size_t bytes = add_assignment(output ? device.rx : device.tx, n, assignable, d);
         s.sync_managers[n].length = static_cast<std::uint16_t>(bytes);
         const std::size_t most = std::max<std::size_t>(bytes, device.sync_managers[n].max_size);
-        (output ? design.most_output_bytes : design.most_input_bytes) =
+        (output ? design.max_output_bytes : design.max_input_bytes) =
             configurable || assignable ? std::max<std::size_t>(most, 128) : most;
     }
     d.finish();

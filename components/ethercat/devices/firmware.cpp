@@ -4,7 +4,37 @@
 #include <algorithm>
 #include <cstring>
 
+#include "ethercat/devices/coe_server.hpp"
+#include "ethercat/wire/registers.hpp"
+
 namespace hal::ethercat::devices {
+
+namespace {
+
+// for valid outputs and SYNC0 after OP was requested
+constexpr std::int64_t op_timeout_ns = 200'000'000;
+constexpr std::int64_t lost_pulses = 10;
+
+int rank(State s) noexcept {
+    if (s == State::op) return 4;
+    if (s == State::safeop) return 3;
+    if (s == State::preop) return 2;
+    if (s == State::boot) return 1;
+    return 0;
+}
+
+bool known(State s) noexcept { return s == State::init || rank(s) != 0; }
+
+/// Returns whether a transition is one of the state machine, or none.
+bool may_change(State from, State to) noexcept {
+    if (to == from || to == State::init) return true;
+    if (from == State::boot) return false;
+    if (to == State::boot) return from == State::init;
+    return rank(to) < rank(from) || rank(to) == rank(from) + 1 ||
+           (from == State::init && to == State::preop);
+}
+
+}  // namespace
 
 Firmware::Firmware(Design design, std::unique_ptr<Behaviour> behaviour)
     : design_(std::move(design)), behaviour_(std::move(behaviour)) {
@@ -21,30 +51,40 @@ Firmware::Firmware(Design design, std::unique_ptr<Behaviour> behaviour)
     }
     auto& dictionary = *design_.dictionary;
     if (design_.coe) {
-        coe_ = std::make_unique<CoeServer>(dictionary);
+        mailbox_.add(std::make_unique<CoeServer>(dictionary));
     }
+    for (auto& service : design_.services) {
+        mailbox_.add(std::move(service));
+    }
+    design_.services.clear();
     dictionary.guard_with(this);
     outputs_.attach(dictionary, static_cast<std::uint16_t>(coe::assignment + sm_out_), true,
-                    design_.most_output_bytes);
+                    design_.max_output_bytes);
     inputs_.attach(dictionary, static_cast<std::uint16_t>(coe::assignment + sm_in_), false,
-                   design_.most_input_bytes);
-    image_.resize(std::max({design_.most_output_bytes, design_.most_input_bytes, std::size_t{1}}));
-    for (auto* v : {&mail_, &newest_, &previous_, &taken_}) {
-        v->resize(largest_mailbox);
-    }
+                   design_.max_input_bytes);
+    image_.resize(std::max({design_.max_output_bytes, design_.max_input_bytes, std::size_t{1}}));
 }
 
-std::uint32_t Firmware::check(const DictionaryObject& o, const DictionaryEntry& e,
-                              std::span<const std::uint8_t> value) noexcept {
-    if (const auto code = outputs_.check(o, e, value)) return code;
-    return inputs_.check(o, e, value);
+coe::Abort Firmware::check(const DictionaryObject& o, const DictionaryEntry& e,
+                           std::span<const std::uint8_t> value) noexcept {
+    const auto outputs = outputs_.check(o, e, value);
+    if (outputs != coe::Abort::none) return outputs;
+    const auto inputs = inputs_.check(o, e, value);
+    if (inputs != coe::Abort::none) return inputs;
+    return behaviour_->check(o.index, e.sub, value);
+}
+
+void Firmware::written(const DictionaryObject& o, const DictionaryEntry& e) noexcept {
+    behaviour_->written(o.index, e.sub);
 }
 
 void Firmware::power_on(esc::Pdi& pdi) noexcept {
     design_.dictionary->power_on();
     behaviour_->power_on();
     state_ = target_ = State::init;
-    error_ = received_ = mailbox_running_ = false;
+    error_ = false;
+    received_ = false;
+    mailbox_.stop();
     change_at_ns_ = -1;
     shown_.store(State::init, std::memory_order_relaxed);
     pdi.set_al_status(static_cast<std::uint16_t>(State::init), 0);
@@ -53,15 +93,13 @@ void Firmware::power_on(esc::Pdi& pdi) noexcept {
 void Firmware::run(esc::Pdi& pdi, std::int64_t now_ns) noexcept {
     now_ns_ = now_ns;
     if (const auto control = pdi.take_al_control()) {
-        take_control(pdi, *control);
+        accept_control(pdi, *control);
     }
     if (change_at_ns_ >= 0 && now_ns >= change_at_ns_) {
         change_at_ns_ = -1;
         change(pdi, target_);
     }
-    if (mailbox_running_) {
-        run_mailbox(pdi);
-    }
+    mailbox_.run(pdi, state_, now_ns);
     if (state_ == State::safeop || state_ == State::op) {
         run_process_data(pdi);
         wait_for_op(pdi);
@@ -78,6 +116,9 @@ bool Firmware::read_outputs(esc::Pdi& pdi) noexcept {
     received_ = true;
     if (state_ == State::op) {
         outputs_.unpack({image_.data(), n});
+        outputs_.each_object([this](std::uint16_t index, std::uint8_t sub) noexcept {
+            behaviour_->written(index, sub);
+        });
     }
     return true;
 }
@@ -94,26 +135,218 @@ void Firmware::run_process_data(esc::Pdi& pdi) noexcept {
                 put(count, static_cast<std::uint16_t>(get<std::uint16_t>(count) + 1));
             }
         }
-        step(pdi, pulses * sync.sync0_cycle_ns, true);
+        step(pdi, pulses * sync.sync0_cycle_ns, sync.sync0_cycle_ns);
     } else {
         read_outputs(pdi);
         if (now_ns_ > last_step_ns_) {
-            step(pdi, now_ns_ - last_step_ns_, false);
+            step(pdi, now_ns_ - last_step_ns_, 0);
         }
     }
 }
 
-void Firmware::step(esc::Pdi& pdi, std::int64_t dt_ns, bool synchronous) noexcept {
-    Step s{now_ns_, dt_ns, state_ == State::op, synchronous, std::nullopt};
+void Firmware::step(esc::Pdi& pdi, std::int64_t dt_ns, std::int64_t sync_cycle_ns) noexcept {
+    Step s{now_ns_, dt_ns, state_ == State::op, sync_cycle_ns};
     behaviour_->step(s);
     last_step_ns_ = now_ns_;
-    if (s.emergency && coe_) {
-        CoeServer::emergency(*s.emergency, outbox_);
+    if (design_.coe) {
+        for (const coe::Emergency& emergency : s.emergencies.all()) {
+            mailbox_.send(emergency);
+        }
     }
     if (inputs_.bytes() == 0) return;
     std::memset(image_.data(), 0, inputs_.bytes());
     inputs_.pack({image_.data(), inputs_.bytes()});
     pdi.write_sync_manager(sm_in_, {image_.data(), inputs_.bytes()});
+}
+
+// The state machine (ETG.1000.6, clause 6.4.1) and its checks.
+
+void Firmware::accept_control(esc::Pdi& pdi, std::uint16_t control) noexcept {
+    const auto to = static_cast<State>(control & 0x0f);
+    const bool acknowledge = (control & al_error) != 0;
+    // an error is acknowledged first
+    if (error_ && !acknowledge && rank(to) > rank(state_)) return;
+    if (acknowledge) {
+        error_ = false;
+    }
+    if ((control & al_identify) != 0 && to == state_ && !error_) {
+        pdi.set_al_status(static_cast<std::uint16_t>(static_cast<unsigned>(state_) | al_identify),
+                          design_.device_id);
+        return;
+    }
+    target_ = to;
+    const auto delay = faults_.state_delay_ns.load(std::memory_order_relaxed);
+    if (delay > 0 && to != state_) {
+        change_at_ns_ = now_ns_ + delay;
+        return;
+    }
+    change_at_ns_ = -1;
+    change(pdi, to);
+}
+
+void Firmware::change(esc::Pdi& pdi, State to) noexcept {
+    op_since_ns_ = -1;
+    if (!known(to)) return fail(pdi, state_, 0x0012);
+    if (!may_change(state_, to)) return fail(pdi, state_, 0x0011);
+    if (to == state_) {
+        if (!error_) {
+            pdi.set_al_status(static_cast<std::uint16_t>(state_), 0);
+        }
+        return;
+    }
+    if (const auto code = faults_.reject[to].load(std::memory_order_relaxed)) {
+        return fail(pdi, state_, code);
+    }
+    const bool up = rank(to) > rank(state_);
+    if (const auto code = up ? code_against(pdi, to) : std::uint16_t{0}) {
+        return fail(pdi, state_, code);
+    }
+    if (to == State::op) {
+        op_since_ns_ = now_ns_;
+        return wait_for_op(pdi);
+    }
+    enter(pdi, to);
+}
+
+std::uint16_t Firmware::code_against(esc::Pdi& pdi, State to) noexcept {
+    switch (to) {
+    case State::boot:
+        if (design_.sii.boot.receive.size == 0) return 0x0013;
+        return check_mailbox(pdi, design_.sii.boot, 0x0015);
+    case State::preop:
+        if (!design_.sii.has_mailbox()) return 0;
+        return check_mailbox(pdi, design_.sii.mailboxes, 0x0016);
+    case State::safeop:
+        if (const auto code = check_process_data(pdi)) return code;
+        return check_sync(pdi);
+    default: return 0;
+    }
+}
+
+std::uint16_t Firmware::check_mailbox(esc::Pdi& pdi, const sii::Mailboxes& m,
+                                      std::uint16_t code) const noexcept {
+    const auto out = pdi.sync_manager(0);
+    const auto in = pdi.sync_manager(1);
+    const auto fits = [](const esc::Pdi::SyncManager& sm, const sii::Area& area,
+                         unsigned direction) {
+        return sm.enabled && sm.start == area.start && sm.length >= smallest_mailbox &&
+               sm.length <= area.size && (sm.control & 0x0fU) == (2U | direction);
+    };
+    return fits(out, m.receive, 4) && fits(in, m.send, 0) ? std::uint16_t{0} : code;
+}
+
+std::uint16_t Firmware::check_process_data(esc::Pdi& pdi) noexcept {
+    outputs_.build();
+    inputs_.build();
+    const auto fits = [&](unsigned number, std::uint16_t start, std::size_t bytes,
+                          unsigned direction) {
+        const auto sm = pdi.sync_manager(number);
+        if (bytes == 0) return !sm.enabled || sm.length == 0;
+        return sm.enabled && sm.start == start && sm.length == bytes &&
+               (sm.control & 0x0fU) == direction;
+    };
+    const bool has_out = out_start_ != 0;
+    const bool has_in = in_start_ != 0;
+    if (has_out && !fits(sm_out_, out_start_, outputs_.bytes(), 4)) return 0x001d;
+    if (has_in && !fits(sm_in_, in_start_, inputs_.bytes(), 0)) return 0x001e;
+    return 0;
+}
+
+std::uint16_t Firmware::check_sync(esc::Pdi& pdi) const noexcept {
+    const std::uint8_t activation = *pdi.memory(registers::dc_activation);
+    const bool requested = (activation & 1) != 0;
+    if (!requested) {
+        if (design_.dc_required) return 0x0027;
+        return 0;
+    }
+    if (!design_.dc) return 0x0028;
+    if ((activation & 2) == 0) return 0x0030;
+    const auto sync = pdi.sync();
+    if (sync.sync0_cycle_ns == 0) return 0x0035;
+    if (sync.sync0_cycle_ns < design_.shortest_cycle_ns) return 0x002e;
+    return 0;
+}
+
+/// Completes SAFE-OP to OP once outputs were received and SYNC0 runs.
+void Firmware::wait_for_op(esc::Pdi& pdi) noexcept {
+    if (op_since_ns_ < 0 || state_ != State::safeop) return;
+    const bool outputs = outputs_.bytes() == 0 || received_;
+    const auto sync = pdi.sync();
+    const bool synchronised = !sync.active || sync.pulses != 0;
+    if (outputs && synchronised) {
+        op_since_ns_ = -1;
+        enter(pdi, State::op);
+    } else if (now_ns_ - op_since_ns_ >= op_timeout_ns) {
+        op_since_ns_ = -1;
+        fail(pdi, State::safeop, synchronised ? 0x001b : 0x002d);
+    }
+}
+
+/// Leaves OP when outputs or SYNC0 fail.
+void Firmware::watch(esc::Pdi& pdi) noexcept {
+    if (const auto code = faults_.fail.exchange(0, std::memory_order_relaxed)) {
+        return fail(pdi, State::safeop, code);
+    }
+    const bool watched = outputs_.bytes() != 0 && (pdi.sync_manager(sm_out_).control & 0x40) != 0;
+    if (watched && pdi.watchdog_expired()) return fail(pdi, State::safeop, 0x001b);
+    if (outputs_.bytes() != 0 && !pdi.sync_manager(sm_out_).enabled) {
+        return fail(pdi, State::safeop, 0x001d);
+    }
+    const auto sync = pdi.sync();
+    if (sync.active && sync.last_pulse_ns != 0 &&
+        now_ns_ - sync.last_pulse_ns > lost_pulses * sync.sync0_cycle_ns) {
+        fail(pdi, State::safeop, 0x002c);
+    }
+}
+
+void Firmware::enter(esc::Pdi& pdi, State to) noexcept {
+    const bool leaves_op = state_ == State::op && to != State::op;
+    if (leaves_op) {
+        outputs_.clear();
+    }
+    if (to == State::init) {
+        mailbox_.stop();
+    }
+    if (to == State::boot) {
+        mailbox_.start(design_.sii.boot);
+    }
+    if (to == State::preop && state_ == State::init && design_.sii.has_mailbox()) {
+        mailbox_.start(design_.sii.mailboxes);
+    }
+    if (to == State::safeop && state_ == State::preop) {
+        const auto sync = pdi.sync();
+        received_ = false;
+        last_step_ns_ = now_ns_;
+        pulses_ = sync.active ? sync.pulses : 0;
+        state_ = to;
+        step(pdi, 0, 0);  // inputs are valid in SAFE-OP
+    }
+    state_ = to;
+    if (to != State::op) {
+        received_ = received_ && to == State::safeop;
+    }
+    shown_.store(to, std::memory_order_relaxed);
+    if (leaves_op) {
+        step(pdi, 0, 0);  // below SAFE-OP it is the last one: outputs are off
+    }
+    pdi.set_al_status(static_cast<std::uint16_t>(to), 0);
+}
+
+void Firmware::fail(esc::Pdi& pdi, State stay, std::uint16_t code) noexcept {
+    if (stay != state_) {
+        const bool leaves_op = state_ == State::op;
+        if (leaves_op) {
+            outputs_.clear();
+            received_ = false;
+        }
+        state_ = stay;
+        shown_.store(stay, std::memory_order_relaxed);
+        if (leaves_op) {
+            step(pdi, 0, 0);
+        }
+    }
+    error_ = true;
+    pdi.set_al_status(static_cast<std::uint16_t>(static_cast<unsigned>(stay) | al_error), code);
 }
 
 }  // namespace hal::ethercat::devices

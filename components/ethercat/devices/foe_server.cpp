@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
+#include "ethercat/devices/foe_server.hpp"
+
 #include <algorithm>
 #include <cstring>
-
-#include "ethercat/devices/mailbox_device.hpp"
 
 namespace hal::ethercat::devices {
 
@@ -10,7 +10,7 @@ void FoeServer::add(std::string name, std::vector<std::uint8_t> content, std::ui
                     bool boot_only) {
     File file{std::move(name), std::move(content), 0, password, boot_only};
     file.length = file.bytes.size();
-    file.bytes.resize(std::max(file.length, most_bytes_));
+    file.bytes.resize(std::max(file.length, max_bytes_));
     files_.push_back(std::move(file));
 }
 

@@ -55,7 +55,8 @@ Parts make_digital(const DeviceOptions& o, bool output) {
         entries.push_back({index, static_cast<std::uint8_t>(n),
                            (output ? "Output " : "Input ") + std::to_string(n)});
     }
-    b.pdo(output, output ? coe::rx_pdo : coe::tx_pdo, output ? "Outputs" : "Inputs", entries);
+    const std::uint16_t pdo = output ? coe::rx_pdo : coe::tx_pdo;
+    b.pdo(output, pdo, output ? "Outputs" : "Inputs", entries);
     auto design = b.finish(o.alias, o.serial);
     auto behaviour = std::make_unique<IoBehaviour>(design.dictionary, index, o.bits, output, true);
     return {std::move(design), std::move(behaviour)};
@@ -65,7 +66,7 @@ Parts make_analog(const DeviceOptions& o, bool output) {
     namespace access = coe::access;
     DesignBuilder b(output ? "analog_out" : "analog_in",
                     (output ? 0x0a0000U : 0x0a1000U) + o.channels);
-    b.mailbox(128, sii::coe);
+    b.mailbox(128);
     const std::uint16_t base = output ? 0x7000 : 0x6000;
     const auto rights = static_cast<std::uint16_t>(output ? access::read_write | access::rx_mappable
                                                           : access::read | access::tx_mappable);

@@ -54,7 +54,10 @@ struct DeviceOptions {
     std::uint16_t alias = 0;
     std::uint32_t serial = 0;
     bool dc_required = false;
-    std::uint32_t modes = 0x3a5;  ///< of a servo (6502h)
+    std::uint32_t modes = 0x3ef;  ///< of a servo (6502h)
+    /// of a servo: parameters of the motor that differ from servo_settings(), as in
+    /// "inertia:1e-4;endless:1"
+    std::string motor{};
     /// description of an esi device, and its name there; empty: the only one
     std::string file{};
     std::string device{};

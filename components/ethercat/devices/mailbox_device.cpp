@@ -4,6 +4,12 @@
 #include <cstring>
 #include <utility>
 
+#include "ethercat/devices/aoe_server.hpp"
+#include "ethercat/devices/eoe_host.hpp"
+#include "ethercat/devices/foe_server.hpp"
+#include "ethercat/devices/soe_server.hpp"
+#include "ethercat/devices/voe_echo.hpp"
+
 namespace hal::ethercat::devices {
 namespace {
 
@@ -41,7 +47,7 @@ Parts make_mailbox_device(const DeviceOptions& o) {
     namespace access = coe::access;
     namespace a = soe::attribute;
     DesignBuilder b("mailbox_device", 0x0b0001);
-    b.mailbox(256, sii::coe | sii::foe | sii::eoe | sii::soe | sii::aoe | sii::voe, true);
+    b.mailbox(256, true);
     auto& d = b.dictionary();
     d.variable(0x7000, "Outputs", coe::type::u64, access::read_write | access::rx_mappable);
     d.variable(0x6000, "Inputs", coe::type::u64, access::read | access::tx_mappable);
@@ -60,8 +66,8 @@ Parts make_mailbox_device(const DeviceOptions& o) {
     auto foe = std::make_unique<FoeServer>();
     foe->add("firmware", bytes_of_text("firmware 1.0"), 0x1234, true);
     foe->add("parameters", bytes_of_text("gain = 1\n"));
-    b.design().services.push_back(std::move(foe));
-    b.design().services.push_back(std::make_unique<EoeHost>());
+    b.service(std::move(foe));
+    b.service(std::make_unique<EoeHost>());
     std::vector<Idn> idns;
     idns.push_back(idn_of<std::uint16_t>(1, a::bytes_2 | a::is_unsigned | a::protected_safeop_op,
                                          "Control unit cycle time", "us", {1000}, 62, 65000));
@@ -89,9 +95,9 @@ Parts make_mailbox_device(const DeviceOptions& o) {
     }
     idns.push_back(idn_of<std::uint16_t>(soe::idn_all, a::bytes_2 | a::idn | a::list | a::read_only,
                                          "All IDNs", "", all));
-    b.design().services.push_back(std::make_unique<SoeServer>(std::move(idns)));
-    b.design().services.push_back(std::make_unique<AoeServer>(b.design().dictionary));
-    b.design().services.push_back(std::make_unique<VoeEcho>());
+    b.service(std::make_unique<SoeServer>(std::move(idns)));
+    b.service(std::make_unique<AoeServer>(b.design().dictionary));
+    b.service(std::make_unique<VoeEcho>());
     auto design = b.finish(o.alias, o.serial, 64, 64);
     auto behaviour = std::make_unique<Loopback>(design.dictionary);
     return {std::move(design), std::move(behaviour)};

@@ -62,6 +62,8 @@ class MailboxService {
 public:
     virtual ~MailboxService() = default;
     virtual MailboxType type() const noexcept = 0;
+    /// Returns whether the protocol is available in the state BOOT.
+    virtual bool in_boot() const noexcept { return false; }
     /// Ends transfers; called when the mailbox starts. [realtime]
     virtual void reset() noexcept {}
     /// Takes a message and answers it. The outbox has space for two messages. [realtime]

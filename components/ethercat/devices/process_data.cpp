@@ -9,11 +9,11 @@
 namespace hal::ethercat::devices {
 
 void ProcessData::attach(Dictionary& dictionary, std::uint16_t assignment, bool output,
-                         std::size_t most_bytes) {
+                         std::size_t max_bytes) {
     dictionary_ = &dictionary;
     assignment_ = assignment;
     output_ = output;
-    most_bytes_ = most_bytes;
+    max_bytes_ = max_bytes;
     std::size_t entries = 0;
     for (const auto& o : dictionary.objects()) {
         if (is_pdo(o.index)) {
@@ -47,85 +47,106 @@ void ProcessData::build() noexcept {
     for (const auto& slot : assignment->entries) {
         if (slot.sub == 0 || slot.sub > dictionary_->count(*assignment)) continue;
         const auto* pdo = dictionary_->find(get<std::uint16_t>(dictionary_->data(slot)));
-        if (pdo == nullptr) continue;
-        for (const auto& e : pdo->entries) {
-            if (e.sub == 0 || e.sub > dictionary_->count(*pdo)) continue;
-            const auto mapping = coe::Mapping::of(get<std::uint32_t>(dictionary_->data(e)));
-            const auto* entry =
-                mapping.index != 0 ? dictionary_->find(mapping.index, mapping.sub) : nullptr;
-            if (entry != nullptr && mapping.bits <= entry->bits && used_ < copies_.size()) {
-                copies_[used_++] = {dictionary_->data(*entry), static_cast<std::uint32_t>(bits_),
-                                    mapping.bits};
-            }
-            bits_ += mapping.bits;
+        if (pdo != nullptr) {
+            add(*pdo);
         }
+    }
+}
+
+/// Appends the objects of a PDO.
+void ProcessData::add(const DictionaryObject& pdo) noexcept {
+    for (const auto& e : pdo.entries) {
+        if (e.sub == 0 || e.sub > dictionary_->count(pdo)) continue;
+        const auto mapping = coe::Mapping::of(get<std::uint32_t>(dictionary_->data(e)));
+        const auto* entry =
+            mapping.index != 0 ? dictionary_->find(mapping.index, mapping.sub) : nullptr;
+        if (entry != nullptr && mapping.bits <= entry->bits && used_ < copies_.size()) {
+            copies_[used_++] = {dictionary_->data(*entry), static_cast<std::uint32_t>(bits_),
+                                mapping};
+        }
+        bits_ += mapping.bits;
     }
 }
 
 void ProcessData::unpack(std::span<const std::uint8_t> from) noexcept {
     for (std::size_t i = 0; i < used_; ++i) {
-        if (copies_[i].bit + copies_[i].bits <= from.size() * 8) {
-            copy_bits(copies_[i].data, 0, from.data(), copies_[i].bit, copies_[i].bits);
+        if (copies_[i].bit + copies_[i].object.bits <= from.size() * 8) {
+            copy_bits(copies_[i].data, 0, from.data(), copies_[i].bit, copies_[i].object.bits);
         }
     }
 }
 
 void ProcessData::pack(std::span<std::uint8_t> to) const noexcept {
     for (std::size_t i = 0; i < used_; ++i) {
-        if (copies_[i].bit + copies_[i].bits <= to.size() * 8) {
-            copy_bits(to.data(), copies_[i].bit, copies_[i].data, 0, copies_[i].bits);
+        if (copies_[i].bit + copies_[i].object.bits <= to.size() * 8) {
+            copy_bits(to.data(), copies_[i].bit, copies_[i].data, 0, copies_[i].object.bits);
         }
     }
 }
 
 void ProcessData::clear() noexcept {
     for (std::size_t i = 0; i < used_; ++i) {
-        std::memset(copies_[i].data, 0, (copies_[i].bits + 7) / 8);
+        std::memset(copies_[i].data, 0, (copies_[i].object.bits + 7) / 8);
     }
 }
 
-std::uint32_t ProcessData::check(const DictionaryObject& o, const DictionaryEntry& e,
-                                 std::span<const std::uint8_t> value) const noexcept {
-    const bool assignment = o.index == assignment_;
-    if (!assignment && !is_pdo(o.index)) return 0;
-    if (e.sub != 0) {
-        if (dictionary_->count(o) != 0) return coe::abort::sub0_not_zero;
-        if (assignment) {
-            const auto index = get<std::uint16_t>(value.data());
-            return is_pdo(index) && dictionary_->find(index) != nullptr ? 0
-                                                                        : coe::abort::not_mappable;
-        }
-        const auto mapping = coe::Mapping::of(get<std::uint32_t>(value.data()));
-        if (mapping.index == 0) {
-            return 0;  // a gap
-        }
-        const auto* object = dictionary_->find(mapping.index);
-        if (object == nullptr) return coe::abort::no_object;
-        const auto* entry = dictionary_->find(mapping.index, mapping.sub);
-        if (entry == nullptr) return coe::abort::no_sub;
-        const std::uint16_t right = output_ ? coe::access::rx_mappable : coe::access::tx_mappable;
-        return (entry->access & right) != 0 && entry->bits == mapping.bits
-                   ? 0
-                   : coe::abort::not_mappable;
+coe::Abort ProcessData::check(const DictionaryObject& o, const DictionaryEntry& e,
+                              std::span<const std::uint8_t> value) const noexcept {
+    if (o.index == assignment_) {
+        return e.sub == 0 ? check_assigned(o, value[0]) : check_assigning(o, value);
     }
-    const unsigned count = value[0];
-    if (count + 1 > o.entries.size()) {
-        return assignment ? coe::abort::too_high : coe::abort::pdo_too_long;
+    if (is_pdo(o.index)) {
+        return e.sub == 0 ? check_mapped(o, value[0]) : check_mapping(o, value);
     }
+    return coe::Abort::none;
+}
+
+/// Checks the write of a PDO to the assignment.
+coe::Abort ProcessData::check_assigning(const DictionaryObject& assignment,
+                                        std::span<const std::uint8_t> value) const noexcept {
+    if (dictionary_->count(assignment) != 0) return coe::Abort::sub0_not_zero;
+    const auto index = get<std::uint16_t>(value.data());
+    const bool exists = is_pdo(index) && dictionary_->find(index) != nullptr;
+    return exists ? coe::Abort::none : coe::Abort::not_mappable;
+}
+
+/// Checks the number of PDOs of the assignment.
+coe::Abort ProcessData::check_assigned(const DictionaryObject& assignment,
+                                       unsigned count) const noexcept {
+    if (count + 1 > assignment.entries.size()) return coe::Abort::too_high;
     std::size_t bits = 0;
-    if (!assignment) {
-        bits = pdo_bits(o, count);
-    } else {
-        for (const auto& slot : o.entries) {
-            if (slot.sub != 0 && slot.sub <= count) {
-                if (const auto* pdo =
-                        dictionary_->find(get<std::uint16_t>(dictionary_->data(slot)))) {
-                    bits += pdo_bits(*pdo, dictionary_->count(*pdo));
-                }
-            }
+    for (const auto& slot : assignment.entries) {
+        if (slot.sub == 0 || slot.sub > count) continue;
+        const auto* pdo = dictionary_->find(get<std::uint16_t>(dictionary_->data(slot)));
+        if (pdo != nullptr) {
+            bits += pdo_bits(*pdo, dictionary_->count(*pdo));
         }
     }
-    return (bits + 7) / 8 > most_bytes_ ? coe::abort::pdo_too_long : 0;
+    return check_length(bits);
+}
+
+/// Checks the write of an object to the mapping of a PDO.
+coe::Abort ProcessData::check_mapping(const DictionaryObject& pdo,
+                                      std::span<const std::uint8_t> value) const noexcept {
+    if (dictionary_->count(pdo) != 0) return coe::Abort::sub0_not_zero;
+    const auto mapping = coe::Mapping::of(get<std::uint32_t>(value.data()));
+    if (mapping.index == 0) return coe::Abort::none;  // a gap
+    if (dictionary_->find(mapping.index) == nullptr) return coe::Abort::no_object;
+    const auto* entry = dictionary_->find(mapping.index, mapping.sub);
+    if (entry == nullptr) return coe::Abort::no_sub;
+    const std::uint16_t right = output_ ? coe::access::rx_mappable : coe::access::tx_mappable;
+    const bool fits = (entry->access & right) != 0 && entry->bits == mapping.bits;
+    return fits ? coe::Abort::none : coe::Abort::not_mappable;
+}
+
+/// Checks the number of objects of a PDO.
+coe::Abort ProcessData::check_mapped(const DictionaryObject& pdo, unsigned count) const noexcept {
+    if (count + 1 > pdo.entries.size()) return coe::Abort::pdo_length;
+    return check_length(pdo_bits(pdo, count));
+}
+
+coe::Abort ProcessData::check_length(std::size_t bits) const noexcept {
+    return (bits + 7) / 8 > max_bytes_ ? coe::Abort::pdo_length : coe::Abort::none;
 }
 
 }  // namespace hal::ethercat::devices

@@ -14,8 +14,9 @@ namespace hal::ethercat::devices {
 /// Copies objects to and from one sync manager.
 class ProcessData {
 public:
-    /// `assignment` is 1C10h + the number of the sync manager; it may be missing in the dictionary. `most_bytes` limits its length. [setup]
-    void attach(Dictionary&, std::uint16_t assignment, bool output, std::size_t most_bytes);
+    /// `assignment` is 1C10h + the number of the sync manager; it may be missing in the dictionary.
+    /// `max_bytes` limits its length. [setup]
+    void attach(Dictionary&, std::uint16_t assignment, bool output, std::size_t max_bytes);
     /// Computes the copies from the present mapping. [realtime]
     void build() noexcept;
     /// Returns the length of the process data. [realtime]
@@ -27,17 +28,33 @@ public:
     void clear() noexcept;  ///< Sets all mapped outputs to 0. [realtime]
     std::uint16_t assignment() const noexcept { return assignment_; }
 
-    /// Checks a write to a mapping or an assignment of this direction; returns an abort code or 0.
-    /// [realtime]
-    std::uint32_t check(const DictionaryObject&, const DictionaryEntry&,
-                        std::span<const std::uint8_t> value) const noexcept;
+    /// Calls f(index, sub) for each object of the process data, in its order. [realtime]
+    template <class F>
+    void each_object(F&& f) const noexcept {
+        for (std::size_t n = 0; n < used_; ++n) {
+            f(copies_[n].object.index, copies_[n].object.sub);
+        }
+    }
+
+    /// Checks a write to a mapping or an assignment of this direction; Abort::none for other
+    /// objects. [realtime]
+    coe::Abort check(const DictionaryObject&, const DictionaryEntry&,
+                     std::span<const std::uint8_t> value) const noexcept;
 
 private:
     struct Copy {
         std::uint8_t* data = nullptr;
         std::uint32_t bit = 0;
-        std::uint32_t bits = 0;
+        coe::Mapping object;
     };
+    void add(const DictionaryObject& pdo) noexcept;
+    coe::Abort check_assigning(const DictionaryObject& assignment,
+                               std::span<const std::uint8_t> value) const noexcept;
+    coe::Abort check_assigned(const DictionaryObject& assignment, unsigned count) const noexcept;
+    coe::Abort check_mapping(const DictionaryObject& pdo,
+                             std::span<const std::uint8_t> value) const noexcept;
+    coe::Abort check_mapped(const DictionaryObject& pdo, unsigned count) const noexcept;
+    coe::Abort check_length(std::size_t bits) const noexcept;
     std::size_t pdo_bits(const DictionaryObject& pdo, unsigned entries) const noexcept;
     bool is_pdo(std::uint16_t index) const noexcept;
 
@@ -45,7 +62,7 @@ private:
     std::uint16_t assignment_ = 0;
     bool output_ = false;
     std::size_t bits_ = 0;
-    std::size_t most_bytes_ = 0;
+    std::size_t max_bytes_ = 0;
     std::size_t used_ = 0;
     std::vector<Copy> copies_;
 };

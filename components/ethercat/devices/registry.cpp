@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "cia402/drive/motor_options.hpp"
 #include "ethercat/devices/esi_device.hpp"
 #include "ethercat/devices/mailbox_device.hpp"
 #include "ethercat/devices/servo.hpp"
@@ -23,7 +24,7 @@ constexpr DeviceRow device_rows[] = {
     {"digital_out", "bits", [](const DeviceOptions& o) { return make_digital(o, true); }},
     {"analog_in", "channels", [](const DeviceOptions& o) { return make_analog(o, false); }},
     {"analog_out", "channels", [](const DeviceOptions& o) { return make_analog(o, true); }},
-    {"servo", "axes dc modes", make_servo},
+    {"servo", "axes dc modes motor", make_servo},
     {"mailbox_device", "", make_mailbox_device},
     {"esi", "file device", make_esi_device},
 };
@@ -49,49 +50,70 @@ std::string list_of_names() {
     return out;
 }
 
+/// An option whose value is a number.
+struct NumberRow {
+    std::string_view name;
+    std::uint64_t min, max;
+    void (*set)(DeviceOptions&, std::uint64_t);
+};
+constexpr NumberRow number_rows[] = {
+    {"bits", 1, 64, [](DeviceOptions& o, std::uint64_t n) { o.bits = static_cast<unsigned>(n); }},
+    {"channels", 1, 16,
+     [](DeviceOptions& o, std::uint64_t n) { o.channels = static_cast<unsigned>(n); }},
+    {"axes", 1, 8, [](DeviceOptions& o, std::uint64_t n) { o.axes = static_cast<unsigned>(n); }},
+    {"modes", 1, 0x3ff,
+     [](DeviceOptions& o, std::uint64_t n) { o.modes = static_cast<std::uint32_t>(n); }},
+    {"alias", 0, 0xffff,
+     [](DeviceOptions& o, std::uint64_t n) { o.alias = static_cast<std::uint16_t>(n); }},
+    {"serial", 0, 0xffffffff,
+     [](DeviceOptions& o, std::uint64_t n) { o.serial = static_cast<std::uint32_t>(n); }},
+};
+
+std::string set_number(DeviceOptions& o, std::string_view key, std::string_view value) {
+    for (const NumberRow& row : number_rows) {
+        if (row.name != key) continue;
+        const auto number = parse_natural(value);
+        if (number && *number >= row.min && *number <= row.max) {
+            row.set(o, *number);
+            return {};
+        }
+        return "invalid value '" + std::string(value) + "' of " + std::string(key) + "; use " +
+               std::to_string(row.min) + ".." + std::to_string(row.max);
+    }
+    return "unknown option '" + std::string(key) + "'";
+}
+
+std::string set_dc(DeviceOptions& o, std::string_view value) {
+    if (value != "required" && value != "optional") {
+        return "invalid value '" + std::string(value) + "' of dc; use required or optional";
+    }
+    o.dc_required = value == "required";
+    return {};
+}
+
+std::string set_text(std::string& to, std::string_view key, std::string_view value,
+                     std::string_view example) {
+    if (value.empty()) {
+        return "option '" + std::string(key) + "' has no value; write " + std::string(key) + "=" +
+               std::string(example);
+    }
+    to = value;
+    return {};
+}
+
+std::string set_motor(DeviceOptions& o, std::string_view value) {
+    canopen::cia402::MotorSettings scratch;
+    o.motor = value;
+    return canopen::cia402::parse_motor(value, scratch);
+}
+
 /// Sets an option; returns what is wrong with it, or an empty text.
 std::string set_option(DeviceOptions& o, std::string_view key, std::string_view value) {
-    if (key == "dc") {
-        if (value != "required" && value != "optional") {
-            return "invalid value '" + std::string(value) + "' of dc; use required or optional";
-        }
-        o.dc_required = value == "required";
-        return {};
-    }
-    if (key == "file" || key == "device") {
-        if (value.empty()) {
-            return "option '" + std::string(key) + "' has no value; write " + std::string(key) +
-                   (key == "file" ? "=FILE.xml" : "=NAME");
-        }
-        (key == "file" ? o.file : o.device) = value;
-        return {};
-    }
-    const std::uint64_t most = key == "bits"       ? 64
-                               : key == "channels" ? 16
-                               : key == "axes"     ? 8
-                               : key == "modes"    ? 0x3ff
-                               : key == "alias"    ? 0xffff
-                                                   : 0xffffffff;
-    const std::uint64_t least = key == "alias" || key == "serial" ? 0 : 1;
-    const auto number = parse_natural(value);
-    if (!number || *number < least || *number > most) {
-        return "invalid value '" + std::string(value) + "' of " + std::string(key) + "; use " +
-               std::to_string(least) + ".." + std::to_string(most);
-    }
-    if (key == "bits") {
-        o.bits = static_cast<unsigned>(*number);
-    } else if (key == "channels") {
-        o.channels = static_cast<unsigned>(*number);
-    } else if (key == "modes") {
-        o.modes = static_cast<std::uint32_t>(*number);
-    } else if (key == "axes") {
-        o.axes = static_cast<unsigned>(*number);
-    } else if (key == "alias") {
-        o.alias = static_cast<std::uint16_t>(*number);
-    } else {
-        o.serial = static_cast<std::uint32_t>(*number);
-    }
-    return {};
+    if (key == "dc") return set_dc(o, value);
+    if (key == "file") return set_text(o.file, key, value, "FILE.xml");
+    if (key == "device") return set_text(o.device, key, value, "NAME");
+    if (key == "motor") return set_motor(o, value);
+    return set_number(o, key, value);
 }
 
 /// Reads the description of an esi device. Returns what is wrong, or an empty text; `help` has what

@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "ethercat/wire/mailbox.hpp"
 #include "ethercat/wire/sii.hpp"
 #include "text/config_text.hpp"
 
@@ -94,12 +95,8 @@ struct Object {
 };
 
 struct Mailbox {
-    bool coe = false;
-    bool foe = false;
-    bool eoe = false;
-    bool soe = false;
-    bool aoe = false;
-    bool voe = false;
+    std::uint16_t protocols = 0;  ///< bits of MailboxProtocol
+    bool has(MailboxType type) const noexcept { return (protocols & bit_of(type)) != 0; }
 
     bool repeat = false;
     bool sdo_info = false;

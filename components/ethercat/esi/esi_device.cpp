@@ -192,16 +192,14 @@ sii::Contents sii_contents(const File& file, const Device& d) {
     if (d.mailbox) {
         const Mailbox& m = *d.mailbox;
         const auto bit = [](bool set, unsigned value) { return set ? value : 0U; };
-        out.protocols = static_cast<std::uint16_t>(bit(m.aoe, sii::aoe) | bit(m.eoe, sii::eoe) |
-                                                   bit(m.coe, sii::coe) | bit(m.foe, sii::foe) |
-                                                   bit(m.soe, sii::soe) | bit(m.voe, sii::voe));
+        out.protocols = m.protocols;
         g.coe_details = static_cast<std::uint8_t>(
-            bit(m.coe, sii::coe_sdo) | bit(m.sdo_info, sii::coe_sdo_info) |
+            bit(m.has(MailboxType::coe), sii::coe_sdo) | bit(m.sdo_info, sii::coe_sdo_info) |
             bit(m.pdo_assign, sii::coe_pdo_assign) | bit(m.pdo_config, sii::coe_pdo_config) |
             bit(m.pdo_upload, sii::coe_upload_at_start) |
             bit(m.complete_access, sii::coe_complete_access));
-        g.foe = m.foe;
-        g.eoe = m.eoe;
+        g.foe = m.has(MailboxType::foe);
+        g.eoe = m.has(MailboxType::eoe);
         g.soe_channels = m.soe_channels;
     }
     if (d.profile == 402) {

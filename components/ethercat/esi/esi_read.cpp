@@ -6,6 +6,14 @@ namespace hal::ethercat::esi {
 
 namespace {
 
+/// Returns the use of an FMMU from its name in lower case.
+sii::FmmuUse fmmu_use(std::string_view name) noexcept {
+    if (name == "outputs") return sii::FmmuUse::outputs;
+    if (name == "inputs") return sii::FmmuUse::inputs;
+    if (name == "mboxstate") return sii::FmmuUse::mailbox_state;
+    return sii::FmmuUse::unused;
+}
+
 class Reader {
 public:
     explicit Reader(std::string_view text) : context_{text} {}
@@ -84,10 +92,7 @@ private:
         t.response = context_.child(mailbox, "ResponseTimeout", t.response);
         for (const Xml f : node.children("Fmmu")) {
             const std::string use = lower(trimmed(f.child_value()));
-            d.fmmus.push_back(use == "outputs"     ? sii::FmmuUse::outputs
-                              : use == "inputs"    ? sii::FmmuUse::inputs
-                              : use == "mboxstate" ? sii::FmmuUse::mailbox_state
-                                                   : sii::FmmuUse::unused);
+            d.fmmus.push_back(fmmu_use(use));
         }
         for (const Xml s : node.children("Sm")) {
             sync_manager(s, d);
@@ -216,13 +221,12 @@ private:
     void mailbox_of(const Xml& node, Device& d) {
         Mailbox m;
         m.repeat = Context::flag(node, "DataLinkLayer");
-        m.foe = node.child("FoE");
-        m.eoe = node.child("EoE");
-        m.aoe = node.child("AoE");
-
-        m.voe = node.child("VoE");
+        for (const MailboxProtocol& protocol : mailbox_protocols) {
+            if (node.child(protocol.name)) {
+                m.protocols |= protocol.bit;
+            }
+        }
         if (const Xml coe = node.child("CoE")) {
-            m.coe = true;
             m.sdo_info = Context::flag(coe, "SdoInfo");
 
             m.pdo_assign = Context::flag(coe, "PdoAssign");
@@ -235,7 +239,6 @@ private:
             init_commands(coe, InitCmd::Protocol::coe, d.init_commands);
         }
         if (const Xml soe = node.child("SoE")) {
-            m.soe = true;
             m.soe_channels = context_.attribute<std::uint8_t>(soe, "ChannelCount", 1);
             init_commands(soe, InitCmd::Protocol::soe, d.init_commands);
         }
@@ -365,12 +368,18 @@ std::optional<std::int64_t> number(std::string_view text) {
     return static_cast<std::int64_t>(negative ? 0 - *value : *value);
 }
 
+/// Returns the value of a digit in lower case; -1 for other characters.
+static int hex_digit(char c) noexcept {
+    if (c >= '0' && c <= '9') return c - '0';
+    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+    return -1;
+}
+
 std::optional<std::vector<std::uint8_t>> hex_bytes(std::string_view text) {
     std::vector<std::uint8_t> out;
     int high = -1;
     for (const char c : text) {
-        const char l = lower(c);
-        const int digit = l >= '0' && l <= '9' ? l - '0' : l >= 'a' && l <= 'f' ? l - 'a' + 10 : -1;
+        const int digit = hex_digit(lower(c));
         if (is_blank(c) || c == '\r' || c == '\n') continue;
         if (digit < 0) {
             return {};

@@ -19,16 +19,6 @@ struct MailboxArea {
     bool usable() const noexcept { return out_size != 0 && in_size != 0; }  ///< [any]
 };
 
-/// Bits of BusSlave::protocols (SII word 1Ch).
-enum MailboxProtocols : std::uint16_t {
-    aoe_supported = 0x01,
-    eoe_supported = 0x02,
-    coe_supported = 0x04,
-    foe_supported = 0x08,
-    soe_supported = 0x10,
-    voe_supported = 0x20
-};
-
 /// Category 41 of the SII: a sync manager.
 struct SiiSyncManager {
     std::uint16_t start = 0;

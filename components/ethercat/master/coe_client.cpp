@@ -7,6 +7,18 @@
 namespace hal::ethercat::master {
 namespace {
 
+/// Returns whether the payload aborts a transfer of an object. Some slaves send an abort as a
+/// request.
+bool is_sdo_abort(std::span<const std::uint8_t> payload, std::uint32_t index,
+                  std::uint32_t sub) noexcept {
+    const auto sdo = coe::read_sdo(payload);
+    if (!sdo || sdo->command != coe::command::abort || sdo->index != index || sdo->sub != sub) {
+        return false;
+    }
+    const auto service = coe::service_of(payload.data());
+    return service == coe::Service::sdo_response || service == coe::Service::sdo_request;
+}
+
 // Index, sub-index, specifier.
 bool accepts_sdo(const Expected& expected, std::span<const std::uint8_t> payload) noexcept {
     if (is_sdo_abort(payload, expected.first, expected.second)) return true;
@@ -14,6 +26,14 @@ bool accepts_sdo(const Expected& expected, std::span<const std::uint8_t> payload
     return sdo && coe::service_of(payload.data()) == coe::Service::sdo_response &&
            sdo->is(static_cast<std::uint8_t>(expected.third)) && sdo->index == expected.first &&
            sdo->sub == expected.second;
+}
+
+// Index, sub-index, specifier with toggle bit.
+bool accepts_segment(const Expected& expected, std::span<const std::uint8_t> payload) noexcept {
+    if (is_sdo_abort(payload, expected.first, expected.second)) return true;
+    return payload.size() >= coe::segment_data &&
+           coe::service_of(payload.data()) == coe::Service::sdo_response &&
+           (payload[2] & (coe::command::specifier | coe::command::toggle)) == expected.third;
 }
 
 }  // namespace
@@ -29,17 +49,6 @@ bool EmergencyQueue::take(const BusSlave& slave, const MailboxMessage& message) 
         }
     }
     return true;
-}
-
-// Some slaves send an abort as a request.
-bool is_sdo_abort(std::span<const std::uint8_t> payload, std::uint32_t index,
-                  std::uint32_t sub) noexcept {
-    const auto sdo = coe::read_sdo(payload);
-    if (!sdo || sdo->command != coe::command::abort || sdo->index != index || sdo->sub != sub) {
-        return false;
-    }
-    const auto service = coe::service_of(payload.data());
-    return service == coe::Service::sdo_response || service == coe::Service::sdo_request;
 }
 
 Task<SdoResult> CoeClient::write_other(Channel& channel, BusSlave& slave,
@@ -89,7 +98,7 @@ Task<SdoResult> CoeClient::upload(Channel& channel, BusSlave& slave, std::uint16
     const std::size_t first = std::min(size, payload.size() - coe::sdo_bytes);
     if (size > to.size()) {
         if (first < size) {
-            co_await send_abort(channel, slave, *mailbox, index, sub, coe::abort::memory);
+            co_await send_abort(channel, slave, *mailbox, index, sub, code_of(coe::Abort::memory));
         }
         co_return refused(0, size);
     }
@@ -142,6 +151,84 @@ Task<SdoResult> CoeClient::download(Channel& channel, BusSlave& slave, std::uint
         if (!result) co_return result;
     }
     co_return succeeded(from.size());
+}
+
+// Segments. A segment names no object: a reply with the toggle bit of the previous one is a
+// duplicate and is dropped.
+
+Task<SdoResult> CoeClient::upload_segments(Channel& channel, BusSlave& slave, SlaveMailbox& mailbox,
+                                           std::uint16_t index, std::uint8_t sub, std::size_t size,
+                                           std::size_t first, std::span<std::uint8_t> to) noexcept {
+    std::size_t used = first;
+    for (std::uint8_t toggle = 0;; toggle ^= coe::command::toggle) {
+        coe::Sdo request;
+        request.command = static_cast<std::uint8_t>(coe::command::upload_segment | toggle);
+        const std::size_t length =
+            coe::write_sdo(mailbox.body(slave).data(), coe::Service::sdo_request, request);
+        const SdoResult result = co_await mailbox.exchange(
+            channel, slave, MailboxType::coe, length,
+            {accepts_segment, index, sub,
+             static_cast<std::uint32_t>(coe::command::upload_segment_response | toggle)});
+        if (!result) co_return result;
+        const auto payload = mailbox.reply().payload;
+        if (payload[2] == coe::command::abort) co_return aborted(coe::read_sdo(payload)->value);
+        const bool last = (payload[2] & coe::command::last_segment) != 0;
+        const auto data = coe::segment_of(payload);
+        // more or less than announced
+        if (data.size() > size - used || (last && used + data.size() != size)) {
+            const bool more = data.size() > size - used;
+            if (!last) {
+                co_await send_abort(channel, slave, mailbox, index, sub,
+                                    code_of(coe::Abort::length));
+            }
+            co_return aborted(more ? code_of(coe::Abort::too_long)
+                                   : code_of(coe::Abort::too_short));
+        }
+        if (!data.empty()) {
+            std::memcpy(to.data() + used, data.data(), data.size());
+        }
+        used += data.size();
+        if (last) co_return succeeded(used);
+        if (data.empty()) {  // would never end
+            co_await send_abort(channel, slave, mailbox, index, sub, code_of(coe::Abort::length));
+            co_return aborted(code_of(coe::Abort::length));
+        }
+    }
+}
+
+Task<SdoResult> CoeClient::download_segments(Channel& channel, BusSlave& slave,
+                                             SlaveMailbox& mailbox, std::uint16_t index,
+                                             std::uint8_t sub,
+                                             std::span<const std::uint8_t> rest) noexcept {
+    const std::size_t capacity = mailbox.body(slave).size() - coe::segment_data;
+    for (std::uint8_t toggle = 0; !rest.empty(); toggle ^= coe::command::toggle) {
+        const auto data = rest.first(std::min(rest.size(), capacity));
+        rest = rest.subspan(data.size());
+        const std::size_t length =
+            coe::write_segment(mailbox.body(slave).data(), coe::Service::sdo_request,
+                               coe::command::download_segment, toggle != 0, rest.empty(), data);
+        const SdoResult result = co_await mailbox.exchange(
+            channel, slave, MailboxType::coe, length,
+            {accepts_segment, index, sub,
+             static_cast<std::uint32_t>(coe::command::download_segment_response | toggle)});
+        if (!result) co_return result;
+        const auto payload = mailbox.reply().payload;
+        if (payload[2] == coe::command::abort) co_return aborted(coe::read_sdo(payload)->value);
+    }
+    co_return succeeded();
+}
+
+Task<> CoeClient::send_abort(Channel& channel, BusSlave& slave, SlaveMailbox& mailbox,
+                             std::uint16_t index, std::uint8_t sub, std::uint32_t code) noexcept {
+    coe::Sdo request;
+    request.command = coe::command::abort;
+    request.index = index;
+    request.sub = sub;
+
+    request.value = code;
+    const std::size_t length =
+        coe::write_sdo(mailbox.body(slave).data(), coe::Service::sdo_request, request);
+    co_await mailbox.send(channel, slave, MailboxType::coe, length);  // has no reply
 }
 
 }  // namespace hal::ethercat::master

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// CANopen over EtherCAT as the master uses it: SDO transfers, SDO information, emergencies
-// (ETG.1000.6, clause 5.6).
+// CANopen over EtherCAT as the master uses it: SDO transfers and emergencies (ETG.1000.6, clause
+// 5.6). SDO information is in object_information.hpp.
 #pragma once
 
 #include <cstdint>
@@ -14,20 +14,6 @@
 #include "hal/queue.hpp"
 
 namespace hal::ethercat::master {
-
-/// Entry of an object as SDO information describes it.
-struct ObjectDescription {
-    std::uint16_t type = 0;
-    std::uint8_t largest_sub = 0;
-    coe::ObjectCode code{};
-    std::size_t name_length = 0;  ///< bytes of the name in the buffer of the call
-};
-struct EntryDescription {
-    std::uint16_t type = 0;
-    std::uint16_t bits = 0;
-    std::uint16_t access = 0;  ///< access: coe::access
-    std::size_t name_length = 0;
-};
 
 /// An emergency and its sender.
 struct EmergencyEvent {
@@ -56,10 +42,6 @@ private:
     std::uint32_t lost_ = 0;
 };
 
-/// Returns whether the payload aborts a transfer of an object. [realtime]
-bool is_sdo_abort(std::span<const std::uint8_t> payload, std::uint32_t index,
-                  std::uint32_t sub) noexcept;
-
 /// See the top of this file. All functions [realtime].
 class CoeClient final : public CoeAccess {
 public:
@@ -75,16 +57,6 @@ public:
         return eoe_.set_ip(channel, slave, ip);
     }
 
-    /// Reads a list of indexes; `length` of the result counts bytes, two for each index.
-    Task<MailboxResult> list(Channel&, BusSlave&, coe::List which,
-                             std::span<std::uint8_t> to) noexcept;
-    /// Reads the description of an object and its name, not terminated, into `name`.
-    Task<MailboxResult> object(Channel&, BusSlave&, std::uint16_t index,
-                               ObjectDescription& description, std::span<char> name) noexcept;
-    /// Reads the description of an entry and its name, not terminated, into `name`.
-    Task<MailboxResult> entry(Channel&, BusSlave&, std::uint16_t index, std::uint8_t sub,
-                              EntryDescription& description, std::span<char> name) noexcept;
-
 private:
     Task<SdoResult> upload_segments(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index,
                                     std::uint8_t sub, std::size_t size, std::size_t first,
@@ -94,10 +66,6 @@ private:
                                       std::span<const std::uint8_t> rest) noexcept;
     Task<> send_abort(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index, std::uint8_t sub,
                       std::uint32_t code) noexcept;
-    Task<MailboxResult> information(Channel&, BusSlave&, coe::Information request,
-                                    std::uint32_t what, std::size_t what_bytes,
-                                    std::span<std::uint8_t> head,
-                                    std::span<std::uint8_t> to) noexcept;
 
     Mailboxes& mailboxes_;
     SoeClient soe_{mailboxes_};

@@ -32,9 +32,11 @@ MasterValue value_of(std::span<const GatewaySlave> slaves, std::uint16_t index,
         return {0, 4, {}};
     }
     if (index == 0xf000 && sub <= 2) {
-        return sub == 0
-                   ? MasterValue{2, 1, {}}
-                   : MasterValue{sub == 1 ? 1U : static_cast<std::uint32_t>(most_slaves), 2, {}};
+        if (sub == 0) {
+            return {2, 1, {}};
+        }
+        const auto slaves_at_most = static_cast<std::uint32_t>(most_slaves);
+        return {sub == 1 ? 1U : slaves_at_most, 2, {}};
     }
     if (index >= 0xf020 && index <= 0xf02f) {
         const std::size_t first = (index - 0xf020U) * addresses_per_object;
@@ -84,12 +86,12 @@ std::size_t answer_for_master(std::span<const GatewaySlave> slaves, std::span<st
     reply.command = coe::command::abort;
     if (sdo->command == coe::command::abort) return 0;
     if (!sdo->is(coe::command::upload)) {
-        reply.value = coe::abort::read_only;
+        reply.value = code_of(coe::Abort::read_only);
     } else if (sdo->complete()) {
-        reply.value = coe::abort::no_complete_access;
+        reply.value = code_of(coe::Abort::no_complete_access);
     } else if (value.bytes == 0 && value.text.empty()) {
-        reply.value =
-            value_of(slaves, sdo->index, 0).bytes != 0 ? coe::abort::no_sub : coe::abort::no_object;
+        reply.value = value_of(slaves, sdo->index, 0).bytes != 0 ? code_of(coe::Abort::no_sub)
+                                                                 : code_of(coe::Abort::no_object);
     } else if (value.text.empty()) {
         reply.command = coe::expedited_command(coe::command::upload_response, value.bytes);
 

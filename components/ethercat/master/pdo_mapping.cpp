@@ -224,7 +224,7 @@ Task<bool> map_process_data(Channel& c, Bus& bus, Device& d) noexcept {
             bus.report(Event::too_few_sync_managers, d, d.slave.sync_managers, sm.number + 1);
             co_return false;
         }
-        if (!d.slave.mailbox.usable() || (d.slave.protocols & coe_supported) == 0) {
+        if (!d.slave.mailbox.usable() || (d.slave.protocols & bit_of(MailboxType::coe)) == 0) {
             if (!has_fixed_size(bus, d, sm)) co_return false;
             continue;
         }

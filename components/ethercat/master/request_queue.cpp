@@ -48,15 +48,7 @@ void RequestPort::wait(MailboxRequest& request) const noexcept {
 }
 
 RequestServer::RequestServer(Mailboxes& mailboxes, Find find, std::size_t workers)
-    : mailboxes_(mailboxes),
-      find_(std::move(find)),
-      coe_(mailboxes),
-      foe_(mailboxes),
-      soe_(mailboxes),
-      aoe_(mailboxes),
-      eoe_(mailboxes),
-      voe_(mailboxes),
-      slots_(mailboxes.size()) {
+    : mailboxes_(mailboxes), find_(std::move(find)), slots_(mailboxes.size()) {
     for (std::size_t i = 0; i < std::max<std::size_t>(workers, 1); ++i) {
         workers_.push_back(std::make_unique<Worker>());
     }
@@ -98,59 +90,79 @@ void RequestServer::collect() noexcept {
 
 void RequestServer::step(std::int64_t now_ns) noexcept {
     collect();
+    if (slots_.empty()) return;
     constexpr std::size_t looked_at = 16;  // slots in a cycle while nothing is requested
-    const std::size_t most = waiting_ != 0 ? slots_.size() : std::min(slots_.size(), looked_at);
+    const std::size_t count = waiting_ != 0 ? slots_.size() : std::min(slots_.size(), looked_at);
     std::size_t at = 0;
     for (const auto& worker : workers_) {
         if (worker->channel.busy()) continue;
-        for (; at < most; ++at) {
-            const std::size_t n = (next_slot_ + at) % slots_.size();
-            Slot& slot = slots_[n];
-            if (slot.busy) continue;
-            BusSlave* slave = find_(static_cast<std::uint16_t>(n));
-            if (slave == nullptr || mailboxes_.find(*slave) == nullptr) {
-                for (; slot.first != nullptr; --waiting_) {
-                    finish(*std::exchange(slot.first, slot.first->next),
-                           slave == nullptr ? nobody : refused());
-                }
-                slot.last = nullptr;
-                continue;
-            }
-            const bool full =
-                slave->mailbox_status != nullptr && (*slave->mailbox_status & 0x08) != 0;
-            // what it sent comes first: it may wait for that
-            const bool frames = !full && switch_ != nullptr && switch_->pending(*slave);
-            const auto interval = switch_ != nullptr && switch_->has(*slave)
-                                      ? std::min(poll_interval_ns_, eoe_poll_interval_ns)
-                                      : poll_interval_ns_;
-            const bool due = slave->mailbox_status == nullptr && poll_interval_ns_ != 0 &&
-                             slave->present && now_ns - slot.polled_ns >= interval;
-            if (slot.first == nullptr && !frames && !full && !due) continue;
-            // its holder reads the mailbox
-            if (slot.first == nullptr && mailboxes_.at(n).held()) continue;
-            slot.busy = true;
-            slot.polled_ns = now_ns;
-            worker->slave = static_cast<std::uint16_t>(n);
-            worker->channel.set_now(now_ns);
-            if (slot.first != nullptr) {
-                worker->request = std::exchange(slot.first, slot.first->next);
-                --waiting_;
-                if (slot.first == nullptr) {
-                    slot.last = nullptr;
-                }
-                worker->request->stage = Stage::running;
-                worker->channel.start([&] { return serve(worker->channel, *worker, *slave); });
-            } else {
-                worker->channel.start(
-                    [&] { return serve_unrequested(worker->channel, *worker, *slave, frames); });
-            }
-            ++at;
-            break;
+        bool started = false;
+        for (; at < count && !started; ++at) {
+            const std::size_t number = (next_slot_ + at) % slots_.size();
+            started = start(*worker, static_cast<std::uint16_t>(number), now_ns);
         }
     }
-    if (!slots_.empty()) {
-        next_slot_ = (next_slot_ + at) % slots_.size();
+    next_slot_ = (next_slot_ + at) % slots_.size();
+}
+
+/// Returns what a slave needs that nobody requested.
+RequestServer::Unrequested RequestServer::unrequested(const BusSlave& slave, const Slot& slot,
+                                                      std::int64_t now_ns) const noexcept {
+    const bool reported = slave.mailbox_status != nullptr;
+    // what it sent comes first: it may wait for that
+    if (reported && (*slave.mailbox_status & 0x08) != 0) return Unrequested::poll;
+    if (switch_ != nullptr && switch_->pending(slave)) return Unrequested::frames;
+    std::int64_t interval = poll_interval_ns_;
+    if (switch_ != nullptr && switch_->has(slave)) {
+        interval = std::min(interval, eoe_poll_interval_ns);
     }
+    const bool due =
+        !reported && poll_interval_ns_ != 0 && slave.present && now_ns - slot.polled_ns >= interval;
+    return due ? Unrequested::poll : Unrequested::nothing;
+}
+
+/// Finishes all requests of a slot.
+void RequestServer::refuse_all(Slot& slot, const MailboxResult& result) noexcept {
+    while (slot.first != nullptr) {
+        finish(*std::exchange(slot.first, slot.first->next), result);
+        --waiting_;
+    }
+    slot.last = nullptr;
+}
+
+/// Starts what a slave needs on an idle worker. Returns whether it needs something.
+bool RequestServer::start(Worker& worker, std::uint16_t number, std::int64_t now_ns) noexcept {
+    Slot& slot = slots_[number];
+    if (slot.busy) return false;
+    BusSlave* slave = find_(number);
+    if (slave == nullptr || mailboxes_.find(*slave) == nullptr) {
+        refuse_all(slot, slave == nullptr ? nobody : refused());
+        return false;
+    }
+    const Unrequested other = unrequested(*slave, slot, now_ns);
+    if (slot.first == nullptr) {
+        if (other == Unrequested::nothing) return false;
+        // its holder reads the mailbox
+        if (mailboxes_.at(number).held()) return false;
+    }
+    slot.busy = true;
+    slot.polled_ns = now_ns;
+    worker.slave = number;
+    worker.channel.set_now(now_ns);
+    if (slot.first == nullptr) {
+        const bool frames = other == Unrequested::frames;
+        worker.channel.start(
+            [&] { return serve_unrequested(worker.channel, worker, *slave, frames); });
+        return true;
+    }
+    worker.request = std::exchange(slot.first, slot.first->next);
+    --waiting_;
+    if (slot.first == nullptr) {
+        slot.last = nullptr;
+    }
+    worker.request->stage = Stage::running;
+    worker.channel.start([&] { return serve(worker.channel, worker, *slave); });
+    return true;
 }
 
 void RequestServer::stop() noexcept {
@@ -205,13 +217,13 @@ Task<MailboxResult> RequestServer::execute(Channel& channel, BusSlave& slave, Ma
         result = co_await coe_.download(channel, slave, r.index, r.sub, r.complete, r.data);
         break;
     case Kind::object_list:
-        result = co_await coe_.list(channel, slave, static_cast<coe::List>(r.index), r.data);
+        result = co_await objects_.list(channel, slave, static_cast<coe::List>(r.index), r.data);
         break;
     case Kind::object:
-        result = co_await coe_.object(channel, slave, r.index, r.object, name);
+        result = co_await objects_.object(channel, slave, r.index, r.object, name);
         break;
     case Kind::entry:
-        result = co_await coe_.entry(channel, slave, r.index, r.sub, r.entry, name);
+        result = co_await objects_.entry(channel, slave, r.index, r.sub, r.entry, name);
         break;
     case Kind::foe_read:
         result = co_await foe_.read(channel, slave, r.name, r.foe, r.data, progress);

@@ -25,6 +25,7 @@
 #include "ethercat/master/coe_client.hpp"
 #include "ethercat/master/eoe_client.hpp"
 #include "ethercat/master/foe_client.hpp"
+#include "ethercat/master/object_information.hpp"
 #include "ethercat/master/soe_client.hpp"
 #include "ethercat/master/voe_client.hpp"
 #include "hal/queue.hpp"
@@ -142,18 +143,23 @@ private:
     Task<> serve_unrequested(Channel&, Worker&, BusSlave&, bool frames) noexcept;
     Task<MailboxResult> execute(Channel&, BusSlave&, MailboxRequest&, FoeProgress&) noexcept;
     Task<MailboxResult> pass(Channel&, BusSlave&, MailboxRequest&) noexcept;
+    enum class Unrequested : std::uint8_t { nothing, poll, frames };
+    Unrequested unrequested(const BusSlave&, const Slot&, std::int64_t now_ns) const noexcept;
+    bool start(Worker&, std::uint16_t number, std::int64_t now_ns) noexcept;
+    void refuse_all(Slot&, const MailboxResult&) noexcept;
     void collect() noexcept;
     void finish(Worker&) noexcept;
     static void finish(MailboxRequest& request, const MailboxResult& result) noexcept;
 
     Mailboxes& mailboxes_;
     Find find_;
-    CoeClient coe_;
-    FoeClient foe_;
-    SoeClient soe_;
-    AoeClient aoe_;
-    EoeClient eoe_;
-    VoeClient voe_;
+    CoeClient coe_{mailboxes_};
+    ObjectInformation objects_{mailboxes_};
+    FoeClient foe_{mailboxes_};
+    SoeClient soe_{mailboxes_};
+    AoeClient aoe_{mailboxes_};
+    EoeClient eoe_{mailboxes_};
+    VoeClient voe_{mailboxes_};
     EoeSwitch* switch_ = nullptr;
     std::int64_t poll_interval_ns_ = 0;
     std::vector<std::unique_ptr<RequestPort>> ports_;

@@ -45,6 +45,13 @@ std::uint16_t start_of(const SyncManager& sm, const BusSlave& s) noexcept {
     return std::uint16_t{0};
 }
 
+/// Returns the control byte of a sync manager of process data.
+std::uint8_t control_of(const SyncManager& sm) noexcept {
+    if (sm.control != 0) return sm.control;
+    if (!sm.output) return inputs_control;
+    return sm.watchdog ? outputs_control : outputs_unwatched;
+}
+
 }  // namespace
 
 Task<bool> clear_settings(Channel& c, Bus& bus, Device& d) noexcept {
@@ -112,11 +119,7 @@ Task<bool> set_process_data(Channel& c, Bus& bus, Device& d) noexcept {
             bus.report(Event::too_few_sync_managers, d, d.slave.sync_managers, sm.number + 1);
             co_return false;
         }
-        const std::uint8_t control = sm.control != 0 ? sm.control
-                                     : !sm.output    ? inputs_control
-                                     : sm.watchdog   ? outputs_control
-                                                     : outputs_unwatched;
-        put_sync_manager(c.data(), start_of(sm, d.slave), bytes, control);
+        put_sync_manager(c.data(), start_of(sm, d.slave), bytes, control_of(sm));
         a = co_await c.exchange(
             Command::fpwr, at_station(d.slave.station, registers::sync_manager_at(sm.number)), 8);
         if (a.wkc != 1) co_return false;
@@ -157,7 +160,7 @@ Task<bool> set_process_data(Channel& c, Bus& bus, Device& d) noexcept {
 }
 
 static Task<bool> set_ip(Channel& c, Bus& bus, Device& d, const Slave& config) noexcept {
-    if (!d.slave.mailbox.usable() || (d.slave.protocols & eoe_supported) == 0) {
+    if (!d.slave.mailbox.usable() || (d.slave.protocols & bit_of(MailboxType::eoe)) == 0) {
         bus.report(Event::no_eoe, d, d.slave.protocols);
         co_return false;
     }

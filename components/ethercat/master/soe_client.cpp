@@ -43,7 +43,10 @@ std::optional<std::uint16_t> parse_idn(std::string_view text) noexcept {
         return soe::idn(text[0] == 'P' || text[0] == 'p', *set, *value);
     }
     const bool hex = text.starts_with("0x");
-    const auto value = number(hex ? text.substr(2) : text, hex ? 16 : 10, 0xffff);
+    if (hex) {
+        text.remove_prefix(2);
+    }
+    const auto value = number(text, hex ? 16 : 10, 0xffff);
     if (!value) return std::nullopt;
     return static_cast<std::uint16_t>(*value);
 }
@@ -82,11 +85,11 @@ Task<MailboxResult> SoeClient::read(Channel& channel, BusSlave& slave, std::uint
                       static_cast<std::uint32_t>(soe::Opcode::read_response) |
                           static_cast<std::uint32_t>(drive & 7U) << 8,
                       idn, 0};
+    const std::int64_t timeout = SlaveMailbox::response_timeout_ns(slave);
     std::size_t used = 0;
     bool overflow = false;
     for (;;) {
-        result = co_await mailbox->wait_for(channel, slave, MailboxType::soe,
-                                            SlaveMailbox::response_timeout_ns(slave), expected);
+        result = co_await mailbox->wait_for(channel, slave, MailboxType::soe, timeout, expected);
         if (!result) co_return result;
         const auto payload = mailbox->reply().payload;
         const soe::Header header = *soe::read(payload);

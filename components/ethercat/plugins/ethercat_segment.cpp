@@ -109,15 +109,7 @@ public:
             unposted_ = !post_disturbances();
         }
         for (EmulatedAxisPins& pins : axes_) {
-            pins.position = pins.axis.position();
-            pins.velocity = pins.axis.velocity();
-
-            pins.statusword = pins.axis.statusword();
-            pins.axis.set_inputs(pins.inputs);
-            if (pins.error_code != pins.was_error && pins.error_code != 0) {
-                pins.axis.fail(static_cast<std::uint16_t>(pins.error_code));
-            }
-            pins.was_error = pins.error_code;
+            pins.update();
         }
         for (auto& c : digital_in_) {
             c.io.set_input(c.number, c.pin ? 1 : 0);
@@ -213,7 +205,8 @@ private:
         "devices along the line, separated by commas: coupler, digital_in bits=16, digital_out "
         "bits=8, analog_in channels=4, "
         "analog_out channels=2, servo axes=1, mailbox_device, esi file=drive.xml device=NAME; all "
-        "take alias= and serial=, a servo dc=required and modes= (6502h)"};
+        "take alias= and serial=, a servo dc=required, modes= (6502h) and motor=, as in "
+        "motor=inertia:1e-4;home-from:5000"};
     hal::TextArgument link_{*this, "link", "sim:ethercat", "segment in memory where the master is"};
     hal::TextArgument backup_{*this, "backup", "",
                               "segment in memory of the master's second port, which closes a ring"};
@@ -248,6 +241,10 @@ cables and devices, at the same times in every run of `hal sim`.
     loadrt ethercat_segment devices="coupler, digital_in bits=16, servo axes=2" link=sim:line
     addf ethercat-segment.0.update servo-thread
     setp ethercat-segment.0.slave-2.axis-0.inputs 1
+
+Each axis of a servo is the simulated one of `canopen_drive`: all modes of CiA 402, homing methods 1 to 37, touch probes, limits, a brake and faults,
+with 10 000 increments per revolution, an absolute encoder and an endless travel. `motor` changes the parameters that `canopen_drive` lists, separated by
+semicolons.
 
 A master on the same segment is `loadrt ethercat config=machine.ethercat link=sim:line`.
 

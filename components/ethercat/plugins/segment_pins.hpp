@@ -174,16 +174,48 @@ struct EmulatedAxisPins {
           position(c, f, (name + "position").c_str(), "position of the motor", {.unit = "counts"}),
           velocity(c, f, (name + "velocity").c_str(), "velocity of the motor",
                    {.unit = "counts/s"}),
+          torque(c, f, (name + "torque").c_str(), "torque of the motor", {.unit = "N*m"}),
           statusword(c, f, (name + "statusword").c_str(), "6041h"),
-          inputs(c, f, (name + "inputs").c_str(), "digital inputs of the drive (60FDh)"),
+          homed(c, f, (name + "homed").c_str(), "TRUE: homed since power-on"),
+          brake(c, f, (name + "brake").c_str(), "TRUE: the brake is closed"),
+          inputs(c, f, (name + "inputs").c_str(),
+                 "digital inputs of the drive (60FDh), besides those of its travel"),
           error_code(
               c, f, (name + "fail").c_str(),
-              "a change to another number than 0 raises a fault with this error code (603Fh)") {}
+              "a change to another number than 0 raises a fault with this error code (603Fh)"),
+          load_torque(c, f, (name + "load-torque").c_str(), "external torque on the shaft",
+                      {.unit = "N*m"}),
+          dc_link(c, f, (name + "dc-link").c_str(),
+                  "DC link voltage; valid range 70..130 % of the rated voltage",
+                  {.initial = its_axis.rated_voltage(), .unit = "V"}),
+          encoder_broken(c, f, (name + "encoder-broken").c_str(),
+                         "TRUE: the encoder cable is cut") {}
+
+    /// Copies the pins to the axis and back. [realtime]
+    void update() noexcept {
+        position = axis.position();
+        velocity = axis.velocity();
+        torque = axis.torque();
+        statusword = axis.statusword();
+        homed = axis.homed();
+        brake = axis.brake_closed();
+        axis.set_inputs(inputs);
+        axis.set_load_torque(std::isfinite(load_torque.get()) ? load_torque.get() : 0.0);
+        axis.set_dc_link(std::isfinite(dc_link.get()) ? dc_link.get() : 0.0);
+        axis.set_encoder_broken(encoder_broken);
+        if (error_code != was_error && error_code != 0) {
+            axis.fail(static_cast<std::uint16_t>(error_code));
+        }
+        was_error = error_code;
+    }
 
     devices::ServoAxis& axis;
-    hal::Out<double> position, velocity;
+    hal::Out<double> position, velocity, torque;
     hal::Out<std::uint32_t> statusword;
+    hal::Out<bool> homed, brake;
     hal::In<std::uint32_t> inputs, error_code;
+    hal::In<double> load_torque, dc_link;
+    hal::In<bool> encoder_broken;
     std::uint32_t was_error = 0;
 };
 

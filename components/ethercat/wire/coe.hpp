@@ -9,6 +9,8 @@
 #include <optional>
 #include <span>
 
+#include "cia301/abort.hpp"
+#include "cia301/types.hpp"
 #include "ethercat/wire/byte_order.hpp"
 #include "ethercat/wire/mailbox.hpp"
 
@@ -140,53 +142,11 @@ inline std::span<const std::uint8_t> segment_of(std::span<const std::uint8_t> pa
     return payload.subspan(segment_data, payload.size() - segment_data - unused);
 }
 
-/// SDO abort codes.
-namespace abort {
-inline constexpr std::uint32_t toggle = 0x05030000;
-inline constexpr std::uint32_t timeout = 0x05040000;
-inline constexpr std::uint32_t command = 0x05040001;
-
-inline constexpr std::uint32_t memory = 0x05040005;
-inline constexpr std::uint32_t access = 0x06010000;
-inline constexpr std::uint32_t write_only = 0x06010001;
-
-inline constexpr std::uint32_t read_only = 0x06010002;
-inline constexpr std::uint32_t sub0_not_zero = 0x06010003;
-
-inline constexpr std::uint32_t no_complete_access = 0x06010004;
-inline constexpr std::uint32_t too_long_for_mailbox = 0x06010005;
-
-inline constexpr std::uint32_t mapped = 0x06010006;
-inline constexpr std::uint32_t no_object = 0x06020000;
-
-inline constexpr std::uint32_t not_mappable = 0x06040041;
-inline constexpr std::uint32_t pdo_too_long = 0x06040042;
-
-inline constexpr std::uint32_t parameter = 0x06040043;
-inline constexpr std::uint32_t internal = 0x06040047;
-inline constexpr std::uint32_t hardware = 0x06060000;
-
-inline constexpr std::uint32_t length = 0x06070010;
-inline constexpr std::uint32_t too_long = 0x06070012;
-inline constexpr std::uint32_t too_short = 0x06070013;
-
-inline constexpr std::uint32_t no_sub = 0x06090011;
-inline constexpr std::uint32_t range = 0x06090030;
-inline constexpr std::uint32_t too_high = 0x06090031;
-
-inline constexpr std::uint32_t too_low = 0x06090032;
-inline constexpr std::uint32_t max_below_min = 0x06090036;
-
-inline constexpr std::uint32_t general = 0x08000000;
-inline constexpr std::uint32_t store = 0x08000020;
-inline constexpr std::uint32_t local_control = 0x08000021;
-
-inline constexpr std::uint32_t state = 0x08000022;
-inline constexpr std::uint32_t no_dictionary = 0x08000023;
-}  // namespace abort
-/// Returns the meaning of an abort code, as in "object does not exist"; "unknown abort code" for
-/// others. [any]
-const char* abort_text(std::uint32_t code) noexcept;
+using cia301::Abort;
+/// Returns the meaning of an abort code in a message; "unknown abort code" for others. [any]
+inline const char* abort_text(std::uint32_t code) noexcept {
+    return cia301::to_string(static_cast<Abort>(code));
+}
 
 // SDO information: CoE header, u8 opcode (bit 7: incomplete), u8 0, u16 fragments left; data.
 inline constexpr std::size_t information_header_bytes = 6;
@@ -232,33 +192,30 @@ inline void write_information(std::uint8_t* to, InformationHeader h) noexcept {
 }
 /// Codes of objects (CiA 301).
 enum class ObjectCode : std::uint8_t { variable = 7, array = 8, record = 9 };
-/// Indices of basic data types (ETG.1020).
+/// Indices of basic data types, as messages and dictionaries carry them.
 namespace type {
-inline constexpr std::uint16_t boolean = 0x0001;
-inline constexpr std::uint16_t s8 = 0x0002;
-inline constexpr std::uint16_t s16 = 0x0003;
-inline constexpr std::uint16_t s32 = 0x0004;
-
-inline constexpr std::uint16_t u8 = 0x0005;
-inline constexpr std::uint16_t u16 = 0x0006;
-inline constexpr std::uint16_t u32 = 0x0007;
-inline constexpr std::uint16_t real32 = 0x0008;
-
-inline constexpr std::uint16_t visible_string = 0x0009;
-inline constexpr std::uint16_t octet_string = 0x000a;
-inline constexpr std::uint16_t real64 = 0x0011;
-
-inline constexpr std::uint16_t s64 = 0x0015;
-inline constexpr std::uint16_t u64 = 0x001b;
-inline constexpr std::uint16_t bit1 = 0x0030;
-inline constexpr std::uint16_t pdo_mapping = 0x0021;
-inline constexpr std::uint16_t identity = 0x0023;
-inline constexpr std::uint16_t command_parameter = 0x0025;
-
-inline constexpr std::uint16_t pdo_parameter = 0x0027;
+constexpr std::uint16_t index_of(cia301::Type type) noexcept {
+    return static_cast<std::uint16_t>(type);
+}
+inline constexpr std::uint16_t boolean = index_of(cia301::Type::boolean);
+inline constexpr std::uint16_t s8 = index_of(cia301::Type::integer8);
+inline constexpr std::uint16_t s16 = index_of(cia301::Type::integer16);
+inline constexpr std::uint16_t s32 = index_of(cia301::Type::integer32);
+inline constexpr std::uint16_t u8 = index_of(cia301::Type::unsigned8);
+inline constexpr std::uint16_t u16 = index_of(cia301::Type::unsigned16);
+inline constexpr std::uint16_t u32 = index_of(cia301::Type::unsigned32);
+inline constexpr std::uint16_t real32 = index_of(cia301::Type::real32);
+inline constexpr std::uint16_t visible_string = index_of(cia301::Type::visible_string);
+inline constexpr std::uint16_t octet_string = index_of(cia301::Type::octet_string);
+inline constexpr std::uint16_t real64 = index_of(cia301::Type::real64);
+inline constexpr std::uint16_t s64 = index_of(cia301::Type::integer64);
+inline constexpr std::uint16_t u64 = index_of(cia301::Type::unsigned64);
+inline constexpr std::uint16_t bit1 = index_of(cia301::Type::bit1);
+inline constexpr std::uint16_t pdo_mapping = index_of(cia301::Type::pdo_mapping);
+inline constexpr std::uint16_t identity = index_of(cia301::Type::identity);
+inline constexpr std::uint16_t command_parameter = index_of(cia301::Type::command_parameter);
+inline constexpr std::uint16_t pdo_parameter = index_of(cia301::Type::pdo_parameter);
 }  // namespace type
-/// Returns the name of a basic data type, as in "UDINT"; "" for unknown ones. [any]
-const char* type_name(std::uint16_t type) noexcept;
 /// Bits of the access rights of an entry.
 namespace access {
 inline constexpr std::uint16_t read_preop = 0x01;

@@ -27,30 +27,35 @@ enum class MailboxType : std::uint8_t {
     soe = 5,
     voe = 15
 };
+/// A mailbox protocol: its name, which is that of its element in an ESI, and its bit in the SII
+/// (word 1Ch).
+struct MailboxProtocol {
+    MailboxType type{};
+    const char* name = "";
+    std::uint16_t bit = 0;
+};
+/// All protocols. What lists, describes or prints them follows from these rows; the README of
+/// `master/` names the other places of a new protocol.
+inline constexpr MailboxProtocol mailbox_protocols[] = {
+    {MailboxType::aoe, "AoE", 0x01}, {MailboxType::eoe, "EoE", 0x02},
+    {MailboxType::coe, "CoE", 0x04}, {MailboxType::foe, "FoE", 0x08},
+    {MailboxType::soe, "SoE", 0x10}, {MailboxType::voe, "VoE", 0x20},
+};
+/// Returns the row of a protocol; an empty one for mailbox errors and undefined numbers. [any]
+constexpr MailboxProtocol protocol_of(MailboxType type) noexcept {
+    for (const MailboxProtocol& row : mailbox_protocols) {
+        if (row.type == type) return row;
+    }
+    return {};
+}
+/// Returns the bit of a protocol in the SII. [any]
+constexpr std::uint16_t bit_of(MailboxType type) noexcept { return protocol_of(type).bit; }
 /// Returns "CoE" and the like, "unknown protocol" for an undefined number. [any]
 constexpr const char* to_string(MailboxType type) noexcept {
-    switch (type) {
-    case MailboxType::error: return "mailbox error";
-    case MailboxType::aoe: return "AoE";
-    case MailboxType::eoe: return "EoE";
-    case MailboxType::coe: return "CoE";
-    case MailboxType::foe: return "FoE";
-    case MailboxType::soe: return "SoE";
-    case MailboxType::voe: return "VoE";
-    }
-    return "unknown protocol";
+    if (type == MailboxType::error) return "mailbox error";
+    const MailboxProtocol row = protocol_of(type);
+    return row.bit != 0 ? row.name : "unknown protocol";
 }
-
-/// Bits of the protocols in the SII (word 1Ch).
-namespace mailbox_protocol {
-inline constexpr std::uint16_t aoe = 0x01;
-inline constexpr std::uint16_t eoe = 0x02;
-inline constexpr std::uint16_t coe = 0x04;
-inline constexpr std::uint16_t foe = 0x08;
-inline constexpr std::uint16_t soe = 0x10;
-
-inline constexpr std::uint16_t voe = 0x20;
-}  // namespace mailbox_protocol
 
 /// A message of a mailbox. The payload points into the mailbox.
 struct MailboxMessage {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "cia301/types.hpp"
 #include "ethercat/wire/byte_order.hpp"
 
 namespace hal::ethercat::sii {
@@ -15,19 +16,8 @@ constexpr std::size_t header_bytes = 4;
 
 constexpr std::size_t categories_at = 2 * word_categories;
 
-/// CoE basic types: number, name.
-struct BasicType {
-    std::uint8_t number;
-    const char* name;
-};
-constexpr BasicType basic_types[] = {
-    {0x01, "BOOL"},   {0x02, "SINT"},   {0x03, "INT"},    {0x04, "DINT"},  {0x05, "USINT"},
-    {0x06, "UINT"},   {0x07, "UDINT"},  {0x08, "REAL"},   {0x10, "INT24"}, {0x11, "LREAL"},
-    {0x12, "INT40"},  {0x13, "INT48"},  {0x14, "INT56"},  {0x15, "LINT"},  {0x16, "UINT24"},
-    {0x18, "UINT40"}, {0x19, "UINT48"}, {0x1a, "UINT56"}, {0x1b, "ULINT"}, {0x1e, "BYTE"},
-    {0x1f, "WORD"},   {0x20, "DWORD"},  {0x30, "BIT1"},   {0x31, "BIT2"},  {0x32, "BIT3"},
-    {0x33, "BIT4"},   {0x34, "BIT5"},   {0x35, "BIT6"},   {0x36, "BIT7"},  {0x37, "BIT8"},
-};
+/// The basic types of SIIs: up to BIT8.
+constexpr std::uint8_t max_type = 0x37;
 
 /// Reads fields up to the end of a category; what lies behind it reads as 0.
 class Fields {
@@ -303,17 +293,15 @@ Contents parse(std::span<const std::uint8_t> image) {
 }
 
 std::uint8_t type_number(std::string_view name) noexcept {
-    for (const auto& t : basic_types) {
-        if (name == t.name) return t.number;
+    for (std::uint8_t number = 1; number <= max_type; ++number) {
+        if (name == type_name(number) && !name.empty()) return number;
     }
     return name == "BIT" ? 0x30 : 0;
 }
 
 const char* type_name(std::uint8_t number) noexcept {
-    for (const auto& t : basic_types) {
-        if (number == t.number) return t.name;
-    }
-    return "";
+    const auto type = static_cast<cia301::Type>(number);
+    return cia301::bits_of(type) != 0 ? cia301::iec_name(type) : "";
 }
 
 }  // namespace hal::ethercat::sii

@@ -35,14 +35,6 @@ inline constexpr std::uint16_t word_version = 0x3f;
 
 inline constexpr std::uint16_t word_categories = 0x40;
 
-/// Bits of the protocols word.
-inline constexpr std::uint16_t aoe = 0x01;
-inline constexpr std::uint16_t eoe = 0x02;
-inline constexpr std::uint16_t coe = 0x04;
-inline constexpr std::uint16_t foe = 0x08;
-inline constexpr std::uint16_t soe = 0x10;
-
-inline constexpr std::uint16_t voe = 0x20;
 /// Bits of the CoE details.
 inline constexpr std::uint8_t coe_sdo = 0x01;
 inline constexpr std::uint8_t coe_sdo_info = 0x02;

@@ -33,7 +33,8 @@ TEST(Esi, Device_has_what_its_description_states) {
     EXPECT_EQ(d->rx[0].exclude, (std::vector<std::uint16_t>{0x1601}));
     EXPECT_FALSE(d->rx[1].sync_manager);
     EXPECT_EQ(d->rx[1].bits(), 32U);
-    EXPECT_TRUE(d->mailbox && d->mailbox->complete_access && d->mailbox->foe && !d->mailbox->eoe);
+    EXPECT_TRUE(d->mailbox && d->mailbox->complete_access && d->mailbox->has(MailboxType::foe) &&
+                !d->mailbox->has(MailboxType::eoe));
     ASSERT_EQ(d->init_commands.size(), 1U);
     EXPECT_EQ(d->init_commands[0].transitions, (std::vector<std::string>{"PS"}));
     EXPECT_EQ(d->init_commands[0].data, (std::vector<std::uint8_t>{8}));
@@ -73,7 +74,7 @@ TEST(Esi, SII_image_has_the_identity_mailboxes_and_PDOs) {
     EXPECT_EQ(c.revision, 0x10001U);
     EXPECT_EQ(c.boot.send, (sii::Area{0x1080, 128}));
     EXPECT_EQ(c.mailboxes.receive, (sii::Area{0x1000, 128}));
-    EXPECT_EQ(c.protocols, sii::coe | sii::foe);
+    EXPECT_EQ(c.protocols, bit_of(MailboxType::coe) | bit_of(MailboxType::foe));
     EXPECT_EQ(c.general.coe_details, 0x2f);
     EXPECT_EQ(c.eeprom_bytes, 2048U);
     ASSERT_EQ(c.rx.size(), 2U);
@@ -115,10 +116,9 @@ TEST(Esi, Invalid_files_are_reported_with_their_place) {
               "x.xml:1:1: error: the root element is 'masters', not EtherCATInfo; give the ESI "
               "file of the device, an XML file from its maker");
     EXPECT_EQ(first("<EtherCATInfo/>"), "x.xml:1:2: error: the file describes no device");
-    EXPECT_EQ(
-        first("<EtherCATInfo><Descriptions><Devices><Device>\n<Type "
-              "ProductCode='#xZZ'/></Device></Devices></Descriptions></EtherCATInfo>"),
-        "x.xml:2:2: error: invalid ProductCode '#xZZ'; write a number, as in 12 or #x1F");
+    EXPECT_EQ(first("<EtherCATInfo><Descriptions><Devices><Device>\n<Type "
+                    "ProductCode='#xZZ'/></Device></Devices></Descriptions></EtherCATInfo>"),
+              "x.xml:2:2: error: invalid ProductCode '#xZZ'; write a number, as in 12 or #x1F");
 }
 
 TEST(Esi, Any_bytes_are_read_without_harm) {

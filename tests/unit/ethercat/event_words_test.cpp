@@ -53,14 +53,15 @@ TEST(EthercatEventWords, Objects_and_aborts_are_written_as_in_the_standard) {
               "slave 4 (x-axis) rejects object 0x6040:0 with 16 bits at 0x1600:1: no answer from "
               "its mailbox; power-cycle it");
     EXPECT_EQ(words(Event::mapping_failed, 1, 0x1600LL << 24 | 0x1c1201, 0x06090030),
-              "slave 4 (x-axis) rejects PDO 0x1600 at 0x1C12:1: SDO abort 0x06090030 (value out of "
-              "range); correct `outputs` or `inputs` or "
+              "slave 4 (x-axis) rejects PDO 0x1600 at 0x1C12:1: SDO abort 0x06090030 "
+              "(invalid value for the parameter); correct `outputs` or `inputs` or "
               "their `sync-manager` in its section");
-    EXPECT_EQ(words(Event::mapping_failed, 1, 12LL << 24 | 0x1a0000, 0x06040042),
-              "slave 4 (x-axis) rejects 12 entries at 0x1A00:0: SDO abort 0x06040042 (mapped "
-              "objects exceed the PDO length); correct "
-              "`inputs` in its section, or, if the "
-              "PDO is full, write `entries-per-pdo = 11`");
+    EXPECT_EQ(
+        words(Event::mapping_failed, 1, 12LL << 24 | 0x1a0000, 0x06040042),
+        "slave 4 (x-axis) rejects 12 entries at 0x1A00:0: SDO abort 0x06040042 "
+        "(number and length of the objects to be mapped would exceed the PDO length); correct "
+        "`inputs` in its section, or, if the "
+        "PDO is full, write `entries-per-pdo = 11`");
     EXPECT_EQ(words(Event::mapping_differs, 1, 0x60640020LL << 24 | 0x1a0002, 0x60410010),
               "slave 4 (x-axis) did not keep the PDO mapping: 0x1A00:2 is 0x60410010 instead of "
               "0x60640020; this PDO is fixed: list its "
@@ -117,9 +118,8 @@ TEST(EthercatEventWords, Start_up_writes_name_value_and_line) {
                                    "eth:enp3s0");
     };
     EXPECT_EQ(of(0x606000, 0x06090031),
-              "slave 0 rejects 0x08 for 0x6060:0: SDO abort 0x06090031 (value too high); correct "
-              "or delete line 12 of the "
-              "configuration");
+              "slave 0 rejects 0x08 for 0x6060:0: SDO abort 0x06090031 (value of the "
+              "parameter written too high); correct or delete line 12 of the configuration");
     EXPECT_EQ(of(0x809601, 0x7004),
               "slave 0 rejects 0x0007 for IDN P-0-150 of drive 1: SoE error 0x7004 (value is "
               "read-only); its description asks "

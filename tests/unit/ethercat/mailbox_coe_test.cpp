@@ -159,6 +159,7 @@ struct Fixture {
     CoeSlave slave;
     Mailboxes mailboxes{1};
     CoeClient client{mailboxes};
+    ObjectInformation objects{mailboxes};
     EmergencyQueue emergencies;
     SdoResult result;
     Bytes buffer = Bytes(4096);
@@ -324,10 +325,11 @@ TEST(EthercatCoe, Information_is_joined_from_fragments) {
             static Task<> all(Channel& channel, Fixture& f, ObjectDescription& object,
                               EntryDescription& entry, std::array<char, 100>& name,
                               std::array<MailboxResult, 3>& results) {
-                results[0] = co_await f.client.list(channel, f.slave.bus, coe::List::all, f.buffer);
-                results[1] = co_await f.client.object(channel, f.slave.bus, 0x2005, object, name);
-                results[2] = co_await f.client.entry(channel, f.slave.bus, 0x2005, 1, entry,
-                                                     std::span<char>(name).subspan(80));
+                results[0] =
+                    co_await f.objects.list(channel, f.slave.bus, coe::List::all, f.buffer);
+                results[1] = co_await f.objects.object(channel, f.slave.bus, 0x2005, object, name);
+                results[2] = co_await f.objects.entry(channel, f.slave.bus, 0x2005, 1, entry,
+                                                      std::span<char>(name).subspan(80));
             }
         };
         std::array<MailboxResult, 3> results;

@@ -92,7 +92,7 @@ TEST(EthercatGateway, Passes_requests_to_the_slave_by_UDP_and_TCP) {
         f.send(f.upload(0, 0x8000, 6));
         EXPECT_EQ(get<std::uint32_t>(f.receive().data() + 14), 0x1234U);
         f.send(f.upload(0, 0x9999, 0));
-        EXPECT_EQ(get<std::uint32_t>(f.receive().data() + 14), coe::abort::no_object);
+        EXPECT_EQ(get<std::uint32_t>(f.receive().data() + 14), code_of(coe::Abort::no_object));
     }
 }
 

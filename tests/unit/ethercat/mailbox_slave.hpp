@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ethercat/master/coe_client.hpp"
+#include "ethercat/master/object_information.hpp"
 #include "ethercat/wire/registers.hpp"
 
 namespace hal::ethercat::tests {

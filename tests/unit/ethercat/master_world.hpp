@@ -65,7 +65,7 @@ inline std::vector<std::uint8_t> image(std::uint32_t product, std::uint16_t alia
     c.serial = 7;
     if (mailbox) {
         c.mailboxes = {{0x1000, 128}, {0x1080, 128}};
-        c.protocols = sii::coe;
+        c.protocols = bit_of(MailboxType::coe);
     }
     c.has_general = true;
     c.general.coe_details = 0x0f;

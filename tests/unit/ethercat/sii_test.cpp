@@ -2,6 +2,7 @@
 #include <random>
 
 #include "ethercat/wire/byte_order.hpp"
+#include "ethercat/wire/mailbox.hpp"
 #include "ethercat/wire/sii.hpp"
 
 namespace hal::ethercat::sii {
@@ -16,7 +17,7 @@ Contents drive() {
     c.serial = 7;
     c.boot = {{0x1000, 256}, {0x1200, 256}};
     c.mailboxes = {{0x1000, 128}, {0x1080, 128}};
-    c.protocols = coe | foe;
+    c.protocols = bit_of(MailboxType::coe) | bit_of(MailboxType::foe);
     c.has_general = true;
     c.general.group = "Drives";
     c.general.order = "SERVO-1";
@@ -64,7 +65,7 @@ TEST(Sii, Image_has_the_same_contents_when_read_again) {
         EXPECT_EQ(r.serial, 7U);
         EXPECT_EQ(r.boot, c.boot);
         EXPECT_EQ(r.mailboxes, c.mailboxes);
-        EXPECT_EQ(r.protocols, coe | foe);
+        EXPECT_EQ(r.protocols, bit_of(MailboxType::coe) | bit_of(MailboxType::foe));
         EXPECT_EQ(r.eeprom_bytes, 2048U);
         EXPECT_EQ(r.general.group, "Drives");
         EXPECT_EQ(r.general.order, "SERVO-1");

@@ -128,21 +128,18 @@ std::string foe_text(Bytes payload) {
 std::string mailbox_text(Bytes bytes) {
     const auto m = read_mailbox(bytes);
     if (!m || m->payload.empty() || (bytes[5] & 0x80) != 0 || bytes[4] != 0) return "";
+    const std::string name = to_string(m->type);
     switch (m->type) {
-    case MailboxType::coe: return "CoE " + coe_text(m->payload);
-    case MailboxType::foe: return "FoE " + foe_text(m->payload);
-    case MailboxType::error:
-        if (const auto error = read_mailbox_error(m->payload)) {
-            return std::string("mailbox error: ") + to_string(*error);
-        }
-        return "";
-    case MailboxType::aoe:
-    case MailboxType::eoe:
-    case MailboxType::soe:
-    case MailboxType::voe:
-        return fmt::format("{}, {} bytes", to_string(m->type), m->payload.size());
+    case MailboxType::coe: return name + " " + coe_text(m->payload);
+    case MailboxType::foe: return name + " " + foe_text(m->payload);
+    case MailboxType::error: {
+        const auto error = read_mailbox_error(m->payload);
+        return error ? name + ": " + to_string(*error) : "";
     }
-    return "";
+    default:
+        if (bit_of(m->type) == 0) return "";
+        return fmt::format("{}, {} bytes", name, m->payload.size());
+    }
 }
 
 }  // namespace

@@ -54,6 +54,15 @@ std::string pdo_xml(const ethercat::sii::Pdo& pdo, const char* element) {
     return text + fmt::format("        </{}>\n", element);
 }
 
+/// The attributes of CoE in an ESI, from the CoE details of the SII.
+std::string coe_attributes(std::uint8_t details) {
+    const auto flag = [&](std::uint8_t bit) { return (details & bit) != 0 ? 1 : 0; };
+    return fmt::format(" SdoInfo=\"{}\" PdoAssign=\"{}\" PdoConfig=\"{}\" CompleteAccess=\"{}\"",
+                       flag(ethercat::sii::coe_sdo_info), flag(ethercat::sii::coe_pdo_assign),
+                       flag(ethercat::sii::coe_pdo_config),
+                       flag(ethercat::sii::coe_complete_access));
+}
+
 std::string device_xml(const ethercat::sii::Contents& c) {
     constexpr const char* sm_words[] = {"", "MBoxOut", "MBoxIn", "Outputs", "Inputs"};
     std::string text = fmt::format(
@@ -82,30 +91,13 @@ std::string device_xml(const ethercat::sii::Contents& c) {
     }
     if (c.has_mailbox()) {
         text += "        <Mailbox>\n";
-        if ((c.protocols & ethercat::sii::aoe) != 0) {
-            text += "          <AoE/>\n";
-        }
-        if ((c.protocols & ethercat::sii::eoe) != 0) {
-            text += "          <EoE/>\n";
-        }
-        if ((c.protocols & ethercat::sii::coe) != 0) {
-            const auto flag = [&](std::uint8_t bit) {
-                return (c.general.coe_details & bit) != 0 ? 1 : 0;
-            };
-            text += fmt::format(
-                "          <CoE SdoInfo=\"{}\" PdoAssign=\"{}\" PdoConfig=\"{}\" "
-                "CompleteAccess=\"{}\"/>\n",
-                flag(ethercat::sii::coe_sdo_info), flag(ethercat::sii::coe_pdo_assign),
-                flag(ethercat::sii::coe_pdo_config), flag(ethercat::sii::coe_complete_access));
-        }
-        if ((c.protocols & ethercat::sii::foe) != 0) {
-            text += "          <FoE/>\n";
-        }
-        if ((c.protocols & ethercat::sii::soe) != 0) {
-            text += "          <SoE/>\n";
-        }
-        if ((c.protocols & ethercat::sii::voe) != 0) {
-            text += "          <VoE/>\n";
+        for (const ethercat::MailboxProtocol& protocol : ethercat::mailbox_protocols) {
+            if ((c.protocols & protocol.bit) == 0) continue;
+            std::string attributes;
+            if (protocol.type == ethercat::MailboxType::coe) {
+                attributes = coe_attributes(c.general.coe_details);
+            }
+            text += fmt::format("          <{}{}/>\n", protocol.name, attributes);
         }
         text += "        </Mailbox>\n";
     }

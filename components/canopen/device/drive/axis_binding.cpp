@@ -1,23 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "axis_binding.hpp"
 
-#include "drive_objects.hpp"
+#include "cia301/error_register.hpp"
+#include "cia402/drive/axis_objects.hpp"
 
 namespace hal::canopen::cia402 {
-
-namespace {
-
-/// Returns the bits of 1001h for an error code: those of its class.
-std::uint8_t register_bits(std::uint16_t code) noexcept {
-    switch (code >> 12) {
-    case 2: return error_current;
-    case 3: return error_voltage;
-    case 4: return error_temperature;
-    default: return code >> 8 == 0x81 ? error_communication : error_profile;
-    }
-}
-
-}  // namespace
 
 AxisBinding::AxisBinding(unsigned number, const AxisSettings& settings)
     : number_(number), axis_(settings) {
@@ -52,7 +39,8 @@ void AxisBinding::raise(std::uint16_t code, std::int32_t detail) noexcept {
     if (device_ == nullptr) return;
     Emcy::Bytes bytes{static_cast<std::uint8_t>(number_)};
     store(bytes.data() + 1, detail);
-    device_->emcy().raise(code, register_bits(code), bytes, static_cast<std::uint8_t>(number_ + 1));
+    device_->emcy().raise(code, cia301::register_bit_of(code), bytes,
+                          static_cast<std::uint8_t>(number_ + 1));
 }
 
 void AxisBinding::clear(std::uint16_t code) noexcept {

@@ -64,7 +64,7 @@ void Drive::set_load_torque(unsigned axis, double torque) noexcept {
 }
 void Drive::set_inputs(unsigned axis, std::uint32_t bits) noexcept {
     if (axis < axes_.size()) {
-        axes_[axis]->axis().set_inputs(bits);
+        axes_[axis]->axis().set_inputs(bits & 0xffff0000);
     }
 }
 void Drive::set_dc_link(unsigned axis, double volts) noexcept {

@@ -3,25 +3,12 @@
 #include <string>
 #include <type_traits>
 
+#include "cia402/drive/axis_objects.hpp"
 #include "drive.hpp"
-#include "drive_objects.hpp"
 
 namespace hal::canopen::cia402 {
 
 namespace {
-template <class T>
-constexpr Type type_for() noexcept {
-    constexpr bool sign = std::is_signed_v<T>;
-    static_assert(std::is_integral_v<T> && sizeof(T) <= 4);
-    if constexpr (sizeof(T) == 1) {
-        return sign ? Type::integer8 : Type::unsigned8;
-    } else if constexpr (sizeof(T) == 2) {
-        return sign ? Type::integer16 : Type::unsigned16;
-    } else {
-        return sign ? Type::integer32 : Type::unsigned32;
-    }
-}
-
 void add_axis(Description& d, unsigned axis, const AxisSettings& settings) {
     AxisValues objects(possible(settings));
     // A second axis needs names of its own.
@@ -35,7 +22,7 @@ void add_axis(Description& d, unsigned axis, const AxisSettings& settings) {
             }
             d.find(index, 0)->value[0] = row.sub;
         }
-        auto& entry = d.add(index, row.sub, type_for<T>(), row.access,
+        auto& entry = d.add(index, row.sub, cia301::type_for<T>(), row.access,
                             static_cast<std::uint64_t>(value), row.name + suffix);
         if (row.pdo == ObjectRow::sent) {
             entry.sent();

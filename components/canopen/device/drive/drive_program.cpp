@@ -1,41 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "drive_program.hpp"
 
-#include <charconv>
-#include <cmath>
-#include <limits>
-
 #include "cia402/error_words.hpp"
 
 namespace hal::canopen {
 
 namespace {
-
-struct MotorRow {
-    const char* name;
-    double cia402::MotorSettings::* value;
-    double least;
-};
-using Motor = cia402::MotorSettings;
-constexpr double anything = -std::numeric_limits<double>::max();
-constexpr MotorRow motor_rows[] = {
-    {"inertia", &Motor::inertia, 1e-9},
-    {"viscous-friction", &Motor::viscous_friction, 0},
-    {"coulomb-friction", &Motor::coulomb_friction, 0},
-    {"rated-torque", &Motor::rated_torque, 1e-6},
-    {"peak-torque", &Motor::peak_torque, 1e-6},
-    {"rated-current", &Motor::rated_current, 1e-6},
-    {"rated-voltage", &Motor::rated_voltage, 1e-3},
-    {"highest-speed", &Motor::highest_speed, 1e-3},
-    {"start", &Motor::start, anything},
-    {"negative-limit", &Motor::negative_limit, anything},
-    {"positive-limit", &Motor::positive_limit, anything},
-    {"negative-stop", &Motor::negative_stop, anything},
-    {"positive-stop", &Motor::positive_stop, anything},
-    {"home-from", &Motor::home_from, anything},
-    {"home-to", &Motor::home_to, anything},
-    {"brake-torque", &Motor::brake_torque, 0},
-};
 
 /// The axis in "NAME-3".
 bool axis_in(std::string_view text, std::string_view name, unsigned axes, unsigned& axis) {
@@ -47,41 +17,6 @@ bool axis_in(std::string_view text, std::string_view name, unsigned axes, unsign
 }
 
 }  // namespace
-
-bool set_motor(cia402::MotorSettings& motor, std::string_view name, double value) {
-    if (name == "resolution") {
-        if (!(value >= 1 && value <= 16'777'216 && value == std::floor(value))) return false;
-        motor.resolution = static_cast<std::uint32_t>(value);
-        return true;
-    }
-    if (name == "endless") return value != 0.0 ? (void)motor.endless() : void(), true;
-    for (const auto& row : motor_rows) {
-        if (name == row.name) return value >= row.least && (motor.*row.value = value, true);
-    }
-    return false;
-}
-
-std::string parse_motor(std::string_view text, cia402::MotorSettings& motor) {
-    while (!text.empty()) {
-        const auto part = text.substr(0, text.find(','));
-        text.remove_prefix(std::min(part.size() + 1, text.size()));
-        const auto sign = part.find_first_of(":=");
-        double value = 0;
-        const auto digits = sign == part.npos ? std::string_view{} : part.substr(sign + 1);
-        const auto [end, wrong] =
-            std::from_chars(digits.data(), digits.data() + digits.size(), value);
-        const bool number =
-            wrong == std::errc{} && !digits.empty() && end == digits.data() + digits.size();
-        if (number && set_motor(motor, part.substr(0, sign), value)) continue;
-        std::string names = "resolution, endless";
-        for (const auto& row : motor_rows) {
-            names += std::string(", ") + row.name;
-        }
-        return "invalid motor parameter '" + std::string(part) +
-               "'; write NAME:VALUE, as in inertia:1e-4; names: " + names;
-    }
-    return {};
-}
 
 DriveProgram::DriveProgram(const cia402::DriveSettings& settings) : settings_(settings) {
     if (settings_.vendor == 0) {

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "canopen/device/program.hpp"
+#include "cia402/drive/motor_options.hpp"
 #include "drive.hpp"
 
 namespace hal::canopen {
@@ -29,10 +30,6 @@ private:
     std::unique_ptr<cia402::Drive> drive_;
 };
 
-/// Sets a motor parameter by name, as in "inertia" and 1e-4. Returns false for an unknown name.
-/// [setup]
-bool set_motor(cia402::MotorSettings&, std::string_view name, double value);
-/// Parses "inertia:1e-4,resolution:8192"; empty is valid. Returns the problem, or "". [setup]
-std::string parse_motor(std::string_view text, cia402::MotorSettings&);
+using cia402::parse_motor;
 
 }  // namespace hal::canopen

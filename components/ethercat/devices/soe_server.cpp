@@ -1,12 +1,24 @@
 // SPDX-License-Identifier: MIT
-// SoE, AoE and VoE of the device with every protocol.
+#include "ethercat/devices/soe_server.hpp"
+
 #include <algorithm>
 #include <cstring>
 #include <utility>
 
-#include "ethercat/devices/mailbox_device.hpp"
-
 namespace hal::ethercat::devices {
+
+namespace {
+
+/// Returns the communication phase of SoE in a state: 2 to 4 of Sercos, from 0.
+unsigned phase_of(State state) noexcept {
+    switch (state) {
+    case State::op: return 2;
+    case State::safeop: return 1;
+    default: return 0;
+    }
+}
+
+}  // namespace
 
 Idn* SoeServer::find(std::uint16_t number) noexcept {
     for (auto& i : idns_) {
@@ -133,11 +145,11 @@ void SoeServer::write(const soe::Header& h, std::span<const std::uint8_t> data, 
         return refuse(h, h.elements == 0 ? soe::error::no_element : soe::error::name_read_only,
                       out);
     }
-    const unsigned phase = state == State::op ? 2 : state == State::safeop ? 1 : 0;
     if (idn->attribute.write_protected(0) && idn->attribute.write_protected(2)) {
         return refuse(h, soe::error::read_only, out);
     }
-    if (idn->attribute.write_protected(phase)) return refuse(h, soe::error::protected_now, out);
+    if (idn->attribute.write_protected(phase_of(state)))
+        return refuse(h, soe::error::protected_now, out);
     const std::size_t head = idn->attribute.list() ? 4 : 0;
     const std::size_t most =
         idn->attribute.list() ? head + idn->value.size() : idn->attribute.bytes();
@@ -162,70 +174,6 @@ void SoeServer::write(const soe::Header& h, std::span<const std::uint8_t> data, 
     answer.opcode = soe::Opcode::write_response;
     soe::write(out.payload(), answer);
     out.send(MailboxType::soe, soe::header_bytes);
-}
-
-void AoeServer::take(const MailboxMessage& message, State state, Outbox& out) noexcept {
-    const auto h = aoe::read(message.payload);
-    if (!h) {
-        return out.send(MailboxType::error,
-                        write_mailbox_error(out.payload(), MailboxError::too_short));
-    }
-    if (h->response()) return;
-    const auto data = message.payload.subspan(aoe::header_bytes, h->length);
-    std::uint8_t* to = out.payload() + aoe::header_bytes;
-    const auto respond = [&](std::size_t length, std::uint32_t error = 0) {
-        aoe::write(out.payload(), aoe::response_to(*h, static_cast<std::uint32_t>(length), error));
-        out.send(MailboxType::aoe, aoe::header_bytes + length);
-    };
-    const auto sdo = [&](auto&& work) {
-        if (data.size() < aoe::address_bytes) return respond(0, aoe::error::size);
-        if (get<std::uint32_t>(data.data()) != aoe::group_sdo) {
-            put(to, aoe::error::group);
-            return respond(4);
-        }
-        const auto offset = get<std::uint32_t>(data.data() + 4);
-        work(static_cast<std::uint16_t>(offset >> 16), static_cast<std::uint8_t>(offset),
-             (offset & 0x100) != 0, get<std::uint32_t>(data.data() + 8));
-    };
-    switch (h->command) {
-    case aoe::Command::read:
-        return sdo([&](std::uint16_t index, std::uint8_t sub, bool complete, std::uint32_t most) {
-            std::size_t n = 0;
-            const std::size_t space =
-                out.mailbox() - mailbox_header_bytes - aoe::header_bytes - aoe::read_response_bytes;
-            const std::span<std::uint8_t> space_for(to + aoe::read_response_bytes,
-                                                    std::min<std::size_t>(space, most));
-            const auto code = dictionary_->read(index, sub, complete, state, space_for, n);
-            put(to, code);
-            put(to + 4, static_cast<std::uint32_t>(n));
-            respond(aoe::read_response_bytes + n);
-        });
-    case aoe::Command::write:
-        return sdo([&](std::uint16_t index, std::uint8_t sub, bool complete, std::uint32_t length) {
-            if (length > data.size() - aoe::address_bytes) return respond(0, aoe::error::size);
-            put(to, dictionary_->write(index, sub, complete, state,
-                                       data.subspan(aoe::address_bytes, length)));
-            respond(aoe::write_response_bytes);
-        });
-    case aoe::Command::read_state:
-        put<std::uint32_t>(to, 0), put<std::uint16_t>(to + 4, 5),
-            put(to + 6, static_cast<std::uint16_t>(state));
-        return respond(8);
-    case aoe::Command::device_info:
-        std::memset(to, 0, 24);
-        to[4] = 1;
-        std::memcpy(to + 8, "mailbox_device", 14);
-        return respond(24);
-    default: return respond(0, aoe::error::unknown_command);
-    }
-}
-
-void VoeEcho::take(const MailboxMessage& message, State, Outbox& out) noexcept {
-    const std::size_t n = std::min(message.payload.size(), out.mailbox() - mailbox_header_bytes);
-    if (n != 0) {
-        std::memcpy(out.payload(), message.payload.data(), n);
-    }
-    out.send(MailboxType::voe, n);
 }
 
 }  // namespace hal::ethercat::devices

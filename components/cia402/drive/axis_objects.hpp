@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: MIT
-// The objects of one axis in the dictionary of a CANopen drive: each is declared once; description
-// and binding come from the list below, the first values from `cia402/drive/axis_values.hpp`.
+// The objects of one axis: each is declared once; the dictionary of a drive on any bus and its
+// binding come from the list below, the first values from `axis_values.hpp`.
 #pragma once
 
 #include <cstdint>
 #include <limits>
 
-#include "canopen/protocol/numbers.hpp"
+#include "cia301/types.hpp"
 #include "cia402/drive/axis_values.hpp"
 
 namespace hal::canopen::cia402 {
+
+using cia301::Access;
 
 /// Properties of an object besides its value.
 struct ObjectRow {
@@ -202,5 +204,8 @@ void each_object(AxisValues& o, F&& f) {
     f(ObjectRow{supported_modes, 0, ro, no, "Supported drive modes"}, o.supported_modes);
     f(ObjectRow{drive_type, 0, ro, no, "Single device type"}, o.type);
 }
+
+/// Returns the name of an object with sub-indices; "" for others. [setup]
+const char* name_of_record(std::uint16_t index) noexcept;
 
 }  // namespace hal::canopen::cia402

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
-// SDO information: lists of objects, descriptions of objects and entries (ETG.1000.6, clause
-// 5.6.3).
+#include "ethercat/master/object_information.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cstring>
-
-#include "ethercat/master/coe_client.hpp"
+#include <utility>
 
 namespace hal::ethercat::master {
 namespace {
@@ -46,10 +45,10 @@ bool accepts_next_fragment(const Expected& expected,
 
 // Joins the fragments of a response: the first `head.size()` bytes of the first one to `head`, all
 // others to `to`.
-Task<MailboxResult> CoeClient::information(Channel& channel, BusSlave& slave,
-                                           coe::Information request, std::uint32_t what,
-                                           std::size_t what_bytes, std::span<std::uint8_t> head,
-                                           std::span<std::uint8_t> to) noexcept {
+Task<MailboxResult> ObjectInformation::fetch(Channel& channel, BusSlave& slave,
+                                             coe::Information request, std::uint32_t what,
+                                             std::size_t what_bytes, std::span<std::uint8_t> head,
+                                             std::span<std::uint8_t> to) noexcept {
     SlaveMailbox* mailbox = mailboxes_.find(slave);
     if (mailbox == nullptr) co_return refused();
     SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
@@ -63,14 +62,14 @@ Task<MailboxResult> CoeClient::information(Channel& channel, BusSlave& slave,
 
     // Each fragment announces how many follow, which distinguishes a duplicate from the next one.
     const auto response = static_cast<coe::Information>(static_cast<unsigned>(request) + 1);
+    const std::int64_t timeout = SlaveMailbox::response_timeout_ns(slave);
     std::size_t used = 0;
     bool first = true;
     Expected expected{accepts_first_fragment, static_cast<std::uint32_t>(response), what,
                       static_cast<std::uint32_t>(what_bytes)};
     bool overflow = false;
     for (;;) {
-        result = co_await mailbox->wait_for(channel, slave, MailboxType::coe,
-                                            SlaveMailbox::response_timeout_ns(slave), expected);
+        result = co_await mailbox->wait_for(channel, slave, MailboxType::coe, timeout, expected);
         if (!result) co_return result;
         const auto payload = mailbox->reply().payload;
         const auto header = *coe::read_information(payload);
@@ -101,22 +100,21 @@ Task<MailboxResult> CoeClient::information(Channel& channel, BusSlave& slave,
     co_return succeeded(used);
 }
 
-Task<MailboxResult> CoeClient::list(Channel& channel, BusSlave& slave, coe::List which,
-                                    std::span<std::uint8_t> to) noexcept {
+Task<MailboxResult> ObjectInformation::list(Channel& channel, BusSlave& slave, coe::List which,
+                                            std::span<std::uint8_t> to) noexcept {
     std::array<std::uint8_t, 2> head{};  // the type; following fragments have none
-    const MailboxResult result =
-        co_await information(channel, slave, coe::Information::list_request,
-                             static_cast<std::uint16_t>(which), 2, head, to);
+    const MailboxResult result = co_await fetch(channel, slave, coe::Information::list_request,
+                                                static_cast<std::uint16_t>(which), 2, head, to);
     co_return result;
 }
 
-Task<MailboxResult> CoeClient::object(Channel& channel, BusSlave& slave, std::uint16_t index,
-                                      ObjectDescription& description,
-                                      std::span<char> name) noexcept {
+Task<MailboxResult> ObjectInformation::object(Channel& channel, BusSlave& slave,
+                                              std::uint16_t index, ObjectDescription& description,
+                                              std::span<char> name) noexcept {
     std::array<std::uint8_t, 6> head{};
     const std::span<std::uint8_t> to{reinterpret_cast<std::uint8_t*>(name.data()), name.size()};
     const MailboxResult result =
-        co_await information(channel, slave, coe::Information::object_request, index, 2, head, to);
+        co_await fetch(channel, slave, coe::Information::object_request, index, 2, head, to);
     if (result) {
         description.type = get<std::uint16_t>(head.data() + 2);
         description.largest_sub = head[4];
@@ -127,15 +125,15 @@ Task<MailboxResult> CoeClient::object(Channel& channel, BusSlave& slave, std::ui
     co_return result;
 }
 
-Task<MailboxResult> CoeClient::entry(Channel& channel, BusSlave& slave, std::uint16_t index,
-                                     std::uint8_t sub, EntryDescription& description,
-                                     std::span<char> name) noexcept {
+Task<MailboxResult> ObjectInformation::entry(Channel& channel, BusSlave& slave, std::uint16_t index,
+                                             std::uint8_t sub, EntryDescription& description,
+                                             std::span<char> name) noexcept {
     std::array<std::uint8_t, 10> head{};
     const std::span<std::uint8_t> to{reinterpret_cast<std::uint8_t*>(name.data()), name.size()};
     // value information 0: only the name
     const std::uint32_t what = index | static_cast<std::uint32_t>(sub) << 16;
     const MailboxResult result =
-        co_await information(channel, slave, coe::Information::entry_request, what, 4, head, to);
+        co_await fetch(channel, slave, coe::Information::entry_request, what, 4, head, to);
     if (result) {
         description.type = get<std::uint16_t>(head.data() + 4);
 
