@@ -88,8 +88,8 @@ std::optional<Address> Nodes::where(std::uint32_t id, bool produced_to_master) c
     const std::uint32_t code = id & 0x780;
     const std::uint32_t node = id & 0x7f;
     if (node == 0 || id > 0x7ff) return std::nullopt;
-    const auto of = [](const std::atomic<std::uint64_t>& node) -> std::optional<Address> {
-        const auto is = node.load(std::memory_order_relaxed);
+    const auto of = [](const std::atomic<std::uint64_t>& entry) -> std::optional<Address> {
+        const auto is = entry.load(std::memory_order_relaxed);
         if ((is & known) == 0 || (is & doubtful) != 0) return std::nullopt;
         return address(is & address_bits);
     };
