@@ -485,7 +485,7 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem,
         double time_s = 0;
         cut = file.eof();  // the line has no line end
         if (cut && words.size() < names.size()) {
-            to.missing = place + "the line is cut off; ";
+            to.missing = location + "the line is cut off; ";
             break;
         }
         if (words.size() != names.size() || !number_of(words[0], time_s) ||
@@ -503,7 +503,7 @@ bool load_csv(const std::string& path, Recording& to, std::string& problem,
                 continue;
             }
             if (cut && i + 1 == words.size()) {
-                to.missing = place + "the line is cut off; ";
+                to.missing = location + "the line is cut off; ";
                 break;
             }
             const auto word = std::find_if(std::begin(type_words), std::end(type_words),
