@@ -13,7 +13,11 @@ write_basic_package_version_file("${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cma
 set(HALCYON_PACKAGE_FILES cmake/HalcyonConfig.cmake cmake/HalcyonComponent.cmake cmake/HalcyonTest.cmake cmake/plugin.map)
 install(FILES ${HALCYON_PACKAGE_FILES} "${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cmake" DESTINATION "${HALCYON_PACKAGE_DIR}")
 
-add_dependencies(installed halcyon_text halcyon_link halcyon_cia301 halcyon_cia402 halcyon_can_timing halcyon_bus_config halcyon_canopen halcyon_tdma halcyon_scocan)
+foreach(library IN ITEMS text link cia301 cia402 can_timing bus_config canopen tdma scocan)
+    if(TARGET halcyon_${library})
+        add_dependencies(installed halcyon_${library})
+    endif()
+endforeach()
 
 # Pages, and the machines to start from, in the order of the tree, so that links between them are right.
 install(FILES LICENSE README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
@@ -23,7 +27,11 @@ install(DIRECTORY components drivers runtime tests tools DESTINATION "${CMAKE_IN
 install(DIRECTORY tests/netlists/semantics DESTINATION "${CMAKE_INSTALL_DOCDIR}/tests/netlists")
 
 set(package "${PROJECT_BINARY_DIR}/lib/cmake/Halcyon")
-export(TARGETS halcyon_abi halcyon_sdk halcyon_text halcyon_link halcyon_cia301 halcyon_cia402 halcyon_can_timing halcyon_bus_config halcyon_canopen NAMESPACE Halcyon:: FILE "${package}/HalcyonTargets.cmake")
+set(exported halcyon_abi halcyon_sdk halcyon_text halcyon_link halcyon_cia301 halcyon_cia402 halcyon_can_timing halcyon_bus_config)
+if(TARGET halcyon_canopen)
+    list(APPEND exported halcyon_canopen)
+endif()
+export(TARGETS ${exported} NAMESPACE Halcyon:: FILE "${package}/HalcyonTargets.cmake")
 foreach(file IN LISTS HALCYON_PACKAGE_FILES ITEMS "${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cmake")
     cmake_path(GET file FILENAME name)
     configure_file("${file}" "${package}/${name}" COPYONLY)

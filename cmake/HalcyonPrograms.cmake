@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: MIT
 # liblinuxcnchal.so.0, by which LinuxCNC's programs connect to a machine; see runtime/linuxcnc/programs/README.md. It is in a folder of its own, which only
 # started programs search: outside of that it must not stand in the way of LinuxCNC's library of the same name.
+if(NOT HALCYON_PACKAGE_LINUXCNC)
+    return()
+endif()
 set(source "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/source/linuxcnc")
 set(map "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/programs/exports.map")
 file(GLOB sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/programs/*.c" "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/programs/*.cpp")

@@ -9,29 +9,31 @@
 #include <optional>
 #include <type_traits>
 
-#include "bus/can/dcf.hpp"
-#include "bus/can/drive.hpp"
+#include "base/tree_packages.hpp"
 #include "bus/can/dump.hpp"
-#include "bus/can/eds_check.hpp"
-#include "bus/can/flash.hpp"
-#include "bus/can/gateway.hpp"
 #include "bus/can/load.hpp"
-#include "bus/can/lss.hpp"
-#include "bus/can/nodes.hpp"
-#include "bus/can/pdo.hpp"
-#include "bus/can/plan.hpp"
-#include "bus/can/produce.hpp"
-#include "bus/can/read_all.hpp"
 #include "bus/can/record.hpp"
-#include "bus/can/scan.hpp"
-#include "bus/can/scocan.hpp"
-#include "bus/can/sdo_command.hpp"
 #include "bus/can/send.hpp"
 #include "bus/can/sniff.hpp"
-#include "bus/can/tdma.hpp"
+#include "bus/canopen/dcf.hpp"
+#include "bus/canopen/drive.hpp"
+#include "bus/canopen/eds_check.hpp"
+#include "bus/canopen/flash.hpp"
+#include "bus/canopen/gateway.hpp"
+#include "bus/canopen/lss.hpp"
+#include "bus/canopen/nmt.hpp"
+#include "bus/canopen/nodes.hpp"
+#include "bus/canopen/pdo.hpp"
+#include "bus/canopen/plan.hpp"
+#include "bus/canopen/produce.hpp"
+#include "bus/canopen/read_all.hpp"
+#include "bus/canopen/scan.hpp"
+#include "bus/canopen/sdo_command.hpp"
+#include "bus/ethercat/ethercat_line.hpp"
 #include "bus/ethercat/options.hpp"
-#include "bus/node/ethercat_line.hpp"
 #include "bus/node/kinds.hpp"
+#include "bus/scocan/plan.hpp"
+#include "bus/tdma/plan.hpp"
 #include "cli/option_set.hpp"
 #include "cli/other_program.hpp"
 #include "cli/output.hpp"
@@ -82,6 +84,13 @@ struct Subcommand {
     bool verbatim;
     /// whether these options need hal-tools, although `hal` has the command
     bool (*needs_tools)(const Options&) = nullptr;
+    const char* package = "";  ///< of the tree; empty: the core
+
+    /// The package, where this build leaves it out; else nullptr.
+    const TreePackage* missing_package() const {
+        const TreePackage* const found = find_tree_package(package);
+        return found && !found->built() ? found : nullptr;
+    }
 };
 
 /// Makes a row. `Where` is an In, whose function takes the command's own options, O.
@@ -89,7 +98,8 @@ template <class O, class Where>
 constexpr Subcommand command(const char* name, const char* usage, const char* summary,
                              bool verbatim = false) {
     const auto make = []() -> std::unique_ptr<Options> { return std::make_unique<O>(); };
-    Subcommand row{name, usage, summary, make, Where::part, nullptr, verbatim, nullptr};
+    Subcommand row{name,    usage,    summary, make,          Where::part,
+                   nullptr, verbatim, nullptr, Where::package};
     if constexpr (!std::is_null_pointer_v<std::remove_const_t<decltype(Where::run)>>) {
         row.run = [](const Options& options) { return Where::run(static_cast<const O&>(options)); };
     }
@@ -119,7 +129,7 @@ constexpr Subcommand table[] = {
                                                     "list the machines to start from, or run one",
                                                     true),
     sim_command(),
-    command<LinuxcncOptions, IN_TOOLS(run_linuxcnc)>(
+    command<LinuxcncOptions, OF_LINUXCNC(run_linuxcnc)>(
         "linuxcnc", "FILE.ini [-- ARG…]",
         "run a LinuxCNC configuration: its netlists, task, I/O and display, until the display "
         "ends"),
@@ -165,7 +175,7 @@ constexpr Subcommand table[] = {
         "replay a recording with its original timing"),
     command<BusLoadOptions, ON_BUS(run_can_load)>("can load", "ADDRESS [--for TIME]",
                                                   "measure the bus load per identifier"),
-    command<NodesOptions, ON_BUS(run_can_nodes)>(
+    command<NodesOptions, OF_CANOPEN(run_can_nodes)>(
         "can nodes", "ADDRESS [--for TIME] [--json]",
         "list the live nodes by listening: state, heartbeat age, last emergencies"),
     command<SniffOptions, ON_BUS(run_can_sniff)>(
@@ -174,145 +184,143 @@ constexpr Subcommand table[] = {
     command<GenerateOptions, ON_BUS(run_can_generate)>(
         "can generate", "ADDRESS [--every TIME] [--id ID[-ID]] [--count N]",
         "send random or counting frames"),
-    command<ProduceOptions, ON_BUS(run_can_produce)>(
+    command<ProduceOptions, OF_CANOPEN(run_can_produce)>(
         "can produce", "ADDRESS heartbeat NODE|sync|guarding NODE [--every TIME]",
         "send a heartbeat, SYNC or guarding requests periodically"),
-    command<FlashOptions, ON_BUS(run_can_flash)>(
+    command<FlashOptions, OF_CANOPEN(run_can_flash)>(
         "can flash", "ADDRESS NODE IMAGE [--program N]",
         "download a program to a node: stop, erase, download, start"),
-    command<NmtOptions, ON_BUS(run_can_nmt)>("can nmt",
+    command<NmtOptions, OF_CANOPEN(run_can_nmt)>("can nmt",
                                              "ADDRESS start|stop|preop|reset|reset-comm NODE|all",
                                              "send an NMT command to CANopen nodes"),
-    command<ScanOptions, ON_BUS(run_can_scan)>(
+    command<ScanOptions, OF_CANOPEN(run_can_scan)>(
         "can scan", "ADDRESS [--for TIME] [--json]",
         "scan a bus for CANopen nodes: state, device type, identity"),
-    command<SdoReadOptions, ON_BUS(run_can_sdo_read)>(
+    command<SdoReadOptions, OF_CANOPEN(run_can_sdo_read)>(
         "can sdo read", "ADDRESS NODE OBJECT… [--eds FILE] [--type TYPE] [-o FILE] [--json]",
         "read objects of a node"),
-    command<SdoWriteOptions, ON_BUS(run_can_sdo_write)>(
+    command<SdoWriteOptions, OF_CANOPEN(run_can_sdo_write)>(
         "can sdo write", "ADDRESS NODE OBJECT VALUE|--from FILE [--eds FILE] [--type TYPE]",
         "write an object of a node"),
-    command<ReadAllOptions, ON_BUS(run_can_read_all)>(
+    command<ReadAllOptions, OF_CANOPEN(run_can_read_all)>(
         "can read-all", "ADDRESS NODE --eds FILE [-o FILE.csv] [--json]",
         "read all objects of a node that its EDS lists, including read-only objects"),
-    command<DcfReadOptions, ON_BUS(run_can_dcf_read)>("can dcf read",
+    command<DcfReadOptions, OF_CANOPEN(run_can_dcf_read)>("can dcf read",
                                                       "ADDRESS NODE --eds FILE [-o FILE]",
                                                       "read the settings of a node into a DCF"),
-    command<DcfWriteOptions, ON_BUS(run_can_dcf_write)>(
+    command<DcfWriteOptions, OF_CANOPEN(run_can_dcf_write)>(
         "can dcf write", "ADDRESS NODE FILE [--check]",
         "write the settings of a DCF to a node: only differences, verified"),
-    command<PdoShowOptions, ON_BUS(run_can_pdo_show)>("can pdo show",
+    command<PdoShowOptions, OF_CANOPEN(run_can_pdo_show)>("can pdo show",
                                                       "ADDRESS NODE [--eds FILE] [--json]",
                                                       "show the PDOs of a node and their mapping"),
-    command<PdoMapOptions, ON_BUS(run_can_pdo_map)>(
+    command<PdoMapOptions, OF_CANOPEN(run_can_pdo_map)>(
         "can pdo map",
         "ADDRESS NODE PDO [OBJECT[/BITS]…] [--transmission N] [--id ID] [--inhibit TIME] [--event "
         "TIME]",
         "configure a PDO in the order of CiA 301"),
-    command<PdoSwitchOptions, ON_BUS(run_can_pdo_enable)>("can pdo enable", "ADDRESS NODE PDO",
+    command<PdoSwitchOptions, OF_CANOPEN(run_can_pdo_enable)>("can pdo enable", "ADDRESS NODE PDO",
                                                           "enable a PDO"),
-    command<PdoSwitchOptions, ON_BUS(run_can_pdo_disable)>("can pdo disable", "ADDRESS NODE PDO",
+    command<PdoSwitchOptions, OF_CANOPEN(run_can_pdo_disable)>("can pdo disable", "ADDRESS NODE PDO",
                                                            "disable a PDO"),
-    command<PdoWatchOptions, ON_BUS(run_can_pdo_watch)>(
+    command<PdoWatchOptions, OF_CANOPEN(run_can_pdo_watch)>(
         "can pdo watch", "ADDRESS NODE [--eds FILE] [--for TIME] [--count N] [--json]",
         "print the values in the PDOs of a node as they are sent"),
-    command<LssOptions, ON_BUS(run_can_lss)>(
+    command<LssOptions, OF_CANOPEN(run_can_lss)>(
         "can lss", "ADDRESS COMMAND [ARG…]",
         "LSS, node IDs and bit rates: scan, switch, select, inquire, node-id, bit-rate, activate, "
         "store, identify"),
-    command<GatewayOptions, ON_BUS(run_can_gateway)>(
+    command<GatewayOptions, OF_CANOPEN(run_can_gateway)>(
         "can gateway",
         "ADDRESS… [--socket PATH|--listen 127.0.0.1:PORT] [--state FILE] | --connect "
         "HOST:PORT|PATH [COMMAND…]",
         "run a CiA 309-3 gateway, controlled by lines of text, or its client"),
-    command<DriveOptions, ON_BUS(run_can_drive)>(
+    command<DriveOptions, OF_CANOPEN(run_can_drive)>(
         "can drive", "ADDRESS --node N [[AXIS] COMMAND [ARG…]]",
         "operate a drive: on, off, go, speed, stop, home, …, or an interactive shell", true),
-    command<EdsCheckOptions, ON_BUS(run_can_eds_check)>(
+    command<EdsCheckOptions, OF_CANOPEN(run_can_eds_check)>(
         "can eds check", "FILE…", "check a device description and summarise it"),
-    command<CanopenCheckOptions, ON_BUS(run_canopen_check)>(
+    command<CanopenCheckOptions, OF_CANOPEN(run_canopen_check)>(
         "canopen check", "FILE…", "check a network configuration and list its pins"),
-    command<CanopenPlanOptions, ON_BUS(run_canopen_plan)>(
+    command<CanopenPlanOptions, OF_CANOPEN(run_canopen_plan)>(
         "canopen plan", "FILE [--cycle TIME] [--json]",
         "compute worst-case response times of all messages of a bus"),
-#ifdef HALCYON_ETHERCAT
-    command<EthercatOptions, ON_BUS(run_ethercat_scan)>(
+    command<EthercatOptions, OF_ETHERCAT(run_ethercat_scan)>(
         "ethercat scan", "ADDRESS|--emulate LINE [--json]",
         "show the slaves of an EtherCAT bus as a tree: states, names, ports, delays"),
-    command<EthercatOptions, ON_BUS(run_ethercat_slaves)>(
+    command<EthercatOptions, OF_ETHERCAT(run_ethercat_slaves)>(
         "ethercat slaves", "ADDRESS|--emulate LINE [--json]",
         "list the slaves: position, alias, state, name"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_states)>(
+    command<EthercatPositionOptions, OF_ETHERCAT(run_ethercat_states)>(
         "ethercat states", "ADDRESS|--emulate LINE [-p N] [STATE] [--json]",
         "print the states of the slaves with the cause of an error, or request a state"),
-    command<EthercatOptions, ON_BUS(run_ethercat_crc)>(
+    command<EthercatOptions, OF_ETHERCAT(run_ethercat_crc)>(
         "ethercat crc", "ADDRESS|--emulate LINE [--json]",
         "print the error counters of all ports and name the faulty cable"),
-    command<EthercatValueOptions, ON_BUS(run_ethercat_upload)>(
+    command<EthercatValueOptions, OF_ETHERCAT(run_ethercat_upload)>(
         "ethercat upload", "ADDRESS|--emulate LINE [-p N] INDEX SUB [--type TYPE] [--json]",
         "read an object of a slave"),
-    command<EthercatValueOptions, ON_BUS(run_ethercat_download)>(
+    command<EthercatValueOptions, OF_ETHERCAT(run_ethercat_download)>(
         "ethercat download", "ADDRESS|--emulate LINE [-p N] INDEX SUB VALUE [--type TYPE] [--json]",
         "write an object of a slave"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_reg_read)>(
+    command<EthercatPositionOptions, OF_ETHERCAT(run_ethercat_reg_read)>(
         "ethercat reg-read", "ADDRESS|--emulate LINE [-p N] REGISTER [BYTES] [--json]",
         "read registers of a slave"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_reg_write)>(
+    command<EthercatPositionOptions, OF_ETHERCAT(run_ethercat_reg_write)>(
         "ethercat reg-write", "ADDRESS|--emulate LINE [-p N] REGISTER BYTE… [--json]",
         "write registers of a slave"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_sii_read)>(
+    command<EthercatPositionOptions, OF_ETHERCAT(run_ethercat_sii_read)>(
         "ethercat sii-read", "ADDRESS|--emulate LINE [-p N] [--json] > FILE",
         "read the EEPROM of a slave (SII)"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_sii_write)>(
+    command<EthercatPositionOptions, OF_ETHERCAT(run_ethercat_sii_write)>(
         "ethercat sii-write", "ADDRESS|--emulate LINE [-p N] FILE [--json]",
         "write the EEPROM of a slave (SII)"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_alias)>(
+    command<EthercatPositionOptions, OF_ETHERCAT(run_ethercat_alias)>(
         "ethercat alias", "ADDRESS|--emulate LINE [-p N] ALIAS [--json]",
         "write the alias of a slave to its EEPROM"),
-    command<EthercatOptions, ON_BUS(run_ethercat_pdos)>(
+    command<EthercatOptions, OF_ETHERCAT(run_ethercat_pdos)>(
         "ethercat pdos", "ADDRESS|--emulate LINE [--json]",
         "list the process data of the slaves, as their EEPROMs have it"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_sdos)>(
+    command<EthercatPositionOptions, OF_ETHERCAT(run_ethercat_sdos)>(
         "ethercat sdos", "ADDRESS|--emulate LINE [-p N] [--json]",
         "list the object dictionary of a slave"),
-    command<EthercatFileOptions, ON_BUS(run_ethercat_foe_read)>(
+    command<EthercatFileOptions, OF_ETHERCAT(run_ethercat_foe_read)>(
         "ethercat foe-read",
         "ADDRESS|--emulate LINE [-p N] NAME [--boot] [--password N] [--json] > FILE",
         "read a file of a slave in PRE-OP or BOOT"),
-    command<EthercatFileOptions, ON_BUS(run_ethercat_foe_write)>(
+    command<EthercatFileOptions, OF_ETHERCAT(run_ethercat_foe_write)>(
         "ethercat foe-write",
         "ADDRESS|--emulate LINE [-p N] FILE [NAME] [--boot] [--password N] [--json]",
         "write a file to a slave in PRE-OP, or its firmware in BOOT"),
-    command<EthercatConfigOptions, ON_BUS(run_ethercat_config)>(
+    command<EthercatConfigOptions, OF_ETHERCAT(run_ethercat_config)>(
         "ethercat config", "ADDRESS|--emulate LINE|--esi LIST NAME [--json]",
         "write NAME.ethercat and a netlist to start from for the slaves of a bus, or for "
         "descriptions"),
-    command<EthercatPositionOptions, ON_BUS(run_ethercat_xml)>(
+    command<EthercatPositionOptions, OF_ETHERCAT(run_ethercat_xml)>(
         "ethercat xml", "ADDRESS|--emulate LINE [-p N] [--json] > FILE",
         "print a device description (ESI) of a slave from its EEPROM"),
-    command<EthercatOptions, ON_BUS(run_ethercat_graph)>("ethercat graph",
+    command<EthercatOptions, OF_ETHERCAT(run_ethercat_graph)>("ethercat graph",
                                                          "ADDRESS|--emulate LINE [--json] > FILE",
                                                          "draw the topology of a bus as SVG"),
-    command<EthercatOptions, ON_BUS(run_ethercat_dc)>(
+    command<EthercatOptions, OF_ETHERCAT(run_ethercat_dc)>(
         "ethercat dc", "ADDRESS|--emulate LINE [--json]",
         "print the deviations of the clocks of the slaves"),
-    command<EthercatDumpOptions, ON_BUS(run_ethercat_dump)>(
+    command<EthercatDumpOptions, OF_ETHERCAT(run_ethercat_dump)>(
         "ethercat dump", "ADDRESS|FILE [--filter WORD] [--for TIME] [--count N] [--json]",
         "print the datagrams of a bus or of a capture in words"),
-    command<EthercatCheckOptions, ON_BUS(run_ethercat_check)>(
+    command<EthercatCheckOptions, OF_ETHERCAT(run_ethercat_check)>(
         "ethercat check", "FILE… [--json]", "check the configuration of a bus and list its pins"),
-    command<EthercatPlanOptions, ON_BUS(run_ethercat_plan)>(
+    command<EthercatPlanOptions, OF_ETHERCAT(run_ethercat_plan)>(
         "ethercat plan", "FILE [--json]",
         "compute frames, wire time, cycle time and latency of a bus"),
-    command<EthercatLcecOptions, ON_BUS(run_ethercat_lcec_conf)>(
+    command<EthercatLcecOptions, OF_ETHERCAT(run_ethercat_lcec_conf)>(
         "ethercat lcec-conf", "FILE [--name NAME]",
         "check the configuration of the component lcec, for loadusr (lcec_conf)"),
-#endif
-    command<ScocanPlanOptions, ON_BUS(run_scocan_plan)>(
+    command<ScocanPlanOptions, OF_SCOCAN(run_scocan_plan)>(
         "scocan plan", "FILE [--mode MODE] [--json | --svg FILE]",
         "print the slots of a CAN bus as a timeline, its load and the worst-case latency of each "
         "message"),
-    command<TdmaPlanOptions, ON_BUS(run_tdma_plan)>(
+    command<TdmaPlanOptions, OF_TDMA(run_tdma_plan)>(
         "tdma plan", "FILE [--json | --svg FILE]",
         "print the slots of an Ethernet segment as a timeline, its load and its input-to-output "
         "latency"),
@@ -322,34 +330,34 @@ constexpr Subcommand table[] = {
     command<TdmaPingOptions, IN_TOOLS(run_tdma_ping)>(
         "tdma ping", "STATION [-c COUNT] [--from COMPONENT] [--name NAME]",
         "measure the round-trip time to a station of a segment"),
-    command<DriveNodeOptions, ON_BUS(run_node_drive)>(
+    command<DriveNodeOptions, OF_CANOPEN(run_node_drive)>(
         "node drive",
         "--link ADDRESS --id N [--axes N] [--motor NAME:VALUE] [--fault FAULT] | --eds",
         "simulate a CiA 402 drive with up to eight axes"),
-    command<IoNodeOptions, ON_BUS(run_node_io)>(
+    command<IoNodeOptions, OF_CANOPEN(run_node_io)>(
         "node io", "--link ADDRESS --id N [--inputs N] [--outputs N] [--fault FAULT] | --eds",
         "simulate a CiA 401 I/O node"),
-    command<AxisIoNodeOptions, ON_BUS(run_node_axis_io)>(
+    command<AxisIoNodeOptions, OF_CANOPEN(run_node_axis_io)>(
         "node axis-io",
         "--link ADDRESS --id N [--plant axis|furuta] [--tdma FILE] [--skew PPM] [--fault FAULT] | "
         "--eds",
         "simulate an axis whose control loop is closed over the bus"),
-    command<NodeOptions, ON_BUS(run_node_safe_io)>(
+    command<NodeOptions, OF_CANOPEN(run_node_safe_io)>(
         "node safe-io", "--link ADDRESS --id N [--fault FAULT] | --eds",
         "simulate an EN 50325-5 safety I/O node (for experiments only)"),
-    command<Jr3NodeOptions, ON_BUS(run_node_jr3)>(
+    command<Jr3NodeOptions, OF_CANOPEN(run_node_jr3)>(
         "node jr3",
         "--link ADDRESS [--id N] [--stream FILE] [--fault FAULT] | --record FILE --for TIME | "
         "--eds",
         "simulate a force/torque node with a JR3 sensor"),
-    command<BootloaderNodeOptions, ON_BUS(run_node_bootloader)>(
+    command<BootloaderNodeOptions, OF_CANOPEN(run_node_bootloader)>(
         "node bootloader",
         "--link ADDRESS --id N [--flash FILE] [--fault FAULT] | --make-image VERSION | --eds",
         "simulate a device with a boot loader"),
-    command<EthercatLineOptions, ON_BUS(run_node_ethercat)>(
+    command<EthercatLineOptions, OF_ETHERCAT(run_node_ethercat)>(
         "node ethercat", "FILE --link ADDRESS [--backup ADDRESS] [--for TIME]",
         "emulate a line of EtherCAT slaves on a network interface"),
-    command<Options, ON_BUS(run_node_faults)>("node faults", "",
+    command<Options, OF_CANOPEN(run_node_faults)>("node faults", "",
                                               "list the faults that simulated devices can inject"),
     command<TopOptions, IN_TOOLS(run_top)>(
         "top", "", "show all instances on this machine and the network, their threads and faults"),
@@ -366,7 +374,7 @@ constexpr Subcommand table[] = {
     command<TraceOptions, IN_TOOLS(run_trace)>(
         "trace", "FILE [--for TIME] [--on-overrun|--on-fault [--keep TIME]] [--sched]",
         "record what the threads of a running instance run, as a Perfetto timeline"),
-    command<PanelOptions, ON_PANEL(run_panel)>(
+    command<PanelOptions, OF_PANEL(run_panel)>(
         "panel", "[FILE] [--write] [--listen ADDRESS]",
         "show a running machine in a web browser: values, graph, scope, user panels"),
     command<DoctorOptions, IN_TOOLS(run_doctor)>("doctor", "",
@@ -384,9 +392,7 @@ struct Group {
 constexpr Group groups[] = {
     {"can", "CAN bus tools"},
     {"canopen", "tools for the configuration of a CANopen network"},
-#ifdef HALCYON_ETHERCAT
     {"ethercat", "EtherCAT bus tools"},
-#endif
     {"scocan", "time slots of a CAN bus"},
     {"tdma", "time slots of an Ethernet segment"},
     {"node",
@@ -400,8 +406,22 @@ const Group* find_group(std::string_view name) {
     return group == std::end(groups) ? nullptr : group;
 }
 
+/// Whether the command is in a group, and this build has it.
 bool belongs(const Subcommand& row, const Group& group) {
-    return std::string_view(row.name).starts_with(std::string(group.name) + " ");
+    return !row.missing_package() &&
+           std::string_view(row.name).starts_with(std::string(group.name) + " ");
+}
+
+/// The package of a group without commands, because this build leaves it out; else nullptr.
+const TreePackage* missing_package(const Group& group) {
+    const TreePackage* missing = nullptr;
+    for (const Subcommand& row : table) {
+        if (belongs(row, group)) return nullptr;
+        if (std::string_view(row.name).starts_with(std::string(group.name) + " ")) {
+            missing = row.missing_package();
+        }
+    }
+    return missing;
 }
 
 /// The purpose, and the second words of the commands: `time slots of a CAN bus: plan`.
@@ -443,6 +463,7 @@ std::string overview() {
         "COMMAND …\n\n";
     const Group* last = nullptr;
     for (const Subcommand& row : table) {
+        if (row.missing_package()) continue;
         const std::string_view name(row.name);
         const Group* group = find_group(name.substr(0, name.find(' ')));
         if (group == nullptr) {
@@ -509,7 +530,9 @@ int no_such_command(const std::vector<std::string>& typed) {
         }
     } else {
         for (const Subcommand& row : table) {
-            names.emplace_back(row.name);
+            if (!row.missing_package()) {
+                names.emplace_back(row.name);
+            }
         }
         for (const Group& g : groups) {
             names.emplace_back(g.name);
@@ -520,10 +543,66 @@ int no_such_command(const std::vector<std::string>& typed) {
                                      hint.empty() ? "type: " + where : hint));
 }
 
+/// Reports that a command is in a package that this build leaves out.
+int refuse(const char* command, const TreePackage& package) {
+    Options options;
+    options.program = fmt::format("hal {}", command);
+    return fail(options, package.problem());
+}
+
+std::string version_text() {
+    std::string built;
+    std::string left_out;
+    for (const TreePackage& p : tree_packages) {
+        std::string& list = p.built() ? built : left_out;
+        list += fmt::format("{}{}", list.empty() ? "" : ", ", p.name);
+        if (p.state == PackageState::switched_off) {
+            list += fmt::format(" ({}=OFF)", package_switch(p.name));
+        } else if (!p.built()) {
+            list += fmt::format(" (needs {})", p.needs);
+        }
+    }
+    std::string text = fmt::format("hal {} (commit {})\npackages: {}\n", paths::version,
+                                   paths::commit, built.empty() ? "none, the core alone" : built);
+    if (!left_out.empty()) {
+        text += fmt::format("left out: {}\n", left_out);
+    }
+    return text;
+}
+
+std::string version_json() {
+    std::string packages;
+    for (const TreePackage& p : tree_packages) {
+        packages += fmt::format(
+            R"({}{{"name":"{}","summary":"{}","built":{},"switch":"{}","needs":"{}"}})",
+            packages.empty() ? "\n " : ",\n ", p.name, p.summary, p.built(),
+            package_switch(p.name), p.needs);
+    }
+    return fmt::format(R"({{"version":"{}","commit":"{}","packages":[{}]}})", paths::version,
+                       paths::commit, packages) +
+           "\n";
+}
+
+/// `hal --version [--json]`.
+int print_version(const std::vector<std::string>& words) {
+    if (words.empty()) return print(version_text()) ? 0 : 1;
+    if (words.size() == 1 && words[0] == "--json") return print(version_json()) ? 0 : 1;
+    const std::string& extra = words[0] == "--json" ? words[1] : words[0];
+    return fail(Options{}, fmt::format("unexpected argument '{}'; type: hal --version --json, or "
+                                       "hal --version",
+                                       extra));
+}
+
 int help(const std::vector<std::string>& about) {
     if (about.empty()) return print(overview()) ? 0 : 1;
-    if (const Found found = find(about); found.row) return print(help_of(*found.row)) ? 0 : 1;
+    if (const Found found = find(about); found.row) {
+        const TreePackage* const missing = found.row->missing_package();
+        if (missing) return refuse(found.row->name, *missing);
+        return print(help_of(*found.row)) ? 0 : 1;
+    }
     if (const Group* group = find_group(about.front()); group && about.size() == 1) {
+        const TreePackage* const missing = missing_package(*group);
+        if (missing) return refuse(group->name, *missing);
         return print(help_of(*group)) ? 0 : 1;
     }
     // The common beginning of some commands: can sdo, can eds.
@@ -532,7 +611,7 @@ int help(const std::vector<std::string>& about) {
         start += word + " ";
     }
     for (const Subcommand& row : table) {
-        if (std::string_view(row.name).starts_with(start)) {
+        if (!row.missing_package() && std::string_view(row.name).starts_with(start)) {
             text += fmt::format("  {:16} {}\n", row.name, row.summary);
         }
     }
@@ -612,14 +691,22 @@ int run_command_line(int argc, char** argv) {
         return help({all.begin() + 1, all.end()});
     }
     if (all[0] == "--version" || all[0] == "version") {
-        return print(fmt::format("hal {} (commit {})\n", paths::version, paths::commit)) ? 0 : 1;
+        return print_version({all.begin() + 1, all.end()});
     }
     const auto [row, name_words] = find(all);
+    if (const Group* const group = row ? nullptr : find_group(all[0])) {
+        if (const TreePackage* const missing = missing_package(*group)) {
+            return refuse(group->name, *missing);
+        }
+    }
     if (!row && find_group(all[0]) &&
         (all.size() == 1 || all[1] == "help" || all[1] == "--help" || all[1] == "-h")) {
         return help({all[0]});
     }
     if (!row) return no_such_command(all);
+    if (const TreePackage* const missing = row->missing_package()) {
+        return refuse(row->name, *missing);
+    }
     if (!row->run) return become_program(program_of(row->part), argv);
     const auto options = row->make_options();
     options->program = fmt::format("hal {}", row->name);
@@ -636,6 +723,7 @@ int run_command_line(int argc, char** argv) {
 std::vector<Completion> completions() {
     std::vector<Completion> all;
     for (const Subcommand& row : table) {
+        if (row.missing_package()) continue;
         const auto options = row.make_options();
         const std::string name = row.name;
         const auto space = name.find(' ');

@@ -378,7 +378,7 @@ inline constexpr CodePage code_pages[] = {
     {"no-dds",
      "The nodes of this netlist exchange signals over DDS, which this build of Halcyon does not "
      "include: Fast DDS was missing when it "
-     "was built, or it was built with -DHALCYON_DDS=OFF.\n\n"
+     "was built, or it was built with -DHALCYON_PACKAGE_DDS=OFF.\n\n"
      "On Debian: `sudo apt install libfastrtps-dev`, then build again. `hal check` and `hal sim` "
      "accept netlists with nodes without "
      "DDS."},

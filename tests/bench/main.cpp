@@ -6,7 +6,7 @@
 #include <fmt/core.h>
 
 #include "bench.hpp"
-#ifdef HALCYON_ETHERCAT
+#if HALCYON_PACKAGE_ETHERCAT
 #include "ethercat.hpp"
 #endif
 #include "ethernet.hpp"
@@ -47,16 +47,22 @@ constexpr Section sections[] = {
     {"ethernet",
      "raw Ethernet over a veth pair: round trips and one-way times, against a plain socket program",
      raw_ethernet},
+#if HALCYON_PACKAGE_TDMA
     {"tdma",
      "slot jitter of a station whose clock is 200 ppm off, and a backup master that takes over",
      time_slots},
+#endif
+#if HALCYON_PACKAGE_SCOCAN
     {"scocan",
      "time slots on a CAN bus in memory: error of a slot's begin, idle slots used, throughput, "
      "speed of the simulation",
      scocan},
+#endif
+#if HALCYON_PACKAGE_TDMA
     {"cnc",
      "five axes and 64 I/O over TDMA: refresh, round trip, CPU, most axes and shortest cycle", cnc},
-#ifdef HALCYON_ETHERCAT
+#endif
+#if HALCYON_PACKAGE_ETHERCAT
     {"ethercat",
      "50 EtherCAT drives over a veth pair against a plain socket program; start, faults, and how "
      "many slaves in memory",
@@ -69,7 +75,9 @@ constexpr Section sections[] = {
      "of the program; with --full fresh clones of this commit and an earlier one: first motion, "
      "complete build and test, memory",
      size},
+#if HALCYON_PACKAGE_CANOPEN
     {"canopen-boot", "a CANopen network of 127 nodes, in memory and on vcan", canopen_boot},
+#endif
 };
 
 int usage(const char* problem, const char* word) {
@@ -107,9 +115,11 @@ void run(const Section& section, const Options& options, Report& report) {
 }  // namespace
 
 int main(int argc, char** argv) {
+#if HALCYON_PACKAGE_CANOPEN
     if (argc == 2 && std::strcmp(argv[1], canopen_boot_inside_word) == 0) {
         return canopen_boot_inside();
     }
+#endif
     Options options;
     std::vector<const Section*> wanted;
     for (int i = 1; i < argc; ++i) {

@@ -24,7 +24,7 @@
 #include "process.hpp"
 #include "sample.hpp"
 #include "segment.hpp"
-#include "tools/bus/node/skewed_port.hpp"
+#include "tools/bus/tdma/skewed_port.hpp"
 
 namespace hal::bench {
 namespace {

@@ -4,7 +4,7 @@
 // m, turned up to 40 degrees.
 #include "bench.hpp"
 
-#if HALCYON_VISION
+#if HALCYON_PACKAGE_VISION
 #include <algorithm>
 #include <chrono>
 #include <cmath>

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: canopen
 """devices_test.py BUS_TESTS: the devices of hal node, from the same folder, on a real SocketCAN interface, in user-mode-linux where the
 machine has no vcan0: found by a scan, started, read and written."""
 import subprocess

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: canopen
 """master_test.py BUS_TESTS: halfiles/canopen-axis with its link on a real SocketCAN interface and `hal node drive` as the drive, in
 user-mode-linux where the machine has no vcan0: boots, moves, the drive is killed and reconnects, the interface goes down and up, the end."""
 import re

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: scocan
 """scocan_vcan_test.py BUS_TESTS: two processes share a real SocketCAN interface by time slots, in user-mode-linux where the machine has no vcan0: the node
 follows the SYNC, private and shared messages arrive, the SYNC node is killed and returns. It prints how evenly a thread sends: the spread of the
 intervals between private messages, by the kernel's time stamps."""

@@ -13,6 +13,7 @@ import files
 import includes
 import language
 import symbols
+import tiers
 
 SPDX = "// SPDX-License-Identifier: MIT\n"
 failures = []
@@ -312,6 +313,40 @@ def check_language(root):
     )
 
 
+def check_tiers(root):
+    tree = {
+        "cmake/packages": "# the table\nalpha docs/alpha.md components/alpha the first\nbeta docs/beta.md components/beta the second\n",
+        "README.md": "[`alpha`](docs/alpha.md) and [`beta`](docs/beta.md)\n",
+        "docs/internals/core-and-packages.md": "| `alpha` | [a](../alpha.md) |\n| `beta` | [b](../beta.md) |\n",
+        "docs/alpha.md": "",
+        "docs/beta.md": "",
+        "components/alpha/a.cpp": "",
+        "components/beta/b.cpp": "",
+        "tests/cli/a_test.py": "# packages: alpha beta\n",
+    }
+    write(root, tree)
+    expect("packages that agree", run(tiers, root), 0)
+    write(
+        root,
+        {
+            "README.md": "[`alpha`](docs/beta.md) and [`gamma`](docs/beta.md)\n",
+            "tests/cli/a_test.py": "# packages: alpha delta\n",
+        },
+    )
+    (root / "components/beta/b.cpp").unlink()
+    (root / "components/beta").rmdir()
+    expect(
+        "packages that differ",
+        run(tiers, root),
+        1,
+        "cmake/packages: beta names components/beta,",
+        "README.md: the row of alpha",
+        "README.md: no row for the package beta",
+        "README.md: has a row for gamma",
+        "tests/cli/a_test.py: states the package delta",
+    )
+
+
 def check_symbols(root):
     write(
         root,
@@ -366,6 +401,7 @@ def main():
         check_files,
         check_abi,
         check_language,
+        check_tiers,
         check_symbols,
         check_clean_tree,
     ):

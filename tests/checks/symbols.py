@@ -18,12 +18,15 @@ def exported(plugin):
 
 def main(root, build):
     plugins = {p.stem: p for p in (build / "components").glob("*.so")}
+    left_out = build / "components/absent"
+    lines = left_out.read_text().splitlines() if left_out.exists() else []
+    absent = {line.split()[0] for line in lines}
     wanted = {
         p.stem
         for p in (root / "components").glob("*/*.cpp")
         if not (p.parent / "CMakeLists.txt").exists()
     }
-    errors = [f"{name}.so: not built" for name in sorted(wanted - plugins.keys())]
+    errors = [f"{name}.so: not built" for name in sorted(wanted - plugins.keys() - absent)]
     for name, plugin in sorted(plugins.items()):
         symbols = exported(plugin)
         if symbols != ["hal_plugin"]:

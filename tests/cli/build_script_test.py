@@ -21,7 +21,8 @@ mkdir -p build/release/components build/release/bin
 echo "CMAKE_HOME_DIRECTORY:INTERNAL=$source" >build/release/CMakeCache.txt
 touch build/release/build.ninja
 for file in "$source"/components/*/*.cpp; do name=${file##*/}; echo "${name%.cpp} math A component"; done >build/release/components/groups
-echo "seeing libseeing-dev" >build/release/components/absent
+printf '%s\n' "seeing libseeing-dev" "moving HALCYON_PACKAGE_MOTION" >build/release/components/absent
+echo "HALCYON_PACKAGE_MOTION:BOOL=OFF" >>build/release/CMakeCache.txt
 printf '%s\n' "lqr libsolving-dev" "panel libplain-dev" >build/release/components/packages
 """
 NINJA = """#!/bin/sh
@@ -201,7 +202,7 @@ class Script(unittest.TestCase):
     def test_build_builds_everything(self):
         self.assertEqual(self.BUILD + "hal everything", self.hal("build")[-1])
         self.assertIn(
-            "hal: left out: seeing (./hal build NAME installs the Debian packages that one needs)\n",
+            "hal: left out: seeing (./hal build NAME installs the Debian packages that one needs)\nhal: switched off: HALCYON_PACKAGE_MOTION\n",
             self.said,
         )
         self.assertEqual([], self.hal("run", "b.hal"))
@@ -210,6 +211,13 @@ class Script(unittest.TestCase):
         self.hal("build", "sum3", status=1)
         self.assertIn(
             "hal: component 'sum3' does not exist; ./hal doc lists all components\n", self.said
+        )
+
+    def test_build_of_a_component_in_a_package_that_is_switched_off_names_the_switch(self):
+        self.hal("build", "moving", status=1)
+        self.assertIn(
+            "hal: 'moving' is in a package that is switched off in this build; type: cmake --preset release -DHALCYON_PACKAGE_MOTION=ON\n",
+            self.said,
         )
 
     def test_only_the_packages_of_what_is_needed_are_installed(self):

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: canopen
 """hal can gateway: lines of CiA 309-3 over a socket, a simulated node behind it."""
 import json
 import socket

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: canopen
 """Recordings in the formats of other tools: python-can's can_logconvert makes ASC, BLF and TRC of our .log files and back."""
 import json
 import shutil

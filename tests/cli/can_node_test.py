@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: canopen
 """hal can sdo, pdo and lss: a simulated node on udp: is asked and set up by hand."""
 import csv
 import json

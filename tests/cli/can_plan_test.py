@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: canopen
 """`hal canopen plan` and `check`: response times of a configuration and of a recording, errors, queues, and what is wrong with the input."""
 import json
 import re

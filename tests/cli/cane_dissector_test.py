@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: canopen tdma
 """tools/wireshark/halcyon.lua: what tshark makes of our own captures of 0x9023. Skipped where there is no tshark."""
 import json
 import shutil

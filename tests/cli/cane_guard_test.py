@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: canopen tdma
 """A foreign station on the segment, with raw frames: forged NMT, SYNC and set-points are rejected and named, in every format; syncs of another
 schedule from a lower address do not take the segment off; what an event timer of a cycle sends is on the wire in every cycle."""
 import itertools

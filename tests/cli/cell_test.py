@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: canopen dds tdma
 """Netlists for several machines: hal check, hal sim, and hal run --node with a process for each node on loopback; hal top."""
 import json
 import os

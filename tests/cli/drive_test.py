@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: canopen
 """hal can drive: a simulated drive (hal node drive) commanded by hand from another process, over udp: on this machine."""
 import os
 import signal

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: canopen
 """hal can drive: the words of the robot shell, and the messages about invalid ones."""
 import unittest
 

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: ethercat
 """hal ethercat on an emulated line."""
 import json
 import os

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: ethercat
 """Ethernet over EtherCAT: an emulated slave answers ARP and ping through the TAP interface of its master."""
 import os
 import re

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: ethercat
 """The mailbox gateway of a running machine: our commands, and bytes of ETG.8200 by hand over UDP and TCP."""
 import json
 import socket

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: ethercat
 """What keeps an EtherCAT master from its slaves on a real interface: no carrier, no privilege, no such interface, another master."""
 import shutil
 import subprocess

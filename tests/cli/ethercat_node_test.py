@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: ethercat
 """hal node ethercat: a line of emulated slaves on a veth pair, with our master at the other end; each is killed in turn."""
 import json
 import os

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: ethercat
 """EtherCAT in UDP datagrams: a master and an emulated line as two processes of an ordinary user, without privileges and interfaces."""
 import json
 import os

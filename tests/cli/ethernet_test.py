@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: canopen tdma
 """The machines at the other end of a wire, as processes in network namespaces. Figures are printed, none is asserted: the machine may be
 busy. What is asserted is that it comes up, that all stations find the master's clock by clocks that differ, that the backup master takes
 over, what the way takes by the schedule, and that nothing is left behind."""

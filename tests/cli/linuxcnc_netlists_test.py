@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: linuxcnc
 """hal linuxcnc: TWOPASS, includes, and netlists in Tcl."""
 import shutil
 import subprocess

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: linuxcnc
 """What LinuxCNC 2.10 has beyond 2.9: its compiled modules, its programs, its order of starting, a source tree that was built in place. The modules and
 programs are of these tests, compiled here; LinuxCNC is not needed."""
 import subprocess

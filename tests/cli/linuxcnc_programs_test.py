@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: linuxcnc
 """liblinuxcnchal.so.0: programs that are linked to LinuxCNC's library connect to a running machine. The programs are in linuxcnc_programs/, compiled here;
 LinuxCNC is not needed (tests/peers runs its own)."""
 import shutil

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: linuxcnc
 """hal linuxcnc: the order in which everything starts and ends, its environment, and what goes wrong."""
 import os
 import signal

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: linuxcnc
 """What LinuxCNC's compiled modules do to the machine as a whole, and their tasks. The modules are in modules/, compiled here; LinuxCNC is not needed."""
 import re
 import signal

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: linuxcnc
 """What compiled modules of LinuxCNC access: PCI cards, here folders like the kernel's, and I/O ports."""
 import struct
 import unittest

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: linuxcnc
 """LinuxCNC's compiled modules: what a module may do, and what goes wrong with one. The modules are in modules/, compiled here; LinuxCNC is
 not needed (tests/peers/linuxcnc_modules_test.py runs its own)."""
 import re

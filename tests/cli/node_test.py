@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: canopen
 """hal node: simulated CANopen devices as processes, looked at by hal can over udp: on this machine."""
 import json
 import os

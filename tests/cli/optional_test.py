@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: vision
 """The script ./hal and a build whose optional packages are removed and installed again, by a package manager of the test. In a mount namespace
 and an overlay of the build tree; needs root and a build in build/release of the sources."""
 import os

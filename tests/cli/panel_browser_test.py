@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: canopen panel
 """The page of `hal panel` in headless Chromium, driven over the DevTools protocol: its views."""
 from harness import SERVO
 from panel_page import WAVE, Page, main

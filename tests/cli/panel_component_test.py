@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: panel
 """A panel whose component the machine rejects states it where it was started."""
 import sys
 import unittest

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: canopen panel
 """Each view of the page of `hal panel` in headless Firefox, without errors in its console."""
 from firefox import Firefox, have_firefox
 from panel_page import Page, main

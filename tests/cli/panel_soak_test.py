@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: panel
 """The page of `hal panel` in headless Chromium for 20 s: its memory and that of the server do not grow."""
 import re
 import time

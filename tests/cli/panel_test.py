@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: panel
 """The server of `hal panel` without a browser: HTTP and WebSockets by hand, what it must reject, what it serves."""
 import json
 import re

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: panel
 """User panels and PyVCP panels in headless Chromium: their widgets, and what happens when the page is lost."""
 import os
 import signal

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: canopen ethercat scocan tdma
 """Pictures and tables that are computed from a simulation: made again, they are the same to the byte."""
 import os
 import re

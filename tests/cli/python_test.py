@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: python
 """Python's module hal: components, their death and their return, functions of the module, streams."""
 import os
 import re

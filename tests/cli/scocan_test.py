@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: scocan
 """hal scocan: tables of a CAN bus with time slots; and a bus between two processes on udp:."""
 import json
 import os

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: canopen tdma
 """RTcfg between two processes on Ethernet: a station that has its address alone gets its schedule and a file from the master."""
 import signal
 import subprocess

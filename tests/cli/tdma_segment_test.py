@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: canopen tdma
 """TDMA between two processes on Ethernet: coming up, processes that die and return, cables that are pulled. Each is named in one line, and
 what can recover without a user does."""
 import signal

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: tdma
 """hal tdma: schedules of an Ethernet segment, and who answers on it."""
 import json
 import re

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: canopen tdma
 """Ordinary packets on a TDMA segment, between two processes through their TAP interfaces: ping, TCP, and what can be in the way."""
 import hashlib
 import os

@@ -62,7 +62,7 @@ class Version(Case):
         for words in (("--version",), ("version",)):
             self.assertRegex(
                 self.good(*words),
-                rf"\Ahal {re.escape(version)} \(commit ([0-9a-f]{{10}}|unknown)\)\n\Z",
+                rf"\Ahal {re.escape(version)} \(commit ([0-9a-f]{{10}}|unknown)\)\npackages: .*\n(left out: .*\n)?\Z",
             )
 
     def test_follows_the_checkout_and_is_not_built_without_a_change(self):

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: MIT
+# packages: canopen ethercat scocan tdma
 """Buses after every kind of stop: an exception, a hang, a process without CPU, a lost partner. `operational` is FALSE meanwhile, the bus
 returns by itself once the thread runs again, and an axis needs another edge of its enable."""
 import os

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: canopen
 """Logs of the Python package can: hal can dump reads its .log files, names its other formats, and reads what can_logconvert makes of them:
 can_logs_peer_test.py PROGRAM. Where can-utils are installed, log2long prints candump's terminal format, which is read too."""
 import json

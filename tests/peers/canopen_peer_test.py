@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: canopen
 """canopen_peer_test.py CANOPEN_PEER: our device under the Python package `canopen` as master, and its device under our SDO client
 and our NMT master, all on the `udp:` bus. 77: the package or multicast is missing."""
 import subprocess

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: dds
 """Cyclone DDS, an independent implementation, reads and writes our topics: dds_cyclone_test.py HAL. Loopback only."""
 import os
 import sys

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: canopen
 """devices_peer_test.py HAL: the Python package `canopen` is master of all devices of `hal node`, each described by its own EDS, on the
 `udp:` bus. 77: the package or multicast is missing."""
 import os

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: ethercat
 """ethercat_ethercrab_test.py HAL: the Rust crate ethercrab is master of `hal node ethercat` over a veth pair: SDO, mapping, distributed clocks, process
 data in OP. The program is built here, in build/peers/ethercrab. 77: cargo, its registry or network namespaces are missing."""
 import os

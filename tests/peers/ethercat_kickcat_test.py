@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: ethercat
 """ethercat_kickcat_test.py HAL: the Python package kickcat (KickCAT) is master of `hal node ethercat` over a veth pair: scan, SDO, mapping, process data
 in OP. 77: the package or network namespaces are missing."""
 import sys

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: ethercat
 """ethercat_pysoem_test.py HAL: the Python package pysoem (SOEM) is master of `hal node ethercat` over a veth pair: scan, SDO, FoE, other PDOs,
 distributed clocks, process data in OP, and what the slaves do when it stops. 77: the package or network namespaces are missing."""
 import re

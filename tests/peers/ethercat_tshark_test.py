@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: ethercat
 """ethercat_tshark_test.py HAL: tshark decodes what our master and our line send each other over a veth pair, from the scan to OP and back. Each
 field that configures the two drives of halfiles/ethercat-servo must be what servo.ethercat asks for, and no frame may be malformed. 77: tshark or
 network namespaces are missing."""

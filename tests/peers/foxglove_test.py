@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: panel
 """foxglove_test.py HAL: the npm package @foxglove/ws-protocol is a client of `hal panel`, by both names of the protocol. The package is installed in
 build/peers/foxglove. 77: node, npm, its registry or hal-panel are missing."""
 import os

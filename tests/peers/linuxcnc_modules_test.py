@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: linuxcnc
 """linuxcnc_modules_test.py HAL [--figures]: LinuxCNC's compiled modules as the Debian package linuxcnc-uspace installs them, unmodified. The
 steps are those of the ladder in docs/linuxcnc-compatibility.md. --figures prints what each module does. LINUXCNC_HOME names another LinuxCNC, such as a
 source tree of 2.10 that was built in place. 77: the package is not installed."""

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: panel
 """linuxcnc_panels_test.py HAL [FOLDER]: each PyVCP panel of LinuxCNC in FOLDER (a source tree, or where Debian's packages put the example
 configurations) is read, its component exists in a running machine, and headless Chromium draws all of its widgets without an error. Panels
 with a list of pins beside them (`expected` of LinuxCNC's own test) must have exactly these. 77: no panels, no hal-panel, no browser."""

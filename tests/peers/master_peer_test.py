@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: canopen
 """master_peer_test.py HAL: two devices of the Python package `canopen` under our master component in a running netlist, on the `udp:` bus
 and over a serial line (slcan). 77: the package is missing. A transport that this machine does not have is left out with a message."""
 import os

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: tdma
 """tdma_tshark_test.py TDMA_FRAMES: tshark decodes the frames of TDMA (0x9021) and RTcfg (0x9022) as we make them; every field that the
 program TDMA_FRAMES prints must equal what tshark reads. Skipped (77) without tshark."""
 import json

@@ -6,7 +6,9 @@
 #include <filesystem>
 #include <string>
 
+#include "base/tree_packages.hpp"
 #include "linuxcnc/binary/module_host.hpp"
+#include "linuxcnc/find/home.hpp"
 #include "linuxcnc/find/modules.hpp"
 #include "machine/load/source_tree.hpp"
 #include "paths.hpp"
@@ -16,9 +18,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* reinstall =
+    "type ./hal build modules in the source tree, or reinstall Halcyon";
+
 struct Library {
     const halcyon_modules* host = nullptr;
     std::string problem;
+    std::string help;
 };
 
 // Never closed: modules are bound to it. RTLD_GLOBAL: they find its symbols in the global scope.
@@ -46,20 +52,23 @@ Library find_library() {
         void* const library =
             dlopen(fs::weakly_canonical(file, none).c_str(), RTLD_NOW | RTLD_GLOBAL);
         if (!library) {
-            return {nullptr, dlerror()};
+            return {nullptr, dlerror(), reinstall};
         }
         const auto entry =
             reinterpret_cast<const halcyon_modules* (*)()>(dlsym(library, "halcyon_module_host"));
         if (!entry || entry()->size != sizeof(halcyon_modules)) {
-            return {nullptr, file.string() + " belongs to another version of this program"};
+            return {nullptr, file.string() + " belongs to another version of this program",
+                    reinstall};
         }
         opened_library = entry();
-        return {entry(), ""};
+        return {entry(), "", ""};
     }
     return {};
 }
 
 Library open_library() {
+    const TreePackage* const package = find_tree_package("linuxcnc");
+    if (!package->built()) return {nullptr, package->reason(), package->remedy()};
     Library found = find_library();
     const auto missing = [&] { return !found.host && found.problem.empty(); };
     if (missing() && build_on_demand("modules")) {
@@ -68,6 +77,7 @@ Library open_library() {
     if (missing()) {
         found.problem =
             library_name() + ", which runs LinuxCNC's modules, is missing beside this program";
+        found.help = reinstall;
     }
     return found;
 }
@@ -92,7 +102,7 @@ std::optional<Plugin> open_module(const std::string& name, Span at, Diagnostics&
     }
     if (!library().host) {
         diagnostics.error("bad-plugin", at, "'" + path + "' cannot be loaded: " + library().problem,
-                          "", "type ./hal build modules in the source tree, or reinstall Halcyon");
+                          "", library().help);
         return {};
     }
     halcyon_module_problem problem{};

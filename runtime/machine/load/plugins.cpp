@@ -16,6 +16,7 @@
 #include <sys/sendfile.h>
 #include <unistd.h>
 
+#include "base/tree_packages.hpp"
 #include "linuxcnc/find/modules.hpp"
 #include "machine/load/foreign_code.hpp"
 #include "machine/load/module_library.hpp"
@@ -101,9 +102,9 @@ std::string underlined(std::string_view name) {
     return text;
 }
 
-/// The Debian package for want of which the build left a component out, or "": the build writes
-/// them down beside the plugins.
-std::string package_of(const std::string& name, const std::vector<std::string>& path) {
+/// Why the build left a component out, or "": a Debian package that is missing, or the switch of its
+/// package of the tree. The build lists them beside the plugins.
+std::string left_out_for(const std::string& name, const std::vector<std::string>& path) {
     for (const std::string& folder : path) {
         std::ifstream file(folder + "/absent");
         for (std::string component, package; file >> component >> package;) {
@@ -128,6 +129,27 @@ void report_missing_module(std::string_view name, Span at, Diagnostics& diagnost
             ? "HAL_RTMOD_DIR names another folder; for a component of ours: loadrt --native " +
                   std::string(name)
             : "sudo apt-get install linuxcnc-uspace");
+}
+
+/// What to type so that the next build has a package of the tree.
+std::string switch_on(std::string_view name) {
+    return TreePackage{name, "", PackageState::switched_off, ""}.remedy();
+}
+
+void report_left_out(std::string_view name, const std::string& why, Span at,
+                     Diagnostics& diagnostics) {
+    const std::string component = "component '" + std::string(name) + "'";
+    for (const TreePackage& package : tree_packages) {
+        if (package_switch(package.name) != why) continue;
+        diagnostics.error("no-such-component", at,
+                          component + " is in the package " + std::string(package.name) +
+                              ", which is switched off in this build",
+                          "", switch_on(package.name));
+        return;
+    }
+    diagnostics.error(
+        "no-such-component", at, component + " was left out of this build: it needs " + why, "",
+        "sudo apt-get install " + why + ", then build again; ./hal does that by itself");
 }
 
 }  // namespace
@@ -216,13 +238,8 @@ std::optional<Plugin> open_component(const Plugins& plugins, std::string_view na
         return {};
     }
     if (found.empty()) {
-        if (const std::string package = package_of(underlined(name), path); !package.empty()) {
-            diagnostics.error("no-such-component", at,
-                              "component '" + std::string(name) +
-                                  "' was left out of this build: it needs " + package,
-                              "",
-                              "sudo apt-get install " + package +
-                                  ", then build again; ./hal does that by itself");
+        if (const std::string why = left_out_for(underlined(name), path); !why.empty()) {
+            report_left_out(name, why, at, diagnostics);
             return {};
         }
         const std::string similar = did_you_mean(name, plugins.available());

@@ -10,7 +10,7 @@
 
 #include "bus/can/bus.hpp"
 #include "bus/can/frame_decoder.hpp"
-#include "bus/can/objects.hpp"
+#include "bus/json_text.hpp"
 #include "cli/output.hpp"
 #include "link/capture.hpp"
 #include "link/timing.hpp"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The meaning of a frame in CANopen, by the predefined connection set.
+// The meaning of a frame in CANopen, by the predefined connection set; of a build without CANopen,
+// of error frames alone.
 #pragma once
 
 #include <array>
@@ -47,7 +48,5 @@ private:
 
 /// Returns the service of an identifier: "TPDO1 of node 2".
 std::string service_name(std::uint32_t id, bool extended);
-/// Returns the profile of object 1000h: "402 drive", "401 I/O module", …
-std::string profile_name(std::uint32_t device_type);
 
 }  // namespace hal::tools

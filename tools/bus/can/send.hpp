@@ -22,18 +22,7 @@ struct SendOptions : Options {
     }
 };
 
-struct NmtOptions : Options {
-    void declare(OptionSet& set) override {
-        set.words(
-            "ADDRESS COMMAND NODE",
-            "the bus; start, stop, preop, reset or reset-comm; node ID 1..127 (or 0x..), or all");
-    }
-};
-
 /// `hal can send`. Returns the exit code.
 int run_can_send(const SendOptions&);
-
-/// `hal can nmt`. Returns the exit code.
-int run_can_nmt(const NmtOptions&);
 
 }  // namespace hal::tools

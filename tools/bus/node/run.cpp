@@ -14,7 +14,7 @@
 #include "bus/can/bus.hpp"
 #include "bus/node/background_writer.hpp"
 #include "bus/node/kinds.hpp"
-#include "bus/node/tdma_station.hpp"
+#include "bus/node/node_station.hpp"
 #include "bus/number_text.hpp"
 #include "canopen/device/eds_export.hpp"
 #include "canopen/device/node.hpp"
@@ -224,7 +224,7 @@ public:
     /// Returns the exit status.
     int run(std::uint8_t id, const Faults& faults) {
         std::string link = options_.link;
-        std::unique_ptr<TdmaStation> station;
+        std::unique_ptr<NodeStation> station;
         if (const std::string problem = make_station(link, station); !problem.empty()) {
             return fail(options_, problem);
         }
@@ -253,11 +253,11 @@ private:
     bool over() const { return stop_.requested() || now_ns_ >= end_ns_; }
 
     /// Makes the station of a TDMA segment, if one is wanted; `link` is then its end of the bus.
-    std::string make_station(std::string& link, std::unique_ptr<TdmaStation>& station) {
+    std::string make_station(std::string& link, std::unique_ptr<NodeStation>& station) {
         if (options_.tdma.empty()) return {};
         const std::int64_t give_up = end_of(monotonic_ns());
         const auto ended = [&] { return stop_.wait_ns(5'000'000) || monotonic_ns() >= give_up; };
-        return TdmaStation::make(options_, link, prefix_, ended, station);
+        return make_tdma_station(options_, link, prefix_, ended, station);
     }
 
     bool announce(std::uint8_t id, const can::Description& about) const {
@@ -287,7 +287,7 @@ private:
         return problem_.empty();
     }
 
-    int run_on_segment(canopen::Node& node, TdmaStation& station) {
+    int run_on_segment(canopen::Node& node, NodeStation& station) {
         std::optional<BackgroundWriter> writer(std::in_place);
         Reporter reporter(node, program_, began_ns_, prefix_,
                           [&](const std::string& text) { return writer->write(text); });

@@ -1,0 +1,128 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""The packages of the tree, from outside: which a build has, and what a tree has that is configured without all of them, or without one."""
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+from harness import HAL, ROOT, SANITIZED, Case
+
+ROWS = [
+    line.split(" ", 3)
+    for line in (ROOT / "cmake/packages").read_text().splitlines()
+    if not line.startswith("#")
+]
+NAMES = [row[0] for row in ROWS]
+
+
+def configure(folder, *switches):
+    done = subprocess.run(
+        ["cmake", "-G", "Ninja", "-S", ROOT, "-B", folder, "-DCMAKE_BUILD_TYPE=Release", *switches],
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+class Version(Case):
+    def test_lists_the_packages_of_the_table(self):
+        packages = json.loads(self.good("--version", "--json"))["packages"]
+        self.assertEqual(NAMES, [one["name"] for one in packages])
+        self.assertEqual([row[3] for row in ROWS], [one["summary"] for one in packages])
+        self.assertEqual(
+            [f"HALCYON_PACKAGE_{name.upper()}" for name in NAMES],
+            [one["switch"] for one in packages],
+        )
+        text = self.good("--version")
+        built = [one["name"] for one in packages if one["built"]]
+        self.assertIn(f"packages: {', '.join(built) or 'none, the core alone'}\n", text)
+        self.assertEqual(len(built) < len(packages), "left out: " in text)
+
+    def test_rejects_other_words(self):
+        self.assertEqual(
+            "hal: unexpected argument 'x'; type: hal --version --json, or hal --version\n",
+            self.bad("--version", "x"),
+        )
+
+
+class SwitchedOff(unittest.TestCase):
+    """A tree in which every package is OFF."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = Path(tempfile.mkdtemp(prefix="hal-"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder, True)
+        cls.tree = cls.folder / "tree"
+        switches = [f"-DHALCYON_PACKAGE_{name.upper()}=OFF" for name in NAMES]
+        status, output = configure(cls.tree, *switches, "-DHALCYON_TESTS=ON")
+        if status != 0:
+            raise AssertionError(output)
+
+    def targets(self):
+        listed = subprocess.run(
+            ["ninja", "-C", self.tree, "-t", "targets", "all"], capture_output=True, text=True
+        )
+        return set(re.findall(r"(?m)^(\S+): phony$", listed.stdout))
+
+    def test_the_core_alone_has_no_target_and_no_test_of_a_package(self):
+        targets = self.targets()
+        core = {"hal", "hal-tools", "hal-bus", "component_pid", "component_can_send", "unit_tests"}
+        self.assertLessEqual(core, targets)
+        absent = dict(
+            line.split() for line in (self.tree / "components/absent").read_text().splitlines()
+        )
+        components = ("canopen", "ethercat", "tdma", "scocan", "dds_publish", "kalman", "vision_blob")
+        for component in components:
+            self.assertRegex(absent[component], "^HALCYON_PACKAGE_[A-Z]+$")
+            self.assertNotIn(f"component_{component}", targets)
+        of_packages = {"hal-panel", "halcyon_modules", "linuxcnchal", "python_hal", "canopen_tests"}
+        self.assertEqual(set(), of_packages & targets)
+        tests = subprocess.run(
+            ["ctest", "--test-dir", self.tree, "--print-labels"], capture_output=True, text=True
+        ).stdout
+        labels = set(re.findall(r"(?m)^  (\S+)$", tests))
+        self.assertIn("core", labels)
+        self.assertEqual(set(), labels & set(NAMES))
+
+    def test_the_list_of_the_program_names_each_switch(self):
+        source = (self.tree / "generated/tree_packages.cpp").read_text()
+        self.assertEqual(len(NAMES), source.count("PackageState::switched_off"))
+        self.assertNotIn("PackageState::built", source)
+
+    def test_the_build_installs_no_debian_package_of_them(self):
+        needs = dict(
+            line.split(" ", 1)
+            for line in (self.tree / "components/packages").read_text().splitlines()
+        )
+        self.assertEqual({"all", "playback"}, set(needs))
+        self.assertEqual("libzstd-dev liblz4-dev", needs["all"])
+
+
+class OneSwitch(Case):
+    def test_each_switch_alone_leaves_the_others_in(self):
+        for name in NAMES:
+            with self.subTest(name):
+                tree = self.folder / name
+                status, output = configure(
+                    tree, f"-DHALCYON_PACKAGE_{name.upper()}=OFF", "-DHALCYON_TESTS=OFF"
+                )
+                self.assertEqual(0, status, output)
+                rows = re.findall(
+                    r'\{"([a-z]+)", .*PackageState::([a-z_]+)',
+                    (tree / "generated/tree_packages.cpp").read_text(),
+                )
+                self.assertEqual([name], [one for one, state in rows if state == "switched_off"])
+                shutil.rmtree(tree)
+
+
+if __name__ == "__main__":
+    if not shutil.which("cmake") or not shutil.which("ninja") or SANITIZED:
+        print("needs cmake and ninja, and a program without sanitizers")
+        sys.exit(77)
+    unittest.main()

@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: MIT
+// `hal can dcf read` and `hal can dcf write`: saves the settings of a node as a DCF (CiA 306), and restores them to the node or its replacement.
+// Only differences are written, PDOs in the order required by CiA 301, and read back.
+#include "bus/canopen/dcf.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <fmt/chrono.h>
+#include <fmt/core.h>
+#include <map>
+#include <unistd.h>
+
+#include "bus/canopen/node_client.hpp"
+#include "bus/canopen/objects.hpp"
+#include "canopen/master/boot/object_writes.hpp"
+#include "cli/output.hpp"
+
+namespace hal::tools {
+
+namespace eds = canopen::eds;
+using canopen::SdoRequest;
+
+namespace {
+
+// of one object; a larger one is a program, not a setting
+constexpr std::size_t most_bytes = 65536;
+
+/// Set-points and outputs of CiA 401 and 402: a write moves the device.
+bool moves(std::uint16_t index) {
+    if (index < 0x6000 || index >= 0xa000) return false;
+    const unsigned first_axis = 0x6000 + (index - 0x6000U) % 0x800;
+    constexpr std::uint16_t drive[] = {0x6040, 0x6042, 0x6071, 0x607a, 0x60b0,
+                                       0x60b1, 0x60b2, 0x60c1, 0x60fe, 0x60ff};
+    const bool outputs = first_axis >= 0x6410 && first_axis <= 0x6413;
+    const bool lines = first_axis == 0x6200 || first_axis == 0x6220 || first_axis == 0x6300 ||
+                       first_axis == 0x6320;
+    return outputs || lines ||
+           std::find(std::begin(drive), std::end(drive), first_axis) != std::end(drive);
+}
+
+/// Returns true for a setting to save and restore: not an object that acts when written, moves the
+/// device, or is a program.
+bool is_setting(std::uint16_t index, const eds::Entry& entry) {
+    constexpr std::uint32_t refused_by_scans = 1;  // ObjFlags
+    const bool acts = index == 0x1003 || index == 0x1010 || index == 0x1011 || index == 0x1f82 ||
+                      (index >= 0x1f50 && index <= 0x1f57);
+    return entry.readable() && entry.writable() && entry.access != eds::Access::rww && !acts &&
+           !moves(index) && entry.data_type != 0x000f && (entry.flags & refused_by_scans) == 0;
+}
+
+enum class Read { value, refused, failed };
+
+Read read_object(NodeClient& station, std::uint8_t node, std::uint16_t index, std::uint8_t sub,
+                 std::vector<std::uint8_t>& bytes, SdoRequest& request) {
+    bytes.resize(most_bytes);
+    request = {.index = index, .sub = sub, .upload = true, .buffer = bytes};
+    const bool read = station.transfer(node, request);
+    bytes.resize(request.ok() ? request.size : 0);
+    if (read) return Read::value;
+    if (request.aborted_by_server) return Read::refused;
+    return Read::failed;
+}
+
+void date(eds::DeviceDescription& description, const DcfReadOptions& options) {
+    const std::time_t now = std::time(nullptr);
+    const std::tm day = fmt::gmtime(now);
+    eds::FileInfo& file = description.file;
+    const auto name = [](const std::string& path) { return path.substr(path.rfind('/') + 1); };
+    file.last_eds = name(options.eds);
+    if (!options.output.empty()) {
+        file.file_name = name(options.output);
+    }
+    file.modified_by = "hal can dcf read";
+    file.modification_date = fmt::format("{:%m-%d-%Y}", day);
+    file.modification_time = fmt::format("{:%I:%M%p}", day);
+}
+
+}  // namespace
+
+int run_can_dcf_read(const DcfReadOptions& options) {
+    if (options.words.size() != 2) {
+        return fail(
+            options,
+            "expected ADDRESS NODE; type: hal can dcf read ADDRESS NODE --eds FILE -o NODE.dcf");
+    }
+    if (options.eds.empty()) {
+        return fail(options, "missing --eds FILE: the description lists the objects of the node");
+    }
+    std::uint8_t node = 0;
+    ObjectNames names;
+    if (!node_of(options, options.words[1], node) || !names.load(options, options.eds)) return 1;
+    if (names.description()->objects.empty()) {
+        return fail(options, fmt::format("'{}' describes no object: nothing to read; give the "
+                                         "whole EDS of the device",
+                                         options.eds));
+    }
+    eds::DeviceDescription description = *names.description();
+    NodeClient station(options, options.timeout_ns);
+    if (!station.open(options.words[0])) return 1;
+    std::size_t read = 0;
+    std::size_t refused = 0;
+    std::vector<std::uint8_t> bytes;
+    for (eds::Object& object : description.objects) {
+        for (eds::Entry& entry : object.entries) {
+            entry.parameter_value.clear();
+            if (!is_setting(object.index, entry)) continue;
+            SdoRequest request;
+            const std::string label = names.named(object.index, entry.sub).label();
+            switch (read_object(station, node, object.index, entry.sub, bytes, request)) {
+            case Read::failed: return station.fail_transfer(node, request, label);
+            case Read::refused:
+                ++refused;
+                fail(options, fmt::format("skipped: {}: {} (0x{:08X})", label,
+                                          canopen::to_string(request.abort),
+                                          static_cast<std::uint32_t>(request.abort)));
+                continue;
+            case Read::value: break;
+            }
+            ++read;
+            // As in the description where equal ($NODEID), so that the file also fits a node with
+            // another ID.
+            const eds::Encoded usual = eds::encode(entry.default_value, entry.data_type, node);
+            entry.parameter_value = usual && usual.bytes == bytes && !bytes.empty()
+                                        ? entry.default_value
+                                        : eds::spell(bytes, entry.data_type);
+        }
+    }
+    date(description, options);
+    eds::Commissioning& commissioning = description.commissioning.emplace();
+    commissioning.node_id = node;
+    commissioning.baud_rate =
+        static_cast<std::uint16_t>(station.bus.link->description().bit_rate / 1000);
+    const std::string text = eds::write_eds(description);
+    if (options.output.empty()) return print(text) ? 0 : 1;
+    if (const std::string wrong = write_file(options.output, text); !wrong.empty()) {
+        return fail(options, fmt::format("cannot write '{}': {}", options.output, wrong));
+    }
+    return print(fmt::format("{}: {} settings of node {}{}\n", options.output, read, node,
+                             refused == 0 ? "" : fmt::format(", {} skipped", refused)))
+               ? 0
+               : 1;
+}
+
+namespace {
+
+/// Returns false after printing why the file is not for this node and bus. `bit_rate` 0: unknown.
+bool fits(const DcfWriteOptions& options, const eds::DeviceDescription& dcf, std::uint8_t node,
+          std::uint32_t bit_rate) {
+    const std::string problem = options.other_node ? "" : eds::misfit(dcf, node, bit_rate);
+    if (problem.empty()) return true;
+    fail(options, fmt::format("'{}' does not fit: {}; to write it all the same, add --other-node",
+                              options.words[2], problem));
+
+    return false;
+}
+
+/// Compares the settings of a file with those of a node.
+class Download {
+public:
+    Download(const DcfWriteOptions& options, std::uint8_t node, const ObjectNames& names,
+             std::vector<eds::Write> writes)
+        : options_(options),
+          node_(node),
+          names_(names),
+          writes_(std::move(writes)),
+          station_(options, options.timeout_ns) {}
+
+    int run() {
+        for (const eds::Write& write : writes_) {
+            wanted_[key(write)] = &write;
+        }
+        if (!station_.open(options_.words[0])) return 1;
+        const std::uint32_t rate = station_.bus.link->description().bit_rate;
+        if (!fits(options_, *names_.description(), node_, rate == can::unlimited ? 0 : rate)) {
+            return 1;
+        }
+        for (const auto& [at, write] : wanted_) {
+            if (!compare(*write)) return 1;
+        }
+        std::size_t written = 0;
+        if (!options_.check) {
+            for (const eds::Write& write : writes_) {
+                if (differing_.contains(group(write))) {
+                    if (!put(write)) return 1;
+                    ++written;
+                }
+            }
+        }
+        if (!options_.check) {
+            for (const auto& [at, write] : wanted_) {
+                if (differing_.contains(group(*write)) && !verify(*write)) return 1;
+            }
+        }
+        const std::string what =
+            fmt::format("node {}: {} of {} settings {}\n", node_, differences_, wanted_.size(),
+                        options_.check      ? "differ"
+                        : differences_ == 0 ? "differed"
+                                            : "differed and were written");
+        if (!print(what)) return 1;
+        if (written != 0 && !print(fmt::format("not stored: they are lost at power-off; to store "
+                                               "them: hal can sdo write {} {} 1010:1 0x65766173 "
+                                               "--type u32\n",
+                                               options_.words[0], node_))) {
+            return 1;
+        }
+        return options_.check && differences_ != 0 ? 1 : 0;
+    }
+
+private:
+    static std::uint32_t key(const eds::Write& write) {
+        return std::uint32_t{write.index} << 8 | write.sub;
+    }
+    /// Writes settings that belong together: a PDO is disabled while it changes.
+    static std::uint32_t group(const eds::Write& write) {
+        const bool of_pdo = write.index >= 0x1400 && write.index < 0x1c00;
+        return of_pdo ? std::uint32_t{write.index & 0xfdffU} << 8 | 0xff : key(write);
+    }
+    std::string label(const eds::Write& write) const {
+        return names_.named(write.index, write.sub).label();
+    }
+    std::string shown(const eds::Write& write, std::span<const std::uint8_t> bytes) const {
+        return value_text(bytes, names_.named(write.index, write.sub).type);
+    }
+    /// Returns false after printing the reason: the node does not respond.
+    bool compare(const eds::Write& write) {
+        SdoRequest request;
+        std::vector<std::uint8_t> bytes;
+        const Read read = read_object(station_, node_, write.index, write.sub, bytes, request);
+        if (read == Read::failed) {
+            station_.fail_transfer(node_, request, label(write));
+            return false;
+        }
+        if (read == Read::value && canopen::same_value(write.index, write.sub, write.data, bytes)) {
+            return true;
+        }
+        ++differences_;
+        differing_[group(write)] = true;
+        const std::string has =
+            read == Read::value ? "is " + shown(write, bytes) : "cannot be read";
+        return print(
+            fmt::format("{} {}, the file has {}\n", label(write), has, shown(write, write.data)));
+    }
+    bool put(const eds::Write& write) {
+        SdoRequest request{.index = write.index, .sub = write.sub, .data = write.data};
+        return station_.transfer(node_, request) ||
+               (station_.fail_transfer(node_, request, label(write)), false);
+    }
+    bool verify(const eds::Write& write) {
+        SdoRequest request;
+        std::vector<std::uint8_t> bytes;
+        switch (read_object(station_, node_, write.index, write.sub, bytes, request)) {
+        case Read::failed: station_.fail_transfer(node_, request, label(write)); return false;
+        case Read::refused: return true;  // write-only
+        case Read::value: break;
+        }
+        if (canopen::same_value(write.index, write.sub, write.data, bytes)) return true;
+        fail(options_,
+             fmt::format("node {} accepted {} for {} but stored {}; write a value it can store",
+                         node_, shown(write, write.data), label(write), shown(write, bytes)));
+
+        return false;
+    }
+
+    const DcfWriteOptions& options_;
+    const std::uint8_t node_;
+    const ObjectNames& names_;
+    const std::vector<eds::Write> writes_;
+    NodeClient station_;
+    std::map<std::uint32_t, const eds::Write*> wanted_;  // the last of each object
+    std::map<std::uint32_t, bool> differing_;  // by group
+    std::size_t differences_ = 0;
+};
+
+}  // namespace
+
+int run_can_dcf_write(const DcfWriteOptions& options) {
+    if (options.words.size() != 3) {
+        return fail(options,
+                    "expected ADDRESS NODE FILE; type: hal can dcf write ADDRESS NODE FILE.dcf");
+    }
+    std::uint8_t node = 0;
+    if (!node_of(options, options.words[1], node)) return 1;
+    ObjectNames names;
+    if (!names.load(options, options.words[2])) return 1;
+    if (!names.reliable()) {
+        return fail(options, fmt::format("'{}' is not reliable: no setting was {}; correct the "
+                                         "file, or create it again: hal can dcf read",
+                                         options.words[2], options.check ? "compared" : "written"));
+    }
+    if (!fits(options, *names.description(), node, 0)) return 1;
+    eds::Configuration configuration = eds::configuration_of(*names.description(), node, true);
+    bool valid = true;
+    for (const eds::Message& message : configuration.messages) {
+        valid = valid && message.severity != eds::Severity::error;
+        fail(options,
+             fmt::format("{}:{}: {}{}", options.words[2], message.at.line, message.sentence,
+                         message.help.empty() ? "" : "; " + message.help));
+    }
+    if (!valid && !options.check) {
+        return fail(options, fmt::format("'{}' has invalid values: no setting was written; correct "
+                                         "them in the file",
+                                         options.words[2]));
+    }
+    std::erase_if(configuration.writes, [&](const eds::Write& write) {
+        if (moves(write.index)) {
+            fail(options, fmt::format("skipped: {}: it moves the device",
+                                      names.named(write.index, write.sub).label()));
+        }
+        return moves(write.index);
+    });
+    if (configuration.writes.empty()) {
+        return fail(options, fmt::format("'{}' has no settings: no ParameterValue to write; to "
+                                         "create such a file: hal can dcf read",
+                                         options.words[2]));
+    }
+    const int result = Download(options, node, names, std::move(configuration.writes)).run();
+    return valid ? result : 1;
+}
+
+}  // namespace hal::tools

@@ -1,0 +1,354 @@
+// SPDX-License-Identifier: MIT
+// `hal can gateway --connect`: a client of a CiA 309-3 gateway. It adds the sequence numbers and prints error texts.
+#include "bus/canopen/gateway.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <fmt/core.h>
+#include <netdb.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "bus/can/bus.hpp"
+#include "canopen/master/gateway/gateway_command.hpp"
+#include "cli/output.hpp"
+#include "cli/prompt_loop.hpp"
+
+namespace hal::tools {
+
+namespace {
+
+/// Connects a socket; returns -1 after printing the reason.
+int connect_to_gateway(const GatewayOptions& options) {
+    const std::string& endpoint = options.connect;
+    const auto colon = endpoint.rfind(':');
+    const std::string port = colon == endpoint.npos ? "" : endpoint.substr(colon + 1);
+    const bool tcp = !port.empty() && endpoint.find('/') == endpoint.npos &&
+                     port.find_first_not_of("0123456789") == port.npos;
+    std::string why;
+    int fd = -1;
+    if (tcp) {
+        addrinfo how{}, *found = nullptr;
+        how.ai_socktype = SOCK_STREAM;
+        if (const int code =
+                ::getaddrinfo(endpoint.substr(0, colon).c_str(), port.c_str(), &how, &found);
+            code != 0) {
+            fail(options,
+                 fmt::format("invalid --connect '{}': {}; write HOST:PORT, such as 127.0.0.1:6000",
+                             endpoint, ::gai_strerror(code)));
+
+            return -1;
+        }
+        for (const addrinfo* at = found; at != nullptr && fd < 0; at = at->ai_next) {
+            fd = ::socket(at->ai_family, at->ai_socktype | SOCK_CLOEXEC, at->ai_protocol);
+            if (fd >= 0 && ::connect(fd, at->ai_addr, at->ai_addrlen) == 0) break;
+            why = std::strerror(errno);
+            if (fd >= 0) {
+                ::close(fd);
+            }
+            fd = -1;
+        }
+        if (found != nullptr) {
+            ::freeaddrinfo(found);
+        }
+    } else {
+        sockaddr_un at{};
+        at.sun_family = AF_UNIX;
+        if (endpoint.size() >= sizeof at.sun_path) {
+            fail(options, fmt::format("path too long for a socket: '{}'", endpoint));
+            return -1;
+        }
+        std::memcpy(at.sun_path, endpoint.c_str(), endpoint.size() + 1);
+        fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+        if (::connect(fd, reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0) {
+            why = std::strerror(errno);
+            ::close(fd);
+            fd = -1;
+        }
+    }
+    if (fd < 0) {
+        fail(options, fmt::format("cannot connect to the gateway at '{}': {}; start one with: hal "
+                                  "can gateway ADDRESS {} {}",
+                                  endpoint, why, tcp ? "--listen" : "--socket", endpoint));
+    }
+    return fd;
+}
+
+/// Formats `1 5 EMCY … #life guard error`: net and node by name, the comment as part of the
+/// sentence.
+std::string event_text(std::string_view line) {
+    std::string text(line);
+    if (const auto mark = text.find(" #"); mark != text.npos) {
+        text.replace(mark, 2, ": ");
+    }
+    unsigned net = 0;
+    unsigned node = 0;
+    const char* const end = text.data() + text.size();
+    const auto after_net = std::from_chars(text.data(), end, net);
+    if (after_net.ec != std::errc() || after_net.ptr == end || *after_net.ptr != ' ') return text;
+    const auto after_node = std::from_chars(after_net.ptr + 1, end, node);
+    if (after_node.ec != std::errc() || after_node.ptr == end) {
+        return fmt::format("net {}: {}", net, after_net.ptr + 1);
+    }
+    return fmt::format("net {}, node {}: {}", net, node, after_node.ptr + 1);
+}
+
+/// Formats `ERROR:105 #no default node set` as "no default node set (error 105); …".
+std::string error_text(std::string_view answer) {
+    const auto mark = answer.find('#');
+    const std::string_view begins = "ERROR:";
+    std::string number(
+        answer.substr(begins.size(), mark == answer.npos ? mark : mark - begins.size()));
+    while (number.ends_with(' ')) {
+        number.pop_back();
+    }
+    const bool abort = number.starts_with("0x");
+    std::string text = abort ? "SDO abort" : "error";
+    if (mark != answer.npos) {
+        text = answer.substr(mark + 1);
+    }
+    text += abort ? fmt::format(" ({})", number) : fmt::format(" (error {})", number);
+    if (number == "104") {
+        text += "; write the net before the command, or type: set network NET";
+    }
+    if (number == "105") {
+        text += "; write the node before the command, or type: set node NODE";
+    }
+    return text;
+}
+
+/// Joins the words of the command line to one line of CiA 309-3.
+std::string joined(std::span<const std::string> words) {
+    std::string line;
+    for (const std::string& word : words) {
+        if (!line.empty()) {
+            line += ' ';
+        }
+        if (!word.empty() && word.find_first_of(" \t#\"") == word.npos) {
+            line += word;
+            continue;
+        }
+        line += '"';
+        for (const char c : word) {
+            line += c == '"' ? "\"\"" : std::string(1, c);
+        }
+        line += '"';
+    }
+    return line;
+}
+
+class GatewaySession final : public LineExecutor {
+public:
+    GatewaySession(const GatewayOptions& options, int fd, StopRequest& stop, bool events)
+        : options_(options), fd_(fd), stop_(stop), events_(events) {}
+    ~GatewaySession() override { ::close(fd_); }
+
+    int execute(std::string_view text) override {
+        while (!text.empty() &&
+               (text.back() == ' ' || text.back() == '\t' || text.back() == '\r')) {
+            text.remove_suffix(1);
+        }
+        while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) {
+            text.remove_prefix(1);
+        }
+        if (text.empty() || text.front() == '#') return 0;
+        if (text == "quit" || text == "exit") {
+            over_ = true;
+            return 0;
+        }
+        if (text.front() == '[') {
+            return fail(
+                options_,
+                fmt::format("'{}': sequence numbers are added here; type the command without one",
+                            text));
+        }
+        std::string answer;
+        if (!ask(text, answer)) return 1;
+        if (answer.starts_with("ERROR:")) {
+            return fail(options_, fmt::format("{}: {}", text, error_text(answer)));
+        }
+        if (!print(answer + "\n")) {
+            over_ = true;
+            return 1;
+        }
+        if (text != "help") return 0;
+        listing_ = true;  // lines follow the response; the next response ends them
+        const bool whole = ask("info version", answer);
+        listing_ = false;
+        return whole ? 0 : 1;
+    }
+    Completion complete(std::string_view line, std::size_t cursor) override {
+        Completion out;
+        line = line.substr(0, cursor);
+        const auto blank = line.find_last_of(' ');
+        out.begin = blank == line.npos ? 0 : blank + 1;
+        constexpr const char* known[] = {"boot_up_indication",
+                                         "disable",
+                                         "enable",
+                                         "guarding",
+                                         "heartbeat",
+                                         "help",
+                                         "info",
+                                         "init",
+                                         "lss_activate_bitrate",
+                                         "lss_conf_bitrate",
+                                         "lss_get_node",
+                                         "lss_ident_nonconf",
+                                         "lss_identity",
+                                         "lss_inquire_addr",
+                                         "lss_set_node",
+                                         "lss_store",
+                                         "lss_switch_glob",
+                                         "lss_switch_sel",
+                                         "network",
+                                         "node",
+                                         "preop",
+                                         "quit",
+                                         "read",
+                                         "reset",
+                                         "restore",
+                                         "set",
+                                         "start",
+                                         "stop",
+                                         "store",
+                                         "version",
+                                         "write"};
+        for (const char* word : known) {
+            if (std::string_view(word).starts_with(line.substr(out.begin))) {
+                out.candidates.push_back({word, {}});
+            }
+        }
+        return out;
+    }
+    bool collecting() const override { return false; }
+    bool over() const override { return over_ || stop_.requested(); }
+    std::function<void()> meanwhile() override {
+        return [this] {
+            std::string answer;
+            while (!over_ && readable(0)) {
+                take(0, answer);
+            }
+        };
+    }
+
+private:
+    /// Waits for the response to a command. Returns false after printing the reason.
+    bool ask(std::string_view text, std::string& answer) {
+        constexpr std::int64_t limit = 60'000'000'000;
+        const std::uint32_t number = ++sequence_;
+        const std::string line = fmt::format("[{}] {}\r\n", number, text);
+        for (std::size_t sent = 0; sent < line.size();) {
+            const ssize_t now = ::send(fd_, line.data() + sent, line.size() - sent, MSG_NOSIGNAL);
+            if (now < 0 && errno == EINTR) continue;
+            if (now < 0) return lost();
+            sent += static_cast<std::size_t>(now);
+        }
+        for (const std::int64_t end = monotonic_ns() + limit; monotonic_ns() < end;) {
+            if (stop_.requested()) {
+                fail(options_,
+                     fmt::format("interrupted while waiting for the response to '{}'", text));
+
+                return false;
+            }
+            if (!readable(100)) continue;
+            if (take(number, answer)) return true;
+            if (over_) return false;
+        }
+        fail(options_,
+             fmt::format("no response to '{}' within 60 s; check that the gateway is running",
+                         text));
+
+        return false;
+    }
+    bool readable(int ms) {
+        if (in_.find('\n') != in_.npos) return true;
+        pollfd all[2] = {{fd_, POLLIN, 0}, {stop_.fd(), POLLIN, 0}};
+        return ::poll(all, 2, ms) > 0 && all[0].revents != 0;
+    }
+    bool lost() {
+        over_ = true;
+        fail(options_, fmt::format("the gateway at '{}' closed the connection", options_.connect));
+
+        return false;
+    }
+    /// Reads pending lines and prints events. Returns true when `answer` is the response to
+    /// `number`.
+    bool take(std::uint32_t number, std::string& answer) {
+        if (in_.find('\n') == in_.npos) {
+            char bytes[65536];
+            const ssize_t got = ::recv(fd_, bytes, sizeof bytes, 0);
+            if (got < 0 && errno == EINTR) return false;
+            if (got <= 0) return lost();
+            in_.append(bytes, static_cast<std::size_t>(got));
+        }
+        const std::string expected = fmt::format("[{}] ", number);
+        for (std::size_t end; (end = in_.find('\n')) != in_.npos;) {
+            std::string line = in_.substr(0, end);
+            in_.erase(0, end + 1);
+            if (line.ends_with('\r')) {
+                line.pop_back();
+            }
+            if (number != 0 && line.starts_with(expected)) {
+                answer = line.substr(expected.size());
+                return true;
+            }
+            if (line.starts_with("# ") && listing_) {
+                print(line.substr(2) + "\n");
+            } else if (!line.starts_with("[") && !line.starts_with("#") && events_) {
+                print(event_text(line) + "\n");
+            }
+        }
+        return false;
+    }
+
+    const GatewayOptions& options_;
+    const int fd_;
+    StopRequest& stop_;
+    const bool events_;
+    bool over_ = false;
+    bool listing_ = false;
+    std::uint32_t sequence_ = 0;
+    std::string in_;
+};
+
+}  // namespace
+
+int run_can_gateway_client(const GatewayOptions& options) {
+    if (!options.socket.empty() || !options.listen.empty() || !options.state.empty()) {
+        return fail(
+            options,
+            "--connect is for a client; --socket, --listen and --state are for the gateway");
+    }
+    if (!options.identity.empty() || !options.vendor_name.empty() ||
+        !options.product_name.empty() || !options.order_code.empty()) {
+        return fail(options,
+                    "--connect is for a client; --identity, --vendor-name, --product-name and "
+                    "--order-code are for the gateway");
+    }
+    StopRequest stop;
+    const int fd = connect_to_gateway(options);
+    if (fd < 0) return 1;
+    GatewaySession session(options, fd, stop, options.words.empty());
+    if (options.words.empty()) {
+        const bool terminal = ::isatty(STDIN_FILENO) == 1;
+        if (terminal) {
+            print(fmt::format("connected to {}; type 'help' for the commands, Tab completes\n",
+                              options.connect));
+        }
+        return run_prompt_loop(session, {"gateway> ", "gateway> "}, stop.fd());
+    }
+    if (options.words.front().find(' ') == options.words.front().npos) {
+        return session.execute(joined(options.words));
+    }
+    for (const std::string& line : options.words) {
+        if (session.execute(line) != 0 || session.over()) return 1;
+    }
+    return 0;
+}
+
+}  // namespace hal::tools

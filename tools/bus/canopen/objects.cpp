@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: MIT
+#include "bus/canopen/objects.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <fmt/core.h>
+
+#include "bus/json_text.hpp"
+#include "canopen/eds/xdd.hpp"
+#include "canopen/master/gateway/gateway_values.hpp"
+#include "cli/output.hpp"
+#include "text/diagnostic.hpp"
+#include "text/glyphs.hpp"
+
+namespace hal::tools {
+
+namespace eds = canopen::eds;
+namespace gateway = canopen::gateway;
+using canopen::Type;
+
+namespace {
+
+/// Lower case, everything but letters and digits as single dashes: for tolerant comparison of
+/// names.
+std::string plain(std::string_view name) {
+    std::string out;
+    for (const char c : name) {
+        if (std::isalnum(static_cast<unsigned char>(c))) {
+            out += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+        } else if (!out.empty() && out.back() != '-') {
+            out += '-';
+        }
+    }
+    while (out.ends_with('-')) {
+        out.pop_back();
+    }
+    return out;
+}
+
+bool hex_number(std::string_view text, unsigned max, unsigned& value) {
+    if (text.starts_with("0x") || text.starts_with("0X")) {
+        text.remove_prefix(2);
+    }
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
+    return !text.empty() && error == std::errc() && end == text.data() + text.size() &&
+           value <= max;
+}
+
+Type basic(std::uint16_t code) {
+    return code <= 0x1b && canopen::to_string(static_cast<Type>(code))[0] != '\0'
+               ? static_cast<Type>(code)
+               : Type::none;
+}
+
+ObjectName object_of(const eds::Object& object, const eds::Entry& entry) {
+    const bool whole = object.single() || entry.name.empty();
+    return {object.index, entry.sub, basic(entry.data_type),
+            whole ? object.name : object.name + ", " + entry.name};
+}
+
+bool looks_like_text(std::span<const std::uint8_t> bytes) {
+    std::size_t end = bytes.size();
+    while (end > 0 && bytes[end - 1] == 0) {
+        --end;
+    }
+    return end >= 3 && std::all_of(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(end),
+                                   [](std::uint8_t c) { return c >= 0x20 && c < 0x7f; });
+}
+
+std::string text_in(std::span<const std::uint8_t> bytes) {
+    std::string text(bytes.begin(), bytes.end());
+    while (text.ends_with('\0')) {
+        text.pop_back();
+    }
+    return text;
+}
+
+std::uint64_t natural(std::span<const std::uint8_t> bytes) {
+    std::uint64_t value = 0;
+    std::copy_n(bytes.begin(), std::min<std::size_t>(bytes.size(), 8),
+                reinterpret_cast<std::uint8_t*>(&value));
+    return value;
+}
+
+bool is_text(Type type) { return type == Type::visible_string; }
+bool is_number(Type type, std::size_t size) {
+    return canopen::bits_of(type) != 0 && canopen::bytes_of(type) == size &&
+           type != Type::time_of_day && type != Type::time_difference;
+}
+
+}  // namespace
+
+std::string ObjectName::label() const {
+    return fmt::format("{:04X}:{:X}{}", index, sub, name.empty() ? "" : " " + hal::printable(name));
+}
+
+bool ObjectNames::load(const Options& options, const std::string& file) {
+    if (file.empty()) return true;
+    std::string bytes;
+    if (!read_file(file, bytes)) {
+        fail(options, fmt::format("cannot read '{}': {}", file, bytes));
+        return false;
+    }
+    eds::Reading reading = eds::read_description(bytes);
+    if (!reading.description) {
+        fail(options, fmt::format("'{0}' is not a valid device description; for the "
+                                  "problems type: hal can eds check {0}",
+                                  file));
+
+        return false;
+    }
+    file_ = file;
+    doubts_ = reading.doubts();
+    print_doubts(options);
+    description_ = std::move(reading.description);
+    for (const eds::Object& object : description_->objects) {
+        for (const eds::Entry& entry : object.entries) {
+            const ObjectName name = object_of(object, entry);
+            if (object.single() || entry.sub == 0) {
+                rows_.push_back({plain(object.name), name});
+            }
+            if (object.single() || entry.sub == 0) continue;
+            rows_.push_back({plain(object.name + " " + entry.name), name});
+            rows_.push_back({plain(entry.name), name});
+        }
+    }
+    return true;
+}
+
+void ObjectNames::print_doubts(const Options& options) const {
+    constexpr std::size_t max_printed = 3;
+    for (std::size_t n = 0; n < doubts_.size() && n < max_printed; ++n) {
+        const eds::Message& doubt = doubts_[n];
+        fail(options, fmt::format("{}:{}: {}{}", file_, doubt.at.line, doubt.sentence,
+                                  doubt.help.empty() ? "" : "; " + doubt.help));
+    }
+    if (doubts_.size() > max_printed) {
+        fail(options, fmt::format("{} more; list them with: hal can eds check {}",
+                                  doubts_.size() - max_printed, file_));
+    }
+}
+
+ObjectName ObjectNames::named(std::uint16_t index, std::uint8_t sub) const {
+    if (description_) {
+        if (const eds::Object* object = description_->find(index)) {
+            if (const eds::Entry* entry = object->find(sub)) return object_of(*object, *entry);
+        }
+    }
+    return {index, sub, Type::none, {}};
+}
+
+bool ObjectNames::find(const std::string& text, ObjectName& out, std::string& problem) const {
+    unsigned index = 0;
+    unsigned sub = 0;
+    const auto colon = std::min(text.find(':'), text.find("sub"));
+    const std::string first = text.substr(0, colon);
+    const bool numbered =
+        hex_number(first, 0xffff, index) && (first.size() == 4 || first.starts_with("0x"));
+    if (numbered && (colon == text.npos ||
+                     hex_number(text.substr(colon + (text[colon] == ':' ? 1 : 3)), 0xff, sub))) {
+        out = named(static_cast<std::uint16_t>(index), static_cast<std::uint8_t>(sub));
+        return true;
+    }
+    if (!description_) {
+        problem = fmt::format(
+            "invalid object '{}'; write INDEX or INDEX:SUB in hex, such as 6041 or 1018:1, "
+            "or add --eds FILE for names",
+            text);
+
+        return false;
+    }
+    const std::string wanted = plain(text);
+    std::vector<const ObjectName*> found;
+    std::vector<std::string> names;
+    for (const Row& row : rows_) {
+        names.push_back(row.words);
+        const bool again = std::any_of(found.begin(), found.end(), [&](const ObjectName* f) {
+            return f->index == row.object.index && f->sub == row.object.sub;
+        });
+        if (row.words == wanted && !again) {
+            found.push_back(&row.object);
+        }
+    }
+    if (found.size() == 1) {
+        out = *found[0];
+        return true;
+    }
+    if (found.empty()) {
+        const std::string hint = did_you_mean(wanted, names);
+        problem = fmt::format("unknown object '{}' in {}; {}", text, file_,
+                              hint.empty() ? "write INDEX:SUB in hex, or one of its names" : hint);
+
+        return false;
+    }
+    std::string all;
+    for (std::size_t n = 0; n < found.size() && n < 4; ++n) {
+        all += (n == 0 ? "" : ", ") + fmt::format("{:04X}:{:X}", found[n]->index, found[n]->sub);
+    }
+    problem = fmt::format(
+        "ambiguous name '{}' of {} objects ({}{}); write the index, such as {:04X}:{:X}", text,
+        found.size(), all, found.size() > 4 ? ", …" : "", found[0]->index, found[0]->sub);
+
+    return false;
+}
+
+std::optional<Type> parse_type(std::string_view word) {
+    if (const gateway::Format* f = gateway::format(word); f && f->type != Type::none) {
+        return f->type;
+    }
+    if (const eds::DataType* type = eds::data_type(word)) {
+        return basic(type->code) != Type::none ? std::optional(basic(type->code)) : std::nullopt;
+    }
+    constexpr std::pair<std::string_view, Type> others[] = {{"bool", Type::boolean},
+                                                            {"string", Type::visible_string},
+                                                            {"octets", Type::octet_string},
+                                                            {"float", Type::real32},
+                                                            {"double", Type::real64}};
+    for (const auto& [name, type] : others) {
+        if (eds::same_word(name, word)) return type;
+    }
+    return std::nullopt;
+}
+
+std::string type_names() {
+    return "bool, i8 … i64, u8 … u64, r32, r64, visible_string, octet_string, unicode_string, "
+           "domain, time_of_day or time_difference";
+}
+
+std::string type_word(Type type) {
+    const gateway::Format* f = type == Type::none ? nullptr : gateway::format(type);
+    return f ? std::string(f->word) : "";
+}
+
+std::string hex_bytes(std::span<const std::uint8_t> bytes, const char* separator) {
+    std::string text;
+    for (const auto byte : bytes) {
+        text += fmt::format("{}{:02X}", text.empty() ? "" : separator, byte);
+    }
+    return text;
+}
+
+std::string value_text(std::span<const std::uint8_t> bytes, Type type) {
+    if (bytes.empty()) return "empty (0 bytes)";
+    const std::string raw =
+        bytes.size() <= 8 ? fmt::format("0x{:0{}X}", natural(bytes), 2 * bytes.size()) : "";
+    if (type == Type::boolean && bytes.size() == 1) {
+        return fmt::format("{} ({})", bytes[0] != 0 ? "true" : "false", raw);
+    }
+    if (is_number(type, bytes.size())) {
+        const std::string decimal = gateway::text_of(bytes, *gateway::format(type));
+        return canopen::is_signed(type) || canopen::is_real(type)
+                   ? fmt::format("{} ({})", decimal, raw)
+                   : fmt::format("{} ({})", raw, decimal);
+    }
+    if ((type == Type::time_of_day || type == Type::time_difference) && bytes.size() == 6) {
+        const auto ms = natural(bytes.first(4)) & 0x0fffffff;
+        return fmt::format("{} days {:02}:{:02}:{:02}.{:03} ({})", natural(bytes.subspan(4)),
+                           ms / 3'600'000, ms / 60'000 % 60, ms / 1000 % 60, ms % 1000, raw);
+    }
+    const auto count = [&] {
+        return fmt::format("{} byte{}", bytes.size(), bytes.size() == 1 ? "" : "s");
+    };
+    if (is_text(type) || (type == Type::none && bytes.size() > 8 && looks_like_text(bytes))) {
+        return fmt::format("\"{}\" ({})", hal::printable(text_in(bytes), 10'000), count());
+    }
+    if (type == Type::none && bytes.size() <= 8) {
+        const unsigned unused = 64 - 8 * static_cast<unsigned>(bytes.size());
+        const auto integer = static_cast<std::int64_t>(natural(bytes) << unused) >> unused;
+        return fmt::format(
+            "{} ({}{}{})", raw, natural(bytes), integer < 0 ? fmt::format(", or {}", integer) : "",
+            looks_like_text(bytes) ? fmt::format(", or \"{}\"", text_in(bytes)) : "");
+    }
+    constexpr std::size_t max = 32;
+    const std::string no_such =
+        canopen::bits_of(type) != 0
+            ? fmt::format("; {} has {}", type_word(type), canopen::bytes_of(type))
+            : "";
+    return fmt::format("{}{} ({}{})", hex_bytes(bytes.first(std::min(bytes.size(), max)), " "),
+                       bytes.size() > max ? " …" : "", count(), no_such);
+}
+
+std::string value_json(std::span<const std::uint8_t> bytes, Type type) {
+    if (type == Type::boolean && bytes.size() == 1) return bytes[0] != 0 ? "true" : "false";
+    if (is_text(type)) return json_text(text_in(bytes));
+    if (is_number(type, bytes.size())) {
+        const std::string text = gateway::text_of(bytes, *gateway::format(type));
+        // nan and inf are invalid in JSON
+        return text.find_first_of("nN") == text.npos ? text : json_text(text);
+    }
+    if (type == Type::none && !bytes.empty() && bytes.size() <= 8) {
+        return fmt::format("{}", natural(bytes));
+    }
+    if (type == Type::none && looks_like_text(bytes)) return json_text(text_in(bytes));
+    return json_text(hex_bytes(bytes, ""));
+}
+
+bool parse_value(const std::string& text, Type type, std::vector<std::uint8_t>& bytes,
+                 std::string& problem) {
+    if (is_text(type)) {
+        bytes.assign(text.begin(), text.end());
+        return true;
+    }
+    const eds::Encoded value = eds::encode_strictly(text, static_cast<std::uint16_t>(type), 0);
+    if (!value) {
+        problem = value.error;
+        return false;
+    }
+    if (value.node_id) {
+        problem = fmt::format("invalid value '{}' with $NODEID; write the number", text);
+
+        return false;
+    }
+    if (value.bytes.empty() && canopen::bits_of(type) != 0) {
+        problem = "empty value";
+        return false;
+    }
+    bytes = value.bytes;
+    return true;
+}
+
+}  // namespace hal::tools
