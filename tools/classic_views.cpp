@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "cli/output.hpp"
-#include "commands.hpp"
+#include "command_line.hpp"
 
 namespace hal::tools {
 namespace {

@@ -1,15 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The table of subcommands: a row per command. The options are declared in the command's own
 // header.
-#include "commands.hpp"
-
-#include <algorithm>
-#include <fmt/format.h>
-#include <memory>
-#include <optional>
-#include <type_traits>
-
-#include "base/tree_packages.hpp"
 #include "bus/can/dump.hpp"
 #include "bus/can/load.hpp"
 #include "bus/can/record.hpp"
@@ -34,10 +25,6 @@
 #include "bus/node/kinds.hpp"
 #include "bus/scocan/plan.hpp"
 #include "bus/tdma/plan.hpp"
-#include "cli/option_set.hpp"
-#include "cli/other_program.hpp"
-#include "cli/output.hpp"
-#include "commands/table.hpp"
 #include "comp/compile.hpp"
 #include "comp/new.hpp"
 #include "completion.hpp"
@@ -53,8 +40,6 @@
 #include "inspect/top.hpp"
 #include "linuxcnc/linuxcnc.hpp"
 #include "panel/panel.hpp"
-#include "part.hpp"
-#include "paths.hpp"
 #include "record/plot.hpp"
 #include "run/check.hpp"
 #include "run/examples.hpp"
@@ -66,45 +51,12 @@
 #include "scope/meter.hpp"
 #include "scope/scope.hpp"
 #include "scope/watch.hpp"
-#include "text/diagnostic.hpp"
+#include "subcommand.hpp"
 #include "trace/trace.hpp"
 
 namespace hal::tools {
 
 namespace {
-
-struct Subcommand {
-    const char* name;     ///< more than one word in a group: "can dump"
-    const char* usage;    ///< what may follow the name
-    const char* summary;
-    std::unique_ptr<Options> (*make_options)();
-    Part part;
-    int (*run)(const Options&);  ///< nullptr: in another program
-    /// from the first word on, everything counts as words, including `-1` and `--`
-    bool verbatim;
-    /// whether these options need hal-tools, although `hal` has the command
-    bool (*needs_tools)(const Options&) = nullptr;
-    const char* package = "";  ///< of the tree; empty: the core
-
-    /// The package, where this build leaves it out; else nullptr.
-    const TreePackage* missing_package() const {
-        const TreePackage* const found = find_tree_package(package);
-        return found && !found->built() ? found : nullptr;
-    }
-};
-
-/// Makes a row. `Where` is an In, whose function takes the command's own options, O.
-template <class O, class Where>
-constexpr Subcommand command(const char* name, const char* usage, const char* summary,
-                             bool verbatim = false) {
-    const auto make = []() -> std::unique_ptr<Options> { return std::make_unique<O>(); };
-    Subcommand row{name,    usage,    summary, make,          Where::part,
-                   nullptr, verbatim, nullptr, Where::package};
-    if constexpr (!std::is_null_pointer_v<std::remove_const_t<decltype(Where::run)>>) {
-        row.run = [](const Options& options) { return Where::run(static_cast<const O&>(options)); };
-    }
-    return row;
-}
 
 constexpr Subcommand sim_command() {
     Subcommand row = command<SimOptions, IN_CORE(run_sim)>(
@@ -383,12 +335,6 @@ constexpr Subcommand table[] = {
         "completion", "SHELL", "print a completion script: source <(hal completion bash)"),
 };
 
-/// Commands of two and more words have a first word in common.
-struct Group {
-    const char* name;
-    const char* purpose;
-};
-
 constexpr Group groups[] = {
     {"can", "CAN bus tools"},
     {"canopen", "tools for the configuration of a CANopen network"},
@@ -400,348 +346,14 @@ constexpr Group groups[] = {
      "injected"},
 };
 
-const Group* find_group(std::string_view name) {
-    const auto* group = std::find_if(std::begin(groups), std::end(groups),
-                                     [&](const Group& g) { return name == g.name; });
-    return group == std::end(groups) ? nullptr : group;
-}
-
-/// Whether the command is in a group, and this build has it.
-bool belongs(const Subcommand& row, const Group& group) {
-    return !row.missing_package() &&
-           std::string_view(row.name).starts_with(std::string(group.name) + " ");
-}
-
-/// The package of a group without commands, because this build leaves it out; else nullptr.
-const TreePackage* missing_package(const Group& group) {
-    const TreePackage* missing = nullptr;
-    for (const Subcommand& row : table) {
-        if (belongs(row, group)) return nullptr;
-        if (std::string_view(row.name).starts_with(std::string(group.name) + " ")) {
-            missing = row.missing_package();
-        }
-    }
-    return missing;
-}
-
-/// The purpose, and the second words of the commands: `time slots of a CAN bus: plan`.
-std::string summary_of(const Group& group) {
-    std::vector<std::string_view> names;
-    for (const Subcommand& row : table) {
-        if (!belongs(row, group)) continue;
-        std::string_view name = row.name;
-        name.remove_prefix(std::string_view(group.name).size() + 1);
-        name = name.substr(0, name.find(' '));
-        if (names.empty() || names.back() != name) names.push_back(name);
-    }
-    return fmt::format("{}: {}", group.purpose, fmt::join(names, ", "));
-}
-
-struct Found {
-    const Subcommand* row = nullptr;
-    std::size_t words = 0;  ///< number of typed words that form its name
-};
-
-/// Returns the row with the longest name that matches the typed words.
-Found find(const std::vector<std::string>& typed) {
-    Found found;
-    std::string name;
-    for (std::size_t i = 0; i < typed.size() && i < 4; ++i) {
-        name += (i == 0 ? "" : " ") + typed[i];
-        const auto* row = std::find_if(std::begin(table), std::end(table),
-                                       [&](const Subcommand& s) { return name == s.name; });
-        if (row != std::end(table)) {
-            found = {row, i + 1};
-        }
-    }
-    return found;
-}
-
-std::string overview() {
-    std::string text =
-        "Halcyon: control components, wired by netlists, run in real-time threads.\n\nusage: hal "
-        "COMMAND …\n\n";
-    const Group* last = nullptr;
-    for (const Subcommand& row : table) {
-        if (row.missing_package()) continue;
-        const std::string_view name(row.name);
-        const Group* group = find_group(name.substr(0, name.find(' ')));
-        if (group == nullptr) {
-            text += fmt::format("  {:11} {}\n", row.name, row.summary);
-        } else if (group != last) {
-            text += fmt::format("  {:11} {}\n", group->name, summary_of(*group));
-        }
-        last = group;
-    }
-    return text +
-           "\nFor details: hal help COMMAND. A first try: hal examples furuta/hang --for "
-           "10s\n";
-}
-
-std::string help_of(const Group& group) {
-    std::string text = fmt::format("hal {}: {}\n\nusage: hal {} COMMAND …\n\n", group.name,
-                                   group.purpose, group.name);
-    for (const Subcommand& row : table) {
-        if (belongs(row, group)) {
-            text += fmt::format("  {:16} {}\n", row.name, row.summary);
-        }
-    }
-    return text + fmt::format("\nFor details: hal help {} COMMAND.\n", group.name);
-}
-
-std::string help_of(const Subcommand& row) {
-    const auto options = row.make_options();
-    const OptionSet set(*options, row.name, row.summary);
-    return fmt::format("hal {}: {}\n\nusage: hal {} {}\n", row.name, row.summary, row.name,
-                       row.usage) +
-           set.help();
-}
-
-int no_such_command(const std::vector<std::string>& typed) {
-    Options options;
-    std::string word = typed.front();
-    if (!word.empty() && word[0] == '-') {
-        return fail(options, fmt::format("unknown option '{}'; type: hal help", word));
-    }
-    const auto ends = [&](std::string_view end) {
-        return word.size() > end.size() && word.ends_with(end);
-    };
-    if (ends(".hal") || ends(".ini")) {
-        return fail(options,
-                    fmt::format("'{0}' is not a command; to run it type: hal run {0}", word));
-    }
-    if (!find_group(word) && find_command(word)) {
-        return fail(options, fmt::format("'{0}' is a command of the shell; to run it in a running "
-                                         "machine type: hal shell {1}",
-                                         word, fmt::join(typed, " ")));
-    }
-    std::vector<std::string> names = {"help"};
-    std::string where = "hal help";
-    if (const Group* group = find_group(word)) {
-        if (typed.size() > 1) {
-            word += " " + typed[1];
-        }
-        where += fmt::format(" {}", group->name);
-        names.clear();
-        for (const Subcommand& row : table) {
-            if (belongs(row, *group)) {
-                names.emplace_back(row.name);
-            }
-        }
-    } else {
-        for (const Subcommand& row : table) {
-            if (!row.missing_package()) {
-                names.emplace_back(row.name);
-            }
-        }
-        for (const Group& g : groups) {
-            names.emplace_back(g.name);
-        }
-    }
-    const std::string hint = did_you_mean(word, names);
-    return fail(options, fmt::format("unknown command '{}'; {}", word,
-                                     hint.empty() ? "type: " + where : hint));
-}
-
-/// Reports that a command is in a package that this build leaves out.
-int refuse(const char* command, const TreePackage& package) {
-    Options options;
-    options.program = fmt::format("hal {}", command);
-    return fail(options, package.problem());
-}
-
-std::string version_text() {
-    std::string built;
-    std::string left_out;
-    for (const TreePackage& p : tree_packages) {
-        std::string& list = p.built() ? built : left_out;
-        list += fmt::format("{}{}", list.empty() ? "" : ", ", p.name);
-        if (p.state == PackageState::switched_off) {
-            list += fmt::format(" ({}=OFF)", package_switch(p.name));
-        } else if (!p.built()) {
-            list += fmt::format(" (needs {})", p.needs);
-        }
-    }
-    std::string text = fmt::format("hal {} (commit {})\npackages: {}\n", paths::version,
-                                   paths::commit, built.empty() ? "none, the core alone" : built);
-    if (!left_out.empty()) {
-        text += fmt::format("left out: {}\n", left_out);
-    }
-    return text;
-}
-
-std::string version_json() {
-    std::string packages;
-    for (const TreePackage& p : tree_packages) {
-        packages += fmt::format(
-            R"({}{{"name":"{}","summary":"{}","built":{},"switch":"{}","needs":"{}"}})",
-            packages.empty() ? "\n " : ",\n ", p.name, p.summary, p.built(),
-            package_switch(p.name), p.needs);
-    }
-    return fmt::format(R"({{"version":"{}","commit":"{}","packages":[{}]}})", paths::version,
-                       paths::commit, packages) +
-           "\n";
-}
-
-/// `hal --version [--json]`.
-int print_version(const std::vector<std::string>& words) {
-    if (words.empty()) return print(version_text()) ? 0 : 1;
-    if (words.size() == 1 && words[0] == "--json") return print(version_json()) ? 0 : 1;
-    const std::string& extra = words[0] == "--json" ? words[1] : words[0];
-    return fail(Options{}, fmt::format("unexpected argument '{}'; type: hal --version --json, or "
-                                       "hal --version",
-                                       extra));
-}
-
-int help(const std::vector<std::string>& about) {
-    if (about.empty()) return print(overview()) ? 0 : 1;
-    if (const Found found = find(about); found.row) {
-        const TreePackage* const missing = found.row->missing_package();
-        if (missing) return refuse(found.row->name, *missing);
-        return print(help_of(*found.row)) ? 0 : 1;
-    }
-    if (const Group* group = find_group(about.front()); group && about.size() == 1) {
-        const TreePackage* const missing = missing_package(*group);
-        if (missing) return refuse(group->name, *missing);
-        return print(help_of(*group)) ? 0 : 1;
-    }
-    // The common beginning of some commands: can sdo, can eds.
-    std::string start, text;
-    for (const std::string& word : about) {
-        start += word + " ";
-    }
-    for (const Subcommand& row : table) {
-        if (!row.missing_package() && std::string_view(row.name).starts_with(start)) {
-            text += fmt::format("  {:16} {}\n", row.name, row.summary);
-        }
-    }
-    if (!text.empty()) {
-        return print(fmt::format("usage: hal {}COMMAND …\n\n{}\nFor details: hal help {}COMMAND.\n",
-                                 start, text, start))
-                   ? 0
-                   : 1;
-    }
-    return no_such_command(about);
-}
-
-/// Returns what to type in place of an unknown option; never another option of one letter.
-std::string option_hint(const Subcommand& row, const std::string& unknown,
-                        const std::vector<std::string>& names) {
-    const std::string help = fmt::format("see: hal help {}", row.name);
-    const std::string option = unknown.substr(0, unknown.find('='));
-    const bool is_output = option.starts_with("-o") || option == "--output";
-    if (is_output && row.name == std::string_view("record")) {
-        return fmt::format("the file is the first word: hal {} {}", row.name, row.usage);
-    }
-    if (is_output && std::find(names.begin(), names.end(), "--record") != names.end()) {
-        return "did you mean '--record'?";
-    }
-    if (option.size() > 2) {
-        const std::string hint = did_you_mean(option, names);
-        return hint.empty() ? help : hint;
-    }
-    return help;
-}
-
-/// Reads `arguments` into `options`. Returns an exit code when the program must exit.
-std::optional<int> read(const Subcommand& row, std::vector<std::string> arguments,
-                        Options& options) {
-    OptionSet set(options, row.name, row.summary);
-    if (const auto dashes = std::find(arguments.begin(), arguments.end(), "--");
-        !row.verbatim && dashes != arguments.end()) {
-        options.arguments.assign(dashes + 1, arguments.end());
-        arguments.erase(dashes, arguments.end());
-    }
-    const OptionSet::Reading reading = set.read(std::move(arguments));
-    switch (reading.outcome) {
-    case OptionSet::Outcome::good: break;
-    case OptionSet::Outcome::help: return print(help_of(row)) ? 0 : 1;
-    case OptionSet::Outcome::missing:
-        return fail(options, fmt::format("missing argument; type: hal {} {}", row.name, row.usage));
-    case OptionSet::Outcome::bad:
-        return fail(options, fmt::format("{}; see: hal help {}", reading.problem, row.name));
-    }
-    const std::vector<std::string>& extra = reading.extra;
-    if (row.verbatim) {
-        if (!extra.empty() && extra.front().size() > 1 && extra.front()[0] == '-' &&
-            !(extra.front() == "--")) {
-            return fail(options, fmt::format("unknown option '{}'; {}", extra.front(),
-                                             option_hint(row, extra.front(), set.names())));
-        }
-        options.words.assign(extra.begin() + (!extra.empty() && extra.front() == "--"),
-                             extra.end());
-    } else if (!extra.empty()) {
-        const bool is_option = extra.front().starts_with('-');
-        return fail(options, is_option ? fmt::format("unknown option '{}'; {}", extra.front(),
-                                                     option_hint(row, extra.front(), set.names()))
-                                       : fmt::format("unexpected argument '{}'; see: hal help {}",
-                                                     extra.front(), row.name));
-    }
-    return std::nullopt;
-}
-
 }  // namespace
 
-int run_command_line(int argc, char** argv) {
-    const std::vector<std::string> all(argv + std::min(argc, 1), argv + argc);
-    if (all.empty()) {
-        return help({});
-    }
-    if (all[0] == "help" || all[0] == "--help" || all[0] == "-h") {
-        return help({all.begin() + 1, all.end()});
-    }
-    if (all[0] == "--version" || all[0] == "version") {
-        return print_version({all.begin() + 1, all.end()});
-    }
-    const auto [row, name_words] = find(all);
-    if (const Group* const group = row ? nullptr : find_group(all[0])) {
-        if (const TreePackage* const missing = missing_package(*group)) {
-            return refuse(group->name, *missing);
-        }
-    }
-    if (!row && find_group(all[0]) &&
-        (all.size() == 1 || all[1] == "help" || all[1] == "--help" || all[1] == "-h")) {
-        return help({all[0]});
-    }
-    if (!row) return no_such_command(all);
-    if (const TreePackage* const missing = row->missing_package()) {
-        return refuse(row->name, *missing);
-    }
-    if (!row->run) return become_program(program_of(row->part), argv);
-    const auto options = row->make_options();
-    options->program = fmt::format("hal {}", row->name);
-    if (const auto end = read(
-            *row, {all.begin() + static_cast<std::ptrdiff_t>(name_words), all.end()}, *options)) {
-        return *end;
-    }
-    if (row->needs_tools && row->needs_tools(*options)) {
-        return become_program(program_of(Part::tools), argv);
-    }
-    return row->run(*options);
+std::span<const Subcommand> subcommands() {
+    return table;
 }
 
-std::vector<Completion> completions() {
-    std::vector<Completion> all;
-    for (const Subcommand& row : table) {
-        if (row.missing_package()) continue;
-        const auto options = row.make_options();
-        const std::string name = row.name;
-        const auto space = name.find(' ');
-        if (all.empty() || all.back().name != name.substr(0, space)) {
-            all.push_back({name.substr(0, space), {}, {}});
-        }
-        if (space != name.npos) {
-            all.back().words.push_back(
-                name.substr(space + 1, name.find(' ', space + 1) - space - 1));
-        }
-        for (std::string& option : OptionSet(*options, row.name, row.summary).names()) {
-            if (auto& known = all.back().options;
-                std::find(known.begin(), known.end(), option) == known.end()) {
-                known.push_back(std::move(option));
-            }
-        }
-    }
-    return all;
+std::span<const Group> subcommand_groups() {
+    return groups;
 }
 
 }  // namespace hal::tools

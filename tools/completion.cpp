@@ -5,7 +5,7 @@
 #include <fmt/core.h>
 
 #include "cli/output.hpp"
-#include "commands.hpp"
+#include "command_line.hpp"
 
 namespace hal::tools {
 
@@ -50,7 +50,7 @@ int run_completion(const CompletionOptions& options) {
         return fail(options, "unsupported shell; type: hal completion bash");
     }
     std::string commands = "help", cases, groups;
-    for (const Completion& completion : completions()) {
+    for (const CompletionEntry& completion : completions()) {
         commands += " " + completion.name;
         std::string all;
         for (const std::string& option : completion.options) {

@@ -17,7 +17,7 @@
 #include "cli/other_program.hpp"
 #include "cli/output.hpp"
 #include "cli/standard_streams.hpp"
-#include "commands.hpp"
+#include "command_line.hpp"
 #include "execute/process_setup.hpp"
 
 namespace {
