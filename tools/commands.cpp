@@ -195,7 +195,7 @@ constexpr Subcommand table[] = {
     command<CanopenCheckOptions, OF_CANOPEN(run_canopen_check)>(
         "canopen check", "FILE…", "check a network configuration and list its pins"),
     command<CanopenPlanOptions, OF_CANOPEN(run_canopen_plan)>(
-        "canopen plan", "FILE [--cycle TIME] [--json]",
+        "canopen plan", "FILE [--cycle TIME] [--json | --svg FILE]",
         "compute worst-case response times of all messages of a bus"),
     command<EthercatOptions, OF_ETHERCAT(run_ethercat_scan)>(
         "ethercat scan", "ADDRESS|--emulate LINE [--json]",
@@ -263,7 +263,7 @@ constexpr Subcommand table[] = {
     command<EthercatCheckOptions, OF_ETHERCAT(run_ethercat_check)>(
         "ethercat check", "FILE… [--json]", "check the configuration of a bus and list its pins"),
     command<EthercatPlanOptions, OF_ETHERCAT(run_ethercat_plan)>(
-        "ethercat plan", "FILE [--json]",
+        "ethercat plan", "FILE [--json | --svg FILE]",
         "compute frames, wire time, cycle time and latency of a bus"),
     command<EthercatLcecOptions, OF_ETHERCAT(run_ethercat_lcec_conf)>(
         "ethercat lcec-conf", "FILE [--name NAME]",

@@ -5,6 +5,7 @@
 import json
 import re
 import unittest
+import xml.etree.ElementTree
 
 from harness import Case
 
@@ -90,6 +91,27 @@ class Plan(Case):
             "hal canopen plan: --cycle is for configurations; a recording has its own SYNCs\n",
             self.bad("canopen", "plan", "bus.log", "--bitrate", "1M", "--cycle", "2ms"),
         )
+
+    def test_picture(self):
+        self.write("plan.canopen", PLAN.replace("125k", "250k"))
+        self.assertEqual("", self.good("canopen", "plan", "plan.canopen", "--svg", "plan.svg"))
+        picture = (self.folder / "plan.svg").read_text()
+        drawn = xml.etree.ElementTree.fromstring(picture)
+        texts = [t.text for t in drawn.iter("{http://www.w3.org/2000/svg}text")]
+        self.assertIn("Worst-case response time of each message and its deadline, ms", texts)
+        self.assertEqual(1, sum(text.startswith("102 C") for text in texts))
+        self.assertEqual(picture, self.good("canopen", "plan", "plan.canopen", "--svg", "-"))
+        self.assertEqual(
+            "hal canopen plan: --json and --svg exclude each other\n",
+            self.bad("canopen", "plan", "plan.canopen", "--json", "--svg", "plan.svg"),
+        )
+
+    def test_a_late_message_is_drawn_and_reported(self):
+        self.write("plan.canopen", PLAN)
+        done = self.run_program("canopen", "plan", "plan.canopen", "--svg", "plan.svg")
+        self.assertEqual(1, done.returncode)
+        self.assertIn("plan.canopen:8: 102 (C) needs 3.500 ms", done.stderr)
+        self.assertTrue((self.folder / "plan.svg").exists())
 
     def test_a_bus_in_Ethernet_frames_has_another_plan(self):
         self.write(

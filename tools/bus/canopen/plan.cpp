@@ -9,14 +9,13 @@
 #include <unistd.h>
 
 #include "base/types.hpp"
+#include "bus/timeline/plan_output.hpp"
+#include "bus/timeline/text_table.hpp"
 #include "canopen/master/config/bus_schedule.hpp"
 #include "canopen/master/config/config_lines.hpp"
-#include "cli/output.hpp"
 #include "fieldbus/can_timing/recorded.hpp"
 #include "link/can.hpp"
 #include "link/capture.hpp"
-#include "text/diagnostic.hpp"
-#include "text/glyphs.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::tools {
@@ -99,29 +98,32 @@ std::string called(const Row& row) {
                             : fmt::format("{} ({})", id_of(row.message), row.name);
 }
 
+std::string length_text(const can_timing::Message& m) {
+    if (m.remote) return "R";
+    const char* const form = m.bit_rate_switch ? "brs" : "fd";
+    return fmt::format("{}{}", m.bytes, m.fd || m.bit_rate_switch ? form : "");
+}
+
+std::string used_text(const can_timing::Message& m, const can_timing::Response& r) {
+    if (r.worst < 0) return "-";
+    return fmt::format("{:.0f} %",
+                       100.0 * static_cast<double>(r.worst) / static_cast<double>(m.limit()));
+}
+
 std::string table_text(const Table& table, const can_timing::Analysis& a) {
-    std::string text = fmt::format("{:>8}  {:>6}  {:>5}  {:>10}  {:>10}  {:>10}  {:>6}\n", "id",
-                                   "bytes", "bits", "period ms", "deadline", "worst", "used");
+    TextTable rows({{"id", 8},
+                    {"bytes", 6},
+                    {"bits", 5},
+                    {"period ms", 10},
+                    {"deadline", 10},
+                    {"worst", 10},
+                    {"used", 6},
+                    {"", 0, true}});
     for (std::size_t i = 0; i < table.rows.size(); ++i) {
         const can_timing::Message& m = table.rows[i].message;
         const can_timing::Response& r = a.responses[i];
-        const std::string used =
-            r.worst < 0 ? "-"
-                        : fmt::format("{:.0f} %", 100.0 * static_cast<double>(r.worst) /
-                                                      static_cast<double>(m.limit()));
-        const std::string bytes = m.remote ? "R"
-                                           : fmt::format("{}{}", m.bytes,
-                                                         m.bit_rate_switch ? "brs"
-                                                         : m.fd            ? "fd"
-                                                                           : "");
-        std::string line =
-            fmt::format("{:>8}  {:>6}  {:>5}  {:>10}  {:>10}  {:>10}  {:>6}  {}{}", id_of(m), bytes,
-                        r.bits, ms(m.period), ms(m.limit()), ms(r.worst), used,
-                        r.in_time ? "" : "LATE ", table.rows[i].name);
-        while (line.back() == ' ') {
-            line.pop_back();
-        }
-        text += line + "\n";
+        rows.add({id_of(m), length_text(m), fmt::format("{}", r.bits), ms(m.period), ms(m.limit()),
+                  ms(r.worst), used_text(m, r), (r.in_time ? "" : "LATE ") + table.rows[i].name});
     }
     std::string errors;
     if (const can_timing::Errors& e = table.bus.errors; e.burst != 0) {
@@ -129,9 +131,29 @@ std::string table_text(const Table& table, const can_timing::Analysis& a) {
             fmt::format("; errors: {} at once{}", e.burst,
                         e.period == 0 ? "" : fmt::format(" and 1 in every {} ms", ms(e.period)));
     }
-    return text + table.notes +
+    return rows.text() + table.notes +
            fmt::format("{} messages at {} bit/s: load {:.1f} % with all stuff bits{}\n",
                        table.rows.size(), table.bus.bit_rate, 100 * a.load, errors);
+}
+
+/// Returns the response times, with their deadlines.
+Timeline timeline_of(const Table& table, const can_timing::Analysis& a) {
+    Timeline timeline;
+    timeline.command = "hal canopen plan";
+    timeline.title = fmt::format("{} messages at {} bit/s: load {:.1f} % with all stuff bits",
+                                 table.rows.size(), table.bus.bit_rate, 100 * a.load);
+    timeline.response_title = "Worst-case response time of each message and its deadline, ms";
+    for (std::size_t i = 0; i < table.rows.size(); ++i) {
+        const can_timing::Response& r = a.responses[i];
+        ResponseTime one;
+        one.name = fmt::format("{} {}", id_of(table.rows[i].message), table.rows[i].name);
+        one.worst_ns = r.worst;
+        one.colour = r.in_time ? Colour::leader : Colour::compared;
+        one.deadline_ns = table.rows[i].message.limit();
+        timeline.responses.push_back(std::move(one));
+    }
+    timeline.summary = {"Red lines: deadlines. Red bars: messages that may miss them."};
+    return timeline;
 }
 
 /// Explains the response time of a late message.
@@ -240,22 +262,10 @@ int read_configuration(const Options& options, const std::string& file, config::
         return fail(options, fmt::format("cannot read '{}': {}", file, text));
     }
     reading = config::read(text, file);
-    Sources sources;
-    const std::uint32_t source = sources.add(file, text);
-    Diagnostics found;
-    for (const config::Message& m : reading.messages) {
-        const Severity severities[] = {Severity::note, Severity::warning, Severity::error};
-        Diagnostic d{severities[static_cast<std::size_t>(m.severity)],
-                     Code::named(config::code_of(m.topic)).value_or(Code("canopen-line")),
-                     m.sentence};
-        d.labels.push_back({Span{source, m.at.offset, m.at.offset + m.at.length}, m.label});
-        if (!m.help.empty()) {
-            d.help.push_back(m.help);
-        }
-        found.add(std::move(d));
-    }
-    write_all(STDERR_FILENO, render(found, sources, colours(STDERR_FILENO)));
-    return found.failed() ? 1 : 0;
+    const auto code = [](const config::Message& m) {
+        return Code::named(config::code_of(m.topic)).value_or(Code("canopen-line"));
+    };
+    return print_findings(file, text, reading.messages, code) ? 0 : 1;
 }
 
 const char* word(config::PinType type) {
@@ -344,7 +354,15 @@ int report_plan(const CanopenPlanOptions& options, const std::string& file, cons
         messages.push_back(row.message);
     }
     const can_timing::Analysis a = can_timing::analyse(messages, table.bus);
-    if (!print(options.json ? json_text(table, a) : table_text(table, a))) return 1;
+    if (!options.svg.empty()) {
+        const Timeline timeline = timeline_of(table, a);
+        if (const int status = write_picture(options, options.svg, options.json, timeline);
+            status != 0) {
+            return status;
+        }
+    } else if (!print(options.json ? json_text(table, a) : table_text(table, a))) {
+        return 1;
+    }
     if (a.fits) return 0;
     std::string text;
     std::size_t late = 0;

@@ -9,6 +9,7 @@ namespace hal::tools {
 
 struct CanopenPlanOptions : Options {
     std::string cycle, errors, bitrate;
+    std::string svg;  ///< a file for the picture; -: standard output; empty: not given
     bool json = false;
 
     void declare(OptionSet& set) override {
@@ -21,6 +22,8 @@ struct CanopenPlanOptions : Options {
         set.value("--bitrate", bitrate, "RATE", "bit rate of the bus, for a recording: 500k");
         set.value("--cycle", cycle, "TIME",
                   "period of the master's thread, for a SYNC in every cycle (default 1ms)");
+        set.value("--svg", svg, "FILE",
+                  "draw the response times to this file; -: standard output");
         set.flag("--json", json, "print JSON");
     }
 };

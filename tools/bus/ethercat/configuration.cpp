@@ -8,7 +8,7 @@
 #include "bus/ethercat/plan_picture.hpp"
 #include "bus/ethercat/wire.hpp"
 #include "bus/ethercat/words.hpp"
-#include "cli/output.hpp"
+#include "bus/timeline/plan_output.hpp"
 #include "ethercat/config/plan.hpp"
 #include "ethercat/wire/registers.hpp"
 
@@ -215,17 +215,14 @@ int run_ethercat_plan(const EthercatPlanOptions& options) {
     config::Reading reading;
     if (!read_bus_file(options, options.words[0], reading)) return 1;
     if (!options.svg.empty()) {
-        if (options.json) return fail(options, "--json and --svg exclude each other");
         if (reading.buses.size() != 1) {
             return fail(options, fmt::format("{} has {} masters; a picture shows one",
                                              options.words[0], reading.buses.size()));
         }
         const config::PlanOptions assumed;
         const config::Plan p = config::plan(reading.buses[0], assumed);
-        const std::string picture = ethercat_plan_picture(reading.buses[0], p, assumed);
-        if (options.svg == "-") return print(picture) ? 0 : 1;
-        const std::string why = write_file(options.svg, picture);
-        return why.empty() ? 0 : fail(options, why);
+        return write_picture(options, options.svg, options.json,
+                             timeline_of(reading.buses[0], p, assumed));
     }
     std::string text, json;
     bool fits = true;

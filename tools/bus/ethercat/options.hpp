@@ -100,7 +100,7 @@ struct EthercatPlanOptions : Options {
     void declare(OptionSet& set) override {
         set.words("FILE",
                   "configuration of the bus, NAME.ethercat or LinuxCNC's ethercat-conf.xml");
-        set.value("--svg", svg, "FILE", "draw the timing of a cycle instead; - prints it");
+        set.value("--svg", svg, "FILE", "draw the timing of a cycle to this file; -: standard output");
         set.flag("--json", json, "print JSON");
     }
 };

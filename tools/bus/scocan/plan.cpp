@@ -10,11 +10,11 @@
 #include <utility>
 
 #include "bus/scocan/plan_picture.hpp"
-#include "cli/output.hpp"
+#include "bus/timeline/letter_strip.hpp"
+#include "bus/timeline/plan_output.hpp"
+#include "bus/timeline/text_table.hpp"
 #include "hal/read_file.hpp"
 #include "link/timing.hpp"
-#include "text/diagnostic.hpp"
-#include "text/glyphs.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::tools {
@@ -42,73 +42,85 @@ std::string node_list(const Table& t) {
     return text;
 }
 
-/// Draws a letter per slot: | SYNC, . shared, a letter per node.
+/// A letter per node; | SYNC, . shared.
+char mark_of(const std::vector<Use>& uses) {
+    if (uses.empty()) return '.';
+    switch (uses.front().kind) {
+    case Kind::shared: return '.';
+    case Kind::sync: return '|';
+    case Kind::priv: break;
+    }
+    return strip_letter(uses.front().node);
+}
+
 std::string timeline_text(const Table& t, const Mode& m) {
-    constexpr std::string_view letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
-    std::string line, key;
+    std::string line;
     std::vector<bool> used(t.nodes.size());
     for (const auto& uses : m.slots) {
-        const Use* u = uses.empty() ? nullptr : &uses.front();
-        if (u == nullptr || u->kind == Kind::shared) {
-            line += '.';
-        } else if (u->kind == Kind::sync) {
-            line += '|';
-        } else {
-            line += letters[u->node % letters.size()];
-        }
+        line += mark_of(uses);
         for (const Use& one : uses) {
             if (one.kind == Kind::priv) {
                 used[one.node] = true;
             }
         }
     }
-    for (std::size_t i = 0; i < used.size(); ++i) {
-        if (used[i]) {
-            key += fmt::format(", {} {}", letters[i % letters.size()], t.nodes[i].name);
-        }
+    std::vector<std::string> names;
+    for (const Node& node : t.nodes) {
+        names.push_back(node.name);
     }
-    return fmt::format("{}\n| SYNC, . shared{}\n", line, key);
+    const std::string key = strip_key(names, used);
+    return fmt::format("{}\n| SYNC, . shared{}{}\n", line, key.empty() ? "" : ", ", key);
+}
+
+std::string identifiers(const Use& use) {
+    if (use.kind == Kind::sync) return "0x000";
+    std::string ids;
+    for (const std::uint32_t id : use.ids) {
+        ids += (ids.empty() ? "" : " ") + scocan::id_text(id);
+    }
+    if (ids.empty()) {
+        ids = "any";
+    }
+    return use.every > 1 ? ids + fmt::format(", cycles {} of {}", use.offset, use.every) : ids;
 }
 
 std::string slots_text(const Table& t, const Mode& m) {
-    std::string text = fmt::format("{:>4}  {:>9}  {:<10} {:<16} {}\n", "slot", "from us", "use",
-                                   "node", "identifiers");
+    TextTable table({{"slot", 4},
+                     {"from us", 9},
+                     {"use", 10, true},
+                     {"node", 16, true, " "},
+                     {"identifiers", 0, true, " "}});
     for (std::uint32_t slot = 0; slot < t.slots; ++slot) {
         for (const Use& u : m.slots[slot]) {
             if (u.kind == Kind::shared) continue;
-            std::string ids;
-            if (u.kind == Kind::sync) {
-                ids = "0x000";
-            } else if (u.ids.empty()) {
-                ids = "any";
-            }
-            for (const std::uint32_t id : u.ids) {
-                ids += (ids.empty() ? "" : " ") + scocan::id_text(id);
-            }
-            if (u.every > 1) {
-                ids += fmt::format(", cycles {} of {}", u.offset, u.every);
-            }
-            text += fmt::format("{:>4}  {:>9g}  {:<10} {:<16} {}\n", slot,
-                                static_cast<double>(t.slot() * slot) / 1e3, to_string(u.kind),
-                                u.kind == Kind::priv ? t.nodes[u.node].name : "", ids);
+            const std::string node = u.kind == Kind::priv ? t.nodes[u.node].name : "";
+            table.add({fmt::format("{}", slot),
+                       fmt::format("{:g}", static_cast<double>(t.slot() * slot) / 1e3),
+                       std::string(to_string(u.kind)), node, identifiers(u)});
         }
     }
-    return text;
+    return table.text();
 }
 
 std::string latencies_text(const Table& t, const plan::Plan& p) {
-    std::string text = fmt::format(
-        "{:<7} {:<16} {:>5} {:<8} {:>9} | {:>9} {:>9} | {:>9} {:>9}\n{:>50}| {:^19} | {:^19}\n",
-        "id", "message", "bytes", "slots", "deadline", "worst ms", "jitter", "worst ms", "jitter",
-        "", "with slots", "plain CAN");
+    TextTable table({{"id", 7, true},
+                     {"message", 16, true, " "},
+                     {"bytes", 5, false, " "},
+                     {"slots", 8, true, " "},
+                     {"deadline", 9, false, " "},
+                     {"worst ms", 9, false, " | "},
+                     {"jitter", 9, false, " "},
+                     {"worst ms", 9, false, " | "},
+                     {"jitter", 9, false, " "},
+                     {"", 0, true}});
+    table.add_text(fmt::format("{:>50}| {:^19} | {:^19}", "", "with slots", "plain CAN"));
     for (const Latency& l : p.latencies) {
         const Message& m = t.messages[l.message];
-        text += fmt::format("{:<7} {:<16} {:>5} {:<8} {:>9} | {:>9} {:>9} | {:>9} {:>9}{}\n",
-                            scocan::id_text(m.id), m.name, m.bytes, l.priv ? "private" : "shared",
-                            ms(l.deadline), ms(l.worst), ms(l.jitter), ms(l.plain),
-                            ms(l.plain_jitter), l.in_time ? "" : "  LATE");
+        table.add({scocan::id_text(m.id), m.name, fmt::format("{}", m.bytes),
+                   l.priv ? "private" : "shared", ms(l.deadline), ms(l.worst), ms(l.jitter),
+                   ms(l.plain), ms(l.plain_jitter), l.in_time ? "" : "LATE"});
     }
-    return text;
+    return table.text();
 }
 
 /// Explains the worst case of a message.
@@ -247,21 +259,10 @@ int run_scocan_plan(const ScocanPlanOptions& options) {
         return fail(options, fmt::format("cannot read '{}': {}", file, text));
     }
     const Reading reading = scocan::read(text);
-    Sources sources;
-    const std::uint32_t source = sources.add(file, text);
-    Diagnostics found;
-    for (const Report& m : reading.messages) {
-        const Severity severities[] = {Severity::note, Severity::warning, Severity::error};
-        Diagnostic d{severities[static_cast<std::size_t>(m.severity)],
-                     Code::named(code_of(m.topic)).value_or(Code("scocan-line")), m.sentence};
-        d.labels.push_back({hal::Span{source, m.at.offset, m.at.offset + m.at.length}, m.label});
-        if (!m.help.empty()) {
-            d.help.push_back(m.help);
-        }
-        found.add(std::move(d));
-    }
-    write_all(STDERR_FILENO, render(found, sources, colours(STDERR_FILENO)));
-    if (found.failed()) return 1;
+    const auto code = [](const Report& m) {
+        return Code::named(code_of(m.topic)).value_or(Code("scocan-line"));
+    };
+    if (!print_findings(file, text, reading.messages, code)) return 1;
     const Table& t = reading.table;
     const auto mode = find_mode(t, options.mode);
     if (!mode) {
@@ -274,11 +275,7 @@ int run_scocan_plan(const ScocanPlanOptions& options) {
     }
     const plan::Plan p = plan::plan_of(t, *mode);
     if (!options.svg.empty()) {
-        if (options.json) return fail(options, "--json and --svg exclude each other");
-        const std::string picture = picture_of(t, p);
-        if (options.svg == "-") return print(picture) ? 0 : 1;
-        const std::string why = write_file(options.svg, picture);
-        return why.empty() ? 0 : fail(options, why);
+        return write_picture(options, options.svg, options.json, timeline_of(t, p));
     }
     if (!print(options.json ? json_text(t, p) : text_of(t, p))) return 1;
     if (p.fits) return 0;

@@ -16,7 +16,7 @@ struct ScocanPlanOptions : Options {
         set.words("FILE", "table of the bus, NAME.scocan");
         set.flag("--json", json, "print JSON");
         set.value("--svg", svg, "FILE",
-                  "write the timeline as a picture to this file; -: standard output");
+                  "draw the slots and the latencies to this file; -: standard output");
         set.value("--mode", mode, "MODE", "mode of the table, by number or name; default 0");
     }
 };

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: MIT
-// The timeline of a SCoCAN table, as a picture.
+// The timing diagram of a SCoCAN table.
 #pragma once
 
-#include <string>
-
+#include "bus/timeline/timeline.hpp"
 #include "fieldbus/scocan/plan/plan.hpp"
 
 namespace hal::tools {
 
-/// Returns the SVG of a cycle: the slots and what leaves in them, and a bar per message: its
-/// worst-case latency with slots and on plain CAN. The same table gives the same text. [setup]
-std::string picture_of(const scocan::Table&, const scocan::plan::Plan&);
+/// Returns a cycle: a lane per node with its private slots and their frames, one of the shared
+/// slots, and the worst-case latency of each message with slots and on plain CAN. [setup]
+Timeline timeline_of(const scocan::Table&, const scocan::plan::Plan&);
 
 }  // namespace hal::tools

@@ -5,14 +5,12 @@
 
 #include <algorithm>
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include "bus/tdma/plan_picture.hpp"
-#include "cli/output.hpp"
+#include "bus/timeline/letter_strip.hpp"
+#include "bus/timeline/plan_output.hpp"
+#include "bus/timeline/text_table.hpp"
 #include "fieldbus/tdma/config/schedule_plan.hpp"
-#include "text/diagnostic.hpp"
-#include "text/glyphs.hpp"
-#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -34,52 +32,58 @@ std::string called(const plan::Entry& e) {
 }
 
 std::string table_text(const config::Schedule& s, const plan::Plan& p) {
-    std::string text = fmt::format("{:>9}  {:>9}  {:>9}  {:<16} {:<12} {:>6}  {}\n", "from us",
-                                   "until", "free", "station", "use", "bytes", "cycles");
+    TextTable table({{"from us", 9},
+                     {"until", 9},
+                     {"free", 9},
+                     {"station", 16, true},
+                     {"use", 12, true, " "},
+                     {"bytes", 6, false, " "},
+                     {"cycles", 0, true}});
     for (std::size_t i = 0; i < p.entries.size(); ++i) {
         const plan::Entry& e = p.entries[i];
-        Time next = s.cycle;
-        for (std::size_t k = i + 1; k < p.entries.size(); ++k) {
-            if (plan::meet(e, p.entries[k])) {
-                next = p.entries[k].at;
-                break;
-            }
-        }
+        const auto next = std::find_if(p.entries.begin() + static_cast<std::ptrdiff_t>(i) + 1,
+                                       p.entries.end(),
+                                       [&](const plan::Entry& other) { return meet(e, other); });
+        const Time free_until = next == p.entries.end() ? s.cycle : next->at;
         const std::string every =
             e.period == 1 ? "all" : fmt::format("{} of {}", e.phasing + 1, e.period);
-        text += fmt::format("{:>9.2f}  {:>9.2f}  {:>9.2f}  {:<16} {:<12} {:>6}  {}\n", us(e.at),
-                            us(e.until), us(next - e.until), s.stations[e.station].name, called(e),
-                            e.bytes, every);
+        table.add({fmt::format("{:.2f}", us(e.at)), fmt::format("{:.2f}", us(e.until)),
+                   fmt::format("{:.2f}", us(free_until - e.until)), s.stations[e.station].name,
+                   called(e), fmt::format("{}", e.bytes), every});
     }
-    return text;
+    return table.text();
 }
 
-/// Draws a letter per station, a column per hundredth of the cycle; the sync is |, a backup's '.
+char mark_of(const plan::Entry& e) {
+    switch (e.what) {
+    case plan::Entry::What::sync: return '|';
+    case plan::Entry::What::backup_sync: return '\'';
+    case plan::Entry::What::slot: break;
+    }
+    return strip_letter(e.station);
+}
+
+/// Draws a column per hundredth of the cycle.
 std::string timeline_text(const config::Schedule& s, const plan::Plan& p) {
-    constexpr std::size_t places = 100;
-    constexpr std::string_view letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ";
-    std::string line(places, '.');
+    constexpr std::size_t columns = 100;
+    std::string line(columns, '.');
+    const auto column = [&](Time t) {
+        return std::min(static_cast<std::size_t>(t * static_cast<Time>(columns) / s.cycle),
+                        columns - 1);
+    };
     for (const plan::Entry& e : p.entries) {
-        const auto column = [&](Time t) {
-            return std::min(static_cast<std::size_t>(t * static_cast<Time>(places) / s.cycle),
-                            places - 1);
-        };
-        const char mark = e.what == plan::Entry::What::sync ? '|'
-                          : e.what == plan::Entry::What::backup_sync
-                              ? '\''
-                              : letters[e.station % letters.size()];
-        for (std::size_t i = column(e.at); i <= column(e.until - 1); ++i) {
-            if (i == column(e.at) || line[i] == '.') {
-                line[i] = mark;
+        const std::size_t first = column(e.at);
+        for (std::size_t i = first; i <= column(e.until - 1); ++i) {
+            if (i == first || line[i] == '.') {
+                line[i] = mark_of(e);
             }
         }
     }
-    std::string key;
-    for (std::size_t i = 0; i < s.stations.size(); ++i) {
-        key += fmt::format("{}{} {}", i == 0 ? "" : ", ", letters[i % letters.size()],
-                           s.stations[i].name);
+    std::vector<std::string> names;
+    for (const auto& station : s.stations) {
+        names.push_back(station.name);
     }
-    return fmt::format("{}\n{}\n", line, key);
+    return fmt::format("{}\n{}\n", line, strip_key(names, std::vector<bool>(names.size(), true)));
 }
 
 std::string trip_text(const config::Schedule& s, const plan::RoundTrip& t,
@@ -101,8 +105,9 @@ std::string text_of(const config::Schedule& s, const plan::Plan& p) {
         std::count_if(p.entries.begin(), p.entries.end(),
                       [](const auto& e) { return e.what == plan::Entry::What::slot; }));
     std::string text =
-        fmt::format("cycle {:g} us at {} Mbit/s, guard {:g} us: {}, {}\n\n", us(s.cycle), s.speed,
-                    us(s.guard), counted(s.stations.size(), "station"), counted(slots, "slot"));
+        fmt::format("cycle {:g} us at {} Mbit/s, guard {:g} us: {} station{}, {} slot{}\n\n",
+                    us(s.cycle), s.speed, us(s.guard), s.stations.size(),
+                    s.stations.size() == 1 ? "" : "s", slots, slots == 1 ? "" : "s");
     text += table_text(s, p) + "\n" + timeline_text(s, p) + "\n";
     text += fmt::format(
         "load {:.1f} % with frames of full length; a frame of 60 bytes takes {:.2f} us on a line, "
@@ -159,32 +164,16 @@ int run_tdma_plan(const TdmaPlanOptions& options) {
         return fail(options, fmt::format("cannot read '{}': {}", file, text));
     }
     const config::Reading reading = config::read(text);
-    Sources sources;
-    const std::uint32_t source = sources.add(file, text);
-    Diagnostics found;
-    for (const config::Message& m : reading.messages) {
-        const Severity severities[] = {Severity::note, Severity::warning, Severity::error};
-        Diagnostic d{severities[static_cast<std::size_t>(m.severity)],
-                     Code::named(config::code_of(m.topic)).value_or(Code("tdma-line")), m.sentence};
-        d.labels.push_back({Span{source, m.at.offset, m.at.offset + m.at.length}, m.label});
-        if (!m.help.empty()) {
-            d.help.push_back(m.help);
-        }
-        found.add(std::move(d));
-    }
-    write_all(STDERR_FILENO, render(found, sources, colours(STDERR_FILENO)));
-    if (found.failed()) return 1;
+    const auto code = [](const config::Message& m) {
+        return Code::named(config::code_of(m.topic)).value_or(Code("tdma-line"));
+    };
+    if (!print_findings(file, text, reading.messages, code)) return 1;
     const plan::Plan p = plan::plan_of(reading.schedule);
     if (!options.svg.empty()) {
-        if (options.json) return fail(options, "--json and --svg exclude each other");
-        const std::string picture = picture_of(reading.schedule, p);
-        if (options.svg == "-") return print(picture) ? 0 : 1;
-        const std::string why = write_file(options.svg, picture);
-        return why.empty() ? 0 : fail(options, why);
+        return write_picture(options, options.svg, options.json, timeline_of(reading.schedule, p));
     }
-    const std::string output =
-        options.json ? json_text(reading.schedule, p) : text_of(reading.schedule, p);
-    return print(output) ? 0 : 1;
+    return print(options.json ? json_text(reading.schedule, p) : text_of(reading.schedule, p)) ? 0
+                                                                                               : 1;
 }
 
 }  // namespace hal::tools

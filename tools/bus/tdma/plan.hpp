@@ -14,7 +14,7 @@ struct TdmaPlanOptions : Options {
     void declare(OptionSet& set) override {
         set.words("FILE", "schedule of the segment, NAME.tdma or RTnet's tdma.conf");
         set.flag("--json", json, "print JSON");
-        set.value("--svg", svg, "FILE", "write a timing diagram to this file; -: standard output");
+        set.value("--svg", svg, "FILE", "draw the slots to this file; -: standard output");
     }
 };
 
