@@ -54,7 +54,7 @@ struct CanReceive : hal::Component {
     std::unique_ptr<hal::Out<std::uint64_t>> invalid =
         pins.has_reals()
             ? std::make_unique<hal::Out<std::uint64_t>>(
-                  *this, "invalid", "messages with a field that was not finite: its pin was kept")
+                  *this, invalid_pin, "messages with a field that was not finite: its pin was kept")
             : nullptr;
     hal::Function run{*this, "update", &CanReceive::update,
                       "reads the messages received since the last cycle"};

@@ -51,7 +51,7 @@ struct CanSend : hal::Component {
     LayoutPins<HAL_DIR_IN> pins{*this, layout, "field of the message"};
     std::unique_ptr<hal::Out<std::uint64_t>> invalid =
         pins.has_reals() ? std::make_unique<hal::Out<std::uint64_t>>(
-                               *this, "invalid",
+                               *this, invalid_pin,
                                "messages with a field that was not finite: its last value was sent")
                          : nullptr;
     hal::Function run{*this, "update", &CanSend::update, "sends the message when it is due"};

@@ -12,6 +12,9 @@ namespace hal::messages {
 
 enum class Kind : std::uint8_t { bit, u8, s8, u16, s16, u32, s32, f32, f64 };
 
+/// Name of the counter of messages with NaN or infinity.
+inline constexpr const char* invalid_pin = "invalid";
+
 struct KindRow {
     const char* name;
     Kind kind;
@@ -38,6 +41,7 @@ public:
             add(text.substr(at, end - at));
             at = end + 1;
         }
+        check_counter();
     }
     const Field* begin() const noexcept { return fields_.data(); }
     const Field* end() const noexcept { return fields_.data() + count_; }
@@ -74,6 +78,17 @@ private:
         }
         fail("unknown type '" + type + "' of field '" + name +
              "'; types are bit, u8, s8, u16, s16, u32, s32, f32, f64");
+    }
+    /// Real fields have a counter, whose pin has this name.
+    void check_counter() const {
+        const auto is_real = [](const Field& f) {
+            return f.kind == Kind::f32 || f.kind == Kind::f64;
+        };
+        const auto is_counter = [](const Field& f) { return f.name == invalid_pin; };
+        if (std::any_of(begin(), end(), is_real) && std::any_of(begin(), end(), is_counter)) {
+            fail("reserved name 'invalid': a message with f32 or f64 counts invalid values in this "
+                 "pin; choose another name");
+        }
     }
     [[noreturn]] static void fail(const std::string& why) {
         throw hal::ArgumentError("fields", "fields: " + why);

@@ -95,10 +95,10 @@ TEST(Guard, covers_the_time_that_nodes_coast) {
 
 TEST(Message, that_contradicts_itself_or_the_pins_of_its_components_is_rejected) {
     const std::string table = std::string(head) + run + "2 private motor 0x10A\n";
-    for (const char* name : {"send", "sent", "fresh", "received", "age", "interval"}) {
+    for (const char* name : {"send", "sent", "fresh", "received", "age", "interval", "invalid"}) {
         EXPECT_EQ("t:8:42: error: reserved field name '" + std::string(name) +
-                      "'; each message has pins send, sent, fresh, received, age and interval; "
-                      "choose another name",
+                      "'; messages have pins send, sent, fresh, received, age, interval and "
+                      "invalid; choose another name",
                   errors(table + "message position 0x10A fields a:s16,b:s8," + name + ":s32\n"));
     }
     EXPECT_EQ("", errors(table + "message position 0x10A fields send-a:s16,data:s32\n"));

@@ -57,8 +57,9 @@ public:
                 {.initial = !m.event}),
           sent_(c, receive, (m.name + ".sent").c_str(), "frames of this message sent") {
         declare_fields(fields_, c, f, m);
-        invalid_ = invalid_counter(
-            c, f, m, fields_, "cycles in which a field was not finite: its last value is sent");
+        invalid_ =
+            invalid_counter(c, f, m, fields_,
+                            "messages with a field that was not finite: its last value was sent");
         if (m.fields.empty() && m.bytes > 0) {
             data_ = std::make_unique<hal::In<std::uint64_t>>(c, f, (m.name + ".data").c_str(),
                                                              "data, little endian");
@@ -137,7 +138,7 @@ public:
                     "time between the begins of the last two frames", {.unit = "us"}) {
         declare_fields(fields_, c, f, m);
         invalid_ = invalid_counter(c, f, m, fields_,
-                                   "frames in which a field was not finite: its pin is kept");
+                                   "messages with a field that was not finite: its pin was kept");
         if (m.fields.empty() && m.bytes > 0) {
             data_ = std::make_unique<hal::Out<std::uint64_t>>(c, f, (m.name + ".data").c_str(),
                                                               "data, little endian");

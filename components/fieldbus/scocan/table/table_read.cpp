@@ -405,11 +405,11 @@ private:
     }
 
     bool is_new_field(const Word& field) {
-        constexpr std::string_view pins[] = {"send",     "sent", "fresh",
-                                             "received", "age",  "interval"};
+        constexpr std::string_view pins[] = {"send", "sent",     "fresh",  "received",
+                                             "age",  "interval", "invalid"};
         if (std::find(std::begin(pins), std::end(pins), field.text) != std::end(pins)) {
             error(Topic::value, field.at, "reserved field name " + quoted(field.text),
-                  "each message has pins send, sent, fresh, received, age and interval; "
+                  "messages have pins send, sent, fresh, received, age, interval and invalid; "
                   "choose another name");
             return false;
         }
@@ -535,7 +535,7 @@ const bus::KeyTable<Reader>& Reader::message_keys() {
          "The queueing jitter of the message."},
         {"fields", bus::own("", "NAME:TYPE, NAME:TYPE", &Reader::read_fields), "none",
          "The fields, with the types u8, s8, u16, s16, u32, s32, f32, f64. The names send, sent, "
-         "fresh, received, age and interval are invalid."},
+         "fresh, received, age, interval and invalid are reserved."},
     }};
     return table;
 }
