@@ -123,9 +123,9 @@ class Halcmd(Case):
         return done.stderr
 
     def test_an_argument_with_blanks_is_saved_with_quotes(self):
-        self.assertEqual(0, self.halcmd("loadrt", "sum2", "names=x y").returncode)
+        self.assertEqual(0, self.halcmd("loadrt", "message", "messages=door open").returncode)
         saved = self.halcmd("save", "comp").stdout
-        self.assertIn('loadrt sum2 names="x y"\n', saved)
+        self.assertIn('loadrt message messages="door open"\n', saved)
         self.assertEqual(
             "0\n", self.good("sim", self.write("again.hal", saved + "getp adder.in0\n"))
         )

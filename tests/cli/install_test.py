@@ -183,6 +183,7 @@ class Installed(unittest.TestCase):
 
     def follow_the_advice_on_limits(self, has_udev):
         etc = self.folder / "etc"
+        shutil.rmtree(etc, ignore_errors=True)
         shutil.copytree("/etc", etc, symlinks=True, ignore_dangling_symlinks=True)
         shutil.rmtree(etc / "udev", ignore_errors=True)
         if has_udev:

@@ -47,7 +47,7 @@ def run(log):
         bus.read_sdo(servo, index, sub, kickcat.Access.PARTIAL, size, 2.0)[:size], "little"
     )
     check("vendor of 1018h", read(0x1018, 1, 4) == 0xFFFFFF, hex(read(0x1018, 1, 4)))
-    check("supported modes", read(0x6502, 0, 4) == 0x3A5, hex(read(0x6502, 0, 4)))
+    check("supported modes", read(0x6502, 0, 4) == 0x3EF, hex(read(0x6502, 0, 4)))
     try:
         read(0x2FFF, 0, 4)
         check("an object that does not exist is an error", False)
