@@ -3,10 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <thread>
 #include <vector>
 
-#include "components/fieldbus/tdma/station/slots.hpp"
+#include "components/fieldbus/tdma/station/transmitter.hpp"
 
 namespace tdma_tests {
 namespace {
@@ -91,6 +92,90 @@ TEST(TdmaSlot, frames_of_several_threads_arrive_whole) {
         thread.join();
     }
     EXPECT_TRUE(slot.front().empty());
+}
+
+TEST(TdmaSlot, returns_a_frame_while_another_thread_queues_a_more_urgent_one) {
+    constexpr unsigned rounds = 20'000;
+    constexpr std::uint8_t ordinary = 1;
+    constexpr std::uint8_t urgent = 2;
+    Slot slot(SlotSetup{.id = 1, .size = 1000}, 8);
+    std::atomic<unsigned> round{0};
+    std::thread other([&] {
+        for (unsigned n = 1; n <= rounds; ++n) {
+            while (round.load(std::memory_order_acquire) < n) {
+                std::this_thread::yield();
+            }
+            EXPECT_TRUE(slot.push(frame_of(header + 46, urgent), 4));
+        }
+    });
+    unsigned missed = 0;
+    for (unsigned n = 1; n <= rounds; ++n) {
+        ASSERT_TRUE(slot.push(frame_of(header + 46, ordinary), 8));
+        round.store(n, std::memory_order_release);
+        while (slot.front()[0] != urgent) {
+            std::this_thread::yield();
+        }
+        slot.pop();
+        if (slot.front().empty()) {
+            ++missed;
+        }
+        while (slot.front().empty()) {
+            std::this_thread::yield();
+        }
+        EXPECT_EQ(popped(slot), ordinary);
+    }
+    other.join();
+    EXPECT_EQ(missed, 0U);
+    EXPECT_EQ(slot.waiting(), 0U);
+}
+
+/// What transmits the slots of a station, without the station.
+struct Sender {
+    hal::tdma::StationCore core;
+    hal::tdma::Calibration calibration;
+    hal::tdma::Pings pings;
+    hal::tdma::Roster roster;
+    hal::tdma::Transmitter transmitter{core, calibration, pings, roster};
+
+    Sender() {
+        core.setup.slots = {{.id = 3, .size = 1000}};
+        transmitter.set_up();
+    }
+    /// Queues what a thread sends that found its target before, and returns what leaves.
+    std::uint8_t sent(const hal::tdma::Transmitter::Target& to, std::uint8_t mark) {
+        EXPECT_TRUE(to.slot->push(frame_of(header + 46, mark), 8, nullptr, to.epoch));
+        return popped(*to.slot);
+    }
+};
+
+TEST(TdmaSlot, drops_a_frame_that_another_thread_queues_after_the_queues_were_emptied) {
+    Sender sender;
+    const auto before = sender.transmitter.target(3);
+    EXPECT_EQ(sender.sent(before, 1), 1);
+    const auto preempted = sender.transmitter.target(3);
+    sender.transmitter.clear_slots();
+    EXPECT_EQ(sender.sent(preempted, 2), 0);
+    EXPECT_EQ(preempted.slot->waiting(), 0U);
+    EXPECT_EQ(sender.sent(sender.transmitter.target(3), 3), 3);
+}
+
+TEST(TdmaSlot, drops_a_frame_for_a_slot_that_has_another_number_meanwhile) {
+    Sender sender;
+    const auto preempted = sender.transmitter.target(3);
+    const SlotSetup other[] = {{.id = 4, .size = 1000}};
+    ASSERT_TRUE(sender.transmitter.change(other));
+    EXPECT_EQ(sender.transmitter.target(3).slot, nullptr);
+    EXPECT_EQ(sender.sent(preempted, 2), 0);
+    EXPECT_EQ(sender.sent(sender.transmitter.target(4), 3), 3);
+}
+
+TEST(TdmaSlot, frames_of_an_earlier_epoch_leave_the_next_turn_to_those_of_this_one) {
+    Slot slot(SlotSetup{.id = 1, .size = 200}, 8);
+    slot.clear(1);
+    EXPECT_TRUE(slot.push(frame_of(header + 200, 1), 8, nullptr, 0));
+    EXPECT_TRUE(slot.push(frame_of(header + 200, 2), 8, nullptr, 1));
+    EXPECT_EQ(popped(slot), 2);
+    EXPECT_EQ(slot.waiting(), 0U);
 }
 
 }  // namespace

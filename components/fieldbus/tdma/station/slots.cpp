@@ -15,11 +15,11 @@ Slot::Slot(const SlotSetup& setup, std::size_t queue)
       entries_(std::make_unique<Entry[]>(count_)) {}
 
 bool Slot::push(std::span<const std::uint8_t> frame, unsigned priority,
-                ethernet::Finisher* finisher) noexcept {
+                ethernet::Finisher* finisher, std::uint32_t epoch) noexcept {
     if (frame.size() < ethernet::header_bytes ||
         frame.size() > ethernet::header_bytes + capacity() ||
         frame.size() > ethernet::largest_frame ||
-        ahead_of(priority) + ethernet::wire_bytes(frame.size()) > turn_bytes()) {
+        ahead_of(priority, epoch) + ethernet::wire_bytes(frame.size()) > turn_bytes()) {
         return false;
     }
     for (std::size_t i = 0; i < count_; ++i) {
@@ -32,34 +32,45 @@ bool Slot::push(std::span<const std::uint8_t> frame, unsigned priority,
         std::copy(frame.begin(), frame.end(), entry.bytes.begin());
         entry.length.store(static_cast<std::uint32_t>(frame.size()), std::memory_order_relaxed);
         entry.priority.store(priority, std::memory_order_relaxed);
+        entry.epoch.store(epoch, std::memory_order_relaxed);
         entry.order = order_.fetch_add(1, std::memory_order_relaxed);
         entry.finisher = finisher;
+        waiting_.fetch_add(1, std::memory_order_relaxed);  // before the entry is ready
         entry.state.store(State::ready, std::memory_order_release);
-        waiting_.fetch_add(1, std::memory_order_release);
         return true;
     }
     return false;
 }
 
-std::size_t Slot::ahead_of(unsigned priority) const noexcept {
+std::size_t Slot::ahead_of(unsigned priority, std::uint32_t epoch) const noexcept {
+    if (waiting() == 0) return 0;
     std::size_t bytes = 0;
-    for (std::size_t i = 0; waiting() != 0 && i < count_; ++i) {
-        const Entry& p = entries_[i];
-        if (p.is_ready() && p.priority.load(std::memory_order_relaxed) <= priority) {
-            bytes += ethernet::wire_bytes(p.length.load(std::memory_order_relaxed));
+    for (std::size_t i = 0; i < count_; ++i) {
+        const Entry& entry = entries_[i];
+        const bool counts = entry.is_ready() &&
+                            entry.epoch.load(std::memory_order_relaxed) == epoch &&
+                            entry.priority.load(std::memory_order_relaxed) <= priority;
+        if (counts) {
+            bytes += ethernet::wire_bytes(entry.length.load(std::memory_order_relaxed));
         }
     }
     return bytes;
 }
 
-std::size_t Slot::most_urgent() const noexcept {
-    // of a place: what leaves first has the smallest
-    const auto rank = [](const Entry& p) {
-        return std::pair(p.priority.load(std::memory_order_relaxed), p.order);
+/// Returns the index of the frame that leaves first; count_: none. Drops frames of earlier epochs.
+std::size_t Slot::most_urgent() noexcept {
+    if (waiting() == 0) return count_;
+    // Returns the order of sending: smaller leaves first.
+    const auto rank = [](const Entry& entry) {
+        return std::pair(entry.priority.load(std::memory_order_relaxed), entry.order);
     };
     std::size_t best = count_;
-    for (std::size_t i = 0; waiting_.load(std::memory_order_acquire) != 0 && i < count_; ++i) {
+    for (std::size_t i = 0; i < count_; ++i) {
         if (!entries_[i].is_ready()) continue;
+        if (entries_[i].epoch.load(std::memory_order_relaxed) != epoch_) {
+            release(entries_[i]);
+            continue;
+        }
         if (best == count_ || rank(entries_[i]) < rank(entries_[best])) {
             best = i;
         }
@@ -80,7 +91,7 @@ ethernet::Finisher* Slot::finisher() const noexcept {
     return front_ == count_ ? nullptr : entries_[front_].finisher;
 }
 
-/// Frees a place that is ready. Returns false when it is not.
+/// Frees an entry that is ready. Returns false when it is not.
 bool Slot::release(Entry& entry) noexcept {
     if (!entry.is_ready()) return false;
     entry.state.store(State::free, std::memory_order_release);
@@ -95,8 +106,10 @@ void Slot::pop() noexcept {
     front_ = count_;
 }
 
-void Slot::clear() noexcept {
-    for (std::size_t i = 0; waiting_.load(std::memory_order_acquire) != 0 && i < count_; ++i) {
+void Slot::clear(std::uint32_t epoch) noexcept {
+    epoch_ = epoch;
+    if (waiting() == 0) return;
+    for (std::size_t i = 0; i < count_; ++i) {
         release(entries_[i]);
     }
 }

@@ -75,7 +75,6 @@ Station::Station(const StationSetup& setup, Events* events) {
 void Station::attach(ethernet::Port& port) {
     core_.port = &port;
     core_.address = port.address();
-    transmitter_.clear_slots();
     core_.status.count = {};
     slot_monitor_.clear();
     unheard_reported_ = false;
@@ -104,6 +103,7 @@ bool Station::reconfigure(const StationSetup& s) noexcept {
 }
 
 void Station::begin() noexcept {
+    stop_sending();
     const Counters kept = core_.status.count;
     core_.status = {};
     core_.status.count = kept;
@@ -130,7 +130,13 @@ void Station::begin() noexcept {
     out_of_step_ = 0;
     schedule_reported_ = false;
     babble_limit_ = core_.setup.babble_limit != 0 ? core_.setup.babble_limit : 64;
+}
+
+/// Drops what is queued: stale frames must not be sent after the next sync. The order matters to
+/// threads in send(), see slots.hpp.
+void Station::stop_sending() noexcept {
     ready_.store(false, std::memory_order_relaxed);
+    transmitter_.clear_slots();
 }
 
 /// Starts anew in a cycle that has begun.
@@ -145,20 +151,13 @@ void Station::reset() noexcept {
     }
 }
 
-void Station::restart() noexcept {
-    transmitter_.clear_slots();
-    begin();
-}
+void Station::restart() noexcept { begin(); }
 
 void Station::become(State state) noexcept {
     core_.status.state = state;
-    const bool ready = state == State::running;
-    ready_.store(ready, std::memory_order_relaxed);
-    if (ready) {
-        report(Event::running);
-    } else {
-        transmitter_.clear_slots();  // stale frames must not be sent after the next sync
-    }
+    if (state != State::running) return stop_sending();
+    ready_.store(true, std::memory_order_relaxed);
+    report(Event::running);
 }
 
 std::size_t Station::waiting(unsigned slot) const noexcept {
@@ -174,14 +173,15 @@ std::size_t Station::capacity(unsigned slot) const noexcept {
 ethernet::Sent Station::send(std::span<const std::uint8_t> frame, unsigned slot, unsigned priority,
                              ethernet::Finisher* finisher) noexcept {
     using enum ethernet::Sent;
-    Slot* s = transmitter_.find(slot);
+    const Transmitter::Target to = transmitter_.target(slot);  // before ready()
+    Slot* const s = to.slot;
     ethernet::Sent result = queued;
     if (s == nullptr || frame.size() < ethernet::header_bytes ||
         frame.size() > ethernet::header_bytes + s->capacity()) {
         result = rejected;
     } else if (!ready()) {
         result = down;
-    } else if (!s->push(frame, std::min(priority, last_priority), finisher)) {
+    } else if (!s->push(frame, std::min(priority, last_priority), finisher, to.epoch)) {
         result = full;
     }
     if (result != queued && result != full) {

@@ -113,6 +113,7 @@ private:
 
     void begin() noexcept;
     void begin_at(Time now) noexcept;
+    void stop_sending() noexcept;
     void become(State) noexcept;
     void report(Event event, const Address& who = {}, Time value = 0) noexcept {
         core_.report(event, who, value);

@@ -21,6 +21,7 @@ bool Transmitter::change(std::span<const SlotSetup> setups) noexcept {
     for (std::size_t i = 0; i < slots_.size(); ++i) {
         slots_[i].change(i < setups.size() ? setups[i] : SlotSetup{.id = unused_slot, .size = 0});
     }
+    clear_slots();
     return true;
 }
 
@@ -33,8 +34,10 @@ void Transmitter::restart() noexcept {
 }
 
 void Transmitter::clear_slots() noexcept {
+    const std::uint32_t epoch = epoch_.load(std::memory_order_relaxed) + 1;
+    epoch_.store(epoch, std::memory_order_release);
     for (Slot& s : slots_) {
-        s.clear();
+        s.clear(epoch);
     }
 }
 
@@ -46,8 +49,9 @@ const Slot* Transmitter::find(unsigned id) const noexcept {
     return nullptr;
 }
 
-Slot* Transmitter::find(unsigned id) noexcept {
-    return const_cast<Slot*>(std::as_const(*this).find(id));
+Transmitter::Target Transmitter::target(unsigned id) noexcept {
+    const std::uint32_t epoch = epoch_.load(std::memory_order_acquire);
+    return {epoch, const_cast<Slot*>(find(id))};
 }
 
 /// Returns the entry of a station, a free one, or nullptr.
@@ -155,11 +159,6 @@ void Transmitter::send_slot(std::size_t index, std::uint32_t cycle) noexcept {
     std::size_t used = 0;
     for (auto frame = slot.front(); !frame.empty(); frame = slot.front()) {
         const std::size_t bytes = ethernet::wire_bytes(frame.size());
-        if (bytes > slot.turn_bytes()) {  // queued while the slot was changed
-            ++core_.status.count.dropped;
-            slot.pop();
-            continue;
-        }
         if (used + bytes > slot.turn_bytes()) break;
         if (launch(frame, {.at_ns = at + core_.wire_time(used),
                            .guard_ns = core_.setup.guard,

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <deque>
 
 #include "calibration.hpp"
@@ -14,20 +15,27 @@
 
 namespace hal::tdma {
 
-/// The transmitter. [realtime]
+/// Sends syncs, answers, requests, and the frames and pings of the slots. [realtime]
 class Transmitter {
 public:
+    /// A slot that a frame is for, and the epoch in which it was found: see slots.hpp.
+    struct Target {
+        std::uint32_t epoch = 0;
+        Slot* slot = nullptr;  ///< nullptr: this station has no such slot
+    };
     /// All must outlive it. [setup]
     Transmitter(StationCore& core, Calibration& calibration, Pings& pings,
                 const Roster& roster) noexcept
         : core_(core), calibration_(calibration), pings_(pings), roster_(roster) {}
     /// Allocates the slots of the setup. [setup]
     void set_up();
-    /// Changes the slots; returns false when there are more than were allocated.
+    /// Changes the slots and drops all queued frames. Returns false when there are more slots than
+    /// were allocated.
     bool change(std::span<const SlotSetup>) noexcept;
     /// Starts anew: drops the requests that wait for an answer.
     void restart() noexcept;
-    /// Drops all queued frames.
+    /// Drops all queued frames, also those that another thread is about to queue for a target that
+    /// it has found.
     void clear_slots() noexcept;
 
     /// Queues the answer to a calibration request, one per station.
@@ -39,7 +47,8 @@ public:
     void transmit(Time now, bool backup_sync) noexcept;
 
     const Slot* find(unsigned id) const noexcept;
-    Slot* find(unsigned id) noexcept;
+    /// Finds the slot for a frame. A sender must check after that whether it may send. [any]
+    Target target(unsigned id) noexcept;
     const std::deque<Slot>& slots() const noexcept { return slots_; }
 
 private:
@@ -85,6 +94,7 @@ private:
     Pings& pings_;
     const Roster& roster_;
     std::deque<Slot> slots_;  // in the order of the setup: calibration uses the first
+    std::atomic<std::uint32_t> epoch_{0};  // of the slots; written by the station's thread
     std::array<Reply, 64> replies_{};  // as many as RTnet's master
     Time sent_until_ = 0;  // global; slots up to here are done
     bool sent_any_ = false;
