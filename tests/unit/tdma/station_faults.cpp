@@ -116,6 +116,20 @@ TEST(Station, does_not_recalibrate_after_a_short_loss_of_the_master) {
     EXPECT_EQ(mac(1), n.station.status().master);
     EXPECT_GE(n.station.status().count.requests - before, 100U)
         << "after a longer time its cable may be another";
+TEST(Station, reports_the_new_schedule_of_a_master_that_restarted_at_once) {
+    Bed bed;
+    Machine& m = bed.add(1, master());
+    StationSetup patient = slave(300'000);
+    patient.lost_limit = 20;
+    Machine& s = bed.add(2, patient, {100e-6, 0});
+    bed.run(600 * ms);
+    ASSERT_TRUE(s.station.ready());
+    m.next += 333'333;
+    m.station.attach(m.port);
+    bed.run(600 * ms);
+    EXPECT_EQ(1, s.events[Event::new_schedule]);
+    EXPECT_EQ(0, s.events[Event::sync_lost]);
+    EXPECT_TRUE(s.station.ready());
 }
 
 TEST(Station, synchronises_to_a_restarted_master_with_another_time) {

@@ -24,7 +24,10 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
      "station in the first slot of this one, and for a cable that carries frames in one direction "
      "only]"},
     {Event::sync_lost, bus::Effect::raises,
-     "lost the sync of {who}{limit}; this station stops sending until the next sync"},
+     "lost the sync of {who}[; this station stops sending until the next sync]",
+     " for {s} (limit {limit}); this station stops sending until the next sync"},
+    {Event::new_schedule, bus::Effect::raises,
+     "{who} sends the syncs of a new schedule; this station stops sending until it follows them"},
     {Event::leading, bus::Effect::none, "active as master"},
     {Event::yielded, bus::Effect::none,
      "higher-priority master {who} resumed; returning to standby"},
@@ -124,7 +127,6 @@ private:
         if (name == "address") return ethernet::to_string(h.who);
         if (name == "value") return std::to_string(h.value);
         if (name == "us") return config::microseconds(h.value);
-        if (name == "limit") return {};  // a line names the station instead
         if (name == "cycle") return cycle_text(h.event, schedule_.cycle);
         if (name == "block") return of_index(duplicate_index(h.value));
         if (name == "first") return ethernet::to_string(duplicate_address(h.value));
@@ -168,8 +170,7 @@ public:
         : names_(known(schedule)),
           texts_(event_rows, names_.size(),
                  [&](Event event, std::size_t station, std::string_view name) {
-                     if (name == "limit")
-                         return " (limit " + counted(setup.lost_limit, "cycle") + ")";
+                     if (name == "limit") return counted(setup.lost_limit, "cycle");
                      if (name == "cycle") return cycle_text(event, setup.cycle);
                      return station < names_.size() ? names_[station].second : unknown(event);
                  }) {}
@@ -196,10 +197,9 @@ private:
         return names;
     }
     static std::string unknown(Event event) {
-        return event == Event::sync_lost || event == Event::uncalibrated ||
-                       event == Event::out_of_step
-                   ? "the master"
-                   : "another station";
+        const bool is_master = event == Event::sync_lost || event == Event::new_schedule ||
+                               event == Event::uncalibrated || event == Event::out_of_step;
+        return is_master ? "the master" : "another station";
     }
 
     Names names_;

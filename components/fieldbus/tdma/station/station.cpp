@@ -525,7 +525,7 @@ void Station::accept_foreign_sync(const Decoded& d, Time now) noexcept {
     ++status.count.foreign;
     const bool is_master = !status.leading && d.from == status.master;
     if (is_master && ++foreign_row_ >= confirmations) {  // it restarted with a new schedule
-        report(Event::sync_lost, d.from, 0);
+        report(Event::new_schedule, d.from);
         ++status.count.losses;
         return begin();
     }

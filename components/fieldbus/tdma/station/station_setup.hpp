@@ -83,7 +83,8 @@ enum class Event : std::uint8_t {
     calibrated,     ///< value: ns to the master
     running,        ///< the slots may be used
     uncalibrated,   ///< many requests without a reply; retrying. value: requests
-    sync_lost,      ///< value: ns since the last sync
+    sync_lost,      ///< who: the master; value: ns since the last sync
+    new_schedule,   ///< the master sends the syncs of another schedule now; who
     leading,        ///< this station sends the syncs now
     yielded,        ///< this station stops sending syncs; who: the master
     other_master,   ///< a second master with a schedule of its own; who
