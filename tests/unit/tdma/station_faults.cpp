@@ -116,6 +116,16 @@ TEST(Station, does_not_recalibrate_after_a_short_loss_of_the_master) {
     EXPECT_EQ(mac(1), n.station.status().master);
     EXPECT_GE(n.station.status().count.requests - before, 100U)
         << "after a longer time its cable may be another";
+TEST(Station, does_not_count_frames_that_were_rejected_before_it_was_attached) {
+    Bed bed;
+    Machine& m = bed.add(1, master());
+    const std::vector<std::uint8_t> frame(60);
+    EXPECT_NE(ethernet::Sent::queued, m.station.send(frame, 0, 0));
+    m.station.attach(m.port);
+    bed.run(5 * ms);
+    EXPECT_EQ(0U, m.status().count.dropped);
+}
+
 TEST(Station, reports_the_new_schedule_of_a_master_that_restarted_at_once) {
     Bed bed;
     Machine& m = bed.add(1, master());

@@ -76,6 +76,7 @@ void Station::attach(ethernet::Port& port) {
     core_.port = &port;
     core_.address = port.address();
     core_.status.count = {};
+    rejected_.store(0, std::memory_order_relaxed);
     slot_monitor_.clear();
     unheard_reported_ = false;
     no_carrier_ = 0;
