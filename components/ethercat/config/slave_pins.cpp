@@ -2,7 +2,6 @@
 #include "ethercat/config/slave_pins.hpp"
 
 #include <algorithm>
-#include <set>
 
 namespace hal::ethercat::config {
 
@@ -16,6 +15,7 @@ struct PinTarget {
     PinInfo& info;
     std::string& name;  ///< of the pin in SlaveInfo
     SlaveInput& in;
+    bool has_type = false;  ///< a type was read
 };
 
 /// Parses a number or a fraction such as 65536/360.
@@ -49,13 +49,8 @@ bool read_offset(PinTarget& to, const Line& line) {
     return true;
 }
 
-/// A unit makes the pin a float, unless its type is given.
 bool read_unit(PinTarget& to, const Line& line) {
     to.info.unit = line.value.text;
-    const std::string object = line.key.text.substr(0, line.key.text.rfind('.'));
-    if (to.in.keys.find(object + ".type") == nullptr) {
-        to.entry.scaled = true;
-    }
     return true;
 }
 
@@ -72,6 +67,7 @@ void reject_real(PinTarget& to, const Line& line, DataType type) {
 
 bool read_type(PinTarget& to, const Line& line) {
     master::Entry& entry = to.entry;
+    to.has_type = true;
     if (same_word(line.value.text, "float")) {
         entry.scaled = true;
         return true;
@@ -162,7 +158,12 @@ void SlavePins::read() {
         line->used = true;
         option(*line);
     }
-    for_each_entry([&](const master::Entry& entry, bool) { info_of(entry); });
+    for_each_entry([&](master::Entry& entry, bool) {
+        // a unit makes the pin a float, unless its type is given
+        if (!info_of(entry).unit.empty() && !typed_.contains(&entry)) {
+            entry.scaled = true;
+        }
+    });
 }
 
 /// Makes the names unique: an input that is also an output has the suffix -feedback.
@@ -235,6 +236,9 @@ void SlavePins::option(const Line& line) {
     PinTarget target{*entry, info, pin->first, in_};
     bus::TopicReport<Topic> key_report(in_.report);
     option_keys().read(*key, line, target, key_report);
+    if (target.has_type) {
+        typed_.insert(entry);
+    }
 }
 
 }  // namespace hal::ethercat::config

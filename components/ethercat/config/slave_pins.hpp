@@ -3,6 +3,8 @@
 // Everything here is [setup].
 #pragma once
 
+#include <set>
+
 #include "ethercat/config/config_text.hpp"
 
 namespace hal::ethercat::config {
@@ -23,6 +25,7 @@ private:
     void option(const Line& line);
 
     SlaveInput in_;
+    std::set<const master::Entry*> typed_;  // those with a type of their own
 };
 
 }  // namespace hal::ethercat::config

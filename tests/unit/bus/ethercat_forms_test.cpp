@@ -64,6 +64,20 @@ TEST(EthercatForms, Unit_leaves_a_type_that_is_given_as_in_canopen) {
     EXPECT_EQ(reading.buses[0].slaves[0].find("2000-01")->unit, "mm");
 }
 
+TEST(EthercatForms, Unit_leaves_a_type_that_is_given_under_another_spelling) {
+    const Reading reading = read(
+        "[bus]\n[slave 0 a]\ndevice = cia402\ninputs = 6041 6064\n"
+        "6041.unit = bits\nstatusword.type = u16\n0x6064.type = s32\n6064:0.unit = counts\n",
+        "m.ethercat");
+    EXPECT_EQ(messages(reading), "");
+    const auto& managers = reading.buses[0].setup.slaves[0].sync_managers;
+    const auto& entries = managers.back().pdos[0].entries;
+    ASSERT_EQ(entries.size(), 2U);
+    EXPECT_FALSE(entries[0].scaled);
+    EXPECT_FALSE(entries[1].scaled);
+    EXPECT_EQ(reading.buses[0].slaves[0].find("statusword")->unit, "bits");
+}
+
 TEST(EthercatForms, Generated_ranges_keep_their_meaning_in_earlier_versions) {
     Found io;
     io.name = "io";

@@ -104,6 +104,17 @@ TEST(CanopenConfig, a_safe_value_is_in_the_pin_s_unit) {
     EXPECT_EQ(static_cast<std::int32_t>(*o[1].safe), -250);
 }
 
+TEST(CanopenConfig, a_unit_leaves_a_type_that_is_given_under_another_spelling) {
+    const auto c = good(
+        "[bus]\n[node 1]\ndevice = cia402\ntpdo1 = statusword, 6064\n"
+        "6041.unit = bits\nstatusword.type = u32\n0x6064.type = s32\n6064:0.unit = counts\n");
+    const auto& o = c.nodes[0].pdos[0].objects;
+    EXPECT_EQ(o[0].unit, "bits");
+    EXPECT_EQ(o[0].as, PinType::u32);
+    EXPECT_EQ(o[1].unit, "counts");
+    EXPECT_EQ(o[1].as, PinType::s32);
+}
+
 TEST(CanopenConfig, limits_values_to_the_range_of_the_object) {
     Object o;
     o.type = Type::integer16;

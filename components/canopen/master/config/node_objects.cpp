@@ -103,7 +103,6 @@ namespace {
 /// What an option of an object is read into.
 struct ObjectTarget {
     Object& object;
-    Keys& keys;
     Report& report;
 };
 
@@ -123,13 +122,8 @@ bool read_offset(ObjectTarget& to, const Line& line) {
     return true;
 }
 
-/// A unit makes the pin a float, unless its type is given.
 bool read_unit(ObjectTarget& to, const Line& line) {
     to.object.unit = line.value.text;
-    const std::string object = line.key.text.substr(0, line.key.text.rfind('.'));
-    if (to.keys.find(object + ".type") == nullptr) {
-        to.object.as = PinType::real;
-    }
     return true;
 }
 
@@ -223,7 +217,7 @@ void NodeObjects::read() {
     for (const bool is_safe : {false, true}) {
         for (const Option& option : all) {
             if ((option.property == "safe") != is_safe) continue;
-            ObjectTarget target{*option.object, keys_, report_};
+            ObjectTarget target{*option.object, report_};
             option_keys().read(*option_keys().find(option.property), *option.line, target,
                                key_report);
         }
@@ -301,7 +295,7 @@ void NodeObjects::complete() {
                 o.safe = pdo.safety ? std::optional<std::uint64_t>(0) : usual_safe(o, pdo.to_node);
             }
             if (o.as == PinType::none) {
-                o.as = usual(o.type);
+                o.as = o.unit.empty() ? usual(o.type) : PinType::real;
             }
             const bool lines = o.bits_wanted > 0 ||
                                (o.bits_wanted == 0 && is_lines(o.index) && o.as != PinType::real);
