@@ -115,6 +115,16 @@ TEST(CanopenConfig, a_unit_leaves_a_type_that_is_given_under_another_spelling) {
     EXPECT_EQ(o[1].as, PinType::s32);
 }
 
+TEST(CanopenConfig, silence_is_not_shorter_than_guarding_takes) {
+    const std::string node =
+        "[bus]\n[node 5]\ndevice = cia402\ntpdo1 = statusword\nheartbeat = 100ms\n"
+        "guarding = 100ms x 3\n";
+    EXPECT_EQ(said(node + "silence = 250ms\n"),
+              "arm:7:11: error: silence is shorter than guard time x life time factor; with "
+              "guarding the node is lost after 300ms; write at least that, or delete silence");
+    EXPECT_EQ(said(node + "silence = 300ms\n"), "");
+}
+
 TEST(CanopenConfig, limits_values_to_the_range_of_the_object) {
     Object o;
     o.type = Type::integer16;

@@ -300,11 +300,20 @@ private:
 
     void check_silence() {
         const NodeSetup& s = node_.setup;
-        if (s.heartbeat_limit <= 0 || s.heartbeat_limit >= Time{s.heartbeat_ms} * millisecond) {
+        if (s.heartbeat_limit <= 0) return;
+        const Span at = keys_.find("silence")->value.at;
+        const Time life_time = Time{s.guard_ms} * s.guard_factor * millisecond;
+        if (s.heartbeat_limit < life_time) {
+            report_.error(Topic::node, at,
+                          "silence is shorter than guard time x life time factor",
+                          "with guarding the node is lost after " +
+                              std::to_string(life_time / millisecond) +
+                              "ms; write at least that, or delete silence");
             return;
         }
+        if (s.heartbeat_limit >= Time{s.heartbeat_ms} * millisecond) return;
         report_.error(
-            Topic::node, keys_.find("silence")->value.at,
+            Topic::node, at,
             "silence is shorter than the heartbeat: the node would be lost before its next "
             "heartbeat",
             "the heartbeat is " + std::to_string(s.heartbeat_ms) + "ms; write at least twice that");
