@@ -39,10 +39,11 @@ Known mapped_object(const std::vector<esi::Pdo>& pdos, std::uint16_t index, std:
     return {};
 }
 
-/// Returns the pin of an object without a name: "2000-0a", in hexadecimal.
+/// Returns the pin of an object without a name: "2000-10". The sub-index is decimal, as messages
+/// print it, with two digits at least.
 std::string unnamed_pin(const ObjectAddress& address) {
-    const std::string sub = bus::hex_text(address.sub, 2).substr(2);
-    return lower(bus::index_text(address.index).substr(2) + "-" + sub);
+    const char* const fill = address.sub < 10 ? "-0" : "-";
+    return lower(bus::index_text(address.index).substr(2) + fill + std::to_string(address.sub));
 }
 
 bool is_pdo(std::uint16_t index) {

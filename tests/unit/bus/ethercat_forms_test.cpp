@@ -78,6 +78,19 @@ TEST(EthercatForms, Unit_leaves_a_type_that_is_given_under_another_spelling) {
     EXPECT_EQ(reading.buses[0].slaves[0].find("statusword")->unit, "bits");
 }
 
+TEST(EthercatForms, Object_without_a_name_has_a_pin_with_a_decimal_sub_index) {
+    const Reading reading = read(
+        "[bus]\n[slave 0 a]\ndevice = cia402\noutputs = 2000:1 u8 2000:0x0A u8 2000:0x1F u8\n"
+        "2000:0x0A.unit = mm\n",
+        "m.ethercat");
+    EXPECT_EQ(messages(reading), "");
+    const auto& entries = reading.buses[0].setup.slaves[0].sync_managers[0].pdos[0].entries;
+    ASSERT_EQ(entries.size(), 3U);
+    EXPECT_EQ(entries[0].name, "2000-01");
+    EXPECT_EQ(entries[1].name, "2000-10");
+    EXPECT_EQ(entries[2].name, "2000-31");
+}
+
 TEST(EthercatForms, Generated_ranges_keep_their_meaning_in_earlier_versions) {
     Found io;
     io.name = "io";

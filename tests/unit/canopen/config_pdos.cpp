@@ -115,6 +115,14 @@ TEST(CanopenConfig, a_unit_leaves_a_type_that_is_given_under_another_spelling) {
     EXPECT_EQ(o[1].as, PinType::s32);
 }
 
+TEST(CanopenConfig, an_object_without_a_name_has_a_pin_with_a_decimal_sub_index) {
+    const auto c = good("[bus]\n[node 1]\ntpdo1 = 0x2000:0x0A u8, 2000:31 u8, 0x2001 u8\n");
+    const auto& o = c.nodes[0].pdos[0].objects;
+    EXPECT_EQ(o[0].pin, "0x2000-10");
+    EXPECT_EQ(o[1].pin, "0x2000-31");
+    EXPECT_EQ(o[2].pin, "0x2001");
+}
+
 TEST(CanopenConfig, silence_is_not_shorter_than_guarding_takes) {
     const std::string node =
         "[bus]\n[node 5]\ndevice = cia402\ntpdo1 = statusword\nheartbeat = 100ms\n"
