@@ -86,6 +86,10 @@ public:
         for (const std::uint32_t id : {sync_id, announce_id, request_id, answer_id}) {
             add_frame(id, no_node);
         }
+        // the owner of a slot takes precedence, as in the line
+        for (const Message& m : t_.messages) {
+            add_frame(m.id, static_cast<std::uint32_t>(m.node));
+        }
         for (const Mode& mode : t_.modes) {
             for (const auto& uses : mode.slots) {
                 for (const Use& u : uses) {
@@ -94,9 +98,6 @@ public:
                     }
                 }
             }
-        }
-        for (const Message& m : t_.messages) {
-            add_frame(m.id, static_cast<std::uint32_t>(m.node));
         }
         faults_.emplace(event_rows, frames_.size(),
                         [this](Event event, std::size_t frame, std::string_view name) {

@@ -65,14 +65,12 @@ public:
             throw std::runtime_error("ppm= and tick_ns= are for simulated nodes; " +
                                      arguments_.link.get() + " has clocks of its own");
         }
-        if (arguments_.follow != 0) {
-            clock_.claim();
-        }
         exchange_ = can::offer_slots(arguments_.node.get(), d);
         if (!exchange_) {
             throw std::runtime_error("node " + arguments_.node.get() +
                                      " is in this process already; load each node once");
         }
+        claim_clock();
         link_ = std::move(opened.link);
         station_->attach(*link_);
         begin_cycles();
@@ -210,6 +208,18 @@ protected:
         }
         last = now_;
         begin(fault_, fault->text, fault->detail(value));
+    }
+
+    /// Claims the clock of the threads. Last in start(): a claim is not given back when the start
+    /// fails. [setup]
+    void claim_clock() {
+        if (arguments_.follow == 0) return;
+        try {
+            clock_.claim();
+        } catch (...) {
+            can::withdraw_slots(*exchange_);
+            throw;
+        }
     }
 
     /// The fault is over. [realtime]
