@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <memory>
 #include <span>
 #include <string>
 
@@ -35,6 +36,12 @@ public:
             }
             return;
         }
+        if (is_real(e) && !output && !invalid_) {
+            invalid_ = std::make_unique<Out<std::uint32_t>>(
+                component_, shows_, "invalid",
+                "real values of slaves that are not finite, counted in each cycle: their pins keep "
+                "the last finite value");
+        }
         Place place{area, at, codec_of(e)};
         hal_type type = place.codec.pin_type();
         if (e.scaled) {
@@ -45,16 +52,25 @@ public:
         add(name, e, type, output, place);
     }
 
-    /// Copies inputs of the slaves to pins. `areas`: process data by number. [realtime]
+    /// Copies inputs of the slaves to pins. A value that is not finite leaves its pin. `areas`:
+    /// process data by number. [realtime]
     void show(std::span<const std::span<std::uint8_t>> areas) noexcept {
-        outs_.each([areas]<class T>(Out<T>& pin, const Place& p) noexcept {
+        std::uint32_t invalid = 0;
+        outs_.each([areas, &invalid]<class T>(Out<T>& pin, const Place& p) noexcept {
             const T value = p.codec.decode<T>(read_bits(areas[p.area], p.at, p.codec.bits()));
             if constexpr (std::is_same_v<T, double>) {
-                pin = (std::isfinite(value) ? value : 0.0) * p.scale + p.offset;
+                if (!std::isfinite(value)) {
+                    ++invalid;
+                    return;
+                }
+                pin = value * p.scale + p.offset;
             } else {
                 pin = value;
             }
         });
+        if (invalid_ && invalid != 0) {
+            *invalid_ = *invalid_ + invalid;
+        }
     }
     /// Copies pins to outputs of the slaves, limited to the range of the entry. [realtime]
     void take(std::span<const std::span<std::uint8_t>> areas) noexcept {
@@ -107,6 +123,7 @@ private:
     const Function &shows_, &takes_;
     AnyIns<Place> ins_;
     AnyOuts<Place> outs_;
+    std::unique_ptr<Out<std::uint32_t>> invalid_;  // if slaves send real values
 };
 
 }  // namespace hal::ethercat

@@ -2,7 +2,7 @@
 #include "ethercat/plugins/entry_pins.hpp"
 
 #include <array>
-#include <cmath>
+#include <bit>
 #include <cstdlib>
 #include <limits>
 #include <map>
@@ -90,6 +90,26 @@ TEST(EthercatEntryPins, Real_of_the_width_of_its_entry_is_a_float) {
     entries.pins.show(areas);
     EXPECT_EQ(image, (std::array<std::uint8_t, 4>{0, 0, 0xc0, 0xbf}));
     EXPECT_EQ(host.value<double>("in"), -1.5);
+}
+
+TEST(EthercatEntryPins, Real_input_that_is_not_finite_keeps_the_last_value_and_is_counted) {
+    Host host;
+    Entries entries(host.get());
+    entries.declare(32, master::Type::real32, false);
+    std::array<std::uint8_t, 4> image{};
+    const std::span<std::uint8_t> areas[] = {image};
+    const auto show = [&](float value) {
+        write_bits(image, 0, 32, std::bit_cast<std::uint32_t>(value));
+        entries.pins.show(areas);
+        return host.value<double>("in");
+    };
+    EXPECT_EQ(show(2.5F), 2.5);
+    EXPECT_EQ(host.value<std::uint32_t>("invalid"), 0U);
+    EXPECT_EQ(show(std::numeric_limits<float>::quiet_NaN()), 2.5);
+    EXPECT_EQ(show(-std::numeric_limits<float>::infinity()), 2.5);
+    EXPECT_EQ(host.value<std::uint32_t>("invalid"), 2U);
+    EXPECT_EQ(show(-1.0F), -1.0);
+    EXPECT_EQ(host.value<std::uint32_t>("invalid"), 2U);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include "hal/any_pin.hpp"
@@ -29,6 +30,12 @@ public:
                               {.unit = o.unit.c_str()});
             }
         };
+        if (!to_node && is_real(o.type) && !invalid_) {
+            invalid_ = std::make_unique<Out<std::uint32_t>>(
+                component, shows_, "invalid",
+                "real values of nodes that are not finite, counted in each cycle: their pins keep "
+                "the last finite value");
+        }
         for (const config::BitPin& b : o.bit_pins) {
             add(HAL_TYPE_BIT, b.name, o.about + ", bit " + std::to_string(b.bit),
                 {slot, codec_of(o), std::uint64_t{1} << b.bit, std::uint64_t{1} << b.bit});
@@ -76,20 +83,30 @@ private:
         double offset = 0.0;
     };
 
-    /// Sets the output pins; `is_safe` selects the slots that have their safe value. [realtime]
+    /// Sets the output pins; `is_safe` selects the slots that have their safe value. A value that
+    /// is not finite leaves its pin. [realtime]
     template <class Slots, class IsSafe>
     void show(Slots slots, IsSafe is_safe) noexcept {
-        outs_.each([slots, is_safe]<class T>(Out<T>& pin, const Bound& b) noexcept {
+        std::uint32_t invalid = 0;
+        outs_.each([slots, is_safe, &invalid]<class T>(Out<T>& pin, const Bound& b) noexcept {
             const Slot& s = slots[b.slot];
             const std::uint64_t raw = is_safe(s) ? s.safe : number_in(*s.entry);
             if constexpr (std::is_same_v<T, bool>) {
                 pin = (raw & b.mask) != 0;
             } else if constexpr (std::is_same_v<T, double>) {
-                pin = (b.codec.decode<T>(raw) - b.offset) / b.scale;
+                const double value = b.codec.decode<T>(raw);
+                if (!std::isfinite(value)) {
+                    ++invalid;
+                    return;
+                }
+                pin = (value - b.offset) / b.scale;
             } else {
                 pin = b.codec.decode<T>(raw);
             }
         });
+        if (invalid_ && invalid != 0) {
+            *invalid_ = *invalid_ + invalid;
+        }
     }
 
     static PinCodec codec_of(const config::Object& o) noexcept {
@@ -115,6 +132,7 @@ private:
     const Function& takes_;
     AnyIns<Bound> ins_;
     AnyOuts<Bound> outs_;
+    std::unique_ptr<Out<std::uint32_t>> invalid_;  // if nodes send real values
 };
 
 /// What is known of a node.
