@@ -442,7 +442,7 @@ private:
             to.entries.push_back(std::move(e));
             return;
         }
-        if (!node.attribute("halType")) {
+        if (std::string_view(node.attribute("halType").value()).empty()) {
             error(Topic::value, node, "pin '" + pin + "' has no halType", "write halType=\"u32\"");
         }
         if (e.type == Type::bit && bits > 1) return add_bits(node, e, pin, to);

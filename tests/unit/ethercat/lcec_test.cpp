@@ -115,6 +115,11 @@ TEST(Lcec, Errors_name_the_element_and_its_line) {
                "name=\"enableCSP\" value=\"maybe\"/></slave>"),
         "c.xml:2:2: error: invalid value 'maybe' of modParam 'enableCSP': expected true or false\n"
         "c.xml:2:53: error: unsupported modParam 'enableCPS'; did you mean 'enableCSP'?");
+    EXPECT_NE(errors("<slave idx=\"0\" type=\"generic\" vid=\"1\" pid=\"2\"><syncManager idx=\"3\" "
+                     "dir=\"in\"><pdo idx=\"1A00\"><pdoEntry idx=\"6000\" subIdx=\"01\" "
+                     "bitLen=\"16\" halType=\"\" halPin=\"x\"/></pdo></syncManager></slave>")
+                  .find("error: pin 'x' has no halType; write halType=\"u32\""),
+              std::string::npos);
     EXPECT_EQ(
         to_string(read("<x/>", "c.xml"), "c.xml"),
         "c.xml:1:2: error: the root element is 'x', not masters; the file begins with <masters>");
