@@ -89,7 +89,7 @@ public:
     bool parse(Target& to, const Entry& entry) const {
         const std::string word = lower(entry.value.text);
         const bool is_none = none_ && (word == "no" || word == "none" || word == "0");
-        const auto value = parse_time(word, bare_ ? 1e3 : 0.0);
+        const auto value = parse_time(entry.value.text, bare_ ? 1e3 : 0.0);
         if (!is_none && (!value || *value < min_ || *value > max_)) return false;
         auto& member = std::invoke(get_, to);
         const std::int64_t time = is_none ? 0 : *value / unit_;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "bus/config/object_address.hpp"
 #include "bus/config/value_types.hpp"
+#include "bus/config/values.hpp"
 #include "canopen/master/config/master_config.hpp"
 
 namespace hal::bus {
@@ -78,6 +79,21 @@ TEST(CanopenForms, Objects_need_no_prefix_and_old_types_are_reported) {
     EXPECT_EQ(received[1].pin, "0x2000-10") << "the same pin as with 0x";
     EXPECT_EQ(received[1].scale, 2.0);
     EXPECT_EQ(reading.config.nodes[0].pdos[1].objects[1].sub, 31);
+}
+
+TEST(ConfigForms, Units_of_times_are_in_lower_case) {
+    std::int64_t time = 7;
+    const auto value = bus::time([&](int&) -> std::int64_t& { return time; }, 0, 1'000'000'000);
+    int target = 0;
+    Entry entry;
+    entry.value.text = "1MS";
+    EXPECT_FALSE(value.parse(target, entry));
+    entry.value.text = "1ms";
+    EXPECT_TRUE(value.parse(target, entry));
+    EXPECT_EQ(time, 1'000'000);
+    entry.value.text = "None";
+    EXPECT_TRUE(value.or_none().parse(target, entry));
+    EXPECT_EQ(time, 0);
 }
 
 }  // namespace
