@@ -75,7 +75,7 @@ struct Connection::State {
     std::atomic<bool> engaged{false};
     // What follows belongs to the thread in handle().
     bool stop = false;
-    /// a request was rejected because the machine ends
+    /// a request was rejected because the machine ends, and the client has no component
     bool told_end = false;
     std::uint64_t halt_ticket = 0;
 };
@@ -335,7 +335,7 @@ Connection::Handled Connection::handle(std::string_view line, std::string& repli
         // end of the machine.
         const bool goes_on = verb.kind == VerbKind::until_closed || verb.ends_instance();
         if (state.session.ending() && !goes_on) {
-            state.told_end = true;
+            state.told_end = !state.has_component;
             return reject(replies, id, machine_ends);
         }
         if (!may_wait && verb.kind == VerbKind::command && may_wait_for(body[verb.name])) {
@@ -346,7 +346,7 @@ Connection::Handled Connection::handle(std::string_view line, std::string& repli
         verb.handle(state, body, replies);
         if (verb.kind == VerbKind::inspection && state.session.ending()) {
             replies.resize(before);  // it may have been abandoned halfway
-            state.told_end = true;
+            state.told_end = !state.has_component;
             return reject(replies, id, machine_ends);
         }
         replies += "}\n";

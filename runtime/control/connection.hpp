@@ -41,8 +41,9 @@ public:
     /// Executes one request line (without its end of line) and appends the reply. Whatever the line
     /// is, there is one.
     Handled handle(std::string_view line, std::string& replies, bool may_wait = false);
-    /// True once a request was rejected because the machine ends: the client's further ones are not
-    /// worth reading. Not while another thread is in handle().
+    /// True once a request was rejected because the machine ends: the client's further ones need
+    /// not be read. False for a component, whose values are exchanged until the connection closes.
+    /// Not while another thread is in handle().
     bool told_end() const;
     /// What execute_urgent() did with a line.
     enum class Urgent {

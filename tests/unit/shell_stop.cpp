@@ -184,5 +184,21 @@ TEST_F(StopTest, an_interrupted_session_ends_the_texts_and_queries_of_clients_ea
     EXPECT_EQ(machine->session.model().find_signal("x0"), nullptr);
 }
 
+TEST_F(StopTest, a_component_is_served_until_the_machine_has_ended_also_after_a_rejection) {
+    serve();
+    const auto c = client();
+    const Json pin{{"name", "out"}, {"type", "float"}, {"dir", "out"}};
+    ASSERT_EQ(c->request({{"component", "p"}, {"pins", Json::array({pin})}})["ok"], true);
+    machine->session.interrupt();
+    EXPECT_EQ(c->request({{"list", "pin"}})["error"], "the machine ends");
+    const std::uint64_t before = server->counts().requests;
+    const auto exchange = c->send({{"exchange", "p"}, {"write", {0, 1.5}}});
+    ASSERT_TRUE(eventually([&] { return server->counts().requests > before; }));
+    EXPECT_EQ(c->wait(exchange)["ok"], true);
+    EXPECT_EQ(c->request({{"list", "pin"}})["error"], "the machine ends");
+    EXPECT_EQ(c->stop().status, 0);
+    EXPECT_TRUE(eventually([this] { return ended.load(); }));
+}
+
 }  // namespace
 }  // namespace hal::test
