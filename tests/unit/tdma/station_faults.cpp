@@ -116,6 +116,8 @@ TEST(Station, does_not_recalibrate_after_a_short_loss_of_the_master) {
     EXPECT_EQ(mac(1), n.station.status().master);
     EXPECT_GE(n.station.status().count.requests - before, 100U)
         << "after a longer time its cable may be another";
+}
+
 TEST(Station, does_not_count_frames_that_were_rejected_before_it_was_attached) {
     Bed bed;
     Machine& m = bed.add(1, master());
