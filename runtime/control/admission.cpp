@@ -8,7 +8,6 @@
 
 #include <sys/eventfd.h>
 #include <sys/socket.h>
-#include <sys/syscall.h>
 #include <unistd.h>
 
 #include "commands/shell.hpp"
@@ -23,19 +22,6 @@ constexpr std::int64_t urgent_ns = 20'000'000;
 constexpr std::size_t max_waiting = 64;  // clients without a place
 // a client without a place waits for one at most
 constexpr std::int64_t give_up_ns = 5'000'000'000;
-
-/// Opens a pidfd of the process at the other end of a socket; -1 with errno when it cannot be opened.
-int pidfd_of_peer(int fd, pid_t pid) {
-#ifdef SO_PEERPIDFD
-    constexpr int peer_pidfd = SO_PEERPIDFD;
-#else
-    constexpr int peer_pidfd = 77;  // Linux 6.5
-#endif
-    int process = -1;
-    socklen_t size = sizeof process;
-    if (getsockopt(fd, SOL_SOCKET, peer_pidfd, &process, &size) == 0) return process;
-    return static_cast<int>(syscall(SYS_pidfd_open, pid, 0));
-}
 
 }  // namespace
 
@@ -68,7 +54,7 @@ std::int64_t Admission::next_due_ns(std::int64_t now_ns) const {
 /// descriptor is left, cannot be watched.
 void Admission::watch_process(ServedClient& client) {
     if (client.process >= 0 || client.process_ended || client.peer <= 0 || spare_ < 0) return;
-    client.process = pidfd_of_peer(client.fd, client.peer);
+    client.process = pidfd_of_peer(client.fd, client.peer, client.accepted_ns);
     if (client.process < 0 && errno == ESRCH) {
         note_process_end(client);
     }

@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "control/connection.hpp"
+#include "control/peer_process.hpp"
 #include "hal/clock.hpp"
 
 namespace hal {
@@ -32,7 +33,7 @@ struct Turn {
     std::size_t capacity = 0;
     bool congested = false;        ///< subscriptions are skipped
     bool stop = false;             ///< a request asked the instance to end
-    bool told_end = false;         ///< a request was rejected because the machine ends
+    bool told_end = false;         ///< as Connection::told_end()
     /// the client is gone: the connection is closed, which may take long
     bool closes = false;
     std::uint64_t requests = 0;
@@ -90,6 +91,8 @@ struct ServedClient {
     Turn turn;
     std::atomic<bool> turn_over{false};
     std::int64_t came_ns = monotonic_ns();
+    /// when it was accepted, on the clock of pidfd_of_peer()
+    std::int64_t accepted_ns = boot_ns();
     std::int64_t active_ns = came_ns;  ///< when it connected or made its last request
     bool reserved = false;  ///< came when all places were taken
     std::mutex events_mutex;
@@ -120,6 +123,15 @@ struct ServedClient {
         }
     }
     bool busy() const { return worker.joinable(); }
+    /// True when its process has ended and all that it has sent was read: these requests are
+    /// executed, but none of them waits.
+    bool is_abandoned() const { return process_ended && input_ended; }
+    /// Drops the replies that are pending.
+    void discard_replies() {
+        out.clear();
+        sent = 0;
+        stalled_since = 0;
+    }
     /// True when all its requests have been executed, and all replies have gone.
     bool is_served() {
         return !busy() && !has_turn && halting_since == 0 && waiting() == 0 &&

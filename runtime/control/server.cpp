@@ -176,19 +176,23 @@ void Server::State::serve_client(ServedClient& client, short events) {
     collect_worker(client);
     if (client.gone) return;
     if (events & POLLIN) {
-        receive(client, (events & POLLHUP) != 0 || client.process_ended);
+        receive(client, (events & POLLHUP) != 0);
     } else if (events & (POLLHUP | POLLERR)) {
-        clients.leave(client);
-    } else if (client.process_ended && !clients.listens_to(client)) {
         clients.leave(client);
     }
     if (client.gone) return;
     if (client.busy()) {
         look_for_cancel(client);
     }
+    if (client.busy() && client.is_abandoned()) {
+        client.connection->cancel();
+    }
     execute(client);
     if (!client.gone) {
         clients.send_out(client);
+    }
+    if (client.process_ended) {
+        client.discard_replies();
     }
     if (!client.gone && client.input_ended && client.is_served()) {
         clients.leave(client);

@@ -386,6 +386,22 @@ class Forked(LifeCase):
         self.assertEqual("[Errno 32] Broken pipe\n", program.stdout.readline())
         wait_until(lambda: not self.watched(files), "no descriptor of a process is left open")
 
+    def test_requests_that_were_sent_before_the_end_are_executed(self):
+        self.machine()
+        last = 4000
+        self.write(
+            "burst.py",
+            "import os, socket, time\ns = socket.socket(socket.AF_UNIX)\n"
+            "s.connect(os.environ['XDG_RUNTIME_DIR'] + '/halcyon/default.sock')\ns.recv(1000)\n"
+            f"text = ''.join('{{\"run\":\"setp adder.in0 %d\"}}\\n' % n for n in range({last + 1}))\n"
+            "child = os.fork()\nif child == 0: time.sleep(600)\n"
+            "s.sendall(text.encode())\nprint(child, flush=True)\n",
+        )
+        program = self.background(sys.executable, "burst.py")
+        self.child_of(program)
+        self.assertEqual(0, program.wait(60))
+        wait_until(lambda: self.value("adder.in0") == str(last), "the last request was executed")
+
     def test_a_program_behind_a_shell(self):
         self.machine()
         self.write(
