@@ -24,7 +24,6 @@
 #include "control/endpoint.hpp"
 #include "control/executors.hpp"
 #include "execute/process_setup.hpp"
-#include "machine/processes/programs.hpp"
 #include "machine/session.hpp"
 
 namespace hal {
@@ -49,7 +48,6 @@ struct Server::State {
     void serve();
     void serve_client(ServedClient& client, short events);
     void end_all();
-    bool clients_wait_for_end() const;
     int sleep_ms();
     bool has_work(ServedClient& client);
     std::int64_t next_due_ns(ServedClient& client);
@@ -71,6 +69,7 @@ struct Server::State {
     /// eventfd: a worker or an executor has finished, or the server is to end
     int wake = -1;
     std::atomic<bool> ending{false};
+    std::atomic<bool> closes_at_exit{false};  ///< the kernel closes the connections
     std::thread thread;
     ClientList clients{options};
     Admission admission{shell, options, endpoint, clients, [this] { eventfd_write(wake, 1); }};
@@ -112,6 +111,8 @@ bool Server::start(Diagnostics& diagnostics) {
     pthread_sigmask(SIG_SETMASK, &before, nullptr);
     return true;
 }
+
+void Server::close_at_exit() { state_->closes_at_exit = true; }
 
 const std::string& Server::path() const { return state_->endpoint.path(); }
 
@@ -213,15 +214,6 @@ void Server::State::remove_gone() {
     });
 }
 
-/// True when the process ends and closes the connections with itself: a hundred clients that are
-/// woken before that would take CPU time from the end. The machine's programs get a message: it waits
-/// for them.
-bool Server::State::clients_wait_for_end() const {
-    Session& session = shell.session();
-    const auto lock = session.lock();
-    return session.ending() && session.programs().idle();
-}
-
 void Server::State::end_all() {
     for (const auto& client : clients.all()) {
         const bool is_being_closed = client->turn.closes;  // an executor has the connection
@@ -243,7 +235,7 @@ void Server::State::end_all() {
         }
     }
     endpoint.stop_listening();
-    if (clients_wait_for_end()) {
+    if (closes_at_exit) {
         keep_for_good(std::make_unique<ClientList::Clients>(std::move(clients.all())));
     }
     clients.all().clear();

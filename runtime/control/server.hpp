@@ -48,8 +48,15 @@ public:
     /// Serves the shell's session; each client gets a shell of its own. The shell must outlive the
     /// server.
     explicit Server(Shell& shell, ServerOptions options = {});
-    ~Server();  ///< ends all connections and waits for the thread; removes the socket
+    /// Ends all connections and waits for the thread; removes the socket. Not with the session's
+    /// lock: ending a connection takes it.
+    ~Server();
     Server(const Server&) = delete;
+
+    /// Leaves the connections open at the end of the server: the kernel closes them when the
+    /// process exits, at once. Clients that wake earlier would take CPU time from the end. Not for
+    /// a machine whose programs run: they end when their connections are closed. [any]
+    void close_at_exit();
 
     /// Makes the socket (named by the session's instance name) and starts the thread. False:
     /// `diagnostics` has the reason, for instance that an instance of this name runs already. A

@@ -13,6 +13,7 @@
 #include "execute/process_setup.hpp"
 #include "machine/load/source_tree.hpp"
 #include "machine/processes/address.hpp"
+#include "machine/processes/programs.hpp"
 #include "tcl/tcl.hpp"
 
 namespace hal::tools {
@@ -155,6 +156,9 @@ HostedMachine::~HostedMachine() {
     // outputs are safe: a second Ctrl-C ends the process at once from here on
     ExitObserver::silence();
     stop.release();  // it calls the shell, which goes now
+    if (server_ && programs_have_ended()) {
+        server_->close_at_exit();
+    }
     server_.reset();
 }
 
@@ -270,6 +274,11 @@ void HostedMachine::advance(std::int64_t ns, std::uint64_t cycles) {
 void HostedMachine::shut_down() {
     const auto lock = session.lock();
     session.shut_down();
+}
+
+bool HostedMachine::programs_have_ended() {
+    const auto lock = session.lock();
+    return session.ending() && session.programs().idle();
 }
 
 bool HostedMachine::faulted() {

@@ -52,6 +52,9 @@ public:
     bool faulted();
 
 private:
+    /// Returns true when the machine ends and none of its programs runs.
+    bool programs_have_ended();
+
     // before the first thread of the process, and after the session
     std::unique_ptr<ExitObserver> observer_;
 
