@@ -100,7 +100,7 @@ void ScriptTexts::keep_part(std::uint32_t source, ParsedText& parsed) const {
     collect_nodes(parsed.commands, nodes, parsed.problems);
     if (!shell_.options.node.empty()) {
         return hal::keep_part(shell_.options.node, parsed.commands);
-    };
+    }
     if (!nodes.empty()) {
         std::vector<std::string> names;
         for (const NodeLine& node : nodes) {

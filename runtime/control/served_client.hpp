@@ -78,8 +78,8 @@ struct ServedClient {
     /// it counts among the places; others have urgent requests executed only
     bool placed = false;
     bool not_urgent = false;  ///< the next request has been looked at
-    /// it knows that the machine ends, and is not listened to: a hundred clients that go on asking
-    /// would take the CPU time that the end needs
+    /// The client was told that the machine ends. Its further requests are not read, so that many
+    /// clients do not delay the end.
     bool told_end = false;
     std::int64_t stalled_since = 0;  ///< since when a full queue has not moved; 0: it moves
     /// since when its next request, a `stop`, waits for the threads; 0: it does not

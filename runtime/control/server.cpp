@@ -132,13 +132,14 @@ void Server::State::serve() {
     while (!ending) {
         ready.clear();
         watched.clear();
-        ready.push_back(
-            {endpoint.fd(), static_cast<short>(admission.accepts(monotonic_ns()) ? POLLIN : 0), 0});
+        const short accepts = admission.accepts(monotonic_ns()) ? POLLIN : 0;
+        ready.push_back({endpoint.fd(), accepts, 0});
         ready.push_back({wake, POLLIN, 0});
         for (const auto& client : clients.all()) {
-            const int reads = clients.listens_to(*client) ? POLLIN : 0;
-            ready.push_back({client->gone ? -1 : client->fd,
-                             static_cast<short>(reads | (client->waiting() > 0 ? POLLOUT : 0)), 0});
+            const short reads = clients.listens_to(*client) ? POLLIN : 0;
+            const short writes = client->waiting() > 0 ? POLLOUT : 0;
+            const int fd = client->gone ? -1 : client->fd;
+            ready.push_back({fd, static_cast<short>(reads | writes), 0});
             if (client->process >= 0) {
                 watched.push_back(client.get());
             }

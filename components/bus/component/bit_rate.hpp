@@ -17,13 +17,14 @@ inline void check_bit_rate(const can::Description& link, const std::string& addr
     if (link.bit_rate == 0 || link.bit_rate == wanted || link.bit_rate == can::unlimited) return;
     const std::string here = std::to_string(wanted);
     const std::string there = std::to_string(link.bit_rate);
+    std::string change_link = "bitrate=" + here + " in the address";
+    if (!link.interface.empty()) {
+        const std::string set = "sudo ip link set " + link.interface;
+        change_link = set + " down && " + set + " up type can bitrate " + here;
+    }
     throw std::runtime_error(address + " runs at " + there + " bit/s, the configuration has " +
                              here + "; change one of them: " + key + there + section + ", or " +
-                             (link.interface.empty()
-                                  ? "bitrate=" + here + " in the address"
-                                  : "sudo ip link set " + link.interface +
-                                        " down && sudo ip link set " + link.interface +
-                                        " up type can bitrate " + here));
+                             change_link);
 }
 
 }  // namespace hal::bus

@@ -17,13 +17,13 @@
 
 namespace hal::bus {
 
-/// What a cycle of receive() is, by whether transmit() runs and the thread was stopped.
+/// What receive() does in a cycle.
 enum class Turn : std::uint8_t {
-    exchanges,  ///< as the cycle before it
-    restarts,   ///< after an interruption: the station begins anew
-    returns,    ///< the same, after cycles offline
-    leaves,     ///< the first cycle offline: transmit() is missing, nothing may be sent
-    offline,    ///< a further one
+    exchanges,  ///< continues
+    restarts,   ///< begins anew after an interruption
+    returns,    ///< begins anew after cycles offline
+    leaves,     ///< goes offline: transmit() is missing, nothing may be sent
+    offline,    ///< stays offline
 };
 /// Returns true while the bus is to be shown as offline. [any]
 constexpr bool is_offline(Turn turn) noexcept {
@@ -53,7 +53,7 @@ protected:
         return instance + "." + function;
     }
 
-    /// In start(), when the links are open. [setup]
+    /// Called in start(), when the links are open. [setup]
     void begin_cycles() {
         faults_ = hal::extension<hal_faults>("hal.faults/1");
         functions_.start(faults_, this);
@@ -61,7 +61,8 @@ protected:
         offline_ = false;
         discipline_.lose();
     }
-    /// First in receive(). `paired` is false for an instance with one function. [realtime]
+    /// Called first in receive(). Returns what this cycle does. `paired` is false for an instance
+    /// with one function. [realtime]
     Turn receive_turn(hal::Cycle cycle, bool paired = true) noexcept {
         const bool was_offline = std::exchange(offline_, paired && !functions_.receive(cycle));
         if (offline_) return was_offline ? Turn::offline : Turn::leaves;

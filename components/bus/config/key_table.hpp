@@ -38,11 +38,12 @@ struct Key {
     Key(const char* name, Value value, const char* usual, const char* about)
         : info{name, value.form(), usual, about},
           parse([value](Target& to, const Entry& entry) { return value.parse(to, entry); }) {}
-    /// A key that others read: its row is in the reference, and its name is offered.
+    /// A key that is read elsewhere; the table has only its row of the reference and its name for
+    /// suggestions.
     Key(const char* name, const char* range, const char* usual, const char* about)
         : info{name, {"", range, "VALUE"}, usual, about} {}
 
-    /// The value has so many words, of this form.
+    /// Sets how many words the value has, and its form.
     Key words(std::size_t min, std::size_t max, const char* usage) const {
         Key out = *this;
         out.info.min_words = min;

@@ -54,7 +54,7 @@ private:
     std::map<std::string, Entry*, std::less<>> entries_;
 };
 
-/// How often a kind of section may occur, and what is in its header behind the kind.
+/// Whether a kind of section may be repeated, and which words follow the kind in its header.
 enum class SectionUse : std::uint8_t {
     once,  ///< [bus]
     repeated,  ///< [messages]: any number

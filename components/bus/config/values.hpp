@@ -26,7 +26,7 @@ namespace hal::bus {
 
 using text::Word;
 
-/// The word behind a key, and a value of more words.
+/// A key and its value.
 struct Entry {
     Word key;    ///< lower case, dashes
     Word value;  ///< as written

@@ -45,7 +45,7 @@ public:
     /// the SYNC of the current cycle has arrived
     bool seen() const noexcept { return seen_; }
     std::uint64_t cycle() const noexcept { return cycle_; }  ///< cycles begun so far
-    /// Returns the time `offset` (nominal ns) behind the begin of cycle `cycle`. [realtime]
+    /// Returns the time `offset` (nominal ns) after the start of cycle `cycle`. [realtime]
     Time at(std::uint64_t cycle, Time offset) const noexcept;
     Time start() const noexcept { return at(cycle_, 0); }
     double period() const noexcept { return period_; }  ///< ns of this node's clock

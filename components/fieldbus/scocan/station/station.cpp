@@ -31,7 +31,7 @@ void Station::attach(can::Link& link) noexcept {
     timed_ = link.description().bit_rate != 0;
     core_.silenced = core_.listen_only = was_down_ = false;
     modes_.attach();
-    watch_.attach();
+    slot_monitor_.attach();
     transmitter_.attach();
     forget();
 }
@@ -45,7 +45,7 @@ void Station::forget() noexcept {
     core_.counter = off_rate_ = 0;
     core_.first_seen = core_.last_begin = INT64_MIN;
     modes_.forget();
-    watch_.forget();
+    slot_monitor_.forget();
     sync_.forget();
     transmitter_.forget();
 }
@@ -63,7 +63,7 @@ void Station::restart(Time now) noexcept {
 
 void Station::reset() noexcept {
     core_.silenced = false;
-    watch_.reset();
+    slot_monitor_.reset();
     sync_.reset();
 }
 
@@ -95,7 +95,7 @@ void Station::receive(Time now) noexcept {
     if (const auto passed = core_.clock.pass(local, core_.table.slot()); passed != 0) {
         core_.counter = (core_.counter + passed) % counter_cycles;
         core_.count.syncs_lost += passed;
-        watch_.close_cycle();
+        slot_monitor_.close_cycle();
         modes_.switch_over();
         modes_.continue_change();
     }
@@ -114,7 +114,7 @@ void Station::accept(const can::Frame& frame) noexcept {
     if (frame.id == sync_id) return accept_sync(frame, begin);
     const SlotTime w = core_.where(begin);
     if (frame.own) return accept_echo(frame, w, bus_begin);
-    watch_.check(frame, w);
+    slot_monitor_.check(frame, w);
     if (std::uint32_t slot = 0; decode_announcement(frame, slot)) {
         return accept_announcement(slot, w);
     }
@@ -128,15 +128,15 @@ void Station::accept(const can::Frame& frame) noexcept {
 void Station::accept_announcement(std::uint32_t slot, const SlotTime& w) noexcept {
     if (!w.known || w.at.slot != slot) return;
     transmitter_.announced(w.at);
-    watch_.announced(w);
-    watch_.monitor_heard();
+    slot_monitor_.announced(w);
+    slot_monitor_.monitor_heard();
 }
 
 /// Handles a SYNC, of others or the echo of an own one.
 void Station::accept_sync(const can::Frame& frame, Time begin) noexcept {
     if (frame.own) {
         if (sync_.sent(begin) == 0) return;
-        watch_.close_cycle();
+        slot_monitor_.close_cycle();
         modes_.switch_over();
         modes_.continue_change();
         if (core_.counter == 0) {
@@ -166,7 +166,7 @@ void Station::accept_sync(const can::Frame& frame, Time begin) noexcept {
     const auto next = static_cast<std::uint32_t>(core_.counter + passed) % counter_cycles;
     core_.counter = s.numbered ? s.counter : static_cast<std::uint32_t>(next);
     core_.numbered = s.numbered;
-    watch_.close_cycle();
+    slot_monitor_.close_cycle();
     modes_.confirm(s);
     modes_.switch_over();
     modes_.follow(s);
@@ -203,11 +203,11 @@ bool Station::synchronises(Time stamp, bool led) noexcept {
 void Station::accept_echo(const can::Frame& frame, const SlotTime& w, Time bus_begin) noexcept {
     if (frame.id == announce_id) {
         transmitter_.announced(w.at);
-        return watch_.announced(w);
+        return slot_monitor_.announced(w);
     }
     SendQueue::Entry sent;
     const bool known = core_.queue.confirm(frame, sent);
-    watch_.check_own(frame, w, bus_begin);
+    slot_monitor_.check_own(frame, w, bus_begin);
     if (known || frame.id < request_id) {
         core_.sink.on_sent(frame, bus_begin);
     }

@@ -65,11 +65,13 @@ public:
     std::uint32_t counter() const noexcept { return core_.counter; }
     std::uint32_t mode() const noexcept { return modes_.mode(); }
     bool leading() const noexcept { return core_.leading; }
-    bool monitored() const noexcept { return watch_.monitored(); }
+    bool monitored() const noexcept { return slot_monitor_.monitored(); }
     bool changing() const noexcept { return modes_.changing(); }
     std::uint32_t lost() const noexcept { return core_.clock.lost(); }
     std::size_t waiting() const noexcept { return core_.queue.size(); }
-    std::uint32_t foreign_of(std::uint32_t id) const noexcept { return watch_.foreign_of(id); }
+    std::uint32_t foreign_of(std::uint32_t id) const noexcept {
+        return slot_monitor_.foreign_of(id);
+    }
     /// Returns the begin of a slot of the current cycle, on the clock of the link. [realtime]
     Time slot_start(std::uint32_t slot) const noexcept {
         return core_.crystal.bus(core_.begin_of({core_.clock.cycle(), slot}));
@@ -94,9 +96,9 @@ private:
 
     StationCore core_;
     ModeControl modes_{core_};
-    SlotWatch watch_{core_, modes_};
+    SlotMonitor slot_monitor_{core_, modes_};
     SyncSender sync_{core_, modes_};
-    Transmitter transmitter_{core_, modes_, watch_, sync_};
+    Transmitter transmitter_{core_, modes_, slot_monitor_, sync_};
     const bool wants_windows_;
     bool timed_ = false;  // frames take the time of their bits
     bool was_down_ = false;

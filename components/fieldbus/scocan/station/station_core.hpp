@@ -23,7 +23,7 @@ struct SlotTime {
     bool known = false;
     SlotIndex at;
     std::uint32_t counter = 0;  ///< of the cycle
-    Time offset = 0;            ///< behind the begin of the slot
+    Time offset = 0;            ///< after the start of the slot
 };
 
 /// The shared part. [realtime]

@@ -24,7 +24,7 @@ const char* to_string(State) noexcept;
 enum class Event : std::uint8_t {
     running,         ///< synchronised: the slots may be used
     sync_lost,       ///< value: SYNCs lost; the node stops sending
-    sync_late,       ///< value: ns behind (or before) its time; ignored
+    sync_late,       ///< value: ns after (or before) its time; ignored
     sync_doubled,    ///< a second SYNC in one cycle; ignored
     /// value: ppm of the SYNC's interval against the cycle; ignored: the node does not synchronise
     sync_off_rate,
@@ -39,7 +39,7 @@ enum class Event : std::uint8_t {
     babbling,  ///< id, who; value: frames outside of their slots in one cycle
     /// id; value: period of the thread, ns: no cycle of it was within the transmit window
     slot_missed,
-    late_frame,  ///< own frame; value: ns behind the end of its transmit window
+    late_frame,  ///< own frame; value: ns after the end of its transmit window
     silenced,  ///< this node
     silenced_by_monitor,  ///< this node, by the monitor
     bus_off,

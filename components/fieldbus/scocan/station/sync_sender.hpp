@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The SYNC: its primary sender listens before it leads; backup k sends k offsets behind the begin of
-// a cycle in which no SYNC came.
+// The SYNC: its primary sender listens before it leads. Backup k sends k offsets after the start of
+// a cycle without SYNC.
 #pragma once
 
 #include "fieldbus/scocan/station/mode_control.hpp"
@@ -14,11 +14,11 @@ public:
     SyncSender(StationCore& core, ModeControl& modes) noexcept : core_(core), modes_(modes) {}
     /// Forgets what came from the bus.
     void forget() noexcept;
-    /// Ends standby behind a second SYNC node.
+    /// Ends the standby that a second SYNC node caused.
     void reset() noexcept { standby_ = false; }
 
-    /// Decides whether this node begins to send the SYNC. Returns true when it makes a cycle of its
-    /// own.
+    /// Decides whether this node begins to send the SYNC. Returns true when it starts a cycle
+    /// itself.
     bool lead(Time now) noexcept;
     /// Sends the SYNC of a cycle, if this node does.
     void plan(std::uint64_t cycle) noexcept;

@@ -33,7 +33,7 @@ can::Sent Transmitter::send(const can::Frame& frame, bool state, std::uint32_t s
     if (frame.extended || frame.fd || !frame.valid() || table.last_start(frame.length) < 0) {
         return drop(can::Sent::rejected);
     }
-    const std::uint32_t sender = watch_.owner_of(frame.id);
+    const std::uint32_t sender = slot_monitor_.owner_of(frame.id);
     const bool of_other = sender != no_node && sender != core_.node;
     if (is_reserved(frame.id) || of_other) return not_allowed(frame.id, sender);
     bool priv = table.owner(modes_.mode(), frame.id) != nullptr;

@@ -6,18 +6,18 @@
 
 #include <array>
 
-#include "fieldbus/scocan/station/slot_watch.hpp"
+#include "fieldbus/scocan/station/slot_monitor.hpp"
 #include "fieldbus/scocan/station/sync_sender.hpp"
 
 namespace hal::scocan {
 
-/// The transmitter. [realtime]
+/// Sends what is queued in the slots of this node. [realtime]
 class Transmitter {
 public:
     /// All outlive it. [setup]
-    Transmitter(StationCore& core, const ModeControl& modes, const SlotWatch& watch,
+    Transmitter(StationCore& core, const ModeControl& modes, const SlotMonitor& monitor,
                 SyncSender& sync) noexcept
-        : core_(core), modes_(modes), watch_(watch), sync_(sync) {}
+        : core_(core), modes_(modes), slot_monitor_(monitor), sync_(sync) {}
     void attach() noexcept { not_allowed_.fill(false); }  ///< [setup]
     /// Forgets what goes to the bus.
     void forget() noexcept;
@@ -76,7 +76,7 @@ private:
 
     StationCore& core_;
     const ModeControl& modes_;
-    const SlotWatch& watch_;
+    const SlotMonitor& slot_monitor_;
     SyncSender& sync_;
     SlotIndex next_{0, 0};  // to be planned
     SlotIndex announced_;  // of the current cycle

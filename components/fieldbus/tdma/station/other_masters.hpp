@@ -20,14 +20,15 @@ struct Claimant {
     bool confirmed() const noexcept { return row >= confirmations; }
 };
 
-/// The other masters. [realtime]
+/// Follows the syncs of other schedules, and reports a second master. [realtime]
 class OtherMasters {
 public:
     /// The core must outlive it. [setup]
     explicit OtherMasters(StationCore& core) noexcept : core_(core) {}
     void restart() noexcept;
-    /// Counts a cycle; reports a second master that is lost.
+    /// Counts a cycle.
     void tick() noexcept;
+    /// Reports that the second master is lost when it sent no sync for `gone_after`.
     void expire(Time now) noexcept;
 
     /// Returns true for a station that may send syncs: the addresses of the master and its backups

@@ -13,7 +13,7 @@
 
 namespace hal::tdma {
 
-/// The monitor. [realtime]
+/// Checks the frames of other stations against the schedule. [realtime]
 class SlotMonitor {
 public:
     using Origin = ethernet::Discipline::Origin;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the parts of a station share: its part of the schedule, its state, the global clock, and the
-// grid of cycles in global time. One thread uses all of them.
+// grid of cycles in global time. Only the station's thread changes them. Other threads read
+// `thread`, and `address` and `setup.others`, which stay the same while the station has a port.
 #pragma once
 
 #include <pthread.h>

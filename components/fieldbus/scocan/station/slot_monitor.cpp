@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "fieldbus/scocan/station/slot_watch.hpp"
+#include "fieldbus/scocan/station/slot_monitor.hpp"
 
 namespace hal::scocan {
 
@@ -11,22 +11,22 @@ constexpr Time offence_window = 1'000'000'000;
 constexpr std::uint32_t monitor_cycles = 10;
 }  // namespace
 
-void SlotWatch::attach() noexcept {
+void SlotMonitor::attach() noexcept {
     monitor_lost_ = false;
     offences_ = 0;
 }
 
-void SlotWatch::forget() noexcept {
+void SlotMonitor::forget() noexcept {
     monitored_ = false;
     unannounced_cycles_ = 0;
 }
 
-void SlotWatch::reset() noexcept {
+void SlotMonitor::reset() noexcept {
     offences_ = 0;
     babbled_ = false;
 }
 
-std::uint32_t SlotWatch::owner_of(std::uint32_t id) const noexcept {
+std::uint32_t SlotMonitor::owner_of(std::uint32_t id) const noexcept {
     const Table& table = core_.table;
     if (const Use* use = table.owner(modes_.mode(), id)) {
         return static_cast<std::uint32_t>(use->node);
@@ -40,11 +40,11 @@ std::uint32_t SlotWatch::owner_of(std::uint32_t id) const noexcept {
     return no_node;
 }
 
-const Use* SlotWatch::use_at(const SlotTime& w) const noexcept {
+const Use* SlotMonitor::use_at(const SlotTime& w) const noexcept {
     return core_.table.use(modes_.of(w.at.cycle), w.at.slot, w.counter);
 }
 
-bool SlotWatch::is_foreign(const can::Frame& frame, const SlotTime& w) const noexcept {
+bool SlotMonitor::is_foreign(const can::Frame& frame, const SlotTime& w) const noexcept {
     if (w.at.slot == 0) return true;
     const Use* use = use_at(w);
     const Use* owner = core_.table.owner(modes_.of(w.at.cycle), frame.id);
@@ -57,7 +57,7 @@ bool SlotWatch::is_foreign(const can::Frame& frame, const SlotTime& w) const noe
     return owner != nullptr || frame.id < 0x10;
 }
 
-void SlotWatch::check(const can::Frame& frame, const SlotTime& w) noexcept {
+void SlotMonitor::check(const can::Frame& frame, const SlotTime& w) noexcept {
     if (!w.known || core_.state != State::running || core_.clock.lost() > 0 || !core_.numbered) {
         return;
     }
@@ -72,7 +72,7 @@ void SlotWatch::check(const can::Frame& frame, const SlotTime& w) noexcept {
     core_.raise(Event::foreign_frame, owner_of(frame.id), frame.id, w.at.slot);
 }
 
-void SlotWatch::check_own(const can::Frame& frame, const SlotTime& w, Time bus_begin) noexcept {
+void SlotMonitor::check_own(const can::Frame& frame, const SlotTime& w, Time bus_begin) noexcept {
     if (w.known) {
         seen_[w.at.slot] = true;
     }
@@ -96,7 +96,8 @@ void SlotWatch::check_own(const can::Frame& frame, const SlotTime& w, Time bus_b
 }
 
 /// Counts an own frame outside of its slot; too many of them silence the node.
-void SlotWatch::offend(Event event, const can::Frame& frame, Time value, Time bus_begin) noexcept {
+void SlotMonitor::offend(Event event, const can::Frame& frame, Time value,
+                         Time bus_begin) noexcept {
     ++core_.count.late;
     core_.raise(event, core_.node, frame.id, value);
     const Time begin = core_.crystal.local(bus_begin);
@@ -109,14 +110,14 @@ void SlotWatch::offend(Event event, const can::Frame& frame, Time value, Time bu
     core_.raise(Event::silenced, core_.node);
 }
 
-void SlotWatch::announced(const SlotTime& w) noexcept {
+void SlotMonitor::announced(const SlotTime& w) noexcept {
     ++core_.count.announced;
     if (w.at.slot < announced_.size()) {
         announced_[w.at.slot] = true;
     }
 }
 
-void SlotWatch::monitor_heard() noexcept {
+void SlotMonitor::monitor_heard() noexcept {
     if (monitor_lost_) {
         core_.raise(Event::monitor_found);
     }
@@ -126,7 +127,7 @@ void SlotWatch::monitor_heard() noexcept {
 }
 
 /// Counts the private slots of others without a frame. Returns those without an announcement.
-std::uint32_t SlotWatch::count_idle() noexcept {
+std::uint32_t SlotMonitor::count_idle() noexcept {
     const Table& table = core_.table;
     const std::uint32_t mode = modes_.mode();
     if (table.mode(mode) == nullptr) return 0;
@@ -144,7 +145,7 @@ std::uint32_t SlotWatch::count_idle() noexcept {
     return unannounced;
 }
 
-void SlotWatch::close_cycle() noexcept {
+void SlotMonitor::close_cycle() noexcept {
     const bool babbles = foreign_in_cycle_ >= babbling_frames;
     if (babbles && !babbled_) {
         core_.raise(Event::babbling, owner_of(foreign_id_), foreign_id_, foreign_in_cycle_);

@@ -9,11 +9,12 @@
 
 namespace hal::scocan {
 
-/// The watch. [realtime]
-class SlotWatch {
+/// Checks what is sent in the slots. [realtime]
+class SlotMonitor {
 public:
     /// Both outlive it. [setup]
-    SlotWatch(StationCore& core, const ModeControl& modes) noexcept : core_(core), modes_(modes) {}
+    SlotMonitor(StationCore& core, const ModeControl& modes) noexcept
+        : core_(core), modes_(modes) {}
     void attach() noexcept;  ///< [setup]
     /// Forgets what came from the bus.
     void forget() noexcept;
