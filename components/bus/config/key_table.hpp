@@ -43,7 +43,7 @@ struct Key {
     Key(const char* name, const char* range, const char* usual, const char* about)
         : info{name, {"", range, "VALUE"}, usual, about} {}
 
-    /// Sets how many words the value has, and its form.
+    /// Sets the number of words of the value, and its form.
     Key words(std::size_t min, std::size_t max, const char* usage) const {
         Key out = *this;
         out.info.min_words = min;
