@@ -189,6 +189,7 @@ class Installed(unittest.TestCase):
         if has_udev:
             (etc / "udev/rules.d").mkdir(parents=True)
         node = self.folder / "latency"
+        node.unlink(missing_ok=True)
         os.mknod(node, 0o20600, os.stat("/dev/cpu_dma_latency").st_rdev) if os.path.exists(
             "/dev/cpu_dma_latency"
         ) else node.touch()
