@@ -78,7 +78,7 @@ struct ServedClient {
     /// it counts among the places; others have urgent requests executed only
     bool placed = false;
     bool not_urgent = false;  ///< the next request has been looked at
-    /// The client was told that the machine ends. Its further requests are not read, so that many
+    /// A request was rejected because the machine ends. Further ones are not read, so that many
     /// clients do not delay the end.
     bool told_end = false;
     std::int64_t stalled_since = 0;  ///< since when a full queue has not moved; 0: it moves
