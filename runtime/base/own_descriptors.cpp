@@ -5,6 +5,7 @@
 #include <atomic>
 #include <mutex>
 
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -24,6 +25,13 @@ struct Entry {
 
 std::array<Entry, 64> entries;
 std::mutex entries_mutex;  // of writers, and of who reads `device` and `file`
+
+/// With the mutex.
+bool refers_to_file_of(const Entry& entry) noexcept {
+    struct stat about{};
+    if (fstat(entry.number.load(std::memory_order_relaxed), &about) != 0) return false;
+    return about.st_dev == entry.device && about.st_ino == entry.file;
+}
 
 }  // namespace
 
@@ -76,15 +84,23 @@ int own_descriptor_within(unsigned first, unsigned last) noexcept {
     return lowest;
 }
 
+bool is_intact(int descriptor) noexcept {
+    const std::scoped_lock lock(entries_mutex);
+    for (const Entry& entry : entries) {
+        if (entry.number.load(std::memory_order_relaxed) != descriptor) continue;
+        if (!refers_to_file_of(entry)) return false;
+    }
+    return true;
+}
+
 bool find_lost_descriptor(LostDescriptor& lost) noexcept {
     const std::scoped_lock lock(entries_mutex);
     for (const Entry& entry : entries) {
         const int number = entry.number.load(std::memory_order_relaxed);
         if (number == closed) continue;
-        struct stat about{};
-        const bool open = fstat(number, &about) == 0;
-        if (open && about.st_dev == entry.device && about.st_ino == entry.file) continue;
-        lost = {number, entry.name.load(std::memory_order_relaxed), open};
+        if (refers_to_file_of(entry)) continue;
+        const bool is_open = fcntl(number, F_GETFD) != -1;
+        lost = {number, entry.name.load(std::memory_order_relaxed), is_open};
         return true;
     }
     return false;

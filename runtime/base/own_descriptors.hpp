@@ -26,6 +26,10 @@ struct LostDescriptor {
 /// Looks for one. Returns false when all are intact. [setup]
 bool find_lost_descriptor(LostDescriptor& lost) noexcept;
 
+/// Returns false when a listed descriptor is lost: its number may belong to another file by now.
+/// [setup]
+bool is_intact(int descriptor) noexcept;
+
 /// In a child process that fork() has made: closes the copies of all listed descriptors and forgets
 /// them. async-signal-safe
 void drop_descriptors_of_parent() noexcept;

@@ -193,7 +193,7 @@ class Installed(unittest.TestCase):
         os.mknod(node, 0o20600, os.stat("/dev/cpu_dma_latency").st_rdev) if os.path.exists(
             "/dev/cpu_dma_latency"
         ) else node.touch()
-        hal = self.copy("by-limits") / "bin/hal"
+        hal = self.copy(f"by-limits-{has_udev}") / "bin/hal"
         user = f"{RUNUSER} tester -c '{hal} doctor --json --seconds 0'"  # logs in, as -u does not
         before = run(
             "unshare",
