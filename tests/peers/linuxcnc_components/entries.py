@@ -687,8 +687,12 @@ behaviour(
 behaviour(
     "filter_kalman",
     "xk-out",
-    lambda v: v["Rk"] < 0 or v["Qk"] < 0 or v.invalid() or v.beyond(1e12),
-    "`Rk` or `Qk` is negative; a NaN",
+    lambda v: v["Rk"] < 0
+    or v["Qk"] < 0
+    or (v["Rk"] == 0 and v["Qk"] == 0)
+    or v.invalid()
+    or v.beyond(1e12),
+    "`Rk` or `Qk` is negative, or both are 0; a NaN",
     "counts as 0; is ignored",
     "the estimate diverges",
     "a variance is not negative",
