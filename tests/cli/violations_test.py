@@ -296,6 +296,28 @@ class Violations(Case):
             r"were set to their safe values; the process ends \[cycle-violation\]\n$",
         )
 
+    @unittest.skipIf(SANITIZED, "the sanitizer has these functions itself")
+    def test_a_function_that_replaces_the_process_ends_the_machine(self):
+        for mode, call in ((50, r"execl\(\)"), (51, r"execvp\(\)")):
+            with self.subTest(call):
+                machine = self.machine()
+                self.shell("setp", "v.mode", mode)
+                self.assertRegex(
+                    self.ends(machine),
+                    rf"^hal: violate: function 'v\.act' called {call} at cycle \d+; outputs were set to their safe values; "
+                    r"the process ends \[cycle-violation\]\n$",
+                )
+
+    def test_a_lowered_limit_of_files_is_raised_again(self):
+        machine = self.machine()
+        self.good("shell", "setp", "v.mode", 60)
+        line = wait_until(machine.stderr.readline, "it is reported")
+        self.assertRegex(
+            line,
+            r"^hal: the limit of open files was lowered to 0 by a component or another process; it is \d+ again\n$",
+        )
+        self.check_goes_on(machine)
+
     # --- signals
 
     def test_signals_that_a_function_unblocks_or_ignores_end_the_machine_in_order(self):

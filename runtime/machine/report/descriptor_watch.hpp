@@ -9,6 +9,8 @@
 #include <mutex>
 #include <thread>
 
+#include <sys/resource.h>
+
 namespace hal {
 
 struct LostDescriptor;
@@ -29,6 +31,9 @@ public:
 
 private:
     void work();
+    /// Raises the limit of open files again when it was lowered: poll() fails with fewer than the
+    /// descriptors that it is given, and accept() with fewer than are open.
+    void keep_limit(const rlimit& begun);
     [[noreturn]] void end(const LostDescriptor& lost);
 
     std::function<void()> halt_;
@@ -36,6 +41,7 @@ private:
     std::mutex mutex_;
     std::condition_variable wake_;
     bool over_ = false;  // guarded by mutex_
+    bool limit_reported_ = false;
     std::thread thread_;
 };
 

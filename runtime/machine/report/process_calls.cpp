@@ -95,6 +95,10 @@ constinit Next<int(int, int)> next_dup2{"dup2"};
 constinit Next<int(int, int, int)> next_dup3{"dup3"};
 constinit Next<int(unsigned, unsigned, int)> next_close_range{"close_range"};
 constinit Next<void(int)> next_closefrom{"closefrom"};
+using Exec = int(const char*, char* const*, char* const*);
+constinit Next<Exec> next_execve{"execve"};
+constinit Next<Exec> next_execvpe{"execvpe"};
+constinit Next<int(int, char* const*, char* const*)> next_fexecve{"fexecve"};
 constinit Next<pid_t()> next_fork{"_Fork"};
 constinit Next<void(void*)> next_pthread_exit{"pthread_exit"};
 
@@ -143,6 +147,29 @@ void end_thread_of_component() noexcept {
     }
 }
 
+/// A component would replace the machine by another program: outputs would stay as they are.
+void end_before_exec(const char* call) noexcept {
+    if (hal::is_machine_process() && hal::report_end(call, " [cycle-violation]")) {
+        hal::end_process(1);
+    }
+}
+
+/// Collects the arguments of execl() and its relatives, up to the null pointer. Returns false when
+/// there are too many.
+constexpr std::size_t max_exec_arguments = 1024;
+bool collect(const char* first, va_list list, char* (&arguments)[max_exec_arguments]) noexcept {
+    std::size_t count = 0;
+    for (const char* one = first; one != nullptr; one = va_arg(list, const char*)) {
+        if (count + 1 == max_exec_arguments) {
+            errno = E2BIG;
+            return false;
+        }
+        arguments[count++] = const_cast<char*>(one);
+    }
+    arguments[count] = nullptr;
+    return true;
+}
+
 bool copies_process(long number, const long* argument) noexcept {
 #ifdef SYS_fork
     if (number == SYS_fork) return true;
@@ -167,6 +194,7 @@ bool may_call(long number, long* argument) noexcept {
         }
         return true;
     case SYS_exit: end_thread_of_component(); return true;
+    case SYS_execve: end_before_exec("the system call execve"); return true;
     case SYS_close: return may_close("the system call close", descriptor(0));
     case SYS_dup3: return may_close("the system call dup3", descriptor(1));
 #ifdef SYS_dup2
@@ -235,6 +263,65 @@ extern "C" {
     if (may_close("closefrom()", first < 0 ? 0U : static_cast<unsigned>(first), ~0U)) {
         (*next_closefrom)(first);
     }
+}
+
+[[gnu::visibility("default")]] int execve(const char* path, char* const* arguments,
+                                          char* const* variables) noexcept {
+    end_before_exec("execve()");
+    return (*next_execve)(path, arguments, variables);
+}
+
+[[gnu::visibility("default")]] int execv(const char* path, char* const* arguments) noexcept {
+    end_before_exec("execv()");
+    return (*next_execve)(path, arguments, environ);
+}
+
+[[gnu::visibility("default")]] int execvpe(const char* file, char* const* arguments,
+                                           char* const* variables) noexcept {
+    end_before_exec("execvpe()");
+    return (*next_execvpe)(file, arguments, variables);
+}
+
+[[gnu::visibility("default")]] int execvp(const char* file, char* const* arguments) noexcept {
+    end_before_exec("execvp()");
+    return (*next_execvpe)(file, arguments, environ);
+}
+
+[[gnu::visibility("default")]] int fexecve(int file, char* const* arguments,
+                                           char* const* variables) noexcept {
+    end_before_exec("fexecve()");
+    return (*next_fexecve)(file, arguments, variables);
+}
+
+[[gnu::visibility("default")]] int execl(const char* path, const char* first, ...) noexcept {
+    end_before_exec("execl()");
+    char* arguments[max_exec_arguments];
+    va_list list;
+    va_start(list, first);
+    const bool fits = collect(first, list, arguments);
+    va_end(list);
+    return fits ? (*next_execve)(path, arguments, environ) : -1;
+}
+
+[[gnu::visibility("default")]] int execlp(const char* file, const char* first, ...) noexcept {
+    end_before_exec("execlp()");
+    char* arguments[max_exec_arguments];
+    va_list list;
+    va_start(list, first);
+    const bool fits = collect(first, list, arguments);
+    va_end(list);
+    return fits ? (*next_execvpe)(file, arguments, environ) : -1;
+}
+
+[[gnu::visibility("default")]] int execle(const char* path, const char* first, ...) noexcept {
+    end_before_exec("execle()");
+    char* arguments[max_exec_arguments];
+    va_list list;
+    va_start(list, first);
+    const bool fits = collect(first, list, arguments);
+    char* const* const variables = fits ? va_arg(list, char* const*) : nullptr;
+    va_end(list);
+    return fits ? (*next_execve)(path, arguments, variables) : -1;
 }
 
 [[gnu::visibility("default")]] pid_t _Fork() noexcept {
