@@ -48,6 +48,9 @@ const AxisOrders& Axis::act(const AxisCommand& command, const AxisRules& rules, 
     walk(command, rules, now);
     select_mode(command, rules, now);
     home(command, rules, now);
+    if (enabled_) {
+        stopped_bus_ = false;
+    }
     active_ = enabled_ && mode_shown_ && home_ == Home::no;
     move(command, rules, now);
     if (failure_) {
@@ -75,6 +78,7 @@ void Axis::set_missing(Cause half) noexcept {
 
 void Axis::interrupt() noexcept {
     wanted_ = enabled_ = active_ = following_ = false;
+    stopped_bus_ = true;
     home_ = Home::no;
     set_points_.clear();
     walk_.restart_timeout();
@@ -140,9 +144,10 @@ void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
         wanted_ = false;
     }
     if (!in_.operational) {
-        if (wanted_ && was_operational_) {
+        if (wanted_ && was_operational_ && !stopped_bus_) {
             fail(Cause::lost, enabled_ ? Request::run : Request::enable);
         }
+        stopped_bus_ = false;
         homed_ = false;
     }
 }
