@@ -276,7 +276,8 @@ class Violations(Case):
 
     @unittest.skipUnless(INSTRUCTIONS, "the instruction is not written for this processor")
     def test_descriptors_that_are_lost_unseen_end_the_machine(self):
-        for mode, what in ((35, "closed"), (36, "replaced")):
+        # the number of a closed descriptor may belong to another file when it is noticed
+        for mode, what in ((35, "(closed|replaced)"), (36, "replaced")):
             with self.subTest(what):
                 machine = self.machine()
                 self.shell("setp", "v.mode", mode)
