@@ -198,7 +198,7 @@ private:
 
     bool was_operational_ = false;
     /// The thread was stopped, and with it perhaps the bus: `operational` may be of before the stop,
-    /// so that its first loss is no failure of an axis that is not enabled yet.
+    /// so that its first loss does not fail an axis that is not enabled yet.
     bool stopped_bus_ = false;
     bool started_ = false;
     bool target_reached_ = false;
