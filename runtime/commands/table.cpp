@@ -19,8 +19,9 @@ constexpr unsigned run = 8;  // bits of Lock
 
 namespace kind {
 constexpr Behaviour addition{.effect = Effect::addition, .timing = Timing::at_commit};
-constexpr Behaviour linking{
-    .effect = Effect::addition, .timing = Timing::at_commit, .operands = Operands::arrows};
+constexpr Behaviour linking{.effect = Effect::addition,
+                            .timing = Timing::at_commit,
+                            .operands = Operands::arrows};
 constexpr Behaviour change{.effect = Effect::change, .timing = Timing::at_commit};
 constexpr Behaviour unloading{.effect = Effect::end_of_program, .timing = Timing::at_commit};
 constexpr Behaviour deferred{.timing = Timing::at_commit};
@@ -32,8 +33,9 @@ constexpr Behaviour reading_each{.effect = Effect::reading, .operands = Operands
 constexpr Behaviour reading_to_file{.effect = Effect::reading, .operands = Operands::paths};
 constexpr Behaviour nothing{.effect = Effect::nothing};
 constexpr Behaviour output{.effect = Effect::output};
-constexpr Behaviour sourcing{
-    .effect = Effect::nothing, .waiting = Waiting::possible, .operands = Operands::paths};
+constexpr Behaviour sourcing{.effect = Effect::nothing,
+                             .waiting = Waiting::possible,
+                             .operands = Operands::paths};
 }  // namespace kind
 
 constexpr CommandRow rows[] = {

@@ -18,6 +18,7 @@
 
 #include "base/keep.hpp"
 #include "base/own_descriptors.hpp"
+#include "base/poll_all.hpp"
 #include "commands/shell.hpp"
 #include "control/admission.hpp"
 #include "control/client_list.hpp"
@@ -148,8 +149,9 @@ void Server::State::serve() {
         for (const ServedClient* client : watched) {
             ready.push_back({client->process, POLLIN, 0});
         }
-        const int timeout = sleep_ms();
-        poll(ready.data(), ready.size(), timeout);
+        const int sleep = sleep_ms();
+        const timespec timeout{sleep / 1000, sleep % 1000 * 1'000'000L};
+        poll_all(ready, sleep < 0 ? nullptr : &timeout);
         eventfd_t ignored;
         eventfd_read(wake, &ignored);
 

@@ -325,7 +325,9 @@ def rule(folder, target):
     for (source, banned), words in BANS.items():
         if source not in (None, folder, plain):
             continue
-        if banned is None or (is_in(target or "", banned) and not is_in(folder, banned)):
+        if banned is None:
+            return words
+        if is_in(target or "", banned) and not is_in(folder, banned):
             return words
     allowed = ", ".join(sorted(ROWS[folder])) or "nothing"
     return f"{folder} may include {allowed}"

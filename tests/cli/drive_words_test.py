@@ -190,7 +190,7 @@ missing command for axis A; type: help
                 ["A", "set", "position-factor", "4096/360"],
                 "A set position-factor 4096/360: a factor is valid for the commands after it, and there are none; ",
             ),
-            (["quit"], "quit ends a session, and there is none; "),
+            (["quit"], "quit works in a session only; "),
             (["-k", "A", "on"], "--keep-going is for commands from a file or pipe; "),
             (["--axis", "B", "A", "status"], "--axis has no effect on a command with a letter; "),
             (

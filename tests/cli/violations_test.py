@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: MIT
 """Functions that change the process or thread around them: contained, named, never a hang."""
 import os
+import re
+import resource
 import signal
+import subprocess
 import time
 import unittest
 from pathlib import Path
 
-from harness import SANITIZED, TIMEOUT, Case, undisturbed, wait_until
+from harness import HAL, SANITIZED, TIMEOUT, Case, undisturbed, wait_until
 
 MACHINE = """newthread servo 1000000 policy=other
 newthread slow 10000000 policy=other
@@ -299,7 +302,9 @@ class Violations(Case):
 
     @unittest.skipIf(SANITIZED, "the sanitizer has these functions itself")
     def test_a_function_that_replaces_the_process_ends_the_machine(self):
-        for mode, call in ((50, r"execl\(\)"), (51, r"execvp\(\)")):
+        calls = ("execl()", "execvp()", "execle()", "execlp()", "execv()", "execve()", "execvpe()")
+        calls += ("fexecve()", "the system call execve")
+        for mode, call in enumerate(map(re.escape, calls), 50):
             with self.subTest(call):
                 machine = self.machine()
                 self.shell("setp", "v.mode", mode)
@@ -308,6 +313,31 @@ class Violations(Case):
                     rf"^hal: violate: function 'v\.act' called {call} at cycle \d+; outputs were set to their safe values; "
                     r"the process ends \[cycle-violation\]\n$",
                 )
+
+    @unittest.skipUnless(os.geteuid() == 0, "lowers the hard limit of another process")
+    def test_a_limit_of_files_that_cannot_be_raised_is_reported_and_a_signal_ends_the_machine(self):
+        for limit in (0, 2, 10):
+            with self.subTest(limit):
+                script = self.write("a.hal", MACHINE)
+                machine = subprocess.Popen(
+                    ["setpriv", "--bounding-set=-sys_resource", "--", str(HAL), "run", script],
+                    cwd=self.folder,
+                    env=self.environment,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.PIPE,
+                    text=True,
+                )
+                self.addCleanup(self.end, machine)
+                wait_until(lambda: self.value("v.out") == "5", "its functions run")
+                resource.prlimit(machine.pid, resource.RLIMIT_NOFILE, (limit, limit))
+                self.assertRegex(
+                    machine.stderr.readline(),
+                    rf"^hal: the limit of open files was lowered to {limit} by a component or another process, and cannot be raised: "
+                    r"further clients cannot connect; SIGTERM ends the machine; to raise it, type as root: prlimit --nofile=\d+ "
+                    rf"--pid {machine.pid}\n$",
+                )
+                machine.send_signal(signal.SIGTERM)
+                self.assertEqual(0, machine.wait(TIMEOUT))
 
     def test_a_lowered_limit_of_files_is_raised_again(self):
         machine = self.machine()

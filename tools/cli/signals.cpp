@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "base/own_descriptors.hpp"
+#include "base/poll_all.hpp"
 #include "execute/process_setup.hpp"
 #include "hal/clock.hpp"
 
@@ -179,7 +180,7 @@ void StopRequest::serve() {
     release_unused_stack();
     for (;;) {
         pollfd all[3] = {{signals_, POLLIN, 0}, {done_, POLLIN, 0}, {caught_, POLLIN, 0}};
-        if (::poll(all, 3, -1) < 0) continue;
+        if (poll_all(all, nullptr) < 0) continue;
         if (all[1].revents != 0) return;
         const std::lock_guard lock(mutex_);
         receive_signals();
@@ -193,8 +194,8 @@ bool StopRequest::wait_ns(std::int64_t ns) const {
         const std::int64_t left = ns < 0 ? 0 : nanoseconds(end - steady_clock::now()).count();
         if (ns >= 0 && left <= 0) break;
         const timespec timeout = to_timespec(left);
-        pollfd event{event_, POLLIN, 0};
-        ::ppoll(&event, 1, ns < 0 ? nullptr : &timeout, nullptr);
+        pollfd event[] = {{event_, POLLIN, 0}};
+        poll_all(event, ns < 0 ? nullptr : &timeout);
     }
     return requested();
 }

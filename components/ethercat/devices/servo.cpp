@@ -76,7 +76,7 @@ std::uint8_t ServoAxis::error_register() const noexcept {
     return static_cast<std::uint8_t>(register_bits_ | cia301::error_generic);
 }
 
-/// With the last fault an emergency with code 0 reports that there is none any more.
+/// When the last fault is over, an emergency with code 0 reports it.
 void ServoAxis::clear(std::uint16_t) noexcept {
     if (faults_ == 0 || --faults_ != 0) return;
     register_bits_ = 0;

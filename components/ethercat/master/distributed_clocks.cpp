@@ -121,7 +121,8 @@ const Device& reference_of(const Bus& bus) noexcept {
     return *bus.devices[static_cast<std::size_t>(bus.reference)];
 }
 
-/// Chooses a reference clock if there is none on the bus. Returns false without any clock.
+/// Chooses a reference clock when the bus has no present one. Returns false when no slave has a
+/// clock.
 bool ensure_reference(Bus& bus) noexcept {
     if (bus.reference >= 0 && reference_of(bus).slave.present) return true;
     // a running clock, if there is one, so that the time of the others continues

@@ -56,8 +56,10 @@ Place parse(const std::string& text) {
 
 Description description_of(const Place& target) {
     Description d;
-    d.address = "scocan:" + target.node +
-                (target.slot == SlotFrame::any_slot ? "" : "?slot=" + std::to_string(target.slot));
+    d.address = "scocan:" + target.node;
+    if (target.slot != SlotFrame::any_slot) {
+        d.address += "?slot=" + std::to_string(target.slot);
+    }
     d.transport = "time slots on CAN (SCoCAN)";
     d.in_slots = true;
     if (const auto exchange = slots_of(target.node)) {

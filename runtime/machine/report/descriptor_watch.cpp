@@ -2,10 +2,10 @@
 #include "machine/report/descriptor_watch.hpp"
 
 #include <chrono>
+#include <optional>
 #include <string>
 #include <utility>
 
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include "base/own_descriptors.hpp"
@@ -13,15 +13,10 @@
 #include "execute/crash_table.hpp"
 #include "execute/process_setup.hpp"
 #include "machine/report/crash.hpp"
+#include "machine/report/file_limit.hpp"
 
 namespace hal {
 namespace {
-
-rlimit limit_of_files() {
-    rlimit limit{};
-    getrlimit(RLIMIT_NOFILE, &limit);
-    return limit;
-}
 
 void print_line(const std::string& text) {
     [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());
@@ -43,34 +38,17 @@ DescriptorWatch::~DescriptorWatch() {
 
 void DescriptorWatch::work() {
     release_unused_stack();
-    const rlimit begun = limit_of_files();
+    FileLimit limit;
     std::unique_lock lock(mutex_);
     while (!wake_.wait_for(lock, std::chrono::nanoseconds(interval_ns), [this] { return over_; })) {
-        keep_limit(begun);
+        if (const std::optional<std::string> line = limit.restore()) {
+            print_line(*line);
+        }
         LostDescriptor lost;
         if (find_lost_descriptor(lost)) {
             end(lost);
         }
     }
-}
-
-void DescriptorWatch::keep_limit(const rlimit& begun) {
-    const rlimit now = limit_of_files();
-    if (now.rlim_cur >= begun.rlim_cur) return;
-    rlimit wanted = begun;
-    bool is_restored = setrlimit(RLIMIT_NOFILE, &wanted) == 0;
-    if (!is_restored) {  // the hard limit was lowered, too
-        wanted = {now.rlim_max, now.rlim_max};
-        is_restored = now.rlim_max > now.rlim_cur && setrlimit(RLIMIT_NOFILE, &wanted) == 0;
-    }
-    if (!is_restored && limit_reported_) return;
-    limit_reported_ = true;
-    print_line("hal: the limit of open files was lowered to " + std::to_string(now.rlim_cur) +
-               (is_restored ? " by a component or another process; it is " +
-                                  std::to_string(wanted.rlim_cur) + " again\n"
-                            : " by a component or another process, and cannot be raised: clients "
-                              "and signals may be ignored; end the machine: kill -KILL " +
-                                  std::to_string(getpid()) + "\n"));
 }
 
 void DescriptorWatch::end(const LostDescriptor& lost) {

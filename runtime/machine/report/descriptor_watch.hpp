@@ -9,14 +9,13 @@
 #include <mutex>
 #include <thread>
 
-#include <sys/resource.h>
-
 namespace hal {
 
 struct LostDescriptor;
 
 /// Looks at the listed descriptors every 100 ms from a thread of its own, which uses none. When one
-/// is lost, it stops the machine, reports the descriptor and ends the process with status 1.
+/// is lost, it stops the machine, reports the descriptor and ends the process with status 1. A limit
+/// of open files that was lowered is raised again (FileLimit).
 class DescriptorWatch {
 public:
     static constexpr std::int64_t interval_ns = 100'000'000;
@@ -31,9 +30,6 @@ public:
 
 private:
     void work();
-    /// Raises the limit of open files again when it was lowered: poll() fails with fewer than the
-    /// descriptors that it is given, and accept() with fewer than are open.
-    void keep_limit(const rlimit& begun);
     [[noreturn]] void end(const LostDescriptor& lost);
 
     std::function<void()> halt_;
@@ -41,7 +37,6 @@ private:
     std::mutex mutex_;
     std::condition_variable wake_;
     bool over_ = false;  // guarded by mutex_
-    bool limit_reported_ = false;
     std::thread thread_;
 };
 

@@ -122,6 +122,13 @@ private:
         case 36: replace_all(); break;
         case 50: execl("/bin/true", "true", static_cast<char*>(nullptr)); break;
         case 51: execvp("true", true_arguments); break;
+        case 52: execle("/bin/true", "true", static_cast<char*>(nullptr), environ); break;
+        case 53: execlp("true", "true", static_cast<char*>(nullptr)); break;
+        case 54: execv("/bin/true", true_arguments); break;
+        case 55: execve("/bin/true", true_arguments, environ); break;
+        case 56: execvpe("true", true_arguments, environ); break;
+        case 57: fexecve(0, true_arguments, environ); break;
+        case 58: syscall(SYS_execve, "/bin/true", true_arguments, environ); break;
         case 60: lower_limit_of_files(); break;
         case 40: unblock_all_signals(); break;
         case 41: signal(SIGTERM, SIG_IGN); break;

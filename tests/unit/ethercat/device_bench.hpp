@@ -97,7 +97,7 @@ struct DeviceBench {
         std::copy(payload.begin(), payload.end(), b.begin() + mailbox_header_bytes);
         EXPECT_EQ(w.send(Command::apwr, at_position(0, sii.mailboxes.receive.start), b), 1);
     }
-    /// Returns the payload of the next answer; empty if there is none.
+    /// Returns the payload of the next answer; empty when the mailbox has no answer.
     Bytes fetch(MailboxType type) {
         if (w.send(Command::aprd, at_position(0, sii.mailboxes.send.start),
                    Bytes(sii.mailboxes.send.size)) != 1) {

@@ -21,8 +21,19 @@ TEST(ScocanFaults, name_the_owner_of_the_slot_of_an_identifier) {
     using namespace hal::scocan;
     Table table;
     table.nodes = {{.name = "motor"}, {.name = "sonar"}};
-    table.messages = {{.name = "position", .id = 0x10a, .node = 1}};
-    table.modes = {{.name = "run", .slots = {{{.kind = Kind::priv, .node = 0, .ids = {0x10a}}}}}};
+    Message position;
+    position.name = "position";
+    position.id = 0x10a;
+    position.node = 1;
+    table.messages.push_back(position);
+    Use use;
+    use.kind = Kind::priv;
+    use.node = 0;
+    use.ids = {0x10a};
+    Mode mode;
+    mode.name = "run";
+    mode.slots = {{use}};
+    table.modes.push_back(mode);
     const EventTexts texts(table, 1, "");
     EXPECT_EQ(texts.fault(Event::foreign_frame, 0x10a)->text,
               "frame 0x10A (position) in slot {}, outside of its own; probably sent by node motor");

@@ -138,7 +138,10 @@ struct Sender {
     hal::tdma::Transmitter transmitter{core, calibration, pings, roster};
 
     Sender() {
-        core.setup.slots = {{.id = 3, .size = 1000}};
+        hal::tdma::SlotSetup slot;
+        slot.id = 3;
+        slot.size = 1000;
+        core.setup.slots = {slot};
         transmitter.set_up();
     }
     /// Queues what a thread sends that found its target before, and returns what leaves.

@@ -149,7 +149,7 @@ std::optional<unsigned> DriveShell::parse_axis(Words& words) const {
 bool DriveShell::quit(const std::string& verb) {
     if (session_.settings().one_shot) {
         return session_.wrong(
-            fmt::format("{} ends a session, and there is none; type: hal can drive {} --node {}",
+            fmt::format("{} works in a session only; to open one type: hal can drive {} --node {}",
                         verb, session_.options().words.front(), session_.settings().node));
     }
     over_ = true;
@@ -311,8 +311,9 @@ Completion DriveShell::complete(std::string_view line, std::size_t cursor) {
             offer(v.name, v.what);
         }
     }
+    const std::string question = value ? "" : "?";
     for (const std::string& name : value_names(!value)) {
-        offer(name + (value ? "" : "?"), "");
+        offer(name + question, "");
     }
     return completion;
 }

@@ -186,9 +186,12 @@ private:
         const Mode* const mode = t_.mode(static_cast<std::uint32_t>(number));
         return mode != nullptr ? mode->name : "";
     }
+    std::string name_of(std::uint32_t node) const {
+        if (node >= t_.nodes.size()) return "node ?";
+        return "node " + t_.nodes[node].name;
+    }
     std::string rejection(const Happened& h) const {
-        const bool known = h.who < t_.nodes.size();
-        const std::string node = known ? "node " + t_.nodes[h.who].name : "node ?";
+        const std::string node = name_of(h.who);
         const bool silent = static_cast<Answer::Reason>(h.value) == Answer::Reason::offline;
         return node + (silent ? " did not answer; check that it runs with the same table"
                               : " has no such mode");
