@@ -422,6 +422,12 @@ bool has_ended(int tid) noexcept { return tgkill(getpid(), tid, 0) != 0 && errno
 
 }  // namespace
 
+bool Supervisor::ended(const Core& core) {
+    const Hold hold(mutex_);
+    const Watched* const of = find(core);
+    return of && has_ended(of->tid);
+}
+
 void Supervisor::find_cause(const Watched& watched, Stall& stall) const {
     const KernelView seen = kernel_view(watched.tid);
     stall.tracer = seen.tracer;

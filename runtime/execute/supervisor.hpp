@@ -70,6 +70,8 @@ public:
     /// Returns true if the thread is late and ready to run, but has got no CPU time, or hardly any,
     /// since it is late.
     bool starved(const Core& core);
+    /// Returns true if a function has ended the thread by a system call of its own.
+    bool ended(const Core& core);
     /// Returns how long the thread was ready to run without running, within the last one to two
     /// seconds before it was late, and since.
     std::int64_t run_delay_ns(const Core& core);

@@ -239,7 +239,14 @@ class Violations(Case):
         )
         self.assertEqual("-1", self.value("v.out"))
         wait_until(lambda: self.value("other.out") == "-1", "the other thread sees it")
-        self.assertEqual(1, self.shell("start").returncode)
+        for words in (("start",), ("setp", "adder.in0", "1")):
+            done = self.shell(*words)
+            self.assertEqual(1, done.returncode)
+            self.assertRegex(
+                done.stderr,
+                r"error: thread 'servo' has ended: function 'v\.act' \(violate\) ended it \[hung-thread\](?s:.*)"
+                r"help: end the machine: the thread cannot be started again",
+            )
         out, err = self.end(machine)
         self.assertEqual(1, machine.returncode, out + err)
 

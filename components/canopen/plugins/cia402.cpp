@@ -363,7 +363,7 @@ the state machine of the drive and steps it towards the commanded state, one tra
   `position-cmd` track `position-fb` while `active` is FALSE. If the two differ at enabling by more than `max-step`, enabling is rejected;
   with `max-step` 0, the difference is blended out over `blend-time`.
 * A fault (see the table) brakes with quick stop, disables the axis and stays until a rising edge of `reset`. After a fault, after
-  `quick-stop` and after the node was lost, `enable` needs another rising edge. At start-up, `enable` waits until the node is operational.
+  `quick-stop` and after the node was lost, `enable` needs another rising edge. At start-up and after a stop, `enable` waits until the node is operational.
 * When `read-all` or `write-all` has not run for 100 cycles of the other one, the axis is in fault and brakes with quick stop, and `show
   fault` names the missing function. The fault of an axis that was off ends when both run again.
 * When the thread is stopped (`stop`, an exception, a hang, a suspended process), the axis is disabled without a fault. When the thread

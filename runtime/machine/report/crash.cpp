@@ -171,7 +171,8 @@ void name_caller(const Core* in_function, const char* module) noexcept {
     }
     char name[32] = "";
     pthread_getname_np(pthread_self(), name, sizeof name);
-    print("thread '");
+    // a thread of a component or a library has the name of the one that created it
+    print("a thread named '");
     print(name);
     print("'");
 }

@@ -296,6 +296,14 @@ void ThreadPlans::report_hung(const Thread& thread, const Core& core,
     if (report_starved(thread, core, diagnostics)) return;
     const std::uint32_t id = core.hung_function();
     const LoadedFunction* const function = id != 0 ? function_with_id(state_.model, id) : nullptr;
+    if (state_.executor->supervisor().ended(core)) {
+        const std::string who = function ? function_text(*function) : "a function";
+        diagnostics.error("hung-thread", thread.made,
+                          "thread '" + thread.name + "' has ended: " + who + " ended it",
+                          "its outputs are at their safe values",
+                          "end the machine: the thread cannot be started again");
+        return;
+    }
     const std::string silent =
         format_duration(static_cast<double>(monotonic_ns() - core.finished_ns()));
     diagnostics.error("hung-thread", thread.made,
