@@ -30,10 +30,10 @@ std::uint8_t popped(Slot& slot) {
 
 TEST(TdmaSlot, frames_leave_by_priority_and_then_in_order) {
     Slot slot(SlotSetup{.id = 1, .size = 1000}, 8);
-    EXPECT_TRUE(slot.push(frame_of(header + 46, 1), 8));
-    EXPECT_TRUE(slot.push(frame_of(header + 46, 2), 4));
-    EXPECT_TRUE(slot.push(frame_of(header + 46, 3), 8));
-    EXPECT_TRUE(slot.push(frame_of(header + 46, 4), 4));
+    EXPECT_TRUE(slot.push(frame_of(header + 46, 1), 8, nullptr, 0));
+    EXPECT_TRUE(slot.push(frame_of(header + 46, 2), 4, nullptr, 0));
+    EXPECT_TRUE(slot.push(frame_of(header + 46, 3), 8, nullptr, 0));
+    EXPECT_TRUE(slot.push(frame_of(header + 46, 4), 4, nullptr, 0));
     EXPECT_EQ(slot.waiting(), 4U);
     EXPECT_EQ(popped(slot), 2);
     EXPECT_EQ(popped(slot), 4);
@@ -45,13 +45,13 @@ TEST(TdmaSlot, frames_leave_by_priority_and_then_in_order) {
 
 TEST(TdmaSlot, a_turn_that_is_full_rejects_frames_of_the_same_priority_only) {
     Slot slot(SlotSetup{.id = 1, .size = 200}, 8);
-    EXPECT_TRUE(slot.push(frame_of(header + 200, 1), 8));
-    EXPECT_FALSE(slot.push(frame_of(header + 46, 2), 8));
-    EXPECT_TRUE(slot.push(frame_of(header + 46, 3), 4));
-    EXPECT_FALSE(slot.push(frame_of(header + 201, 4), 0)) << "longer than the slot";
+    EXPECT_TRUE(slot.push(frame_of(header + 200, 1), 8, nullptr, 0));
+    EXPECT_FALSE(slot.push(frame_of(header + 46, 2), 8, nullptr, 0));
+    EXPECT_TRUE(slot.push(frame_of(header + 46, 3), 4, nullptr, 0));
+    EXPECT_FALSE(slot.push(frame_of(header + 201, 4), 0, nullptr, 0)) << "longer than the slot";
     EXPECT_EQ(popped(slot), 3);
-    slot.clear();
-    EXPECT_TRUE(slot.push(frame_of(header + 46, 2), 8));
+    slot.clear(0);
+    EXPECT_TRUE(slot.push(frame_of(header + 46, 2), 8, nullptr, 0));
 }
 
 TEST(TdmaSlot, frames_of_several_threads_arrive_whole) {
@@ -63,7 +63,7 @@ TEST(TdmaSlot, frames_of_several_threads_arrive_whole) {
         threads.emplace_back([&slot, n] {
             for (unsigned sent = 0; sent < each;) {
                 const std::size_t length = header + 46 + (sent % 50) * n;
-                if (slot.push(frame_of(length, static_cast<std::uint8_t>(n)), n % 2)) {
+                if (slot.push(frame_of(length, static_cast<std::uint8_t>(n)), n % 2, nullptr, 0)) {
                     ++sent;
                 } else {
                     std::this_thread::yield();
@@ -105,12 +105,12 @@ TEST(TdmaSlot, returns_a_frame_while_another_thread_queues_a_more_urgent_one) {
             while (round.load(std::memory_order_acquire) < n) {
                 std::this_thread::yield();
             }
-            EXPECT_TRUE(slot.push(frame_of(header + 46, urgent), 4));
+            EXPECT_TRUE(slot.push(frame_of(header + 46, urgent), 4, nullptr, 0));
         }
     });
     unsigned missed = 0;
     for (unsigned n = 1; n <= rounds; ++n) {
-        ASSERT_TRUE(slot.push(frame_of(header + 46, ordinary), 8));
+        ASSERT_TRUE(slot.push(frame_of(header + 46, ordinary), 8, nullptr, 0));
         round.store(n, std::memory_order_release);
         while (slot.front()[0] != urgent) {
             std::this_thread::yield();
@@ -179,6 +179,18 @@ TEST(TdmaSlot, frames_of_an_earlier_epoch_leave_the_next_turn_to_those_of_this_o
     EXPECT_TRUE(slot.push(frame_of(header + 200, 2), 8, nullptr, 1));
     EXPECT_EQ(popped(slot), 2);
     EXPECT_EQ(slot.waiting(), 0U);
+    EXPECT_EQ(slot.take_dropped(), 1U);
+    EXPECT_EQ(slot.take_dropped(), 0U);
+}
+
+TEST(TdmaSlot, counts_the_frames_that_were_queued_when_the_station_stopped_sending) {
+    Sender sender;
+    const auto to = sender.transmitter.target(3);
+    for (int i = 0; i < 2; ++i) {
+        ASSERT_TRUE(to.slot->push(frame_of(header + 46, 1), 8, nullptr, to.epoch));
+    }
+    sender.transmitter.clear_slots();
+    EXPECT_EQ(sender.core.status.count.dropped, 2U);
 }
 
 }  // namespace

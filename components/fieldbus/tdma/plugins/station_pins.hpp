@@ -63,7 +63,8 @@ struct StationPins {
     hal::Out<std::uint64_t> syncs_lost{c, f, "syncs-lost", "cycles without a sync"};
     hal::Out<std::uint64_t> sent{c, f, "frames-sent", "frames sent in slots"};
     hal::Out<std::uint64_t> dropped{c, f, "frames-dropped",
-                                    "frames dropped: longer than their slot, or no link"};
+                                    "frames dropped: longer than their slot, no link, or queued when "
+                                    "the station stopped sending"};
     hal::Out<std::uint64_t> late{c, f, "frames-late",
                                  "frames not sent because their slot had passed"};
     hal::Out<std::uint64_t> foreign{

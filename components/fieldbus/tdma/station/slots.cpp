@@ -68,7 +68,7 @@ std::size_t Slot::most_urgent() noexcept {
     for (std::size_t i = 0; i < count_; ++i) {
         if (!entries_[i].is_ready()) continue;
         if (entries_[i].epoch.load(std::memory_order_relaxed) != epoch_) {
-            release(entries_[i]);
+            drop(entries_[i]);
             continue;
         }
         if (best == count_ || rank(entries_[i]) < rank(entries_[best])) {
@@ -99,6 +99,12 @@ bool Slot::release(Entry& entry) noexcept {
     return true;
 }
 
+void Slot::drop(Entry& entry) noexcept {
+    if (release(entry)) {
+        ++dropped_;
+    }
+}
+
 void Slot::pop() noexcept {
     if (front_ != count_) {
         release(entries_[front_]);
@@ -110,7 +116,7 @@ void Slot::clear(std::uint32_t epoch) noexcept {
     epoch_ = epoch;
     if (waiting() == 0) return;
     for (std::size_t i = 0; i < count_; ++i) {
-        release(entries_[i]);
+        drop(entries_[i]);
     }
 }
 

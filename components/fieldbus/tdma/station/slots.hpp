@@ -40,6 +40,7 @@
 #include <atomic>
 #include <memory>
 #include <span>
+#include <utility>
 
 #include "station_setup.hpp"
 
@@ -76,7 +77,7 @@ public:
     /// its priority already fill the next turn: a longer queue would delay everything by a cycle
     /// after each missed turn. A frame of an earlier epoch is dropped later. [any, realtime]
     bool push(std::span<const std::uint8_t> frame, unsigned priority,
-              ethernet::Finisher* finisher = nullptr, std::uint32_t epoch = 0) noexcept;
+              ethernet::Finisher* finisher, std::uint32_t epoch) noexcept;
     /// Returns the oldest frame of the highest priority; empty: none. Valid until the next pop() or
     /// clear(). Drops frames of earlier epochs. [realtime]
     std::span<const std::uint8_t> front() noexcept;
@@ -86,7 +87,9 @@ public:
     /// pushed meanwhile. [realtime]
     void pop() noexcept;
     /// Empties the queue, which then accepts frames of this epoch only. [realtime]
-    void clear(std::uint32_t epoch = 0) noexcept;
+    void clear(std::uint32_t epoch) noexcept;
+    /// Returns how many frames front() and clear() have dropped since the last call. [realtime]
+    std::uint64_t take_dropped() noexcept { return std::exchange(dropped_, 0); }
     std::size_t waiting() const noexcept { return waiting_.load(std::memory_order_relaxed); }
 
 private:
@@ -107,9 +110,11 @@ private:
     // bytes on the line
     std::size_t ahead_of(unsigned priority, std::uint32_t epoch) const noexcept;
     bool release(Entry& entry) noexcept;
+    void drop(Entry& entry) noexcept;
 
     SlotSetup setup_;  // of the station's thread
     std::uint32_t epoch_ = 0;  // of the station's thread
+    std::uint64_t dropped_ = 0;  // of the station's thread
     std::atomic<unsigned> id_;
     std::atomic<std::uint32_t> size_;
     std::size_t count_ = 0;

@@ -38,6 +38,7 @@ void Transmitter::clear_slots() noexcept {
     epoch_.store(epoch, std::memory_order_release);
     for (Slot& s : slots_) {
         s.clear(epoch);
+        core_.status.count.dropped += s.take_dropped();
     }
 }
 
@@ -168,6 +169,7 @@ void Transmitter::send_slot(std::size_t index, std::uint32_t cycle) noexcept {
         slot.pop();
         used += bytes;
     }
+    core_.status.count.dropped += slot.take_dropped();
     send_pings(slot, at, used);
 }
 
