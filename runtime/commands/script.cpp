@@ -242,7 +242,6 @@ bool Script::merge_module_load(const Command& command) {
 }
 
 void Script::defer(const Command& command, const CommandRow& row) {
-    if (shell_.options.check && !row.is_checked()) return;
     effects_.add_line(command.span);
     if (!check_lock(row, command, locks(), session_.model(), pending_)) return;
     ++edits_;

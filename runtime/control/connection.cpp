@@ -69,7 +69,8 @@ struct Connection::State {
     std::atomic<std::uint64_t> invalid_requests{0};
     /// the client has declared one since idle() last found none
     std::atomic<bool> has_component{false};
-    /// it is reserved for commands, because so many clients are connected; 0: it is not
+    /// It is reserved for commands, because so many clients are connected; 0: it is not. Written by
+    /// the server's thread before each turn, read in handle().
     std::atomic<std::size_t> reserved_beyond{0};
     /// a request is being executed, or `begin` is open since the last one
     std::atomic<bool> engaged{false};

@@ -70,7 +70,8 @@ struct Server::State {
     /// eventfd: a worker or an executor has finished, or the server is to end
     int wake = -1;
     std::atomic<bool> ending{false};
-    std::atomic<bool> closes_at_exit{false};  ///< the kernel closes the connections
+    /// the kernel closes the connections; set before the server ends, read by its thread then
+    std::atomic<bool> closes_at_exit{false};
     std::thread thread;
     ClientList clients{options};
     Admission admission{shell, options, endpoint, clients, [this] { eventfd_write(wake, 1); }};
@@ -127,7 +128,6 @@ void Server::State::serve() {
     release_unused_stack();
     pool.start();
     admission.keep_spare();
-    // only open descriptors: poll() rejects more entries than the process may have descriptors
     std::vector<pollfd> ready;
     std::vector<ServedClient*> watched;  // whose process is in `ready`, behind the sockets
     while (!ending) {

@@ -43,15 +43,14 @@ public:
     void note_trap() noexcept { trapped_.store(true, std::memory_order_relaxed); }
 
     /// The function is the cause. Returns true if that is news since the last cycle without a
-    /// change.
+    /// change; only the first eight functions are.
     bool name(std::uint32_t function) noexcept {
         checked_cycles_ = for_ever;
         pending_ = 0;
         const auto end = named_.begin() + static_cast<std::ptrdiff_t>(named_count_);
         if (std::find(named_.begin(), end, function) != end) return false;
-        if (named_count_ < named_.size()) {
-            named_[named_count_++] = function;
-        }
+        if (named_count_ == named_.size()) return false;  // as many are news at a time
+        named_[named_count_++] = function;
         return true;
     }
     /// Some function of this cycle is the cause: the next one looks for it.

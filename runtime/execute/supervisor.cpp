@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "base/own_descriptors.hpp"
+#include "base/poll_all.hpp"
 #include "execute/process_setup.hpp"
 
 namespace hal {
@@ -217,8 +218,8 @@ void Supervisor::work() {
     while (!quit_) {
         const std::int64_t interval = interval_ns_;
         const timespec timeout = to_timespec(interval);
-        pollfd woken{wake_, POLLIN, 0};
-        if (ppoll(&woken, 1, &timeout, nullptr) > 0) {
+        pollfd woken[] = {{wake_, POLLIN, 0}};
+        if (poll_all(woken, &timeout) > 0) {
             eventfd_t ignored;
             eventfd_read(wake_, &ignored);
         }

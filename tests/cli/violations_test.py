@@ -40,6 +40,11 @@ def machines(parent):
     return found
 
 
+def cpu_seconds(process):
+    fields = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 class Violations(Case):
     def machine(self, *words):
         machine = self.start("run", self.write("a.hal", MACHINE), *words)
@@ -310,7 +315,7 @@ class Violations(Case):
     @unittest.skipIf(SANITIZED, "the sanitizer has these functions itself")
     def test_a_function_that_replaces_the_process_ends_the_machine(self):
         calls = ("execl()", "execvp()", "execle()", "execlp()", "execv()", "execve()", "execvpe()")
-        calls += ("fexecve()", "the system call execve")
+        calls += ("fexecve()", "the system call execve", "execveat()")
         for mode, call in enumerate(map(re.escape, calls), 50):
             with self.subTest(call):
                 machine = self.machine()
@@ -339,10 +344,15 @@ class Violations(Case):
                 resource.prlimit(machine.pid, resource.RLIMIT_NOFILE, (limit, limit))
                 self.assertRegex(
                     machine.stderr.readline(),
-                    rf"^hal: the limit of open files was lowered to {limit} by a component or another process, and cannot be raised: "
-                    r"further clients cannot connect; SIGTERM ends the machine; to raise it, type as root: prlimit --nofile=\d+ "
+                    rf"^hal: the limit of open files was lowered from \d+ to {limit} by a component or another process, and cannot be "
+                    rf"raised beyond {limit}: a client for which no file is left cannot connect; SIGTERM ends the machine; "
+                    r"to raise it, type as root: prlimit --nofile=\d+ "
                     rf"--pid {machine.pid}\n$",
                 )
+                before = cpu_seconds(machine.pid)
+                time.sleep(0.5)
+                used = cpu_seconds(machine.pid) - before
+                self.assertLess(used, 0.25, "no thread of the runtime spins")
                 machine.send_signal(signal.SIGTERM)
                 self.assertEqual(0, machine.wait(TIMEOUT))
 
@@ -352,7 +362,7 @@ class Violations(Case):
         line = wait_until(machine.stderr.readline, "it is reported")
         self.assertRegex(
             line,
-            r"^hal: the limit of open files was lowered to 0 by a component or another process; it is \d+ again\n$",
+            r"^hal: the limit of open files was lowered from \d+ to 0 by a component or another process; it was raised again\n$",
         )
         self.check_goes_on(machine)
 

@@ -149,7 +149,7 @@ TEST(A_helper_thread_that_exits, is_named) {
     const Result result = run("real", "newthread t 1000000\nloadrt test-exits in=thread\n");
     EXPECT_TRUE(WIFEXITED(result.status) && WEXITSTATUS(result.status) == 1) << result.status;
     EXPECT_EQ(result.said,
-              "hal: thread 'helper' called exit() while the machine runs; outputs were set to "
+              "hal: a thread named 'helper' called exit() while the machine runs; outputs were set to "
               "their safe values; the process ends\n");
 }
 

@@ -13,6 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/poll_all.hpp"
 #include "base/own_descriptors.hpp"
 #include "execute/core.hpp"
 #include "execute/process_setup.hpp"
@@ -112,7 +113,8 @@ void ChildProcesses::run() {
         }
         const int timeout_ms = sleep_ms();
         lock.unlock();
-        poll(waiting.data(), waiting.size(), timeout_ms);
+        const timespec timeout{timeout_ms / 1000, timeout_ms % 1000 * 1'000'000L};
+        poll_all(waiting, timeout_ms < 0 ? nullptr : &timeout);
         lock.lock();
         eventfd_t ignored;
         eventfd_read(wake_, &ignored);

@@ -220,6 +220,8 @@ void on_quick_exit() {
 
 }  // namespace
 
+bool end_is_reported() noexcept { return reported.load(); }
+
 bool is_machine_process() noexcept { return machine_process.load() == getpid(); }
 
 // A machine ends by its own orders.

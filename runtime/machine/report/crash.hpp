@@ -24,6 +24,8 @@ bool is_machine_process() noexcept;
 /// Returns false when it is not code of a component, or an end was reported already.
 /// async-signal-safe
 bool report_end(const char* call, const char* code = "") noexcept;
+/// Returns true once the end of the process was reported. async-signal-safe
+bool end_is_reported() noexcept;
 /// Ends a copy of the process that returned from the code of a component that had forked it.
 [[noreturn]] void end_copy() noexcept;
 

@@ -41,7 +41,7 @@ void DescriptorWatch::work() {
     FileLimit limit;
     std::unique_lock lock(mutex_);
     while (!wake_.wait_for(lock, std::chrono::nanoseconds(interval_ns), [this] { return over_; })) {
-        if (const std::optional<std::string> line = limit.restore()) {
+        if (const std::optional<std::string> line = limit.restore(monotonic_ns())) {
             print_line(*line);
         }
         LostDescriptor lost;

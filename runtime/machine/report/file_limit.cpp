@@ -12,39 +12,49 @@ rlimit limit_of_files() {
     return limit;
 }
 
+std::string lowered_text(rlim_t from, rlim_t to) {
+    return "hal: the limit of open files was lowered from " + std::to_string(from) + " to " +
+           std::to_string(to) + " by a component or another process";
+}
+
 }  // namespace
 
 FileLimit::FileLimit() : begun_(limit_of_files()) {}
 
-std::optional<rlim_t> FileLimit::raise(const rlimit& now) const {
-    // the hard limit can be raised with the capability CAP_SYS_RESOURCE only
-    const rlimit within_hard{now.rlim_max, now.rlim_max};
-    for (const rlimit& wanted : {begun_, within_hard}) {
-        if (wanted.rlim_cur > now.rlim_cur && setrlimit(RLIMIT_NOFILE, &wanted) == 0) {
-            return wanted.rlim_cur;
-        }
-    }
-    return std::nullopt;
-}
-
-std::optional<std::string> FileLimit::restore() {
+std::optional<std::string> FileLimit::restore(std::int64_t now_ns) {
     const rlimit now = limit_of_files();
-    const bool is_lowered = now.rlim_cur < begun_.rlim_cur;
-    if (!is_lowered) {
+    if (now.rlim_cur >= begun_.rlim_cur) {
         failure_reported_ = false;
         return std::nullopt;
     }
-    const std::string lowered = "hal: the limit of open files was lowered to " +
-                                std::to_string(now.rlim_cur) +
-                                " by a component or another process";
-    if (const std::optional<rlim_t> raised = raise(now)) {
-        return lowered + "; it is " + std::to_string(*raised) + " again\n";
+    // the hard limit can be raised with the capability CAP_SYS_RESOURCE only
+    if (setrlimit(RLIMIT_NOFILE, &begun_) == 0) return raised(now.rlim_cur, now_ns);
+    return not_raised(now);
+}
+
+std::optional<std::string> FileLimit::raised(rlim_t lowered_to, std::int64_t now_ns) {
+    ++times_;
+    if (now_ns - printed_ns_ < interval_ns) return std::nullopt;
+    std::string text = lowered_text(begun_.rlim_cur, lowered_to);
+    if (times_ > 1) {
+        text += ", " + std::to_string(times_) + " times";
+    }
+    times_ = 0;
+    printed_ns_ = now_ns;
+    return text + "; it was raised again\n";
+}
+
+std::optional<std::string> FileLimit::not_raised(const rlimit& lowered) {
+    const rlimit all{lowered.rlim_max, lowered.rlim_max};
+    if (lowered.rlim_cur < lowered.rlim_max) {
+        setrlimit(RLIMIT_NOFILE, &all);
     }
     if (failure_reported_) return std::nullopt;
     failure_reported_ = true;
-    return lowered +
-           ", and cannot be raised: further clients cannot connect; SIGTERM ends the machine; to "
-           "raise it, type as root: prlimit --nofile=" +
+    return lowered_text(begun_.rlim_cur, lowered.rlim_cur) + ", and cannot be raised beyond " +
+           std::to_string(limit_of_files().rlim_cur) +
+           ": a client for which no file is left cannot connect; SIGTERM ends the machine; to raise "
+           "it, type as root: prlimit --nofile=" +
            std::to_string(begun_.rlim_cur) + " --pid " + std::to_string(getpid()) + "\n";
 }
 

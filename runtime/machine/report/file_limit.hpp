@@ -3,6 +3,7 @@
 // lowered limit no client can connect to a machine.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -14,16 +15,20 @@ namespace hal {
 /// thread. [setup]
 class FileLimit {
 public:
+    static constexpr std::int64_t interval_ns = 60'000'000'000;
+
     FileLimit();
-    /// Returns the line to print about a limit that was lowered: one for each time that it could be
-    /// raised again, one in all while it cannot be.
-    std::optional<std::string> restore();
+    /// Returns the line to print about a limit that was lowered: at most one per minute while it
+    /// can be raised again, with the number of times; one in all while it cannot be.
+    std::optional<std::string> restore(std::int64_t now_ns);
 
 private:
-    /// Returns the soft limit that was reached.
-    std::optional<rlim_t> raise(const rlimit& now) const;
+    std::optional<std::string> raised(rlim_t lowered_to, std::int64_t now_ns);
+    std::optional<std::string> not_raised(const rlimit& lowered);
 
     const rlimit begun_;
+    unsigned times_ = 0;  // since the last line
+    std::int64_t printed_ns_ = -interval_ns;
     bool failure_reported_ = false;
 };
 

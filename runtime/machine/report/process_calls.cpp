@@ -99,6 +99,7 @@ using Exec = int(const char*, char* const*, char* const*);
 constinit Next<Exec> next_execve{"execve"};
 constinit Next<Exec> next_execvpe{"execvpe"};
 constinit Next<int(int, char* const*, char* const*)> next_fexecve{"fexecve"};
+constinit Next<int(int, const char*, char* const*, char* const*, int)> next_execveat{"execveat"};
 constinit Next<pid_t()> next_fork{"_Fork"};
 constinit Next<void(void*)> next_pthread_exit{"pthread_exit"};
 
@@ -149,7 +150,9 @@ void end_thread_of_component() noexcept {
 
 /// A component would replace the machine by another program: outputs would stay as they are.
 void end_before_exec(const char* call) noexcept {
-    if (hal::is_machine_process() && hal::report_end(call, " [cycle-violation]")) {
+    if (!hal::is_machine_process()) return;
+    // an end that was reported already makes outputs safe in another thread
+    if (hal::report_end(call, " [cycle-violation]") || hal::end_is_reported()) {
         hal::end_process(1);
     }
 }
@@ -157,9 +160,10 @@ void end_before_exec(const char* call) noexcept {
 /// Collects the arguments of execl() and its relatives, up to the null pointer. Returns false when
 /// there are too many.
 constexpr std::size_t max_exec_arguments = 1024;
-bool collect(const char* first, va_list list, char* (&arguments)[max_exec_arguments]) noexcept {
+bool collect(const char* first, va_list* list,
+             char* (&arguments)[max_exec_arguments]) noexcept {
     std::size_t count = 0;
-    for (const char* one = first; one != nullptr; one = va_arg(list, const char*)) {
+    for (const char* one = first; one != nullptr; one = va_arg(*list, const char*)) {
         if (count + 1 == max_exec_arguments) {
             errno = E2BIG;
             return false;
@@ -195,6 +199,9 @@ bool may_call(long number, long* argument) noexcept {
         return true;
     case SYS_exit: end_thread_of_component(); return true;
     case SYS_execve: end_before_exec("the system call execve"); return true;
+#ifdef SYS_execveat
+    case SYS_execveat: end_before_exec("the system call execveat"); return true;
+#endif
     case SYS_close: return may_close("the system call close", descriptor(0));
     case SYS_dup3: return may_close("the system call dup3", descriptor(1));
 #ifdef SYS_dup2
@@ -293,12 +300,18 @@ extern "C" {
     return (*next_fexecve)(file, arguments, variables);
 }
 
+[[gnu::visibility("default")]] int execveat(int folder, const char* path, char* const* arguments,
+                                            char* const* variables, int flags) noexcept {
+    end_before_exec("execveat()");
+    return (*next_execveat)(folder, path, arguments, variables, flags);
+}
+
 [[gnu::visibility("default")]] int execl(const char* path, const char* first, ...) noexcept {
     end_before_exec("execl()");
     char* arguments[max_exec_arguments];
     va_list list;
     va_start(list, first);
-    const bool fits = collect(first, list, arguments);
+    const bool fits = collect(first, &list, arguments);
     va_end(list);
     return fits ? (*next_execve)(path, arguments, environ) : -1;
 }
@@ -308,7 +321,7 @@ extern "C" {
     char* arguments[max_exec_arguments];
     va_list list;
     va_start(list, first);
-    const bool fits = collect(first, list, arguments);
+    const bool fits = collect(first, &list, arguments);
     va_end(list);
     return fits ? (*next_execvpe)(file, arguments, environ) : -1;
 }
@@ -318,7 +331,7 @@ extern "C" {
     char* arguments[max_exec_arguments];
     va_list list;
     va_start(list, first);
-    const bool fits = collect(first, list, arguments);
+    const bool fits = collect(first, &list, arguments);
     char* const* const variables = fits ? va_arg(list, char* const*) : nullptr;
     va_end(list);
     return fits ? (*next_execve)(path, arguments, variables) : -1;
