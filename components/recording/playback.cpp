@@ -13,6 +13,7 @@
 #include "hal/any_pin.hpp"
 #include "hal/texts.hpp"
 #include "recording/mcap/recording.hpp"
+#include "recording/playback_pin.hpp"
 
 namespace {
 
@@ -156,10 +157,7 @@ private:
         for (std::size_t c = 0; c < track.table.columns.size(); ++c) {
             const hal::mcap::Column& column = track.table.columns[c];
             if (!wanted(column.name)) continue;
-            const bool own = column.name == "enable" || column.name == "restart" ||
-                             column.name == "loop" || column.name == "time" ||
-                             column.name == "done" || column.name == "begin";
-            const std::string name = own ? "value-" + column.name : column.name;
+            const std::string name = hal::playback_pin(column.name);
             const auto [at, made] = by_name_.try_emplace(name, values_.size());
             if (made) {
                 values_.emplace_back();

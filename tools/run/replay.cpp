@@ -17,6 +17,7 @@
 
 #include "cli/output.hpp"
 #include "recording/mcap/recording.hpp"
+#include "recording/playback_pin.hpp"
 #include "run/hosted_machine.hpp"
 #include "run/sim_summary.hpp"
 #include "text/quoting.hpp"
@@ -167,12 +168,16 @@ public:
                         "signal without a writer, or an input pin "
                         "without a signal");
         }
-        TextOutput output;  // its warnings about the file have been printed
-        const int status = machine_.shell.execute(commands, output, "<replay>");
-        if (status != 0) {
-            write_all(STDERR_FILENO, output.err_text);
+        // what playback warns of the file has been printed
+        TextOutput of_loading;
+        if (const int status = machine_.shell.execute({commands.front()}, of_loading, "<replay>");
+            status != 0) {
+            write_all(STDERR_FILENO, of_loading.err_text);
+            return status;
         }
-        return status;
+        commands.erase(commands.begin());
+        ProcessOutput output;
+        return machine_.shell.execute(commands, output, "<replay>");
     }
 
     /// Runs the netlist over the recording and compares.
@@ -394,7 +399,8 @@ private:
         // times are never the same
         if ((!pin && !signal) || (pin && (pin->of_thread || pin->function))) return;
         const std::string source =
-            fmt::format("{}.{}", players_.at(thread_of(model, table).name).name, column.name);
+            fmt::format("{}.{}", players_.at(thread_of(model, table).name).name,
+                        playback_pin(column.name));
         const bool parameter = pin && pin->dir == HAL_DIR_PARAM;
         if (signal && !signal->writer && signal->ios == 0) {
             if (driven_.insert(signal->name).second) {
@@ -411,8 +417,8 @@ private:
         }
     }
 
-    // Recorded times count from the first row, replayed ones from when it is due. A recorded row is compared with the row of the same
-    // time.
+    // Recorded times count from the first row, replayed ones from when it is due. A recorded row is
+    // compared with the row of the same time.
     void compare(const ProbeRows& rows, std::int64_t wanted_ns) {
         if (rows.layout) {
             layout_ = *rows.layout;

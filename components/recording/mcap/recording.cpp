@@ -299,7 +299,11 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem,
     const auto end =
         options.end_ns == INT64_MAX ? UINT64_MAX : static_cast<std::uint64_t>(options.end_ns);
     const auto visit = [&](const Message& message) { return loader.add(message); };
-    if (!reader.each(visit, begin, end)) {
+    const bool is_whole = reader.each(visit, begin, end);
+    for (Table& table : to.tables) {
+        sort(table);
+    }
+    if (!is_whole) {
         to.missing = "'" + path + "': " + reader.problem() + "; " + missing_rows(to);
     } else if (reader.unfinished()) {
         to.missing = "'" + path + "' ends without a summary; " + missing_rows(to);
@@ -415,8 +419,16 @@ std::vector<Table> split(const Table& whole, const std::vector<std::size_t>& fir
     std::vector<Table> tables;
     std::vector<std::vector<std::size_t>> columns;  // of each table, in the whole
     std::map<std::size_t, std::size_t> table_of;  // group to table
+    std::set<std::size_t> filled;  // groups
+    for (const std::size_t column : first_filled) {
+        filled.insert(groups.group(column));
+    }
     for (std::size_t c = 0; c < whole.columns.size(); ++c) {
-        const auto [at, added] = table_of.try_emplace(groups.group(c), tables.size());
+        std::size_t group = groups.group(c);
+        if (!filled.empty() && !filled.contains(group)) {
+            group = *filled.begin();  // a column without any value keeps its initial one
+        }
+        const auto [at, added] = table_of.try_emplace(group, tables.size());
         if (added) {
             tables.push_back({whole.topic, {}, {}, {}});
             columns.emplace_back();
