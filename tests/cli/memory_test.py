@@ -12,7 +12,7 @@ HANG = Path(__file__).parents[2] / "halfiles/furuta/hang.hal"
 MOST_KB = 24 * 1024
 EDITS = 100_000
 FILES = 1000
-FLAT_KB = 1024  # what the allocator may keep: 10 bytes of an edit
+FLAT_KB = 1536  # what the allocator may keep: 15 bytes of an edit
 MOST_TRIES = 100  # of an edit that a busy host withdraws
 
 # Each pair of lines leaves the machine as it was.
