@@ -18,7 +18,7 @@ void EventLog::add(std::string_view kind, std::string_view text) {
     entries_.push_back(
         nlohmann::json{{"event", "log"}, {"unix_ms", unix_ms}, {"kind", kind}, {"text", text}}.dump(
             -1, ' ', false, nlohmann::json::error_handler_t::replace));
-    if (entries_.size() > max) {
+    if (entries_.size() > max_entries) {
         entries_.pop_front();
     }
     write_all(STDERR_FILENO, fmt::format("hal panel: {}\n", printable(text)));

@@ -19,7 +19,7 @@ public:
     const std::deque<std::string>& entries() const { return entries_; }
 
 private:
-    static constexpr std::size_t max = 200;
+    static constexpr std::size_t max_entries = 200;
     std::deque<std::string> entries_;
 };
 

@@ -16,6 +16,7 @@ const views = {
 };
 
 let view = null;
+let shown = 0;  // counts calls of show(): loading a module may take longer than the next call
 const main = document.getElementById('main'), nav = document.getElementById('views');
 
 const place = () => parse(location.hash, Object.keys(views));
@@ -23,13 +24,14 @@ const place = () => parse(location.hash, Object.keys(views));
 async function show() {
     if (/[#&]t=/.test(location.hash) || location.hash === '#main' || isShown(location.hash)) return;
     enter(location.hash);
+    const call = ++shown;
     const {name, query} = place();
     view?.end();
     view = null;
     drawNav();
     main.replaceChildren(h('p', {class: 'dim'}, 'Loading …'));
     const module = await views[name][1]();
-    if (place().name !== name) return;
+    if (call !== shown) return;
     main.replaceChildren();
     document.title = `${views[name][0]} · ${state.instance || 'Halcyon'}`;
     view = new module.View(main, query);

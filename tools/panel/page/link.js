@@ -94,7 +94,10 @@ export function probe(names, options, act, failed) {
 async function startProbe(one) {
     if (!state.machine || one.names.length === 0) return;
     const reply = await request({probe: one.names, ...one.options});
-    if (!reply.ok) return one.failed(reply);
+    if (!reply.ok) {
+        if (probes.delete(one)) one.failed(reply);
+        return;
+    }
     if (!probes.has(one)) return request({unprobe: reply.probe});
     one.number = reply.probe;
     one.layout = reply;
