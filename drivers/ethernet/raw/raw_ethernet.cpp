@@ -51,8 +51,8 @@ public:
 
     Sent send(std::span<const std::uint8_t> frame, const Launch& launch,
               std::int64_t) noexcept override {
-        const auto max = header_bytes + sender_.mtu.load(std::memory_order_relaxed);
-        if (!launch.fits(frame.size()) || frame.size() > max) {
+        const auto max_bytes = header_bytes + sender_.mtu.load(std::memory_order_relaxed);
+        if (!launch.fits(frame.size()) || frame.size() > max_bytes) {
             return sender_.drop(Sent::rejected);
         }
         if (!sender_.up.load(std::memory_order_relaxed)) return sender_.drop(Sent::down);

@@ -33,10 +33,10 @@ bool Sender::bind(int index) noexcept {
 void Sender::await(std::int64_t time_ns) noexcept {
     constexpr std::int64_t cold_after = 30'000;
     constexpr std::int64_t ahead = 8'000;
-    constexpr std::int64_t min = 4'000;
+    constexpr std::int64_t min_lead = 4'000;
     static constexpr std::array<std::uint8_t, header_bytes - 1> runt{};
     auto now = link::monotonic_ns();
-    if (time_ns - now > min && time_ns - last_ns_.load(std::memory_order_relaxed) > cold_after) {
+    if (time_ns - now > min_lead && time_ns - last_ns_.load(std::memory_order_relaxed) > cold_after) {
         for (; now < time_ns - ahead; now = link::monotonic_ns()) {
             pause_processor();
         }

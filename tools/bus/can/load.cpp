@@ -85,12 +85,12 @@ int run_can_load(const BusLoadOptions& options) {
         peak = std::max(peak, busy);
     }
     const can::Statistics s = bus.link->statistics();
-    const std::string max =
+    const std::string load_text =
         about.bit_rate ? fmt::format("peak load over 0.1 s: {:.1f} %",
                                      static_cast<double>(peak) * 100 / window_ns)
                        : "load unknown without a bit rate; add ?bitrate=500k to the address";
     write_all(STDERR_FILENO,
-              fmt::format("{:.2f} s; {}; {} errors, {} lost\n", seconds, max, s.errors, s.lost));
+              fmt::format("{:.2f} s; {}; {} errors, {} lost\n", seconds, load_text, s.errors, s.lost));
     return 0;
 }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <fmt/core.h>
+#include <sstream>
 #include <numeric>
 #include <unistd.h>
 
@@ -110,6 +111,18 @@ std::string used_text(const can_timing::Message& m, const can_timing::Response& 
                        100.0 * static_cast<double>(r.worst) / static_cast<double>(m.limit()));
 }
 
+std::string load_text(const Table& table, const can_timing::Analysis& a) {
+    std::string text = fmt::format("{} messages at {} bit/s: load {:.1f} % with all stuff bits",
+                                   table.rows.size(), table.bus.bit_rate, 100 * a.load);
+    const can_timing::Errors& errors = table.bus.errors;
+    if (errors.burst == 0) return text;
+    text += fmt::format("; errors: {} at once", errors.burst);
+    if (errors.period != 0) {
+        text += fmt::format(" and 1 in every {} ms", ms(errors.period));
+    }
+    return text;
+}
+
 std::string table_text(const Table& table, const can_timing::Analysis& a) {
     TextTable rows({{"id", 8},
                     {"bytes", 6},
@@ -125,23 +138,14 @@ std::string table_text(const Table& table, const can_timing::Analysis& a) {
         rows.add({id_of(m), length_text(m), fmt::format("{}", r.bits), ms(m.period), ms(m.limit()),
                   ms(r.worst), used_text(m, r), (r.in_time ? "" : "LATE ") + table.rows[i].name});
     }
-    std::string errors;
-    if (const can_timing::Errors& e = table.bus.errors; e.burst != 0) {
-        errors =
-            fmt::format("; errors: {} at once{}", e.burst,
-                        e.period == 0 ? "" : fmt::format(" and 1 in every {} ms", ms(e.period)));
-    }
-    return rows.text() + table.notes +
-           fmt::format("{} messages at {} bit/s: load {:.1f} % with all stuff bits{}\n",
-                       table.rows.size(), table.bus.bit_rate, 100 * a.load, errors);
+    return rows.text() + table.notes + load_text(table, a) + "\n";
 }
 
 /// Returns the response times, with their deadlines.
 Timeline timeline_of(const Table& table, const can_timing::Analysis& a) {
     Timeline timeline;
     timeline.command = "hal canopen plan";
-    timeline.title = fmt::format("{} messages at {} bit/s: load {:.1f} % with all stuff bits",
-                                 table.rows.size(), table.bus.bit_rate, 100 * a.load);
+    timeline.title = load_text(table, a);
     timeline.response_title = "Worst-case response time of each message and its deadline, ms";
     for (std::size_t i = 0; i < table.rows.size(); ++i) {
         const can_timing::Response& r = a.responses[i];
@@ -153,6 +157,10 @@ Timeline timeline_of(const Table& table, const can_timing::Analysis& a) {
         timeline.responses.push_back(std::move(one));
     }
     timeline.summary = {"Red lines: deadlines. Red bars: messages that may miss them."};
+    std::istringstream notes(table.notes);
+    for (std::string line; std::getline(notes, line);) {
+        timeline.summary.push_back(line);
+    }
     return timeline;
 }
 

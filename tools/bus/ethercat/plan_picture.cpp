@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "bus/ethercat/plan_picture.hpp"
+#include "text/quoting.hpp"
 
 #include <algorithm>
 #include <fmt/core.h>
@@ -46,7 +47,7 @@ public:
         timeline.key = key(synchronised);
         const std::size_t hidden = bus_.setup.slaves.size() - shown_slaves_;
         if (hidden > 0) {
-            timeline.summary.push_back(fmt::format("{} more slaves are not shown.", hidden));
+            timeline.summary.push_back("Not shown: " + counted(hidden, "further slave") + ".");
         }
         timeline.summary.push_back(
             fmt::format("Wire load {:.1f} %; shortest cycle {}; worst case from an input to the "

@@ -275,9 +275,12 @@ int run_scocan_plan(const ScocanPlanOptions& options) {
     }
     const plan::Plan p = plan::plan_of(t, *mode);
     if (!options.svg.empty()) {
-        return write_picture(options, options.svg, options.json, timeline_of(t, p));
+        const Timeline timeline = timeline_of(t, p);
+        const int status = write_picture(options, options.svg, options.json, timeline);
+        if (status != 0) return status;
+    } else if (!print(options.json ? json_text(t, p) : text_of(t, p))) {
+        return 1;
     }
-    if (!print(options.json ? json_text(t, p) : text_of(t, p))) return 1;
     if (p.fits) return 0;
     std::string late;
     for (const Latency& l : p.latencies) {

@@ -9,8 +9,9 @@ namespace {
 
 using namespace scocan;
 
-/// Slots of which more fit into the picture than labels do.
+/// In a picture of more slots the identifiers, and the numbers, would overlap.
 constexpr std::uint32_t max_labelled_slots = 40;
+constexpr std::uint32_t max_numbered_slots = 80;
 
 Bar slot_bar(const Table& t, std::uint32_t slot, Colour colour) {
     const Bar::Shape shape = colour == Colour::leader ? Bar::Shape::pale : Bar::Shape::solid;
@@ -19,17 +20,35 @@ Bar slot_bar(const Table& t, std::uint32_t slot, Colour colour) {
 
 std::string label_of(const Use& use) {
     const std::string id = use.ids.empty() ? "any" : scocan::id_text(use.ids.front()).substr(2);
-    return use.every > 1 ? fmt::format("{} {}/{}", id, use.offset + 1, use.every) : id;
+    return use.every > 1 ? fmt::format("{} {} of {}", id, use.offset, use.every) : id;
 }
 
-/// Adds a private slot to the lane of its node: pale, with a frame of 8 bytes to scale.
+/// Adds a private slot to the lane of its node: pale, with a frame of 8 bytes to scale. Uses of one
+/// slot in different cycles share the bars and the label.
 void add_private(Lane& lane, const Table& t, std::uint32_t slot, const Use& use) {
     const Time begin = t.slot() * slot;
-    lane.bars.push_back(slot_bar(t, slot, Colour::leader));
-    lane.bars.push_back({begin, begin + t.frame(8), Colour::leader, Bar::Shape::solid});
-    if (t.slots <= max_labelled_slots) {
-        lane.labels.push_back({begin + t.slot() / 2, label_of(use), true});
+    const Time middle = begin + t.slot() / 2;
+    const bool labelled = t.slots <= max_labelled_slots;
+    const bool is_shared = !lane.bars.empty() && lane.bars.back().from_ns == begin;
+    if (!is_shared) {
+        lane.bars.push_back(slot_bar(t, slot, Colour::leader));
+        lane.bars.push_back({begin, begin + t.frame(8), Colour::leader, Bar::Shape::solid});
     }
+    if (labelled && is_shared) {
+        lane.labels.back().text += ", " + label_of(use);
+    } else if (labelled) {
+        lane.labels.push_back({middle, label_of(use), true});
+    }
+}
+
+/// The numbers of the slots.
+Lane number_lane(const Table& t) {
+    Lane lane;
+    lane.name = "slot";
+    for (std::uint32_t slot = 0; slot < t.slots; ++slot) {
+        lane.labels.push_back({t.slot() * slot + t.slot() / 2, fmt::format("{}", slot), true});
+    }
+    return lane;
 }
 
 std::vector<Lane> lanes_of(const Table& t, const Mode& mode) {
@@ -51,7 +70,11 @@ std::vector<Lane> lanes_of(const Table& t, const Mode& mode) {
             }
         }
     }
-    std::vector<Lane> lanes = {std::move(sync)};
+    std::vector<Lane> lanes;
+    if (t.slots <= max_numbered_slots) {
+        lanes.push_back(number_lane(t));
+    }
+    lanes.push_back(std::move(sync));
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         if (nodes[i].bars.empty()) continue;
         nodes[i].name = t.nodes[i].name;

@@ -38,7 +38,12 @@ const char* code_of(Colour colour) {
 /// Leaves out what does not fit to the left of the lanes.
 std::string fitting(const std::string& name) {
     constexpr std::size_t max_length = 24;
-    return name.size() <= max_length ? name : name.substr(0, max_length - 1) + "…";
+    if (name.size() <= max_length) return name;
+    std::size_t end = max_length - 1;
+    while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xc0) == 0x80) {
+        --end;  // within a character of several bytes
+    }
+    return name.substr(0, end) + "…";
 }
 
 double us(std::int64_t ns) { return static_cast<double>(ns) / 1e3; }
