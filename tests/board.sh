@@ -11,8 +11,7 @@ use_board "$1"
 tree=$board-test
 
 tests=ON
-compile "$tree" "everything for $board" hal hal-bus components unit_tests component_tests canopen_tests \
-    can_timing_tests scocan_tests tdma_tests recording_tests ethercat_tests estimation_tests bus_tests dds_schema_tests
+compile "$tree" "everything for $board" hal hal-bus components unit_programs
 exec 9>&-
 
 # The tests start programs, which start others: the kernel must run each with qemu-user. Where it is not registered for that, a user namespace
