@@ -191,7 +191,7 @@ the response-time analysis for every message with a higher identifier. Their dat
 `data=longest` each has nearly as many stuff bits as a message can have.
 
 `worst-response` is the longest time from a release to the last bit of a message on the bus; it must not exceed the computed response time
-(`hal can plan`); 0 on a bus that does not report what was sent. A message that is released while eight of its predecessors wait is dropped. With
+(`hal canopen plan`); 0 on a bus that does not report what was sent. A message that is released while eight of its predecessors wait is dropped. With
 `one_node=1` all messages come from one node.
 
     loadrt can_traffic names=others link=sim:can0 id=0x200 messages=18
