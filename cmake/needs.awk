@@ -52,13 +52,13 @@ function read_command(text, folder,    words, count, i) {
             else emit(words[i + 1])
         }
         if (words[i] == "source") read_file(words[i + 1], folder)
-        if (words[i] ~ /(^|\/)hal$/ && words[i + 1] ~ /^(can|canopen|node)$/) emit("bus")
+        if (words[i] ~ /(^|\/)hal$/ && words[i + 1] ~ /^(can|canopen|node|ethercat|scocan)$/) emit("bus")
         if (words[i] == "loadusr") for (; i <= count; ++i) {
             if (words[i] ~ /[.]py$/) {
                 read_program(words[i])
                 read_program(folder words[i])
             }
-            if (words[i] ~ /(^|\/)hal$/ && words[i + 1] ~ /^(can|canopen|node)$/) emit("bus")
+            if (words[i] ~ /(^|\/)hal$/ && words[i + 1] ~ /^(can|canopen|node|ethercat|scocan)$/) emit("bus")
         }
     }
 }

@@ -52,6 +52,21 @@ case "$*" in *libsolving-dev*) touch "$TOOLS/solving.h" ;; esac
 """
 
 
+def needs(*words, cwd=ROOT):
+    """What cmake/needs.awk prints for a command of the program."""
+    done = subprocess.run(
+        ["awk", "-v", f"command={words[0]}", "-f", ROOT / "cmake/needs.awk", "--", *words],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    if done.stderr:
+        raise AssertionError(done.stderr)
+    return set(done.stdout.split())
+
+
 class Script(unittest.TestCase):
     maxDiff = None
 
@@ -192,7 +207,10 @@ class Script(unittest.TestCase):
         self.assertEqual("hal: building the program in build/release\n", self.said)
 
     def test_the_program_of_the_bus_tools_is_built_for_its_commands(self):
-        self.assertEqual(self.BUILD + "hal hal-bus", self.hal("can", "dump", "can:can0")[-1])
+        self.assertEqual(self.BUILD + "hal hal-bus", self.hal("ethercat", "scan", "eth:eth0")[-1])
+        for command in ("can", "canopen", "node", "ethercat", "scocan"):
+            self.assertEqual([], self.hal(command, "anything"))
+            self.assertEqual({"bus"}, needs("shell", "loadusr", "-W", "hal", command, "anything"))
 
     def test_an_edit_typed_as_a_command_is_read_too(self):
         self.assertEqual(
@@ -339,18 +357,6 @@ class Script(unittest.TestCase):
 class Needs(unittest.TestCase):
     """The rough reader of cmake/needs.awk, against one that takes its time."""
 
-    def needs(self, *words, cwd=ROOT):
-        done = subprocess.run(
-            ["awk", "-v", f"command={words[0]}", "-f", ROOT / "cmake/needs.awk", "--", *words],
-            cwd=cwd,
-            capture_output=True,
-            text=True,
-            timeout=60,
-            check=True,
-        )
-        self.assertEqual("", done.stderr)
-        return set(done.stdout.split())
-
     def loaded(self, path, seen):
         """The components that the loadrt lines of a netlist name, and of those it sources."""
         names = set()
@@ -382,7 +388,7 @@ class Needs(unittest.TestCase):
                 continue
             with self.subTest(path.relative_to(ROOT)):
                 self.assertEqual(
-                    self.loaded(path, set()), self.needs("run", str(path)) - {"python", "bus"}
+                    self.loaded(path, set()), needs("run", str(path)) - {"python", "bus"}
                 )
 
     def test_an_ini_file_names_its_netlists_and_the_values_of_variables(self):
@@ -392,7 +398,7 @@ class Needs(unittest.TestCase):
             )
             Path(folder, "m.hal").write_text("loadrt [KINS]KINEMATICS\nloadrt 'pid' count=3\n")
             self.assertLessEqual(
-                {"or2", "pid", "trivial_kins"}, self.needs("run", f"{folder}/m.ini")
+                {"or2", "pid", "trivial_kins"}, needs("run", f"{folder}/m.ini")
             )
 
     def test_programs_that_a_netlist_starts_are_read(self):
@@ -401,32 +407,32 @@ class Needs(unittest.TestCase):
             Path(folder, "m.hal").write_text(
                 "loadusr -W python3 p.py\nloadusr -W hal node io --link sim:a --id 3\n"
             )
-            self.assertEqual({"python", "bus"}, self.needs("run", f"{folder}/m.hal"))
+            self.assertEqual({"python", "bus"}, needs("run", f"{folder}/m.hal"))
 
     def test_a_node_of_several_exchanges_signals_with_the_others(self):
         self.assertEqual(
             {"node", "dds_publish", "dds_subscribe"},
-            self.needs("run", "nothing.hal", "--node", "cell"),
+            needs("run", "nothing.hal", "--node", "cell"),
         )
 
     def test_a_netlist_that_sources_itself_is_read_once(self):
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "m.hal").write_text("source m.hal\nloadrt pid\nsource n.hal\n")
             Path(folder, "n.hal").write_text("source m.hal\nloadrt sum2\n")
-            self.assertEqual({"pid", "sum2"}, self.needs("run", "m.hal", cwd=folder))
-            self.assertEqual({"pid", "sum2"}, self.needs("run", f"{folder}/m.hal", cwd=folder))
+            self.assertEqual({"pid", "sum2"}, needs("run", "m.hal", cwd=folder))
+            self.assertEqual({"pid", "sum2"}, needs("run", f"{folder}/m.hal", cwd=folder))
 
     def test_a_folder_with_the_name_of_an_argument_is_not_a_netlist(self):
         with tempfile.TemporaryDirectory() as folder:
             Path(folder, "build").mkdir()
-            self.assertEqual({"pid"}, self.needs("build", "pid", cwd=folder))
+            self.assertEqual({"pid"}, needs("build", "pid", cwd=folder))
 
     def test_pages_of_components_need_them(self):
         self.assertEqual(
-            {"pid", "conv_s32_float"}, self.needs("doc", "pid", "conv-s32-float", "--markdown")
+            {"pid", "conv_s32_float"}, needs("doc", "pid", "conv-s32-float", "--markdown")
         )
-        self.assertEqual({"all"}, self.needs("doc", "--all", "--output", "pages"))
-        self.assertEqual(set(), self.needs("doc"))
+        self.assertEqual({"all"}, needs("doc", "--all", "--output", "pages"))
+        self.assertEqual(set(), needs("doc"))
 
 
 class Unbuilt(Case):
