@@ -21,8 +21,17 @@ mkdir -p build/release/components build/release/bin
 echo "CMAKE_HOME_DIRECTORY:INTERNAL=$source" >build/release/CMakeCache.txt
 touch build/release/build.ninja
 for file in "$source"/components/*/*.cpp; do name=${file##*/}; echo "${name%.cpp} math A component"; done >build/release/components/groups
-printf '%s\n' "seeing libseeing-dev" "moving HALCYON_PACKAGE_MOTION" >build/release/components/absent
-echo "HALCYON_PACKAGE_MOTION:BOOL=OFF" >>build/release/CMakeCache.txt
+echo "seeing libseeing-dev" >build/release/components/absent
+case "$*" in
+    *-DHALCYON_PACKAGE_MOTION=ON)
+        : >build/release/components/switched_off
+        echo "moving motion A component" >>build/release/components/groups
+        ;;
+    *)
+        echo "motion HALCYON_PACKAGE_MOTION" >build/release/components/switched_off
+        echo "moving HALCYON_PACKAGE_MOTION" >>build/release/components/absent
+        ;;
+esac
 printf '%s\n' "lqr libsolving-dev" "panel libplain-dev" >build/release/components/packages
 """
 NINJA = """#!/bin/sh
@@ -238,6 +247,14 @@ class Script(unittest.TestCase):
             self.said,
         )
 
+    def test_a_package_that_is_switched_on_is_built_although_it_was_requested_before(self):
+        self.hal("build", "moving", status=1)
+        advised = self.said.split("type: ")[1].split()
+        self.assertEqual(["cmake", "--preset", "release"], advised[:-1])
+        subprocess.run(advised, cwd=self.tree, env=self.environment, check=True)
+        self.assertEqual([self.BUILD + "hal component_moving"], self.hal("build", "moving"))
+        self.assertEqual([], self.hal("build", "moving"))
+
     def test_only_the_packages_of_what_is_needed_are_installed(self):
         self.assertNotIn("apt-get", " ".join(self.hal("run", "a.hal")))
         self.write("c.hal", "loadrt lqr\n")
@@ -397,9 +414,7 @@ class Needs(unittest.TestCase):
                 "[HAL]\nHALFILE = m.hal\nHALCMD = loadrt or2\n[KINS]\nKINEMATICS = trivial-kins coordinates=xyz\n"
             )
             Path(folder, "m.hal").write_text("loadrt [KINS]KINEMATICS\nloadrt 'pid' count=3\n")
-            self.assertLessEqual(
-                {"or2", "pid", "trivial_kins"}, needs("run", f"{folder}/m.ini")
-            )
+            self.assertLessEqual({"or2", "pid", "trivial_kins"}, needs("run", f"{folder}/m.ini"))
 
     def test_programs_that_a_netlist_starts_are_read(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """The packages of the tree, from outside: which a build has, and what a tree has that is configured without all of them, or without one."""
+import itertools
 import json
 import re
 import shutil
@@ -77,7 +78,15 @@ class SwitchedOff(unittest.TestCase):
         absent = dict(
             line.split() for line in (self.tree / "components/absent").read_text().splitlines()
         )
-        components = ("canopen", "ethercat", "tdma", "scocan", "dds_publish", "kalman", "vision_blob")
+        components = (
+            "canopen",
+            "ethercat",
+            "tdma",
+            "scocan",
+            "dds_publish",
+            "kalman",
+            "vision_blob",
+        )
         for component in components:
             self.assertRegex(absent[component], "^HALCYON_PACKAGE_[A-Z]+$")
             self.assertNotIn(f"component_{component}", targets)
@@ -106,13 +115,13 @@ class SwitchedOff(unittest.TestCase):
 
 class OneSwitch(Case):
     def test_each_switch_alone_leaves_the_others_in(self):
-        for name in NAMES:
+        for name, value in zip(NAMES, itertools.cycle(("OFF", "0", "off", "NO"))):
             with self.subTest(name):
-                tree = self.folder / name
-                status, output = configure(
-                    tree, f"-DHALCYON_PACKAGE_{name.upper()}=OFF", "-DHALCYON_TESTS=OFF"
-                )
+                tree, switch = self.folder / name, f"HALCYON_PACKAGE_{name.upper()}"
+                status, output = configure(tree, f"-D{switch}={value}", "-DHALCYON_TESTS=OFF")
                 self.assertEqual(0, status, output)
+                listed = (tree / "components/switched_off").read_text()
+                self.assertEqual(f"{name} {switch}\n", listed)
                 rows = re.findall(
                     r'\{"([a-z]+)", .*PackageState::([a-z_]+)',
                     (tree / "generated/tree_packages.cpp").read_text(),
