@@ -211,6 +211,16 @@ class Script(unittest.TestCase):
         self.touch("components/math/scale.cpp")
         self.assertEqual([self.BUILD + "hal component_sum2 component_pid"], self.hal("version"))
 
+    def test_changed_presets_configure_the_tree_again(self):
+        self.hal("run", "a.hal")
+        for name in ("build/release/CMakeCache.txt", "build/.built"):
+            os.utime(self.tree / name, (1, 1))
+        self.assertEqual(
+            ["cmake --preset release", self.BUILD + "hal component_sum2 component_pid"],
+            self.hal("version"),
+        )
+        self.assertEqual([], self.hal("version"))
+
     def test_a_command_that_loads_nothing_builds_the_program_alone(self):
         self.assertEqual(self.BUILD + "hal", self.hal("version")[-1])
         self.assertEqual("hal: building the program in build/release\n", self.said)
