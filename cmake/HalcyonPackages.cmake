@@ -131,26 +131,27 @@ function(halcyon_packages_of_text variable)
     set(${variable} "${found}" PARENT_SCOPE)
 endfunction()
 
-# halcyon_packages_source(): writes generated/tree_packages.cpp, with the values of runtime/base/tree_packages.hpp; and for the script `hal` the
-# table of the packages that are switched off, NAME SWITCH.
+# halcyon_packages_source(): writes generated/tree_packages.cpp, with the values of runtime/base/tree_packages.hpp; and the table
+# of the packages that this build leaves out, for the script `hal` and for the tests: NAME SWITCH, or NAME and what it needs.
 function(halcyon_packages_source)
     set(rows "")
-    set(switches "")
+    set(left_out "")
     foreach(name IN LISTS HALCYON_PACKAGES)
         halcyon_package_switched_off(is_off ${name})
         get_property(needs GLOBAL PROPERTY HALCYON_PACKAGE_NEEDS_${name})
         if(is_off)
             set(state "PackageState::switched_off")
             string(TOUPPER "${name}" switch)
-            string(APPEND switches "${name} HALCYON_PACKAGE_${switch}\n")
+            string(APPEND left_out "${name} HALCYON_PACKAGE_${switch}\n")
         elseif(needs)
             set(state "PackageState::incomplete")
+            string(APPEND left_out "${name} ${needs}\n")
         else()
             set(state "PackageState::built")
         endif()
         string(APPEND rows "    {\"${name}\", \"${HALCYON_PACKAGE_SUMMARY_${name}}\", ${state}, \"${needs}\"},\n")
     endforeach()
-    file(CONFIGURE OUTPUT "${HALCYON_COMPONENT_OUTPUT_DIRECTORY}/switched_off" CONTENT "${switches}")
+    file(CONFIGURE OUTPUT "${HALCYON_COMPONENT_OUTPUT_DIRECTORY}/packages_left_out" CONTENT "${left_out}")
     file(CONFIGURE OUTPUT "${PROJECT_BINARY_DIR}/generated/tree_packages.cpp" @ONLY CONTENT [[
 // SPDX-License-Identifier: MIT
 #include "base/tree_packages.hpp"

@@ -110,7 +110,7 @@ $(sed -n 's/^ *[0-9]*\/[0-9]* Test *#[0-9]*: \([^ ]*\) .*/    \1/p' "$log.again"
         fi
     fi
     lap "testing build/$tree"
-    reasons=$(python3 "$root/tests/skipped.py" "$log.xml")
+    reasons=$(python3 "$root/tests/skipped.py" "$log.xml" "$build/$tree/components/packages_left_out")
     [ -z "$reasons" ] || say "left out, and why (which: build/$tree-tests.log):
 $reasons"
     say "$(python3 "$root/tests/slowest.py" "$log.xml")"

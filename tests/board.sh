@@ -39,7 +39,7 @@ failed=
 $namespace sh "$in_board" "$qemu" ctest --test-dir "$build/$tree" --output-on-failure \
     --no-tests=error --test-output-size-passed 1000000 -j "$((3 * $(nproc)))" -L '^(unit|netlists)$' --output-junit "$log.xml" >"$log" 2>&1 </dev/null || failed=1
 grep -vE '^ *(Start +[0-9]+:|[0-9]+/[0-9]+ .* (Passed|Skipped) )|\(Skipped\)$|\*\*\*Skipped ' "$log" || :
-reasons=$(python3 "$root/tests/skipped.py" "$log.xml")
+reasons=$(python3 "$root/tests/skipped.py" "$log.xml" "$build/$tree/components/packages_left_out")
 [ -z "$reasons" ] || say "skipped, and why (which: $log):
 $reasons"
 say "left out: components/vision, components/dds and tools/python (their libraries are not in the sysroot); tests of real time, of buses between processes, of the command line and of packages, whose times or privileges mean nothing under an emulator"

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""skipped.py RESULTS.xml: why tests were left out, and how many for each reason, from what `ctest --output-junit` wrote."""
+"""skipped.py RESULTS.xml [PACKAGES]: why tests were left out, and how many for each reason, from what `ctest --output-junit` wrote; and which
+packages of the tree are not in the build, whose tests are not in the results, from the table that CMake made."""
 import collections
 import re
 import sys
 import xml.etree.ElementTree as xml
+from pathlib import Path
 
 reasons = collections.Counter()
 for case in xml.parse(sys.argv[1]).iter("testcase"):
@@ -25,3 +27,8 @@ for case in xml.parse(sys.argv[1]).iter("testcase"):
     ] += 1
 for reason, count in sorted(reasons.items()):
     print(f"    {count:>4}  {reason}")
+for table in map(Path, sys.argv[2:]):
+    for row in table.read_text(encoding="utf-8").splitlines():
+        name, reason = row.split(" ", 1)
+        reason = f"{reason}=OFF" if reason.startswith("HALCYON_PACKAGE_") else f"needs {reason}"
+        print(f"     all  of the package {name}: {reason}")

@@ -21,6 +21,7 @@ RESULTS = """<?xml version="1.0" encoding="UTF-8"?>
   </testcase>
 </testsuite>
 """
+PACKAGES = "vision HALCYON_PACKAGE_VISION\npython a build without sanitizers\n"
 EXPECTED = {
     (
         "slowest.py",
@@ -37,6 +38,13 @@ EXPECTED = {
         6.0 s  cli/run_test
 """,
     ("skipped.py",): "       1  cyclonedds is not installed\n",
+    (
+        "skipped.py",
+        "packages_left_out",
+    ): """       1  cyclonedds is not installed
+     all  of the package vision: HALCYON_PACKAGE_VISION=OFF
+     all  of the package python: needs a build without sanitizers
+""",
 }
 
 
@@ -45,9 +53,10 @@ def main(root):
     with tempfile.TemporaryDirectory() as folder:
         results = Path(folder) / "results.xml"
         results.write_text(RESULTS)
+        (Path(folder) / "packages_left_out").write_text(PACKAGES)
         for (script, *arguments), expected in EXPECTED.items():
             command = [sys.executable, str(Path(root) / "tests" / script), str(results), *arguments]
-            printed = subprocess.run(command, stdout=subprocess.PIPE, text=True).stdout
+            printed = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, text=True).stdout
             if printed != expected:
                 failures += 1
                 print(f"{' '.join([script, *arguments])} prints\n{printed}expected:\n{expected}")

@@ -24,11 +24,11 @@ for file in "$source"/components/*/*.cpp; do name=${file##*/}; echo "${name%.cpp
 echo "seeing libseeing-dev" >build/release/components/absent
 case "$*" in
     *-DHALCYON_PACKAGE_MOTION=ON)
-        : >build/release/components/switched_off
+        : >build/release/components/packages_left_out
         echo "moving motion A component" >>build/release/components/groups
         ;;
     *)
-        echo "motion HALCYON_PACKAGE_MOTION" >build/release/components/switched_off
+        printf '%s\n' "motion HALCYON_PACKAGE_MOTION" "sight libsight-dev" >build/release/components/packages_left_out
         echo "moving HALCYON_PACKAGE_MOTION" >>build/release/components/absent
         ;;
 esac
