@@ -66,7 +66,7 @@ test_progress() {
         case $line in
             *[0-9]/[0-9]*" Test "*"#"*)
                 ran=$((ran + 1)) all=${line%% Test *} all=${all#*/}
-                case $line in *"***Failed"* | *"***Timeout"* | *"***Exception"*) bad=$((bad + 1)) ;; esac
+                case $line in *"***Failed"* | *"***Timeout"* | *"***Exception"* | *"***Not Run"*) bad=$((bad + 1)) ;; esac
                 now="testing build/$1: $ran of $all tests$([ $bad -eq 0 ] || echo ", $bad failed")"
                 if [ -t 2 ]; then
                     printf '\r%s\033[K' "hal: $now" >&2
@@ -95,7 +95,7 @@ run_tests() {
         sed -n '/tests passed/,/^Total Test time/p' "$log"
     else
         grep -vE '^ *(Start +[0-9]+:|[0-9]+/[0-9]+ .* (Passed|Skipped) )|\(Skipped\)$|\*\*\*Skipped ' "$log"
-        if grep -qE 'Sanitizer: |runtime error: ' "$log" || [ "$(grep -cE '\*\*\*(Failed|Timeout|Exception)' "$log")" -gt 20 ]; then
+        if grep -qE 'Sanitizer: |runtime error: ' "$log" || [ "$(grep -cE '\*\*\*(Failed|Timeout|Exception|Not Run)' "$log")" -gt 20 ]; then
             failed="$failed build/$tree"
         else
             say "running the failed tests of build/$tree again, one at a time"
