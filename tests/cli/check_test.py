@@ -5,7 +5,7 @@ import re
 import subprocess
 import unittest
 
-from harness import Case, SERVO
+from harness import SERVO, Case, needs_package
 
 MACHINE = """loadrt [KINS]KINEMATICS
 loadrt motmod servo_period_nsec=[EMCMOT]PERIOD num_joints=2
@@ -253,13 +253,17 @@ class SpecialFiles(Case):
             ["compile", "fifo.cpp"],
             ["compile", "fifo.c"],
             ["compile", "fifo.comp"],
-            ["canopen", "check", "fifo.canopen"],
-            ["can", "eds", "check", "fifo.eds"],
         ):
             with self.subTest(words=words):
                 self.assertRegex(self.bad(*words), "FIFO|regular file")
         self.write("included.ini", "#INCLUDE fifo.ini\n")
         self.assertIn("FIFO", self.bad("check", "included.ini"))
+
+    @needs_package("canopen")
+    def test_as_a_file_of_canopen(self):
+        for words in (["canopen", "check", "fifo.canopen"], ["can", "eds", "check", "fifo.eds"]):
+            with self.subTest(words=words):
+                self.assertRegex(self.bad(*words), "FIFO|regular file")
 
     def test_in_a_running_machine(self):
         self.start("run", self.write("a.hal", SERVO))

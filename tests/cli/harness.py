@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What the tests of the program share: a sandbox, running machines, a terminal."""
 import fcntl
+import functools
+import json
 import os
 import pty
 import re
@@ -29,6 +31,19 @@ PLUGINS = os.environ.get("HALCYON_PLUGIN_PATH") or str(HAL.parent.parent / "test
 SANITIZED = any(
     name in HAL.read_bytes() for name in (b"__asan_init", b"__tsan_init")
 )  # then the sanitizer takes crash signals
+
+
+@functools.cache
+def packages_left_out():
+    """The packages of the tree that the program was built without."""
+    command = [HAL, "--version", "--json"]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    return {one["name"] for one in json.loads(printed)["packages"] if not one["built"]}
+
+
+def needs_package(name):
+    """Skips a test in a build without the package. For a file of which every test needs it: `# packages: NAME`."""
+    return unittest.skipIf(name in packages_left_out(), f"this build leaves out {name}")
 
 
 def run_share(share):

@@ -10,7 +10,7 @@ import signal
 import subprocess
 import unittest
 
-from harness import Case, HAL, wait_until
+from harness import HAL, Case, needs_package, wait_until
 
 NETLIST = """loadrt threads name1=servo period1=1000000
 loadrt siggen names=wave
@@ -65,6 +65,7 @@ class Simulated(Case):
             (self.folder / "b.mcap").read_bytes(), (self.folder / "c.mcap").read_bytes()
         )
 
+    @needs_package("canopen")
     def test_messages_of_a_bus_are_in_the_recording(self):
         self.write(
             "a.canopen",

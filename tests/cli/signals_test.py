@@ -5,7 +5,7 @@ import signal
 import subprocess
 import unittest
 
-from harness import HAL, SANITIZED, SERVO, Case, Terminal, wait_until
+from harness import HAL, SANITIZED, SERVO, Case, Terminal, needs_package, wait_until
 
 ENDING = [
     signal.SIGINT,
@@ -158,6 +158,7 @@ class Others(Case):
         )
         self.check("record", wait=self.first_line)
 
+    @needs_package("canopen")
     def test_node(self):
         self.check(
             "node", "io", "--link", "udp:239.74.163.2:43113", "--id", "5", wait=self.first_line
