@@ -2,10 +2,7 @@
 # libhalcyon_modules.so runs LinuxCNC's compiled modules. machine/load/module_library.cpp opens it at run time, with its symbols in the global
 # scope; nothing links to it. It exports what runtime/linuxcnc/binary/exports.map lists.
 if(NOT HALCYON_PACKAGE_LINUXCNC)
-    file(GLOB stale "${PROJECT_BINARY_DIR}/lib/libhalcyon_modules.so*")  # of a build that had the package
-    if(stale)
-        file(REMOVE ${stale})
-    endif()
+    halcyon_remove_products("lib/libhalcyon_modules.so*")
     return()
 endif()
 file(GLOB sources CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/binary/*.cpp")

@@ -30,6 +30,15 @@ function(halcyon_package_needs name package)
     set_property(GLOBAL PROPERTY HALCYON_PACKAGE_NEEDS_${name} "${package}")
 endfunction()
 
+# halcyon_remove_products(PATH...): removes files and folders of the build tree that an earlier build with the package made, by patterns.
+function(halcyon_remove_products)
+    list(TRANSFORM ARGN PREPEND "${PROJECT_BINARY_DIR}/")
+    file(GLOB stale LIST_DIRECTORIES true ${ARGN})
+    if(stale)
+        file(REMOVE_RECURSE ${stale})
+    endif()
+endfunction()
+
 # halcyon_package_built(VARIABLE NAME): whether this build has the package. Call it after the folder of the package was added.
 function(halcyon_package_built variable name)
     halcyon_package_switched_off(is_off ${name})

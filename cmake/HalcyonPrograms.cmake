@@ -2,6 +2,7 @@
 # liblinuxcnchal.so.0, by which LinuxCNC's programs connect to a machine; see runtime/linuxcnc/programs/README.md. It is in a folder of its own, which only
 # started programs search: outside of that it must not stand in the way of LinuxCNC's library of the same name.
 if(NOT HALCYON_PACKAGE_LINUXCNC)
+    halcyon_remove_products("lib/halcyon/linuxcnc/liblinuxcnchal.so*")
     return()
 endif()
 set(source "${PROJECT_SOURCE_DIR}/runtime/linuxcnc/source/linuxcnc")

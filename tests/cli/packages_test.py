@@ -19,6 +19,16 @@ ROWS = [
     if not line.startswith("#")
 ]
 NAMES = [row[0] for row in ROWS]
+# What builds with the packages leave in a tree; the suffixes depend on the machine and the version.
+PRODUCTS = (
+    "bin/hal-panel",
+    "components/kalman.so",
+    "lib/halcyon/linuxcnc/liblinuxcnchal.so.0",
+    "lib/libhalcyon_dds.so.1.2",
+    "lib/libhalcyon_modules.so.1.2",
+    "lib/libhalcyon_vision.so.1.2",
+    "python/hal/_core.so",
+)
 
 
 def configure(folder, *switches):
@@ -60,6 +70,9 @@ class SwitchedOff(unittest.TestCase):
         cls.folder = Path(tempfile.mkdtemp(prefix="hal-"))
         cls.addClassCleanup(shutil.rmtree, cls.folder, True)
         cls.tree = cls.folder / "tree"
+        for product in PRODUCTS:
+            (cls.tree / product).parent.mkdir(parents=True, exist_ok=True)
+            (cls.tree / product).touch()
         switches = [f"-DHALCYON_PACKAGE_{name.upper()}=OFF" for name in NAMES]
         status, output = configure(cls.tree, *switches, "-DHALCYON_TESTS=ON")
         if status != 0:
@@ -98,6 +111,9 @@ class SwitchedOff(unittest.TestCase):
         labels = set(re.findall(r"(?m)^  (\S+)$", tests))
         self.assertIn("core", labels)
         self.assertEqual(set(), labels & set(NAMES))
+
+    def test_products_of_an_earlier_build_with_the_packages_are_removed(self):
+        self.assertEqual([], [one for one in PRODUCTS if (self.tree / one).exists()])
 
     def test_the_list_of_the_program_names_each_switch(self):
         source = (self.tree / "generated/tree_packages.cpp").read_text()
