@@ -49,6 +49,10 @@ void add_axis(Dictionary& d, unsigned axis, const cia402::AxisSettings& settings
     values.mode_display = 0;
     values.abort_connection_option =
         static_cast<std::int16_t>(cia402::AbortConnection::disable_voltage);
+    values.homing_method = 37;
+    values.following_error_window = cia402::no_window;
+    values.following_error_timeout = 0;
+    values.output_mask = 0xffffffff;
     const auto counts = counts_of(values);
     cia402::each_object(values, [&](const cia402::ObjectRow& row, const auto& value) {
         using T = std::remove_cvref_t<decltype(value)>;

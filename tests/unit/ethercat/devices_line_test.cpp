@@ -290,6 +290,24 @@ TEST_F(Devices, Servo_reports_switch_on_disabled_in_PRE_OP_on_every_axis) {
     EXPECT_EQ(upload(0x6841, 0) & 0xffff, 0x250U);
 }
 
+TEST_F(Devices, Servo_has_the_first_values_of_every_axis) {
+    start("servo", {.axes = 2});
+    to_preop();
+    for (unsigned axis = 0; axis < 2; ++axis) {
+        const auto value = [&](std::uint16_t index, std::uint8_t sub = 0) {
+            return upload(hal::canopen::cia402::of_axis(index, axis), sub);
+        };
+        EXPECT_EQ(value(0x6098) & 0xff, 37U) << "home at the current position";
+        EXPECT_EQ(value(0x6065), 0xffffffffU) << "no window";
+        EXPECT_EQ(value(0x6066) & 0xffff, 0U);
+        EXPECT_EQ(value(0x60fe, 2), 0xffffffffU) << "all outputs are enabled";
+        EXPECT_EQ(value(0x6007) & 0xffff, 2U) << "disable voltage";
+        EXPECT_EQ(value(0x6085), 5'000'000U);
+        EXPECT_EQ(value(0x6076), 300U);
+        EXPECT_EQ(value(0x6502), 0x3efU);
+    }
+}
+
 TEST(DeviceLine, Description_reports_what_is_invalid) {
     const auto good = read_line(
         "# line\ncoupler\nservo axes=2 alias=5 serial=1 dc=required\ndigital_in bits=16\n");
