@@ -15,7 +15,7 @@ using cia301::Access;
 
 /// Properties of an object besides its value.
 struct ObjectRow {
-    enum Pdo : std::uint8_t { no_pdo, sent, received };
+    enum Pdo : std::uint8_t { no_pdo, sent, received, both };
     std::uint16_t index;
     std::uint8_t sub;
     Access access;
@@ -35,6 +35,7 @@ void each_object(AxisValues& o, F&& f) {
     constexpr auto no = ObjectRow::no_pdo;
     constexpr auto tx = ObjectRow::sent;
     constexpr auto rx = ObjectRow::received;
+    constexpr auto both = ObjectRow::both;
     const auto ramp = [&](std::uint16_t index, Ramp& r) {
         f(ObjectRow{index, 1, rw, no, "Delta speed"}, r.speed);
         f(ObjectRow{index, 2, rw, no, "Delta time"}, r.time);
@@ -106,7 +107,7 @@ void each_object(AxisValues& o, F&& f) {
     f(ObjectRow{torque_actual, 0, ro, tx, "Torque actual value"}, o.torque_actual);
     f(ObjectRow{current_actual, 0, ro, tx, "Current actual value"}, o.current_actual);
     f(ObjectRow{dc_link_voltage, 0, ro, tx, "DC link circuit voltage"}, o.dc_link);
-    f(ObjectRow{target_position, 0, rw, rx, "Target position"}, o.target_position);
+    f(ObjectRow{target_position, 0, rw, both, "Target position"}, o.target_position);
     f(ObjectRow{position_range_limit, 1, rw, no, "Min position range limit"}, o.range_min);
     f(ObjectRow{position_range_limit, 2, rw, no, "Max position range limit"}, o.range_max);
     f(ObjectRow{home_offset, 0, rw, no, "Home offset"}, o.home_offset);

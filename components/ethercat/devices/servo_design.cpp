@@ -27,6 +27,7 @@ std::uint16_t rights_of(const cia402::ObjectRow& row) noexcept {
     switch (row.pdo) {
     case cia402::ObjectRow::sent: return rights | access::tx_mappable;
     case cia402::ObjectRow::received: return rights | access::rx_mappable;
+    case cia402::ObjectRow::both: return rights | access::rx_mappable | access::tx_mappable;
     case cia402::ObjectRow::no_pdo: break;
     }
     return rights;

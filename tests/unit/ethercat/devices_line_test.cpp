@@ -89,6 +89,16 @@ TEST_F(Devices, Remapping_changes_the_length_of_the_sync_manager) {
     EXPECT_EQ(request(State::safeop, al_error), 4U);
 }
 
+TEST_F(Devices, Servo_sends_its_target_position_back) {
+    start("servo");
+    to_preop();
+    EXPECT_EQ(download(0x1c13, 0, 0, 1), 0U);
+    EXPECT_EQ(download(0x1a00, 0, 0, 1), 0U);
+    EXPECT_EQ(download(0x1a00, 1, 0x60ff0020, 4), code_of(coe::Abort::not_mappable));
+    EXPECT_EQ(download(0x1a00, 1, 0x607a0020, 4), 0U);
+    EXPECT_EQ(download(0x1a00, 0, 1, 1), 0U);
+}
+
 TEST_F(Devices, Servo_follows_its_target_position) {
     start("servo");
     const auto frame = [&](std::uint16_t control, std::int32_t position, std::uint8_t mode = 8) {

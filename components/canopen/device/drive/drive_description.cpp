@@ -24,11 +24,11 @@ void add_axis(Description& d, unsigned axis, const AxisSettings& settings) {
         }
         auto& entry = d.add(index, row.sub, cia301::type_for<T>(), row.access,
                             static_cast<std::uint64_t>(value), row.name + suffix);
-        if (row.pdo == ObjectRow::sent) {
-            entry.sent();
-        }
-        if (row.pdo == ObjectRow::received) {
-            entry.mappable();
+        switch (row.pdo) {
+        case ObjectRow::sent: entry.sent(); break;
+        case ObjectRow::received:  // a master may read back what it commands
+        case ObjectRow::both: entry.mappable(); break;
+        case ObjectRow::no_pdo: break;
         }
         if (row.low != 0 || row.high != 0) {
             entry.limited(row.low, row.high);
