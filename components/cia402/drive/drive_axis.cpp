@@ -232,15 +232,30 @@ void DriveAxis::continue_transitions(double dt) noexcept {
 
 void DriveAxis::lose_connection() noexcept {
     const bool on = state_ == State::switched_on || torque_on();
-    if (!on || state_ == State::fault_reaction_active) return;
-    switch (static_cast<AbortConnection>(values_.abort_connection_option)) {
+    const bool commanded = on || state_ == State::ready_to_switch_on;
+    const auto option = static_cast<AbortConnection>(values_.abort_connection_option);
+    if (commanded && option == AbortConnection::none) return;
+    if (on && state_ != State::fault_reaction_active) {
+        abort_connection(option);
+    }
+    if (state_ == State::ready_to_switch_on) {
+        enter(State::switch_on_disabled);  // 7
+    }
+    // The next controlword is compared with 0, so that a fault reset that was held rises again.
+    // Not a command: a stop on its ramp goes on.
+    values_.controlword = 0;
+    control_ = {};
+    publish();
+}
+
+void DriveAxis::abort_connection(AbortConnection option) noexcept {
+    switch (option) {
     case AbortConnection::none: return;
     case AbortConnection::fault: return raise(DriveFault::connection);
     case AbortConnection::disable_voltage: values_.controlword = command::disable_voltage; break;
     case AbortConnection::quick_stop: values_.controlword = command::quick_stop; break;
     }
     accept_controlword();
-    publish();
 }
 
 // The reference of a step.

@@ -43,7 +43,8 @@ public:
     void power_up() noexcept;
     /// Advances by `dt` s, at most 1 ms.
     void step(double dt) noexcept;
-    /// Handles the loss of the master as configured in 6007h.
+    /// Handles the loss of the master as configured in 6007h. Unless 6007h = 0 keeps the drive as it
+    /// is, "ready to switch on" becomes "switch on disabled", and the controlword counts as 0.
     void lose_connection() noexcept;
     /// Raises a fault of the device with its code (603Fh), until the next reset.
     void fail(std::uint16_t code) noexcept;
@@ -76,6 +77,7 @@ private:
     void command_quick_stop(Command) noexcept;
     void quick_stop() noexcept;
     void stay_enabled() noexcept;
+    void abort_connection(AbortConnection) noexcept;
     void continue_transitions(double dt) noexcept;
     void enter(State) noexcept;
     void stop_then(Stop, State then) noexcept;

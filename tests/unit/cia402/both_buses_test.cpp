@@ -354,6 +354,64 @@ TEST_P(BothBuses, Loss_of_the_master_acts_as_6007h_says) {
     EXPECT_EQ(state(), State::switch_on_disabled);
 }
 
+TEST_P(BothBuses, Loss_of_the_master_with_6007h_0_keeps_the_drive_as_it_is) {
+    start();
+    ASSERT_EQ(drive->write_by_sdo(object::abort_connection_option, 0, 0), Abort::none);
+    control(command::shutdown);
+    drive->stop_bus();
+    drive->run(2);
+    EXPECT_EQ(state(), State::ready_to_switch_on);
+    drive->start_bus();
+    enable(Mode::profile_velocity);
+    drive->stop_bus();
+    drive->run(2);
+    EXPECT_EQ(state(), State::operation_enabled);
+    drive->start_bus();
+    control(command::enable_operation);
+    EXPECT_EQ(state(), State::operation_enabled);
+}
+
+TEST_P(BothBuses, Loss_of_the_master_with_6007h_3_stops_on_the_quick_stop_ramp) {
+    start();
+    ASSERT_EQ(drive->write_by_sdo(object::abort_connection_option, 0, 3), Abort::none);
+    enable(Mode::profile_velocity);
+    set(object::target_velocity, 100'000);
+    ASSERT_TRUE(until([&] { return bit(status::target_reached); }));
+    drive->stop_bus();
+    EXPECT_EQ(state(), State::quick_stop_active);
+    ASSERT_TRUE(until([&] { return state() == State::switch_on_disabled; }, 1000));
+    EXPECT_NEAR(static_cast<double>(velocity()), 0, 200);
+    drive->start_bus();
+    control(command::enable_operation);
+    EXPECT_EQ(state(), State::switch_on_disabled) << "needs shutdown first";
+    enable(Mode::profile_velocity);
+}
+
+TEST_P(BothBuses, Loss_of_the_master_takes_a_ready_drive_to_switch_on_disabled) {
+    start();
+    control(command::shutdown);
+    ASSERT_EQ(state(), State::ready_to_switch_on);
+    drive->stop_bus();
+    EXPECT_EQ(state(), State::switch_on_disabled);
+    EXPECT_EQ(get(object::error_code), 0);
+    EXPECT_EQ(get(object::controlword), 0);
+}
+
+TEST_P(BothBuses, Fault_reset_that_was_held_rises_again_after_the_loss_of_the_master) {
+    start();
+    enable(Mode::profile_velocity);
+    control(command::enable_operation | command::fault_reset);
+    drive->set_dc_link(0, 100);
+    ASSERT_TRUE(until([&] { return state() == State::fault; }, 2000));
+    drive->set_dc_link(0, 48);
+    control(command::fault_reset);
+    ASSERT_EQ(state(), State::fault) << "bit 7 has not risen";
+    drive->stop_bus();
+    drive->start_bus();
+    control(command::fault_reset);
+    EXPECT_EQ(state(), State::switch_on_disabled);
+}
+
 struct Homing : testing::TestWithParam<std::tuple<Bus, std::int8_t>>, DriveTest {};
 
 /// Returns where the home position is along the travel, with an index pulse every 10 000 increments.

@@ -52,6 +52,7 @@ public:
         }
     }
     void stop_bus() override { drive_.device().command(NmtCommand::stop, now_); }
+    void start_bus() override { drive_.device().command(NmtCommand::start, now_); }
     void set_load_torque(unsigned axis, double torque) override {
         drive_.set_load_torque(axis, torque);
     }

@@ -35,6 +35,8 @@ public:
     virtual void run(int ms) = 0;
     /// Ends the operation of the drive as a master does that stops.
     virtual void stop_bus() = 0;
+    /// Makes the drive operational again.
+    virtual void start_bus() = 0;
     /// Returns the emergencies since the last call.
     std::vector<Emergency> emergencies() { return std::exchange(emergencies_, {}); }
 

@@ -67,6 +67,10 @@ public:
         }
     }
     void stop_bus() override { bench_.request(State::safeop); }
+    void start_bus() override {
+        run(1);  // outputs, which OP waits for
+        bench_.request(State::op);
+    }
     void set_load_torque(unsigned n, double torque) override { axis(n).set_load_torque(torque); }
     void set_dc_link(unsigned n, double volts) override { axis(n).set_dc_link(volts); }
     void set_inputs(unsigned n, std::uint32_t bits) override { axis(n).set_inputs(bits); }
