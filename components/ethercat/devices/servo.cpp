@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "cia301/error_register.hpp"
 #include "cia402/drive/axis_objects.hpp"
@@ -35,6 +36,7 @@ void ServoAxis::power_on() noexcept {
     register_bits_ = 0;
     faults_ = 0;
     outputs_valid_ = false;
+    command_waits_ = false;
     axis_.power_up();
     copy_surroundings();
     axis_.step(max_step);  // the self-test: switch on disabled, which SDOs read before SAFE-OP
@@ -54,8 +56,12 @@ coe::Abort ServoAxis::check(std::uint16_t index,
 
 void ServoAxis::written(std::uint16_t index, std::uint8_t sub) noexcept {
     const std::uint16_t object = cia402::of_first_axis(index);
-    // Without valid outputs nobody commands the drive.
-    if (object == o402::controlword && !outputs_valid_) return;
+    // Without valid outputs nobody commands the drive. The first outputs are written before the step
+    // that has them.
+    if (object == o402::controlword && !outputs_valid_) {
+        command_waits_ = true;
+        return;
+    }
     axis_.written(object, sub);
 }
 
@@ -123,6 +129,9 @@ void ServoAxis::step(Step& step) noexcept {
     outputs_valid_ = step.outputs_valid;
     if (lost) {
         axis_.lose_connection();
+    }
+    if (outputs_valid_ && std::exchange(command_waits_, false)) {
+        axis_.written(o402::controlword, 0);
     }
     advance(step.dt_ns);
     for (const coe::Emergency& emergency : pending_.all()) {

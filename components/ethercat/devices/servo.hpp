@@ -72,6 +72,7 @@ private:
     std::uint8_t register_bits_ = 0;  ///< of the present faults
     unsigned faults_ = 0;
     bool outputs_valid_ = false;
+    bool command_waits_ = false;  ///< a controlword was written while the outputs were not valid
 
     std::atomic<double> shown_position_{0};
     std::atomic<double> shown_velocity_{0};

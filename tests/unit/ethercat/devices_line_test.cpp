@@ -134,6 +134,40 @@ TEST_F(Devices, Servo_follows_its_target_position) {
     EXPECT_EQ(frame(0x80, 2000) & 0x4f, 0x40);
 }
 
+TEST_F(Devices, Servo_follows_the_first_controlword_in_OP) {
+    start("servo");
+    to_preop();
+    process_data();
+    ASSERT_EQ(request(State::safeop), 4U);
+    Bytes shutdown(13);
+    shutdown[0] = 6;
+    outputs(shutdown);
+    const auto& axis = dynamic_cast<Servo&>(device.firmware->behaviour()).axis(0);
+    EXPECT_EQ(axis.statusword() & 0x6f, 0x40) << "outputs are not valid in SAFE-OP";
+    // One frame requests OP and carries the first outputs.
+    std::vector<World::Item> items{
+        {Command::apwr, at_position(0, registers::al_control), {8, 0}},
+        {Command::apwr, at_position(0, area(sii::SmType::outputs).start), shutdown}};
+    w.send(items);
+    ASSERT_EQ(device.firmware->state(), State::op);
+    EXPECT_EQ(axis.statusword() & 0x6f, 0x21);
+}
+
+TEST_F(Devices, Servo_follows_a_controlword_that_an_SDO_wrote_before_OP) {
+    start("servo");
+    to_preop();
+    ASSERT_EQ(download(0x1c12, 0, 0, 1), 0U);
+    sync_manager(2, 0, 0, 0);
+    const auto& in = area(sii::SmType::inputs);
+    sync_manager(3, in.start, in.length, in.control);
+    ASSERT_EQ(request(State::safeop), 4U);
+    ASSERT_EQ(download(0x6040, 0, 6, 2), 0U);
+    const auto& axis = dynamic_cast<Servo&>(device.firmware->behaviour()).axis(0);
+    EXPECT_EQ(axis.statusword() & 0x6f, 0x40);
+    ASSERT_EQ(request(State::op), 8U);
+    EXPECT_EQ(axis.statusword() & 0x6f, 0x21);
+}
+
 TEST_F(Devices, Long_objects_travel_in_segments) {
     start("mailbox_device");
     to_preop();
