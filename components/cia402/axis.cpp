@@ -10,6 +10,8 @@ namespace {
 constexpr double farthest_count = 4e18;        // of a position that does not wrap
 // for so many cycles the display in flight may be the old one
 constexpr unsigned mode_change_cycles = 3;
+// after a stop, for so long the feedback may be from before it
+constexpr Time restart_window = one_second;
 
 bool in_fault(State s) noexcept { return s == State::fault || s == State::fault_reaction_active; }
 bool by_position(Mode m) noexcept {
@@ -44,12 +46,13 @@ void Axis::fail(Cause cause, double value, double limit) noexcept {
 }
 
 const AxisOrders& Axis::act(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
+    follow_restart(now);
     decide(command, rules);
     walk(command, rules, now);
     select_mode(command, rules, now);
     home(command, rules, now);
-    if (enabled_) {
-        stopped_bus_ = false;
+    if (enabled_ && !disable_sent_) {  // seen disabled, then enabled: the feedback is new
+        restart_ = Restart::no;
     }
     active_ = enabled_ && mode_shown_ && home_ == Home::no;
     move(command, rules, now);
@@ -78,10 +81,22 @@ void Axis::set_missing(Cause half) noexcept {
 
 void Axis::interrupt() noexcept {
     wanted_ = enabled_ = active_ = following_ = false;
-    stopped_bus_ = true;
+    restart_ = Restart::pending;
     home_ = Home::no;
     set_points_.clear();
     walk_.restart_timeout();
+}
+
+void Axis::follow_restart(Time now) noexcept {
+    if (restart_ == Restart::pending) {
+        restart_ = Restart::recent;
+        restarted_at_ = now;
+        // The outputs of a stopped thread disable the drive, which may still be braking.
+        disable_sent_ = true;
+        disable_sent_at_ = now;
+    } else if (restart_ == Restart::recent && now - restarted_at_ >= restart_window) {
+        restart_ = Restart::no;
+    }
 }
 
 /// Updates position, velocity and torque in user units; without a node they keep their values.
@@ -144,10 +159,10 @@ void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
         wanted_ = false;
     }
     if (!in_.operational) {
-        if (wanted_ && was_operational_ && !stopped_bus_) {
+        if (wanted_ && was_operational_ && restart_ == Restart::no) {
             fail(Cause::lost, enabled_ ? Request::run : Request::enable);
         }
-        stopped_bus_ = false;
+        restart_ = Restart::no;
         homed_ = false;
     }
 }

@@ -108,7 +108,9 @@ public:
     void set_missing(Cause half) noexcept;
 
     /// Disables the axis after a time without cycles, in which the drive was stopped. This is not a
-    /// failure; enable needs another edge. [realtime]
+    /// failure; enable needs another edge. The bus may have been stopped, too: in the first second of
+    /// cycles, and until the drive has been enabled, the first loss of the node is not a failure
+    /// either, and enabling waits for its return. [realtime]
     void interrupt() noexcept;
 
     State state() const noexcept { return walk_.state(); }
@@ -142,7 +144,10 @@ public:
 
 private:
     enum class Home : std::uint8_t { no, entering, running, leaving };
+    /// After a time without cycles: before the first cycle; feedback may be from before the stop.
+    enum class Restart : std::uint8_t { no, pending, recent };
 
+    void follow_restart(Time now) noexcept;
     void decide(const AxisCommand&, const AxisRules&) noexcept;
     void walk(const AxisCommand&, const AxisRules&, Time now) noexcept;
     void watch_enabled(State, const AxisRules&, Time now) noexcept;
@@ -181,6 +186,8 @@ private:
     Time mode_since_ = 0;
     Time joined_at_ = 0;
     Time disable_sent_at_ = 0;
+    Time restarted_at_ = 0;
+    Restart restart_ = Restart::no;
     Home home_ = Home::no;
     unsigned home_cycles_ = 0;
     bool failed_while_off_ = false;
@@ -197,9 +204,6 @@ private:
     bool was_go_ = false;
 
     bool was_operational_ = false;
-    /// The thread was stopped, and with it perhaps the bus: `operational` may be of before the stop,
-    /// so that its first loss does not fail an axis that is not enabled yet.
-    bool stopped_bus_ = false;
     bool started_ = false;
     bool target_reached_ = false;
     bool jumped_ = false;

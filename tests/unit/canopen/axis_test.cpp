@@ -273,6 +273,89 @@ TEST(Axis, Node_lost_is_a_failure_and_takes_another_edge) {
     EXPECT_TRUE(p.enable()) << p.why();
 }
 
+TEST(Axis, Stop_disables_without_a_failure_and_takes_another_edge) {
+    Pair p;
+    ASSERT_TRUE(p.enable()) << p.why();
+    p.axis.interrupt();
+    EXPECT_FALSE(p.axis.enabled());
+    p.cycle(10);
+    EXPECT_FALSE(p.axis.enabled());
+    EXPECT_FALSE(p.axis.failure()) << p.why();
+    EXPECT_EQ(State::switch_on_disabled, p.drive.state);
+    p.command.enable = false;
+    p.cycle();
+    EXPECT_TRUE(p.enable()) << p.why();
+}
+
+/// An axis that brakes when its thread stops, and is enabled meanwhile: `operational` and the
+/// statusword are those of before the stop until the bus has run.
+struct StoppedWhileBraking : testing::Test {
+    Pair p;
+
+    void SetUp() override {
+        ASSERT_TRUE(p.enable()) << p.why();
+        p.drive.stuck_in = State::operation_enabled;  // a long ramp
+        p.command.enable = false;
+        p.cycle(10);
+        p.axis.interrupt();
+        p.now += 60 * second;
+        p.command.enable = true;
+    }
+    void lose(unsigned cycles) {
+        p.drive.out.operational = false;
+        p.cycle(cycles);
+    }
+    void find_switched_off() {
+        p.drive.stuck_in = State::unknown;
+        p.drive.state = State::switch_on_disabled;
+        p.drive.tell();
+        p.drive.out.operational = true;
+    }
+};
+
+TEST_F(StoppedWhileBraking, Waits_for_the_bus_after_cycles_with_the_old_statusword) {
+    p.cycle(3);
+    lose(200);
+    EXPECT_FALSE(p.axis.failure()) << p.why();
+    find_switched_off();
+    EXPECT_TRUE(p.until([&] { return p.axis.active() || p.axis.failure(); }));
+    EXPECT_FALSE(p.axis.failure()) << p.why();
+}
+
+TEST_F(StoppedWhileBraking, Enables_a_drive_that_has_stopped_meanwhile) {
+    p.cycle(3);
+    find_switched_off();
+    EXPECT_TRUE(p.until([&] { return p.drive.state == State::operation_enabled; }));
+    p.cycle(2);
+    EXPECT_FALSE(p.axis.failure()) << p.why();
+    EXPECT_TRUE(p.axis.active());
+}
+
+TEST_F(StoppedWhileBraking, A_loss_after_a_second_is_a_failure) {
+    p.cycle(1001);
+    lose(1);
+    EXPECT_EQ(Cause::lost, p.axis.failure().cause);
+}
+
+TEST_F(StoppedWhileBraking, A_second_loss_is_a_failure) {
+    p.cycle(3);
+    lose(3);
+    p.drive.out.operational = true;
+    p.cycle(3);
+    lose(1);
+    EXPECT_EQ(Cause::lost, p.axis.failure().cause);
+}
+
+TEST_F(StoppedWhileBraking, A_loss_once_the_drive_was_enabled_is_a_failure) {
+    p.cycle(3);
+    find_switched_off();
+    ASSERT_TRUE(p.until([&] { return p.drive.state == State::operation_enabled; }));
+    p.cycle(2);
+    ASSERT_TRUE(p.axis.enabled());
+    lose(1);
+    EXPECT_EQ(Cause::lost, p.axis.failure().cause);
+}
+
 TEST(Axis, Quick_stop_takes_another_edge) {
     Pair p;
     ASSERT_TRUE(p.enable());
