@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <functional>
 
 #include <sched.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 #include "execute/violation.hpp"
 
@@ -38,6 +41,23 @@ void store(hal_pin& pin, bool value) noexcept {
     __atomic_store_n(&pin.slot->bit, value, __ATOMIC_RELAXED);
 }
 
+/// Returns the function that a step of the plan belongs to; 0: none.
+std::uint32_t function_of(const plan::Plan* plan, const plan::Step* step) noexcept {
+    if (!plan || !step) return 0;
+    const auto among = [step](const std::vector<plan::Step>& steps,
+                              const std::vector<plan::Function>& functions) -> std::uint32_t {
+        const std::less<> before;
+        if (before(step, steps.data()) || !before(step, steps.data() + steps.size())) return 0;
+        const auto at = static_cast<std::uint32_t>(step - steps.data());
+        for (const plan::Function& function : functions) {
+            if (at >= function.begin && at < function.end) return function.id;
+        }
+        return 0;
+    };
+    const std::uint32_t cyclic = among(plan->steps, plan->functions);
+    return cyclic != 0 ? cyclic : among(plan->init_steps, plan->init);
+}
+
 struct Current {  // outlives no core: on the virtual clock the session's own thread runs them all
     explicit Current(Core* core) noexcept { current_core = core; }
     ~Current() { current_core = nullptr; }
@@ -61,7 +81,8 @@ Core* Core::current() noexcept { return current_core; }
 
 Core::Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board,
            Timeline& timeline, const std::atomic<bool>& running, bool measure, CycleMark* mark)
-    : id_(id),
+    : monitor(period_ns),
+      id_(id),
       period_ns_(period_ns),
       pins_(pins),
       board_(board),
@@ -113,12 +134,8 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
     std::int64_t end_ns = woke_ns;
     tracing_ = trace_.load(std::memory_order_acquire);
     if (measure_) {
-        due_.store(due_ns, std::memory_order_release);
-        busy_since_.store(woke_ns, std::memory_order_release);
+        monitor.begin_cycle(due_ns, woke_ns);
         wakeup.add(woke_ns - due_ns);
-        if (max_gap_ns.load(std::memory_order_relaxed) > 0) {
-            note_usage();
-        }
     }
     take_over();
     if (plan_) {
@@ -147,9 +164,7 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
         halt_seen_.store(halt_asked_.load(std::memory_order_acquire), std::memory_order_release);
     }
     ++info_.number;
-    finished_.store(end_ns, std::memory_order_release);
-    cycles.store(cycles.load(std::memory_order_relaxed) + 1, std::memory_order_release);
-    busy_since_.store(0, std::memory_order_release);
+    monitor.end_cycle(end_ns);
 }
 
 void Core::service() noexcept {
@@ -214,12 +229,8 @@ void Core::skip(std::uint64_t periods) noexcept {
         tracing->put(TraceEvent::missed, now_ns, now_ns, info_.number + periods, periods);
     }
     info_.number += periods;
-    // first the deadline, then the number: missed_by() never counts a period twice
-    due_.store(
-        due_.load(std::memory_order_relaxed) + static_cast<std::int64_t>(periods) * period_ns_,
-        std::memory_order_release);
-    missed.store(missed.load(std::memory_order_relaxed) + periods, std::memory_order_release);
-    store(*pins_.missed, static_cast<std::uint32_t>(missed.load(std::memory_order_relaxed)));
+    monitor.skip(periods);
+    store(*pins_.missed, static_cast<std::uint32_t>(monitor.missed()));
 }
 
 // The inbox first: a write that was queued before a plan was offered goes to the places of the plan
@@ -374,6 +385,53 @@ void Core::run_functions() noexcept {
     suspect_modes();
 }
 
+/// Runs functions one by one: no other function runs with the modes that one has changed.
+void Core::run_checked() noexcept {
+    const auto& functions = plan_->functions;
+    const plan::Step* const steps = plan_->steps.data();
+    const bool time_all = profile_every.load(std::memory_order_relaxed) || tracing_ != nullptr;
+    const std::size_t sampled = sampled_;
+    sampled_ = sampled_ + 1 == functions.size() ? 0 : sampled_ + 1;
+    for (std::size_t i = 0; i < functions.size(); ++i) {
+        if (stopped_.load(std::memory_order_relaxed)) return;
+        const plan::Function& function = functions[i];
+        if (measure_ && (time_all || i == sampled)) {
+            run_timed(function, steps);
+        } else {
+            run_steps(steps + function.begin, steps + function.end);
+        }
+        check_modes(function.id);
+    }
+}
+
+void Core::check_modes(std::uint32_t function) noexcept {
+    const unsigned differences = modes_.take();
+    if (differences == 0 || !modes_.name(function)) [[likely]]
+        return;
+    raise({HAL_FAULT_VIOLATION, function, info_.number, info_.start_ns,
+           static_cast<double>(differences), violation::float_modes, nullptr});
+}
+
+void Core::suspect_modes() noexcept {
+    if (const unsigned differences = modes_.take(); differences != 0) [[unlikely]] {
+        modes_.suspect(differences);
+    }
+}
+
+void Core::settle_modes() noexcept {
+    const ModeCheck::Result result = modes_.end_cycle();
+    if (result.begins) {
+        board_.begin(this, &modes_);
+    }
+    if (result.unnamed != 0) {
+        raise({HAL_FAULT_VIOLATION, 0, info_.number, info_.start_ns,
+               static_cast<double>(result.unnamed), violation::float_modes, nullptr});
+    }
+    if (result.ends) {
+        board_.end(this, &modes_);
+    }
+}
+
 // The function that runs did not return to its cycle.
 void Core::stop_at(hal_fault_code code, const char* reason) noexcept {
     mark_->in_function.store(false, std::memory_order_relaxed);
@@ -474,8 +532,6 @@ std::int64_t Core::account(std::int64_t woke_ns, bool ran) noexcept {
         store(*pins_.tmax_increased, more);
     }
     const std::int64_t budget = budget_ns.load(std::memory_order_relaxed);
-
-    const std::int64_t limit = supervise_ns.load(std::memory_order_relaxed);
     const bool too_long = busy_ns >= longest_overrun * period_ns_;
     const bool in_budget = (budget == 0 || busy_ns <= budget) && !too_long;
     if (!in_budget) {
@@ -486,16 +542,14 @@ std::int64_t Core::account(std::int64_t woke_ns, bool ran) noexcept {
                 info_.start_ns, static_cast<double>(busy_ns), nullptr,
                 nullptr};
     };
-    const bool gap = limit != 0 && busy_ns > limit &&
-                     max_gap_ns.load(std::memory_order_relaxed) > 0 && was_preempted() &&
-                     tolerate_gap(busy_ns);
-    if (!gap && limit != 0 &&
-        now_ns - std::max(woke_ns, excused_.load(std::memory_order_acquire)) > limit) {
+    const CycleMonitor::Length length = monitor.length(woke_ns, now_ns);
+    const bool is_gap = length == CycleMonitor::Length::gap;
+    if (length == CycleMonitor::Length::silent) {
         // otherwise the supervisor has reported it
         if (declare_hung()) {
             raise(event(HAL_FAULT_SILENT_THREAD));
         }
-    } else if (!gap && !in_budget && in_budget_ && !hung()) {
+    } else if (!is_gap && !in_budget && in_budget_ && !monitor.hung()) {
         board_.begin(this, &in_budget_);
         raise(event(HAL_FAULT_BUDGET));
     } else if (in_budget && !in_budget_) {
@@ -526,11 +580,82 @@ void Core::make_safe_at_end() noexcept {
     turn_.store(nobody, std::memory_order_release);
 }
 
+void Core::woke_late(std::int64_t due_ns, std::int64_t now_ns) noexcept {
+    const std::int64_t silent_ns = monitor.silence_before(due_ns, now_ns);
+    if (silent_ns == 0 || !declare_hung()) return;
+    raise({HAL_FAULT_SILENT_THREAD, 0, info_.number, info_.start_ns, static_cast<double>(silent_ns),
+           nullptr, nullptr});
+}
+
+bool Core::declare_hung() noexcept {
+    if (!monitor.declare_hung()) return false;
+    board_.begin(this, &stopped_);
+    stopped_.store(true, std::memory_order_release);
+    return true;
+}
+
+void Core::stand_in(std::int64_t now_ns, bool emergency) noexcept {
+    int free = nobody;
+    const bool mine = turn_.compare_exchange_strong(free, supervisor, std::memory_order_acq_rel);
+    if (plan::Plan* const plan = shown_.load(std::memory_order_acquire)) {
+        for (const plan::Safe& safe : plan->safe) {
+            __atomic_store_n(&safe.pin->slot->raw, safe.value.raw, __ATOMIC_RELAXED);
+        }
+        __atomic_store_n(&pins_.missed->slot->u32,
+                         static_cast<std::uint32_t>(monitor.missed_by(now_ns)), __ATOMIC_RELAXED);
+        if (emergency) {
+            hal_cycle info{};
+            info.size = sizeof info;
+            info.period_ns = period_ns_;
+            info.period_s = static_cast<double>(period_ns_) * 1e-9;
+            info.start_ns = now_ns;
+            info.number = monitor.cycles();
+            for (const plan::Step& step : plan->emergency) {
+                step.step(step.self, &info);
+            }
+        }
+        if (mine) {
+            publish(*plan);
+        }
+    }
+    if (mine) {
+        turn_.store(nobody, std::memory_order_release);
+    }
+}
+
+std::uint32_t Core::current_function() const noexcept { return function_of(plan_, mark_->current); }
+
+std::uint32_t Core::interrupted_function() const noexcept {
+    return in_function() ? function_of(shown_.load(std::memory_order_acquire), newest_step(*mark_))
+                         : 0;
+}
+
+std::uint32_t Core::hung_function() const noexcept {
+    return monitor.busy_since_ns() != 0 ? interrupted_function() : 0;
+}
+
+/// Where the newest sample of the cycle that woke at `woke_ns` found it; 0: that cycle has no
+/// sample.
+std::uint32_t Core::slow_function(std::int64_t woke_ns) const noexcept {
+    return function_of(plan_, monitor.sampled_step(woke_ns));
+}
+
 void Core::raise(FaultEvent event) noexcept {
     event.time_ns = measure_ ? monotonic_ns() : info_.start_ns;
     board_.count(event, id_);
     // when full the newest is lost but counted
     limiter_.raise(event, [this](const FaultEvent& e) noexcept { faults_.push(e); });
+}
+
+void Core::note_fork() noexcept {
+    raise({HAL_FAULT_VIOLATION, current_function(), info_.number, info_.start_ns, 0.0,
+           violation::forked, nullptr});
+}
+
+void Core::end_copy() noexcept {
+    for (;;) {
+        syscall(SYS_exit_group, 1);
+    }
 }
 
 void Core::trace_frame(TraceEvent::Kind kind, std::uint32_t id, std::size_t bytes) noexcept {

@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "execute/cycle_mark.hpp"
+#include "execute/cycle_monitor.hpp"
 #include "execute/faults.hpp"
 #include "execute/histogram.hpp"
 #include "execute/mode_check.hpp"
@@ -62,9 +63,6 @@ public:
     void warm(std::int64_t until_ns) const noexcept;
     /// Counts periods in which no cycle ran. [realtime]
     void skip(std::uint64_t periods) noexcept;
-    /// Begins supervision: the thread must finish its first cycle, which is due at `due_ns`, and
-    /// all others. [realtime]
-    void begin(std::int64_t now_ns, std::int64_t due_ns) noexcept;
     /// Checks the start of the cycle that was due at `due_ns`: a delay above the supervision limit
     /// is a fault that stops the thread. [realtime]
     void woke_late(std::int64_t due_ns, std::int64_t now_ns) noexcept;
@@ -81,35 +79,16 @@ public:
     void step_clock(std::int64_t ns) noexcept;
 
     // --- by the supervisor, in a thread of its own (supervisor.hpp) ----------------------------------------------------
-    /// A thread that was created now and has not begun yet must finish its first cycle one period
-    /// later. [setup]
-    void expect(std::int64_t now_ns) noexcept;
-    /// Returns when the newest cycle ended, CLOCK_MONOTONIC. [any]
-    std::int64_t finished_ns() const noexcept { return finished_.load(std::memory_order_acquire); }
-    /// Returns the time from which the running or next cycle counts as unfinished; in the future
-    /// while it is not due yet. [any]
-    std::int64_t overdue_since_ns() const noexcept;
-    /// Restarts the time without a finished cycle, because another thread used the CPU until now.
-    /// Not called by the thread itself
-    void excuse(std::int64_t now_ns) noexcept { excused_.store(now_ns, std::memory_order_release); }
-    /// Returns true while the thread is declared hung and no cycle has ended since. [any]
-    bool hung() const noexcept {
-        return hung_at_.load(std::memory_order_acquire) ==
-               cycles.load(std::memory_order_acquire) + 1;
-    }
     /// Stops the thread's functions because the running or due cycle does not end. Returns false if
     /// they were stopped already. [any]
     bool declare_hung() noexcept;
-    /// Records the current function, so that an overrun report can name it.
-    void sample() noexcept;
+    /// Notes the function that runs, so that an overrun report can name it.
+    void sample() noexcept { monitor.sample(*mark_); }
     /// Acts for a thread that hangs: writes the safe values, with `emergency` calls the emergency
     /// functions, counts the missed periods, and publishes the result to other threads.
     void stand_in(std::int64_t now_ns, bool emergency) noexcept;
     /// Returns the function that the cycle is running; 0: none.
     std::uint32_t hung_function() const noexcept;
-    /// Returns the missed periods by the clock: those that the thread has counted, and those that
-    /// have passed since. [any]
-    std::uint64_t missed_by(std::int64_t now_ns) const noexcept;
 
     // --- by the session ---------------------------------------------------------------------------------------------
     /// Puts a plan in the inbox; the thread answers by storing its epoch in taken().
@@ -135,9 +114,6 @@ public:
     static constexpr std::size_t most_writes = 4096;  ///< largest batch
     /// Returns the remaining capacity in writes; the thread only increases it.
     std::size_t room() const { return writes_.capacity() - writes_.size(); }
-    /// Returns when the running cycle began (CLOCK_MONOTONIC); 0 between cycles and under the
-    /// virtual clock.
-    std::int64_t busy_since_ns() const { return busy_since_.load(std::memory_order_acquire); }
     /// Returns true when all queued writes have been applied.
     bool settled() const { return applied_.load(std::memory_order_acquire) == pushed_; }
     void observe(Observation* observation) {
@@ -178,24 +154,12 @@ public:
     const CycleMark* mark() const { return mark_ == &own_mark_ ? nullptr : mark_; }
     std::uint32_t id() const { return id_; }
     std::int64_t period_ns() const { return period_ns_; }
+    CycleMonitor monitor;  ///< of its cycles
     std::atomic<std::int64_t> budget_ns{0};
-    /// Longest time without a finished cycle; 0: not supervised. Set before the thread begins.
-    std::atomic<std::int64_t> supervise_ns{0};
-    /// Longest time without CPU above the supervision limit that is counted as a gap and does not
-    /// stop the thread; 0: none.
-    std::atomic<std::int64_t> max_gap_ns{0};
-    /// number of such gaps; written by the thread
-    std::atomic<std::uint64_t> gaps{0};
-    /// length of the newest; written by the thread before `gaps`
-    std::atomic<std::int64_t> newest_gap_ns{0};
     /// A cycle that takes this many periods is a fault, whatever the budget.
     static constexpr std::int64_t longest_overrun = 10;
-    /// number of times the thread was declared hung
-    std::atomic<std::uint64_t> hangs{0};
     std::atomic<bool> profile_every{false};
     Histogram wakeup, busy;  ///< written by the thread
-    std::atomic<std::uint64_t> cycles{0};
-    std::atomic<std::uint64_t> missed{0};
     std::atomic<std::uint64_t> overruns{0};  ///< written by the thread
     bool stopped_by_fault() const { return stopped_.load(std::memory_order_acquire); }
 
@@ -229,7 +193,6 @@ private:
         return running_.load(std::memory_order_acquire) &&
                !stopped_.load(std::memory_order_relaxed);
     }
-    const plan::Step* where() const noexcept;
     std::uint32_t slow_function(std::int64_t woke_ns) const noexcept;
     void run() noexcept;
     void run_functions() noexcept;
@@ -243,9 +206,6 @@ private:
     void run_rows(const plan::Row*& row, const plan::Step* first, const plan::Step* last) noexcept;
     void run_steps(const plan::Step* first, const plan::Step* last) noexcept;
     std::int64_t account(std::int64_t woke_ns, bool ran) noexcept;
-    bool tolerate_gap(std::int64_t silent_ns) noexcept;
-    void note_usage() noexcept;
-    bool was_preempted() const noexcept;
 
     const std::uint32_t id_;
     const std::int64_t period_ns_;
@@ -269,16 +229,6 @@ private:
     std::atomic<bool> passed_{false};  // set by the thread
     std::atomic<std::uint64_t> halt_asked_{0};  // written by who stops the machine
     std::atomic<std::uint64_t> halt_seen_{0};  // written by the thread
-    std::atomic<std::int64_t> busy_since_{0};  // written by the thread
-    // of the newest cycle: when it was due and when it ended; written by the thread
-    std::atomic<std::int64_t> due_{0};
-    std::atomic<std::int64_t> finished_{0};
-    std::atomic<std::int64_t> excused_{0};  // written by the supervisor
-    // the thread's own, while gaps are tolerated: at the start of its cycle
-    std::int64_t cpu_before_ns_ = 0;
-    std::int64_t waits_before_ = 0;
-    // cycles + 1 when it was declared hung; written by thread and supervisor
-    std::atomic<std::uint64_t> hung_at_{0};
     // Whose turn it is to make outputs safe and to publish: the thread in each cycle, the
     // supervisor in place of a hung thread.
     //   1. thread: nobody -> thread      2. make safe if stopped, publish      3. thread -> nobody     (release)
@@ -288,9 +238,6 @@ private:
     // which then is alive, finds itself stopped in its next cycle.
     enum Turn : int { nobody, thread, supervisor };
     std::atomic<int> turn_{nobody};
-    // the cycle (busy_since_) and the step of the newest sample; the supervisor's
-    std::atomic<std::int64_t> seen_since_{0};
-    std::atomic<const plan::Step*> seen_step_{nullptr};
     std::atomic<plan::Plan*> shown_{nullptr};  // plan_, for the supervisor
     Queue<Write> writes_{most_writes};  // session to thread
     std::uint64_t pushed_ = 0;  // the session's own

@@ -46,7 +46,7 @@ Core* core_in_cycle() noexcept {
 CycleNow cycle_now() {
     const std::lock_guard lock(cycle_now_mutex);
     if (const Core* const core = core_in_cycle()) {
-        return {core, core->cycles.load(std::memory_order_acquire), core->interrupted_function()};
+        return {core, core->monitor.cycles(), core->interrupted_function()};
     }
     return {};
 }

@@ -15,4 +15,7 @@ struct alignas(64) CycleMark {
     const plan::Step* volatile current = nullptr;  ///< the step that runs, or ran last
 };
 
+/// Returns the step that the thread is at, or was at last. Of any thread
+const plan::Step* newest_step(const CycleMark& mark) noexcept;
+
 }  // namespace hal

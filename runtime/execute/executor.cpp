@@ -54,7 +54,7 @@ Executor::Halt Executor::halted(std::uint64_t ticket) const {
     const std::scoped_lock own(runners_mutex_);
     bool all = true;
     for (const auto& runner : runners_) {
-        if (runner->core.hung()) return Halt::hung;
+        if (runner->core.monitor.hung()) return Halt::hung;
         all = all && runner->core.confirmed_halt(ticket);
     }
     return all ? Halt::done : Halt::pending;
@@ -130,8 +130,8 @@ constexpr std::int64_t for_ever = std::numeric_limits<std::int64_t>::max() / 2;
 // Declared hung by the supervisor, or not supervised and in a cycle that an earlier call has
 // already waited for.
 bool hangs(const Core& core, std::int64_t timeout_ns) {
-    if (core.hung()) return true;
-    const std::int64_t since = core.busy_since_ns();
+    if (core.monitor.hung()) return true;
+    const std::int64_t since = core.monitor.busy_since_ns();
     return since != 0 && monotonic_ns() - since > timeout_ns + 2 * core.period_ns();
 }
 }  // namespace
@@ -143,7 +143,7 @@ bool Executor::remove(Core& core, std::int64_t timeout_ns) {
     } else if (leaving.started()) {
         const std::int64_t longest_ns = timeout_ns + leaving.options.period_ns;
         leaving.ask_to_end();
-        if (!wait_for([&] { return leaving.ended() || core.hung(); }, longest_ns) ||
+        if (!wait_for([&] { return leaving.ended() || core.monitor.hung(); }, longest_ns) ||
             !leaving.ended()) {
             leaving.ask_to_go_on();
             return false;
@@ -182,14 +182,15 @@ std::vector<Core*> Executor::hanging(std::int64_t timeout_ns) const {
     std::vector<Core*> found;
     for (const auto& runner : runners_) {
         Core& core = runner->core;
-        if (core.hung()) {
+        if (core.monitor.hung()) {
             found.push_back(&core);
             continue;
         }
-        const std::int64_t since = core.busy_since_ns();
+        const std::int64_t since = core.monitor.busy_since_ns();
         if (since == 0) continue;
-        if (!wait_for([&] { return core.busy_since_ns() != since || hangs(core, timeout_ns); },
-                      for_ever) ||
+        if (!wait_for(
+                [&] { return core.monitor.busy_since_ns() != since || hangs(core, timeout_ns); },
+                for_ever) ||
             hangs(core, timeout_ns)) {
             found.push_back(&core);
         }
@@ -208,7 +209,7 @@ std::vector<Core*> Executor::swap(const std::vector<std::pair<Core*, plan::Plan*
     }
     for (const auto& [core, plan] : plans) {
         const auto taken = [core = core, plan = plan] { return core->taken() == plan->epoch; };
-        wait_for([&, core = core] { return taken() || core->hung(); },
+        wait_for([&, core = core] { return taken() || core->monitor.hung(); },
                  timeout_ns + 2 * core->period_ns());
         if (taken()) continue;
         if (core->withdraw(plan)) {

@@ -34,9 +34,8 @@ public:
         }
         FloatModes::defaults().set();
         changed_ = true;
-        const unsigned trap = trapped_.exchange(false, std::memory_order_relaxed)
-                                  ? unsigned{FloatModes::traps}
-                                  : 0U;
+        const unsigned trap =
+            trapped_.exchange(false, std::memory_order_relaxed) ? unsigned{FloatModes::traps} : 0U;
         return now.differences(FloatModes::defaults()) | trap;
     }
     /// An exception trapped in a function and was masked. In a signal handler of the thread

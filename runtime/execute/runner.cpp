@@ -85,7 +85,7 @@ Runner::Runner(std::uint32_t id, const CoreOptions& o, ThreadPins pins, FaultBoa
       epoch_ns_(epoch_ns),
       signal_stack_(std::make_unique<char[]>(signal_stack_bytes)) {
     core.budget_ns = o.budget_ns;
-    core.supervise_ns = o.supervise_ns;
+    core.monitor.supervise_ns = o.supervise_ns;
     core.profile_every = o.profile_every;
     wait_.spin_ns = o.spin_ns >= 0 ? std::min(o.spin_ns, o.period_ns * 9 / 10)
                                    : Wait::default_spin_ns(o.period_ns);
@@ -162,7 +162,7 @@ void Runner::set_up() noexcept {
             granted.priority = parameters.sched_priority;
         }
     }
-    core.max_gap_ns =
+    core.monitor.max_gap_ns =
         granted.policy == Granted::Policy::other ? options.max_gap_ns : options.max_gap_realtime_ns;
     granted.refused = wants && granted.policy == Granted::Policy::other;
     // Without a real-time policy spinning is charged like work, and the kernel preempts the thread
@@ -229,7 +229,7 @@ Runner::Woken Runner::spin() const noexcept {
 void Runner::loop() noexcept {
     set_up();
     place(monotonic_ns());
-    core.begin(monotonic_ns(), timeline_.due_ns(grid_ns));
+    core.monitor.begin(monotonic_ns(), timeline_.due_ns(grid_ns));
     const std::int64_t period = options.period_ns;
     std::uint64_t served = 0;
     while (!quit_.load(std::memory_order_acquire)) {

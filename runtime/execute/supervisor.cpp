@@ -86,7 +86,7 @@ void Supervisor::add(Core& core, pthread_t thread, int tid, int priority, int cp
                             .priority = priority,
                             .cpu = cpu,
                             .usage = scheduler_usage(tid)});
-        core.expect(monotonic_ns());
+        core.monitor.expect(monotonic_ns());
         std::stable_sort(watched_.begin(), watched_.end(), [](const Watched& a, const Watched& b) {
             return a.priority > b.priority;
         });
@@ -148,7 +148,7 @@ void Supervisor::set_priority(const Core& core, int priority) {
 
 bool Supervisor::reset(Core& core) {
     const Hold hold(mutex_);
-    if (core.hung()) return false;
+    if (core.monitor.hung()) return false;
     core.clear_stop();
     if (Watched* const of = find(core); of && of->demoted) {
         sched_param parameters{};
@@ -194,7 +194,7 @@ void Supervisor::settle_down() {
     cpu_set_t all = left;
     for (const Watched& one : watched_) {
         interval = std::min(interval, Core::longest_overrun * one.core->period_ns() / 2);
-        if (const std::int64_t limit = one.core->supervise_ns; limit > 0) {
+        if (const std::int64_t limit = one.core->monitor.supervise_ns; limit > 0) {
             interval = std::min(interval, limit / 8);
         }
         if (one.cpu >= 0) {
@@ -254,7 +254,7 @@ bool Supervisor::look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t sus
     for (Watched& one : watched_) {
         Core& core = *one.core;
         core.sample();
-        if (core.hung()) {  // what it goes on writing does not last
+        if (core.monitor.hung()) {  // what it goes on writing does not last
             core.stand_in(now_ns, false);
             look_at_late(one);
             if (one.starved && uses_cpu(one)) {
@@ -263,12 +263,12 @@ bool Supervisor::look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t sus
             well = false;
             continue;
         }
-        const std::int64_t limit = core.supervise_ns;
+        const std::int64_t limit = core.monitor.supervise_ns;
         if (limit == 0) continue;
-        const std::int64_t silent = now_ns - core.overdue_since_ns();
+        const std::int64_t silent = now_ns - core.monitor.overdue_since_ns();
         if (suspended_ns <= limit && silent > limit && behind_hog(one, now_ns)) continue;
         if (silent > limit && suspended_ns <= limit && in_gap(one, now_ns, gap_ns)) {
-            core.excuse(now_ns);  // the thread counts the gap when it has the CPU again
+            core.monitor.excuse(now_ns);  // the thread counts the gap when it has the CPU again
         } else if (silent > limit || suspended_ns > limit) {
             declare(one, now_ns, gap_ns, suspended_ns);
             well = false;
@@ -290,11 +290,11 @@ bool Supervisor::look(std::int64_t now_ns, std::int64_t gap_ns, std::int64_t sus
 bool Supervisor::behind_hog(const Watched& watched, std::int64_t now_ns) const {
     return watched.cpu >= 0 &&
            std::any_of(watched_.begin(), watched_.end(), [&](const Watched& other) {
-        const std::int64_t limit = other.core->supervise_ns;
-        const std::int64_t since = other.core->busy_since_ns();
+        const std::int64_t limit = other.core->monitor.supervise_ns;
+        const std::int64_t since = other.core->monitor.busy_since_ns();
         return other.cpu == watched.cpu && other.priority > watched.priority && limit > 0 &&
-               since != 0 && !other.core->hung() && 2 * (now_ns - since) > limit &&
-               limit - (now_ns - since) < watched.core->supervise_ns / 4;
+               since != 0 && !other.core->monitor.hung() && 2 * (now_ns - since) > limit &&
+               limit - (now_ns - since) < watched.core->monitor.supervise_ns / 4;
     });
 }
 
@@ -302,8 +302,8 @@ bool Supervisor::behind_hog(const Watched& watched, std::int64_t now_ns) const {
 // it.
 bool Supervisor::in_gap(const Watched& watched, std::int64_t now_ns, std::int64_t gap_ns) const {
     const Core& core = *watched.core;
-    const std::int64_t silent_ns = now_ns - core.finished_ns() - core.period_ns();
-    if (core.max_gap_ns == 0 || silent_ns > core.max_gap_ns) return false;
+    const std::int64_t silent_ns = now_ns - core.monitor.finished_ns() - core.period_ns();
+    if (core.monitor.max_gap_ns == 0 || silent_ns > core.monitor.max_gap_ns) return false;
     if (2 * gap_ns > silent_ns) return true;
     Stall found;
     find_cause(watched, found);
@@ -317,9 +317,9 @@ Stall stall_of(const Core& core, int cpu, std::int64_t now_ns) {
     Stall stall;
     stall.thread = core.id();
     stall.function = core.hung_function();
-    stall.cycle = core.cycles;
-    stall.limit_ns = core.supervise_ns;
-    stall.silent_ns = now_ns - core.finished_ns();
+    stall.cycle = core.monitor.cycles();
+    stall.limit_ns = core.monitor.supervise_ns;
+    stall.silent_ns = now_ns - core.monitor.finished_ns();
     stall.time_ns = now_ns;
     stall.cpu = cpu;
     return stall;
@@ -379,7 +379,7 @@ void Supervisor::declare_busy(Watched& watched, std::int64_t now_ns) {
 bool Supervisor::uses_cpu(const Watched& watched) noexcept {
     const SchedulerUsage now = scheduler_usage(watched.tid);
     return watched.mark.taken_ns != 0 &&
-           now.cpu_ns - watched.mark.cpu_ns > watched.core->supervise_ns;
+           now.cpu_ns - watched.mark.cpu_ns > watched.core->monitor.supervise_ns;
 }
 
 namespace {
@@ -408,7 +408,7 @@ bool Supervisor::got_no_cpu(const Watched& watched) noexcept {
     if (watched.mark.taken_ns == 0 || now.taken_ns == 0) return false;
     const std::int64_t used_ns = now.cpu_ns - watched.mark.cpu_ns;
     const std::int64_t since_ns = now.taken_ns - watched.mark.taken_ns;
-    return used_ns < std::min<std::int64_t>(since_ns, watched.core->supervise_ns) / 10;
+    return used_ns < std::min<std::int64_t>(since_ns, watched.core->monitor.supervise_ns) / 10;
 }
 
 bool Supervisor::starved(const Core& core) {
@@ -442,7 +442,7 @@ void Supervisor::find_cause(const Watched& watched, Stall& stall) const {
         stall.cause = Stall::Cause::starved;
         for (const Watched& other : watched_) {
             if (&other != &watched && other.cpu == watched.cpu &&
-                other.priority > watched.priority && other.core->busy_since_ns() != 0) {
+                other.priority > watched.priority && other.core->monitor.busy_since_ns() != 0) {
                 stall.occupant = other.core->id();
                 break;
             }
@@ -458,17 +458,17 @@ void Supervisor::name_starved(Watched& hog, Stall& stall, std::int64_t now_ns) {
     if (stall.cause != Stall::Cause::busy || hog.cpu < 0 || hog.priority == 0) return;
     for (Watched& other : watched_) {
         if (&other == &hog || other.cpu != hog.cpu || other.priority >= hog.priority ||
-            other.core->hung()) {
+            other.core->monitor.hung()) {
             continue;
         }
-        if (now_ns - other.core->finished_ns() <
+        if (now_ns - other.core->monitor.finished_ns() <
             2 * other.core->period_ns() + shortest_interval_ns) {
             continue;
         }
         if (stall.starved_count < Stall::most_starved) {
             stall.starved[stall.starved_count++] = other.core->id();
         }
-        other.core->excuse(now_ns);
+        other.core->monitor.excuse(now_ns);
     }
 }
 

@@ -23,14 +23,14 @@ TEST(Core, is_not_late_before_its_first_cycle_is_due) {
     Timeline timeline;
     const std::atomic<bool> running{false};
     Core core(1, period, {}, board, timeline, running, true);
-    EXPECT_GT(core.overdue_since_ns(), now);
-    core.expect(now);
-    EXPECT_EQ(core.overdue_since_ns(), now + period);
-    EXPECT_EQ(core.finished_ns(), now);
-    core.begin(now + 10, now + 700'000);
-    EXPECT_EQ(core.overdue_since_ns(), now + 700'000);
-    core.expect(now + 20);
-    EXPECT_EQ(core.overdue_since_ns(), now + 700'000) << "it has begun";
+    EXPECT_GT(core.monitor.overdue_since_ns(), now);
+    core.monitor.expect(now);
+    EXPECT_EQ(core.monitor.overdue_since_ns(), now + period);
+    EXPECT_EQ(core.monitor.finished_ns(), now);
+    core.monitor.begin(now + 10, now + 700'000);
+    EXPECT_EQ(core.monitor.overdue_since_ns(), now + 700'000);
+    core.monitor.expect(now + 20);
+    EXPECT_EQ(core.monitor.overdue_since_ns(), now + 700'000) << "it has begun";
 }
 
 TEST(FaultBoard, keeps_one_fault_for_each_condition_that_lasts) {

@@ -59,7 +59,7 @@ void end_after_slow_cycle(const Core& core, std::int64_t took_ns) {
         "hal: " + names.thread + ": the cycle took " +
         format_duration(static_cast<double>(took_ns)) + " of wall time (--cycle-limit " +
         format_duration(static_cast<double>(VirtualClock::cycle_limit.limit_ns)) + ", cycle " +
-        std::to_string(core.cycles.load() - 1) +
+        std::to_string(core.monitor.cycles() - 1) +
         "); outputs were set to their safe values; the process ends [hung-thread]\n";
     [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());
     end_process(1);

@@ -69,8 +69,8 @@ ThreadReport Reports::thread(const Thread& thread) const {
     report.period_ns = thread.options.period_ns;
     const Core* const core = machine_.core(&thread);
     if (!core) return report;
-    report.cycles = core->cycles.load();
-    report.missed = core->missed_by(monotonic_ns());
+    report.cycles = core->monitor.cycles();
+    report.missed = core->monitor.missed_by(monotonic_ns());
     report.overruns = core->overruns.load();
     report.wakeup_p50_ns = core->wakeup.quantile(0.5);
     report.wakeup_p99_ns = core->wakeup.quantile(0.99);
@@ -84,12 +84,12 @@ ThreadReport Reports::thread(const Thread& thread) const {
     report.page_faults = machine_.executor.page_faults(*core);
     report.faulted = core->stopped_by_fault();
     report.supervised = thread.options.supervision_limit_ns() != 0;
-    report.hangs = core->hangs.load();
-    report.gaps = core->gaps.load(std::memory_order_acquire);
-    report.gap_ns = core->newest_gap_ns.load(std::memory_order_relaxed);
-    report.hung = core->hung();
+    report.hangs = core->monitor.hangs();
+    report.gaps = core->monitor.gaps.load(std::memory_order_acquire);
+    report.gap_ns = core->monitor.newest_gap_ns.load(std::memory_order_relaxed);
+    report.hung = core->monitor.hung();
     if (report.hung) {
-        report.silent_ns = monotonic_ns() - core->finished_ns();
+        report.silent_ns = monotonic_ns() - core->monitor.finished_ns();
         const std::uint32_t id = core->hung_function();
         if (const LoadedFunction* const function =
                 id != 0 ? function_with_id(machine_.model, id) : nullptr) {

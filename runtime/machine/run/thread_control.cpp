@@ -35,7 +35,8 @@ bool ThreadControl::start(Diagnostics* diagnostics) {
 bool ThreadControl::report_hung(Diagnostics& diagnostics) const {
     bool any = false;
     for (const auto& thread : state_.model.threads) {
-        if (const Core* const core = state_.threads.core(thread.get()); core && core->hung()) {
+        if (const Core* const core = state_.threads.core(thread.get());
+            core && core->monitor.hung()) {
             state_.threads.report_hung(*thread, *core, diagnostics);
             any = true;
         }
@@ -103,11 +104,11 @@ void ThreadControl::advance_cycles(std::uint64_t cycles) {
     if (s.model.threads.empty()) return;
     const Thread& fastest = *s.model.threads.front();
     const Core* const core = s.threads.core(&fastest);
-    const std::uint64_t wanted = core->cycles.load() + cycles;
+    const std::uint64_t wanted = core->monitor.cycles() + cycles;
     if (s.executor->is_virtual()) return s.executor->advance_cycles(*core, cycles);
     s.executor->advance(static_cast<std::int64_t>(cycles) * fastest.options.period_ns);
     // under the real clock periods may have been missed: cycles are what was asked for
-    for (int turn = 0; turn < 10'000 && core->cycles.load() < wanted; ++turn) {
+    for (int turn = 0; turn < 10'000 && core->monitor.cycles() < wanted; ++turn) {
         s.executor->advance(fastest.options.period_ns);
     }
 }

@@ -199,12 +199,12 @@ bool ThreadPlans::end(std::vector<std::unique_ptr<Thread>>& threads, Diagnostics
 bool ThreadPlans::end(Thread& thread, Core& leaving, Diagnostics& diagnostics) {
     const CycleMark* const mark = leaving.mark();
     state_.faults.collect(thread);
-    if (leaving.hung()) {
+    if (leaving.monitor.hung()) {
         report_hung(thread, leaving, diagnostics);
         return false;
     }
     if (!state_.executor->remove(leaving, answer_timeout_ns)) {
-        if (leaving.hung()) {
+        if (leaving.monitor.hung()) {
             report_hung(thread, leaving, diagnostics);
         } else {
             diagnostics.error(
@@ -267,7 +267,7 @@ void ThreadPlans::report_silent(const Core* silent, Diagnostics& diagnostics) co
     const auto found = std::ranges::find(cores_, silent, &Cores::value_type::second);
     if (found == cores_.end()) return;
     const Thread& thread = *found->first;
-    if (silent->hung()) return report_hung(thread, *silent, diagnostics);
+    if (silent->monitor.hung()) return report_hung(thread, *silent, diagnostics);
     if (report_starved(thread, *silent, diagnostics)) return;
     diagnostics.error("silent-thread", thread.made,
                       "thread '" + thread.name + "' did not answer within " +
@@ -281,12 +281,12 @@ bool ThreadPlans::report_starved(const Thread& thread, const Core& core,
                                  Diagnostics& diagnostics) const {
     if (!state_.executor->supervisor().starved(core)) return false;
     const std::string silent =
-        format_duration(static_cast<double>(monotonic_ns() - core.finished_ns()));
+        format_duration(static_cast<double>(monotonic_ns() - core.monitor.finished_ns()));
     const int cpu = state_.executor->granted(core).cpu;
     diagnostics.error("starved-thread", thread.made,
                       "thread '" + thread.name + "' is ready to run, but has got no CPU time" +
                           (cpu >= 0 ? " on CPU " + std::to_string(cpu) : "") + " for " + silent,
-                      core.hung() ? "its outputs are at their safe values" : "",
+                      core.monitor.hung() ? "its outputs are at their safe values" : "",
                       starvation_help(cpu));
     return true;
 }
@@ -305,7 +305,7 @@ void ThreadPlans::report_hung(const Thread& thread, const Core& core,
         return;
     }
     const std::string silent =
-        format_duration(static_cast<double>(monotonic_ns() - core.finished_ns()));
+        format_duration(static_cast<double>(monotonic_ns() - core.monitor.finished_ns()));
     diagnostics.error("hung-thread", thread.made,
                       "thread '" + thread.name + "' has not finished a cycle for " + silent +
                           (function ? ": " + function_text(*function) + " does not return" : ""),
@@ -447,7 +447,8 @@ bool ThreadPlans::report_hung_writers(const std::vector<std::pair<Core*, std::ve
                                       Diagnostics& diagnostics) const {
     bool any = false;
     for (const auto& [thread, core] : cores_) {
-        if (core->hung() && std::ranges::find(rows, core, &WriteRows::Row::first) != rows.end()) {
+        if (core->monitor.hung() &&
+            std::ranges::find(rows, core, &WriteRows::Row::first) != rows.end()) {
             report_hung(*thread, *core, diagnostics);
             any = true;
         }
