@@ -92,7 +92,7 @@ function(halcyon_packages_of_sources variable)
     set(${variable} "${found}" PARENT_SCOPE)
 endfunction()
 
-# halcyon_packages_of_commands(VARIABLE LINE...): the packages of the commands `hal ethercat`, `hal can sdo` and so on in the lines. What is left
+# halcyon_packages_of_commands(VARIABLE LINE...): the packages of the commands `hal ethercat`, `hal can sdo` and so on in the lines. What remains
 # of `hal can` is in the core.
 function(halcyon_packages_of_commands variable)
     set(found "")

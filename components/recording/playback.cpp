@@ -12,8 +12,8 @@
 
 #include "hal/any_pin.hpp"
 #include "hal/texts.hpp"
+#include "recording/mcap/playback_pin.hpp"
 #include "recording/mcap/recording.hpp"
-#include "recording/playback_pin.hpp"
 
 namespace {
 

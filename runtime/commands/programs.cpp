@@ -9,6 +9,7 @@
 
 #include <fcntl.h>
 
+#include "base/poll_all.hpp"
 #include "commands/table.hpp"
 #include "machine/processes/programs.hpp"
 
@@ -167,7 +168,8 @@ public:
     bool pass_on(Output& output, int timeout_ms) {
         std::array<pollfd, 2> ready{pollfd{pipes_[0][0], POLLIN, 0},
                                     pollfd{pipes_[1][0], POLLIN, 0}};
-        poll(ready.data(), ready.size(), timeout_ms);
+        const timespec timeout{timeout_ms / 1000, timeout_ms % 1000 * 1'000'000L};
+        poll_all(ready, &timeout);
         for (std::size_t i = 0; i < 2; ++i) {
             if (pipes_[i][0] < 0) continue;
             std::array<char, 4096> text;

@@ -218,8 +218,9 @@ Declaration declaration_of(const Json& body) {
                    .every_ns = {},
                    .pins = {},
                    .safe = member(body, "safe")};
-    const Json &prefix = member(body, "prefix"), &pins = member(body, "pins"),
-               &ready = member(body, "ready");
+    const Json& prefix = member(body, "prefix");
+    const Json& pins = member(body, "pins");
+    const Json& ready = member(body, "ready");
     if (!to.safe.is_null() && (!to.safe.is_array() || to.safe.size() % 2 != 0)) {
         throw RequestError{"safe must be an array of alternating pin numbers and declared values"};
     }
@@ -341,8 +342,9 @@ bool loops_back(const Pin& pin) {
 
 void exchange_values(const Program& by, const Json& body, std::string& reply) {
     const std::string& name = text_of(body["exchange"], "exchange");
-    const Json &write = member(body, "write"), &read = member(body, "read"),
-               &alive = member(body, "alive");
+    const Json& write = member(body, "write");
+    const Json& read = member(body, "read");
+    const Json& alive = member(body, "alive");
     if (!alive.is_null() && !alive.is_boolean()) {
         throw RequestError{"alive must be true or false"};
     }
@@ -476,8 +478,9 @@ Pin& find_port(const Program& by, const std::string& name, bool takes, bool writ
 
 void use_port(const Program& by, const Json& body, std::string& reply) {
     const std::string& name = text_of(body["port"], "port");
-    const Json &read = member(body, "read"), &peek = member(body, "peek"),
-               &write = member(body, "write");
+    const Json& read = member(body, "read");
+    const Json& peek = member(body, "peek");
+    const Json& write = member(body, "write");
     if (!read.is_null() + !peek.is_null() + !write.is_null() > 1) {
         throw RequestError{"a request either reads, peeks into or writes a port"};
     }
@@ -588,8 +591,9 @@ std::vector<std::vector<std::string>> rows_of(const Json& records) {
 
 void use_stream(const Program& by, const Json& body, std::string& reply) {
     const std::string& name = text_of(body["stream"], "stream");
-    const Json &take = member(body, "take"), &records = member(body, "records"),
-               &create = member(body, "create");
+    const Json& take = member(body, "take");
+    const Json& records = member(body, "records");
+    const Json& create = member(body, "create");
     if (!take.is_null() + !records.is_null() + !create.is_null() > 1) {
         throw RequestError{
             "a request either reads (take), feeds (records) or creates (create) a stream"};

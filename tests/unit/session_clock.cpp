@@ -152,7 +152,7 @@ TEST(DisciplinedRealThreads, Follow_adjustments_while_they_sleep_and_keep_their_
     machine.start();
     EXPECT_TRUE(eventually([&] { return machine.session.reports().threads()[2].cycles >= 4; }));
     machine.must("setp fast.step 0");
-    // a host that stood still meanwhile has run no cycle, however long this takes
+    // a host that was suspended meanwhile has run no cycle, whatever time has passed
     const auto done = machine.session.reports().threads();
     EXPECT_TRUE(eventually([&] {
         const auto threads = machine.session.reports().threads();

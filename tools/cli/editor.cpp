@@ -16,6 +16,7 @@
 #include <histedit.h>
 #endif
 
+#include "base/poll_all.hpp"
 #include "cli/history_file.hpp"
 #include "cli/output.hpp"
 
@@ -23,12 +24,14 @@ namespace hal::tools {
 
 bool wait_readable(int descriptor, int stop, const std::function<void()>& meanwhile) {
     pollfd both[2] = {{descriptor, POLLIN, 0}, {stop, POLLIN, 0}};
+    const timespec turn{0, 10'000'000};
     for (;;) {
         if (meanwhile) {
             meanwhile();
         }
-        both[0].revents = both[1].revents = 0;
-        if (::poll(both, 2, meanwhile ? 10 : -1) < 0 && errno != EINTR) return false;
+        both[0].revents = 0;
+        both[1].revents = 0;
+        if (poll_all(both, meanwhile ? &turn : nullptr) < 0 && errno != EINTR) return false;
         if (both[1].revents != 0) return false;
         if (both[0].revents != 0) return true;
     }

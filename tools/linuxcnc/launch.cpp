@@ -10,6 +10,7 @@
 #include <thread>
 #include <unistd.h>
 
+#include "base/poll_all.hpp"
 #include "cli/output.hpp"
 #include "commands/files.hpp"
 #include "machine/processes/programs.hpp"
@@ -315,9 +316,10 @@ void Launch::watch() {
 }
 
 bool Launch::line_typed() {
-    pollfd input{STDIN_FILENO, POLLIN, 0};
+    pollfd input[] = {{STDIN_FILENO, POLLIN, 0}};
+    const timespec at_once{};
     char c = 0;
-    while (::poll(&input, 1, 0) > 0) {
+    while (poll_all(input, &at_once) > 0) {
         if (::read(STDIN_FILENO, &c, 1) <= 0 || c == '\n') return true;
     }
     return false;

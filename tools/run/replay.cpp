@@ -16,8 +16,8 @@
 #include <utility>
 
 #include "cli/output.hpp"
+#include "recording/mcap/playback_pin.hpp"
 #include "recording/mcap/recording.hpp"
-#include "recording/playback_pin.hpp"
 #include "run/hosted_machine.hpp"
 #include "run/sim_summary.hpp"
 #include "text/quoting.hpp"
@@ -258,19 +258,22 @@ public:
                     : fmt::format("{:.6g}", wanted),
                 recording_.missing.empty() ? "recording" : "an incomplete recording",
                 counted(driven_.size(), "input"), counted(compared_.size(), "value"),
-                options_.tolerance < 0 ? ""
-                : nothing ? ": nothing was tested; record values that the netlist computes too"
-                : different == 0 ? ", none differs"
-                                 : fmt::format(", {} by more than {:g}",
-                                               different == 1 ? "1 differs"
-                                                              : fmt::format("{} differ", different),
-                                               options_.tolerance));
+                verdict(nothing, different));
         }
         if (!print(text)) return 1;
         return different != 0 || nothing ? 1 : status;
     }
 
 private:
+    /// What the last line of the report adds about the comparison.
+    std::string verdict(bool nothing, std::size_t different) const {
+        if (options_.tolerance < 0) return "";
+        if (nothing) return ": nothing was tested; record values that the netlist computes too";
+        if (different == 0) return ", none differs";
+        const std::string_view verb = different == 1 ? "differs" : "differ";
+        return fmt::format(", {} {} by more than {:g}", different, verb, options_.tolerance);
+    }
+
     /// A gap is replayed like the rest: a clock that jumped makes hours of it.
     void warn_of_gap(std::int64_t wanted_ns) const {
         constexpr std::int64_t long_gap_ns = 600'000'000'000;
@@ -398,9 +401,8 @@ private:
         const Signal* const signal = pin ? pin->signal : model.find_signal(column.name);
         // times are never the same
         if ((!pin && !signal) || (pin && (pin->of_thread || pin->function))) return;
-        const std::string source =
-            fmt::format("{}.{}", players_.at(thread_of(model, table).name).name,
-                        playback_pin(column.name));
+        const std::string source = fmt::format(
+            "{}.{}", players_.at(thread_of(model, table).name).name, playback_pin(column.name));
         const bool parameter = pin && pin->dir == HAL_DIR_PARAM;
         if (signal && !signal->writer && signal->ios == 0) {
             if (driven_.insert(signal->name).second) {

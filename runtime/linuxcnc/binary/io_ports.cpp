@@ -69,6 +69,15 @@ bool find(unsigned short base, KernelPort& port) {
     return false;
 }
 
+/// What to type after an attempt to claim a port has failed, with a separator before it.
+const char* remedy_of(int error) {
+    switch (error) {
+    case EACCES: return "; type: sudo usermod -aG lp $USER, and log in again";
+    case ENOENT: return "; type: sudo modprobe ppdev";
+    default: return "";
+    }
+}
+
 }  // namespace
 
 namespace hal::modules {
@@ -123,10 +132,7 @@ int rtapi_parport_get(const char* name, halcyon_parport* port, unsigned short ba
         if (port->fd < 0 || ioctl(port->fd, PPCLAIM) != 0) {
             const int why = errno;
             rtapi_print_msg(RTAPI_MSG_ERR, "%s: cannot claim %s: %s%s\n", who, file.c_str(),
-                            std::strerror(why),
-                            why == EACCES   ? "; type: sudo usermod -aG lp $USER, and log in again"
-                            : why == ENOENT ? "; type: sudo modprobe ppdev"
-                                            : "");
+                            std::strerror(why), remedy_of(why));
             rtapi_parport_release(port);
             return -why;
         }

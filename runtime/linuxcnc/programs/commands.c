@@ -47,14 +47,21 @@ int halcyon_run(const char* const* words, const char* key, unsigned* number) {
     return done ? 0 : -EINVAL;
 }
 
+/// Returns the name of a type in netlists; NULL: signals have no such type.
+static const char* type_name(hal_type_t type) {
+    switch (type) {
+    case HAL_BIT: return "bit";
+    case HAL_FLOAT: return "float";
+    case HAL_S32: return "s32";
+    case HAL_U32: return "u32";
+    case HAL_S64: return "s64";
+    case HAL_U64: return "u64";
+    default: return NULL;
+    }
+}
+
 int hal_signal_new(const char* name, hal_type_t type) {
-    const char* const word = type == HAL_BIT     ? "bit"
-                             : type == HAL_FLOAT ? "float"
-                             : type == HAL_S32   ? "s32"
-                             : type == HAL_U32   ? "u32"
-                             : type == HAL_S64   ? "s64"
-                             : type == HAL_U64   ? "u64"
-                                                 : NULL;
+    const char* const word = type_name(type);
     return word ? RUN("newsig", name, word) : -EINVAL;
 }
 int hal_set_unready(int comp) { return hal_unready(comp); }

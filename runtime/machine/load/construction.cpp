@@ -85,9 +85,10 @@ bool take_function(const hal_host* host, const hal_function_decl* decl) {
     }
     const bool shared = decl->flags & HAL_FUNCTION_SHARED;
     const bool whole = c.whole_function_names || whole_names(c.instance);
-    std::string full = whole    ? decl->name
-                       : shared ? dashed(c.instance.component->name)
-                                : c.instance.name;
+    std::string full = decl->name;
+    if (!whole) {
+        full = shared ? dashed(c.instance.component->name) : c.instance.name;
+    }
     if (*decl->name && !whole) {
         full += std::string(".") + decl->name;
     }

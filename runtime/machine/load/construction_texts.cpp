@@ -37,6 +37,14 @@ void begin_text(const hal_host* host, const char* name, const char* text, std::s
     });
 }
 
+Severity severity_of(const hal_text_message& message) {
+    switch (message.severity) {
+    case HAL_SEVERITY_ERROR: return Severity::error;
+    case HAL_SEVERITY_WARNING: return Severity::warning;
+    default: return Severity::note;
+    }
+}
+
 void report_in_text(const hal_host* host, const hal_text_message* message) {
     Construction& c = construction_of(host);
     guarded(c, false, [&] {
@@ -61,9 +69,7 @@ void report_in_text(const hal_host* host, const hal_text_message* message) {
             c.said_why = true;
             return true;
         }
-        const Severity severity = message->severity == HAL_SEVERITY_ERROR     ? Severity::error
-                                  : message->severity == HAL_SEVERITY_WARNING ? Severity::warning
-                                                                              : Severity::note;
+        const Severity severity = severity_of(*message);
         Diagnostic d{severity,
                      failure_code(message->code, "construct-failed"),
                      message->sentence,

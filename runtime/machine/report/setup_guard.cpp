@@ -88,11 +88,13 @@ void watch(const SetupGuard::Flags& flags) noexcept {
         print_text(call.what);
         print_text(" for ");
         print_seconds(ends ? name_after_ns + end_after_ns : name_after_ns);
-        print_text(ends             ? "; outputs set to their safe values; the process ends\n"
-                   : ending_ns != 0 ? "; the machine ends when it returns, at the latest in 13 s\n"
-                                    : "; all commands wait for it\n");
         if (ends) {
+            print_text("; outputs set to their safe values; the process ends\n");
             end_process(1);
+        } else if (ending_ns != 0) {
+            print_text("; the machine ends when it returns, at the latest in 13 s\n");
+        } else {
+            print_text("; all commands wait for it\n");
         }
     }
 }

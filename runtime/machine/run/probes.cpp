@@ -239,10 +239,8 @@ std::shared_ptr<LiveProbe> Probes::attach(const ProbeRequest& request, std::stri
         if (type == HAL_TYPE_PORT) {
             return reject("'" + name + "' is a port: a probe samples values, not bytes");
         }
-        probe->columns.push_back({name, type,
-                                  pin              ? pin->unit
-                                  : signal->writer ? signal->writer->unit
-                                                   : ""});
+        const Pin* const source = pin ? pin : signal->writer;
+        probe->columns.push_back({name, type, source ? source->unit : ""});
     }
     Found found = resolve(model, nullptr, *probe);
     std::size_t bytes = 0;

@@ -88,9 +88,12 @@ void halcyon_add_number(hal_type type, double value) {
 
 uint64_t halcyon_significant(hal_type type, uint64_t raw) {
     const hal_value value = {.raw = raw};
-    return type == HAL_TYPE_BIT                           ? value.bit
-           : type == HAL_TYPE_S32 || type == HAL_TYPE_U32 ? value.u32
-                                                          : raw;
+    switch (type) {
+    case HAL_TYPE_BIT: return value.bit;
+    case HAL_TYPE_S32:
+    case HAL_TYPE_U32: return value.u32;
+    default: return raw;
+    }
 }
 
 hal_value halcyon_take_value(const char** at, hal_type type) {
