@@ -10,7 +10,7 @@ namespace {
 constexpr double farthest_count = 4e18;        // of a position that does not wrap
 // for so many cycles the display in flight may be the old one
 constexpr unsigned mode_change_cycles = 3;
-// after a stop, for so long the feedback may be from before it
+// after a stop, the feedback may be from before it during this time
 constexpr Time restart_window = one_second;
 
 bool in_fault(State s) noexcept { return s == State::fault || s == State::fault_reaction_active; }
