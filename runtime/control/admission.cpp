@@ -129,9 +129,9 @@ ServedClient* Admission::longest_idle(std::int64_t idle_ns) const {
 /// Closes the client that has been idle longest, for at least this time. Returns false without such
 /// a client.
 bool Admission::close_one_idle(std::int64_t idle_ns) {
-    ServedClient* const max = longest_idle(idle_ns);
-    if (!max) return false;
-    close_idle(*max);
+    ServedClient* const idle = longest_idle(idle_ns);
+    if (!idle) return false;
+    close_idle(*idle);
     return true;
 }
 
