@@ -92,8 +92,8 @@ function(halcyon_packages_of_sources variable)
     set(${variable} "${found}" PARENT_SCOPE)
 endfunction()
 
-# halcyon_packages_of_commands(VARIABLE LINE...): the packages of the commands `hal ethercat`, `hal can sdo` and so on in the lines. What remains
-# of `hal can` is in the core.
+# halcyon_packages_of_commands(VARIABLE LINE...): the packages of the commands `hal ethercat`, `hal can sdo` and so on in the lines. The other
+# commands of `hal can` are in the core.
 function(halcyon_packages_of_commands variable)
     set(found "")
     string(REPLACE "hal node ethercat " "hal ethercat " lines "${ARGN}")
