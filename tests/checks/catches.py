@@ -315,13 +315,17 @@ def check_language(root):
 
 def check_tiers(root):
     tree = {
-        "cmake/packages": "# the table\nalpha docs/alpha.md components/alpha the first\nbeta docs/beta.md components/beta the second\n",
+        "cmake/packages": "# the table\nalpha docs/alpha.md components/alpha,tools/alpha the first\nbeta docs/beta.md components/beta the second\n",
         "README.md": "[`alpha`](docs/alpha.md) and [`beta`](docs/beta.md)\n",
         "docs/internals/core-and-packages.md": "| `alpha` | [a](../alpha.md) |\n| `beta` | [b](../beta.md) |\n",
         "docs/alpha.md": "",
         "docs/beta.md": "",
-        "components/alpha/a.cpp": "",
+        "components/alpha/a.cpp": '#include "alpha/a.hpp"\n',
+        "components/alpha/a.hpp": "",
         "components/beta/b.cpp": "",
+        "tools/alpha/options.hpp": "",
+        "tools/commands.cpp": '#include "alpha/options.hpp"\n',
+        "tools/part.hpp": 'inline constexpr char alpha[] = "alpha";\n#define OF_ALPHA(run) run\n',
         "tests/cli/a_test.py": "# packages: alpha beta\n",
     }
     write(root, tree)
@@ -331,6 +335,8 @@ def check_tiers(root):
         {
             "README.md": "[`alpha`](docs/beta.md) and [`gamma`](docs/beta.md)\n",
             "tests/cli/a_test.py": "# packages: alpha delta\n",
+            "tools/main.cpp": '#include "alpha/options.hpp"\n',
+            "tools/part.hpp": 'inline constexpr char beta[] = "beta";\n',
         },
     )
     (root / "components/beta/b.cpp").unlink()
@@ -344,6 +350,10 @@ def check_tiers(root):
         "README.md: no row for the package beta",
         "README.md: has a row for gamma",
         "tests/cli/a_test.py: states the package delta",
+        "tools/part.hpp: no row for the package alpha",
+        "tools/part.hpp: names the package beta",
+        "tools/part.hpp: BETA has a name or a macro OF_BETA",
+        "tools/main.cpp: is in the core and includes tools/alpha/options.hpp",
     )
 
 
