@@ -129,6 +129,25 @@ class SwitchedOff(unittest.TestCase):
         self.assertEqual("libzstd-dev liblz4-dev", needs["all"])
 
 
+class WithoutGoogleTest(Case):
+    """On a machine that has what `./hal build` installs."""
+
+    ABSENT = "-DCMAKE_DISABLE_FIND_PACKAGE_GTest=ON"
+
+    def test_the_tests_are_left_out(self):
+        status, output = configure(self.folder / "tree", self.ABSENT)
+        self.assertEqual(0, status, output)
+        self.assertIn(
+            "libgtest-dev not found: the tests are left out; install it, then add -DHALCYON_TESTS=ON\n",
+            output,
+        )
+
+    def test_requested_tests_are_an_error(self):
+        status, output = configure(self.folder / "tree", self.ABSENT, "-DHALCYON_TESTS=ON")
+        self.assertEqual(1, status)
+        self.assertIn("GTest", output)
+
+
 class OneSwitch(Case):
     def test_each_switch_alone_leaves_the_others_in(self):
         for name, value in zip(NAMES, itertools.cycle(("OFF", "0", "off", "NO"))):
