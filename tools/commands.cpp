@@ -2,6 +2,7 @@
 // The table of subcommands: a row per command. The options are declared in the command's own
 // header.
 #include "bus/can/dump.hpp"
+#include "bus/can/generate.hpp"
 #include "bus/can/load.hpp"
 #include "bus/can/record.hpp"
 #include "bus/can/send.hpp"
