@@ -115,6 +115,25 @@ TEST(Task, Uses_the_same_memory_again) {
     EXPECT_EQ(asker.task_memory().max_used(), used);
 }
 
+TEST(TaskMemory, Returns_the_newest_frame_only) {
+    hal::TaskMemory memory(64);
+    void* first = memory.take(8);
+    void* second = memory.take(20);
+    EXPECT_EQ(memory.max_used(), 48U);
+    memory.give_back(second, 20);
+    memory.give_back(first, 8);
+    EXPECT_EQ(memory.take(8), first);
+    EXPECT_EQ(memory.size(), 64U);
+}
+
+TEST(TaskMemory, Ends_the_program_when_a_frame_is_returned_before_a_newer_one) {
+    hal::TaskMemory memory(64);
+    void* first = memory.take(8);
+    memory.take(8);
+    EXPECT_DEATH(memory.give_back(first, 8), "");
+    EXPECT_DEATH(memory.give_back(first, 100), "");
+}
+
 TEST(Task, Ends_the_program_when_the_chain_of_tasks_is_deeper_than_its_memory) {
     EXPECT_DEATH(
         {

@@ -58,10 +58,19 @@ public:
         }
         return at;
     }
-    /// Returns the space of the newest frame to the memory. [realtime]
-    void give_back(std::size_t size) noexcept { used_ -= round(size); }
-    /// Returns the largest use so far, in bytes. [any]
+    /// Returns the space of the newest frame to the memory. Another frame ends the program: the
+    /// next one would overlap a frame in use. [realtime]
+    void give_back(void* frame, std::size_t size) noexcept {
+        size = round(size);
+        if (size > used_ || frame != bytes_.data() + (used_ - size)) {
+            std::terminate();
+        }
+        used_ -= size;
+    }
+    /// Returns the largest use so far, in bytes. [realtime]
     std::size_t max_used() const noexcept { return max_used_; }
+    /// Returns the size of the memory, in bytes. [any]
+    std::size_t size() const noexcept { return bytes_.size(); }
 
 private:
     static std::size_t round(std::size_t size) noexcept { return (size + 15) / 16 * 16; }
@@ -109,7 +118,7 @@ struct TaskPromiseBase {
     }
     static void operator delete(void* frame, std::size_t size) noexcept {
         auto* at = static_cast<std::byte*>(frame) - header;
-        (*reinterpret_cast<TaskMemory**>(at))->give_back(size + header);
+        (*reinterpret_cast<TaskMemory**>(at))->give_back(at, size + header);
     }
 };
 
@@ -208,14 +217,16 @@ public:
     }
     /// Returns whether a task is running.
     bool busy() const noexcept { return !task_.done(); }
-    /// Returns the memory of the tasks, for its statistics. [any]
+    /// Returns the memory of the tasks, for its statistics.
     const TaskMemory& task_memory() const noexcept { return memory_; }
 
 protected:
     ~TaskChannel() = default;
-    /// Remembers the task that waits; for await_suspend().
+    /// Remembers the task that waits; for await_suspend(). Precondition: no other task of the
+    /// channel waits, that is, resume() or stop() has been called since the previous suspend().
     void suspend(std::coroutine_handle<> task) noexcept { resume_ = task; }
-    /// Continues the task that waits, up to its next wait or its end.
+    /// Continues the task that waits, up to its next wait or its end. Precondition: a task waits,
+    /// that is, neither resume() nor stop() has been called since the newest suspend().
     void resume() noexcept { std::exchange(resume_, {}).resume(); }
 
 private:
