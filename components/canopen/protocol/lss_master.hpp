@@ -92,10 +92,15 @@ public:
         channel_.stop();
     }
 
+    /// Bytes for the tasks of a scan.
+    static constexpr std::size_t task_bytes = 1024;
+    /// Returns the largest use of them so far, in bytes. [realtime]
+    std::size_t max_task_memory() const noexcept { return channel_.task_memory().max_used(); }
+
 private:
     /// The tasks of a scan; each waits for the answers to one question.
     struct Channel : TaskChannel {
-        Channel() : TaskChannel(1024) {}
+        Channel() : TaskChannel(task_bytes) {}
         using TaskChannel::resume;
         using TaskChannel::suspend;
     };

@@ -84,6 +84,12 @@ public:
         TaskChannel::stop();
     }
 
+    /// Returns the largest part of the memory for tasks that was used so far, 0..1.
+    double max_task_share() const noexcept {
+        return static_cast<double>(task_memory().max_used()) /
+               static_cast<double>(task_memory().size());
+    }
+
     // For the engine.
     enum class Stage : std::uint8_t { idle, waiting, sent, sleeping };
     Stage stage() const noexcept { return stage_; }

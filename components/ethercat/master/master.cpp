@@ -194,6 +194,7 @@ BusSlave* Master::slave(std::size_t slave) noexcept {
 Channel& Master::channel(const BusSlave& slave) noexcept {
     return bus_->devices[slave.number]->channel;
 }
+double Master::max_task_share() const noexcept { return bus_->engine.max_task_share(); }
 bool Master::idle(const BusSlave& slave) const noexcept {
     return !bus_->devices[slave.number]->channel.busy();
 }

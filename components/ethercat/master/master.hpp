@@ -103,6 +103,9 @@ public:
     Channel& channel(const BusSlave& slave) noexcept;
     /// Returns whether no start-up or check works on the slave. [realtime]
     bool idle(const BusSlave& slave) const noexcept;
+    /// Returns the largest part of its memory for tasks that a channel has used so far, 0..1.
+    /// [realtime]
+    double max_task_share() const noexcept;
 
 private:
     std::unique_ptr<Bus> bus_;

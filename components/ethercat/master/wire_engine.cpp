@@ -82,6 +82,15 @@ void WireEngine::attach(ethernet::Port& primary, ethernet::Port* backup) {
 
 void WireEngine::add(Channel& channel) { channels_.push_back(&channel); }
 
+double WireEngine::max_task_share() const noexcept {
+    double share = 0;
+    for (const Channel* channel : channels_) {
+        share = std::max(share, channel->max_task_share());
+    }
+    return share;
+}
+
+
 void WireEngine::ready() {
     active_.assign((channels_.size() + 7) / 8 * 8, 0);
     for (std::size_t n = 0; n < channels_.size(); ++n) {

@@ -66,6 +66,8 @@ public:
     /// closed ring, whose slaves count in the copy that arrives at the backup port; -1: none
     /// arrived.
     int primary_wkc() const noexcept { return primary_wkc_; }
+    /// Returns Channel::max_task_share() of the channel where it is largest.
+    double max_task_share() const noexcept;
     /// Returns how often a task continued.
     std::uint64_t resumed() const noexcept { return resumed_; }
     bool idle() const noexcept;  ///< Returns whether no process data is in flight.

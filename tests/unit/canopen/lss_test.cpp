@@ -135,6 +135,8 @@ TEST_F(Lss, Fastscan_finds_one_after_the_other) {
         run(2);
     }
     EXPECT_EQ(found, (std::vector<std::uint32_t>{0, 1, 0x80000000, 0xdeadbeef, 0xffffffff}));
+    EXPECT_GT(master.max_task_memory(), 0U);
+    EXPECT_LT(master.max_task_memory(), LssMaster::task_bytes * 3 / 4);
 }
 TEST_F(Lss, Fastscan_survives_a_lost_answer_now_and_then) {
     add(0xdeadbeef);

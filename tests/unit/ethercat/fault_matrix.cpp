@@ -61,6 +61,8 @@ Machine::Machine() {
     master->attach(port);
 }
 
+Machine::~Machine() { EXPECT_LT(master->max_task_share(), 0.75); }
+
 std::int64_t Machine::deviation_ns(std::size_t drive) {
     const std::size_t reference = events.reference < drives ? events.reference : 0;
     return line.controller(drive).clock().system_time(now_ns) -

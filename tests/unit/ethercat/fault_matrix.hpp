@@ -202,6 +202,8 @@ struct Machine {
     static constexpr std::size_t io = 3;
 
     Machine();
+    /// Checks that the tasks of the master had memory to spare.
+    ~Machine();
     /// Runs one cycle of 1 ms, and checks that no drive is in OP that may not be there.
     void cycle();
     void run(unsigned cycles) {

@@ -35,6 +35,8 @@ struct Served {
     Bytes buffer = Bytes(5000);
     FoeProgress progress;
 
+    /// Checks that the tasks of the worker had memory to spare.
+    ~Served() { EXPECT_LT(server.channel(0).max_task_share(), 0.75); }
     explicit Served(std::uint16_t size = 64) : slave(size) {
         request.data = buffer;
         request.progress = &progress;

@@ -229,6 +229,12 @@ struct World {
     std::int64_t cycle_ns = 1'000'000;
     std::uint64_t cycles = 0;
 
+    /// Checks that the tasks of the master had memory to spare.
+    ~World() {
+        if (master != nullptr) {
+            EXPECT_LT(master->max_task_share(), 0.75);
+        }
+    }
     Firmware& add(std::uint32_t product, std::uint16_t alias = 0, bool mailbox = false,
                   esc::Settings settings = {}) {
         firmware.emplace_back();
