@@ -483,17 +483,36 @@ std::map<std::string, std::string> Reader::metadata(std::string_view name) {
 }
 
 bool Reader::each(const Visit& visit, std::uint64_t begin, std::uint64_t end) {
+    damaged_.clear();
+    std::string first_problem;
     std::string records;
+    bool goes_on = true;
     for (const ChunkIndex& chunk : chunks_) {
+        if (!goes_on) break;
         if (chunk.end_time < begin || chunk.begin_time >= end) continue;
-        if (!load_chunk(chunk, records)) return false;
-        for (Fields fields(records); fields.more();) {
-            const auto opcode = fields.get<std::uint8_t>();
-            const std::string_view content = fields.blob();
-            if (!fields.good() || opcode != op_message || content.size() < 22) continue;
-            const Message message = read_message(content);
-            if (message.log_time >= begin && message.log_time < end && !visit(message)) return true;
+        if (!load_chunk(chunk, records)) {
+            if (damaged_.empty()) {
+                first_problem = problem_;
+            }
+            damaged_.push_back(chunk);
+            continue;
         }
+        goes_on = each_in(records, visit, begin, end);
+    }
+    problem_ = first_problem;
+    return damaged_.empty();
+}
+
+/// Calls `visit` for the messages of a chunk; returns what it returned last.
+bool Reader::each_in(std::string_view records, const Visit& visit, std::uint64_t begin,
+                     std::uint64_t end) {
+    for (Fields fields(records); fields.more();) {
+        const auto opcode = fields.get<std::uint8_t>();
+        const std::string_view content = fields.blob();
+        if (!fields.good() || opcode != op_message || content.size() < message_head) continue;
+        const Message message = read_message(content);
+        const bool is_wanted = message.log_time >= begin && message.log_time < end;
+        if (is_wanted && !visit(message)) return false;
     }
     return true;
 }

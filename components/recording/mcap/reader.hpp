@@ -59,11 +59,12 @@ public:
 
     using Visit = std::function<bool(const Message&)>;
     /// Calls `visit` for the messages with begin <= log time < end, in the order of the file, until
-    /// it returns false. Only chunks that may have some are read. Returns false and sets problem()
-    /// when one is damaged.
+    /// it returns false. Only chunks that may have some are read. Damaged ones are left out: then it
+    /// returns false, problem() is that of the first, and damaged() are all of them.
     bool each(const Visit& visit, std::uint64_t begin = 0,
               std::uint64_t end = std::numeric_limits<std::uint64_t>::max());
     std::uint64_t chunks_read() const { return chunks_read_; }
+    const std::vector<ChunkIndex>& damaged() const { return damaged_; }
 
 private:
     struct RecordHead;
@@ -89,6 +90,8 @@ private:
     void add_channel(Fields);
     bool add_chunk_index(Fields);
     bool load_chunk(const ChunkIndex& chunk, std::string& records);
+    static bool each_in(std::string_view records, const Visit& visit, std::uint64_t begin,
+                        std::uint64_t end);
 
     std::unique_ptr<Source> source_;
     std::string problem_;
@@ -98,6 +101,7 @@ private:
     std::map<std::uint16_t, Schema> schemas_;
     std::map<std::uint16_t, Channel> channels_;
     std::vector<ChunkIndex> chunks_;
+    std::vector<ChunkIndex> damaged_;  // found by the last each()
     struct Metadata {
         std::uint64_t offset, length;
         std::string name;

@@ -267,21 +267,47 @@ std::vector<std::string> names_of(const Table& table) {
     return names;
 }
 
-/// Returns "rows after 0.25 s are missing, of '/hal/servo' (x, y)": what a file does not have that
-/// is not read to its end.
-std::string missing_rows(const Recording& recording) {
-    const bool any = std::any_of(recording.tables.begin(), recording.tables.end(),
-                                 [](const Table& table) { return table.rows() != 0; });
-    std::string text =
-        any ? "rows after " + seconds(recording.end_ns() - recording.begin_ns()) + " are missing"
-            : std::string("all rows are missing");
+/// Returns ", of '/hal/servo' (x, y)": the tables of a recording.
+std::string of_tables(const Recording& recording) {
     std::vector<std::string> tables;
     for (const Table& table : recording.tables) {
         const std::string values = listed(names_of(table));
         tables.push_back(
             table.topic.empty() ? values : "'" + table.topic.substr(0, 60) + "' (" + values + ")");
     }
-    return tables.empty() ? text : text + ", of " + listed(tables);
+    return tables.empty() ? "" : ", of " + listed(tables);
+}
+
+bool has_rows(const Recording& recording) {
+    return std::any_of(recording.tables.begin(), recording.tables.end(),
+                       [](const Table& table) { return table.rows() != 0; });
+}
+
+/// Returns "rows after 0.25 s are missing, of '/hal/servo' (x, y)": what a file does not have that
+/// is not read to its end.
+std::string missing_rows(const Recording& recording) {
+    const std::string end = seconds(recording.end_ns() - recording.begin_ns());
+    const std::string rows = has_rows(recording) ? "rows after " + end : "all rows";
+    return rows + " are missing" + of_tables(recording);
+}
+
+/// Returns "rows from 0.25 s to 0.5 s are missing, ...": those of the damaged chunks of a file.
+std::string rows_of(const std::vector<ChunkIndex>& damaged, const Recording& recording) {
+    constexpr std::size_t max_named = 3;
+    const auto since_begin = [&](std::uint64_t ns) {
+        return seconds(static_cast<std::int64_t>(ns) - recording.begin_ns());
+    };
+    std::vector<std::string> spans;
+    for (std::size_t i = 0; i < damaged.size() && i < max_named; ++i) {
+        spans.push_back("from " + since_begin(damaged[i].begin_time) + " to " +
+                        since_begin(damaged[i].end_time));
+    }
+    if (damaged.size() > max_named) {
+        const std::size_t others = damaged.size() - max_named;
+        spans.push_back("in " + std::to_string(others) +
+                        (others == 1 ? " further chunk" : " further chunks"));
+    }
+    return "rows " + listed(spans) + " are missing" + of_tables(recording);
 }
 
 bool load_mcap(const std::string& path, Recording& to, std::string& problem,
@@ -304,7 +330,9 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem,
         sort(table);
     }
     if (!is_whole) {
-        to.missing = "'" + path + "': " + reader.problem() + "; " + missing_rows(to);
+        const bool is_empty = !has_rows(to);
+        to.missing = "'" + path + "': " + reader.problem() + "; " +
+                     (is_empty ? missing_rows(to) : rows_of(reader.damaged(), to));
     } else if (reader.unfinished()) {
         to.missing = "'" + path + "' ends without a summary; " + missing_rows(to);
     }

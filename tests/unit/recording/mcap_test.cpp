@@ -159,20 +159,62 @@ TEST(Recording, A_file_without_its_end_is_read_up_to_its_last_chunk) {
     EXPECT_GT(last, 3000u);
 }
 
-TEST(Recording, A_damaged_chunk_is_noticed) {
+/// A recording of 5000 rows with these chunks damaged.
+struct DamagedFile : testing::Test {
+    void damage(std::initializer_list<std::size_t> chunks) {
+        ASSERT_TRUE(write(folder.file("a.mcap"), 5000));
+        std::string bytes = content(folder.file("a.mcap"));
+        Reader reader;
+        ASSERT_TRUE(reader.open(open_file(folder.file("a.mcap"), problem)));
+        for (const std::size_t chunk : chunks) {
+            const ChunkIndex& index = reader.chunks().at(chunk);
+            bytes[index.offset + index.length / 2] ^= 0x40;
+        }
+        put_file(folder.file("b.mcap"), bytes);
+        ASSERT_TRUE(load(folder.file("b.mcap"), recording, problem));
+    }
+    std::size_t rows() const {
+        std::size_t sum = 0;
+        for (const Table& table : recording.tables) {
+            sum += table.rows();
+        }
+        return sum;
+    }
+
     const Folder folder;
-    ASSERT_TRUE(write(folder.file("a.mcap"), 5000));
-    std::string bytes = content(folder.file("a.mcap"));
-    Reader reader;
     std::string problem;
-    ASSERT_TRUE(reader.open(open_file(folder.file("a.mcap"), problem)));
-    bytes[reader.chunks().at(2).offset + reader.chunks().at(2).length / 2] ^= 0x40;
-    put_file(folder.file("b.mcap"), bytes);
     Recording recording;
-    ASSERT_TRUE(load(folder.file("b.mcap"), recording, problem));
-    EXPECT_NE(recording.missing.find("': a chunk is damaged: its CRC is wrong; rows after 1.999 s "
-                                     "are missing, of '"),
+};
+
+TEST_F(DamagedFile, Is_read_but_for_the_damaged_chunk) {
+    damage({2});
+    EXPECT_NE(recording.missing.find("b.mcap': a chunk is damaged: its CRC is wrong; rows from 2 s "
+                                     "to 2.999 s are missing, of '"),
               std::string::npos)
+        << recording.missing;
+    EXPECT_EQ(rows(), 4000u);
+    EXPECT_EQ(recording.end_ns() - recording.begin_ns(), 4'999'000'000);
+}
+
+TEST_F(DamagedFile, Names_all_damaged_chunks) {
+    damage({1, 4});
+    EXPECT_NE(recording.missing.find("b.mcap': a chunk is damaged: its CRC is wrong; rows from 1 s "
+                                     "to 1.999 s, from 4 s to 4.999 s are missing, of '"),
+              std::string::npos)
+        << recording.missing;
+    EXPECT_EQ(rows(), 3000u);
+}
+
+TEST_F(DamagedFile, Names_three_of_many_damaged_chunks) {
+    damage({0, 1, 2, 3});
+    EXPECT_NE(recording.missing.find(", in 1 further chunk are missing, of '"), std::string::npos)
+        << recording.missing;
+    EXPECT_EQ(rows(), 1000u);
+}
+
+TEST_F(DamagedFile, Without_an_undamaged_chunk_has_no_rows) {
+    damage({0, 1, 2, 3, 4});
+    EXPECT_NE(recording.missing.find("; all rows are missing, of '"), std::string::npos)
         << recording.missing;
 }
 
