@@ -30,11 +30,15 @@ public:
     const std::size_t width;  ///< words of a row
     const std::uint64_t every;  ///< cycles from one row to the next
 
-    /// Adds a row when the cycle is one of those to be sampled. [realtime] writer
+    /// Adds a row when the cycle is one of those to be sampled: its number is a multiple of
+    /// `every`, or it is the first after a skipped one that is. [realtime] writer
     void sample(std::uint64_t cycle, std::int64_t time_ns, const hal_value* const* from) noexcept {
-        if (cycle >= next_) {
-            // of a grid: a skipped cycle shifts nothing
-            next_ = every == 1 ? cycle + 1 : (cycle / every + 1) * every;
+        if (every == 1) {
+            put(cycle, time_ns, from);
+        } else if (next_ == 0 && cycle % every != 0) {
+            next_ = (cycle / every + 1) * every;
+        } else if (cycle >= next_) {
+            next_ = (cycle / every + 1) * every;
             put(cycle, time_ns, from);
         }
         reached_.store(time_ns + 1, std::memory_order_release);

@@ -93,12 +93,9 @@ TEST_F(Probed, Every_nth_cycle_is_a_grid_of_cycle_numbers) {
     Rows rows;
     rows.take(machine.session, *probe, Probes::layout(*probe));
     const auto& seen = rows.of[{1, 0}];
-    ASSERT_GE(seen.size(), 5u);
-    for (std::size_t i = 1; i < seen.size(); ++i) {
-        EXPECT_EQ(seen[i].cycle % 5, 0u);
-    }
-    for (std::size_t i = 2; i < seen.size(); ++i) {
-        EXPECT_EQ(seen[i].cycle - seen[i - 1].cycle, 5u);
+    ASSERT_EQ(seen.size(), 4u);
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+        EXPECT_EQ(seen[i].cycle, 5 * (i + 1));
     }
 }
 
