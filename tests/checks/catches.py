@@ -323,8 +323,8 @@ def check_tiers(root):
         "components/alpha/a.cpp": '#include "alpha/a.hpp"\n',
         "components/alpha/a.hpp": "",
         "components/beta/b.cpp": "",
-        "tools/alpha/options.hpp": "",
-        "tools/commands.cpp": '#include "alpha/options.hpp"\n',
+        "tools/alpha/options.hpp": "int run_alpha(const Options&);\n",
+        "tools/commands.cpp": '#include "alpha/options.hpp"\nOF_ALPHA(run_alpha)\n',
         "tools/part.hpp": 'inline constexpr char alpha[] = "alpha";\n#define OF_ALPHA(run) run\n',
         "tests/cli/a_test.py": "# packages: alpha beta\n",
     }
@@ -335,6 +335,7 @@ def check_tiers(root):
         {
             "README.md": "[`alpha`](docs/beta.md) and [`gamma`](docs/beta.md)\n",
             "tests/cli/a_test.py": "# packages: alpha delta\n",
+            "tools/commands.cpp": '#include "alpha/options.hpp"\nON_BUS(run_alpha)\n',
             "tools/main.cpp": '#include "alpha/options.hpp"\n',
             "tools/part.hpp": 'inline constexpr char beta[] = "beta";\n',
         },
@@ -353,6 +354,7 @@ def check_tiers(root):
         "tools/part.hpp: no row for the package alpha",
         "tools/part.hpp: names the package beta",
         "tools/part.hpp: BETA has a name or a macro OF_BETA",
+        "tools/commands.cpp: run_alpha is in tools/alpha/options.hpp, of alpha",
         "tools/main.cpp: is in the core and includes tools/alpha/options.hpp",
     )
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """tiers.py ROOT: every row of cmake/packages has a page and folders that exist, and a row in the tables of README.md and of
 docs/internals/core-and-packages.md, which name no other package; every packages line of a test names packages of the table; tools/part.hpp
-names the packages that have commands; the core includes no header of a package but the listed ones."""
+names the packages that have commands, which are in their folders; the core includes no header of a package but the listed ones."""
 import re
 import sys
 from pathlib import Path
@@ -60,20 +60,38 @@ def included(root, source):
                 break
 
 
+def owner(rows, path):
+    """The package of a file; None for the core."""
+    for name, _, folders in rows:
+        if path.startswith(tuple(f"{folder}/" for folder in folders)):
+            return name
+    return None
+
+
+def of_the_table(root, rows):
+    """Reports commands whose functions are not in the package that their rows state: one of them would be missing without the package."""
+    table = root / TABLE_OF_COMMANDS
+    headers = [(path, (root / path).read_text(encoding="utf-8")) for path in included(root, table)]
+    stated = re.findall(
+        r"\b(?:IN_CORE|IN_TOOLS|ON_BUS|OF_(\w+))\((run_\w+)\)", table.read_text(encoding="utf-8")
+    )
+    for package, function in stated:
+        for path, text in headers:
+            actual = owner(rows, path)
+            if f"int {function}(" in text and actual != (package.lower() or None):
+                yield f"{TABLE_OF_COMMANDS}: {function} is in {path}, of {actual or 'the core'}"
+
+
 def of_the_core(root, rows):
     """Reports includes from the core into a package."""
-    owners = {f"{folder}/": name for name, _, folders in rows for folder in folders}
-
-    def owner(path):
-        return next((name for folder, name in owners.items() if path.startswith(folder)), None)
-
     for source in sorted(one for folder in SOURCES for one in (root / folder).rglob("*")):
         path = source.relative_to(root).as_posix()
-        if source.suffix not in SUFFIXES or path == TABLE_OF_COMMANDS or owner(path):
+        if source.suffix not in SUFFIXES or path == TABLE_OF_COMMANDS or owner(rows, path):
             continue
         for header in included(root, source):
-            if owner(header) and header not in INCLUDED_BY_THE_CORE:
-                yield f"{path}: is in the core and includes {header} of the package {owner(header)}"
+            package = owner(rows, header)
+            if package and header not in INCLUDED_BY_THE_CORE:
+                yield f"{path}: is in the core and includes {header} of the package {package}"
 
 
 def problems(root):
@@ -99,6 +117,7 @@ def problems(root):
             if name not in names:
                 yield f"{script.relative_to(root)}: states the package {name}, which is not in cmake/packages"
     yield from of_the_programs(root, rows)
+    yield from of_the_table(root, rows)
     yield from of_the_core(root, rows)
 
 
