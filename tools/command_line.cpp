@@ -27,22 +27,34 @@ const Group* find_group(std::string_view name) {
     return nullptr;
 }
 
-/// Whether the command is in a group, and this build has it.
-bool belongs(const Subcommand& row, const Group& group) {
-    return !row.missing_package() &&
-           std::string_view(row.name).starts_with(std::string(group.name) + " ");
+/// Whether the name of the command begins with these words, and has more.
+bool begins(const Subcommand& row, std::string_view words) {
+    const std::string_view name = row.name;
+    return name.size() > words.size() && name.starts_with(words) && name[words.size()] == ' ';
 }
 
-/// The package of a group without commands, because this build leaves it out; else nullptr.
-const TreePackage* missing_package(const Group& group) {
+/// Whether the command is in a group, and this build has it.
+bool belongs(const Subcommand& row, const Group& group) {
+    return !row.missing_package() && begins(row, group.name);
+}
+
+/// The package of the commands that begin with these words, where this build leaves all of them out; else
+/// nullptr.
+const TreePackage* missing_package(std::string_view words) {
     const TreePackage* missing = nullptr;
     for (const Subcommand& row : subcommands()) {
-        if (belongs(row, group)) return nullptr;
-        if (std::string_view(row.name).starts_with(std::string(group.name) + " ")) {
-            missing = row.missing_package();
-        }
+        if (!begins(row, words)) continue;
+        missing = row.missing_package();
+        if (!missing) return nullptr;
     }
     return missing;
+}
+
+/// Reports that a command is in a package that this build leaves out.
+int refuse(std::string_view command, const TreePackage& package) {
+    Options options;
+    options.program = fmt::format("hal {}", command);
+    return fail(options, package.problem());
 }
 
 /// The purpose, and the second words of the commands: `time slots of a CAN bus: plan`.
@@ -142,6 +154,9 @@ int no_such_command(const std::vector<std::string>& typed) {
         if (typed.size() > 1) {
             word += " " + typed[1];
         }
+        if (const TreePackage* const missing = missing_package(word)) {
+            return refuse(word, *missing);
+        }
         where += fmt::format(" {}", group->name);
         names.clear();
         for (const Subcommand& row : subcommands()) {
@@ -162,13 +177,6 @@ int no_such_command(const std::vector<std::string>& typed) {
     const std::string hint = did_you_mean(word, names);
     return fail(options, fmt::format("unknown command '{}'; {}", word,
                                      hint.empty() ? "type: " + where : hint));
-}
-
-/// Reports that a command is in a package that this build leaves out.
-int refuse(const char* command, const TreePackage& package) {
-    Options options;
-    options.program = fmt::format("hal {}", command);
-    return fail(options, package.problem());
 }
 
 std::string version_text() {
@@ -222,7 +230,7 @@ int help(const std::vector<std::string>& about) {
         return print(help_of(*found.row)) ? 0 : 1;
     }
     if (const Group* group = find_group(about.front()); group && about.size() == 1) {
-        const TreePackage* const missing = missing_package(*group);
+        const TreePackage* const missing = missing_package(group->name);
         if (missing) return refuse(group->name, *missing);
         return print(help_of(*group)) ? 0 : 1;
     }
@@ -316,7 +324,7 @@ int run_command_line(int argc, char** argv) {
     }
     const auto [row, name_words] = find(all);
     if (const Group* const group = row ? nullptr : find_group(all[0])) {
-        if (const TreePackage* const missing = missing_package(*group)) {
+        if (const TreePackage* const missing = missing_package(group->name)) {
             return refuse(group->name, *missing);
         }
     }

@@ -5,7 +5,7 @@ import signal
 import subprocess
 import unittest
 
-from harness import HAL, SERVO, Case, Terminal, wait_until
+from harness import HAL, SERVO, Case, Terminal, needs_package, wait_until
 
 
 class Halcmd(Case):
@@ -51,6 +51,9 @@ class Halcmd(Case):
             (1, "halshow: unexpected argument 'x.halshow'; type: hal panel, or hal watch NAME…\n"),
             run("halshow", "x.halshow"),
         )
+
+    @needs_package("linuxcnc")
+    def test_started_programs_find_ours_beside_those_of_linuxcnc(self):
         found = self.run_program(
             "loadusr", "-w", "sh", "-c", "command -v halmeter; command -v halcmd", name="halcmd"
         ).stdout

@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import unittest
 
-from harness import Case
+from harness import Case, needs_package
 
 
 class Links(html.parser.HTMLParser):
@@ -57,6 +57,7 @@ class Reference(Case):
         self.assertEqual(len(self.names()), len(index.links))
         self.assertIn('<h2 id="pins">', (folder / "sum2.html").read_text())
 
+    @needs_package("estimation")
     def test_defaults_are_the_shortest_number_that_is_read_as_the_same(self):
         page = self.good("doc", "fir") + self.good("doc", "furuta")
         self.assertIn("below 0.5 (default 0.1)\n", page)

@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import unittest
 
-from harness import HAL, Case
+from harness import HAL, Case, needs_package, packages_left_out
 
 
 class Help(Case):
@@ -67,6 +67,7 @@ class WrongWords(Case):
     def test_unknown_command_gets_a_suggestion(self):
         self.assertEqual("hal: unknown command 'shel'; did you mean 'shell'?\n", self.bad("shel"))
 
+    @needs_package("canopen")
     def test_commands_with_a_common_beginning(self):
         self.assertEqual(
             "usage: hal can eds COMMAND …\n\n  can eds check    check a device description and summarise it\n\n"
@@ -79,6 +80,16 @@ class WrongWords(Case):
             (("can", "dcf"), "can dcf write"),
         ):
             self.assertIn(last, self.good("help", *words))
+
+    @unittest.skipUnless("canopen" in packages_left_out(), "this build has canopen")
+    def test_a_common_beginning_of_commands_that_are_left_out(self):
+        for words, start in (
+            (("can", "eds"), "can eds"),
+            (("can", "sdo", "reed"), "can sdo"),
+            (("help", "can", "pdo"), "can pdo"),
+        ):
+            with self.subTest(words=words):
+                self.assertIn(f"hal {start}: the package canopen ", self.bad(*words))
 
     def test_unknown_command_without_likeness_points_to_help(self):
         self.assertEqual("hal: unknown command 'qqqqqqqq'; type: hal help\n", self.bad("qqqqqqqq"))
