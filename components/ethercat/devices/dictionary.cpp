@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cstring>
+#include <stdexcept>
 
+#include "bus/config/object_address.hpp"
 #include "cia301/values.hpp"
 #include "ethercat/devices/bits.hpp"
 
@@ -129,12 +131,17 @@ void Dictionary::bind(std::uint16_t index, std::uint8_t sub, std::uint8_t* value
                       std::size_t bytes) {
     const auto at = std::find_if(objects_.begin(), objects_.end(),
                                  [&](const DictionaryObject& o) { return o.index == index; });
-    if (at == objects_.end()) return;
-    for (DictionaryEntry& e : at->entries) {
-        if (e.sub == sub && e.bytes() == bytes) {
-            e.bound = value;
+    if (at != objects_.end()) {
+        for (DictionaryEntry& e : at->entries) {
+            if (e.sub == sub && e.bytes() == bytes) {
+                e.bound = value;
+                return;
+            }
         }
     }
+    throw std::logic_error("cannot bind a value of " + std::to_string(bytes) + " bytes to object " +
+                           bus::object_text(index, sub) +
+                           ": no entry of this size; add one before finish()");
 }
 
 void Dictionary::power_on() noexcept {

@@ -84,8 +84,9 @@ public:
     void limit(std::int64_t low, std::int64_t high);
     /// Sorts the objects. Nothing may be added after it.
     void finish();
-    /// Makes `value`, which outlives the dictionary, the data of an entry; nothing without the
-    /// entry. After finish(). The initial value is written to it at power-on.
+    /// Makes `value`, which outlives the dictionary, the data of an entry. After finish(). The
+    /// initial value is written to it at power-on. Throws std::logic_error without an entry of this
+    /// size.
     template <class T>
     void bind(std::uint16_t index, std::uint8_t sub, T& value) {
         bind(index, sub, reinterpret_cast<std::uint8_t*>(&value), sizeof value);

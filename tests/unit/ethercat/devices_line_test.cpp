@@ -366,6 +366,34 @@ TEST(DeviceLine, Description_reports_what_is_invalid) {
     EXPECT_EQ(bad.messages[3].sentence, "option 'bits' has no value; write bits=VALUE");
 }
 
+TEST(DeviceDictionary, Rejects_to_bind_a_value_without_an_entry_of_its_size) {
+    Dictionary dictionary;
+    dictionary.variable(0x6040, "Controlword", coe::type::u16, coe::access::read_write, 6);
+    dictionary.finish();
+    std::uint16_t word = 0;
+    std::uint32_t wide = 0;
+    const auto text_of = [&](std::uint16_t index, std::uint8_t sub, auto& value) -> std::string {
+        try {
+            dictionary.bind(index, sub, value);
+        } catch (const std::logic_error& error) {
+            return error.what();
+        }
+        return {};
+    };
+    EXPECT_EQ(text_of(0x6041, 0, word),
+              "cannot bind a value of 2 bytes to object 0x6041:0: no entry "
+              "of this size; add one before finish()");
+    EXPECT_EQ(text_of(0x6040, 1, word),
+              "cannot bind a value of 2 bytes to object 0x6040:1: no entry "
+              "of this size; add one before finish()");
+    EXPECT_EQ(text_of(0x6040, 0, wide),
+              "cannot bind a value of 4 bytes to object 0x6040:0: no entry "
+              "of this size; add one before finish()");
+    EXPECT_EQ(text_of(0x6040, 0, word), "");
+    dictionary.power_on();
+    EXPECT_EQ(word, 6);
+}
+
 TEST_F(Devices, Outputs_are_off_as_soon_as_the_master_takes_the_slave_to_init) {
     start("digital_out");
     to_op({0xff});
