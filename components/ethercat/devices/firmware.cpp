@@ -149,14 +149,24 @@ void Firmware::step(esc::Pdi& pdi, std::int64_t dt_ns, std::int64_t sync_cycle_n
     behaviour_->step(s);
     last_step_ns_ = now_ns_;
     if (design_.coe) {
-        for (const coe::Emergency& emergency : s.emergencies.all()) {
-            mailbox_.send(emergency);
-        }
+        send(s.emergencies);
     }
     if (inputs_.bytes() == 0) return;
     std::memset(image_.data(), 0, inputs_.bytes());
     inputs_.pack({image_.data(), inputs_.bytes()});
     pdi.write_sync_manager(sm_in_, {image_.data(), inputs_.bytes()});
+}
+
+void Firmware::send(const Emergencies& emergencies) noexcept {
+    std::uint32_t dropped = emergencies.dropped();
+    for (const coe::Emergency& emergency : emergencies.all()) {
+        if (!mailbox_.send(emergency)) {
+            ++dropped;
+        }
+    }
+    if (dropped != 0) {
+        dropped_emergencies_.fetch_add(dropped, std::memory_order_relaxed);
+    }
 }
 
 // The state machine (ETG.1000.6, clause 6.4.1) and its checks.

@@ -21,19 +21,34 @@
 
 namespace hal::ethercat::devices {
 
-/// Emergencies of one step. What does not fit is dropped.
+/// Emergencies of one step, oldest first. Beyond the capacity, the newest ones are dropped and
+/// counted. [realtime]
 class Emergencies {
 public:
+    /// One that begins and one that ends a fault, of each of 8 axes.
+    static constexpr std::size_t capacity = 16;
+
     void push(const coe::Emergency& emergency) noexcept {
-        if (count_ < items_.size()) {
-            items_[count_++] = emergency;
+        if (count_ == capacity) {
+            ++dropped_;
+            return;
         }
+        items_[count_++] = emergency;
+    }
+    /// Appends the emergencies of a part of the device, and counts those it dropped.
+    void append(const Emergencies& part) noexcept {
+        for (const coe::Emergency& emergency : part.all()) {
+            push(emergency);
+        }
+        dropped_ += part.dropped_;
     }
     std::span<const coe::Emergency> all() const noexcept { return {items_.data(), count_}; }
+    std::uint32_t dropped() const noexcept { return dropped_; }
 
 private:
-    std::array<coe::Emergency, 8> items_{};
+    std::array<coe::Emergency, capacity> items_{};
     std::size_t count_ = 0;
+    std::uint32_t dropped_ = 0;
 };
 
 /// A step of a device.
@@ -43,7 +58,7 @@ struct Step {
     /// OP: the outputs in the dictionary are the master's; else they are 0
     bool outputs_valid = false;
     std::int64_t sync_cycle_ns = 0;  ///< of SYNC0, whose pulse the step belongs to; 0: free run
-    Emergencies emergencies{};  ///< sent to the master after the step
+    Emergencies emergencies{};  ///< put into the outbox of the mailbox after the step
 };
 
 /// What a device does with its dictionary.
@@ -93,6 +108,11 @@ public:
     std::uint32_t missed_outputs() const noexcept {
         return missed_.load(std::memory_order_relaxed);
     }
+    /// Returns how many emergencies the master never gets, because there were more in one step
+    /// than Emergencies::capacity, or than the outbox had space for. [any]
+    std::uint32_t dropped_emergencies() const noexcept {
+        return dropped_emergencies_.load(std::memory_order_relaxed);
+    }
 
 private:
     coe::Abort check(const DictionaryObject&, const DictionaryEntry&,
@@ -115,6 +135,7 @@ private:
     // Process data.
     void run_process_data(esc::Pdi&) noexcept;
     void step(esc::Pdi&, std::int64_t dt_ns, std::int64_t sync_cycle_ns) noexcept;
+    void send(const Emergencies&) noexcept;
     bool read_outputs(esc::Pdi&) noexcept;
 
     Design design_;
@@ -132,6 +153,7 @@ private:
     State target_ = State::init;
     std::atomic<State> shown_{State::init};
     std::atomic<std::uint32_t> missed_{0};
+    std::atomic<std::uint32_t> dropped_emergencies_{0};
     bool error_ = false;
     bool received_ = false;  ///< outputs since SAFE-OP
     std::int64_t now_ns_ = 0;

@@ -46,10 +46,10 @@ void FirmwareMailbox::pump() noexcept {
     }
 }
 
-void FirmwareMailbox::send(const coe::Emergency& emergency) noexcept {
-    if (!outbox_.full()) {
-        outbox_.send(MailboxType::coe, coe::write_emergency(outbox_.payload(), emergency));
-    }
+bool FirmwareMailbox::send(const coe::Emergency& emergency) noexcept {
+    if (outbox_.full()) return false;
+    outbox_.send(MailboxType::coe, coe::write_emergency(outbox_.payload(), emergency));
+    return true;
 }
 
 void FirmwareMailbox::refuse(MailboxError error) noexcept {

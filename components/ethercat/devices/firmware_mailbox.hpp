@@ -26,8 +26,8 @@ public:
     void stop() noexcept { running_ = false; }
     /// Works once, if it is started.
     void run(esc::Pdi&, State, std::int64_t now_ns) noexcept;
-    /// Queues an emergency; it is dropped if the outbox is full.
-    void send(const coe::Emergency&) noexcept;
+    /// Queues an emergency. Returns false when the outbox is full: the emergency is dropped.
+    bool send(const coe::Emergency&) noexcept;
 
 private:
     /// A message with its header.

@@ -134,9 +134,7 @@ void ServoAxis::step(Step& step) noexcept {
         axis_.written(o402::controlword, 0);
     }
     advance(step.dt_ns);
-    for (const coe::Emergency& emergency : pending_.all()) {
-        step.emergencies.push(emergency);
-    }
+    step.emergencies.append(pending_);
     pending_ = {};
     show(step.outputs_valid);
 }

@@ -394,6 +394,39 @@ TEST(DeviceDictionary, Rejects_to_bind_a_value_without_an_entry_of_its_size) {
     EXPECT_EQ(word, 6);
 }
 
+TEST(DeviceEmergencies, Drop_the_newest_ones_and_count_them) {
+    Emergencies part;
+    Emergencies all;
+    for (std::uint16_t code = 1; code <= Emergencies::capacity + 2; ++code) {
+        coe::Emergency emergency;
+        emergency.code = code;
+        part.push(emergency);
+    }
+    EXPECT_EQ(part.dropped(), 2U);
+    all.push({});
+    all.append(part);
+    EXPECT_EQ(all.all().size(), Emergencies::capacity);
+    EXPECT_EQ(all.all()[1].code, 1);
+    EXPECT_EQ(all.all().back().code, Emergencies::capacity - 1);
+    EXPECT_EQ(all.dropped(), 3U);
+}
+
+TEST_F(Devices, Emergencies_that_the_outbox_has_no_space_for_are_counted) {
+    start("servo", {.axes = 8});
+    to_op(Bytes(8 * 13));
+    for (unsigned axis = 0; axis < 8; ++axis) {
+        dynamic_cast<Servo&>(device.firmware->behaviour()).axis(axis).fail(0x2310);
+    }
+    w.now_ns += 1'000'000;
+    outputs(Bytes(8 * 13));
+    unsigned received = 0;
+    while (!fetch(MailboxType::coe).empty()) {
+        ++received;
+    }
+    EXPECT_EQ(received, 4U);
+    EXPECT_EQ(device.firmware->dropped_emergencies(), 4U);
+}
+
 TEST_F(Devices, Outputs_are_off_as_soon_as_the_master_takes_the_slave_to_init) {
     start("digital_out");
     to_op({0xff});
