@@ -7,10 +7,8 @@
 #include <memory>
 
 #include "ethercat/devices/builder.hpp"
+#include "ethercat/devices/device_options.hpp"
 
-namespace hal::ethercat::esi {
-struct File;
-}
 namespace hal::ethercat::devices {
 
 inline constexpr unsigned most_channels = 64;
@@ -44,24 +42,6 @@ private:
 class Idle : public Behaviour {
 public:
     void step(Step&) noexcept override {}
-};
-
-/// Options of a device in a line description.
-struct DeviceOptions {
-    unsigned bits = 8;
-    unsigned channels = 4;
-    unsigned axes = 1;
-    std::uint16_t alias = 0;
-    std::uint32_t serial = 0;
-    bool dc_required = false;
-    std::uint32_t modes = 0x3ef;  ///< of a servo (6502h)
-    /// of a servo: parameters of the motor that differ from servo_settings(), as in
-    /// "inertia:1e-4;endless:1"
-    std::string motor{};
-    /// description of an esi device, and its name there; empty: the only one
-    std::string file{};
-    std::string device{};
-    std::shared_ptr<const esi::File> description{};  ///< the contents of `file`
 };
 
 /// A device: its description and its behaviour.

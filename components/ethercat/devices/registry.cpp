@@ -50,49 +50,29 @@ std::string list_of_names() {
     return out;
 }
 
-/// An option whose value is a number.
-struct NumberRow {
-    std::string_view name;
-    std::uint64_t min, max;
-    void (*set)(DeviceOptions&, std::uint64_t);
-};
-constexpr NumberRow number_rows[] = {
-    {"bits", 1, 64, [](DeviceOptions& o, std::uint64_t n) { o.bits = static_cast<unsigned>(n); }},
-    {"channels", 1, 16,
-     [](DeviceOptions& o, std::uint64_t n) { o.channels = static_cast<unsigned>(n); }},
-    {"axes", 1, 8, [](DeviceOptions& o, std::uint64_t n) { o.axes = static_cast<unsigned>(n); }},
-    {"modes", 1, 0x3ff,
-     [](DeviceOptions& o, std::uint64_t n) { o.modes = static_cast<std::uint32_t>(n); }},
-    {"alias", 0, 0xffff,
-     [](DeviceOptions& o, std::uint64_t n) { o.alias = static_cast<std::uint16_t>(n); }},
-    {"serial", 0, 0xffffffff,
-     [](DeviceOptions& o, std::uint64_t n) { o.serial = static_cast<std::uint32_t>(n); }},
-};
-
-std::string set_number(DeviceOptions& o, std::string_view key, std::string_view value) {
-    for (const NumberRow& row : number_rows) {
-        if (row.name != key) continue;
-        const auto number = parse_natural(value);
-        if (number && *number >= row.min && *number <= row.max) {
-            row.set(o, *number);
-            return {};
-        }
+/// Parses a number from `min` to `max`. Returns what is wrong with it, or an empty text.
+template <class T>
+std::string parse_number(std::string_view key, std::string_view value, std::uint64_t min,
+                         std::uint64_t max, T& to) {
+    const auto number = parse_natural(value);
+    if (!number || *number < min || *number > max) {
         return "invalid value '" + std::string(value) + "' of " + std::string(key) + "; use " +
-               std::to_string(row.min) + ".." + std::to_string(row.max);
+               std::to_string(min) + ".." + std::to_string(max);
     }
-    return "unknown option '" + std::string(key) + "'";
-}
-
-std::string set_dc(DeviceOptions& o, std::string_view value) {
-    if (value != "required" && value != "optional") {
-        return "invalid value '" + std::string(value) + "' of dc; use required or optional";
-    }
-    o.dc_required = value == "required";
+    to = static_cast<T>(*number);
     return {};
 }
 
-std::string set_text(std::string& to, std::string_view key, std::string_view value,
-                     std::string_view example) {
+std::string parse_dc(std::string_view value, bool& required) {
+    if (value != "required" && value != "optional") {
+        return "invalid value '" + std::string(value) + "' of dc; use required or optional";
+    }
+    required = value == "required";
+    return {};
+}
+
+std::string parse_text(std::string_view key, std::string_view value, std::string_view example,
+                       std::string& to) {
     if (value.empty()) {
         return "option '" + std::string(key) + "' has no value; write " + std::string(key) + "=" +
                std::string(example);
@@ -101,19 +81,49 @@ std::string set_text(std::string& to, std::string_view key, std::string_view val
     return {};
 }
 
-std::string set_motor(DeviceOptions& o, std::string_view value) {
-    canopen::cia402::MotorSettings scratch;
-    o.motor = value;
-    return canopen::cia402::parse_motor(value, scratch);
+/// An option, and how its value is parsed: the function returns what is wrong, or an empty text.
+struct OptionRow {
+    std::string_view name;
+    std::string (*parse)(std::string_view key, std::string_view value, DeviceOptions&);
+};
+using Text = std::string_view;
+constexpr OptionRow option_rows[] = {
+    {"bits", [](Text k, Text v, DeviceOptions& o) { return parse_number(k, v, 1, 64, o.bits); }},
+    {"channels",
+     [](Text k, Text v, DeviceOptions& o) { return parse_number(k, v, 1, 16, o.channels); }},
+    {"axes", [](Text k, Text v, DeviceOptions& o) { return parse_number(k, v, 1, 8, o.axes); }},
+    {"modes",
+     [](Text k, Text v, DeviceOptions& o) { return parse_number(k, v, 1, 0x3ff, o.modes); }},
+    {"alias",
+     [](Text k, Text v, DeviceOptions& o) { return parse_number(k, v, 0, 0xffff, o.alias); }},
+    {"serial",
+     [](Text k, Text v, DeviceOptions& o) { return parse_number(k, v, 0, 0xffffffff, o.serial); }},
+    {"dc", [](Text, Text v, DeviceOptions& o) { return parse_dc(v, o.dc_required); }},
+    {"file", [](Text k, Text v, DeviceOptions& o) { return parse_text(k, v, "FILE.xml", o.file); }},
+    {"device", [](Text k, Text v, DeviceOptions& o) { return parse_text(k, v, "NAME", o.device); }},
+    {"motor",
+     [](Text, Text v, DeviceOptions& o) { return canopen::cia402::parse_motor(v, o.motor); }},
+};
+
+/// Returns an option that a device offers; nullptr: unknown.
+const OptionRow* option_row(const DeviceRow& device, std::string_view key) {
+    for (const OptionRow& row : option_rows) {
+        if (row.name == key && offers(device, key)) return &row;
+    }
+    return nullptr;
 }
 
-/// Sets an option; returns what is wrong with it, or an empty text.
-std::string set_option(DeviceOptions& o, std::string_view key, std::string_view value) {
-    if (key == "dc") return set_dc(o, value);
-    if (key == "file") return set_text(o.file, key, value, "FILE.xml");
-    if (key == "device") return set_text(o.device, key, value, "NAME");
-    if (key == "motor") return set_motor(o, value);
-    return set_number(o, key, value);
+/// Parses an option of a device, as in "axes=2". Returns what is wrong with it, or an empty text.
+std::string parse_option(const DeviceRow& device, std::string_view word, DeviceOptions& options) {
+    const auto equals = word.find('=');
+    const std::string key(word.substr(0, equals));
+    if (equals == word.npos && device_row(word) != nullptr) {
+        return "'" + key + "' is a device of its own; write it on the next line, or after a comma";
+    }
+    if (equals == word.npos) return "option '" + key + "' has no value; write " + key + "=VALUE";
+    const OptionRow* option = option_row(device, key);
+    if (option == nullptr) return "unknown option '" + key + "' of " + std::string(device.name);
+    return option->parse(key, word.substr(equals + 1), options);
 }
 
 /// Reads the description of an esi device. Returns what is wrong, or an empty text; `help` has what
@@ -197,20 +207,7 @@ LineDescription read_line(std::string_view text, const FindFile& find) {
         LineDescription::Slave slave{words[0].text, {}, words[0].at};
         bool good = true;
         for (std::size_t n = 1; n < words.size(); ++n) {
-            const auto equals = words[n].text.find('=');
-            const std::string key = words[n].text.substr(0, equals);
-            std::string problem;
-            if (equals == std::string::npos && device_row(words[n].text) != nullptr) {
-                problem = "'" + words[n].text +
-                          "' is a device of its own; write it on the next line, or after a comma";
-            } else if (equals == std::string::npos) {
-                problem = "option '" + key + "' has no value; write " + key + "=VALUE";
-            } else if (!offers(*row, key)) {
-                problem = "unknown option '" + key + "' of " + words[0].text;
-            } else {
-                problem = set_option(slave.options, key,
-                                     std::string_view(words[n].text).substr(equals + 1));
-            }
+            const std::string problem = parse_option(*row, words[n].text, slave.options);
             if (problem.empty()) continue;
             good = false;
             messages.error(LineTopic::option, words[n].at, problem,

@@ -109,9 +109,6 @@ private:
     std::vector<std::unique_ptr<ServoAxis>> axes_;
 };
 
-/// Returns the settings of an axis before its options: 10 000 increments per revolution, up to
-/// 12 000 r/min, an absolute encoder, no limits of the travel. [setup]
-canopen::cia402::AxisSettings servo_settings();
 /// Makes a servo drive of `axes` 1..8: 1600h + 10h * axis with 6040 6060 607A 60FF 6071, 1A00h +
 /// 10h * axis with 6041 6061 6064 606C 6077.
 Parts make_servo(const DeviceOptions&);  ///< [setup]

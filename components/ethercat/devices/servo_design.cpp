@@ -6,7 +6,6 @@
 #include <type_traits>
 
 #include "cia402/drive/axis_objects.hpp"
-#include "cia402/drive/motor_options.hpp"
 
 namespace hal::ethercat::devices {
 
@@ -95,9 +94,8 @@ void add_sync(Dictionary& d, std::uint16_t index, const char* name, bool output)
 
 }  // namespace
 
-cia402::AxisSettings servo_settings() {
-    cia402::AxisSettings settings;
-    cia402::MotorSettings& motor = settings.motor;
+cia402::MotorSettings servo_motor() {
+    cia402::MotorSettings motor;
     motor.resolution = 10'000;
     motor.highest_speed = 12'000;
     motor.absolute_encoder = true;
@@ -106,13 +104,11 @@ cia402::AxisSettings servo_settings() {
     motor.home_to = 60'000;
     motor.probe_from = {75'000, 100'000};
     motor.probe_to = {75'250, 100'250};
-    return settings;
+    return motor;
 }
 
 Parts make_servo(const DeviceOptions& options) {
-    cia402::AxisSettings settings = servo_settings();
-    cia402::parse_motor(options.motor, settings.motor);
-    settings = cia402::possible(settings);
+    const cia402::AxisSettings settings = cia402::possible({.motor = options.motor});
     DesignBuilder b("servo", 0x0402'0000 + options.axes);
     b.mailbox(256);
     auto& d = b.dictionary();

@@ -2,6 +2,7 @@
 #include "ethercat/devices/servo.hpp"
 
 #include "cia301/values.hpp"
+#include "cia402/drive/motor_options.hpp"
 #include "tests/unit/cia402/drive_on_bus.hpp"
 #include "tests/unit/ethercat/device_bench.hpp"
 
@@ -27,7 +28,9 @@ constexpr std::size_t bytes_per_axis = 13;
 class EthercatDrive final : public Drive {
 public:
     EthercatDrive(unsigned axes, const std::string& motor) : outputs_(bytes_per_axis * axes) {
-        bench_.start("servo", {.axes = axes, .motor = motor});
+        hal::ethercat::devices::DeviceOptions options{.axes = axes};
+        EXPECT_EQ(hal::canopen::cia402::parse_motor(motor, options.motor), "");
+        bench_.start("servo", options);
         bench_.w.gap_ns = 100;
         bench_.to_op(outputs_);
         run(1);

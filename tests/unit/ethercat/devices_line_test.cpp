@@ -358,12 +358,60 @@ TEST(DeviceLine, Description_reports_what_is_invalid) {
     EXPECT_TRUE(good.messages.empty());
     ASSERT_EQ(make_line(good).size(), 3U);
     EXPECT_EQ(sii::parse(make_line(good)[1].sii).alias(), 5);
-    const auto bad = read_line("servos\nservo axes=9\nservo bits=3\ndigital_in bits\n");
-    ASSERT_EQ(bad.messages.size(), 4U);
-    EXPECT_EQ(bad.messages[0].sentence, "unknown device 'servos'");
-    EXPECT_EQ(bad.messages[1].sentence, "invalid value '9' of axes; use 1..8");
-    EXPECT_EQ(bad.messages[2].sentence, "unknown option 'bits' of servo");
-    EXPECT_EQ(bad.messages[3].sentence, "option 'bits' has no value; write bits=VALUE");
+    struct {
+        const char* line;
+        const char* sentence;
+        const char* help;
+    } const rows[] = {
+        {"servos", "unknown device 'servos'",
+         "use one of: coupler, digital_in, digital_out, analog_in, analog_out, servo, "
+         "mailbox_device, esi"},
+        {"servo axes=9", "invalid value '9' of axes; use 1..8",
+         "options of servo: axes dc modes motor alias serial"},
+        {"servo modes=0", "invalid value '0' of modes; use 1..1023",
+         "options of servo: axes dc modes motor alias serial"},
+        {"servo bits=3", "unknown option 'bits' of servo",
+         "options of servo: axes dc modes motor alias serial"},
+        {"servo dc=maybe", "invalid value 'maybe' of dc; use required or optional",
+         "options of servo: axes dc modes motor alias serial"},
+        {"servo motor=inertia",
+         "invalid motor parameter 'inertia'; write NAME:VALUE, as in "
+         "inertia:1e-4; names: resolution, endless, inertia, "
+         "viscous-friction, coulomb-friction, rated-torque, peak-torque, "
+         "rated-current, rated-voltage, highest-speed, start, "
+         "negative-limit, positive-limit, negative-stop, positive-stop, "
+         "home-from, home-to, brake-torque",
+         "options of servo: axes dc modes motor alias serial"},
+        {"digital_in bits", "option 'bits' has no value; write bits=VALUE",
+         "options of digital_in: bits alias serial"},
+        {"coupler alias=-1", "invalid value '-1' of alias; use 0..65535",
+         "options of coupler: alias serial"},
+        {"coupler servo",
+         "'servo' is a device of its own; write it on the next line, or after a comma",
+         "options of coupler: alias serial"},
+        {"esi file=", "option 'file' has no value; write file=FILE.xml",
+         "options of esi: file device alias serial"},
+        {"esi device=", "option 'device' has no value; write device=NAME",
+         "options of esi: file device alias serial"},
+        {"# only a comment", "the line has no device", "write one device per line"},
+    };
+    for (const auto& row : rows) {
+        const auto bad = read_line(row.line);
+        ASSERT_EQ(bad.messages.size(), 1U) << row.line;
+        EXPECT_EQ(bad.messages[0].sentence, row.sentence);
+        EXPECT_EQ(bad.messages[0].help, row.help);
+        EXPECT_TRUE(bad.slaves.empty()) << row.line;
+    }
+}
+
+TEST(DeviceLine, Motor_of_a_servo_differs_only_where_its_option_does) {
+    const auto line = read_line("servo\nservo motor=inertia:1e-3;resolution:4096\n");
+    ASSERT_EQ(line.slaves.size(), 2U);
+    EXPECT_EQ(line.slaves[0].options.motor.resolution, 10'000U);
+    EXPECT_EQ(line.slaves[1].options.motor.resolution, 4096U);
+    EXPECT_EQ(line.slaves[1].options.motor.inertia, 1e-3);
+    EXPECT_EQ(line.slaves[1].options.motor.highest_speed,
+              line.slaves[0].options.motor.highest_speed);
 }
 
 TEST(DeviceDictionary, Rejects_to_bind_a_value_without_an_entry_of_its_size) {

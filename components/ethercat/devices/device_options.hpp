@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// The options of a device in a line description.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "cia402/drive/axis_settings.hpp"
+
+namespace hal::ethercat::esi {
+struct File;
+}
+namespace hal::ethercat::devices {
+
+/// Returns the motor of a servo before its options: 10 000 increments per revolution, up to
+/// 12 000 r/min, an absolute encoder, no limits of the travel. [setup]
+canopen::cia402::MotorSettings servo_motor();
+
+/// See the top of this file.
+struct DeviceOptions {
+    unsigned bits = 8;
+    unsigned channels = 4;
+    unsigned axes = 1;
+    std::uint16_t alias = 0;
+    std::uint32_t serial = 0;
+    bool dc_required = false;
+    std::uint32_t modes = 0x3ef;  ///< of a servo (6502h)
+    canopen::cia402::MotorSettings motor = servo_motor();  ///< of a servo
+    /// description of an esi device, and its name there; empty: the only one
+    std::string file{};
+    std::string device{};
+    std::shared_ptr<const esi::File> description{};  ///< the contents of `file`
+};
+
+}  // namespace hal::ethercat::devices
