@@ -2,10 +2,11 @@
 #include "ethercat/devices/dictionary.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <cstring>
 #include <stdexcept>
 
-#include "bus/config/object_address.hpp"
 #include "cia301/values.hpp"
 #include "ethercat/devices/bits.hpp"
 
@@ -25,6 +26,13 @@ std::uint16_t in_state(std::uint16_t right, State state) noexcept {
 /// Returns the bits of a basic type; 0 for texts and unknown types.
 std::uint16_t bits_of(std::uint16_t type) noexcept {
     return static_cast<std::uint16_t>(cia301::bits_of(static_cast<cia301::Type>(type)));
+}
+
+/// Formats an address: "0x6099:1".
+std::string text_of(std::uint16_t index, std::uint8_t sub) {
+    std::array<char, 16> text{};
+    std::snprintf(text.data(), text.size(), "0x%04X:%u", unsigned{index}, unsigned{sub});
+    return text.data();
 }
 
 }  // namespace
@@ -140,7 +148,7 @@ void Dictionary::bind(std::uint16_t index, std::uint8_t sub, std::uint8_t* value
         }
     }
     throw std::logic_error("cannot bind a value of " + std::to_string(bytes) + " bytes to object " +
-                           bus::object_text(index, sub) +
+                           text_of(index, sub) +
                            ": no entry of this size; add one before finish()");
 }
 
