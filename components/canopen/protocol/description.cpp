@@ -4,19 +4,17 @@
 #include <algorithm>
 #include <utility>
 
+#include "cia301/shorthand.hpp"
+
 namespace hal::canopen {
 
 namespace {
+using namespace cia301::shorthand;
+
 void put(std::vector<std::uint8_t>& to, const void* from, std::size_t size) {
     const auto* bytes = static_cast<const std::uint8_t*>(from);
     to.assign(bytes, bytes + size);
 }
-constexpr auto u8 = Type::unsigned8;
-constexpr auto u16 = Type::unsigned16;
-constexpr auto u32 = Type::unsigned32;
-constexpr auto rw = Access::read_write;
-constexpr auto ro = Access::read_only;
-constexpr auto fixed = Access::constant;
 }  // namespace
 
 EntryDescription& Description::add(std::uint16_t index, std::uint8_t sub, Type type, Access access,

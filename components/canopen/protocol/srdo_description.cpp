@@ -3,14 +3,13 @@
 
 #include <algorithm>
 
+#include "cia301/shorthand.hpp"
+
 namespace hal::canopen {
 
 namespace {
-constexpr auto u8 = Type::unsigned8;
-constexpr auto u16 = Type::unsigned16;
-constexpr auto u32 = Type::unsigned32;
-constexpr auto rw = Access::read_write;
-constexpr auto fixed = Access::constant;
+using namespace cia301::shorthand;
+
 constexpr std::size_t most_mapped = 16;
 
 template <class T>

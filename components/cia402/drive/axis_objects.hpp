@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "cia301/types.hpp"
+#include "cia301/shorthand.hpp"
 #include "cia402/drive/axis_values.hpp"
 
 namespace hal::canopen::cia402 {
@@ -28,10 +28,8 @@ struct ObjectRow {
 /// Calls f(row, value) for every object of the first axis. [setup]
 template <class F>
 void each_object(AxisValues& o, F&& f) {
+    using namespace cia301::shorthand;
     using namespace object;
-    constexpr auto rw = Access::read_write;
-    constexpr auto ro = Access::read_only;
-    constexpr auto fixed = Access::constant;
     constexpr auto no = ObjectRow::no_pdo;
     constexpr auto tx = ObjectRow::sent;
     constexpr auto rx = ObjectRow::received;

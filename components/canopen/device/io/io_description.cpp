@@ -3,6 +3,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "cia301/shorthand.hpp"
 #include "io.hpp"
 
 namespace hal::canopen {
@@ -36,18 +37,7 @@ void add(Description& d, unsigned count, const Row& row) {
     }
 }
 
-constexpr auto u8 = Type::unsigned8;
-constexpr auto u16 = Type::unsigned16;
-constexpr auto u32 = Type::unsigned32;
-
-constexpr auto boolean = Type::boolean;
-constexpr auto i8 = Type::integer8;
-constexpr auto i16 = Type::integer16;
-
-constexpr auto i32 = Type::integer32;
-constexpr auto real = Type::real32;
-constexpr auto rw = Access::read_write;
-constexpr auto ro = Access::read_only;
+using namespace cia301::shorthand;
 
 void add_digital_inputs(Description& d, unsigned bits) {
     const unsigned n = (bits + 7) / 8;
