@@ -3,19 +3,16 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
-#include <cmath>
-#include <cstdio>
-#include <limits>
 #include <map>
 #include <numeric>
 #include <set>
-#include <sstream>
 #include <type_traits>
 #include <utility>
 
 #include "hal/pin_type.hpp"
 #include "recording/mcap/bytes.hpp"
+#include "recording/mcap/csv_loader.hpp"
+#include "recording/mcap/missing_rows.hpp"
 #include "recording/mcap/reader.hpp"
 
 namespace hal::mcap {
@@ -103,19 +100,6 @@ private:
 
 std::string topic_text(const Channel& channel) {
     return "topic '" + channel.topic.substr(0, 60) + "'";
-}
-
-/// Returns "header.frame_id (string), name (string[]) and 2 more".
-std::string listed(const std::vector<std::string>& fields) {
-    constexpr std::size_t max_fields = 4;
-    std::string text;
-    for (std::size_t i = 0; i < fields.size() && i < max_fields; ++i) {
-        text += (i == 0 ? "" : ", ") + fields[i];
-    }
-    if (fields.size() > max_fields) {
-        text += " and " + std::to_string(fields.size() - max_fields) + " more";
-    }
-    return text;
 }
 
 /// The event in a message of rcl_interfaces/msg/Log: stamp, level, name, msg. Returns false when it
@@ -252,64 +236,6 @@ private:
     std::size_t bytes_ = 0;
 };
 
-/// Returns "0.25 s" for a time since the first row.
-std::string seconds(std::int64_t ns) {
-    char text[40];
-    std::snprintf(text, sizeof text, "%.9g s", static_cast<double>(ns) * 1e-9);
-    return text;
-}
-
-std::vector<std::string> names_of(const Table& table) {
-    std::vector<std::string> names;
-    for (const Column& column : table.columns) {
-        names.push_back(column.name);
-    }
-    return names;
-}
-
-/// Returns ", of '/hal/servo' (x, y)": the tables of a recording.
-std::string of_tables(const Recording& recording) {
-    std::vector<std::string> tables;
-    for (const Table& table : recording.tables) {
-        const std::string values = listed(names_of(table));
-        tables.push_back(
-            table.topic.empty() ? values : "'" + table.topic.substr(0, 60) + "' (" + values + ")");
-    }
-    return tables.empty() ? "" : ", of " + listed(tables);
-}
-
-bool has_rows(const Recording& recording) {
-    return std::any_of(recording.tables.begin(), recording.tables.end(),
-                       [](const Table& table) { return table.rows() != 0; });
-}
-
-/// Returns "rows after 0.25 s are missing, of '/hal/servo' (x, y)": what a file does not have that
-/// is not read to its end.
-std::string missing_rows(const Recording& recording) {
-    const std::string end = seconds(recording.end_ns() - recording.begin_ns());
-    const std::string rows = has_rows(recording) ? "rows after " + end : "all rows";
-    return rows + " are missing" + of_tables(recording);
-}
-
-/// Returns "rows from 0.25 s to 0.5 s are missing, ...": those of the damaged chunks of a file.
-std::string rows_of(const std::vector<ChunkIndex>& damaged, const Recording& recording) {
-    constexpr std::size_t max_named = 3;
-    const auto since_begin = [&](std::uint64_t ns) {
-        return seconds(static_cast<std::int64_t>(ns) - recording.begin_ns());
-    };
-    std::vector<std::string> spans;
-    for (std::size_t i = 0; i < damaged.size() && i < max_named; ++i) {
-        spans.push_back("from " + since_begin(damaged[i].begin_time) + " to " +
-                        since_begin(damaged[i].end_time));
-    }
-    if (damaged.size() > max_named) {
-        const std::size_t others = damaged.size() - max_named;
-        spans.push_back("in " + std::to_string(others) +
-                        (others == 1 ? " further chunk" : " further chunks"));
-    }
-    return "rows " + listed(spans) + " are missing" + of_tables(recording);
-}
-
 bool load_mcap(const std::string& path, Recording& to, std::string& problem,
                const LoadOptions& options) {
     Reader reader;
@@ -330,9 +256,8 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem,
         sort(table);
     }
     if (!is_whole) {
-        const bool is_empty = !has_rows(to);
-        to.missing = "'" + path + "': " + reader.problem() + "; " +
-                     (is_empty ? missing_rows(to) : rows_of(reader.damaged(), to));
+        to.missing =
+            "'" + path + "': " + reader.problem() + "; " + missing_rows(to, reader.damaged());
     } else if (reader.unfinished()) {
         to.missing = "'" + path + "' ends without a summary; " + missing_rows(to);
     }
@@ -345,240 +270,9 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem,
     return true;
 }
 
-std::vector<std::string> csv_words(const std::string& line) {
-    std::vector<std::string> words(1);
-    bool quoted = false;
-    for (std::size_t i = 0; i < line.size(); ++i) {
-        if (line[i] == '"') {
-            if (quoted && i + 1 < line.size() && line[i + 1] == '"') {
-                words.back() += line[i++];
-            } else {
-                quoted = !quoted;
-            }
-        } else if (line[i] == ',' && !quoted) {
-            words.emplace_back();
-        } else if (line[i] != '\r') {
-            words.back() += line[i];
-        }
-    }
-    return words;
-}
-
-bool number_of(const std::string& text, double& value) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return error == std::errc() && end == text.data() + text.size();
-}
-
-template <class Int>
-bool whole_number(const std::string& text, std::uint64_t& word) {
-    Int value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error == std::errc() && end == text.data() + text.size()) {
-        word = static_cast<std::uint64_t>(
-            static_cast<std::conditional_t<std::is_signed_v<Int>, std::int64_t, std::uint64_t>>(
-                value));
-        return true;
-    }
-    double real = 0;  // "1.0", "1e3": of another program
-    if (!number_of(text, real) || real != std::floor(real) || std::abs(real) > 0x1p53) return false;
-    if (real < static_cast<double>(std::numeric_limits<Int>::min()) ||
-        real > static_cast<double>(std::numeric_limits<Int>::max())) {
-        return false;
-    }
-    word = static_cast<std::uint64_t>(static_cast<std::int64_t>(real));
-    return true;
-}
-
-/// Reads a value of that type into `word`. Returns false, and keeps `word`, when the text is
-/// invalid.
-bool word_of(const std::string& text, hal_type type, std::uint64_t& word) {
-    return visit_type(type, [&]<class T>(std::type_identity<T>) {
-        if constexpr (std::is_same_v<T, bool>) {
-            std::uint64_t bit = 0;
-            if (!whole_number<std::uint8_t>(text, bit) || bit > 1) return false;
-            word = bit;
-        } else if constexpr (std::is_same_v<T, double>) {
-            double real = 0;
-            if (!number_of(text, real)) return false;
-            word = std::bit_cast<std::uint64_t>(real);
-        } else {
-            return whole_number<T>(text, word);
-        }
-        return true;
-    });
-}
-
 constexpr std::pair<std::string_view, hal_type> type_words[] = {
     {"bit", HAL_TYPE_BIT}, {"float", HAL_TYPE_FLOAT}, {"s32", HAL_TYPE_S32},
     {"u32", HAL_TYPE_U32}, {"s64", HAL_TYPE_S64},     {"u64", HAL_TYPE_U64}};
-
-/// What a reader of a table must know, though it was read; empty: nothing.
-std::string note_of_csv(std::size_t equal) {
-    if (equal == 0) return "";
-    return std::to_string(equal) + (equal == 1 ? " row has" : " rows have") +
-           " the time of the row before";
-}
-
-/// Columns of which a row has values together: those of one thread. Columns that share a row, or are
-/// connected by such columns, are a group.
-class ColumnGroups {
-public:
-    explicit ColumnGroups(std::size_t columns) : parents_(columns) {
-        std::iota(parents_.begin(), parents_.end(), std::size_t{0});
-    }
-    void join(std::size_t a, std::size_t b) { parents_[group(b)] = group(a); }
-    /// Returns the group of a column: one of its columns.
-    std::size_t group(std::size_t column) {
-        while (parents_[column] != column) {
-            parents_[column] = parents_[parents_[column]];
-            column = parents_[column];
-        }
-        return column;
-    }
-
-private:
-    std::vector<std::size_t> parents_;
-};
-
-/// Returns a table per group. `first_filled` has, for each row, a column that it has a value of; a
-/// row without any is in the first table.
-std::vector<Table> split(const Table& whole, const std::vector<std::size_t>& first_filled,
-                         ColumnGroups& groups) {
-    std::vector<Table> tables;
-    std::vector<std::vector<std::size_t>> columns;  // of each table, in the whole
-    std::map<std::size_t, std::size_t> table_of;  // group to table
-    std::set<std::size_t> filled;  // groups
-    for (const std::size_t column : first_filled) {
-        filled.insert(groups.group(column));
-    }
-    for (std::size_t c = 0; c < whole.columns.size(); ++c) {
-        std::size_t group = groups.group(c);
-        if (!filled.empty() && !filled.contains(group)) {
-            group = *filled.begin();  // a column without any value keeps its initial one
-        }
-        const auto [at, added] = table_of.try_emplace(group, tables.size());
-        if (added) {
-            tables.push_back({whole.topic, {}, {}, {}});
-            columns.emplace_back();
-        }
-        tables[at->second].columns.push_back(whole.columns[c]);
-        columns[at->second].push_back(c);
-    }
-    for (std::size_t row = 0; row < whole.rows(); ++row) {
-        const std::size_t t = table_of.at(groups.group(first_filled[row]));
-        tables[t].times_ns.push_back(whole.times_ns[row]);
-        for (const std::size_t c : columns[t]) {
-            tables[t].words.push_back(whole.word(row, c));
-        }
-    }
-    return tables;
-}
-
-/// Returns the number of rows with the time of the row before.
-std::size_t equal_times(const std::vector<Table>& tables) {
-    std::size_t count = 0;
-    for (const Table& table : tables) {
-        for (std::size_t row = 1; row < table.rows(); ++row) {
-            count += table.times_ns[row] == table.times_ns[row - 1];
-        }
-    }
-    return count;
-}
-
-bool load_csv(const std::string& path, Recording& to, std::string& problem,
-              const LoadOptions& options) {
-    const auto source = open_file(path, problem);
-    std::string text, line;
-    if (!source) return false;
-    constexpr std::uint64_t addressable =
-        std::numeric_limits<std::size_t>::max() / 2;  // on 32 bit less than the limit
-    if (source->size() > std::min(4 * options.most_bytes, addressable) ||
-        !source->read(0, static_cast<std::size_t>(source->size()), text)) {
-        problem = "'" + path + "' is too large, or cannot be read";
-        return false;
-    }
-    std::istringstream file(text);
-    std::getline(file, line);
-    const std::vector<std::string> names = csv_words(line);
-    if (names.size() < 2 || names[0] != "time_s") {
-        problem = "'" + path + "' is not a recording: its first column must be time_s";
-        return false;
-    }
-    Table table{"", {}, {}, {}};
-    for (std::size_t i = 1; i < names.size(); ++i) {
-        const auto earlier = names.begin() + static_cast<std::ptrdiff_t>(i);
-        if (std::find(names.begin(), earlier, names[i]) != earlier) {
-            problem = "'" + path + "', line 1: column '" + names[i] + "' occurs twice";
-            return false;
-        }
-        const auto type = options.types.find(names[i]);
-        table.columns.push_back(
-            {names[i], type == options.types.end() ? HAL_TYPE_FLOAT : type->second, ""});
-    }
-    std::vector<std::uint64_t> held(table.columns.size());
-    ColumnGroups groups(table.columns.size());
-    std::vector<std::size_t> first_filled;
-    bool cut = false;
-    for (std::size_t number = 2; std::getline(file, line); ++number) {
-        const std::vector<std::string> words = csv_words(line);
-        const std::string location = "'" + path + "', line " + std::to_string(number) + ": ";
-        double time_s = 0;
-        cut = file.eof();  // the line has no line end
-        if (cut && words.size() < names.size()) {
-            to.missing = location + "the line is cut off; ";
-            break;
-        }
-        if (words.size() != names.size() || !number_of(words[0], time_s) ||
-            !(std::abs(time_s) < 9e9)) {
-            problem = location + "not a row of " + std::to_string(names.size()) + " numbers";
-            return false;
-        }
-        std::size_t filled = 0;  // the first one; 0: none
-        for (std::size_t i = 1; i < words.size(); ++i) {
-            const hal_type type = table.columns[i - 1].type;
-            if (words[i].empty()) continue;  // as before
-            filled = filled == 0 ? i : filled;
-            if (word_of(words[i], type, held[i - 1])) {
-                groups.join(filled - 1, i - 1);
-                continue;
-            }
-            if (cut && i + 1 == words.size()) {
-                to.missing = location + "the line is cut off; ";
-                break;
-            }
-            const auto word = std::find_if(std::begin(type_words), std::end(type_words),
-                                           [type](const auto& one) { return one.second == type; });
-            if (type == HAL_TYPE_FLOAT) {
-                problem = location + "not a row of " + std::to_string(names.size()) + " numbers";
-            } else {
-                problem = location + "'" + words[i].substr(0, 40) + "' of '" + names[i] +
-                          "' is not a value of type " + std::string(word->first);
-            }
-            return false;
-        }
-        if (!to.missing.empty()) break;
-        const auto time_ns = static_cast<std::int64_t>(std::llround(time_s * 1e9));
-        if (time_ns < options.begin_ns || time_ns >= options.end_ns) continue;
-        first_filled.push_back(filled == 0 ? 0 : filled - 1);
-        table.times_ns.push_back(time_ns);
-        table.words.insert(table.words.end(), held.begin(), held.end());
-        if (table.words.size() * 8 <= options.most_bytes) continue;
-        problem = "'" + path + "' has more than " + std::to_string(options.most_bytes >> 20) +
-                  " MiB of values; choose a part of it";
-        return false;
-    }
-    to.tables = split(table, first_filled, groups);
-    if (!to.missing.empty()) {
-        to.missing += missing_rows(to);
-    } else if (cut) {
-        to.missing = "'" + path + "': the last line has no line end; its value of '" +
-                     names.back() + "' may be cut, and rows after it may be missing";
-    }
-    if (const std::string note = note_of_csv(equal_times(to.tables)); !note.empty()) {
-        to.note = "'" + path + "': " + note;
-    }
-    return true;
-}
 
 }  // namespace
 
@@ -587,6 +281,13 @@ std::optional<hal_type> type_of_word(std::string_view word) {
         if (own == word) return type;
     }
     return std::nullopt;
+}
+
+std::string_view word_of_type(hal_type type) {
+    for (const auto& [word, own] : type_words) {
+        if (own == type) return word;
+    }
+    return "";
 }
 
 double Table::real(std::size_t row, std::size_t column) const {

@@ -15,6 +15,8 @@ namespace hal::mcap {
 
 /// Returns the type of "bit", "float" or "s32", "u32", "s64", "u64".
 std::optional<hal_type> type_of_word(std::string_view word);
+/// Returns its inverse; "" for other types.
+std::string_view word_of_type(hal_type type);
 
 /// Rows of one channel: those of one thread.
 struct Table {
