@@ -17,49 +17,65 @@ struct MasterValue {
     std::string_view text;  // instead of a number
 };
 
+/// F000h: modular device profile.
+MasterValue modular_device(std::uint8_t sub) noexcept {
+    switch (sub) {
+    case 0: return {2, 1, {}};
+    case 1: return {1, 2, {}};  // distance of the objects of two slaves
+    case 2: return {static_cast<std::uint32_t>(most_slaves), 2, {}};
+    default: return {};
+    }
+}
+
+/// F020h to F02Fh: addresses of the slaves, 255 in each.
+MasterValue addresses(std::span<const GatewaySlave> slaves, std::size_t object,
+                      std::uint8_t sub) noexcept {
+    const std::size_t first = object * addresses_per_object;
+    const auto rest = slaves.subspan(std::min(first, slaves.size()));
+    const std::size_t count = std::min(rest.size(), addresses_per_object);
+    if (sub == 0) return {static_cast<std::uint32_t>(count), 1, {}};
+    return sub <= count ? MasterValue{rest[sub - 1U].station, 2, {}} : MasterValue{};
+}
+
+/// 8000h + n: what slave n is.
+MasterValue description(const GatewaySlave& slave, std::uint8_t sub) noexcept {
+    switch (sub) {
+    case 0: return {8, 1, {}};
+    case 1: return {slave.station, 2, {}};
+    case 5: return {slave.vendor, 4, {}};
+    case 6: return {slave.product, 4, {}};
+    case 7: return {slave.revision, 4, {}};
+    case 8: return {slave.serial, 4, {}};
+    default: return {};
+    }
+}
+
+/// 1018h: identity.
+MasterValue identity(std::uint8_t sub) noexcept {
+    if (sub == 0) return {4, 1, {}};
+    return sub <= 4 ? MasterValue{0, 4, {}} : MasterValue{};
+}
+
 MasterValue value_of(std::span<const GatewaySlave> slaves, std::uint16_t index,
                      std::uint8_t sub) noexcept {
-    if (index == 0x1000 && sub == 0) {
-        return {5000, 4, {}};  // modular device
+    constexpr std::uint32_t modular = 5000;
+    constexpr std::uint16_t first_addresses = 0xf020;
+    constexpr std::uint16_t last_addresses = 0xf02f;
+    constexpr std::uint16_t first_description = 0x8000;
+    switch (index) {
+    case 0x1000: return sub == 0 ? MasterValue{modular, 4, {}} : MasterValue{};
+    case 0x1008: return sub == 0 ? MasterValue{0, 0, "Halcyon EtherCAT master"} : MasterValue{};
+    case 0x1018: return identity(sub);
+    case 0xf000: return modular_device(sub);
+    default: break;
     }
-    if (index == 0x1008 && sub == 0) {
-        return {0, 0, "Halcyon EtherCAT master"};
+    if (index >= first_addresses && index <= last_addresses) {
+        return addresses(slaves, index - first_addresses, sub);
     }
-    if (index == 0x1018 && sub == 0) {
-        return {4, 1, {}};
-    }
-    if (index == 0x1018 && sub <= 4) {
-        return {0, 4, {}};
-    }
-    if (index == 0xf000 && sub <= 2) {
-        if (sub == 0) {
-            return {2, 1, {}};
-        }
-        const auto slaves_at_most = static_cast<std::uint32_t>(most_slaves);
-        return {sub == 1 ? 1U : slaves_at_most, 2, {}};
-    }
-    if (index >= 0xf020 && index <= 0xf02f) {
-        const std::size_t first = (index - 0xf020U) * addresses_per_object;
-        const std::size_t count =
-            slaves.size() <= first ? 0 : std::min(slaves.size() - first, addresses_per_object);
-        if (sub == 0) {
-            return {static_cast<std::uint32_t>(count), 1, {}};
-        }
-        return sub <= count ? MasterValue{slaves[first + sub - 1].station, 2, {}} : MasterValue{};
-    }
-    if (index >= 0x8000 && index - 0x8000U < std::min(slaves.size(), most_slaves)) {
-        const GatewaySlave& slave = slaves[index - 0x8000U];
-        switch (sub) {
-        case 0: return {8, 1, {}};
-        case 1: return {slave.station, 2, {}};
-        case 5: return {slave.vendor, 4, {}};
-        case 6: return {slave.product, 4, {}};
-        case 7: return {slave.revision, 4, {}};
-        case 8: return {slave.serial, 4, {}};
-        default: return {};
-        }
-    }
-    return {};
+    if (index < first_description) return {};
+    const std::size_t slave = index - first_description;
+    const bool exists = slave < std::min(slaves.size(), most_slaves);
+    return exists ? description(slaves[slave], sub) : MasterValue{};
 }
 
 }  // namespace

@@ -296,56 +296,79 @@ bool is_at_its_place(const Slave& want, const BusSlave& have) noexcept {
                                : have.position == want.position;
 }
 
+namespace {
+
+/// Returns the slave at the place of a configured one; nullptr: it is missing. Where several are,
+/// none of them is started.
+Device* find_present(Bus& bus, std::size_t configured) noexcept {
+    const Slave& want = bus.setup.slaves[configured];
+    Device* found = nullptr;
+    for (const std::uint16_t number : bus.by_position) {
+        Device& d = *bus.devices[number];
+        const bool is_free = d.slave.present && d.identified && d.slave.configured < 0;
+        if (!is_free || !is_at_its_place(want, d.slave)) continue;
+        if (found == nullptr) {
+            found = &d;
+            continue;
+        }
+        if (!d.refused) {
+            const bool by_device_id = want.identity.device_id.has_value();
+            bus.events.report(Event::duplicate_alias, static_cast<std::uint32_t>(configured),
+                              by_device_id ? d.slave.device_id : d.slave.alias, d.slave.position);
+        }
+        d.refused = true;
+        found->refused = true;
+    }
+    return found;
+}
+
+/// A slave that does not process LRW gets its process data by LRD and LWR.
+void respect_lrw(Bus& bus, std::size_t configured, const BusSlave& slave) noexcept {
+    constexpr std::uint16_t sii_no_lrw = 2;
+    const bool has_lrw =
+        (slave.features & registers::no_lrw) == 0 && (slave.sii_flags & sii_no_lrw) == 0;
+    if (has_lrw || bus.image.slave(configured).no_lrw || !bus.engine.idle()) return;
+    bus.image.set_no_lrw(configured);
+    bus.image.build();
+}
+
+/// Makes a device the configured slave, if it is like it; an optional one need not be.
+void assign(Bus& bus, std::size_t configured, Device& d) noexcept {
+    const Slave& want = bus.setup.slaves[configured];
+    d.slave.configured = static_cast<int>(configured);
+    if (!matches(bus, want, d.slave, &d)) {
+        if (want.optional) {
+            d.slave.configured = -1;
+            return;
+        }
+        d.refused = true;
+    }
+    d.slave.timeouts = want.timeouts;
+    d.slave.complete_access = want.complete_access;
+    d.slave.mailbox_status = nullptr;
+    bus.device_of[configured] = d.slave.number;
+    respect_lrw(bus, configured, d.slave);
+}
+
+}  // namespace
+
 void assign(Bus& bus) noexcept {
     for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {
         if (bus.device_of[n] >= 0) continue;
         const Slave& want = bus.setup.slaves[n];
-        Device* found = nullptr;
-        for (const std::uint16_t number : bus.by_position) {
-            Device& d = *bus.devices[number];
-            if (!d.slave.present || !d.identified || d.slave.configured >= 0) continue;
-            if (!is_at_its_place(want, d.slave)) continue;
-            if (found == nullptr) {
-                found = &d;
-                continue;
-            }
-            if (!d.refused) {
-                bus.events.report(Event::duplicate_alias, static_cast<std::uint32_t>(n),
-                                  want.identity.device_id ? d.slave.device_id : d.slave.alias,
-                                  d.slave.position);
-            }
-            d.refused = found->refused = true;  // ambiguous: neither is started
-        }
-        if (found == nullptr) {
-            if (!want.optional) {
-                bus.events.report(Event::slave_missing, static_cast<std::uint32_t>(n),
-                                  want.position, 0);
-            }
-            continue;
-        }
-        Device& d = *found;
-        d.slave.configured = static_cast<int>(n);
-        if (!matches(bus, want, d.slave, &d)) {
-            if (want.optional) {
-                d.slave.configured = -1;
-                continue;
-            }
-            d.refused = true;
-        }
-        d.slave.timeouts = want.timeouts;
-        d.slave.complete_access = want.complete_access;
-        d.slave.mailbox_status = nullptr;
-        bus.device_of[n] = d.slave.number;
-        if (((d.slave.features & registers::no_lrw) != 0 || (d.slave.sii_flags & 2) != 0) &&
-            !bus.image.slave(n).no_lrw && bus.engine.idle()) {
-            bus.image.set_no_lrw(n);
-            bus.image.build();
+        Device* const found = find_present(bus, n);
+        if (found != nullptr) {
+            assign(bus, n, *found);
+        } else if (!want.optional) {
+            bus.events.report(Event::slave_missing, static_cast<std::uint32_t>(n), want.position,
+                              0);
         }
     }
+    if (bus.setup.accept_other_slaves || bus.setup.slaves.empty()) return;
     for (const std::uint16_t number : bus.by_position) {
         Device& d = *bus.devices[number];
-        if (d.slave.present && d.identified && d.slave.configured < 0 && !d.refused &&
-            !bus.setup.accept_other_slaves && !bus.setup.slaves.empty()) {
+        const bool is_unknown = d.slave.present && d.identified && d.slave.configured < 0;
+        if (is_unknown && !d.refused) {
             bus.report(Event::unknown_slave, d, d.slave.vendor, d.slave.product);
         }
     }

@@ -50,6 +50,58 @@ void start(Bus& bus, Device& d) noexcept {
     bus.run(d, [&] { return boot(d.channel, bus, d); });
 }
 
+/// Returns the device of a configured slave; nullptr: it has none yet.
+Device* device_of(const Bus& bus, std::size_t configured) noexcept {
+    const int number = bus.device_of[configured];
+    return number < 0 ? nullptr : bus.devices[static_cast<std::size_t>(number)].get();
+}
+
+/// Returns a device that is away and belongs to no configured slave; nullptr: all are in use.
+Device* spare_device(const Bus& bus) noexcept {
+    for (const auto& d : bus.devices) {
+        if (!d->slave.present && d->slave.configured < 0) return d.get();
+    }
+    return nullptr;
+}
+
+/// A configured slave, and the device that it gets.
+struct Seat {
+    std::size_t configured = 0;
+    Device* device = nullptr;  // nullptr: no configured slave is like it
+};
+
+/// Returns the first of the configured slaves that are missing and like this one.
+Seat seat_of(Bus& bus, const BusSlave& found) noexcept {
+    for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {
+        const Slave& want = bus.setup.slaves[n];
+        Device* const before = device_of(bus, n);
+        if (before != nullptr && before->slave.present) continue;
+        const bool has_own_identity = want.identity.alias || want.identity.device_id;
+        const bool may_be_anywhere = want.optional && !has_own_identity;
+        if (!is_at_its_place(want, found) && !may_be_anywhere) continue;
+        if (!matches(bus, want, found, nullptr)) continue;
+        Device* const device = before != nullptr ? before : spare_device(bus);
+        if (device != nullptr) return {n, device};
+    }
+    return {};
+}
+
+/// Reports a slave that no configured one is like: the position is known, the slave is another one.
+void report_unknown(Bus& bus, const BusSlave& found) noexcept {
+    for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {
+        Device* const device = device_of(bus, n);
+        const Slave& want = bus.setup.slaves[n];
+        if (want.position != found.position || device == nullptr || device->slave.present) continue;
+        if (found.product != bus.unknown_product) {
+            matches(bus, want, found, device);  // reports the difference
+        }
+    }
+    if (std::exchange(bus.unknown_product, found.product) != found.product) {
+        bus.events.report(Event::unknown_slave, Events::of_position + found.position, found.vendor,
+                          found.product);
+    }
+}
+
 /// Identifies a slave without known address at a position, and makes it one of those that are
 /// missing. Returns its device, or -1.
 Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
@@ -64,65 +116,29 @@ Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
     if (a.wkc != 1) co_return -1;
     const bool identified = co_await identify(c, bus, found);
     if (!identified) co_return -1;
-    Device* place = nullptr;
-    int configured = -1;
-    for (std::size_t n = 0; n < bus.setup.slaves.size() && place == nullptr; ++n) {
-        const Slave& want = bus.setup.slaves[n];
-        Device* before = bus.device_of[n] >= 0
-                             ? bus.devices[static_cast<std::size_t>(bus.device_of[n])].get()
-                             : nullptr;
-        if (before != nullptr && before->slave.present) continue;
-        if (!is_at_its_place(want, found) &&
-            !(want.optional && !want.identity.alias && !want.identity.device_id)) {
-            continue;
-        }
-        if (!matches(bus, want, found, nullptr)) continue;
-        configured = static_cast<int>(n);
-        place = before;
-        if (place == nullptr) {
-            for (const auto& d : bus.devices) {
-                if (!d->slave.present && d->slave.configured < 0) {
-                    place = d.get();
-                    break;
-                }
-            }
-        }
-    }
-    if (place == nullptr) {
-        // the position is known, the slave is another one
-        for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {
-            const int device = bus.device_of[n];
-            if (bus.setup.slaves[n].position != position ||
-                (device >= 0 && bus.devices[static_cast<std::size_t>(device)]->slave.present)) {
-                continue;
-            }
-            if (device >= 0 && found.product != bus.unknown_product) {
-                matches(bus, bus.setup.slaves[n], found,
-                        bus.devices[static_cast<std::size_t>(device)].get());
-            }
-        }
-        if (std::exchange(bus.unknown_product, found.product) != found.product) {
-            bus.events.report(Event::unknown_slave, Events::of_position + position, found.vendor,
-                              found.product);
-        }
+    const Seat seat = seat_of(bus, found);
+    if (seat.device == nullptr) {
+        report_unknown(bus, found);
         co_return -1;
     }
-    Device& d = *place;
+    Device& d = *seat.device;
+    const Slave& want = bus.setup.slaves[seat.configured];
     found.station = d.slave.station;
     found.number = d.slave.number;
-    found.configured = configured;
+    found.configured = static_cast<int>(seat.configured);
     found.present = true;
-    found.timeouts = bus.setup.slaves[static_cast<std::size_t>(configured)].timeouts;
-    found.complete_access = bus.setup.slaves[static_cast<std::size_t>(configured)].complete_access;
+    found.timeouts = want.timeouts;
+    found.complete_access = want.complete_access;
     put(c.data(), found.station);
     a = co_await c.exchange(Command::fpwr, at_station(spare_station, registers::station_address),
                             2);
     if (a.wkc != 1) co_return -1;
     d.slave = found;
-    bus.device_of[static_cast<std::size_t>(configured)] = d.slave.number;
+    bus.device_of[seat.configured] = d.slave.number;
     d.identified = true;
     d.refused = false;
-    d.clock_set = d.synchronised = false;
+    d.clock_set = false;
+    d.synchronised = false;
     d.status.online = true;
     bus.unknown_product = 0;
     co_return d.slave.number;
@@ -218,10 +234,10 @@ static Task<void> start_line(Channel& c, Bus& bus) noexcept {
 
 /// What one look at the line shows.
 struct Look {
-    unsigned count = 0;         ///< slaves that answer
-    unsigned present = 0;       ///< slaves that are known
-    std::uint16_t states = 0;   ///< the OR of their AL status
-    bool at_rest = true;        ///< no slave is in start-up
+    unsigned count = 0;  ///< slaves that answer
+    unsigned present = 0;  ///< slaves that are known
+    std::uint16_t states = 0;  ///< the OR of their AL status
+    bool at_rest = true;  ///< no slave is in start-up
 };
 
 /// Counts the slaves that answer and those that are known.

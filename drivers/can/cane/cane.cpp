@@ -352,67 +352,89 @@ private:
             whole[13] != (ether_type & 0xff)) {
             return Counting::add(counting_.errors);
         }
-        ethernet::Address to, from;
-        std::copy_n(whole.begin(), 6, to.begin());
-        std::copy_n(whole.begin() + 6, 6, from.begin());
+        Sender sender;
+        std::copy_n(whole.begin() + 6, 6, sender.address.begin());
+        sender.time_ns = arrival.time_ns;
         // a multicast source address is invalid
-        if ((from[0] & 1) != 0) return Counting::add(counting_.errors);
+        if (is_multicast(sender.address)) return Counting::add(counting_.errors);
         load_.add(whole.size());
-        using Origin = ethernet::Discipline::Origin;
-        Origin origin = Origin::plausible;
         if (discipline_) {
             discipline_->with([&](const ethernet::Discipline& d) {
-                origin = d.origin(from, arrival.time_ns, whole.size());
+                sender.origin = d.origin(sender.address, arrival.time_ns, whole.size());
             });
         }
-        if (origin == Origin::unknown_station) {
-            return reject(Rejected::Why::unknown_station, 0, from, arrival.time_ns);
+        if (sender.origin == ethernet::Discipline::Origin::unknown_station) {
+            return reject(Rejected::Why::unknown_station, 0, sender.address, arrival.time_ns);
         }
-        /// Returns false for a command that is not from the master, or not in its slot.
-        const auto is_allowed = [&](const Frame& f) {
-            if (Guard::negotiates(f)) {
-                guard_.release();
-            }
-            if (!Guard::commands(f)) return true;
-            if (origin == Origin::out_of_slot) {
-                reject(Rejected::Why::out_of_slot, f.id, from, arrival.time_ns);
-                return false;
-            }
-            return guard_.may_command(from, arrival.time_ns) ||
-                   (reject(Rejected::Why::not_the_master, f.id, from, arrival.time_ns), false);
-        };
-        Frame f;
         if (settings_.format == Format::single) {
-            if (get_single(whole.subspan(ethernet::header_bytes), settings_.order, f) !=
-                Wrong::none) {
-                return Counting::add(counting_.errors);
-            }
-            if (is_allowed(f)) {
-                keep(f, from, arrival.time_ns);
-            }
-            return;
+            take_single(whole.subspan(ethernet::header_bytes), sender);
+        } else {
+            take_packed(whole, sender);
         }
+    }
+
+    /// Who has sent an Ethernet frame, and when it arrived.
+    struct Sender {
+        ethernet::Address address{};
+        std::int64_t time_ns = 0;
+        ethernet::Discipline::Origin origin = ethernet::Discipline::Origin::plausible;
+    };
+
+    static bool is_multicast(const ethernet::Address& address) noexcept {
+        return (address[0] & 1) != 0;
+    }
+
+    /// Returns false for a command that is not from the master, or not in its slot.
+    bool is_allowed(const Frame& f, const Sender& sender) noexcept {
+        if (Guard::negotiates(f)) {
+            guard_.release();
+        }
+        if (!Guard::commands(f)) return true;
+        if (sender.origin == ethernet::Discipline::Origin::out_of_slot) {
+            reject(Rejected::Why::out_of_slot, f.id, sender.address, sender.time_ns);
+            return false;
+        }
+        if (guard_.may_command(sender.address, sender.time_ns)) return true;
+        reject(Rejected::Why::not_the_master, f.id, sender.address, sender.time_ns);
+        return false;
+    }
+
+    void take_single(std::span<const std::uint8_t> bytes, const Sender& sender) noexcept {
+        Frame f;
+        if (get_single(bytes, settings_.order, f) != Wrong::none) {
+            return Counting::add(counting_.errors);
+        }
+        if (is_allowed(f, sender)) {
+            keep(f, sender.address, sender.time_ns);
+        }
+    }
+
+    /// Takes all CAN frames of an Ethernet frame, or none when one of them is not allowed.
+    void take_packed(std::span<const std::uint8_t> whole, const Sender& sender) noexcept {
+        const ethernet::Address& from = sender.address;
+        const bool to_many = (whole[0] & 1) != 0;
         Unpacker packed;
         switch (packed.open(whole, settings_.key ? &*settings_.key : nullptr)) {
         case Wrong::none: break;
         case Wrong::not_signed:
-            return reject(Rejected::Why::unsigned_frame, 0, from, arrival.time_ns);
-        case Wrong::tag: return reject(Rejected::Why::wrong_tag, 0, from, arrival.time_ns);
+            return reject(Rejected::Why::unsigned_frame, 0, from, sender.time_ns);
+        case Wrong::tag: return reject(Rejected::Why::wrong_tag, 0, from, sender.time_ns);
         default: return Counting::add(counting_.errors);
         }
         if (settings_.key && !replays_.fresh(from, packed.counter())) {
-            return reject(Rejected::Why::replayed, 0, from, arrival.time_ns);
+            return reject(Rejected::Why::replayed, 0, from, sender.time_ns);
         }
+        Frame f;
         for (Unpacker look = packed; look.next(f);) {
-            if (!is_allowed(f)) return;
+            if (!is_allowed(f, sender)) return;
         }
-        const auto verdict = streams_.take(from, (to[0] & 1) != 0, packed.stamp(), arrival.time_ns);
+        const auto verdict = streams_.take(from, to_many, packed.stamp(), sender.time_ns);
         if (verdict.lost != 0) {
             Counting::add(counting_.lost, verdict.lost);
         }
         if (!verdict.fresh) return Counting::add(counting_.errors);
         while (packed.next(f)) {
-            keep(f, from, arrival.time_ns);
+            keep(f, from, sender.time_ns);
         }
     }
 

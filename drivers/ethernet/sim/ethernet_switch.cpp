@@ -389,23 +389,26 @@ void Switch::deliver(const Event& e, Station& s) noexcept {
     }
 }
 
-/// Applies disturbances to the frame. Returns true when nothing of it proceeds unchanged. Those of
-/// one receiver apply at its line, all others where the frame leaves.
-bool Switch::disturbed(Event& e, bool only_one) noexcept {
+/// Returns true when the disturbance is for frames like this one, whenever it is active.
+bool Switch::is_meant(const Disturbance& w, const Event& e, bool only_one) noexcept {
     const Bytes& bytes = e.from->places[e.slot].bytes;
+    if ((w.to >= 0) != only_one || (only_one && w.to != e.to)) return false;
+    if (w.type != 0 && w.type != type_of(bytes)) return false;
+    if (w.from >= 0 && w.from != e.from->station->number) return false;
+    if (w.at == 0) return true;
+    const bool has_word = w.at + std::size_t{2} <= e.length;
+    return has_word && (bytes[w.at] << 8 | bytes[w.at + 1U]) == w.is;
+}
+
+/// Counts the frame in all disturbances that it matches. Returns the first that hits it; nullptr:
+/// none does.
+Switch::Active* Switch::find_disturbance(const Event& e, bool only_one) noexcept {
     Active* found = nullptr;
-    for (auto& d : disturbances) {
+    for (Active& d : disturbances) {
         const Disturbance& w = d.what;
-        if ((w.to >= 0) != only_one || (only_one && w.to != e.to)) continue;
-        if ((w.type != 0 && w.type != type_of(bytes)) ||
-            (w.from >= 0 && w.from != e.from->station->number)) {
-            continue;
-        }
-        if (w.at != 0 &&
-            (w.at + std::size_t{2} > e.length || (bytes[w.at] << 8 | bytes[w.at + 1U]) != w.is)) {
-            continue;
-        }
-        if (e.time_ns < w.from_ns || e.time_ns >= w.until_ns || d.hits >= w.count) continue;
+        if (!is_meant(w, e, only_one)) continue;
+        const bool is_active = e.time_ns >= w.from_ns && e.time_ns < w.until_ns;
+        if (!is_active || d.hits >= w.count) continue;
         ++d.matched;
         const bool hit = w.every != 0 ? d.matched % w.every == 0
                                       : static_cast<double>(draw() >> 11) * 0x1p-53 < w.probability;
@@ -413,6 +416,13 @@ bool Switch::disturbed(Event& e, bool only_one) noexcept {
         ++d.hits;
         found = &d;
     }
+    return found;
+}
+
+/// Applies disturbances to the frame. Returns true when nothing of it proceeds unchanged. Those of
+/// one receiver apply at its line, all others where the frame leaves.
+bool Switch::disturbed(Event& e, bool only_one) noexcept {
+    const Active* const found = find_disturbance(e, only_one);
     if (found == nullptr) return false;
     const Disturbance& w = found->what;
     switch (w.fault) {

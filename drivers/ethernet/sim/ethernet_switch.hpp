@@ -176,6 +176,8 @@ private:
     void pass_on(const Event&) noexcept;
     void deliver(const Event&, Station& to) noexcept;
     bool add_event(const Event&) noexcept;
+    static bool is_meant(const Disturbance&, const Event&, bool only_one) noexcept;
+    Active* find_disturbance(const Event&, bool only_one) noexcept;
     bool disturbed(Event&, bool only_one) noexcept;
     void release(const Event&) noexcept;
     void give_back(User&, std::uint32_t slot) noexcept;

@@ -169,40 +169,65 @@ std::string datagram_address(const DatagramView& d, bool passed) {
     return "";
 }
 
+namespace {
+
+/// Returns ": SAFE-OP, acknowledge": the state that the master requests.
+std::string control_text(const DatagramView& d) {
+    const bool acknowledges = (d.data[0] & 0x10) != 0;
+    return ": " + state_name(d.data[0] & 0x0fU) + (acknowledges ? ", acknowledge" : "");
+}
+
+/// Returns ": SAFE-OP + ERR 0x001B, text": the state of a slave, with the cause of an error.
+std::string status_text(const DatagramView& d) {
+    const std::string text = ": " + state_name(d.data[0]);
+    const bool has_error = (d.data[0] & 0x10) != 0;
+    const std::uint16_t code = d.length >= 6 ? get<std::uint16_t>(d.data + 4) : 0;
+    if (!has_error || code == 0) return text;
+    const std::string hexadecimal = fmt::format(" 0x{:04X}", code);
+    const AlStatusCode* row = al_status(code);
+    return text + (row ? fmt::format("{}, {}", hexadecimal, row->text) : hexadecimal);
+}
+
+/// Returns " 1, full": which sync manager, and the state of its buffer where that alone is read.
+std::string sync_manager_text(const DatagramView& d, std::uint16_t address) {
+    constexpr std::size_t bytes = 8;
+    constexpr std::size_t status = 5;
+    const std::size_t offset = address - registers::sync_manager;
+    const bool is_one = d.length < bytes * 9;
+    const bool is_status = offset % bytes == status && d.length == 1;
+    const std::string number = is_one ? fmt::format(" {}", offset / bytes) : "";
+    if (!is_status) return number;
+    const bool is_full = (d.data[0] & 0x08) != 0;
+    return number + (is_full ? ", full" : ", empty");
+}
+
+/// Returns what the bytes of a register mean, to be put behind its name.
+std::string value_text(const DatagramView& d, std::uint16_t address) {
+    constexpr std::uint16_t end_of_fmmus = 0x0700;
+    constexpr std::uint16_t end_of_sync_managers = 0x0880;
+    if (address == registers::al_control && d.length >= 1) return control_text(d);
+    if (address == registers::al_status && d.length >= 1) return status_text(d);
+    if (address >= registers::sync_manager && address < end_of_sync_managers) {
+        return sync_manager_text(d, address);
+    }
+    if (address >= registers::fmmu && address < end_of_fmmus) {
+        return fmt::format(" {}", (address - registers::fmmu) / 16);
+    }
+    if (address == registers::dc_system_time && d.length == 8) {
+        return fmt::format(": {} ns", get<std::uint64_t>(d.data));
+    }
+    return "";
+}
+
+}  // namespace
+
 std::string datagram_text(const DatagramView& d) {
     if (d.command == Command::nop || is_logical(d.command)) return "";
     const std::uint16_t address = d.register_address();
     if (address >= registers::process_data_memory) {
         return mailbox_text({d.data, d.length});
     }
-    std::string text = register_name(address);
-    if (address == registers::al_control && d.length >= 1) {
-        text +=
-            ": " + state_name(d.data[0] & 0x0fU) + ((d.data[0] & 0x10) != 0 ? ", acknowledge" : "");
-    }
-    if (address == registers::al_status && d.length >= 1) {
-        text += ": " + state_name(d.data[0]);
-        const std::uint16_t code = d.length >= 6 ? get<std::uint16_t>(d.data + 4) : 0;
-        if ((d.data[0] & 0x10) != 0 && code != 0) {
-            const AlStatusCode* row = al_status(code);
-            text += fmt::format(" 0x{:04X}{}{}", code, row == nullptr ? "" : ", ",
-                                row == nullptr ? "" : row->text);
-        }
-    }
-    if (address >= registers::sync_manager && address < 0x0880 && d.length < 8 * 9) {
-        text += fmt::format(" {}", (address - registers::sync_manager) / 8);
-    }
-    if (address >= registers::sync_manager && address < 0x0880 && address % 8 == 5 &&
-        d.length == 1) {
-        text += (d.data[0] & 0x08) != 0 ? ", full" : ", empty";
-    }
-    if (address >= registers::fmmu && address < 0x0700) {
-        text += fmt::format(" {}", (address - registers::fmmu) / 16);
-    }
-    if (address == registers::dc_system_time && d.length == 8) {
-        text += fmt::format(": {} ns", get<std::uint64_t>(d.data));
-    }
-    return text;
+    return register_name(address) + value_text(d, address);
 }
 
 }  // namespace hal::tools
