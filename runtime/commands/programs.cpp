@@ -297,6 +297,8 @@ bool wait_for_name(Context& context, const Plan& plan, Timeout& timeout) {
 
 constexpr const char* initializing = "has registered it and is initializing";
 
+constexpr char nothing_registered[] = "has not registered a component";
+
 /// Why the awaited component is not ready yet: what the program has done so far.
 std::string progress(Context& context, const Plan& plan, pid_t pid) {
     const auto* const entry = context.programs.find(plan.name);
@@ -305,16 +307,36 @@ std::string progress(Context& context, const Plan& plan, pid_t pid) {
         return "could not register: " + why;
     }
     const auto names = context.programs.registered_by(pid);
-    if (names.empty()) return "has not registered a component";
+    if (names.empty()) return nothing_registered;
     return "has registered " + (names.size() == 1 ? "'" + names[0] + "'" : listed(names)) +
            " instead";
+}
+
+/// Reports that the program has ended before its component was ready. `last`: what it had done.
+void report_ended_early(Context& context, const Plan& plan, bool registered,
+                        const std::string& last) {
+    std::string why = "it " + last;
+    if (registered) {
+        why = "it registered the component and ended while it was initializing";
+    } else if (last == nothing_registered) {
+        why = "a program registers over the control socket; omit -W if it does not";
+    }
+    context.diagnostics.error("program-ended", context.span(plan.program),
+                              "'" + context.argument(plan.program) +
+                                  "' ended before a component '" + plan.name + "' was ready",
+                              "", why);
+}
+
+/// Returns true for a component that comes back: its program is restarted, or has not ended yet.
+bool may_return(const Programs::Entry& entry) {
+    return entry.dead() && (entry.restarts.due_ns != 0 || !entry.ended());
 }
 
 /// `fresh`: no dead program had the name before.
 void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64_t number,
                       bool fresh, Timeout& timeout) {
     const std::string& program = context.argument(plan.program);
-    std::string last = "has not registered a component";
+    std::string last = nothing_registered;
     while (true) {
         const auto* const child = context.programs.find(pid);
         if (child || !context.programs.refusal_of(pid).empty()) {
@@ -324,17 +346,10 @@ void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64
         if (entry && entry->ready()) return;
         const auto* const named = plan.any_name ? nullptr : context.programs.find(plan.name);
         if (named && named->ready()) return;
-        if (!child &&
-            !(entry && entry->dead() && (entry->restarts.due_ns != 0 || !entry->ended()))) {
-            const bool registered = last == initializing || (fresh && entry && entry->dead());
-            context.diagnostics.error(
-                "program-ended", context.span(plan.program),
-                "'" + program + "' ended before a component '" + plan.name + "' was ready", "",
-                registered ? "it registered the component and ended while it was initializing"
-                : last == "has not registered a component"
-                    ? "a program registers over the control socket; omit -W if it does not"
-                    : "it " + last);
-            if (fresh && entry && entry->dead()) {
+        if (!child && !(entry && may_return(*entry))) {
+            const bool is_lost = fresh && entry && entry->dead();
+            report_ended_early(context, plan, last == initializing || is_lost, last);
+            if (is_lost) {
                 context.programs.give_up(*entry);
             }
             return;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
+#include <utility>
 
 #include "text/numbers.hpp"
 
@@ -108,6 +109,37 @@ std::string format_trigger(const Trigger& trigger, const std::vector<Channel>& c
                        trigger.level);
 }
 
+/// Returns the hysteresis of an edge: a share of the range of the values so far.
+double TriggerSearch::margin_with(double value) {
+    const bool is_first = least_ > most_;
+    least_ = is_first ? value : std::min(least_, value);
+    most_ = is_first ? value : std::max(most_, value);
+    const double range = most_ - least_;
+    return bit_ || !std::isfinite(range) ? 0 : hysteresis * range;
+}
+
+/// Returns true when this sample completes an edge of the wanted direction.
+bool TriggerSearch::crosses(double value, double margin) {
+    const double level = trigger_.level;
+    const bool rose = below_ && value >= level && trigger_.edge != Edge::falling;
+    const bool fell = above_ && value <= level && trigger_.edge != Edge::rising;
+    // A sample on the level may belong to both sides, but does not re-arm the edge that it is part
+    // of.
+    below_ = value < level - margin || (below_ && value < level);
+    above_ = value > level + margin || (above_ && value > level);
+    return rose || fell;
+}
+
+/// Returns when the straight line between two samples meets the level.
+std::int64_t TriggerSearch::crossing_ns(const Sample& before, const Sample& after) const {
+    if (bit_ || before.value == after.value) return after.time_ns;
+    const double step = after.value - before.value;
+    const double part = std::clamp((trigger_.level - before.value) / step, 0.0, 1.0);
+    if (!std::isfinite(part)) return after.time_ns;
+    const auto between = static_cast<double>(after.time_ns - before.time_ns);
+    return before.time_ns + std::llround(part * between);
+}
+
 std::optional<std::int64_t> TriggerSearch::feed(Sample sample) {
     if (std::isnan(sample.value)) {
         rearm();  // an edge across an invalid value is not one
@@ -116,38 +148,19 @@ std::optional<std::int64_t> TriggerSearch::feed(Sample sample) {
     if (trigger_.magnitude) {
         sample.value = std::abs(sample.value);
     }
-    const bool first = least_ > most_;
-    least_ = first ? sample.value : std::min(least_, sample.value);
-    most_ = first ? sample.value : std::max(most_, sample.value);
-    const double margin =
-        bit_ || !std::isfinite(most_ - least_) ? 0 : hysteresis * (most_ - least_);
-    const double x = sample.value;
-    const double level = trigger_.level;
-    if (trigger_.edge == Edge::above) {
-        return x >= level ? std::optional(sample.time_ns) : std::nullopt;
-    }
-    if (trigger_.edge == Edge::below) {
-        return x <= level ? std::optional(sample.time_ns) : std::nullopt;
-    }
-    const bool rose = below_ && x >= level && trigger_.edge != Edge::falling;
-    const bool fell = above_ && x <= level && trigger_.edge != Edge::rising;
-    // A sample on the level may belong to both sides, but does not re-arm the edge that it is part
-    // of.
-    below_ = x < level - margin || (below_ && x < level);
-    above_ = x > level + margin || (above_ && x > level);
-    const std::optional<Sample> before = last_;
-    last_ = sample;
-    if (!rose && !fell) return std::nullopt;
-    if (bit_ || !before || before->value == x) return sample.time_ns;
-    const double part = std::clamp((level - before->value) / (x - before->value), 0.0, 1.0);
-    return std::isfinite(part)
-               ? before->time_ns +
-                     std::llround(part * static_cast<double>(sample.time_ns - before->time_ns))
-               : sample.time_ns;
+    const double margin = margin_with(sample.value);
+    const auto at = std::optional(sample.time_ns);
+    if (trigger_.edge == Edge::above) return sample.value >= trigger_.level ? at : std::nullopt;
+    if (trigger_.edge == Edge::below) return sample.value <= trigger_.level ? at : std::nullopt;
+    const bool has_crossed = crosses(sample.value, margin);
+    const std::optional<Sample> before = std::exchange(last_, sample);
+    if (!has_crossed) return std::nullopt;
+    return before ? crossing_ns(*before, sample) : sample.time_ns;
 }
 
 void TriggerSearch::rearm() {
-    below_ = above_ = false;
+    below_ = false;
+    above_ = false;
     last_.reset();
 }
 

@@ -51,6 +51,10 @@ public:
     double most() const { return most_; }
 
 private:
+    double margin_with(double value);
+    bool crosses(double value, double margin);
+    std::int64_t crossing_ns(const Sample& before, const Sample& after) const;
+
     Trigger trigger_;
     bool bit_;
     bool below_ = false;

@@ -116,79 +116,99 @@ bool Supervision::set_up() {
     return true;
 }
 
-bool Supervision::by_heartbeat(std::string& why_not) {
+/// Returns the node whose heartbeat an entry of 1016h expects; 0: the entry is not in use.
+unsigned Supervision::node_in(std::uint32_t entry) {
+    return (entry & 0xffff) == 0 ? 0U : entry >> 16 & 0xff;
+}
+
+/// Reads the entries of the drive's heartbeat consumer; none when it has no such object. Returns
+/// false when the bus failed.
+bool Supervision::read_consumer(std::vector<std::uint32_t>& entries) {
     std::uint32_t count = 0;
-    const Read there = read(0x1016, 0, count);
-    if (there == Read::failed) return false;
-    count &= 0xff;
-    if (there == Read::missing || count == 0) {
+    const Read found = read(0x1016, 0, count);
+    if (found != Read::value) return found == Read::missing;
+    entries.resize(count & 0xff);
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+        if (read(0x1016, static_cast<std::uint8_t>(i + 1), entries[i]) == Read::failed) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/// Returns a node ID for our heartbeat that no other node sends; 0: none is free. Programs that start
+/// together begin with different IDs.
+std::uint8_t Supervision::free_node_id() const {
+    constexpr unsigned all = last_own - first_own + 1;
+    const auto start = static_cast<unsigned>(::getpid()) % all;
+    for (unsigned n = 0; n < all; ++n) {
+        const auto id = static_cast<std::uint8_t>(first_own + (start + n) % all);
+        if (!heartbeat_seen_[id] && id != node_) return id;
+    }
+    return 0;
+}
+
+/// Returns true for an entry that this program has left when it was killed.
+bool Supervision::is_left_over(std::uint32_t entry) const {
+    const unsigned id = node_in(entry);
+    if (id == own_) return true;
+    const bool is_chosen_here = settings_.own_node == 0 && id >= first_own && id <= last_own;
+    return is_chosen_here && !heartbeat_seen_[id];
+}
+
+/// Returns the entry for our heartbeat: the first free one, or the last one that was left over, with
+/// its node ID then. std::nullopt: all are in use.
+std::optional<std::size_t> Supervision::choose_entry(std::vector<std::uint32_t>& entries) {
+    std::optional<std::size_t> chosen;
+    for (std::size_t i = entries.size(); i > 0; --i) {
+        if (node_in(entries[i - 1]) == 0) {
+            chosen = i - 1;
+        }
+    }
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+        if (!is_left_over(entries[i])) continue;
+        chosen = i;
+        own_ = static_cast<std::uint8_t>(node_in(entries[i]));
+        entries[i] = 0;
+    }
+    return chosen;
+}
+
+bool Supervision::by_heartbeat(std::string& why_not) {
+    std::vector<std::uint32_t> entries;
+    if (!read_consumer(entries)) return false;
+    if (entries.empty()) {
         why_not = "it has no heartbeat consumer, 1016h";
         return true;
     }
     // receive other heartbeats
     station_.until([] { return false; },
                    std::max<std::int64_t>(began_ + listening_ns - monotonic_ns(), 0));
-    std::vector<std::uint32_t> entries(count + 1);
-    for (unsigned sub = 1; sub <= count; ++sub) {
-        if (read(0x1016, static_cast<std::uint8_t>(sub), entries[sub]) == Read::failed) {
-            return false;
-        }
+    if (settings_.own_node != 0 && heartbeat_seen_[settings_.own_node]) {
+        fail(options_, fmt::format("node {} is on this bus: our heartbeat needs a free node ID; "
+                                   "choose another --heartbeat-id",
+                                   settings_.own_node));
+        return false;
     }
-    const auto node_in = [](std::uint32_t entry) {
-        return (entry & 0xffff) == 0 ? 0U : entry >> 16 & 0xff;
-    };
-    if (settings_.own_node != 0) {
-        if (heartbeat_seen_[settings_.own_node]) {
-            fail(options_, fmt::format("node {} is on this bus: our heartbeat needs a free "
-                                       "node ID; choose another --heartbeat-id",
-                                       settings_.own_node));
-
-            return false;
-        }
-        own_ = settings_.own_node;
-    } else {
-        // Programs that start together begin with different IDs.
-        constexpr unsigned all = last_own - first_own + 1;
-        const auto start = static_cast<unsigned>(::getpid()) % all;
-        for (unsigned n = 0; n < all && own_ == 0; ++n) {
-            if (const auto id = static_cast<std::uint8_t>(first_own + (start + n) % all);
-                !heartbeat_seen_[id] && id != node_) {
-                own_ = id;
-            }
-        }
-        if (own_ == 0) {
-            why_not = fmt::format("no node ID from {} to {} is free for our heartbeat", first_own,
-                                  last_own);
-
-            return true;
-        }
-    }
-    unsigned sub = 0;
-    for (unsigned n = count; n >= 1; --n) {
-        if (node_in(entries[n]) == 0) {
-            sub = n;
-        }
-    }
-    for (unsigned n = 1; n <= count; ++n) {  // left by a killed instance of this program
-        if (const auto id = node_in(entries[n]);
-            id == own_ || (settings_.own_node == 0 && id >= first_own && id <= last_own &&
-                           !heartbeat_seen_[id])) {
-            sub = n;
-            own_ = static_cast<std::uint8_t>(id);
-            entries[n] = 0;
-        }
-    }
-    if (sub == 0) {
-        why_not = fmt::format("all {} entries of its heartbeat consumer, 1016h, are in use", count);
-
+    own_ = settings_.own_node != 0 ? settings_.own_node : free_node_id();
+    if (own_ == 0) {
+        why_not =
+            fmt::format("no node ID from {} to {} is free for our heartbeat", first_own, last_own);
         return true;
     }
+    const std::optional<std::size_t> chosen = choose_entry(entries);
+    if (!chosen) {
+        why_not = fmt::format("all {} entries of its heartbeat consumer, 1016h, are in use",
+                              entries.size());
+        return true;
+    }
+    const auto sub = static_cast<std::uint8_t>(*chosen + 1);
     const std::uint32_t entry =
         std::uint32_t{own_} << 16 | static_cast<std::uint32_t>(settings_.limit_ns / 1'000'000);
     bool failed = false;
     // Write zero first: some drives arm an entry only when it changes.
-    if (!write(0x1016, static_cast<std::uint8_t>(sub), 4, 0, failed) ||
-        !change(0x1016, static_cast<std::uint8_t>(sub), 4, entries[sub], entry, failed)) {
+    if (!write(0x1016, sub, 4, 0, failed) ||
+        !change(0x1016, sub, 4, entries[*chosen], entry, failed)) {
         why_not = "it rejects an entry in its heartbeat consumer, 1016h";
         return !failed;
     }

@@ -53,6 +53,11 @@ private:
     bool change(std::uint16_t index, std::uint8_t sub, unsigned bytes, std::uint32_t was,
                 std::uint32_t value, bool& failed);
     bool set_up();
+    static unsigned node_in(std::uint32_t entry);
+    bool read_consumer(std::vector<std::uint32_t>& entries);
+    std::uint8_t free_node_id() const;
+    bool is_left_over(std::uint32_t entry) const;
+    std::optional<std::size_t> choose_entry(std::vector<std::uint32_t>& entries);
     bool by_heartbeat(std::string& why_not);
     bool by_guarding(std::string& why_not);
     bool set_reaction(unsigned axis);
