@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
 
 namespace hal::ethercat::master {
 namespace {
@@ -34,6 +35,18 @@ bool accepts_segment(const Expected& expected, std::span<const std::uint8_t> pay
     return payload.size() >= coe::segment_data &&
            coe::service_of(payload.data()) == coe::Service::sdo_response &&
            (payload[2] & (coe::command::specifier | coe::command::toggle)) == expected.third;
+}
+
+/// Returns the reply that a segment of an object waits for.
+Expected segment_reply(std::uint16_t index, std::uint8_t sub, std::uint8_t command,
+                       std::uint8_t toggle) noexcept {
+    return {accepts_segment, index, sub, static_cast<std::uint32_t>(command | toggle)};
+}
+
+/// Returns the abort code in an accepted reply; nullopt: it is no abort.
+std::optional<std::uint32_t> abort_in(std::span<const std::uint8_t> payload) noexcept {
+    if (payload[2] != coe::command::abort) return std::nullopt;
+    return coe::read_sdo(payload)->value;
 }
 
 }  // namespace
@@ -86,8 +99,8 @@ Task<SdoResult> CoeClient::upload(Channel& channel, BusSlave& slave, std::uint16
     if (!result) co_return result;
 
     const auto payload = mailbox->reply().payload;
+    if (const auto code = abort_in(payload)) co_return aborted(*code);
     const coe::Sdo sdo = *coe::read_sdo(payload);
-    if (sdo.command == coe::command::abort) co_return aborted(sdo.value);
     if (sdo.expedited()) {
         const std::size_t bytes = sdo.expedited_bytes();
         if (bytes > to.size()) co_return refused(0, bytes);
@@ -143,8 +156,7 @@ Task<SdoResult> CoeClient::download(Channel& channel, BusSlave& slave, std::uint
         co_await mailbox->exchange(channel, slave, MailboxType::coe, length,
                                    {accepts_sdo, index, sub, coe::command::download_response});
     if (!result) co_return result;
-    const coe::Sdo sdo = *coe::read_sdo(mailbox->reply().payload);
-    if (sdo.command == coe::command::abort) co_return aborted(sdo.value);
+    if (const auto code = abort_in(mailbox->reply().payload)) co_return aborted(*code);
     if (first < from.size()) {
         result =
             co_await download_segments(channel, slave, *mailbox, index, sub, from.subspan(first));
@@ -167,11 +179,10 @@ Task<SdoResult> CoeClient::upload_segments(Channel& channel, BusSlave& slave, Sl
             coe::write_sdo(mailbox.body(slave).data(), coe::Service::sdo_request, request);
         const SdoResult result = co_await mailbox.exchange(
             channel, slave, MailboxType::coe, length,
-            {accepts_segment, index, sub,
-             static_cast<std::uint32_t>(coe::command::upload_segment_response | toggle)});
+            segment_reply(index, sub, coe::command::upload_segment_response, toggle));
         if (!result) co_return result;
         const auto payload = mailbox.reply().payload;
-        if (payload[2] == coe::command::abort) co_return aborted(coe::read_sdo(payload)->value);
+        if (const auto code = abort_in(payload)) co_return aborted(*code);
         const bool last = (payload[2] & coe::command::last_segment) != 0;
         const auto data = coe::segment_of(payload);
         // more or less than announced
@@ -209,11 +220,9 @@ Task<SdoResult> CoeClient::download_segments(Channel& channel, BusSlave& slave,
                                coe::command::download_segment, toggle != 0, rest.empty(), data);
         const SdoResult result = co_await mailbox.exchange(
             channel, slave, MailboxType::coe, length,
-            {accepts_segment, index, sub,
-             static_cast<std::uint32_t>(coe::command::download_segment_response | toggle)});
+            segment_reply(index, sub, coe::command::download_segment_response, toggle));
         if (!result) co_return result;
-        const auto payload = mailbox.reply().payload;
-        if (payload[2] == coe::command::abort) co_return aborted(coe::read_sdo(payload)->value);
+        if (const auto code = abort_in(mailbox.reply().payload)) co_return aborted(*code);
     }
     co_return succeeded();
 }
