@@ -31,13 +31,10 @@ void add_analog_inputs(Description&, std::span<const AnalogChannel>);
 /// Implements the objects. Channels `n` are counted from 0.
 class AnalogInputs final : public Handler {
 public:
+    // bits of 6150h
     static constexpr std::uint8_t not_valid = 0x01;
-
-public:
     static constexpr std::uint8_t too_high = 0x02;
-
-public:
-    static constexpr std::uint8_t too_low = 0x04;  // of 6150h
+    static constexpr std::uint8_t too_low = 0x04;
 
     /// Binds the values of `channels` channels, as many as were described. [setup]
     void attach(Device&, unsigned channels);
@@ -56,7 +53,6 @@ public:
 
     double field(unsigned n) const noexcept { return channels_[n].field; }
     double process(unsigned n) const noexcept;
-    double displayed(unsigned n, std::uint8_t part) noexcept;
     double net(unsigned n) const noexcept { return process(n) - double{channels_[n].tare}; }
 
     Abort reading(Entry&) noexcept override;
@@ -94,6 +90,7 @@ private:
         Time last = 0;
     };
     float* value(Channel&, std::uint8_t part) noexcept;
+    double displayed(unsigned n, std::uint8_t part) noexcept;
     void show(unsigned n) noexcept;
 
     std::vector<Channel> channels_;
