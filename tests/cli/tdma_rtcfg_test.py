@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # packages: canopen tdma
 """RTcfg between two processes on Ethernet: a station that has its address alone gets its schedule and a file from the master."""
+import re
 import signal
 import subprocess
 import unittest
@@ -138,7 +139,12 @@ class Rtcfg(Segment):
         self.wait_for_words("node", " s  runs: its slots may be used\n", 2)
         self.wait_for("m", "stations", "1")
         self.stop(node)
-        self.assertIn("TDMA: running, ", self.said("node"))
+        said = self.said("node")
+        self.assertIn("TDMA: running, ", said)
+        # The time of the lines and that of the summary begin together, before the schedule came.
+        runs = [float(t) for t in re.findall(r"([\d.]+) s  runs: ", said)]
+        (end,) = (float(t) for t in re.findall(r"(?m)^([\d.]+) s: \d+ frames sent", said))
+        self.assertGreaterEqual(end + 0.1, runs[-1], said)
         nobody = self.at(
             "x",
             HAL,

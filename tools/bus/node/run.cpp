@@ -240,23 +240,17 @@ public:
             node.faults().set(fault, setting);
         }
         if (!announce(id, about)) return 1;
-        began_ns_ = monotonic_ns();
-        now_ns_ = began_ns_;
-        end_ns_ = end_of(began_ns_);
+        now_ns_ = monotonic_ns();
         return station ? run_on_segment(node, *station) : run_on_link(node, about.simulated);
     }
 
 private:
-    std::int64_t end_of(std::int64_t began_ns) const {
-        return options_.for_ns >= 0 ? began_ns + options_.for_ns : INT64_MAX;
-    }
     bool over() const { return stop_.requested() || now_ns_ >= end_ns_; }
 
     /// Makes the station of a TDMA segment, if one is wanted; `link` is then its end of the bus.
     std::string make_station(std::string& link, std::unique_ptr<NodeStation>& station) {
         if (options_.tdma.empty()) return {};
-        const std::int64_t give_up = end_of(monotonic_ns());
-        const auto ended = [&] { return stop_.wait_ns(5'000'000) || monotonic_ns() >= give_up; };
+        const auto ended = [&] { return stop_.wait_ns(5'000'000) || monotonic_ns() >= end_ns_; };
         return make_tdma_station(options_, link, prefix_, ended, station);
     }
 
@@ -324,15 +318,16 @@ private:
     }
 
     StopRequest stop_;
-    const hal::LinePrefix prefix_ = hal::LinePrefix::time_since(monotonic_ns());
     const NodeOptions& options_;
     const NodeKind& kind_;
     canopen::Program& program_;
     const std::vector<Setting> settings_;
     std::size_t next_setting_ = 0;
-    std::int64_t began_ns_ = 0;
-    std::int64_t now_ns_ = 0;
-    std::int64_t end_ns_ = INT64_MAX;
+    /// Begins the time of lines, settings and `--for`, also of the wait for a TDMA segment.
+    const std::int64_t began_ns_ = monotonic_ns();
+    const std::int64_t end_ns_ = options_.for_ns >= 0 ? began_ns_ + options_.for_ns : INT64_MAX;
+    const hal::LinePrefix prefix_ = hal::LinePrefix::time_since(began_ns_);
+    std::int64_t now_ns_ = began_ns_;
     bool is_read_ = true;  // standard output is open
     std::string problem_;
 };
