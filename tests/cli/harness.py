@@ -41,6 +41,12 @@ def packages_left_out():
     return {one["name"] for one in json.loads(printed)["packages"] if not one["built"]}
 
 
+def lacks_a_package(errors):
+    """Whether the errors of a netlist name a component of a package that this build leaves out."""
+    named = re.search("(left out of|switched off in) this build", errors)
+    return named is not None and packages_left_out() != set()
+
+
 def needs_package(name):
     """Skips a test in a build without the package. For a file of which every test needs it: `# packages: NAME`."""
     return unittest.skipIf(name in packages_left_out(), f"this build leaves out {name}")

@@ -12,7 +12,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from harness import HAL, TIMEOUT, ROOT, SANITIZED
+from harness import HAL, ROOT, SANITIZED, TIMEOUT, lacks_a_package
 
 BUILD = HAL.parent.parent
 RUNUSER = shutil.which("runuser")
@@ -252,24 +252,32 @@ class Installed(unittest.TestCase):
                     "20ms",
                     cwd=(folder / machine).parent,
                 )
+                if lacks_a_package(done.stderr):
+                    self.skipTest("a package of this machine is left out of this build")
                 self.assertEqual(0, done.returncode, done.stdout + done.stderr)
                 self.assertNotIn("error", done.stderr)
+
+    def test_machines_run_in_real_time(self):
+        folder = self.prefix / MACHINES
         for machine in (
             "furuta/hang.hal",
             "vision-furuta/vision-furuta.hal",
             "canopen-axis/axis.hal",
         ):
-            done = self.ordinary(
-                self.hal,
-                "run",
-                folder / machine,
-                "--for",
-                "50ms",
-                "--no-picture",
-                cwd=(folder / machine).parent,
-            )
-            self.assertIn("in another terminal: hal shell", done.stdout, done.stderr)
-            self.assertNotIn("error", done.stderr)
+            with self.subTest(machine):
+                done = self.ordinary(
+                    self.hal,
+                    "run",
+                    folder / machine,
+                    "--for",
+                    "50ms",
+                    "--no-picture",
+                    cwd=(folder / machine).parent,
+                )
+                if lacks_a_package(done.stderr):
+                    self.skipTest("a package of this machine is left out of this build")
+                self.assertIn("in another terminal: hal shell", done.stdout, done.stderr)
+                self.assertNotIn("error", done.stderr)
 
     def test_every_component_loads(self):
         here = {path.stem for path in (self.prefix / "lib/halcyon/components").glob("*.so")}
@@ -353,7 +361,7 @@ class Installed(unittest.TestCase):
         broken = self.copy("broken")
         for library in broken.glob("lib/libhalcyon_link.so*"):
             library.unlink()
-        (self.home / "bus.hal").write_text("loadrt canopen\n")
+        (self.home / "bus.hal").write_text("loadrt can_send\n")
         said = self.ordinary(broken / "bin/hal", "check", "bus.hal", cwd=self.home).stderr
         self.assertIn(
             "is not a usable component: libhalcyon_link.so.0.1: cannot open shared object file: No such file or directory [bad-plugin]",

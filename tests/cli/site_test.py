@@ -103,7 +103,7 @@ class Site(Case):
             '["Diagnostics","two-writers","errors.html#two-writers"',
             '["pid","","reference/pid.html"',
             '["Commands","run","commands.html#run"',
-            '["Commands","can sdo read","commands.html#can-sdo-read"',
+            '["Commands","can dump","commands.html#can-dump"',
         ):
             self.assertIn(text, index)
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: scocan
 """halfiles/yair in two processes over udp: the robot and its PC."""
 import signal
 import unittest
