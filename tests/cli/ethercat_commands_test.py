@@ -214,7 +214,11 @@ class Objects(Ethercat):
             "hal ethercat foe-read: slave 3: file 'none': the slave ends the transfer with FoE error 0x8001 (file not found)\n",
             self.refused("foe-read", "-p", 3, "none"),
         )
-        self.assertIn("rejected by the mailbox", self.refused("foe-read", "-p", 1, "none"))
+        self.assertEqual(
+            "hal ethercat foe-read: slave 1: file 'none': mailbox error 0x0002 (protocol not supported); "
+            "the protocols of the slave are in: hal ethercat xml\n",
+            self.refused("foe-read", "-p", 1, "none"),
+        )
 
 
 class Configuration(Ethercat):

@@ -40,6 +40,10 @@ std::string al_words(std::int64_t code) {
 
 std::string abort_words(std::int64_t code) {
     const auto number = static_cast<std::uint32_t>(code);
+    if ((code & master::mailbox_error_flag) != 0) {
+        return "mailbox error " + hex(number, 4) + " (" +
+               to_string(static_cast<MailboxError>(number)) + ")";
+    }
     if (number == 0) return "no answer from its mailbox";
     return "SDO abort " + hex(code, 8) + " (" + coe::abort_text(number) + ")";
 }
@@ -79,18 +83,20 @@ std::string write_words(std::int64_t object, std::int64_t code, const master::Sl
     }
     std::string what = object_words(object);
     std::string why = abort_words(code);
+    const bool is_mailbox_error = (code & master::mailbox_error_flag) != 0;
     if (at->protocol == Protocol::soe) {
         what = std::string("IDN ") + (soe::is_product(at->index) ? "P-" : "S-") +
                std::to_string(soe::set_of(at->index)) + "-" +
                std::to_string(soe::number_of(at->index)) + " of drive " + std::to_string(at->sub);
-        if (code != 0) {
+        if (code != 0 && !is_mailbox_error) {
             why = "SoE error " + hex(code, 4) + " (" +
                   soe::error_text(static_cast<std::uint16_t>(code)) + ")";
         }
     } else if (at->protocol == Protocol::aoe) {
         what += " by AoE" + (at->port != 0 ? ", port " + std::to_string(at->port) : std::string());
-        if (code != 0 && std::string_view(coe::abort_text(static_cast<std::uint32_t>(code)))
-                             .starts_with("unknown")) {
+        if (code != 0 && !is_mailbox_error &&
+            std::string_view(coe::abort_text(static_cast<std::uint32_t>(code)))
+                .starts_with("unknown")) {
             why = "ADS error " + hex(code, 4);
         }
     } else if (at->protocol == Protocol::reg) {

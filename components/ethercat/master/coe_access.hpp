@@ -8,6 +8,7 @@
 
 #include "ethercat/master/bus_slave.hpp"
 #include "ethercat/master/channel.hpp"
+#include "ethercat/master/events.hpp"
 
 namespace hal::ethercat::master {
 
@@ -24,6 +25,13 @@ struct SdoResult {
     std::size_t length = 0;   ///< bytes of an upload
     explicit operator bool() const noexcept { return outcome == Outcome::done; }
 };
+
+/// Returns the code of a failed exchange as events carry it: the abort code, or
+/// mailbox_error_flag and the code of a mailbox error. [any]
+constexpr std::int64_t event_code(const SdoResult& result) noexcept {
+    const bool rejected = result.outcome == SdoResult::Outcome::refused && result.abort != 0;
+    return std::int64_t{result.abort} | (rejected ? mailbox_error_flag : 0);
+}
 
 /// SDO transfers with one slave (ETG.1000.6, clause 5.6.2). The buffers must outlive the task.
 class CoeAccess {

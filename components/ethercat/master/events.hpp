@@ -32,10 +32,10 @@ enum class Event : std::uint8_t {
     state_refused,                 ///< [State requested, AL status code]
     state_timeout,                 ///< [State requested, AL status]
     fell_back,                     ///< left its state by itself [AL status, AL status code]
-    startup_write_failed,          ///< [index << 8 | sub, abort code]
+    startup_write_failed,          ///< [index << 8 | sub, event_code()]
     no_eoe,  ///< configured, but the slave has no EoE [MailboxProtocols, -]
     eoe_failed,  ///< rejects its IP settings [eoe::Result; 0: no answer, -]
-    mapping_failed,  ///< [value << 24 | index << 8 | sub, abort code]
+    mapping_failed,  ///< [value << 24 | index << 8 | sub, event_code()]
     /// read back other than written [value << 24 | index << 8 | sub, value read]
     mapping_differs,
     too_many_entries,  ///< [PDO, entries]
@@ -72,6 +72,10 @@ enum class Event : std::uint8_t {
     /// in the state below OP that the setup names for it [State, ms since its start-up began]
     slave_settled,
 };
+
+/// Set in the second number of an event if its low half is the code of a mailbox error and not of
+/// an abort.
+inline constexpr std::int64_t mailbox_error_flag = std::int64_t{1} << 32;
 
 /// Receives events. [realtime] in the thread of the master's cycle
 class Events {

@@ -29,7 +29,7 @@ Task<SdoResult> write_value(Channel& c, Bus& bus, Device& d, std::uint16_t index
     if (!r) {
         bus.report(Event::mapping_failed, d,
                    static_cast<std::int64_t>(value) << 24 | index << 8 | static_cast<int>(sub),
-                   r.abort);
+                   event_code(r));
     }
     co_return r;
 }
@@ -59,7 +59,7 @@ Task<Compared> compare(Channel& c, Bus& bus, Device& d, std::uint16_t index, std
     std::uint32_t value = 0;
     SdoResult r = co_await read_value(c, bus, d, index, 0, value);
     if (!r) {
-        bus.report(Event::mapping_failed, d, index << 8, r.abort);
+        bus.report(Event::mapping_failed, d, index << 8, event_code(r));
         co_return Compared::failed;
     }
     if ((value & 0xff) != count) {

@@ -203,7 +203,7 @@ Task<bool> startup_writes(Channel& c, Bus& bus, Device& d, State before) noexcep
             r = co_await bus.coe.write_other(c, d.slave, w);
         }
         if (r) continue;
-        bus.report(Event::startup_write_failed, d, object, r.abort);
+        bus.report(Event::startup_write_failed, d, object, event_code(r));
         co_return false;
     }
     co_return true;

@@ -124,6 +124,13 @@ TEST(EthercatEventWords, Start_up_writes_name_value_and_line) {
               "slave 0 rejects 0x0007 for IDN P-0-150 of drive 1: SoE error 0x7004 (value is "
               "read-only); its description asks "
               "for it: check its `esi`");
+    constexpr std::int64_t unsupported = master::mailbox_error_flag | 2;
+    EXPECT_EQ(of(0x809601, unsupported),
+              "slave 0 rejects 0x0007 for IDN P-0-150 of drive 1: mailbox error 0x0002 (protocol "
+              "not supported); its description asks for it: check its `esi`");
+    EXPECT_EQ(of(0x606000, unsupported),
+              "slave 0 rejects 0x08 for 0x6060:0: mailbox error 0x0002 (protocol not supported); "
+              "correct or delete line 12 of the configuration");
     EXPECT_EQ(of(0x42000, 0),
               "slave 0 rejects 0x0007 for register 0x0420: it does not answer; correct or delete "
               "line 14 of the configuration");

@@ -2,6 +2,7 @@
 // `hal ethercat sdos`, `foe-read` and `foe-write`: the object dictionary and the files of one slave.
 #include <unistd.h>
 
+#include "bus/ethercat/mailbox_failure.hpp"
 #include "bus/ethercat/session.hpp"
 #include "bus/ethercat/words.hpp"
 #include "cli/output.hpp"
@@ -63,12 +64,8 @@ bool transfer_file(const EthercatFileOptions& options, EthercatSession& session,
             "the slave ends the transfer with FoE error 0x{:04X} ({}){}{}", request.result.abort,
             ethercat::foe::to_string(static_cast<ethercat::foe::Error>(request.result.abort)),
             progress.text[0] != '\0' ? ": " : "", progress.text.data());
-    } else if (finished && request.result.outcome == Outcome::timed_out) {
-        why = "no answer from its mailbox; see: hal ethercat states";
-    } else if (finished && request.result.outcome == Outcome::lost) {
-        why = "it no longer responds; check its supply and cable";
     } else if (finished) {
-        why = s.mailbox.usable() ? "rejected by the mailbox" : "the slave has no mailbox";
+        why = mailbox_failure_text(s, request.result);
     }
     fail(options, fmt::format("slave {}: file '{}': {}", s.position, name, why));
     if (options.boot && finished) {

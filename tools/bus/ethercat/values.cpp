@@ -9,6 +9,7 @@
 #include <fmt/core.h>
 #include <optional>
 
+#include "bus/ethercat/mailbox_failure.hpp"
 #include "bus/ethercat/session.hpp"
 #include "bus/ethercat/words.hpp"
 #include "cli/output.hpp"
@@ -135,18 +136,11 @@ std::optional<Bytes> value_bytes(const std::string& text, const ValueType& type)
 int fail_mailbox(const Options& options, const BusSlave& s, const std::string& what,
                  const ethercat::master::MailboxResult& result) {
     const std::string who = fmt::format("slave {}: {}: ", s.position, what);
-    switch (result.outcome) {
-    case Outcome::aborted:
-        return fail(options, fmt::format("{}SDO transfer aborted with code 0x{:08X}: {}", who,
-                                         result.abort, ethercat::coe::abort_text(result.abort)));
-    case Outcome::timed_out:
-        return fail(options, who + "no answer from its mailbox; see: hal ethercat states");
-    case Outcome::lost:
-        return fail(options, who + "it no longer responds; check its supply and cable");
-    default:
-        return fail(options, who + (s.mailbox.usable() ? "rejected by the mailbox"
-                                                       : "the slave has no mailbox"));
+    if (result.outcome != Outcome::aborted) {
+        return fail(options, who + mailbox_failure_text(s, result));
     }
+    return fail(options, fmt::format("{}SDO transfer aborted with code 0x{:08X}: {}", who,
+                                     result.abort, ethercat::coe::abort_text(result.abort)));
 }
 
 /// Returns the type that --type names, or that the slave reports; nullptr after printing the
