@@ -216,7 +216,7 @@ class Line(Case):
         self.write("servo.line", "coupler\nservo\nservo\n")
         self.node("--fault", "2:corrupt-every=41")
         for _ in range(3):
-            self.run_program("ethercat", "states", "eth:m0")
+            self.run_program("ethercat", "scan", "eth:m0")
         report = self.good("ethercat", "crc", "eth:m0")
         self.assertRegex(report, r"(?m)^ +2 +0 +[1-9]\d* +0 +0 +0$")
         self.assertIn("      check the cable between slave 2 port 0 and slave 1 port 1\n", report)

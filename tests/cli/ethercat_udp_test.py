@@ -140,6 +140,21 @@ class Udp(Case):
         )
         self.assertIn("PRE-OP", self.good("ethercat", "states", self.link))
 
+    def test_a_long_line_is_scanned_in_few_frames(self):
+        self.write("servo.line", "coupler\n" + "servo alias=7\n" * 29)
+        node = self.node()
+        slaves = json.loads(self.good("ethercat", "slaves", self.link, "--json"))
+        scanned = json.loads(self.good("ethercat", "scan", self.link, "--json"))
+        self.assertEqual(
+            (["Halcyon coupler"] + ["Halcyon servo"] * 29, ["INIT"] * 30, [0] + [7] * 29),
+            tuple([slave[key] for slave in slaves] for key in ("name", "state", "alias")),
+        )
+        self.assertEqual([0xFFFFFF] * 30, [slave["vendor"] for slave in slaves])
+        self.assertEqual([None, *range(29)], [slave["parent"] for slave in scanned])
+        self.finish(node)
+        frames = int(re.search(r"(\d+) frames passed", self.said(node))[1])
+        self.assertLess(frames, 3000, "both together; one datagram in a frame takes 20000")
+
     def test_a_second_master_is_named(self):
         self.node()
         self.machine()

@@ -104,6 +104,8 @@ bool EthercatAccess::open(const EthercatOptions& options, bool alone) {
     }
     ethernet::Options how;
     how.types = {ethercat::ethertype};
+    // an answer ends the wait when it arrives
+    how.policy = ethernet::Policy::block;
     auto opened = ethernet::open(address_, how);
     if (!opened) {
         fail(options, opened.problem);

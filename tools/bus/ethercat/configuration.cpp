@@ -112,6 +112,7 @@ bool read_bus_file(const Options& options, const std::string& path, config::Read
 int run_ethercat_pdos(const EthercatOptions& options) {
     EthercatWire wire;
     if (!wire.open(options) || !wire.without_arguments(options)) return 1;
+    wire.identify();
     std::string text, json;
     for (std::size_t n = 0; n < wire.size(); ++n) {
         const auto& c = wire.contents(n);
@@ -150,6 +151,7 @@ int run_ethercat_dc(const EthercatOptions& options) {
     namespace reg = ethercat::registers;
     EthercatWire wire;
     if (!wire.open(options) || !wire.without_arguments(options)) return 1;
+    wire.identify();
     std::string text, json;
     for (std::size_t n = 0; n < wire.size(); ++n) {
         const auto& s = wire.slave(n);

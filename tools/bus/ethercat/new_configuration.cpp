@@ -41,6 +41,7 @@ struct Source {
 /// Takes the slaves from a bus. Returns false after printing the reason.
 bool from_bus(const EthercatConfigOptions& options, const std::string& name, EthercatWire& wire,
               Source& to) {
+    wire.identify();
     for (std::size_t n = 0; n < wire.size(); ++n) {
         const auto& c = wire.contents(n);
         config::Found& found = to.slaves.emplace_back();

@@ -178,6 +178,7 @@ int run_ethercat_xml(const EthercatPositionOptions& options) {
 int run_ethercat_graph(const EthercatOptions& options) {
     EthercatWire wire;
     if (!wire.open(options) || !wire.without_arguments(options)) return 1;
+    wire.identify();
     const std::string text = topology_svg(wire);
     if (!options.json) return print(text) ? 0 : 1;
     return print(fmt::format("{{\"svg\":{}}}\n", json_string(text))) ? 0 : 1;

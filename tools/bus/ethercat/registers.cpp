@@ -197,6 +197,7 @@ int run_ethercat_alias(const EthercatPositionOptions& options) {
     }
     const auto* s = wire.chosen(options);
     if (s == nullptr) return 1;
+    wire.identify();
     for (std::size_t n = 0; *alias != 0 && n < wire.size(); ++n) {
         if (n != s->position && wire.contents(n).alias() == *alias) {
             return fail(options, fmt::format("slave {} has alias {} already; choose another one", n,

@@ -166,6 +166,7 @@ std::optional<State> bring(EthercatWire& wire, BusSlave& s, State target) {
 int run_ethercat_scan(const EthercatOptions& options) {
     EthercatWire wire;
     if (!wire.open(options) || !wire.without_arguments(options)) return 1;
+    wire.identify();
     const auto depth = [&](const BusSlave& s) {
         std::size_t count = 0;
         for (int at = s.parent; at >= 0 && count < wire.size();
@@ -195,6 +196,7 @@ int run_ethercat_scan(const EthercatOptions& options) {
 int run_ethercat_slaves(const EthercatOptions& options) {
     EthercatWire wire;
     if (!wire.open(options) || !wire.without_arguments(options)) return 1;
+    wire.identify();
     // the newest alias along the line, and how far behind it a slave is
     unsigned alias = 0;
     unsigned behind = 0;
@@ -233,6 +235,9 @@ int run_ethercat_states(const EthercatPositionOptions& options) {
     EthercatWire wire;
     if (!wire.open(options, target.has_value())) return 1;
     if (options.position >= 0 && wire.chosen(options) == nullptr) return 1;
+    if (target && options.position < 0) {
+        wire.identify();
+    }
     int code = 0;
     for (std::size_t n = 0; target && n < wire.size(); ++n) {
         if (options.position >= 0 && n != static_cast<std::size_t>(options.position)) continue;

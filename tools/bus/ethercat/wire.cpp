@@ -2,8 +2,8 @@
 #include "bus/ethercat/wire.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <fmt/core.h>
+#include <tuple>
 
 #include "cli/output.hpp"
 #include "ethercat/master/topology.hpp"
@@ -17,61 +17,34 @@ namespace reg = ethercat::registers;
 using ethercat::Command;
 using ethercat::get;
 
-constexpr std::int64_t answer_timeout_ns = 20'000'000;
-constexpr std::int64_t eeprom_timeout_ns = 100'000'000;
-constexpr unsigned tries_each = 3;
-constexpr std::uint16_t eeprom_busy = 0x8000;
-constexpr std::uint16_t eeprom_failed = 0x6000;
-constexpr std::uint16_t eeprom_wide = 0x0040;
+void set_state(ethercat::master::BusSlave& s, const WireDatagram& answer) {
+    if (!answer.accepted()) {
+        s.state = ethercat::State::none;
+        return;
+    }
+    s.state = static_cast<ethercat::State>(answer.data[0] & 0x0f);
+    s.al_failed = (answer.data[0] & ethercat::al_error) != 0;
+    s.al_code = get<std::uint16_t>(answer.data.data() + 4);
+}
 
-constexpr std::uint16_t eeprom_reads = 0x0100;
-constexpr std::uint16_t eeprom_writes = 0x0201;
+constexpr std::uint16_t al_status_bytes = 6;
 
 }  // namespace
-
-std::optional<std::uint16_t> EthercatWire::exchange(Command command, std::uint32_t address,
-                                                    std::span<std::uint8_t> data) {
-    for (unsigned n = 0; n < tries_each; ++n) {
-        std::array<std::uint8_t, ethercat::largest_frame_bytes> buffer;
-        ethercat::FrameWriter frame(buffer, access_.port().address());
-        ++index_;
-        std::uint8_t* to =
-            frame.add(command, index_, address, static_cast<std::uint16_t>(data.size()));
-        if (to == nullptr) return std::nullopt;
-        std::copy(data.begin(), data.end(), to);
-        access_.port().send(frame.finish(), {}, access_.now_ns());
-        const std::int64_t until = access_.now_ns() + answer_timeout_ns;
-        while (auto bytes = access_.receive(until)) {
-            ethercat::FrameReader reader(*bytes);
-            const auto d = reader.next();
-            const bool own = d && !d->more && d->command == command && d->index == index_ &&
-                             d->length == data.size() && d->register_address() == address >> 16;
-            if (!own) {
-                continue;  // of another master
-            }
-            std::copy_n(d->data, d->length, data.begin());
-            return d->wkc();
-        }
-    }
-    return std::nullopt;
-}
 
 std::optional<std::vector<std::uint8_t>> EthercatWire::read(std::size_t position,
                                                             std::uint16_t address,
                                                             std::uint16_t length) {
-    std::vector<std::uint8_t> bytes(length);
-    if (exchange(Command::aprd, ethercat::at_position(static_cast<unsigned>(position), address),
-                 bytes) != std::uint16_t{1}) {
-        return std::nullopt;
-    }
-    return bytes;
+    WireDatagram datagram = read_datagram(position, address, length);
+    exchange_.run({&datagram, 1});
+    if (!datagram.accepted()) return std::nullopt;
+    return datagram.data;
 }
 
 bool EthercatWire::write(std::size_t position, std::uint16_t address,
                          std::span<const std::uint8_t> bytes) {
-    std::vector<std::uint8_t> data(bytes.begin(), bytes.end());
-    return exchange(Command::apwr, ethercat::at_position(static_cast<unsigned>(position), address),
-                    data) == std::uint16_t{1};
+    WireDatagram datagram = write_datagram(position, address, bytes);
+    exchange_.run({&datagram, 1});
+    return datagram.accepted();
 }
 
 bool EthercatWire::write(std::size_t position, std::uint16_t address, std::uint16_t value) {
@@ -81,76 +54,51 @@ bool EthercatWire::write(std::size_t position, std::uint16_t address, std::uint1
 }
 
 void EthercatWire::read_state(ethercat::master::BusSlave& s) {
-    const auto bytes = read(s.position, reg::al_status, 6);
-    if (!bytes) return void(s.state = ethercat::State::none);
-    s.state = static_cast<ethercat::State>((*bytes)[0] & 0x0f);
-    s.al_failed = ((*bytes)[0] & ethercat::al_error) != 0;
-    s.al_code = get<std::uint16_t>(bytes->data() + 4);
-}
-
-bool EthercatWire::eeprom(std::size_t position, std::uint16_t command, std::uint32_t word,
-                          std::vector<std::uint8_t>& answer) {
-    std::uint8_t request[6];
-    ethercat::put(request, command);
-    ethercat::put(request + 2, word);
-    for (const std::int64_t until = now_ns() + eeprom_timeout_ns; now_ns() < until;) {
-        if (!write(position, reg::eeprom_control, request)) return false;
-        std::uint16_t control = eeprom_busy;
-        while ((control & eeprom_busy) != 0 && now_ns() < until) {
-            const auto bytes = read(position, reg::eeprom_control, 14);
-            if (!bytes) return false;
-            answer = *bytes;
-            control = get<std::uint16_t>(answer.data());
-        }
-        if ((control & (eeprom_busy | eeprom_failed)) == 0) return true;
-        // clears the error; a part that stores a word does not acknowledge
-        write(position, reg::eeprom_control, std::uint16_t{0});
-    }
-    return false;
+    WireDatagram datagram = read_datagram(s.position, reg::al_status, al_status_bytes);
+    exchange_.run({&datagram, 1});
+    set_state(s, datagram);
 }
 
 std::optional<std::vector<std::uint8_t>> EthercatWire::sii(std::size_t position,
                                                            std::size_t length) {
-    const auto owner = read(position, reg::eeprom_configuration, 1);
-    if (!owner) return std::nullopt;
-    const std::uint8_t to_master[] = {0};
-    if ((*owner)[0] != 0 && !write(position, reg::eeprom_configuration, to_master)) {
-        return std::nullopt;
-    }
-    std::vector<std::uint8_t> bytes, answer;
-    bool good = true;
-    while (good && bytes.size() < (length != 0 ? length : ethercat::sii::bytes_needed(bytes))) {
-        good = eeprom(position, eeprom_reads, static_cast<std::uint32_t>(bytes.size() / 2), answer);
-        if (good) {
-            bytes.insert(bytes.end(), answer.begin() + 6,
-                         answer.begin() + ((answer[0] & eeprom_wide) != 0 ? 14 : 10));
-        }
-    }
-    if ((*owner)[0] != 0) {
-        write(position, reg::eeprom_configuration, *owner);
-    }
-    if (!good) return std::nullopt;
-    if (length != 0) {
-        bytes.resize(length);
-    }
-    return bytes;
+    return sii_.read({&position, 1}, length).front();
 }
 
 bool EthercatWire::write_sii(std::size_t position, std::uint32_t word, std::uint16_t value) {
-    const std::uint8_t to_master[] = {0};
-    std::vector<std::uint8_t> answer;
-    return write(position, reg::eeprom_configuration, to_master) &&
-           write(position, reg::eeprom_data, value) &&
-           eeprom(position, eeprom_writes, word, answer);
+    return sii_.write(position, word, value);
+}
+
+void EthercatWire::keep(std::size_t position, const SiiReader::Image& image) {
+    auto& c = contents_[position].emplace();
+    if (image) {
+        c = ethercat::sii::parse(*image);
+    }
+    auto& s = slaves_[position];
+    s.vendor = c.vendor;
+    s.product = c.product;
+    s.revision = c.revision;
+    s.serial = c.serial;
+    s.protocols = c.protocols;
+}
+
+void EthercatWire::identify() {
+    std::vector<std::size_t> positions;
+    for (std::size_t n = 0; n < size(); ++n) {
+        if (!contents_[n]) {
+            positions.push_back(n);
+        }
+    }
+    const std::vector<SiiReader::Image> images = sii_.read(positions);
+    for (std::size_t n = 0; n < positions.size(); ++n) {
+        keep(positions[n], images[n]);
+    }
 }
 
 const ethercat::sii::Contents& EthercatWire::contents(std::size_t position) {
-    auto& cached = contents_[position];
-    if (!cached) {
-        const auto bytes = sii(position);
-        cached = bytes ? ethercat::sii::parse(*bytes) : ethercat::sii::Contents{};
+    if (!contents_[position]) {
+        keep(position, sii(position));
     }
-    return *cached;
+    return *contents_[position];
 }
 
 std::string EthercatWire::name(std::size_t position) {
@@ -159,46 +107,46 @@ std::string EthercatWire::name(std::size_t position) {
                                   : c.general.name;
 }
 
-bool EthercatWire::identify(std::size_t position) {
-    auto& s = slaves_[position];
-    s.number = s.position = static_cast<std::uint16_t>(position);
-    const auto type = read(position, reg::type, 10);
-
-    const auto station = read(position, reg::station_address, 4);
-
-    const auto link = read(position, reg::dl_status, 2);
-    if (!type || !station || !link) return false;
-    s.present = true;
-    s.fmmus = (*type)[4];
-    s.sync_managers = (*type)[5];
-    s.port_descriptor = (*type)[7];
-
-    s.features = get<std::uint16_t>(type->data() + 8);
-    s.station = get<std::uint16_t>(station->data());
-
-    s.alias = get<std::uint16_t>(station->data() + 2);
-    s.dl_status = get<std::uint16_t>(link->data());
-    read_state(s);
-    const auto& c = contents(position);
-    s.vendor = c.vendor;
-    s.product = c.product;
-    s.revision = c.revision;
-    s.serial = c.serial;
-
-    s.protocols = c.protocols;
-    if (!s.has_dc()) return true;
-    const auto times = read(position, reg::dc_receive_time, 16);
-    for (unsigned port = 0; times && port < 4; ++port) {
-        s.receive_time[port] = get<std::uint32_t>(times->data() + 4 * port);
+bool EthercatWire::read_registers() {
+    constexpr std::size_t each = 5;
+    std::vector<WireDatagram> datagrams;
+    for (std::size_t n = 0; n < size(); ++n) {
+        datagrams.push_back(read_datagram(n, reg::type, 10));
+        datagrams.push_back(read_datagram(n, reg::station_address, 4));
+        datagrams.push_back(read_datagram(n, reg::dl_status, 2));
+        datagrams.push_back(read_datagram(n, reg::al_status, al_status_bytes));
+        datagrams.push_back(read_datagram(n, reg::dc_receive_time, 16));
+    }
+    exchange_.run(datagrams);
+    for (std::size_t n = 0; n < size(); ++n) {
+        const WireDatagram* const answers = &datagrams[each * n];
+        const auto& [type, station, link] = std::tie(answers[0], answers[1], answers[2]);
+        auto& s = slaves_[n];
+        s.number = static_cast<std::uint16_t>(n);
+        s.position = s.number;
+        if (!type.accepted() || !station.accepted() || !link.accepted()) return false;
+        s.present = true;
+        s.fmmus = type.data[4];
+        s.sync_managers = type.data[5];
+        s.port_descriptor = type.data[7];
+        s.features = get<std::uint16_t>(type.data.data() + 8);
+        s.station = get<std::uint16_t>(station.data.data());
+        s.alias = get<std::uint16_t>(station.data.data() + 2);
+        s.dl_status = get<std::uint16_t>(link.data.data());
+        set_state(s, answers[3]);
+        if (!s.has_dc() || !answers[4].accepted()) continue;
+        for (std::size_t port = 0; port < 4; ++port) {
+            s.receive_time[port] = get<std::uint32_t>(answers[4].data.data() + 4 * port);
+        }
     }
     return true;
 }
 
 bool EthercatWire::open(const EthercatOptions& options, bool alone) {
     if (!access_.open(options, alone)) return false;
-    std::vector<std::uint8_t> byte(1), latch(4);
-    const auto count = exchange(Command::brd, ethercat::at_position(0, reg::type), byte);
-    if (!count || *count == 0) {
+    WireDatagram count{Command::brd, ethercat::at_position(0, reg::type), {0}};
+    exchange_.run({&count, 1});
+    if (count.working_counter.value_or(0) == 0) {
         fail(options, fmt::format("no slave responds on {}; check cable and supply, and "
                                   "that it is the right interface",
                                   address()));
@@ -206,19 +154,22 @@ bool EthercatWire::open(const EthercatOptions& options, bool alone) {
         return false;
     }
     // the receive times of this frame, for the delays
-    exchange(Command::bwr, ethercat::at_position(0, reg::dc_receive_time), latch);
-    slaves_.assign(*count, {});
-    contents_.assign(*count, std::nullopt);
-    std::vector<ethercat::master::BusSlave*> line;
-    for (std::size_t n = 0; n < size(); ++n) {
-        if (!identify(n)) {
-            fail(options, fmt::format("{} slaves respond on {}, but slave {} stopped doing "
-                                      "so; check its cable and supply",
-                                      size(), address(), n));
+    WireDatagram latch{Command::bwr, ethercat::at_position(0, reg::dc_receive_time), {0, 0, 0, 0}};
+    exchange_.run({&latch, 1});
+    slaves_.assign(*count.working_counter, {});
+    contents_.assign(size(), std::nullopt);
+    if (!read_registers()) {
+        const auto missing =
+            std::find_if(slaves_.begin(), slaves_.end(), [](const auto& s) { return !s.present; });
+        fail(options, fmt::format("{} slaves respond on {}, but slave {} stopped doing "
+                                  "so; check its cable and supply",
+                                  size(), address(), missing->number));
 
-            return false;
-        }
-        line.push_back(&slaves_[n]);
+        return false;
+    }
+    std::vector<ethercat::master::BusSlave*> line;
+    for (auto& s : slaves_) {
+        line.push_back(&s);
     }
     ethercat::master::find_tree(line);
     const auto first =

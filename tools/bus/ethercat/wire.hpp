@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Datagrams by position, one at a time, without a master: no state and no address of a slave
-// changes, and a running master goes on. Everything here is [setup]; everything has a timeout.
+// Datagrams by position, without a master: no state and no address of a slave changes, and a
+// running master goes on. Everything here is [setup]; everything has a timeout.
 //
 //     EthercatWire wire;
 //     if (!wire.open(options)) return 1;                               // the reason is printed
@@ -14,6 +14,8 @@
 #include <vector>
 
 #include "bus/ethercat/access.hpp"
+#include "bus/ethercat/datagram_exchange.hpp"
+#include "bus/ethercat/sii_reader.hpp"
 #include "ethercat/master/bus_slave.hpp"
 #include "ethercat/wire/frames.hpp"
 #include "ethercat/wire/sii.hpp"
@@ -22,9 +24,13 @@ namespace hal::tools {
 
 class EthercatWire {
 public:
-    /// Opens the bus and reads what the slaves are. `alone`: see EthercatAccess. Returns false
-    /// after printing the reason.
+    EthercatWire() : exchange_(access_), sii_(access_, exchange_) {}
+
+    /// Opens the bus and reads the registers of the slaves. `alone`: see EthercatAccess. Returns
+    /// false after printing the reason.
     bool open(const EthercatOptions&, bool alone = false);
+    /// Reads the EEPROMs of all slaves, and with them their identities.
+    void identify();
     const std::vector<std::string>& arguments() const { return access_.arguments(); }
     const std::string& address() const { return access_.address(); }
     std::size_t size() const { return slaves_.size(); }
@@ -38,6 +44,8 @@ public:
                                                   std::uint16_t length);
     bool write(std::size_t position, std::uint16_t address, std::span<const std::uint8_t> bytes);
     bool write(std::size_t position, std::uint16_t address, std::uint16_t value);
+    /// Sends datagrams together; see DatagramExchange.
+    void run(std::span<WireDatagram> datagrams) { exchange_.run(datagrams); }
     void read_state(ethercat::master::BusSlave&);
 
     /// Reads the SII up to its end, or `length` bytes; nullopt: not readable.
@@ -51,16 +59,14 @@ public:
     void pass(std::int64_t ns) { access_.pass(ns); }
 
 private:
-    std::optional<std::uint16_t> exchange(ethercat::Command, std::uint32_t address,
-                                          std::span<std::uint8_t> data);
-    bool eeprom(std::size_t position, std::uint16_t command, std::uint32_t word,
-                std::vector<std::uint8_t>& answer);
-    bool identify(std::size_t position);
+    bool read_registers();
+    void keep(std::size_t position, const SiiReader::Image& image);
 
     EthercatAccess access_;
+    DatagramExchange exchange_;
+    SiiReader sii_;
     std::vector<ethercat::master::BusSlave> slaves_;
     std::vector<std::optional<ethercat::sii::Contents>> contents_;
-    std::uint8_t index_ = 0;
 };
 
 }  // namespace hal::tools
