@@ -88,7 +88,7 @@ std::vector<std::string> problems_of(const MasterSetup& setup) {
                        " ms, not longer than its heartbeat period of " +
                        std::to_string(n.heartbeat_ms) + " ms; use a longer timeout");
         }
-        if (n.retry <= 0 || n.boot_limit < 0) {
+        if (n.retry <= 0 || n.boot_limit <= 0) {
             add(n, "has an invalid retry interval or boot timeout; both must be above 0");
         }
     }

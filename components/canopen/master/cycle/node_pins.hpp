@@ -65,7 +65,8 @@ public:
                 wish = (wish & ~b.mask) | (pin ? b.high : 0);
             } else if constexpr (std::is_same_v<T, double>) {
                 const double value = pin * b.scale + b.offset;
-                wish = std::isnan(value) ? wish : b.codec.encode(value);
+                if (!std::isfinite(value)) return;  // the last one stays
+                wish = b.codec.encode(value);
             } else {
                 wish = b.codec.encode(pin.get());
             }
