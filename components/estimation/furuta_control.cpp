@@ -228,9 +228,10 @@ private:
             identification_ = {};
             return;
         }
-        const bool again = enable && !enabled_;
+        const bool enabled_now = enable && !enabled_;
         enabled_ = enable;
-        if (given != identification_.nominal() || dt != identification_.dt() || (again && !homed)) {
+        const bool has_new_rig = given != identification_.nominal() || dt != identification_.dt();
+        if (has_new_rig || (enabled_now && !homed)) {
             identification_.restart(given, dt);
             homed = true;
         }

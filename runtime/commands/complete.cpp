@@ -359,12 +359,13 @@ Completion complete_line(Session& session, const ShellOptions& options, std::str
     completion.begin = last == line.npos ? 0 : last + 1;
 
     const auto lock = session.lock();
-    Search search{session,
-                  session.programs(),
-                  options,
-                  {},
-                  std::string(line.substr(completion.begin)),
-                  completion.candidates};
+    const std::string begun(line.substr(completion.begin));
+    Search search{.session = session,
+                  .programs = session.programs(),
+                  .options = options,
+                  .words = {},
+                  .typed = begun,
+                  .found = completion.candidates};
     for (std::size_t at = 0; at < completion.begin;) {
         const auto end = std::min(line.find_first_of(" \t", at), completion.begin);
         if (end > at && !is_arrow(line.substr(at, end - at))) {

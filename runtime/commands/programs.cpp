@@ -327,7 +327,7 @@ void report_ended_early(Context& context, const Plan& plan, bool registered,
                               "", why);
 }
 
-/// Returns true for a component that comes back: its program is restarted, or has not ended yet.
+/// Returns true for a component that returns: its program is restarted, or has not ended yet.
 bool may_return(const Programs::Entry& entry) {
     return entry.dead() && (entry.restarts.due_ns != 0 || !entry.ended());
 }

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <fmt/core.h>
 #include <limits>
+#include <optional>
+#include <string>
 
 #include "cli/xml_escape.hpp"
 #include "record/plot.hpp"
@@ -148,68 +150,77 @@ private:
             left, strip.y, plot_, strip.height);
     }
 
-    // A pixel at a time: the value that enters it, the extremes in it, the value that leaves it.
+    /// The values of a trace within one pixel: what enters it, the extremes in it, what leaves it.
+    struct Pixel {
+        double first = NAN;  ///< the first finite one
+        double low = std::numeric_limits<double>::infinity();
+        double high = -std::numeric_limits<double>::infinity();
+        double last = NAN;
+
+        void add(double value) {
+            last = value;
+            if (!std::isfinite(value)) return;
+            first = std::isnan(first) ? value : first;
+            low = std::min(low, value);
+            high = std::max(high, value);
+        }
+        bool is_gap() const { return std::isnan(first); }
+    };
+
+    double pixel_x(std::int64_t time_ns) const { return std::max(x_of(time_ns), left); }
+
+    /// Takes the rows of one pixel, beginning with `row`, which is then the first behind them.
+    Pixel pixel_of(const Trace& trace, std::size_t& row) const {
+        const auto& times = trace.table->times_ns;
+        const double column = std::floor(pixel_x(times[row]));
+        Pixel pixel;
+        for (; row < times.size() && times[row] <= end_; ++row) {
+            if (std::floor(pixel_x(times[row])) != column) break;
+            pixel.add(trace.table->real(row, trace.column));
+        }
+        return pixel;
+    }
+
     void line(const Strip& strip, const Trace& trace, const char* stroke) {
         const auto& times = trace.table->times_ns;
-        auto row = static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), begin_) -
-                                            times.begin());
+        const auto after_begin = std::upper_bound(times.begin(), times.end(), begin_);
+        auto row = static_cast<std::size_t>(after_begin - times.begin());
         if (row > 0) {
             --row;
         }
-        std::string path, at;  // at: y of the pen
-        bool pen = false;
-        for (double last = NAN; row < times.size() && times[row] <= end_;) {
-            const double pixel = std::floor(std::max(x_of(times[row]), left));
-            double low = std::numeric_limits<double>::infinity();
-            double high = -low;
-            double first = NAN;
-            const double x = std::max(x_of(times[row]), left);
-            for (; row < times.size() && times[row] <= end_ &&
-                   std::floor(std::max(x_of(times[row]), left)) == pixel;
-                 ++row) {
-                last = trace.table->real(row, trace.column);
-                if (std::isnan(first)) {
-                    first = last;
-                }
-                if (std::isfinite(last)) {
-                    low = std::min(low, last);
-                    high = std::max(high, last);
-                }
-            }
-            if (!(low <= high)) {  // NaN: a gap
-                pen = false;
+        const auto y = [&](double value) { return fmt::format("{:.1f}", y_of(strip, value)); };
+        std::string path;
+        std::optional<std::string> pen_y;  // none: the pen is up
+        while (row < times.size() && times[row] <= end_) {
+            const double x = pixel_x(times[row]);
+            const Pixel pixel = pixel_of(trace, row);
+            if (pixel.is_gap()) {
+                pen_y.reset();
                 continue;
             }
-            const auto text = [&](double value) {
-                return fmt::format("{:.1f}", y_of(strip, value));
-            };
-            if (pen && low == high && text(low) == at) {
-                continue;  // a horizontal line goes on
+            const bool goes_on_flat = pixel.low == pixel.high && pen_y == y(pixel.low);
+            if (goes_on_flat && std::isfinite(pixel.last)) continue;
+            path += pen_y ? fmt::format("H{:.1f}V{}", x, y(pixel.first))
+                          : fmt::format("M{:.1f} {}", x, y(pixel.first));
+            // enters at the first value, covers all, leaves at the last
+            if (pixel.low != pixel.first) {
+                path += "V" + y(pixel.low);
             }
-            if (pen) {
-                path += fmt::format("H{:.1f}V{}", x, text(first));
-            } else {
-                path += fmt::format("M{:.1f} {}", x, text(first));
+            if (pixel.high != pixel.low) {
+                path += "V" + y(pixel.high);
             }
-            if (low != first) {
-                path += "V" + text(low);
+            pen_y.reset();
+            if (!std::isfinite(pixel.last)) continue;
+            if (pixel.last != pixel.high) {
+                path += "V" + y(pixel.last);
             }
-            if (high != low) {
-                path += "V" + text(high);
-            }
-            if (std::isfinite(last) && last != high) {
-                path += "V" + text(last);
-            }
-            pen = std::isfinite(last);
-            if (pen) {
-                at = text(last);
-            }
+            pen_y = y(pixel.last);
         }
-        if (pen) {
-            path += fmt::format("H{:.1f}",
-                                row < times.size()
-                                    ? left + plot_
-                                    : std::min(x_of(std::max(times.back(), begin_)), left + plot_));
+        if (pen_y) {
+            const double right_edge = left + plot_;
+            const bool goes_on = row < times.size();
+            const double end = std::min(x_of(std::max(times.back(), begin_)), right_edge);
+            path += fmt::format("H{:.1f}", goes_on ? right_edge : end);
         }
         svg_ += fmt::format(
             "<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.4\" "

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <utility>
 #include <vector>
 
 namespace hal::canopen {
@@ -255,37 +256,51 @@ void Faults::identity(Frame& f) noexcept {
     }
 }
 
-/// Alters a response of the SDO server. Returns false when it must not be sent.
-bool Faults::answer(Frame& f, FrameQueue& bus) noexcept {
-    const auto tell_abort = [&](Frame& to, const std::array<std::uint8_t, 3>& about, Abort why) {
-        to.data[0] = 0x80;
-        std::copy(about.begin(), about.end(), to.data.begin() + 1);
-        store(to.data.data() + 4, static_cast<std::uint32_t>(why));
-    };
-    if (hit(Fault::no_sdo)) return false;
+namespace {
+
+/// Responses of an SDO server: the upper three bits of byte 0, CiA 301, 7.2.4.3.
+constexpr std::uint8_t last_segment_kind = 1;
+constexpr std::uint8_t download_block = 5;
+constexpr std::uint8_t upload_block = 6;
+/// Whole bytes 0.
+constexpr std::uint8_t abort_transfer = 0x80;
+constexpr std::uint8_t end_of_download = 0xa1;
+constexpr std::uint8_t block_confirmed = 0xa2;
+
+void make_abort(Frame& f, const std::array<std::uint8_t, 3>& object, Abort why) noexcept {
+    f.data[0] = abort_transfer;
+    std::copy(object.begin(), object.end(), f.data.begin() + 1);
+    store(f.data.data() + 4, static_cast<std::uint32_t>(why));
+}
+
+}  // namespace
+
+/// Alters a response within a block transfer. Returns false when it must not be sent.
+bool Faults::answer_in_block(Frame& f) noexcept {
     if (block_ == Block::sending) {  // only segments follow
         if ((f.data[0] & 0x80) != 0) {
             last_sequence_ = f.data[0] & 0x7f;
         }
         return !hit(Fault::block_gap);
     }
+    if (block_ == Block::receiving && f.data[0] == block_confirmed) return true;
+    const bool was_receiving = std::exchange(block_, Block::none) == Block::receiving;
+    if (was_receiving) {
+        if (f.data[0] == end_of_download && hit(Fault::block_crc)) {
+            make_abort(f, request_, Abort::crc);
+        }
+    } else if (f.data[0] >> 5 == upload_block && hit(Fault::block_crc)) {
+        f.data[1] ^= 0xff;
+    }
+    return true;
+}
+
+/// Alters a response of the SDO server. Returns false when it must not be sent.
+bool Faults::answer(Frame& f, FrameQueue& bus) noexcept {
+    if (hit(Fault::no_sdo)) return false;
+    if (block_ != Block::none) return answer_in_block(f);
     const auto kind = f.data[0] >> 5;
-    if (block_ == Block::ending) {
-        block_ = Block::none;
-        if (kind == 6 && hit(Fault::block_crc)) {
-            f.data[1] ^= 0xff;
-        }
-        return true;
-    }
-    if (block_ == Block::receiving) {
-        if (f.data[0] == 0xa2) return true;
-        block_ = Block::none;
-        if (f.data[0] == 0xa1 && hit(Fault::block_crc)) {
-            tell_abort(f, request_, Abort::crc);
-        }
-        return true;
-    }
-    if (kind <= 1) {
+    if (kind <= last_segment_kind) {
         if (hit(Fault::toggle)) {
             f.data[0] ^= 0x10;
         }
@@ -293,15 +308,15 @@ bool Faults::answer(Frame& f, FrameQueue& bus) noexcept {
     }
     if (hit(Fault::stale_abort)) {
         Frame stale = f;
-        tell_abort(stale, previous_, Abort::command);
+        make_abort(stale, previous_, Abort::command);
         bus.push(stale);
     }
-    if (f.data[0] == 0x80) return true;
+    if (f.data[0] == abort_transfer) return true;
     if (hit(Fault::abort)) {
-        tell_abort(f, request_, Abort::general);
+        make_abort(f, request_, Abort::general);
         return true;
     }
-    if (kind == 5) {
+    if (kind == download_block) {
         block_ = Block::receiving;
     }
     identity(f);

@@ -117,6 +117,7 @@ private:
     void find_any() noexcept;
     void start(Time now) noexcept;
     void hold(const Frame&, Time due, FrameQueue& bus) noexcept;
+    bool answer_in_block(Frame&) noexcept;
     bool answer(Frame&, FrameQueue& bus) noexcept;
     bool error_control(Frame&) noexcept;
     void process_data(Frame&) noexcept;

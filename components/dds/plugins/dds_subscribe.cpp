@@ -55,9 +55,11 @@ public:
         const std::int64_t now = cycle.start_ns();
         if (fresh) {
             fields_.load(m.values.data());
-            // Received then. On a virtual clock this is unknown: received now.
+            // A virtual clock has another origin: then the sample counts as received now.
+            constexpr std::int64_t max_wait_ns = 10'000'000'000;
             const std::int64_t waited = now - m.monotonic_ns;
-            seen_ = waited >= 0 && waited < 10'000'000'000 ? m.monotonic_ns : now;
+            const bool is_plausible = waited >= 0 && waited < max_wait_ns;
+            seen_ = is_plausible ? m.monotonic_ns : now;
             transit_ = m.transit_ns;
             seq = m.sequence;
             lost = m.lost;
@@ -87,6 +89,14 @@ public:
         malformed = malformed_.load(std::memory_order_relaxed);
         wrong_type = connection_.wrong_type();
         silent = silent_.load(std::memory_order_relaxed);
+        watch_second_writer(now);
+        ignored = ignored_.load(std::memory_order_relaxed);
+        flood = flood_.load(std::memory_order_relaxed);
+    }
+
+    /// A second writer of a topic is a fault only where the values must be of one writer.
+    /// [realtime]
+    void watch_second_writer(std::int64_t now) noexcept {
         const std::uint64_t others = others_.load(std::memory_order_relaxed);
         if (others != others_seen_) {
             others_seen_ = others;
@@ -100,8 +110,6 @@ public:
             second_fault_.end(faults_, this);
         }
         second_writer = with_other;
-        ignored = ignored_.load(std::memory_order_relaxed);
-        flood = flood_.load(std::memory_order_relaxed);
     }
 
 private:

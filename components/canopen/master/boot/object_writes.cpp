@@ -19,6 +19,7 @@ std::vector<ObjectWrite> pdo_writes(std::uint16_t communication, unsigned number
     const auto pdo = (communication == 0x1400 ? "RPDO" : "TPDO") + std::to_string(number) + ' ';
     std::uint32_t cob = p.cob;
     if (cob == 0) {
+        // only the first four PDOs have predefined COB-IDs (CiA 301, 7.3.5)
         cob = number <= 4 ? predefined + (number - 1) * 0x100 + node : cob_invalid;
     } else if (p.plus_node_id) {
         cob += node;
@@ -27,6 +28,7 @@ std::vector<ObjectWrite> pdo_writes(std::uint16_t communication, unsigned number
     if (p.mapping.empty() && !multiplexed) {
         cob |= cob_invalid;
     }
+    // off first: a mapping may change only while its PDO is invalid
     std::vector<ObjectWrite> writes{object_write(index, 1, cob | cob_invalid, pdo + "COB-ID")};
     if (p.mapping.empty() && !multiplexed) return writes;
     const auto add = [&](std::uint16_t at, std::uint8_t sub, auto value,
@@ -44,6 +46,7 @@ std::vector<ObjectWrite> pdo_writes(std::uint16_t communication, unsigned number
                     : static_cast<std::uint8_t>(p.mapping.size()),
         "mapping");
     add(index, 2, p.transmission, "transmission type");
+    // 0 is the default: a node without these objects has it
     add(index, 3, p.inhibit_100us, "inhibit time").optional = p.inhibit_100us == 0;
     add(index, 5, p.event_ms, "event timer").optional = p.event_ms == 0;
     if (communication == 0x1800) {

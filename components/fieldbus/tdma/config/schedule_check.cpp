@@ -27,6 +27,7 @@ public:
             station(e);
         }
         backups();
+        master();
     }
 
 private:
@@ -132,7 +133,8 @@ private:
     }
 
     void backups() {
-        const Time arrives = s_.path(ethernet::smallest_frame) + s_.guard;
+        const Time sync_path = s_.path(ethernet::smallest_frame);
+        const Time sync_arrives_after = sync_path + s_.guard;
         std::vector<const StationEntry*> list;
         for (const StationEntry& e : s_.stations) {
             if (e.role == Role::backup) {
@@ -147,14 +149,15 @@ private:
             const Time before = i == 0 ? 0 : list[i - 1]->backup_offset;
             const std::string whose =
                 i == 0 ? "the master's sync" : "the sync of " + list[i - 1]->name;
-            if (e.phase > 0 && e.phase < before + arrives) {
+            if (e.phase > 0 && e.phase < before + sync_arrives_after) {
                 report(Severity::error, e.backup_at,
                        "the thread of '" + e.name + "' checks " + microseconds(e.phase) +
                            " after the beginning of the cycle, but " + whose + " arrives after " +
-                           microseconds(before) + " + " + microseconds(s_.path(60)) + " + guard " +
-                           microseconds(s_.guard) + " = " + microseconds(before + arrives),
+                           microseconds(before) + " + " + microseconds(sync_path) + " + guard " +
+                           microseconds(s_.guard) + " = " +
+                           microseconds(before + sync_arrives_after),
                        "the smallest backup-offset that works is " +
-                           microseconds(needed(before + arrives)));
+                           microseconds(needed(before + sync_arrives_after)));
             }
             if (e.phase > 0 && e.phase + e.lead >= e.backup_offset) {
                 report(Severity::error, e.backup_at,
@@ -165,6 +168,9 @@ private:
                        "phase + lead must be less than backup-offset");
             }
         }
+    }
+
+    void master() {
         if (s_.master() == nullptr && s_.stations.size() > 1) {
             report(Severity::warning, s_.stations.front().at,
                    "no master in this file: the stations wait for an external one",
