@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 
@@ -479,4 +479,4 @@ void Axis::move(const AxisCommand& command, const AxisRules& rules, Time now) no
     set_mode_bits(command);
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -13,7 +13,7 @@
 #include "axis_units.hpp"
 #include "axis_walk.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// Feedback of the drive, in its units.
 struct AxisFeedback {
@@ -210,4 +210,4 @@ private:
     bool disable_sent_ = false;  // and the drive has not been seen disabled since
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -8,7 +8,7 @@
 
 #include "error_words.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 
@@ -300,4 +300,4 @@ double Sentences::number(const Failure& f) noexcept {
     }
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -8,7 +8,7 @@
 
 #include "drive_profile.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// The command that failed.
 enum class Request : std::uint8_t { enable, run, disable, quick_stop, reset, mode, home, go };
@@ -89,4 +89,4 @@ private:
     std::vector<std::string> texts_;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

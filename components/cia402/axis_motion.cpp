@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "axis_motion.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 // a statusword in flight may date from before the set-point
@@ -123,4 +123,4 @@ HomingRun::Result HomingRun::step(std::uint16_t statusword, bool halted, Time no
     return Result::running;
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

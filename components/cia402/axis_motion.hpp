@@ -7,7 +7,7 @@
 
 #include "axis_failure.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// A set-point of profile position.
 struct SetPoint {
@@ -86,4 +86,4 @@ private:
     Failure failure_;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// Drive units per user unit as a fraction, because a ratio such as 7:3 has no exact decimal.
 /// Negative: reversed direction.
@@ -70,4 +70,4 @@ private:
     bool known_ = false;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

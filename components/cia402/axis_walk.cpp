@@ -4,7 +4,7 @@
 #include <iterator>
 #include <utility>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 
@@ -189,4 +189,4 @@ void Walk::expire(std::uint16_t statusword, std::uint16_t error_code, Time waite
     }
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

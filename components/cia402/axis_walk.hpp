@@ -5,7 +5,7 @@
 
 #include "axis_failure.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// Walks the state machine. All functions are called by one thread.
 class Walk {
@@ -66,4 +66,4 @@ private:
     bool forced_ = false;  // braking took too long: the voltage is disabled
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -7,7 +7,7 @@
 #include <array>
 #include <cstdint>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// Nanoseconds on the clock of the caller; only differences count.
 using Time = std::int64_t;
@@ -512,4 +512,4 @@ inline constexpr std::uint16_t negative_stored = 0x0004;
 inline constexpr std::uint16_t updated = 0x0040;
 }  // namespace probe
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <iterator>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 struct Row {
@@ -215,4 +215,4 @@ const char* error_class_word(std::uint16_t code) noexcept {
     return "unknown error";
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

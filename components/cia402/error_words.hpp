@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// Returns the text of an error code 603Fh or of an EMCY from a drive (CiA 402, IEC 61800-7-201);
 /// for any other code the text of its class, as error_class_word(). Manufacturers also define their
@@ -15,4 +15,4 @@ const char* error_word(std::uint16_t code) noexcept;
 /// the code. [any]
 const char* error_class_word(std::uint16_t code) noexcept;
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -7,6 +7,7 @@
 namespace {
 
 using namespace hal::canopen;
+namespace cia402 = hal::cia402;
 
 struct CanopenDrive final : NodeComponent {
     explicit CanopenDrive(const hal_host* host) : NodeComponent(host, 2) {}
@@ -91,7 +92,7 @@ private:
         return settings;
     }
     Program& program() override {
-        cia402::DriveSettings settings;
+        DriveSettings settings;
         settings.axes = static_cast<unsigned>(axes);
         for (auto& axis : settings.axis) {
             axis.motor = the_motor;

@@ -12,8 +12,7 @@
 
 namespace {
 
-using namespace hal::canopen;
-using namespace hal::canopen::cia402;
+using namespace hal::cia402;
 
 struct Cia402 : hal::Component {
     using Component::Component;

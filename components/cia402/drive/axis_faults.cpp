@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 
@@ -96,4 +96,4 @@ bool AxisFaults::reset() noexcept {
     return true;
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -4,7 +4,7 @@
 
 #include "cia402/drive/drivetrain.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 enum class DriveFault : std::uint8_t {
     over_current,
@@ -75,4 +75,4 @@ private:
     std::uint16_t device_code_ = 0;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

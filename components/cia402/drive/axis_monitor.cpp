@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 double AxisMonitor::following_error() const noexcept {
     const Reference& reference = train_.reference;
@@ -47,4 +47,4 @@ void AxisMonitor::read_inputs(std::uint32_t external) noexcept {
     sense(plant.probe(1), input::probe_2);
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

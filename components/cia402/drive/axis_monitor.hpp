@@ -4,7 +4,7 @@
 
 #include "cia402/drive/motion_modes.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// The monitor. [realtime]
 class AxisMonitor {
@@ -41,4 +41,4 @@ private:
     std::uint32_t inputs_before_ = 0;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

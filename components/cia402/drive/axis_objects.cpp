@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "cia402/drive/axis_objects.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 const char* name_of_record(std::uint16_t index) noexcept {
     using namespace object;
@@ -32,4 +32,4 @@ const char* name_of_record(std::uint16_t index) noexcept {
     }
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -9,7 +9,7 @@
 #include "cia301/shorthand.hpp"
 #include "cia402/drive/axis_values.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 using cia301::Access;
 
@@ -207,4 +207,4 @@ void each_object(AxisValues& o, F&& f) {
 /// Returns the name of an object with sub-indices; "" for others. [setup]
 const char* name_of_record(std::uint16_t index) noexcept;
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 
@@ -128,4 +128,4 @@ Range AxisScale::software_limits() const noexcept {
     return {encoder(to), encoder(from)};
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

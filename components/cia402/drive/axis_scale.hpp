@@ -11,7 +11,7 @@
 #include "cia402/drive/plant.hpp"
 #include "cia402/drive/trajectory.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// Rounds to the next integer; clamps what is beyond any counter. [any]
 inline std::int64_t whole(double value) noexcept {
@@ -82,4 +82,4 @@ private:
     double origin_ = 0;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

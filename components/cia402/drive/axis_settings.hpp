@@ -8,7 +8,7 @@
 
 #include "cia402/drive_profile.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// The motor, its load, and the switches along its travel. Places along the travel are in encoder
 /// increments; 0 is index pulse 0. A switch or mark whose first place is not below its second does
@@ -86,4 +86,4 @@ struct AxisStatus {
     double current = 0;  ///< A
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 AxisSettings possible(AxisSettings settings) {
     auto& m = settings.motor;
@@ -57,4 +57,4 @@ AxisValues::AxisValues(const AxisSettings& settings) {
     }
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -9,7 +9,7 @@
 
 #include "cia402/drive/axis_settings.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// Manufacturer-specific objects, 0x800 further up for each axis: external torque in mN·m, and
 /// simulated faults.
@@ -165,4 +165,4 @@ struct AxisValues {
     explicit AxisValues(const AxisSettings&);
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

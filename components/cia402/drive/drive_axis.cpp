@@ -8,7 +8,7 @@
 #include <numbers>
 #include <utility>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 
@@ -483,4 +483,4 @@ void DriveAxis::written(std::uint16_t index, std::uint8_t sub) noexcept {
     }
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -25,7 +25,7 @@
 #include "cia402/drive/motion_modes.hpp"
 #include "cia402/drive/touch_probes.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// Whether an axis accepts a write.
 enum class WriteCheck : std::uint8_t { accepted, invalid_value, wrong_state, buffer_full };
@@ -117,4 +117,4 @@ private:
     double engage_left_ = 0;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

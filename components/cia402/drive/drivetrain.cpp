@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 constexpr double friction_slope = 0.5;  // rad/s
@@ -143,4 +143,4 @@ double Drivetrain::velocity_loop(double dt, double max_speed, Range torque_limit
     return torque;
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

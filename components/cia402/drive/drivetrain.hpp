@@ -9,7 +9,7 @@
 
 #include "cia402/drive/axis_scale.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// The innermost closed loop that follows the reference.
 enum class Control : std::uint8_t { off, position, velocity, torque };
@@ -89,4 +89,4 @@ private:
     bool saturated_ = false;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -6,7 +6,7 @@
 
 #include "cia402/drive/axis_values.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 const HomingSearch::Rule HomingSearch::rules[15] = {
     {},
@@ -160,4 +160,4 @@ bool HomingSearch::blocked(const Plant& plant, int direction) noexcept {
     return limit.holds(plant.place());
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -15,7 +15,7 @@
 
 #include "cia402/drive/plant.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 class HomingSearch {
 public:
@@ -70,4 +70,4 @@ private:
     double home_ = 0;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 
@@ -625,4 +625,4 @@ void MotionModes::guard_limits(const Motion& before, double dt) noexcept {
     reference.motion = guarded_;
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -12,7 +12,7 @@
 #include "cia402/drive/drivetrain.hpp"
 #include "cia402/drive/homing_search.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// The controlword and its rising edges since the modes last looked.
 struct Controlword {
@@ -181,4 +181,4 @@ private:
     bool homed_ = false;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

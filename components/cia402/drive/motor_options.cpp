@@ -7,7 +7,7 @@
 #include <limits>
 #include <optional>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 
@@ -89,4 +89,4 @@ std::string parse_motor(std::string_view text, MotorSettings& motor) {
     return {};
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -8,7 +8,7 @@
 
 #include "cia402/drive/axis_settings.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// Sets a motor parameter by name, as in "inertia" and 1e-4. Returns false for an unknown name or an
 /// impossible value.
@@ -17,4 +17,4 @@ bool set_motor(MotorSettings&, std::string_view name, double value);
 /// empty is valid. Returns the problem, or "".
 std::string parse_motor(std::string_view text, MotorSettings&);
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

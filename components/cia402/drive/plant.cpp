@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 constexpr double max_step = 0.00025;
@@ -79,4 +79,4 @@ std::optional<double> Plant::index_pulse(double from, int direction) const noexc
     return next >= place_ ? std::optional(next) : std::nullopt;
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

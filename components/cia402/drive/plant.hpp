@@ -15,7 +15,7 @@
 
 #include "cia402/drive/axis_settings.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// A range [from, to) of the travel.
 struct Range {
@@ -59,4 +59,4 @@ private:
     double place_, before_, speed_ = 0, torque_ = 0, heat_ = 0;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

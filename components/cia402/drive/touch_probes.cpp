@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "cia402/drive/touch_probes.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 
@@ -83,4 +83,4 @@ void TouchProbes::step_probe(unsigned n, unsigned function, unsigned before,
     }
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -8,7 +8,7 @@
 
 #include "cia402/drive/axis_monitor.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// Both probes. [realtime]
 class TouchProbes {
@@ -33,4 +33,4 @@ private:
     std::array<std::uint8_t, 2> armed_{};  // edges not found yet
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

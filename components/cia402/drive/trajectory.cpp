@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 namespace {
 void move(Motion& m, double acceleration, double dt) noexcept {
@@ -184,4 +184,4 @@ double Interpolator::step(Motion& m, double dt) noexcept {
     return dt - time;
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

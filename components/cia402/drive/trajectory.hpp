@@ -6,7 +6,7 @@
 #include <array>
 #include <cstdint>
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 
 /// State of a motion; one unit of length throughout, seconds.
 struct Motion {
@@ -116,4 +116,4 @@ private:
     double left_ = 0;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

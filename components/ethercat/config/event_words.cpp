@@ -212,7 +212,7 @@ std::string emergency_words(std::int64_t first, std::int64_t bytes) {
     }
     const auto code = static_cast<std::uint16_t>(first & 0xffff);
     if (code == 0) return "reports that its errors are gone";
-    return "reports emergency " + hex(code, 4) + " (" + canopen::cia402::error_word(code) +
+    return "reports emergency " + hex(code, 4) + " (" + cia402::error_word(code) +
            "), error register " + hex(first >> 16 & 0xff, 2) + ", data" + data +
            "; see the manual of the device";
 }

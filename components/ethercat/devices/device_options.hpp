@@ -15,7 +15,7 @@ namespace hal::ethercat::devices {
 
 /// Returns the motor of a servo before its options: 10 000 increments per revolution, up to
 /// 12 000 r/min, an absolute encoder, no limits of the travel. [setup]
-canopen::cia402::MotorSettings servo_motor();
+cia402::MotorSettings servo_motor();
 
 /// See the top of this file.
 struct DeviceOptions {
@@ -26,7 +26,7 @@ struct DeviceOptions {
     std::uint32_t serial = 0;
     bool dc_required = false;
     std::uint32_t modes = 0x3ef;  ///< of a servo (6502h)
-    canopen::cia402::MotorSettings motor = servo_motor();  ///< of a servo
+    cia402::MotorSettings motor = servo_motor();  ///< of a servo
     /// description of an esi device, and its name there; empty: the only one
     std::string file{};
     std::string device{};

@@ -101,8 +101,7 @@ constexpr OptionRow option_rows[] = {
     {"dc", [](Text, Text v, DeviceOptions& o) { return parse_dc(v, o.dc_required); }},
     {"file", [](Text k, Text v, DeviceOptions& o) { return parse_text(k, v, "FILE.xml", o.file); }},
     {"device", [](Text k, Text v, DeviceOptions& o) { return parse_text(k, v, "NAME", o.device); }},
-    {"motor",
-     [](Text, Text v, DeviceOptions& o) { return canopen::cia402::parse_motor(v, o.motor); }},
+    {"motor", [](Text, Text v, DeviceOptions& o) { return cia402::parse_motor(v, o.motor); }},
 };
 
 /// Returns an option that a device offers; nullptr: unknown.

@@ -10,8 +10,7 @@
 
 namespace hal::ethercat::devices {
 
-namespace cia402 = canopen::cia402;
-namespace o402 = canopen::cia402::object;
+namespace o402 = cia402::object;
 
 namespace {
 

@@ -13,10 +13,10 @@
 namespace hal::ethercat::devices {
 
 /// An axis with its objects. [realtime] unless marked.
-class ServoAxis final : private canopen::cia402::AxisBus {
+class ServoAxis final : private cia402::AxisBus {
 public:
     /// Binds axis `number`, counted from 0, to its objects. [setup]
-    ServoAxis(Dictionary&, unsigned number, const canopen::cia402::AxisSettings&);
+    ServoAxis(Dictionary&, unsigned number, const cia402::AxisSettings&);
     void power_on() noexcept;
     coe::Abort check(std::uint16_t index, std::span<const std::uint8_t> value) const noexcept;
     void written(std::uint16_t index, std::uint8_t sub) noexcept;
@@ -67,7 +67,7 @@ private:
 
     const unsigned number_;
     const double rated_voltage_;
-    canopen::cia402::DriveAxis axis_;
+    cia402::DriveAxis axis_;
     Emergencies pending_;  ///< since the last step
     std::uint8_t register_bits_ = 0;  ///< of the present faults
     unsigned faults_ = 0;
@@ -91,7 +91,7 @@ private:
 class Servo : public Behaviour {
 public:
     /// [setup]
-    Servo(std::shared_ptr<Dictionary>, unsigned axes, const canopen::cia402::AxisSettings&);
+    Servo(std::shared_ptr<Dictionary>, unsigned axes, const cia402::AxisSettings&);
     void power_on() noexcept override;
     coe::Abort check(std::uint16_t index, std::uint8_t sub,
                      std::span<const std::uint8_t> value) noexcept override;

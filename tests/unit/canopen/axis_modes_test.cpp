@@ -5,7 +5,7 @@
 
 #include "tests/unit/canopen/axis_stand_in.hpp"
 
-namespace hal::canopen::cia402::test {
+namespace hal::canopen::axis_test {
 namespace {
 
 TEST(Axis, Mode_is_followed_when_the_drive_shows_it) {
@@ -262,4 +262,4 @@ TEST(AxisFailure, Every_sentence_of_the_cycle_is_there_beforehand) {
 }
 
 }  // namespace
-}  // namespace hal::canopen::cia402::test
+}  // namespace hal::canopen::axis_test

@@ -11,7 +11,9 @@
 #include "canopen/protocol/numbers.hpp"
 #include "cia402/axis.hpp"
 
-namespace hal::canopen::cia402::test {
+namespace hal::canopen::axis_test {
+
+using namespace cia402;
 
 struct StandIn {
     State state = State::switch_on_disabled;
@@ -187,4 +189,4 @@ private:
     std::deque<AxisOrders> under_way_;
 };
 
-}  // namespace hal::canopen::cia402::test
+}  // namespace hal::canopen::axis_test

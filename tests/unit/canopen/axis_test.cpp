@@ -7,7 +7,7 @@
 
 #include "tests/unit/canopen/axis_stand_in.hpp"
 
-namespace hal::canopen::cia402::test {
+namespace hal::canopen::axis_test {
 namespace {
 
 TEST(AxisUnits, Counter_goes_on_where_the_drives_wraps) {
@@ -374,4 +374,4 @@ TEST(Axis, Quick_stop_takes_another_edge) {
 }
 
 }  // namespace
-}  // namespace hal::canopen::cia402::test
+}  // namespace hal::canopen::axis_test

@@ -3,7 +3,7 @@
 
 #include "tests/unit/canopen/axis_stand_in.hpp"
 
-namespace hal::canopen::cia402::test {
+namespace hal::canopen::axis_test {
 namespace {
 
 using Words = std::vector<std::uint16_t>;
@@ -226,4 +226,4 @@ TEST(AxisWalk, Resets_a_fault_by_an_edge) {
 }
 
 }  // namespace
-}  // namespace hal::canopen::cia402::test
+}  // namespace hal::canopen::axis_test

@@ -5,8 +5,8 @@
 namespace hal::canopen::test {
 namespace {
 
-cia402::DriveSettings two_wheels() {
-    cia402::DriveSettings settings;
+DriveSettings two_wheels() {
+    DriveSettings settings;
     settings.axes = 2;
     for (auto& axis : settings.axis) {
         axis.motor.endless();

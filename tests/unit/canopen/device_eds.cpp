@@ -62,7 +62,7 @@ TEST(DeviceEds, of_a_bootloader_reads_back_as_the_device) {
 }
 TEST(DeviceEds, of_drives_reads_back_as_the_device) {
     for (const unsigned axes : {1U, 8U}) {
-        cia402::DriveSettings settings;
+        DriveSettings settings;
         settings.axes = axes;
         comes_back(DriveProgram(settings));
     }
@@ -74,7 +74,7 @@ TEST(DeviceEds, names_objects_as_their_documents_do) {
     EXPECT_EQ(object_name(d, 0x1a02), "TPDO mapping parameter 3");
     EXPECT_EQ(object_name(d, 0x6411), "Write analogue output 16-bit");
     EXPECT_EQ(object_name(d, 0x2abc), "Object 2ABCh");
-    cia402::DriveSettings settings;
+    DriveSettings settings;
     settings.axes = 2;
     EXPECT_EQ(object_name(DriveProgram(settings).description(), 0x6899), "Homing speeds 2");
 }

@@ -103,9 +103,9 @@ inline std::ostream& operator<<(std::ostream& out, Abort abort) {
 
 }  // namespace hal::canopen::test
 
-namespace hal::canopen::cia402 {
+namespace hal::cia402 {
 inline std::ostream& operator<<(std::ostream& out, State state) { return out << to_string(state); }
 inline std::ostream& operator<<(std::ostream& out, Homing homing) {
     return out << to_string(homing);
 }
-}  // namespace hal::canopen::cia402
+}  // namespace hal::cia402

@@ -64,8 +64,8 @@ struct Wire : RunnerEvents {
         EXPECT_TRUE(opened) << opened.problem;
         return std::move(opened.link);
     }
-    static cia402::DriveSettings settings() {
-        cia402::DriveSettings s;
+    static DriveSettings settings() {
+        DriveSettings s;
         s.axes = 1;
         return s;
     }

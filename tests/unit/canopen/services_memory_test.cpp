@@ -202,9 +202,9 @@ TEST(Memory, Is_not_taken_while_a_master_boots_loses_and_restarts_nodes) {
 }
 
 TEST(Memory, Is_not_taken_by_a_drive_at_work) {
-    cia402::DriveSettings settings;
+    DriveSettings settings;
     settings.axes = 2;
-    cia402::Drive drive(settings, {.node_id = 5});
+    Drive drive(settings, {.node_id = 5});
     auto& dictionary = drive.device().dictionary();
     Time now = 0;
     const auto write = [&](std::uint16_t index, std::int32_t value) {

@@ -17,7 +17,7 @@ std::unique_ptr<Drive> make_drive(Bus bus, unsigned axes, const std::string& mot
 
 namespace {
 
-using namespace hal::canopen::cia402;
+using namespace hal::cia402;
 
 /// One revolution has 10 000 increments, the motor turns with up to 12 000 r/min.
 const std::string motor = "resolution:10000;highest-speed:12000";

@@ -11,6 +11,7 @@ namespace drive_on_bus {
 namespace {
 
 using namespace hal::canopen;
+namespace cia402 = hal::cia402;
 
 class CanopenDrive final : public Drive {
 public:
@@ -64,8 +65,8 @@ public:
     bool brake_closed(unsigned axis) override { return drive_.status(axis).brake_closed; }
 
 private:
-    static cia402::DriveSettings settings(unsigned axes, const std::string& motor) {
-        cia402::DriveSettings result;
+    static hal::canopen::DriveSettings settings(unsigned axes, const std::string& motor) {
+        hal::canopen::DriveSettings result;
         result.axes = axes;
         for (auto& axis : result.axis) {
             EXPECT_EQ(cia402::parse_motor(motor, axis.motor), "");
@@ -73,7 +74,7 @@ private:
         return result;
     }
     Time now_ = 0;
-    cia402::Drive drive_;
+    hal::canopen::Drive drive_;
 };
 
 }  // namespace

@@ -10,7 +10,7 @@ namespace drive_on_bus {
 
 namespace {
 
-namespace object = hal::canopen::cia402::object;
+namespace object = hal::cia402::object;
 using namespace hal::ethercat;
 
 /// An object of the process data of an axis.
@@ -29,7 +29,7 @@ class EthercatDrive final : public Drive {
 public:
     EthercatDrive(unsigned axes, const std::string& motor) : outputs_(bytes_per_axis * axes) {
         hal::ethercat::devices::DeviceOptions options{.axes = axes};
-        EXPECT_EQ(hal::canopen::cia402::parse_motor(motor, options.motor), "");
+        EXPECT_EQ(hal::cia402::parse_motor(motor, options.motor), "");
         bench_.start("servo", options);
         bench_.w.gap_ns = 100;
         bench_.to_op(outputs_);
@@ -44,9 +44,9 @@ public:
         return answer.is(coe::command::abort) ? static_cast<Abort>(answer.value) : Abort::none;
     }
     Abort command(std::uint16_t index, std::uint8_t sub, std::int64_t value) override {
-        const unsigned axis = hal::canopen::cia402::axis_of(index);
+        const unsigned axis = hal::cia402::axis_of(index);
         for (const Mapped& m : mapped) {
-            if (m.index != hal::canopen::cia402::of_first_axis(index)) continue;
+            if (m.index != hal::cia402::of_first_axis(index)) continue;
             std::memcpy(&outputs_[bytes_per_axis * axis + m.at], &value, m.bytes);
             return Abort::none;
         }

@@ -339,7 +339,7 @@ TEST_F(Devices, Servo_has_the_first_values_of_every_axis) {
     to_preop();
     for (unsigned axis = 0; axis < 2; ++axis) {
         const auto value = [&](std::uint16_t index, std::uint8_t sub = 0) {
-            return upload(hal::canopen::cia402::of_axis(index, axis), sub);
+            return upload(hal::cia402::of_axis(index, axis), sub);
         };
         EXPECT_EQ(value(0x6098) & 0xff, 37U) << "home at the current position";
         EXPECT_EQ(value(0x6065), 0xffffffffU) << "no window";

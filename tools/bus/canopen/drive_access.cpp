@@ -10,7 +10,7 @@
 
 namespace hal::tools {
 
-using namespace canopen::cia402;
+using namespace cia402;
 using canopen::SdoRequest;
 
 namespace {

@@ -22,7 +22,7 @@ public:
 
     /// Reads the state of the axis from the drive.
     bool look();
-    const canopen::cia402::AxisFeedback& seen() const { return feedback_; }
+    const cia402::AxisFeedback& seen() const { return feedback_; }
     double position() const { return rules.position.to_user(feedback_.position); }
     double velocity() const { return rules.velocity.to_user(feedback_.velocity); }
 
@@ -37,13 +37,13 @@ public:
     /// Prints "A: ", the sentence and a new EMCY on stderr. Returns false.
     bool refuse(const std::string& sentence) const;
 
-    canopen::cia402::AxisRules rules;
+    cia402::AxisRules rules;
 
 protected:
     // between two cycles, to leave the bus to others
     static constexpr std::int64_t pause_ns = 10'000'000;
 
-    canopen::cia402::State state() const { return canopen::cia402::state_of(feedback_.statusword); }
+    cia402::State state() const { return cia402::state_of(feedback_.statusword); }
     /// An EMCY that arrived before this call is not reported with a failure.
     void forget_emergencies() { emergencies_ = station_.network.add(node_).emergencies(); }
     /// Starts to measure how long the position does not change.
@@ -54,7 +54,7 @@ protected:
     const Options& options_;
     NodeClient& station_;
     const std::uint8_t node_;
-    canopen::cia402::AxisFeedback feedback_;
+    cia402::AxisFeedback feedback_;
 
 private:
     bool read_optional(bool& available, std::uint16_t index, std::int64_t& value);

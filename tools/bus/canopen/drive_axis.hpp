@@ -32,7 +32,7 @@ public:
     bool quick_stop();
     bool home(std::optional<int> method);
     bool reset();
-    bool set_mode(canopen::cia402::Mode);
+    bool set_mode(cia402::Mode);
     bool wait();
     /// Returns true when a command of this session enabled or moved the axis.
     bool touched() const { return touched_; }
@@ -61,8 +61,8 @@ private:
     bool adopt();
     bool cycle();
     bool cycles(unsigned count);
-    bool write_orders(const canopen::cia402::AxisOrders&);
-    bool write_target(const canopen::cia402::AxisOrders&);
+    bool write_orders(const cia402::AxisOrders&);
+    bool write_target(const cia402::AxisOrders&);
     template <typename Value>
     bool write_changed(std::optional<Value>& written, Value value, std::uint16_t index);
     bool until(const Ready&, bool (SdoAxis::*still)() = nullptr);
@@ -71,13 +71,13 @@ private:
     bool timed_out();
     bool report();
     bool clear_failure();
-    bool begin_motion(canopen::cia402::Mode);
+    bool begin_motion(cia402::Mode);
     bool arrived();
     bool withdraw_set_points();
     bool target_reached() const;
 
-    canopen::cia402::Axis machine_;
-    canopen::cia402::AxisCommand command_;
+    cia402::Axis machine_;
+    cia402::AxisCommand command_;
     Written written_;
     bool adopted_ = false;
     bool touched_ = false;

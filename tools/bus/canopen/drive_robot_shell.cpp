@@ -12,7 +12,7 @@
 
 namespace hal::tools {
 
-using namespace canopen::cia402;
+using namespace cia402;
 
 struct RobotShell::Command {
     const char* name;

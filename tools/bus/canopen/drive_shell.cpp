@@ -11,7 +11,7 @@
 
 namespace hal::tools {
 
-using namespace canopen::cia402;
+using namespace cia402;
 
 struct DriveShell::Motion {
     double value = 0;

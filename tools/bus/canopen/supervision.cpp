@@ -254,8 +254,7 @@ bool Supervision::by_guarding(std::string& why_not) {
 }
 
 bool Supervision::set_reaction(unsigned axis) {
-    const auto index =
-        canopen::cia402::of_axis(canopen::cia402::object::abort_connection_option, axis);
+    const auto index = cia402::of_axis(cia402::object::abort_connection_option, axis);
     const char letter = static_cast<char>('A' + axis);
     const char* what = way_ == Way::heartbeat ? "heartbeat" : "life guarding";
     std::uint32_t option = 0;

@@ -68,7 +68,7 @@ int record_line(const Jr3NodeOptions& options) {
 }  // namespace
 
 int run_node_drive(const DriveNodeOptions& options) {
-    canopen::cia402::DriveSettings settings;
+    canopen::DriveSettings settings;
     settings.axes = options.axes;
     settings.serial = options.serial;
     settings.heartbeat_ms = options.heartbeat_ms;

@@ -4,7 +4,9 @@
 #include "cia301/error_register.hpp"
 #include "cia402/drive/axis_objects.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::canopen {
+
+using namespace cia402;
 
 AxisBinding::AxisBinding(unsigned number, const AxisSettings& settings)
     : number_(number), axis_(settings) {
@@ -52,4 +54,4 @@ bool AxisBinding::master_alive() const noexcept {
     return device_ == nullptr || device_->error_control().all_alive();
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::canopen

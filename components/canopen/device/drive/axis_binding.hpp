@@ -6,18 +6,18 @@
 #include "canopen/protocol/device.hpp"
 #include "cia402/drive/drive_axis.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::canopen {
 
 /// The axis with its objects. [realtime] unless marked.
-class AxisBinding final : private Handler, private AxisBus {
+class AxisBinding final : private Handler, private cia402::AxisBus {
 public:
     /// Creates axis `number`, counted from 0. [setup]
-    AxisBinding(unsigned number, const AxisSettings&);
+    AxisBinding(unsigned number, const cia402::AxisSettings&);
     /// Binds the values of the axis to the dictionary of a device, which must outlive the use of
     /// the axis. [setup]
     void attach(Device&);
 
-    DriveAxis& axis() noexcept { return axis_; }
+    cia402::DriveAxis& axis() noexcept { return axis_; }
 
 private:
     Abort writing(Entry&, std::span<const std::uint8_t>) noexcept override;
@@ -27,8 +27,8 @@ private:
     bool master_alive() const noexcept override;
 
     const unsigned number_;
-    DriveAxis axis_;
+    cia402::DriveAxis axis_;
     Device* device_ = nullptr;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::canopen

@@ -6,7 +6,7 @@
 
 #include "axis_binding.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::canopen {
 
 namespace {
 Events nobody;
@@ -20,7 +20,7 @@ Drive::Drive(const DriveSettings& settings, const DeviceSettings& device, Events
 Drive::Drive(const Description& description, const DriveSettings& settings,
              const DeviceSettings& device, Events* also)
     : also_(also != nullptr ? *also : nobody), device_(description, device, *this) {
-    for (unsigned n = 0; n < std::clamp(settings.axes, 1U, most_axes); ++n) {
+    for (unsigned n = 0; n < std::clamp(settings.axes, 1U, cia402::most_axes); ++n) {
         axes_.push_back(std::make_unique<AxisBinding>(n, settings.axis[n]));
         axes_[n]->attach(device_);
         axes_[n]->axis().power_up();
@@ -54,8 +54,8 @@ void Drive::step(Time now) noexcept {
     }
 }
 
-AxisStatus Drive::status(unsigned axis) const noexcept {
-    return axis < axes_.size() ? axes_[axis]->axis().status() : AxisStatus{};
+cia402::AxisStatus Drive::status(unsigned axis) const noexcept {
+    return axis < axes_.size() ? axes_[axis]->axis().status() : cia402::AxisStatus{};
 }
 void Drive::set_load_torque(unsigned axis, double torque) noexcept {
     if (axis < axes_.size()) {
@@ -132,4 +132,4 @@ void Drive::on_lss_activate(std::uint32_t bit_rate, Time delay) noexcept {
     also_.on_lss_activate(bit_rate, delay);
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::canopen

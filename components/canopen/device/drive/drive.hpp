@@ -23,12 +23,12 @@
 #include "canopen/protocol/device.hpp"
 #include "cia402/drive/axis_settings.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::canopen {
 
 /// Settings of the node.
 struct DriveSettings {
     unsigned axes = 1;  ///< 1–8
-    std::array<AxisSettings, most_axes> axis{};
+    std::array<cia402::AxisSettings, cia402::most_axes> axis{};
     std::uint32_t vendor = 0;
     std::uint32_t product = 0x402;
     std::uint32_t revision = 0x00010000;
@@ -70,7 +70,7 @@ public:
     unsigned axes() const noexcept { return static_cast<unsigned>(axes_.size()); }
     /// Returns the status of an axis, counted from 0; this and the functions below ignore an axis
     /// that does not exist. [realtime]
-    AxisStatus status(unsigned axis) const noexcept;
+    cia402::AxisStatus status(unsigned axis) const noexcept;
     /// Sets the external torque on the shaft in N·m, positive in the positive direction. Object
     /// 2010h does the same in mN·m. [realtime]
     void set_load_torque(unsigned axis, double torque) noexcept;
@@ -109,4 +109,4 @@ private:
     Time last_ = 0;
 };
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::canopen

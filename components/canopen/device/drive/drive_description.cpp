@@ -6,7 +6,9 @@
 #include "cia402/drive/axis_objects.hpp"
 #include "drive.hpp"
 
-namespace hal::canopen::cia402 {
+namespace hal::canopen {
+
+using namespace cia402;
 
 namespace {
 void add_axis(Description& d, unsigned axis, const AxisSettings& settings) {
@@ -101,4 +103,4 @@ Description drive_description(const DriveSettings& settings) {
     return d;
 }
 
-}  // namespace hal::canopen::cia402
+}  // namespace hal::canopen

@@ -18,14 +18,14 @@ bool axis_in(std::string_view text, std::string_view name, unsigned axes, unsign
 
 }  // namespace
 
-DriveProgram::DriveProgram(const cia402::DriveSettings& settings) : settings_(settings) {
+DriveProgram::DriveProgram(const DriveSettings& settings) : settings_(settings) {
     if (settings_.vendor == 0) {
         settings_.vendor = example_vendor;
     }
 }
 
 Device& DriveProgram::make(const DeviceSettings& settings) {
-    drive_ = std::make_unique<cia402::Drive>(settings_, settings, this);
+    drive_ = std::make_unique<Drive>(settings_, settings, this);
     return drive_->device();
 }
 

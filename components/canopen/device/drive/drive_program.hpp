@@ -12,9 +12,9 @@ namespace hal::canopen {
 
 class DriveProgram final : public Program {
 public:
-    explicit DriveProgram(const cia402::DriveSettings&);  // [setup]
+    explicit DriveProgram(const DriveSettings&);  // [setup]
 
-    Description description() const override { return cia402::drive_description(settings_); }
+    Description description() const override { return drive_description(settings_); }
     Device& make(const DeviceSettings&) override;
     void boot(Time now) noexcept override { drive_->start(now); }
     void step(Time now) noexcept override { drive_->step(now); }
@@ -23,11 +23,11 @@ public:
     std::string summary() const override;
 
     /// Returns the drive, once the Node exists. [realtime]
-    cia402::Drive& drive() noexcept { return *drive_; }
+    Drive& drive() noexcept { return *drive_; }
 
 private:
-    cia402::DriveSettings settings_;
-    std::unique_ptr<cia402::Drive> drive_;
+    DriveSettings settings_;
+    std::unique_ptr<Drive> drive_;
 };
 
 using cia402::parse_motor;
