@@ -43,7 +43,7 @@ Expected segment_reply(std::uint16_t index, std::uint8_t sub, std::uint8_t comma
     return {accepts_segment, index, sub, static_cast<std::uint32_t>(command | toggle)};
 }
 
-/// Returns the abort code in an accepted reply; nullopt: it is not an abort.
+/// Returns the abort code in an accepted reply; nullopt for another reply.
 std::optional<std::uint32_t> abort_in(std::span<const std::uint8_t> payload) noexcept {
     if (payload[2] != coe::command::abort) return std::nullopt;
     return coe::read_sdo(payload)->value;
