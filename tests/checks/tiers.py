@@ -111,7 +111,8 @@ def problems(root):
                 yield f"{page}: the row of {name} does not link to {own_page}"
         for name in sorted(set(listed) - names):
             yield f"{page}: has a row for {name}, which is not in cmake/packages"
-    for script in sorted((root / "tests").rglob("*.py")):
+    scripts = (one for one in (root / "tests").rglob("*") if one.suffix in {".py", ".sh"})
+    for script in sorted(scripts):
         stated = re.search(r"(?m)^# packages: (.*)$", script.read_text(encoding="utf-8"))
         for name in stated[1].split() if stated else ():
             if name not in names:

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
+# packages: linuxcnc
 """Compares our components with LinuxCNC's of the same names: linuxcnc_components.py HAL [options]
 
 HAL is our program. For every component that exists on both sides: pins, parameters and functions with types, directions and defaults;
