@@ -110,6 +110,7 @@ ROWS = {
         "components/canopen/eds",
         "components/fieldbus/can_timing",
         "components/bus/config",
+        "components/bus/events",
     ],
     "components/canopen/device": [
         "components/canopen/eds",

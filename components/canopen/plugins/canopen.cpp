@@ -53,24 +53,20 @@ public:
         objects_.emplace(shows, by_index() ? *update_ : *transmit_);
         for (const config::Node& n : config_.nodes) {
             nodes_.emplace_back(*this, shows, n.name);
-            messages_.emplace_back(n);
         }
         for (std::size_t i = 0; i < runner_->slots().size(); ++i) {
             const Slot& s = runner_->slots()[i];
             objects_->declare(*this, by_index() ? "" : config_.nodes[s.node].name + ".", s.to_node,
                               *s.object, i);
         }
-        for (const Received& r : runner_->own().received) {
-            pdo_messages_.emplace_back(config_.nodes[r.node], *r.pdo);
-        }
+        const std::vector<Received>& received = runner_->own().received;
+        messages_.emplace(config_, received);
         node_faults_.resize(nodes_.size());
-        late_faults_.resize(pdo_messages_.size());
-        short_faults_.resize(pdo_messages_.size());
+        late_faults_.resize(received.size());
+        short_faults_.resize(received.size());
+        short_raised_.resize(received.size());
         srdo_faults_.resize(runner_->own().srdos.size());
         safety_.emplace(*this, shows, *runner_);
-        own_id_message_ = "duplicate node ID " + std::to_string(config_.node_id) +
-                          ": another device has the node ID of the master; change one: node-id in "
-                          "[bus], or masternodeid=";
         reporter_ = std::make_unique<Reporter>(name_, config_, file);
     }
 
@@ -116,9 +112,7 @@ public:
             }
             end(period_fault_);
             if (config_.sync == config::SyncMode::timed && config_.sync_period % period_ != 0) {
-                begin(period_fault_,
-                      "the SYNC period is not a multiple of the thread's period; SYNCs are up to "
-                      "half a period early or late");
+                begin(period_fault_, messages_->of(BusEvent::sync_between_cycles));
             }
         }
         now_ = now;
@@ -229,19 +223,13 @@ private:
     void follow(Time now) noexcept {
         switch (follower_->cycle(*runner_, now, period_)) {
         case SyncFollower::Notice::lost:
-            begin(sync_fault_,
-                  "followed SYNC missing for {} s; threads run on their own clock until it returns",
-                  follower_->silence(now));
+            begin(sync_fault_, messages_->of(BusEvent::sync_missing), follower_->silence(now));
             break;
         case SyncFollower::Notice::in_vain:
-            begin(sync_fault_,
-                  "SYNC feedback loop: this machine produces the SYNC its own threads "
-                  "follow; write clock = own in the configuration");
+            begin(sync_fault_, messages_->of(BusEvent::sync_loop));
             break;
         case SyncFollower::Notice::unequal:
-            begin(sync_fault_,
-                  "cannot follow the SYNC: its period is not a multiple of the "
-                  "thread's; change the thread's period, or write clock = own");
+            begin(sync_fault_, messages_->of(BusEvent::sync_unequal));
             break;
         case SyncFollower::Notice::nothing:
             if (sync_fault_.lasts() && follower_->locked()) {
@@ -288,10 +276,14 @@ private:
         }
     }
     void on_lost(std::size_t place, const NodeStatus& s) noexcept {
-        const NodeFaultMessages& messages = messages_[place];
         nodes_[place].is_faulty = true;
-        node_fault(place, messages.lost(s),
-                   NodeFaultMessages::has_silence(s.cause) ? silence(s) : not_a_number);
+        // A fault of a node lasts until it runs again.
+        const FaultMessages::Fault& fault = messages_->lost(place, s);
+        if (s.last_heard != 0) {
+            begin(node_faults_[place], fault, silence(s));
+        } else {
+            begin(node_faults_[place], fault.text);
+        }
         reporter_->node(s);
     }
     /// Raises a fault for a node that did not boot or start, once until it runs.
@@ -301,7 +293,7 @@ private:
         if (nodes_[place].is_faulty || !(not_started || not_booted)) return;
         if (!not_started && may_be_powering_up(place, s)) return;
         nodes_[place].is_faulty = true;
-        node_fault(place, messages_[place].not_booted(s));
+        begin(node_faults_[place], messages_->not_booted(place, s));
         reporter_->node(s);
     }
     /// Returns true for an absent node that need not be there yet.
@@ -318,21 +310,21 @@ private:
         }
         end(node_faults_[place]);
         tell_notes(place, s);
-        for (std::size_t n = 0; n < pdo_messages_.size(); ++n) {
+        for (std::size_t n = 0; n < short_faults_.size(); ++n) {
             if (runner_->own().received[n].node != place) continue;
-            pdo_messages_[n].short_raised = false;
+            short_raised_[n] = false;
             end(short_faults_[n]);
         }
     }
-    /// Returns the time since the last frame of the node in seconds.
-    double silence(const NodeStatus& s) const noexcept {
-        if (s.last_heard == 0) return not_a_number;
-        return static_cast<double>((now_ - s.last_heard + millisecond / 2) / millisecond) * 1e-3;
+    /// Returns the time since the last frame of the node, in ns, whole milliseconds.
+    Time silence(const NodeStatus& s) const noexcept {
+        return (now_ - s.last_heard + millisecond / 2) / millisecond * millisecond;
     }
-    /// A fault of a node lasts until it runs again. [realtime]
-    void node_fault(std::size_t place, const std::string& reason,
-                    double detail = not_a_number) noexcept {
-        begin(node_faults_[place], reason, detail);
+    using BusComponent::begin;
+    /// Raises a fault with the value of its event; it lasts until end(). [realtime]
+    void begin(hal::LastingFault& lasting, const FaultMessages::Fault& fault,
+               std::int64_t value = 0) noexcept {
+        begin(lasting, fault.text, fault.detail(value));
     }
     /// Reports each note about a node once, a suspected duplicate node ID after each boot.
     void tell_notes(std::size_t place, const NodeStatus& s) noexcept {
@@ -345,7 +337,7 @@ private:
             }
         }
         if ((fresh & note_duplicate_id) != 0) {
-            raise(messages_[place].suspected.c_str());
+            raise(messages_->of(NodeFault::suspected_id, place).text.c_str());
         }
     }
     void on_network(const NetworkStatus& n) noexcept override {
@@ -362,46 +354,41 @@ private:
         reporter_->emergency(runner_->status(place), e);
     }
     void on_late(std::size_t place) noexcept override {
-        const double timeout_s =
-            static_cast<double>(runner_->own().received[place].pdo->limit) * 1e-9;
-        begin(late_faults_[place], pdo_messages_[place].late, timeout_s);
+        begin(late_faults_[place], messages_->of(PdoFault::late, place),
+              runner_->own().received[place].pdo->limit);
     }
     void on_short(std::size_t place, unsigned bytes) noexcept override {
-        if (!std::exchange(pdo_messages_[place].short_raised, true)) {
-            begin(short_faults_[place], pdo_messages_[place].short_pdo, bytes);
-        }
+        if (short_raised_[place]) return;
+        short_raised_[place] = true;
+        begin(short_faults_[place], messages_->of(PdoFault::too_short, place), bytes);
     }
     void on_foreign(const Foreign& f) noexcept override {
         if (f.sync || f.rpdo) {
             foreign_seen_ = now_;
         }
         if (f.begins && f.sync) {
-            begin(foreign_fault_, "another device also produces SYNC; nodes act on both");
+            begin(foreign_fault_, messages_->of(BusEvent::foreign_sync));
         }
         if (f.begins && f.rpdo) {
-            begin(foreign_fault_,
-                  "another device also sends RPDO {x} of a node of this master; the "
-                  "node follows both",
-                  f.id);
+            begin(foreign_fault_, messages_->of(BusEvent::foreign_rpdo), f.id);
         }
         reporter_->foreign(f);
     }
     void on_own_id_collision() noexcept override {
         own_id_seen_ = now_;
-        begin(own_id_fault_, own_id_message_);
+        begin(own_id_fault_, messages_->of(BusEvent::own_id));
     }
     void on_srdo_fault(std::size_t place, SrdoFault fault) noexcept override {
         begin(srdo_faults_[place], safety_->words(place, fault));
     }
     void on_bus_state(hal::can::State state) noexcept override {
-        if (state == hal::can::State::bus_off) {
-            begin(bus_fault_, "bus off: too many errors; the master retries");
-        } else if (state == hal::can::State::down && runner_->had_bus()) {
-            begin(bus_fault_, "bus down: the interface is off or was removed; the master retries");
-        } else if (state != hal::can::State::down) {
-            end(bus_fault_);
+        const BusEvent event = bus_event(state, runner_->had_bus());
+        switch (bus_event_rows[static_cast<std::size_t>(event)].effect) {
+        case hal::bus::Effect::raises: begin(bus_fault_, messages_->of(event)); break;
+        case hal::bus::Effect::ends: end(bus_fault_); break;
+        case hal::bus::Effect::none: break;
         }
-        reporter_->bus(state, runner_->had_bus());
+        reporter_->bus(event);
     }
     void on_rejected(const hal::can::Rejected& what) noexcept override {
         reporter_->rejected(what);
@@ -410,9 +397,7 @@ private:
     void on_sync_overrun() noexcept override {
         if (!overran_) {
             overran_ = true;
-            raise(
-                "SYNC overrun: frames of the last SYNC were still queued when the next was due; to "
-                "see what fits: hal canopen plan");
+            raise(messages_->of(BusEvent::sync_overrun).text.c_str());
         }
     }
 
@@ -427,9 +412,7 @@ private:
     std::optional<FlyingPins> flying_;
     std::optional<SyncFollower> follower_;
     std::deque<NodePins> nodes_;
-    std::deque<NodeFaultMessages> messages_;
-    std::deque<PdoFaultMessages> pdo_messages_;  // indexed as OwnNode::received
-    std::string own_id_message_;
+    std::optional<FaultMessages> messages_;
     std::optional<ObjectPins> objects_;
     std::optional<SafetyPins> safety_;
     std::unique_ptr<Reporter> reporter_;
@@ -437,6 +420,7 @@ private:
     hal::SetupTime setup_time_;
     // as nodes, received PDOs and SRDOs
     std::vector<hal::LastingFault> node_faults_, late_faults_, short_faults_, srdo_faults_;
+    std::vector<std::uint8_t> short_raised_;  // since the node was booted; as received PDOs
     hal::LastingFault period_fault_, sync_fault_, bus_fault_, foreign_fault_, own_id_fault_;
     Time foreign_seen_ = 0;
     Time own_id_seen_ = 0;

@@ -9,6 +9,7 @@
 #include "canopen/master/boot/node_status.hpp"
 #include "canopen/master/config/bus_schedule.hpp"
 #include "emergency_text.hpp"
+#include "event_rows.hpp"
 #include "hal/reporter.hpp"
 #include "link/can.hpp"
 #include "runner.hpp"
@@ -30,56 +31,40 @@ public:
     void stop() noexcept { reported_.stop(); }    // [setup]
 
     // By the cycle. [realtime]
-    void node(const NodeStatus& s) noexcept { reported_.tell({Event::node, s, {}, {}, {}, 0}); }
+    void node(const NodeStatus& s) noexcept { reported_.tell({.kind = Event::node, .of_node = s}); }
     /// What should be known of it: one bit of its notes.
     void note(NodeStatus s, Note one) noexcept {
         s.notes = one;
-        reported_.tell({Event::note, s, {}, {}, {}, 0});
+        reported_.tell({.kind = Event::note, .of_node = s});
     }
     void network(const NetworkStatus& n, const NodeStatus& s) noexcept {
-        reported_.tell({Event::network, s, n, {}, {}, 0});
+        reported_.tell({.kind = Event::network, .of_node = s, .of_network = n});
     }
     void emergency(const NodeStatus& s, const Emergency& e) noexcept {
-        reported_.tell({Event::emergency, s, {}, e, {}, 0});
+        reported_.tell({.of_bus = BusEvent::emergency, .of_node = s, .of_emergency = e});
     }
-    /// `had`: it was in order, now or earlier.
-    void bus(can::State state, bool had) noexcept {
-        reported_.tell({had ? Event::bus : Event::waiting, {}, {}, {}, state, 0});
-    }
+    void bus(BusEvent state) noexcept { reported_.tell({.of_bus = state}); }
     void rejected(const can::Rejected& what) noexcept {
-        Event e;
-        e.kind = Event::rejected;
-        e.of_link = what;
-        reported_.tell(e);
+        reported_.tell({.kind = Event::rejected, .of_link = what});
     }
-    void cycle(Time period) noexcept { reported_.tell({Event::cycle, {}, {}, {}, {}, period}); }
+    void cycle(Time period) noexcept { reported_.tell({.kind = Event::cycle, .period = period}); }
     void foreign(const RunnerEvents::Foreign& f) noexcept {
-        reported_.tell({Event::foreign, {}, {}, {}, {}, 0, 0, {}, f});
+        reported_.tell({.of_bus = foreign_event(f), .of_foreign = f});
     }
     void flying(const FlyingMaster& f) noexcept {
-        if (f.master() != 0) {
-            reported_.tell({Event::flying, {}, {}, {}, {}, 0, f.master()});
-        }
+        if (f.master() == 0) return;
+        const bool own = f.master() == config_.node_id;
+        reported_.tell(
+            {.of_bus = own ? BusEvent::is_master : BusEvent::on_standby, .master = f.master()});
     }
 
 private:
     struct Event {
-        enum Kind : std::uint8_t {
-            node,
-            note,
-            network,
-            emergency,
-            bus,
-            waiting,
-            cycle,
-            flying,
-            rejected,
-            foreign,
-        } kind = node;
+        enum Kind : std::uint8_t { bus, node, note, network, cycle, rejected } kind = bus;
+        BusEvent of_bus{};
         NodeStatus of_node{};
         NetworkStatus of_network{};
         Emergency of_emergency{};
-        can::State of_bus{};
         Time period = 0;
         std::uint8_t master = 0;
         can::Rejected of_link{};
@@ -106,7 +91,17 @@ private:
             add(of.kind, e.of_network.node);
             add(of.detail, static_cast<int>(e.of_network.state));
             break;
-        case Event::emergency:
+        case Event::bus: add_bus_event(e, of); break;
+        case Event::cycle:
+        case Event::rejected: break;
+        }
+        return of;
+    }
+    static void add_bus_event(const Event& e, MessageSubject& of) {
+        const auto add = [](std::string& text, auto value) { text += ' ' + std::to_string(value); };
+        switch (e.of_bus) {
+        case BusEvent::emergency:
+            add(of.kind, static_cast<int>(e.of_bus));
             add(of.kind, e.of_node.id);
             add(of.detail, e.of_emergency.code);
             // how much is over
@@ -114,24 +109,36 @@ private:
                 add(of.detail, e.of_emergency.error_register);
             }
             break;
-        case Event::bus: add(of.detail, static_cast<int>(e.of_bus)); break;
-        case Event::flying: add(of.detail, e.master); break;
-        case Event::foreign: add(of.detail, e.of_foreign.id); break;
-        default: break;
+        case BusEvent::is_master:
+        case BusEvent::on_standby:
+            of.kind += " flying";
+            add(of.detail, e.master);
+            break;
+        case BusEvent::foreign_nmt:
+        case BusEvent::foreign_sync:
+        case BusEvent::foreign_time:
+        case BusEvent::foreign_rpdo:
+        case BusEvent::foreign_sdo:
+        case BusEvent::foreign_id:
+            of.kind += " foreign";
+            add(of.detail, e.of_foreign.id);
+            break;
+        case BusEvent::waiting: of.kind += " waiting"; break;
+        default: add(of.detail, static_cast<int>(e.of_bus)); break;
         }
-        return of;
     }
-    std::string called(std::uint8_t id) const {
-        for (const config::Node& n : config_.nodes) {
-            if (n.setup.id == id) {
-                return "node " + std::to_string(id) +
-                       (n.setup.name.empty() ? "" : " (" + n.setup.name + ")");
-            }
-        }
-        return "node " + std::to_string(id);
+    static BusEvent foreign_event(const RunnerEvents::Foreign& f) noexcept {
+        if (f.id == 0) return BusEvent::foreign_nmt;
+        if (f.sync) return BusEvent::foreign_sync;
+        if (f.id == 0x100) return BusEvent::foreign_time;
+        if (f.rpdo) return BusEvent::foreign_rpdo;
+        if (f.id > 0x600 && f.id < 0x680) return BusEvent::foreign_sdo;
+        return BusEvent::foreign_id;
     }
+
     std::string words(const Event& e) {
         switch (e.kind) {
+        case Event::bus: return line(e);
         case Event::node:
             for (const NodeSetup& n : setup_.nodes) {
                 if (n.id == e.of_node.id) return sentence(n, e.of_node);
@@ -142,43 +149,7 @@ private:
                 if (n.id == e.of_node.id) return note_sentences(n, e.of_node).front();
             }
             break;
-        case Event::network: {
-            const NetworkStatus& n = e.of_network;
-            if ((n.state == NetworkState::booting && n.node == 0) || n.state == NetworkState::off) {
-                return {};
-            }
-            if (n.state != NetworkState::operational) return sentence(setup_, n, e.of_node);
-            char text[120];
-            const double after = static_cast<double>(n.operational_since - n.begun) * 1e-9;
-            if (n.begun == operational_reported_) {
-                std::snprintf(text, sizeof text, "the network is operational again: %u of %u nodes",
-                              n.operational, n.nodes);
-            } else {
-                std::snprintf(text, sizeof text,
-                              "the network is operational: %u of %u nodes, after %.2f s",
-                              n.operational, n.nodes, after);
-            }
-            operational_reported_ = n.begun;
-            return text;
-        }
-        case Event::emergency: {
-            char text[160];
-            const auto code = e.of_emergency.code;
-            std::snprintf(text, sizeof text, "%s: emergency 0x%04X (%s), error register 0x%02X",
-                          called(e.of_node.id).c_str(), code,
-                          emergency_text(config_, e.of_node.id, code),
-                          e.of_emergency.error_register);
-            return text;
-        }
-        case Event::bus: return bus_words(e.of_bus);
-        case Event::waiting:
-            return "waits for the bus: its interface is off, or its slots may not be used yet";
-        case Event::flying:
-            return e.master == config_.node_id
-                       ? "is the NMT master now"
-                       : "node " + std::to_string(e.master) +
-                             " is the NMT master; this one is ready to take over";
-        case Event::foreign: return foreign_words(e.of_foreign);
+        case Event::network: return network_line(e);
         case Event::rejected: return can::to_string(e.of_link);
         case Event::cycle:
             for (const config::Message& m : config::load_messages(config_, e.period, file_)) {
@@ -188,43 +159,81 @@ private:
         }
         return {};
     }
+    std::string network_line(Event e) {
+        const NetworkStatus& n = e.of_network;
+        if ((n.state == NetworkState::booting && n.node == 0) || n.state == NetworkState::off) {
+            return {};
+        }
+        if (n.state != NetworkState::operational) return sentence(setup_, n, e.of_node);
+        e.of_bus =
+            n.begun == operational_reported_ ? BusEvent::operational_again : BusEvent::operational;
+        operational_reported_ = n.begun;
+        return line(e);
+    }
+    /// Formats the line of a row.
+    std::string line(const Event& e) const {
+        return bus::format(bus_event_rows[static_cast<std::size_t>(e.of_bus)].text, bus::Text::line,
+                           [&](std::string_view name) { return value_of(name, e); });
+    }
 
-    std::string foreign_words(const RunnerEvents::Foreign& f) const {
-        char id[8], text[64] = "";
-        std::snprintf(id, sizeof id, "%03Xh", unsigned{f.id});
-        if (f.frames > 1) {
-            std::snprintf(text, sizeof text, " (%u frames)", unsigned{f.frames});
+    template <class... Values>
+    static std::string print(const char* format, Values... values) {
+        char text[80];
+        std::snprintf(text, sizeof text, format, values...);
+        return text;
+    }
+    /// Returns the value of a name in a row.
+    std::string value_of(std::string_view name, const Event& e) const {
+        const NetworkStatus& network = e.of_network;
+        const RunnerEvents::Foreign& foreign = e.of_foreign;
+        if (name == "node") return called(e);
+        if (name == "operational") return std::to_string(network.operational);
+        if (name == "nodes") return std::to_string(network.nodes);
+        if (name == "s") {
+            return print("%.2f s",
+                         static_cast<double>(network.operational_since - network.begun) * 1e-9);
         }
-        if (f.id == 0) {
-            const auto whom = f.data[1] == 0 ? "all nodes" : called(f.data[1]);
-            return "another NMT master is on the bus: it commands '" + nmt_word(f.data[0]) +
-                   "' to " + whom + text;
+        if (name == "code") return print("0x%04X", unsigned{e.of_emergency.code});
+        if (name == "meaning") return emergency_text(config_, e.of_node.id, e.of_emergency.code);
+        if (name == "register") return print("0x%02X", unsigned{e.of_emergency.error_register});
+        if (name == "x") return print("%03Xh", unsigned{foreign.id});
+        if (name == "frames") {
+            return foreign.frames > 1 ? print(" (%u frames)", unsigned{foreign.frames}) : "";
         }
-        if (f.sync) {
-            return "another device produces SYNC (" + std::string(id) +
-                   "), too, and nodes act on both" + text + "; clear bit 30 of its 1005h";
+        if (name == "command") return nmt_word(foreign.data[0]);
+        if (name == "pdo") return rpdo_name(foreign.id);
+        return {};
+    }
+    /// Returns the name of the node that an event is about.
+    std::string called(const Event& e) const {
+        switch (e.of_bus) {
+        case BusEvent::on_standby: return called(e.master);
+        case BusEvent::foreign_nmt:
+            return e.of_foreign.data[1] == 0 ? "all nodes" : called(e.of_foreign.data[1]);
+        case BusEvent::foreign_sdo:
+            return called(static_cast<std::uint8_t>(e.of_foreign.id & 0x7f));
+        default: return called(e.of_node.id);
         }
-        if (f.id == 0x100) {
-            return std::string("another device produces TIME (100h), too") + text +
-                   "; clear bit 30 of its 1012h";
+    }
+    std::string called(std::uint8_t id) const {
+        for (const config::Node& n : config_.nodes) {
+            if (n.setup.id == id) {
+                return "node " + std::to_string(id) +
+                       (n.setup.name.empty() ? "" : " (" + n.setup.name + ")");
+            }
         }
-        if (f.rpdo) {
-            for (const config::Node& n : config_.nodes) {
-                for (const config::Pdo& p : n.pdos) {
-                    if (p.to_node && cob_id(p.cob) == f.id) {
-                        return "another device sends " + std::string(id) + ", which is rpdo" +
-                               std::to_string(p.number) + " of " + called(n.setup.id) +
-                               " and only this master's to send" + text + "; the node obeys both";
-                    }
+        return "node " + std::to_string(id);
+    }
+    /// Returns the name of the RPDO of a node that this master sends with an identifier.
+    std::string rpdo_name(std::uint16_t id) const {
+        for (const config::Node& n : config_.nodes) {
+            for (const config::Pdo& p : n.pdos) {
+                if (p.to_node && cob_id(p.cob) == id) {
+                    return "rpdo" + std::to_string(p.number) + " of " + called(n.setup.id);
                 }
             }
         }
-        if (f.id > 0x600 && f.id < 0x680) {
-            return "another SDO client uses the channel of " +
-                   called(static_cast<std::uint8_t>(f.id & 0x7f)) + " (" + id + ")" + text +
-                   "; transfers of both may be aborted";
-        }
-        return "another device sends " + std::string(id) + ", an identifier of this master" + text;
+        return "an RPDO";
     }
     static std::string nmt_word(std::uint8_t command) {
         switch (static_cast<NmtCommand>(command)) {
@@ -235,23 +244,6 @@ private:
         case NmtCommand::reset_communication: return "reset communication";
         }
         return "command " + std::to_string(command);
-    }
-    static const char* bus_words(can::State state) {
-        switch (state) {
-        case can::State::active: return "the bus is active again";
-        case can::State::warning:
-            return "the bus is warning: many frames fail; check the cable, its termination, the "
-                   "bit rate, and that a node is there";
-        case can::State::passive:
-            return "the bus is passive: most frames fail; check the cable, its termination, the "
-                   "bit rate, and that a node is there";
-        case can::State::bus_off:
-            return "the bus is bus off: too many errors; it is tried again by itself";
-        case can::State::down:
-            return "the bus is down: its interface is off or was taken away; it is tried again by "
-                   "itself";
-        }
-        return "";
     }
 
     const config::MasterConfig& config_;

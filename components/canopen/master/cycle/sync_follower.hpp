@@ -70,7 +70,7 @@ public:
     /// Returns true while the threads follow the SYNC of another device. [realtime]
     bool locked() const noexcept { return beat_.locked(); }
     /// Returns the time since the newest SYNC in s. [realtime]
-    double silence(Time now) const noexcept { return static_cast<double>(now - came_) * 1e-9; }
+    Time silence(Time now) const noexcept { return now - came_; }
 
 private:
     static constexpr unsigned most_missed = 5;
