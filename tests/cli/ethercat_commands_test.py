@@ -306,7 +306,7 @@ class Configuration(Ethercat):
         self.assertNotIn("loadrt ethercat_segment", (self.folder / "real.hal").read_text())
         bad = lambda *words: self.bad("ethercat", "config", *words)
         self.assertEqual(
-            "hal ethercat config: 'drive.xml': the description has several devices; write drive.xml:NAME with one of: SERVO-1, DIO-8\n",
+            "hal ethercat config: 'drive.xml' describes several devices; write drive.xml:NAME with one of: SERVO-1, DIO-8\n",
             bad("--esi", "drive.xml", "x"),
         )
         self.assertEqual(
@@ -321,6 +321,39 @@ class Configuration(Ethercat):
             "hal ethercat config: type: hal ethercat config --esi FILE.xml:DEVICE NAME, or eth:INTERFACE before NAME\n",
             bad("--esi", "drive.xml"),
         )
+
+    def test_names_with_blanks_commas_and_colons_survive_in_the_generated_files(self):
+        text = (ROOT / "tests/unit/ethercat/data/servo.xml").read_text()
+        device = text[text.index("<Device ") : text.index("</Device>") + len("</Device>")]
+        newer = device.replace("SERVO-1<", "It's 1: a, b<")
+        self.assertNotEqual(newer, device)
+        path = "my drives, all: it's new.xml"
+        (self.folder / path).write_text(text.replace(device, device + newer))
+        item = "'" + path.replace("'", "''") + ":It''s 1: a, b'"
+        self.good(
+            "ethercat",
+            "config",
+            "--esi",
+            f"{item}, '{path.replace(chr(39), chr(39) * 2)}:SERVO-1'",
+            "odd",
+        )
+        self.assertIn(
+            f"esi      = {path}\ndevice   = It's 1: a, b\n",
+            (self.folder / "odd.ethercat").read_text(),
+        )
+        self.assertIn(
+            "esi file='my drives, all: it''s new.xml' device='It''s 1: a, b', esi file='my drives, all: it''s new.xml' device=SERVO-1",
+            (self.folder / "odd.hal").read_text(),
+        )
+        self.good("ethercat", "check", "odd.ethercat")
+        run = self.run_program("sim", "odd.hal", "--for", "3s")
+        self.assertIn("slave 1 (servo-1) is operational", run.stdout + run.stderr)
+        self.assertIn("slave 0 (it-s-1-a-b) is operational", run.stdout + run.stderr)
+        for bad in ("a #1.xml", 'a "b".xml', "$a.xml"):
+            (self.folder / bad).write_text(text)
+            self.assertIn(
+                "rename the file", self.bad("ethercat", "config", "--esi", bad + ":SERVO-1", "x")
+            )
 
     def test_a_described_device_does_what_its_description_says(self):
         (self.folder / "drive.xml").write_text(
@@ -343,7 +376,7 @@ class Configuration(Ethercat):
         self.assertIn("607A:0 DINT, 32 bit  Target position\n", self.on("pdos", line=line))
         (self.folder / "line.txt").write_text("coupler\nesi file=drive.xml device=none\n")
         self.assertEqual(
-            "hal ethercat slaves: line.txt:2:1: 'drive.xml': the description has no device 'none'; write device=NAME with one of: SERVO-1, DIO-8\n",
+            "hal ethercat slaves: line.txt:2:1: 'drive.xml' does not describe a device 'none'; write device=NAME with one of: SERVO-1, DIO-8\n",
             self.refused("slaves", line="line.txt"),
         )
         for wrong, printed in (

@@ -142,7 +142,7 @@ void check(const Messages& messages, std::string_view text) {
 void description(std::string_view text) {
     const esi::File file = esi::read(text);
     for (const esi::Device& d : file.devices) {
-        sii::parse(esi::sii_image(file, d));
+        sii::parse(esi::sii_image(d));
     }
 }
 

@@ -156,7 +156,9 @@ void check_pdos(const esi::Device& device, const std::string& type,
             const esi::Pdo* d = device.find_pdo(p.index);
             if (d == nullptr || p.write_mapping) continue;
             if (const std::string sentence = esi::longer_entry(device, *d); !sentence.empty()) {
-                error(sentence, "correct the description, or list the objects with another PDO");
+                report.warning(Topic::object, at, sentence,
+                               "the bits of the PDO are exchanged; if its mapping is rejected, "
+                               "list the objects");
             }
         }
     }

@@ -5,6 +5,7 @@
 
 #include "ethercat/config/slave_pdos.hpp"
 #include "ethercat/config/slave_writes.hpp"
+#include "ethercat/esi/lookup.hpp"
 
 namespace hal::ethercat::config {
 
@@ -39,9 +40,11 @@ std::optional<std::uint32_t> parse_revision(std::string_view text) {
 
 bool read_revision(SlaveInput& to, const Line& line) {
     if (same_word(line.value.text, "any")) return true;
+    if (same_word(line.value.text, "esi")) return true;  // SlaveReader::identity() has set it
     master::Identity& identity = to.slave.identity;
     identity.revision = parse_revision(line.value.text);
-    identity.revision_or_higher = line.value.text.ends_with('+');
+    const bool or_higher = line.value.text.ends_with('+');
+    identity.revision_rule = or_higher ? RevisionRule::equal_or_higher : RevisionRule::equal;
     return identity.revision.has_value();
 }
 
@@ -98,9 +101,13 @@ const bus::KeyTable<SlaveInput>& slave_keys() {
         {"vendor", bus::number(&vendor, 1, 0xffffffff), "from the ESI", "expected identity"},
         {"product", bus::number(&product, 1, 0xffffffff), "from the ESI", "expected identity"},
         {"revision",
-         bus::own("any, a number, or one with + for this revision or a higher one, as in 0x10001+",
-                  "any, a number, a number+", &read_revision),
-         "`any`", "expected identity; `revision = 0x10001+` also accepts higher revisions"},
+         bus::own("any, esi, a number, or one with + for this revision or a higher one, as in "
+                  "0x10001+",
+                  "any, esi, a number, a number+", &read_revision),
+         "`any`",
+         "expected identity; `revision = 0x10001+` also accepts higher revisions, `esi` those that "
+         "`CheckRevisionNo` of the ESI accepts. A number also selects the description of that "
+         "revision in the ESI"},
         {"serial",
          bus::own("a number of 0..4294967295, decimal or with 0x", "any, a number", &read_serial),
          "`any`", "expected identity"},
@@ -233,11 +240,8 @@ private:
         file_ = in_.descriptions.get(esi->value, report_);
         if (file_ == nullptr) return false;
         in_.info.description = esi->value.text;
-        device_ = find_device(name);
-        if (device_ == nullptr) {
-            report_unknown_device(*esi, name);
-            return false;
-        }
+        device_ = find_device(*esi, name);
+        if (device_ == nullptr) return false;
         in_.info.type = device_->order;
         const bool is_drive = name != nullptr && same_word(name->value.text, "cia402");
         if (device_->profile == 402 || axes_given || is_drive) {
@@ -258,20 +262,12 @@ private:
         return false;
     }
 
-    /// Finds the device of the ESI: by its name, by its product code, or because it is the only one.
-    const esi::Device* find_device(const Line* name) {
-        if (name != nullptr && !same_word(name->value.text, "cia402")) {
-            return file_->find(name->value.text);
-        }
-        if (const Line* line = keys_.find("product")) {
-            const auto code = parse_natural(line->value.text);
-            return code ? file_->find(static_cast<std::uint32_t>(*code), revision()) : nullptr;
-        }
-        const auto& devices = file_->devices;
-        const bool one = std::all_of(devices.begin(), devices.end(), [&](const esi::Device& d) {
-            return d.product == devices[0].product;
-        });
-        return one && !devices.empty() ? file_->find(devices[0].product, revision()) : nullptr;
+    /// Returns the number of a key; nullopt: it is not given, or invalid.
+    std::optional<std::uint32_t> number_of(const char* key) {
+        const Line* line = keys_.find(key);
+        if (line == nullptr) return std::nullopt;
+        const auto value = parse_natural(line->value.text);
+        return value ? std::optional(static_cast<std::uint32_t>(*value)) : std::nullopt;
     }
 
     std::optional<std::uint32_t> revision() {
@@ -279,26 +275,54 @@ private:
         return line != nullptr ? parse_revision(line->value.text) : std::nullopt;
     }
 
-    void report_unknown_device(const Line& esi, const Line* name) {
-        std::vector<std::string> names;
-        for (const esi::Device& d : file_->devices) {
-            if (std::find(names.begin(), names.end(), d.order) == names.end()) {
-                names.push_back(d.order);
-            }
+    /// Finds the device of the ESI by `device`, `vendor`, `product` and `revision`, or because it
+    /// is the only one. Returns nullptr after reporting that there is none.
+    const esi::Device* find_device(const Line& esi, const Line* name) {
+        const bool is_named = name != nullptr && !same_word(name->value.text, "cia402");
+        esi::Wanted wanted;
+        if (is_named) {
+            wanted.name = name->value.text;
         }
+        wanted.vendor = number_of("vendor").value_or(0);
+        wanted.product = number_of("product");
+        wanted.revision = revision();
+        const esi::Match match = esi::look_up(*file_, wanted);
         const std::string file = "'" + esi.value.text + "'";
-        if (name != nullptr) {
-            return report_.error(Topic::slave, name->value.at,
-                                 file + " does not describe a device '" + name->value.text + "'",
-                                 suggestion(name->value.text, names, "the devices are"));
+        if (match.device == nullptr) {
+            report_no_device(match, file, deciding_key(esi, is_named ? name : nullptr));
+            return nullptr;
         }
-        if (const Line* line = keys_.find("product")) {
-            return report_.error(Topic::slave, line->value.at,
-                                 file + " does not describe a product " + line->value.text,
-                                 "the devices are: " + listed(names));
+        if (match.revision == esi::Match::Revision::other) {
+            const Line& line = *keys_.find("revision");
+            report_.warning(
+                Topic::slave, line.value.at,
+                file + " does not describe revision " + line.value.text + " of '" +
+                    match.device->order + "'; the description of revision " +
+                    esi::number_text(match.device->revision) + " is used",
+                "the revisions are: " + listed(esi::revisions_of(*file_, *match.device)));
         }
-        report_.error(Topic::slave, esi.value.at, file + " describes several devices",
-                      "write device = NAME; the devices are: " + listed(names));
+        return match.device;
+    }
+
+    /// Returns the line that an unsuccessful look-up is reported at.
+    const Line& deciding_key(const Line& esi, const Line* name) {
+        if (name != nullptr) return *name;
+        const Line* product = keys_.find("product");
+        return product != nullptr ? *product : esi;
+    }
+
+    void report_no_device(const esi::Match& match, const std::string& file, const Line& line) {
+        std::string help;
+        if (match.choices.empty()) {
+            help = "correct the key, or write the ESI file of the device";
+        } else if (line.key.text == "device") {
+            help = suggestion(line.value.text, match.choices, "the devices are");
+        } else if (line.key.text == "esi") {
+            help = "write device = NAME; the devices are: " + listed(match.choices);
+        } else {
+            help = "the devices are: " + listed(match.choices);
+        }
+        report_.error(Topic::slave, line.value.at, file + " " + match.problem, help);
     }
 
     /// Builds a modular device, and writes its configured module list (ETG.5001).
@@ -357,8 +381,13 @@ private:
     void identity() {
         master::Identity& id = slave_.identity;
         if (device_ == nullptr) return;
-        id.vendor = file_->vendor;
+        id.vendor = device_->vendor;
         id.product = device_->product;
+        const Line* revision = keys_.find("revision");
+        if (revision != nullptr && same_word(revision->value.text, "esi")) {
+            id.revision = device_->revision;
+            id.revision_rule = device_->check_revision.value_or(RevisionRule::equal_or_higher);
+        }
         const esi::Timeouts& t = device_->timeouts;
         slave_.timeouts = {t.preop,          t.safeop_op, t.back_to_init,
                            t.back_to_safeop, t.request,   t.response};

@@ -205,13 +205,14 @@ std::string write(const std::string& link, std::int64_t cycle_ns,
         if (s.vendor != 0) {
             out += "vendor   = " + hex(s.vendor) + "\n";
         }
-        if (s.product != 0) {
+        const bool described = !s.esi.empty();
+        if (described || s.product != 0) {
             out += "product  = " + hex(s.product) + "\n";
         }
-        if (s.revision != 0) {
+        if (described || s.revision != 0) {
             out += "revision = " + hex(s.revision) + "+  # or a higher one\n";
         }
-        if (s.esi.empty()) {
+        if (!described) {
             const unsigned axes = axes_of(s);
             if (axes != 0) {
                 out += "device  = cia402\n";

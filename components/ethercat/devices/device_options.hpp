@@ -4,11 +4,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "cia402/drive/axis_settings.hpp"
 
 namespace hal::ethercat::esi {
+struct Device;
 struct File;
 }
 namespace hal::ethercat::devices {
@@ -30,7 +32,9 @@ struct DeviceOptions {
     /// description of an esi device, and its name there; empty: the only one
     std::string file{};
     std::string device{};
+    std::optional<std::uint32_t> revision{};  ///< of an esi device; nullopt: the newest
     std::shared_ptr<const esi::File> description{};  ///< the contents of `file`
+    const esi::Device* described = nullptr;  ///< the device in `description`
 };
 
 }  // namespace hal::ethercat::devices

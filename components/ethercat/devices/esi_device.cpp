@@ -187,32 +187,6 @@ void add_identity(const sii::Contents& s, Plan& plan) {
 
 }  // namespace
 
-const esi::Device* find_device(const esi::File& file, std::string_view wanted,
-                               std::string& problem) {
-    if (file.devices.empty()) {
-        problem = "the description has no device";
-        return nullptr;
-    }
-    if (wanted.empty()) {
-        for (const esi::Device& d : file.devices) {
-            if (d.product != file.devices.front().product) {
-                problem = "the description has several devices";
-                return nullptr;
-            }
-        }
-        return file.find(file.devices.front().product);
-    }
-    if (const esi::Device* device = file.find(wanted)) return device;
-    const auto product = parse_natural(wanted);
-    if (product && *product <= 0xffffffff) {
-        if (const esi::Device* device = file.find(static_cast<std::uint32_t>(*product))) {
-            return device;
-        }
-    }
-    problem = "the description has no device '" + std::string(wanted) + "'";
-    return nullptr;
-}
-
 std::string why_not_emulated(const esi::Device& d) {
     for (const sii::SmType type : {sii::SmType::outputs, sii::SmType::inputs}) {
         unsigned used = 0;
@@ -222,13 +196,6 @@ std::string why_not_emulated(const esi::Device& d) {
         if (used > 1) {
             return std::string("several sync managers with ") +
                    (type == sii::SmType::outputs ? "outputs" : "inputs") + " are not emulated";
-        }
-    }
-    for (const auto* pdos : {&d.rx, &d.tx}) {
-        for (const esi::Pdo& pdo : *pdos) {
-            if (std::string sentence = esi::longer_entry(d, pdo); !sentence.empty()) {
-                return sentence;
-            }
         }
     }
     for (const esi::SyncManager& s : d.sync_managers) {
@@ -242,11 +209,10 @@ std::string why_not_emulated(const esi::Device& d) {
 }
 
 Parts make_esi_device(const DeviceOptions& o) {
-    std::string problem;
-    const esi::Device& device = *find_device(*o.description, o.device, problem);
+    const esi::Device& device = *o.described;
     Design design;
     design.name = device.order;
-    design.sii = esi::sii_contents(*o.description, device);
+    design.sii = esi::sii_contents(device);
     sii::Contents& s = design.sii;
     s.configuration[4] = o.alias;
     design.device_id = o.alias;

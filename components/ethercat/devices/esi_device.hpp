@@ -12,14 +12,10 @@
 
 namespace hal::ethercat::devices {
 
-/// Returns the device that a name, an order code or a product code (0x…) means; without one, the
-/// only device. nullptr after setting `problem`. [setup]
-const esi::Device* find_device(const esi::File&, std::string_view wanted, std::string& problem);
-
 /// Returns what the emulation cannot do with a device; empty: nothing. [setup]
 std::string why_not_emulated(const esi::Device&);
 
-/// Makes the device `options.device` of `options.description`, which must be there. [setup]
+/// Makes the device `options.described`, which must be there. [setup]
 Parts make_esi_device(const DeviceOptions&);
 
 }  // namespace hal::ethercat::devices

@@ -5,9 +5,11 @@
 #include <optional>
 
 #include "cia402/drive/motor_options.hpp"
+#include "ethercat/devices/device_words.hpp"
 #include "ethercat/devices/esi_device.hpp"
 #include "ethercat/devices/mailbox_device.hpp"
 #include "ethercat/devices/servo.hpp"
+#include "ethercat/esi/lookup.hpp"
 #include "hal/read_file.hpp"
 #include "text/numbers.hpp"
 
@@ -26,7 +28,7 @@ constexpr DeviceRow device_rows[] = {
     {"analog_out", "channels", [](const DeviceOptions& o) { return make_analog(o, true); }},
     {"servo", "axes dc modes motor", make_servo},
     {"mailbox_device", "", make_mailbox_device},
-    {"esi", "file device", make_esi_device},
+    {"esi", "file device revision", make_esi_device},
 };
 
 const DeviceRow* device_row(std::string_view name) {
@@ -40,6 +42,14 @@ bool offers(const DeviceRow& row, std::string_view option) {
     return option == "alias" || option == "serial" ||
            (" " + std::string(row.options) + " ").find(" " + std::string(option) + " ") !=
                std::string::npos;
+}
+
+std::string list_of(const std::vector<std::string>& names) {
+    std::string out;
+    for (const std::string& name : names) {
+        out += (out.empty() ? "" : ", ") + name;
+    }
+    return out;
 }
 
 std::string list_of_names() {
@@ -96,6 +106,10 @@ constexpr OptionRow option_rows[] = {
      [](Text k, Text v, DeviceOptions& o) { return parse_number(k, v, 1, 0x3ff, o.modes); }},
     {"alias",
      [](Text k, Text v, DeviceOptions& o) { return parse_number(k, v, 0, 0xffff, o.alias); }},
+    {"revision",
+     [](Text k, Text v, DeviceOptions& o) {
+    return parse_number(k, v, 0, 0xffffffff, o.revision.emplace());
+}},
     {"serial",
      [](Text k, Text v, DeviceOptions& o) { return parse_number(k, v, 0, 0xffffffff, o.serial); }},
     {"dc", [](Text, Text v, DeviceOptions& o) { return parse_dc(v, o.dc_required); }},
@@ -140,23 +154,24 @@ std::string read_description(DeviceOptions& o, const FindFile& find, std::string
             return "'" + path + "', line " + std::to_string(m.at.line) + ": " + m.sentence;
         }
     }
-    std::string problem;
-    const esi::Device* device = find_device(file, o.device, problem);
-    if (device == nullptr) {
-        std::string list;
-        for (const esi::Device& d : file.devices) {
-            if (list.find(d.order) == std::string::npos) {
-                list += (list.empty() ? "" : ", ") + d.order;
-            }
-        }
-        help = "write device=NAME with one of: " + list;
-        return "'" + path + "': " + problem;
+    auto description = std::make_shared<const esi::File>(std::move(file));
+    const esi::Match match = esi::look_up(*description, {.name = o.device, .revision = o.revision});
+    if (match.device == nullptr) {
+        help = "write device=NAME with one of: " + list_of(match.choices);
+        return "'" + path + "' " + match.problem;
     }
-    if (std::string why = why_not_emulated(*device); !why.empty()) {
+    if (match.revision == esi::Match::Revision::other) {
+        help = "write revision= with one of: " +
+               list_of(esi::revisions_of(*description, *match.device));
+        return "'" + path + "' does not describe revision " + esi::number_text(*o.revision) +
+               " of '" + match.device->order + "'";
+    }
+    if (std::string why = why_not_emulated(*match.device); !why.empty()) {
         help = "choose another device, or correct the description";
-        return "'" + path + "', device '" + device->order + "': " + why;
+        return "'" + path + "', device '" + match.device->order + "': " + why;
     }
-    o.description = std::make_shared<const esi::File>(std::move(file));
+    o.description = std::move(description);
+    o.described = match.device;
     return {};
 }
 
@@ -172,7 +187,7 @@ std::vector<std::string_view> names() {
 
 std::optional<Device> make(std::string_view name, const DeviceOptions& options) {
     const auto* row = device_row(name);
-    if (row == nullptr || (row->make == make_esi_device && !options.description)) {
+    if (row == nullptr || (row->make == make_esi_device && options.described == nullptr)) {
         return std::nullopt;
     }
     Parts parts = row->make(options);
@@ -196,7 +211,7 @@ LineDescription read_line(std::string_view text, const FindFile& find) {
     LineDescription out;
     text::Messages<LineTopic> messages;
     for (text::Lines lines(text); auto line = lines.next();) {
-        const auto words = text::words_of(*line);
+        const auto words = device_words(*line);
         const auto* row = device_row(words[0].text);
         if (row == nullptr) {
             messages.error(LineTopic::device, words[0].at, "unknown device '" + words[0].text + "'",

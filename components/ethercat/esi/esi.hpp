@@ -2,7 +2,8 @@
 // Device descriptions in XML (ESI, ETG.2000): what a vendor states about a device.
 //
 //     const esi::File file = esi::read(text);
-//     if (const esi::Device* device = file.find(0x402, {})) image = esi::sii_image(file, *device);
+//     const esi::Match match = esi::look_up(file, {.product = 0x402});       // lookup.hpp
+//     if (match.device != nullptr) image = esi::sii_image(*match.device);
 //
 // Everything here is [setup].
 #pragma once
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "ethercat/wire/mailbox.hpp"
+#include "ethercat/wire/revision_rule.hpp"
 #include "ethercat/wire/sii.hpp"
 #include "text/config_text.hpp"
 
@@ -128,8 +130,11 @@ struct Slot {
 struct Device {
     /// physics: Y MII, K EBUS, one letter per port
     std::string order, name, group, physics;
+    std::uint32_t vendor = 0;
     std::uint32_t product = 0;
     std::uint32_t revision = 0;
+    /// of the revisions for which the description is valid; nullopt: not given
+    std::optional<RevisionRule> check_revision;
     std::uint32_t serial = 0;
     Timeouts timeouts;
     std::vector<sii::FmmuUse> fmmus;
@@ -168,18 +173,11 @@ struct Module {
 };
 
 struct File {
-    std::uint32_t vendor = 0;
-    std::string vendor_name;
     std::vector<Device> devices;
     std::vector<Module> modules;
     std::vector<Message> messages;
 
     bool good() const { return text::good(messages); }
-    /// Returns the device with this product code: that of the given revision, else the one of the
-    /// highest revision; nullptr without one.
-    const Device* find(std::uint32_t product, std::optional<std::uint32_t> revision = {}) const;
-    /// Returns the newest device with this order code or name; nullptr without one.
-    const Device* find(std::string_view name) const;
 };
 
 /// Reads a file. Accepts any bytes; what is invalid is left out and reported.
@@ -194,10 +192,10 @@ Device with_modules(const File&, const Device&, const std::vector<std::uint32_t>
 std::string longer_entry(const Device&, const Pdo&);
 
 /// Returns what the SII of the device contains.
-sii::Contents sii_contents(const File&, const Device&);
+sii::Contents sii_contents(const Device&);
 /// Returns the EEPROM image of the device: that of the file if it has a whole one, else one made
 /// from the description.
-std::vector<std::uint8_t> sii_image(const File&, const Device&);
+std::vector<std::uint8_t> sii_image(const Device&);
 
 /// Parses a number of an ESI: decimal, `#x1f` or `0x1f`, with sign. Nothing for anything else.
 std::optional<std::int64_t> number(std::string_view text);

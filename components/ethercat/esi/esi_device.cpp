@@ -45,29 +45,6 @@ const Pdo* Device::find_pdo(std::uint16_t index) const {
     return nullptr;
 }
 
-const Device* File::find(std::uint32_t product, std::optional<std::uint32_t> revision) const {
-    const Device* best = nullptr;
-    for (const Device& d : devices) {
-        if (d.product != product) continue;
-        if (revision && d.revision == *revision) return &d;
-        if (best == nullptr || d.revision > best->revision) {
-            best = &d;
-        }
-    }
-    return best;
-}
-
-const Device* File::find(std::string_view name) const {
-    const Device* best = nullptr;
-    for (const Device& d : devices) {
-        if ((same_word(d.order, name) || same_word(d.name, name)) &&
-            (best == nullptr || d.revision > best->revision)) {
-            best = &d;
-        }
-    }
-    return best;
-}
-
 Device with_modules(const File& file, const Device& device,
                     const std::vector<std::uint32_t>& idents) {
     Device out = device;
@@ -149,12 +126,12 @@ void add_pdos(const std::vector<Pdo>& from, std::vector<sii::Pdo>& to) {
 
 }  // namespace
 
-sii::Contents sii_contents(const File& file, const Device& d) {
+sii::Contents sii_contents(const Device& d) {
     sii::Contents out;
     for (std::size_t i = 0; i + 1 < d.config_data.size() && i < 14; i += 2) {
         out.configuration[i / 2] = get<std::uint16_t>(d.config_data.data() + i);
     }
-    out.vendor = file.vendor;
+    out.vendor = d.vendor;
     out.product = d.product;
     out.revision = d.revision;
 
@@ -218,8 +195,8 @@ sii::Contents sii_contents(const File& file, const Device& d) {
     return out;
 }
 
-std::vector<std::uint8_t> sii_image(const File& file, const Device& device) {
-    return device.eeprom.size() >= 128 ? device.eeprom : sii::build(sii_contents(file, device));
+std::vector<std::uint8_t> sii_image(const Device& device) {
+    return device.eeprom.size() >= 128 ? device.eeprom : sii::build(sii_contents(device));
 }
 
 }  // namespace hal::ethercat::esi

@@ -33,7 +33,9 @@ public:
                                   "is it a device description?");
             return finish();
         }
-        const Xml root = document.child("EtherCATInfo");
+        // a list is what the IgH master prints for several slaves
+        const Xml list = document.child("EtherCATInfoList");
+        const Xml root = list ? list.child("EtherCATInfo") : document.child("EtherCATInfo");
         if (!root) {
             context_.report.error(Topic::file, {1, 1, 0, 0},
                                   "the root element is '" +
@@ -42,14 +44,8 @@ public:
                                   "give the ESI file of the device, an XML file from its maker");
             return finish();
         }
-        out_.vendor = context_.child<std::uint32_t>(root.child("Vendor"), "Id");
-        out_.vendor_name = text_of(root.child("Vendor"), "Name");
-        const Xml descriptions = root.child("Descriptions");
-        for (const Xml d : descriptions.child("Devices").children("Device")) {
-            device(d);
-        }
-        for (const Xml m : descriptions.child("Modules").children("Module")) {
-            module_of(m);
+        for (Xml info = root; info; info = info.next_sibling("EtherCATInfo")) {
+            info_of(info);
         }
         if (out_.devices.empty()) {
             context_.report.error(Topic::file, span_of(root, context_.text),
@@ -65,8 +61,20 @@ private:
         return std::move(out_);
     }
 
+    void info_of(const Xml& node) {
+        vendor_ = context_.child<std::uint32_t>(node.child("Vendor"), "Id");
+        const Xml descriptions = node.child("Descriptions");
+        for (const Xml d : descriptions.child("Devices").children("Device")) {
+            device(d);
+        }
+        for (const Xml m : descriptions.child("Modules").children("Module")) {
+            module_of(m);
+        }
+    }
+
     void device(const Xml& node) {
         Device d;
+        d.vendor = vendor_;
         d.at = span_of(node, context_.text);
         const Xml type = node.child("Type");
         d.order = trimmed(type.child_value());
@@ -74,6 +82,7 @@ private:
 
         d.revision = context_.attribute<std::uint32_t>(type, "RevisionNo");
         d.serial = context_.attribute<std::uint32_t>(type, "SerialNo");
+        d.check_revision = revision_rule(type);
         d.name = text_of(node, "Name");
         d.group = text_of(node, "GroupType");
         d.physics = node.attribute("Physics").value();
@@ -131,6 +140,27 @@ private:
         out_.devices.push_back(std::move(d));
     }
 
+    std::optional<RevisionRule> revision_rule(const Xml& type) {
+        const std::string_view value = trimmed(type.attribute("CheckRevisionNo").value());
+        if (value.empty()) return std::nullopt;
+        const auto rule = parse_revision_rule(value);
+        if (!rule) {
+            context_.warn(type, "unknown CheckRevisionNo '" + std::string(value.substr(0, 60)) +
+                                    "'; higher revisions are accepted");
+        }
+        return rule;
+    }
+
+    /// Returns the type of a sync manager by its control byte (0804h), for descriptions without
+    /// the name of the type.
+    static sii::SmType type_by_control(std::uint8_t control, std::uint16_t start) {
+        const bool is_mailbox = (control & 0x03) == 0x02;
+        const bool is_output = (control & 0x0c) == 0x04;
+        if (start == 0 || control == 0) return sii::SmType::unused;
+        if (is_mailbox) return is_output ? sii::SmType::mailbox_out : sii::SmType::mailbox_in;
+        return is_output ? sii::SmType::outputs : sii::SmType::inputs;
+    }
+
     void sync_manager(const Xml& node, Device& d) {
         SyncManager s;
         const std::string type = lower(trimmed(node.child_value()));
@@ -154,6 +184,9 @@ private:
         s.control = context_.attribute<std::uint8_t>(node, "ControlByte");
 
         s.enable = context_.attribute<std::uint8_t>(node, "Enable");
+        if (type.empty()) {
+            s.type = type_by_control(s.control, s.start);
+        }
         d.sync_managers.push_back(s);
     }
 
@@ -342,6 +375,7 @@ private:
     }
 
     Context context_;
+    std::uint32_t vendor_ = 0;  ///< of the EtherCATInfo that is being read
     File out_;
 };
 

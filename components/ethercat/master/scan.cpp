@@ -280,8 +280,7 @@ bool matches(Bus& bus, const Slave& want, const BusSlave& have, Device* to_repor
     if (id.product != 0 && have.product != id.product) {
         return fail(Event::wrong_product, have.product, id.product);
     }
-    if (id.revision && have.revision != *id.revision &&
-        !(id.revision_or_higher && have.revision > *id.revision)) {
+    if (id.revision && !accepts(id.revision_rule, *id.revision, have.revision)) {
         return fail(Event::wrong_revision, have.revision, *id.revision);
     }
     if (id.serial && have.serial != *id.serial) {

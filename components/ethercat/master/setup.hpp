@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ethercat/wire/eoe.hpp"
+#include "ethercat/wire/revision_rule.hpp"
 #include "ethercat/wire/states.hpp"
 
 namespace hal::ethercat::master {
@@ -108,7 +109,7 @@ struct Identity {
     std::uint32_t vendor = 0;
     std::uint32_t product = 0;
     std::optional<std::uint32_t> revision, serial;
-    bool revision_or_higher = false;  ///< a higher revision is accepted
+    RevisionRule revision_rule = RevisionRule::equal;  ///< how a found revision compares to it
     std::optional<std::uint16_t> alias;  ///< the slave is found by it, wherever it is
     std::optional<std::uint16_t> device_id;  ///< explicit device identification
 };

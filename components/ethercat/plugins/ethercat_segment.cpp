@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "ethercat/devices/device_words.hpp"
 #include "ethercat/devices/registry.hpp"
 #include "ethercat/devices/servo.hpp"
 #include "ethercat/esc/line.hpp"
@@ -21,14 +22,8 @@ using namespace hal::ethercat;
 class EthercatSegment : public hal::Component {
 public:
     explicit EthercatSegment(const hal_host* host) : Component(host) {
-        std::string text = devices_.get();
-        for (char& c : text) {
-            if (c == ',') {
-                c = '\n';
-            }
-        }
         const devices::LineDescription description = devices::read_line(
-            text,
+            devices::device_lines(devices_.get()),
             [texts = hal::Texts(*this)](const std::string& name) { return texts.find(name); });
         for (const auto& m : description.messages) {
             if (m.severity == hal::Severity::error) {  // duplicate aliases may be wanted

@@ -98,12 +98,68 @@ TEST(EthercatConfig, Drive_without_a_description_has_the_objects_of_its_profile)
     EXPECT_EQ(s.sync_managers[0].pdos[0].entries[1].name, "axis-2-controlword");
     EXPECT_EQ(s.sync_managers[0].pdos[1].entries[0].name, "2000-01");
     EXPECT_EQ(s.identity.revision, 0x20U);
-    EXPECT_TRUE(s.identity.revision_or_higher);
+    EXPECT_EQ(s.identity.revision_rule, RevisionRule::equal_or_higher);
     ASSERT_EQ(s.startup.size(), 4U);
     EXPECT_TRUE(s.startup[1].complete);
     EXPECT_EQ(s.startup[2].protocol, master::StartupWrite::Protocol::reg);
     EXPECT_EQ(s.startup[3].index, 0x8096);
     EXPECT_EQ(s.startup[3].sub, 1);
+}
+
+/// Two revisions of a device, and a variant of it with the same product code.
+bool read_revisions(const std::string&, std::string& bytes) {
+    const auto device = [](const char* type, const char* object) {
+        return std::string("<Device><Type ProductCode='7' ") + type +
+               "</Type><Sm>Outputs</Sm><RxPdo Sm='0' Fixed='1'><Index>#x1600</Index><Name>P</Name>"
+               "<Entry><Index>#x" +
+               object +
+               "</Index><SubIndex>1</SubIndex><BitLen>8</BitLen><Name>V</Name><DataType>USINT"
+               "</DataType></Entry></RxPdo></Device>";
+    };
+    bytes = "<EtherCATInfo><Vendor><Id>2</Id></Vendor><Descriptions><Devices>" +
+            device("RevisionNo='#x10000' CheckRevisionNo='HW_EQ'>BOX, 24 V", "7001") +
+            device("RevisionNo='#x20000'>BOX, 24 V", "7002") +
+            device("RevisionNo='#x20010'>BOX: x", "7003") +
+            "</Devices></Descriptions></EtherCATInfo>";
+    return true;
+}
+
+TEST(EthercatConfig, Revision_selects_the_description) {
+    const auto slave = [](const std::string& lines) {
+        Reading r = read("[bus]\n[slave 0 a]\nesi = my boxes, all: new.xml\n" + lines, "m.ethercat",
+                         read_revisions);
+        EXPECT_EQ(to_string(r, "m.ethercat"), "");
+        return r.buses.at(0).setup.slaves.at(0);
+    };
+    const auto object = [](const master::Slave& s) {
+        return s.sync_managers.at(0).pdos.at(0).entries.at(0).index;
+    };
+    EXPECT_EQ(object(slave("device = BOX, 24 V\n")), 0x7002);
+    EXPECT_EQ(object(slave("device = BOX, 24 V\nrevision = 0x10000\n")), 0x7001);
+    EXPECT_EQ(object(slave("product = 7\nrevision = 0x20010+\n")), 0x7003);
+    EXPECT_EQ(object(slave("device = BOX: x\n")), 0x7003);
+    const master::Slave s = slave("device = BOX: x\nrevision = esi\n");
+    EXPECT_EQ(s.identity.revision, 0x20010U);
+    EXPECT_EQ(s.identity.revision_rule, RevisionRule::equal_or_higher);
+    EXPECT_FALSE(slave("device = BOX: x\n").identity.revision);
+}
+
+TEST(EthercatConfig, A_product_with_several_types_and_an_unknown_revision_are_reported) {
+    const auto first = [](const std::string& lines) {
+        const Reading r =
+            read("[bus]\n[slave 0 a]\nesi = box.xml\n" + lines, "m.ethercat", read_revisions);
+        return r.messages.empty() ? std::string()
+                                  : r.messages.front().sentence + "; " + r.messages.front().help;
+    };
+    EXPECT_EQ(first("product = 7\n"),
+              "'box.xml' describes several devices with the product code 0x00000007; the devices "
+              "are: BOX, 24 V, BOX: x");
+    EXPECT_EQ(first("device = BOX: x\nrevision = 5\n"),
+              "'box.xml' does not describe revision 5 of 'BOX: x'; the description of revision "
+              "0x00020010 is used; the revisions are: 0x00020010");
+    EXPECT_EQ(first("device = BOX: x\nvendor = 9\n"),
+              "'box.xml' describes devices of vendor 0x00000002, not of 0x00000009; correct the "
+              "key, or write the ESI file of the device");
 }
 
 TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
@@ -129,7 +185,8 @@ TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
               "m.ethercat:3:7: error: 'servo.xml' describes several devices; write device = NAME; "
               "the devices are: SERVO-1, DIO-8");
     EXPECT_EQ(errors("[bus]\n[slave 0 a]\nesi = servo.xml\nproduct = 9\n"),
-              "m.ethercat:4:11: error: 'servo.xml' does not describe a product 9; the devices are: "
+              "m.ethercat:4:11: error: 'servo.xml' does not describe a product 0x00000009; the "
+              "devices are: "
               "SERVO-1, DIO-8");
     const std::string a = "[bus]\n[slave 0 a]\nesi = servo.xml\ndevice = SERVO-1\n";
     EXPECT_EQ(errors(a + "outputs = 6040 6072\n"),

@@ -2,6 +2,7 @@
 #include <random>
 
 #include "ethercat/esi/esi.hpp"
+#include "ethercat/esi/lookup.hpp"
 #include "hal/read_file.hpp"
 
 namespace hal::ethercat::esi {
@@ -16,11 +17,11 @@ std::string servo_text() {
 TEST(Esi, Device_has_what_its_description_states) {
     const File file = read(servo_text());
     ASSERT_TRUE(file.messages.empty()) << file.messages[0].sentence;
-    EXPECT_EQ(file.vendor, 0xcafeU);
+    EXPECT_EQ(file.devices.front().vendor, 0xcafeU);
     ASSERT_EQ(file.devices.size(), 2U);
-    const Device* d = file.find(0x402);
+    const Device* d = look_up(file, {.product = 0x402}).device;
     ASSERT_NE(d, nullptr);
-    EXPECT_EQ(file.find("servo-1"), d);
+    EXPECT_EQ(look_up(file, {.name = "servo-1"}).device, d);
     EXPECT_EQ(d->name, "Servo drive");
     EXPECT_EQ(d->timeouts.preop, 2000U);
     EXPECT_EQ(d->timeouts.back_to_init, 5000U);
@@ -44,9 +45,113 @@ TEST(Esi, Device_has_what_its_description_states) {
     EXPECT_EQ(file.devices[1].rx[0].sync_manager, 0) << "mandatory: the first one of its direction";
 }
 
+/// A description with a device for each pair of attributes of Type and order code.
+std::string types(const std::vector<std::pair<std::string, std::string>>& rows) {
+    std::string text = "<EtherCATInfo><Vendor><Id>2</Id></Vendor><Descriptions><Devices>";
+    for (const auto& [attributes, order] : rows) {
+        text += "<Device><Type " + attributes + ">" + order + "</Type></Device>";
+    }
+    return text + "</Devices></Descriptions></EtherCATInfo>";
+}
+
+TEST(EsiLookup, A_revision_selects_its_description_and_then_one_that_accepts_it) {
+    const File file = read(types({{"ProductCode='7' RevisionNo='#x10000'", "BOX"},
+                                  {"ProductCode='7' RevisionNo='#x20000'", "BOX"},
+                                  {"ProductCode='7' RevisionNo='#x40000'", "box"}}));
+    using Revision = Match::Revision;
+    const auto found = [&](std::optional<std::uint32_t> revision) {
+        const Match match = look_up(file, {.product = 7, .revision = revision});
+        return std::pair(match.device->revision, match.revision);
+    };
+    EXPECT_EQ(found({}), std::pair(0x40000U, Revision::newest));
+    EXPECT_EQ(found(0x10000), std::pair(0x10000U, Revision::exact));
+    EXPECT_EQ(found(0x30000), std::pair(0x20000U, Revision::accepted));
+    EXPECT_EQ(found(0x00005), std::pair(0x40000U, Revision::other));
+    EXPECT_EQ(revisions_of(file, file.devices[0]),
+              (std::vector<std::string>{"0x00010000", "0x00020000", "0x00040000"}));
+}
+
+TEST(EsiLookup, CheckRevisionNo_decides_which_revisions_a_description_is_valid_for) {
+    struct Row {
+        const char* rule;
+        std::uint32_t revision;
+        bool accepted;
+    };
+    const Row rows[] = {{"NONE", 1, true},
+                        {"EQ", 0x20011, false},
+                        {"GE", 0x20011, true},
+                        {"EQ_OR_G", 0x2000f, false},
+                        {"LW_EQ", 0x10010, true},
+                        {"LW_EQ", 0x20011, false},
+                        {"LW_EQ_HW_EQ_OR_G", 0x30010, true},
+                        {"LW_EQ_HW_EQ_OR_G", 0x10010, false},
+                        {"HW_EQ", 0x20001, true},
+                        {"HW_EQ", 0x30010, false},
+                        {"HW_EQ_LW_EQ_OR_G", 0x20011, true},
+                        {"HW_EQ_LW_EQ_OR_G", 0x20001, false}};
+    for (const Row& row : rows) {
+        const File file =
+            read(types({{std::string("ProductCode='7' RevisionNo='#x20010' CheckRevisionNo='") +
+                             row.rule + "'",
+                         "BOX"}}));
+        const Match match = look_up(file, {.revision = row.revision});
+        EXPECT_EQ(match.revision == Match::Revision::accepted, row.accepted)
+            << row.rule << " " << std::hex << row.revision;
+    }
+    const File file = read(types({{"ProductCode='7' CheckRevisionNo='OTHER'", "BOX"}}));
+    ASSERT_EQ(file.messages.size(), 1U);
+    EXPECT_EQ(file.messages[0].sentence,
+              "unknown CheckRevisionNo 'OTHER'; higher revisions are accepted");
+}
+
+TEST(EsiLookup, Types_of_one_product_code_are_told_apart) {
+    const File file = read(
+        types({{"ProductCode='7' RevisionNo='#x100000'", "EL3104"},
+               {"ProductCode='7' RevisionNo='#x110000' CheckRevisionNo='LW_EQ'", "EL3104"},
+               {"ProductCode='7' RevisionNo='#x110014' CheckRevisionNo='LW_EQ'", "EL3104-0020"},
+               {"ProductCode='8' RevisionNo='#x110000'", "EL3104, old"}}));
+    const Match several = look_up(file, {.product = 7});
+    EXPECT_EQ(several.device, nullptr);
+    EXPECT_EQ(several.problem, "describes several devices with the product code 0x00000007");
+    EXPECT_EQ(several.choices, (std::vector<std::string>{"EL3104", "EL3104-0020"}));
+    EXPECT_EQ(look_up(file, {.name = "el3104"}).device, &file.devices[1]);
+    EXPECT_EQ(look_up(file, {.name = "EL3104, old"}).device, &file.devices[3]);
+    EXPECT_EQ(look_up(file, {.name = "0x8"}).device, &file.devices[3]);
+    EXPECT_EQ(look_up(file, {.product = 7, .revision = 0x120014}).device, &file.devices[2])
+        << "by the rule";
+    EXPECT_EQ(look_up(file, {.name = "EL3104", .product = 8}).problem,
+              "does not describe a product 0x00000008");
+    EXPECT_EQ(look_up(file, {.name = "EL3104", .vendor = 3}).problem,
+              "describes devices of vendor 0x00000002, not of 0x00000003");
+    EXPECT_EQ(look_up(File{}, {}).problem, "describes no device");
+}
+
+TEST(Esi, A_list_of_the_IgH_master_has_a_device_per_slave) {
+    const auto info = [](int vendor, const std::string& order) {
+        return "<EtherCATInfo><Vendor><Id>" + std::to_string(vendor) +
+               "</Id></Vendor><Descriptions><Devices><Device><Type ProductCode='#x1'>" + order +
+               "</Type><Sm Enable='1' StartAddress='#x1000' ControlByte='#x26' />"
+               "<Sm Enable='1' StartAddress='#x1100' ControlByte='#x22' />"
+               "<Sm Enable='1' StartAddress='#x1200' ControlByte='#x64' />"
+               "<Sm Enable='1' StartAddress='#x1300' ControlByte='#x20' />"
+               "</Device></Devices></Descriptions></EtherCATInfo>";
+    };
+    const File file =
+        read("<EtherCATInfoList>" + info(2, "A") + info(3, "B") + "</EtherCATInfoList>");
+    ASSERT_TRUE(file.messages.empty()) << file.messages[0].sentence;
+    ASSERT_EQ(file.devices.size(), 2U);
+    EXPECT_EQ(look_up(file, {.name = "B"}).device->vendor, 3U);
+    ASSERT_EQ(file.devices[0].sync_managers.size(), 4U);
+    const std::array expected{sii::SmType::mailbox_out, sii::SmType::mailbox_in,
+                              sii::SmType::outputs, sii::SmType::inputs};
+    for (std::size_t n = 0; n < expected.size(); ++n) {
+        EXPECT_EQ(file.devices[0].sync_managers[n].type, expected[n]) << n;
+    }
+}
+
 TEST(Esi, Dictionary_resolves_records_arrays_and_enumerations) {
     const File file = read(servo_text());
-    const Device& d = *file.find(0x402);
+    const Device& d = *look_up(file, {.product = 0x402}).device;
     EXPECT_EQ(d.objects.size(), 7U);
     const Value* mode = d.find(0x6060, 0);
     ASSERT_NE(mode, nullptr);
@@ -66,7 +171,7 @@ TEST(Esi, Dictionary_resolves_records_arrays_and_enumerations) {
 
 TEST(Esi, SII_image_has_the_identity_mailboxes_and_PDOs) {
     const File file = read(servo_text());
-    const auto c = sii::parse(sii_image(file, file.devices[0]));
+    const auto c = sii::parse(sii_image(file.devices[0]));
     EXPECT_TRUE(c.problems.empty()) << c.problems[0];
     EXPECT_EQ(c.configuration[0], 0x0c80);
     EXPECT_EQ(c.configuration[2], 0x0064);
@@ -136,7 +241,7 @@ TEST(Esi, Any_bytes_are_read_without_harm) {
         }
         const File file = read(text);
         for (const Device& d : file.devices) {
-            sii::parse(sii_image(file, with_modules(file, d, {1, 2})));
+            sii::parse(sii_image(with_modules(file, d, {1, 2})));
         }
     }
 }

@@ -175,17 +175,19 @@ TEST(PdoRules, A_sync_manager_has_a_largest_size) {
               "leave out objects");
 }
 
-TEST(PdoRules, An_entry_longer_than_its_object_is_an_error) {
+TEST(PdoRules, An_entry_longer_than_its_object_is_a_warning) {
     std::string pdos = pdo("RxPdo", "Sm=\"2\"", "1600", "1");
     pdos.replace(pdos.find("<BitLen>16"), 10, "<BitLen>32");
     const std::string xml = device(pdos, "PdoAssign=\"1\" PdoConfig=\"1\"", dictionary(3));
-    EXPECT_EQ(errors(xml, "outputs = 1600\n"),
-              "m.ethercat:4:11: error: PDO 1600 maps 32 bits of object 7000:1, which has 16; "
-              "correct the description, or list the objects "
-              "with another PDO");
+    EXPECT_EQ(errors(xml, "outputs = 1600\n"), "");
+    const Reading reading = with(xml, "outputs = 1600\n");
+    ASSERT_EQ(reading.messages.size(), 1U);
+    EXPECT_EQ(reading.messages[0].severity, Severity::warning);
+    EXPECT_EQ(reading.messages[0].sentence, "PDO 1600 maps 32 bits of object 7000:1, which has 16");
+    EXPECT_EQ(reading.messages[0].help,
+              "the bits of the PDO are exchanged; if its mapping is rejected, list the objects");
     const esi::File file = esi::read(xml);
-    EXPECT_EQ(devices::why_not_emulated(file.devices.at(0)),
-              "PDO 1600 maps 32 bits of object 7000:1, which has 16");
+    EXPECT_EQ(devices::why_not_emulated(file.devices.at(0)), "");
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "cli/output.hpp"
 #include "ethercat/config/event_words.hpp"
+#include "ethercat/devices/device_words.hpp"
 #include "ethercat/wire/frames.hpp"
 #include "hal/clock.hpp"
 
@@ -28,11 +29,7 @@ bool EthercatAccess::emulate(const EthercatOptions& options) {
             return false;
         }
     } else {
-        for (char& c : text) {
-            if (c == ',') {
-                c = '\n';
-            }
-        }
+        text = ethercat::devices::device_lines(text);
     }
     const auto description = ethercat::devices::read_line(
         text, in_file ? ethercat::devices::beside(options.emulate) : ethercat::devices::FindFile());

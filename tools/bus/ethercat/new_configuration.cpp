@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: MIT
 // `hal ethercat config`: writes a configuration and a netlist for the slaves on a bus, or for descriptions of their makers.
+#include <algorithm>
 #include <filesystem>
+#include <fmt/ranges.h>
+#include <optional>
 
 #include "bus/ethercat/wire.hpp"
 #include "bus/ethercat/words.hpp"
 #include "cli/output.hpp"
 #include "ethercat/config/config.hpp"
+#include "ethercat/devices/device_words.hpp"
 #include "ethercat/devices/esi_device.hpp"
+#include "ethercat/esi/lookup.hpp"
 #include "hal/read_file.hpp"
 
 namespace hal::tools {
@@ -65,65 +70,133 @@ bool from_bus(const EthercatConfigOptions& options, const std::string& name, Eth
     return true;
 }
 
+/// Returns whether a text arrives as it is when it is the value of a key in a `.ethercat` file.
+bool fits_configuration(const std::string& text) {
+    const bool is_line = std::none_of(text.begin(), text.end(), [](char c) {
+        return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+    });
+    const text::Word whole{text, {}};
+    const bool is_trimmed = text::part(whole, 0, text.size()).text == text;
+    const bool has_comment = text.starts_with('#') || text.starts_with(';') ||
+                             text.find(" #") != text.npos || text.find(" ;") != text.npos;
+    return !text.empty() && is_line && is_trimmed && !has_comment;
+}
+
+/// Returns whether a text arrives as it is between the double quotes of `devices="…"`.
+bool fits_netlist(const std::string& text) {
+    return fits_configuration(text) && text.find_first_of("\"$[") == text.npos;
+}
+
+using Fits = bool (*)(const std::string&);
+
+/// Returns the shortest text that means this device in a look-up with `wanted`: one of `names`, or
+/// an empty text if the rest of `wanted` is enough. nullopt: there is none.
+std::optional<std::string> name_of(const ethercat::esi::File& file,
+                                   const ethercat::esi::Device& device,
+                                   ethercat::esi::Wanted wanted,
+                                   const std::vector<std::string>& names, Fits fits) {
+    for (const std::string& name : names) {
+        if (!name.empty() && !fits(name)) continue;
+        wanted.name = name;
+        if (ethercat::esi::look_up(file, wanted).device == &device) return name;
+    }
+    return std::nullopt;
+}
+
+/// Splits FILE or FILE:DEVICE. The path is the longest beginning that names a file.
+std::pair<std::string, std::string> split_item(const std::string& text) {
+    const std::string plain = ethercat::devices::without_device_quotes(text);
+    for (std::size_t end = plain.size(); end != plain.npos && end != 0;
+         end = plain.rfind(':', end - 1)) {
+        const std::string path = plain.substr(0, end);
+        if (!std::filesystem::is_regular_file(path)) continue;
+        return {path, end == plain.size() ? "" : plain.substr(end + 1)};
+    }
+    const std::size_t extension = plain.rfind(".xml:");
+    if (extension == plain.npos) return {plain, ""};
+    return {plain.substr(0, extension + 4), plain.substr(extension + 5)};
+}
+
+/// Reads a description. Returns false after printing the reason.
+bool read_description(const EthercatConfigOptions& options, const std::string& path,
+                      ethercat::esi::File& to) {
+    std::string bytes;
+    if (!read_regular_file(path, 64'000'000, bytes)) {
+        fail(options, fmt::format("cannot read '{}': {}", path, bytes));
+        return false;
+    }
+    to = ethercat::esi::read(bytes);
+    for (const auto& m : to.messages) {
+        if (m.severity == Severity::error) {
+            fail(options, fmt::format("{}:{}: {}; {}", path, m.at.line, m.sentence, m.help));
+            return false;
+        }
+    }
+    return true;
+}
+
+/// Adds the device of FILE:DEVICE. Returns false after printing the reason.
+bool add_description(const EthercatConfigOptions& options, const std::string& item,
+                     const std::filesystem::path& folder, bool emulate, Source& to) {
+    namespace esi = ethercat::esi;
+    const auto [path, wanted] = split_item(item);
+    esi::File file;
+    if (!read_description(options, path, file)) return false;
+    const esi::Match match = esi::look_up(file, {.name = wanted});
+    if (match.device == nullptr) {
+        fail(options, fmt::format("'{}' {}; write {}:NAME with one of: {}", path, match.problem,
+                                  path, fmt::join(match.choices, ", ")));
+        return false;
+    }
+    const esi::Device& device = *match.device;
+    // paths in the files start at their own folder
+    const std::string beside =
+        path.starts_with('/') ? path : std::filesystem::proximate(path, folder).string();
+    const std::string code = esi::number_text(device.product);
+    const auto key =
+        name_of(file, device,
+                {.vendor = device.vendor, .product = device.product, .revision = device.revision},
+                {device.order, device.name, ""}, fits_configuration);
+    if (!key || !fits_configuration(beside)) {
+        fail(options, fmt::format("'{}': the path cannot be written to a configuration; rename "
+                                  "the file so that it has no ' #', ' ;' or control characters",
+                                  path));
+        return false;
+    }
+    config::Found& found = to.slaves.emplace_back();
+    found.name = device.order;
+    found.device = device.name;
+    found.esi = beside;
+    found.order = *key;
+    found.vendor = device.vendor;
+    found.product = device.product;
+    found.revision = device.revision;
+    if (!emulate || !ethercat::devices::why_not_emulated(device).empty()) return true;
+    const auto word = name_of(file, device, {.revision = device.revision},
+                              {code, device.order, device.name}, fits_netlist);
+    if (!word || !fits_netlist(beside)) {
+        fail(options, fmt::format("'{}': the path cannot be written to a netlist; rename the file "
+                                  "so that it has no \", $ or [",
+                                  path));
+        return false;
+    }
+    to.segment += fmt::format("{}esi file={} device={}", to.segment.empty() ? "" : ", ",
+                              ethercat::devices::device_value(beside),
+                              ethercat::devices::device_value(*word));
+    if (esi::look_up(file, {.name = *word}).device != &device) {
+        to.segment += " revision=" + esi::number_text(device.revision);
+    }
+    return true;
+}
+
 /// Takes the slaves from descriptions. Returns false after printing the reason.
 bool from_descriptions(const EthercatConfigOptions& options, const std::filesystem::path& stem,
                        const std::string& address, Source& to) {
     const std::string name = stem.filename().string();
     const std::filesystem::path folder =
         stem.has_parent_path() ? stem.parent_path() : std::filesystem::path(".");
-    std::string list = options.esi;
-    while (!list.empty()) {
-        const std::size_t comma = std::min(list.find(','), list.size());
-        std::string item = list.substr(0, comma);
-        list.erase(0, comma + 1);
-        item.erase(0, item.find_first_not_of(' '));
-        item.erase(item.find_last_not_of(' ') + 1);
-        const std::size_t colon = item.rfind(".xml:");
-        const std::string path = colon == std::string::npos ? item : item.substr(0, colon + 4);
-        const std::string wanted = colon == std::string::npos ? "" : item.substr(colon + 5);
-        std::string bytes, problem;
-        if (!read_regular_file(path, 64'000'000, bytes)) {
-            fail(options, fmt::format("cannot read '{}': {}", path, bytes));
-            return false;
-        }
-        const ethercat::esi::File file = ethercat::esi::read(bytes);
-        for (const auto& m : file.messages) {
-            if (m.severity == Severity::error) {
-                fail(options, fmt::format("{}:{}: {}; {}", path, m.at.line, m.sentence, m.help));
-
-                return false;
-            }
-        }
-        const auto* device = ethercat::devices::find_device(file, wanted, problem);
-        if (device == nullptr) {
-            std::string names;
-            for (const auto& d : file.devices) {
-                names += (names.empty() ? "" : ", ") + d.order;
-            }
-            fail(options, fmt::format("'{}': {}; write {}:NAME with one of: {}", path, problem,
-                                      path, names));
-
-            return false;
-        }
-        // paths in the files start at their own folder
-        const std::string beside =
-            path.starts_with('/') ? path : std::filesystem::proximate(path, folder).string();
-        config::Found& found = to.slaves.emplace_back();
-        found.name = device->order;
-        found.device = device->name;
-        found.esi = beside;
-
-        found.order = device->order;
-        found.vendor = file.vendor;
-        found.product = device->product;
-
-        found.revision = device->revision;
-        const bool emulated =
-            address.empty() && ethercat::devices::why_not_emulated(*device).empty();
-        if (emulated) {
-            to.segment += fmt::format("{}esi file={} device=0x{:x}", to.segment.empty() ? "" : ", ",
-                                      beside, device->product);
-        }
+    for (const std::string& item : ethercat::devices::device_list(options.esi)) {
+        if (!add_description(options, item, folder, address.empty(), to)) return false;
     }
     to.link = address.empty() ? "sim:" + name : address;
     return true;

@@ -40,7 +40,8 @@ struct EthercatConfigOptions : EthercatOptions {
         declare_bus(set);
         set.value("--esi", esi, "LIST",
                   "write the files for these descriptions instead of the slaves on a bus: "
-                  "FILE.xml, or FILE.xml:DEVICE, separated by commas");
+                  "FILE.xml, or FILE.xml:DEVICE, separated by commas; between single quotes if it "
+                  "contains commas");
     }
 };
 
