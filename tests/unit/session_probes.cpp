@@ -99,6 +99,37 @@ TEST_F(Probed, Every_nth_cycle_is_a_grid_of_cycle_numbers) {
     }
 }
 
+TEST_F(Probed, Rows_follow_their_layout_when_a_function_moves_to_another_thread) {
+    const auto probe = attach(machine.session, {{"a.count", "b.count"}});
+    std::uint64_t announced = Probes::layout(*probe).number;
+    std::uint64_t layouts = 0;
+    std::size_t rows = 0;
+    const auto take = [&] {
+        machine.cycles(9);
+        for (const ProbeRows& one : machine.session.probes().take(*probe)) {
+            if (one.layout) {
+                EXPECT_GT(one.layout->number, announced);
+                announced = one.layout->number;
+                ++layouts;
+            }
+            if (one.parts.empty()) continue;
+            EXPECT_EQ(one.layout_number, announced);
+            for (const auto& part : one.parts) {
+                rows += part.rows;
+            }
+        }
+    };
+    take();
+    const std::size_t before = rows;
+    machine.must("delf a fast\naddf a slow");
+    machine.cycles(9);
+    machine.must("delf a slow\naddf a fast");
+    take();
+    take();
+    EXPECT_GE(layouts, 2u);
+    EXPECT_GT(rows, before + 20);
+}
+
 TEST_F(Probed, Values_are_grouped_by_the_thread_that_owns_them) {
     machine.must("newsig knob float\nnet knob c.step\n");
     machine.must("unlinkp b.step\nnet set b.step\nsets set 2.5");

@@ -28,7 +28,7 @@ struct LiveProbe {
     ProbeLayout layout;
     std::vector<RingGroup> groups;
     struct Ended {
-        std::uint64_t number;
+        ProbeLayout layout;
         std::vector<RingGroup> groups;
     };
     /// layouts before this one, until their rows have been taken
@@ -180,7 +180,7 @@ bool same_groups(const std::vector<RingGroup>& a, const std::vector<RingGroup>& 
 void adopt(LiveProbe& probe, Found& found) {
     if (probe.layout.number != 0) {
         if (same_groups(probe.groups, found.groups)) return;
-        probe.ended.push_back({probe.layout.number, std::move(probe.groups)});
+        probe.ended.push_back({std::move(probe.layout), std::move(probe.groups)});
     }
     for (RingGroup& group : found.groups) {
         if (group.thread) {
@@ -188,8 +188,9 @@ void adopt(LiveProbe& probe, Found& found) {
                 group.columns.size(), rows_for(probe.request, *group.thread), probe.request.every);
         }
     }
+    const std::uint64_t number = probe.layout.number + 1;
     probe.groups = std::move(found.groups);
-    probe.layout = described(probe, probe.layout.number + 1);
+    probe.layout = described(probe, number);
 }
 
 }  // namespace
@@ -370,13 +371,20 @@ std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t most) {
         }
         return reached_ns;
     };
+    // no rows before their layout, also of one that an edit has made and ended at once
+    const auto announce = [&probe](const ProbeLayout& layout, ProbeRows& rows) {
+        rows.layout_number = layout.number;
+        if (probe.announced == layout.number) return;
+        rows.layout = layout;
+        probe.announced = layout.number;
+    };
     while (!probe.ended.empty()) {
         auto& ended = probe.ended.front();
         ProbeRows rows;
-        rows.layout_number = ended.number;
         rows.until_ns = probe.until_ns;
         const bool all = collect(ended.groups, rows, INT64_MAX) == INT64_MAX;
         if (!rows.parts.empty()) {
+            announce(ended.layout, rows);
             results.push_back(std::move(rows));
         }
         if (!all) return results;
@@ -384,11 +392,7 @@ std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t most) {
         probe.ended.erase(probe.ended.begin());
     }
     ProbeRows rows;
-    rows.layout_number = probe.layout.number;
-    if (probe.announced != probe.layout.number) {
-        rows.layout = probe.layout;
-        probe.announced = probe.layout.number;
-    }
+    announce(probe.layout, rows);
     std::int64_t until_ns = INT64_MAX;
     for (const RingGroup& group : probe.groups) {
         if (group.ring) {
