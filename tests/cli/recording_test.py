@@ -10,7 +10,7 @@ import signal
 import subprocess
 import unittest
 
-from harness import HAL, Case, needs_package, wait_until
+from harness import HAL, SERVO, Case, needs_package, wait_until
 
 NETLIST = """loadrt threads name1=servo period1=1000000
 loadrt siggen names=wave
@@ -256,6 +256,15 @@ setp io.fault-emcy-storm 1
                 )
                 self.assertIn("help: what it has is played\n", done.stderr)
             self.assertRegex(self.run_program("plot", name).stderr, sentence)
+
+    def test_two_runs_of_one_netlist_give_the_same_file(self):
+        self.write("a.hal", SERVO + "start\n")
+        contents = []
+        for ending in ("mcap", "csv"):
+            for name in ("one", "two"):
+                self.good("sim", "a.hal", "--for", "100ms", "-q", "--record", f"{name}.{ending}")
+                contents.append((self.folder / f"{name}.{ending}").read_bytes())
+            self.assertEqual(*contents[-2:])
 
     def test_a_replay_of_a_table_has_the_types_of_the_netlist(self):
         logic = "loadrt threads name1=servo period1=1000000\nloadrt and2 names=both\nloadrt conv_s32_float names=to\naddf both servo\naddf to servo\nnet a => both.in0\nnet b => both.in1\nnet y both.out\nnet n => to.in\nnet x to.out\n"

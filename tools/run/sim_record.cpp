@@ -113,7 +113,7 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
     }
     const auto sink = make_sink(
         options.record, Probes::columns(*probe),
-        {session.options().name, std::string(paths::version), "", "", 0, options.profile});
+        {options.name.empty() ? "sim" : options.name, std::string(paths::version), "", "", 0, options.profile});
     if (!sink->kept().empty()) {
         write_all(2, kept_line(*sink, options.record));
     }
