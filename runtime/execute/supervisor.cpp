@@ -429,6 +429,24 @@ bool Supervisor::ended(const Core& core) {
     return of && has_ended(of->tid);
 }
 
+/// Returns a thread of the machine that goes before this one on its CPU; `is_busy`: whose cycle is
+/// under way. nullptr: there is no such thread.
+const Supervisor::Watched* Supervisor::rival_of(const Watched& watched, bool is_busy) const {
+    for (const Watched& other : watched_) {
+        const bool goes_before =
+            &other != &watched && other.cpu == watched.cpu && other.priority > watched.priority;
+        if (goes_before && (!is_busy || other.core->monitor.busy_since_ns() != 0)) return &other;
+    }
+    return nullptr;
+}
+
+const Core* Supervisor::rival_of(const Core& core, bool is_busy) {
+    const Hold hold(mutex_);
+    const Watched* const of = find(core);
+    const Watched* const rival = of ? rival_of(*of, is_busy) : nullptr;
+    return rival ? rival->core : nullptr;
+}
+
 void Supervisor::find_cause(const Watched& watched, Stall& stall) const {
     const KernelView seen = kernel_view(watched.tid);
     stall.tracer = seen.tracer;
@@ -440,12 +458,8 @@ void Supervisor::find_cause(const Watched& watched, Stall& stall) const {
         stall.cause = Stall::Cause::waiting;
     } else if (got_no_cpu(watched)) {
         stall.cause = Stall::Cause::starved;
-        for (const Watched& other : watched_) {
-            if (&other != &watched && other.cpu == watched.cpu &&
-                other.priority > watched.priority && other.core->monitor.busy_since_ns() != 0) {
-                stall.occupant = other.core->id();
-                break;
-            }
+        if (const Watched* const other = rival_of(watched, true)) {
+            stall.occupant = other->core->id();
         }
     } else {
         stall.cause = Stall::Cause::busy;

@@ -70,6 +70,9 @@ public:
     /// Returns true if the thread is late and ready to run, but has got no CPU time, or hardly any,
     /// since it is late.
     bool starved(const Core& core);
+    /// Returns a thread of the machine that goes before this one on its CPU; `is_busy`: only one
+    /// whose cycle is under way. nullptr: there is no such thread.
+    const Core* rival_of(const Core& core, bool is_busy);
     /// Returns true if a function has ended the thread by a system call of its own.
     bool ended(const Core& core);
     /// Returns how long the thread was ready to run without running, within the last one to two
@@ -123,6 +126,7 @@ private:
     void settle_down();  // interval and CPUs, after the threads have changed
     void feed_watchdog(std::int64_t now_ns);
     Watched* find(const Core& core);
+    const Watched* rival_of(const Watched& watched, bool is_busy) const;
 
     FaultBoard& board_;
     // of watched_; its holder inherits the priority of who waits

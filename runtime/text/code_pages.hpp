@@ -225,6 +225,12 @@ inline constexpr CodePage code_pages[] = {
      "s is reported on stderr while it runs, and `--cycle-limit TIME` ends the run with this code "
      "and status 1; after Ctrl-C the "
      "limit is two seconds."},
+    {"ignored-option",
+     "An option of a thread has no effect, because another one excludes it or the machine cannot "
+     "do it. The thread runs without it.\n\n"
+     "Only threads with `policy=fifo`, the default, have a priority. Threads with "
+     "`policy=deadline` run on all CPUs. A thread with `cpu=N` that the machine does not have runs "
+     "where the kernel puts it; `hal doctor` lists the CPUs."},
     {"ini-version",
      "LinuxCNC 2.9 and later start a configuration only if its INI file has `[EMC]VERSION = 1.1`. "
      "Files of 2.7 and before have another version, or none: "

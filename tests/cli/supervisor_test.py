@@ -35,6 +35,17 @@ class Debugger:
 
 
 class Supervisor(HungCase):
+    def test_a_cpu_that_the_machine_does_not_have_is_reported(self):
+        path = self.write("t.hal", "newthread servo 1000000 policy=other cpu=1023\n")
+        machine = self.start("run", path)
+        out, err = self.end(machine)
+        self.assertEqual(0, machine.returncode, out + err)
+        self.assertRegex(
+            err,
+            r"^\S*t\.hal:1:11: warning: thread 'servo' is not bound to a CPU: this machine has no CPU 1023 \[ignored-option\]\n",
+        )
+        self.assertRegex(err, r"(?m)^ +\S help: write a cpu= from 0 to \d+, or none$")
+
     def test_blocked_function(self):
         machine = self.machine()
         self.check_hung(machine, self.hang(1), "waits in a system call")

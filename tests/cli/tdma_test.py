@@ -147,7 +147,7 @@ class Tdma(Case):
         self.assertRegex(status, r"(?m)^station +state +since +frames +late +drift  slots$")
         self.assertRegex(status, r"(?m)^away +unheard +- +0 +0 +-  0: 700 us$")
         online = re.compile(
-            r"(?m)^x +online +\S+ s +\d+ +0 +[-+]0\.0 ppm  0: 300 us, 2: 500 us in 1 of 2 cycles$"
+            r"(?m)^x +online +\S+ s +\d+ +\d+ +[-+]\d+\.\d ppm  0: 300 us, 2: 500 us in 1 of 2 cycles$"
         )
         wait_until(lambda: online.search(self.good("tdma", "status")), "x is heard")
 

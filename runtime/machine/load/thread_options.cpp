@@ -137,6 +137,28 @@ bool fits_period(const NewThread& thread, Diagnostics& diagnostics) {
     return false;
 }
 
+/// Options that the policy of the thread leaves without effect.
+void warn_of_ignored(const NewThread& thread, Diagnostics& diagnostics) {
+    const ThreadOptions& o = thread.options;
+    const auto warn = [&](const std::string& option, const std::string& why) {
+        diagnostics.warning("ignored-option", thread.at,
+                            option + " of thread '" + thread.name + "' has no effect: " + why, "",
+                            "remove it, or choose policy=fifo");
+    };
+    if (o.policy == Policy::deadline && o.cpu >= 0) {
+        warn("cpu=" + std::to_string(o.cpu), "a thread with policy=deadline runs on all CPUs");
+    }
+    if (o.policy != Policy::fifo && o.priority > 0) {
+        warn("priority=" + std::to_string(o.priority), "only policy=fifo has priorities");
+    }
+}
+
+/// Checks that the options of a thread fit each other.
+bool check_options(const NewThread& thread, Diagnostics& diagnostics) {
+    warn_of_ignored(thread, diagnostics);
+    return fits_period(thread, diagnostics);
+}
+
 }  // namespace
 
 bool parse_new_thread(std::span<const Token> args, NewThread& thread, Diagnostics& diagnostics) {
@@ -159,7 +181,7 @@ bool parse_new_thread(std::span<const Token> args, NewThread& thread, Diagnostic
             good = false;
         }
     }
-    return fits_period(thread, diagnostics) && good;
+    return check_options(thread, diagnostics) && good;
 }
 
 bool parse_threads(std::span<const Token> args, Span at, std::vector<NewThread>& threads,
@@ -211,7 +233,7 @@ bool parse_threads(std::span<const Token> args, Span at, std::vector<NewThread>&
         if (thread.options.period_ns == 0) {
             thread.options.period_ns = 1'000'000;
         }
-        good = fits_period(thread, diagnostics) && good;
+        good = check_options(thread, diagnostics) && good;
         threads.push_back(std::move(thread));
     }
     return good;

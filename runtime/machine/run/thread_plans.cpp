@@ -6,6 +6,8 @@
 #include <map>
 #include <stdexcept>
 
+#include <sys/sysinfo.h>
+
 #include "machine/report/cpu_occupant.hpp"
 #include "machine/report/exit_observer.hpp"
 #include "machine/run/plan_adoption.hpp"
@@ -185,7 +187,24 @@ bool ThreadPlans::add(Thread& thread, int priority, Diagnostics& diagnostics) {
         cores_.erase(&thread);
         throw;
     }
+    warn_of_missing_cpu(thread, *entry, diagnostics);
     return true;
+}
+
+/// A thread that this machine cannot bind as its netlist has it runs all the same.
+void ThreadPlans::warn_of_missing_cpu(const Thread& thread, const Core& core,
+                                      Diagnostics& diagnostics) const {
+    const int wanted = thread.options.cpu;
+    const bool may_be_bound = wanted >= 0 && thread.options.policy != Policy::deadline;
+    if (!may_be_bound || state_.executor->is_virtual()) return;
+    if (state_.executor->granted(core).cpu == wanted) return;
+    const int count = get_nprocs_conf();
+    const std::string cpu = "CPU " + std::to_string(wanted);
+    const std::string why = wanted >= count ? "this machine has no " + cpu
+                                            : cpu + " is offline, or not one of this process";
+    diagnostics.warning("ignored-option", thread.made,
+                        "thread '" + thread.name + "' is not bound to a CPU: " + why, "",
+                        "write a cpu= from 0 to " + std::to_string(count - 1) + ", or none");
 }
 
 bool ThreadPlans::end(std::vector<std::unique_ptr<Thread>>& threads, Diagnostics& diagnostics) {
@@ -283,12 +302,30 @@ bool ThreadPlans::report_starved(const Thread& thread, const Core& core,
     const std::string silent =
         format_duration(static_cast<double>(monotonic_ns() - core.monitor.finished_ns()));
     const int cpu = state_.executor->granted(core).cpu;
+    const std::string rival = rival_of(core, cpu);
+    const std::string by_rival =
+        rival + " of this machine uses CPU " + std::to_string(cpu) +
+        ": let it do less, or bind one of them to another CPU with cpu=N of newthread";
     diagnostics.error("starved-thread", thread.made,
                       "thread '" + thread.name + "' is ready to run, but has got no CPU time" +
                           (cpu >= 0 ? " on CPU " + std::to_string(cpu) : "") + " for " + silent,
                       core.monitor.hung() ? "its outputs are at their safe values" : "",
-                      starvation_help(cpu));
+                      rival.empty() ? starvation_help(cpu) : by_rival);
     return true;
+}
+
+/// Returns "thread 'fast'": a thread of the machine that uses the CPU of this one; "": another
+/// process does, or nothing is known.
+std::string ThreadPlans::rival_of(const Core& core, int cpu) const {
+    if (cpu < 0) return "";
+    Supervisor& supervisor = state_.executor->supervisor();
+    const Core* rival = supervisor.rival_of(core, true);
+    // one that is between two cycles just now
+    if (!rival && cpu_occupant(cpu).empty()) {
+        rival = supervisor.rival_of(core, false);
+    }
+    const auto found = std::ranges::find(cores_, rival, &Cores::value_type::second);
+    return found == cores_.end() ? "" : "thread '" + found->first->name + "'";
 }
 
 void ThreadPlans::report_hung(const Thread& thread, const Core& core,

@@ -74,6 +74,9 @@ public:
 
 private:
     bool add(Thread& thread, int priority, Diagnostics& diagnostics);
+    std::string rival_of(const Core& core, int cpu) const;
+    void warn_of_missing_cpu(const Thread& thread, const Core& core,
+                             Diagnostics& diagnostics) const;
     bool end(Thread& thread, Core& core, Diagnostics& diagnostics);
     bool report_starved(const Thread& thread, const Core& core, Diagnostics& diagnostics) const;
     void report_silent(const Core* core, Diagnostics& diagnostics) const;
