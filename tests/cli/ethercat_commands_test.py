@@ -284,7 +284,9 @@ class Configuration(Ethercat):
             "ethercat", "config", "--esi", "drive.xml:SERVO-1, drive.xml:SERVO-1", "two"
         )
         self.assertEqual(
-            "two.ethercat and two.hal written, 2 slaves; next: hal run two.hal\n", said
+            "'SERVO-1' is emulated without its mailbox protocols FoE\n" * 2
+            + "two.ethercat and two.hal written, 2 slaves; next: hal run two.hal\n",
+            said,
         )
         text = (self.folder / "two.ethercat").read_text()
         self.assertIn(
@@ -560,7 +562,8 @@ class Configuration(Ethercat):
         text = self.on("xml", "-p", 1)
         device = ElementTree.fromstring(text).find("Descriptions/Devices/Device")
         self.assertEqual(
-            ["#x1600", "#x1610"], [pdo.findtext("Index") for pdo in device.findall("RxPdo")]
+            [f"#x{index:x}" for first in (0x1600, 0x1610) for index in range(first, first + 4)],
+            [pdo.findtext("Index") for pdo in device.findall("RxPdo")],
         )
         self.assertEqual(text, json.loads(self.on("xml", "-p", 1, "--json"))["xml"])
         (self.folder / "servo.xml").write_text(text)

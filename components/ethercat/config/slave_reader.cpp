@@ -329,11 +329,12 @@ private:
     void modules() {
         const Line* line = keys_.find("modules");
         const std::vector<std::uint32_t> idents =
-            line != nullptr ? configured_modules(*line) : default_modules();
+            line != nullptr ? configured_modules(*line) : esi::default_modules(*device_);
         const bool all_empty =
             std::all_of(idents.begin(), idents.end(), [](std::uint32_t i) { return i == 0; });
         if (line == nullptr && all_empty) return;
         modular_ = esi::with_modules(*file_, *device_, idents);
+        if (!device_->download_modules.value_or(true)) return;
         for (std::size_t i = 0; i < idents.size(); ++i) {
             slave_.startup.push_back(startup_write(0xf030, static_cast<unsigned>(i + 1),
                                                    little_endian(idents[i], 32), State::safeop));
@@ -342,14 +343,6 @@ private:
             slave_.startup.push_back(
                 startup_write(0xf030, 0, little_endian(idents.size(), 8), State::safeop));
         }
-    }
-
-    std::vector<std::uint32_t> default_modules() const {
-        std::vector<std::uint32_t> idents;
-        for (const esi::Slot& s : device_->slots) {
-            idents.push_back(s.default_module);
-        }
-        return idents;
     }
 
     std::vector<std::uint32_t> configured_modules(const Line& line) {
@@ -364,12 +357,9 @@ private:
 
     /// Returns the number of a module, 0 for an empty slot; nothing after reporting an unknown one.
     std::optional<std::uint32_t> module_ident(const Word& word) {
-        if (word.text == "-") return 0;
+        if (const auto ident = esi::find_module(*file_, word.text)) return ident;
         std::vector<std::string> names;
         for (const esi::Module& m : file_->modules) {
-            const bool is_it = same_word(m.type, word.text) || same_word(m.name, word.text) ||
-                               parse_natural(word.text) == std::optional<std::uint64_t>(m.ident);
-            if (is_it) return m.ident;
             names.push_back(m.type);
         }
         report_.error(Topic::slave, word.at, "unknown module '" + word.text + "'",

@@ -206,7 +206,7 @@ std::string write(const std::string& link, std::int64_t cycle_ns,
             out += "vendor   = " + hex(s.vendor) + "\n";
         }
         const bool described = !s.esi.empty();
-        if (described || s.product != 0) {
+        if (s.product != 0) {
             out += "product  = " + hex(s.product) + "\n";
         }
         if (described || s.revision != 0) {

@@ -151,6 +151,14 @@ void DesignBuilder::assignment(bool output, std::uint16_t sm) {
     }
 }
 
+/// Adds the assignment of a sync manager without PDOs: masters write it in every device.
+void DesignBuilder::empty_assignment(std::uint16_t sm) {
+    namespace access = coe::access;
+    dictionary().record(static_cast<std::uint16_t>(coe::assignment + sm), "PDO assignment", 0,
+                        coe::ObjectCode::array, access::read | access::write_preop, coe::type::u16);
+    dictionary().limit(0, 0);
+}
+
 Design DesignBuilder::finish(std::uint16_t alias, std::uint32_t serial,
                              std::size_t max_output_bytes, std::size_t max_input_bytes) {
     namespace access = coe::access;
@@ -175,8 +183,10 @@ Design DesignBuilder::finish(std::uint16_t alias, std::uint32_t serial,
         s.fmmus.push_back(sii::FmmuUse::outputs);
         at += (3 * design_.max_output_bytes + 127) / 128 * 128;
     } else if (mailbox_bytes_ != 0) {
+        const auto sm = static_cast<std::uint16_t>(s.sync_managers.size());
         s.sync_managers.push_back(
             {static_cast<std::uint16_t>(at), 0, 0x64, 0, 0, sii::SmType::outputs});
+        empty_assignment(sm);
     }
     if (!s.tx.empty()) {
         const auto sm = static_cast<std::uint16_t>(s.sync_managers.size());
@@ -184,6 +194,9 @@ Design DesignBuilder::finish(std::uint16_t alias, std::uint32_t serial,
                                    0x20, 0, 1, sii::SmType::inputs});
         assignment(false, sm);
         s.fmmus.push_back(sii::FmmuUse::inputs);
+    }
+    if (s.tx.empty() && mailbox_bytes_ != 0) {
+        empty_assignment(static_cast<std::uint16_t>(s.sync_managers.size()));
     }
     if (mailbox_bytes_ != 0) {
         s.fmmus.push_back(sii::FmmuUse::mailbox_state);

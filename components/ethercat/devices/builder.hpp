@@ -44,6 +44,7 @@ public:
 
 private:
     void assignment(bool output, std::uint16_t sm);
+    void empty_assignment(std::uint16_t sm);
 
     Design design_;
     std::size_t mailbox_bytes_ = 0;

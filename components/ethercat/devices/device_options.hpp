@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "cia402/drive/axis_settings.hpp"
 
@@ -33,6 +34,9 @@ struct DeviceOptions {
     std::string file{};
     std::string device{};
     std::optional<std::uint32_t> revision{};  ///< of an esi device; nullopt: the newest
+    /// modules of a modular esi device, as in "A, -, 0x12"; empty: the default ones
+    std::string modules{};
+    std::vector<std::uint32_t> module_idents{};  ///< of the slots
     std::shared_ptr<const esi::File> description{};  ///< the contents of `file`
     const esi::Device* described = nullptr;  ///< the device in `description`
 };

@@ -2,15 +2,20 @@
 #include "ethercat/devices/esi_device.hpp"
 
 #include <algorithm>
+#include <bit>
+#include <limits>
 #include <map>
 #include <set>
 
-#include "text/numbers.hpp"
+#include "ethercat/devices/soe_server.hpp"
 
 namespace hal::ethercat::devices {
 namespace {
 
 namespace access = coe::access;
+
+constexpr std::uint16_t sync_manager_count = 15;
+constexpr std::size_t usual_max_bytes = 128;  ///< of process data that can be mapped anew
 
 struct PlannedEntry {
     std::string name;
@@ -27,10 +32,14 @@ struct PlannedObject {
 };
 using Plan = std::map<std::uint16_t, PlannedObject>;
 
+bool is_mapping(std::uint16_t index) {
+    return (index >= coe::rx_pdo && index < coe::rx_pdo + 0x200) ||
+           (index >= coe::tx_pdo && index < coe::tx_pdo + 0x200);
+}
+
 /// Returns whether an object follows from the PDOs, the sync managers or the identity.
 bool is_derived(std::uint16_t index) {
-    return (index >= coe::rx_pdo && index < coe::rx_pdo + 0x200) ||
-           (index >= coe::tx_pdo && index < coe::tx_pdo + 0x200) ||
+    return is_mapping(index) ||
            (index >= coe::sync_manager_types && index < coe::assignment + 0x10) || index == 0x1018;
 }
 
@@ -52,6 +61,115 @@ void add_objects(const esi::Device& device, Plan& plan) {
                                  static_cast<std::uint16_t>(rights), v.initial};
         }
     }
+}
+
+/// Returns the entries of an object that is known by a write with complete access only: equal ones,
+/// as many as sub-index 0 counts.
+void add_complete(const esi::InitCmd& command, PlannedObject& object) {
+    constexpr std::size_t count_bytes = 2;
+    object.code = coe::ObjectCode::record;
+    if (command.data.size() <= count_bytes) return;
+    const std::size_t bytes = command.data.size() - count_bytes;
+    const std::size_t count = command.data[0];
+    const bool equal = count != 0 && bytes % count == 0;
+    const std::size_t entries = equal ? count : 1;
+    for (std::size_t n = 1; n <= entries; ++n) {
+        object.entries[static_cast<std::uint8_t>(n)] = {
+            "", 0, static_cast<std::uint16_t>(8 * bytes / entries), access::read_write, {}};
+    }
+}
+
+/// Adds what the start-up commands write: objects that are missing in the dictionary, and the right
+/// to write those that have it not.
+void add_commands(const esi::Device& device, Plan& plan) {
+    for (const esi::InitCmd& command : device.init_commands) {
+        if (command.protocol != esi::InitCmd::Protocol::coe || command.data.empty() ||
+            is_derived(command.index)) {
+            continue;
+        }
+        const bool is_new = !plan.contains(command.index);
+        PlannedObject& object = plan[command.index];
+        if (is_new) {
+            object.name = command.comment;
+        }
+        if (command.complete) {
+            if (is_new) {
+                add_complete(command, object);
+            }
+            continue;
+        }
+        PlannedEntry& entry = object.entries[command.sub];
+        const auto bits = static_cast<std::uint16_t>(std::min<std::size_t>(
+            8 * command.data.size(), std::numeric_limits<std::uint16_t>::max()));
+        if ((entry.bits + 7) / 8 != bits / 8) {
+            entry.bits = bits;
+            entry.type = 0;
+            entry.initial.clear();
+        }
+        entry.rights |= access::read_write;
+        if (command.sub != 0) {
+            object.code =
+                object.code == coe::ObjectCode::variable ? coe::ObjectCode::record : object.code;
+        }
+    }
+}
+
+/// Returns whether a start-up command writes an object of a range.
+bool is_commanded(const esi::Device& device, std::uint16_t first, std::uint16_t last) {
+    return std::any_of(device.init_commands.begin(), device.init_commands.end(),
+                       [=](const esi::InitCmd& c) {
+        return c.protocol == esi::InitCmd::Protocol::coe && c.index >= first && c.index <= last;
+    });
+}
+
+/// Adds the configured and the detected module list (ETG.5001).
+void add_module_lists(const std::vector<std::uint32_t>& idents, Plan& plan) {
+    for (const std::uint16_t index : {std::uint16_t{0xf030}, std::uint16_t{0xf050}}) {
+        const bool is_detected = index == 0xf050;
+        PlannedObject& list = plan[index];
+        list = {is_detected ? "Detected modules" : "Configured modules",
+                coe::type::u32,
+                coe::ObjectCode::array,
+                {}};
+        list.entries[0] = {"Number of entries",
+                           coe::type::u8,
+                           8,
+                           is_detected ? access::read : access::read_write,
+                           {static_cast<std::uint8_t>(is_detected ? idents.size() : 0)}};
+        for (std::size_t n = 0; n < idents.size(); ++n) {
+            std::vector<std::uint8_t> ident(4);
+            put(ident.data(), is_detected ? idents[n] : 0U);
+            list.entries[static_cast<std::uint8_t>(n + 1)] = {
+                "Module " + std::to_string(n + 1), coe::type::u32, 32,
+                is_detected ? access::read : access::read_write, ident};
+        }
+    }
+}
+
+/// Returns the parameters that the start-up commands write.
+std::vector<Idn> idns_of(const esi::Device& device) {
+    std::vector<Idn> idns;
+    for (const esi::InitCmd& command : device.init_commands) {
+        const std::size_t size = command.data.size();
+        if (command.protocol != esi::InitCmd::Protocol::soe || size == 0) continue;
+        Idn idn;
+        idn.number = command.index;
+        idn.drive = command.sub;
+        idn.name = command.comment;
+        const bool is_list = size >= 4 && get<std::uint16_t>(command.data.data()) == size - 4;
+        const std::size_t width = std::bit_width(std::bit_ceil(size)) - 1U;
+        if (is_list) {
+            idn.attribute.raw = soe::attribute::list | soe::attribute::bytes_2;
+            idn.value.assign(command.data.begin() + 4, command.data.end());
+            idn.length = idn.value.size();
+        } else {
+            idn.attribute.raw = static_cast<std::uint32_t>(std::min<std::size_t>(width, 3)) << 16;
+            idn.value.resize(std::size_t{1} << std::min<std::size_t>(width, 3));
+            idn.length = idn.value.size();
+        }
+        idns.push_back(std::move(idn));
+    }
+    return idns;
 }
 
 /// Adds the objects of PDOs that are missing in the dictionary of the description, and their right
@@ -94,7 +212,11 @@ void write_dictionary(const Plan& plan, Dictionary& d) {
         d.object(index, object.name, object.code, object.type);
         const std::uint8_t last =
             object.entries.empty() ? std::uint8_t{0} : object.entries.rbegin()->first;
-        d.entry(0, "Number of entries", coe::type::u8, 8, access::read, std::span(&last, 1));
+        const auto count = object.entries.find(0);
+        const std::uint16_t count_rights =
+            count == object.entries.end() ? std::uint16_t{0} : count->second.rights;
+        d.entry(0, "Number of entries", coe::type::u8, 8,
+                static_cast<std::uint16_t>(access::read | count_rights), std::span(&last, 1));
         for (const auto& [sub, e] : object.entries) {
             if (sub != 0) {
                 d.entry(sub, e.name, e.type, e.bits, e.rights, e.initial);
@@ -129,6 +251,19 @@ void add_pdos(const std::vector<esi::Pdo>& pdos, bool configurable, Dictionary& 
     }
 }
 
+/// Adds the mappings that only start-up commands name, without entries.
+void add_commanded_pdos(const esi::Device& device, Dictionary& d, std::set<std::uint16_t>& done) {
+    std::vector<esi::Pdo> pdos;
+    for (const esi::InitCmd& command : device.init_commands) {
+        const bool is_coe = command.protocol == esi::InitCmd::Protocol::coe;
+        if (!is_coe || !is_mapping(command.index) || done.contains(command.index)) continue;
+        esi::Pdo& pdo = pdos.emplace_back();
+        pdo.index = command.index;
+        pdo.name = command.comment;
+    }
+    add_pdos(pdos, true, d, done);
+}
+
 /// Adds the assignment of a sync manager; returns the bytes of the assigned PDOs.
 std::size_t add_assignment(const std::vector<esi::Pdo>& pdos, unsigned number, bool writable,
                            Dictionary& d) {
@@ -153,6 +288,20 @@ std::size_t add_assignment(const std::vector<esi::Pdo>& pdos, unsigned number, b
               rights, n < assigned.size() ? assigned[n] : 0);
     }
     return (bits + 7) / 8;
+}
+
+/// Adds 1C12h and 1C13h where no sync manager of process data has that number: masters write them in
+/// every device.
+void add_empty_assignments(const sii::Contents& s, Dictionary& d) {
+    for (unsigned n = 2; n <= 3; ++n) {
+        const sii::SmType type =
+            n < s.sync_managers.size() ? s.sync_managers[n].type : sii::SmType::unused;
+        if (type == sii::SmType::outputs || type == sii::SmType::inputs) continue;
+        d.record(static_cast<std::uint16_t>(coe::assignment + n),
+                 "PDO assignment of sync manager " + std::to_string(n), 0, coe::ObjectCode::array,
+                 access::read | access::write_preop, coe::type::u16);
+        d.limit(0, 0);
+    }
 }
 
 void add_identity(const sii::Contents& s, Plan& plan) {
@@ -185,53 +334,7 @@ void add_identity(const sii::Contents& s, Plan& plan) {
     }
 }
 
-}  // namespace
-
-std::string why_not_emulated(const esi::Device& d) {
-    for (const sii::SmType type : {sii::SmType::outputs, sii::SmType::inputs}) {
-        unsigned used = 0;
-        for (std::size_t n = 0; n < d.sync_managers.size(); ++n) {
-            used += d.sync_managers[n].type == type ? 1 : 0;
-        }
-        if (used > 1) {
-            return std::string("several sync managers with ") +
-                   (type == sii::SmType::outputs ? "outputs" : "inputs") + " are not emulated";
-        }
-    }
-    for (const esi::SyncManager& s : d.sync_managers) {
-        if ((s.type == sii::SmType::mailbox_out || s.type == sii::SmType::mailbox_in) &&
-            s.default_size > largest_mailbox) {
-            return "a mailbox of " + std::to_string(s.default_size) +
-                   " bytes is longer than a datagram";
-        }
-    }
-    return {};
-}
-
-Parts make_esi_device(const DeviceOptions& o) {
-    const esi::Device& device = *o.described;
-    Design design;
-    design.name = device.order;
-    design.sii = esi::sii_contents(device);
-    sii::Contents& s = design.sii;
-    s.configuration[4] = o.alias;
-    design.device_id = o.alias;
-    if (o.serial != 0) {
-        s.serial = o.serial;
-    }
-    if (s.general.ports == std::array<std::uint8_t, 4>{}) {
-        s.general.ports = {1, 1, 0, 0};
-    }
-    design.coe = s.has_mailbox() && (s.protocols & bit_of(MailboxType::coe)) != 0;
-    design.dc = device.has_dc;
-    const bool configurable = design.coe && (s.general.coe_details & sii::coe_pdo_config) != 0;
-    const bool assignable = design.coe && (s.general.coe_details & sii::coe_pdo_assign) != 0;
-
-    Plan plan;
-    add_objects(device, plan);
-    add_mapped(device.rx, true, plan);
-    add_mapped(device.tx, false, plan);
-    add_identity(s, plan);
+void add_sync_manager_types(const sii::Contents& s, Plan& plan) {
     PlannedObject& types = plan[coe::sync_manager_types];
     types = {"Sync manager types", coe::type::u8, coe::ObjectCode::array, {}};
     for (std::size_t n = 0; n < s.sync_managers.size(); ++n) {
@@ -242,19 +345,84 @@ Parts make_esi_device(const DeviceOptions& o) {
             access::read,
             {static_cast<std::uint8_t>(s.sync_managers[n].type)}};
     }
+}
+
+}  // namespace
+
+std::string not_emulated(const esi::Device& d) {
+    if (!d.mailbox) return {};
+    std::string protocols;
+    for (const MailboxProtocol& protocol : ethercat::mailbox_protocols) {
+        const bool is_emulated =
+            protocol.type == MailboxType::coe || protocol.type == MailboxType::soe;
+        if (is_emulated || (d.mailbox->protocols & protocol.bit) == 0) continue;
+        protocols += (protocols.empty() ? "" : ", ") + std::string(protocol.name);
+    }
+    return protocols.empty() ? "" : "its mailbox protocols " + protocols;
+}
+
+Parts make_esi_device(const DeviceOptions& o) {
+    const esi::Device device = esi::with_modules(*o.description, *o.described, o.module_idents);
+    Design design;
+    design.name = device.order;
+    design.sii = esi::sii_contents(device);
+    sii::Contents& s = design.sii;
+    s.configuration[4] = o.alias;
+    design.device_id = o.alias;
+    if (o.serial != 0) {
+        s.serial = o.serial;
+    }
+    for (sii::Area* area : {&s.mailboxes.receive, &s.mailboxes.send}) {
+        area->size = static_cast<std::uint16_t>(std::min<std::size_t>(area->size, largest_mailbox));
+    }
+    if (s.general.ports == std::array<std::uint8_t, 4>{}) {
+        s.general.ports = {1, 1, 0, 0};
+    }
+    design.coe = s.has_mailbox() && (s.protocols & bit_of(MailboxType::coe)) != 0;
+    design.dc = device.has_dc;
+    const bool configurable =
+        design.coe && ((s.general.coe_details & sii::coe_pdo_config) != 0 ||
+                       is_commanded(device, coe::rx_pdo, coe::tx_pdo + 0x1ff));
+    const bool assignable =
+        design.coe && ((s.general.coe_details & sii::coe_pdo_assign) != 0 ||
+                       is_commanded(device, coe::assignment, coe::assignment + sync_manager_count));
+    if (s.has_mailbox() && (s.protocols & bit_of(MailboxType::soe)) != 0) {
+        design.services.push_back(std::make_unique<SoeServer>(idns_of(device)));
+    }
+
+    Plan plan;
+    add_objects(device, plan);
+    add_commands(device, plan);
+    add_mapped(device.rx, true, plan);
+    add_mapped(device.tx, false, plan);
+    if (design.coe && !o.module_idents.empty()) {
+        add_module_lists(o.module_idents, plan);
+    }
+    // without CoE there are only the objects of the process data, whose numbers may be any
+    if (design.coe) {
+        add_identity(s, plan);
+        add_sync_manager_types(s, plan);
+    }
     Dictionary& d = *design.dictionary;
     write_dictionary(plan, d);
     std::set<std::uint16_t> done;
     add_pdos(device.rx, configurable, d, done);
     add_pdos(device.tx, configurable, d, done);
+    if (design.coe) {
+        add_commanded_pdos(device, d, done);
+    }
     for (unsigned n = 0; n < s.sync_managers.size(); ++n) {
         const bool output = s.sync_managers[n].type == sii::SmType::outputs;
         if (!output && s.sync_managers[n].type != sii::SmType::inputs) continue;
         const std::size_t bytes = add_assignment(output ? device.rx : device.tx, n, assignable, d);
         s.sync_managers[n].length = static_cast<std::uint16_t>(bytes);
         const std::size_t most = std::max<std::size_t>(bytes, device.sync_managers[n].max_size);
-        (output ? design.max_output_bytes : design.max_input_bytes) =
-            configurable || assignable ? std::max<std::size_t>(most, 128) : most;
+        std::size_t& max_bytes = output ? design.max_output_bytes : design.max_input_bytes;
+        const bool changes = configurable || assignable;
+        max_bytes = std::max({max_bytes, most, changes ? usual_max_bytes : std::size_t{0}});
+    }
+    if (design.coe) {
+        add_empty_assignments(s, d);
     }
     d.finish();
     return {std::move(design), std::make_unique<Idle>()};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A device as a description in XML (ESI, ETG.2000) has it: its EEPROM, its object dictionary, its
-// PDOs. Its objects keep the values that are written; behaviour beyond that is not in a
-// description.
+// PDOs, and what its InitCmds write. Its objects keep the values that are written; behaviour beyond
+// that is not in a description.
 #pragma once
 
 #include <string>
@@ -12,8 +12,9 @@
 
 namespace hal::ethercat::devices {
 
-/// Returns what the emulation cannot do with a device; empty: nothing. [setup]
-std::string why_not_emulated(const esi::Device&);
+/// Returns what the emulation of a device leaves out, as in "its protocols EoE, FoE"; empty:
+/// nothing. [setup]
+std::string not_emulated(const esi::Device&);
 
 /// Makes the device `options.described`, which must be there. [setup]
 Parts make_esi_device(const DeviceOptions&);

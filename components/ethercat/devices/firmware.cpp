@@ -14,6 +14,9 @@ namespace {
 // for valid outputs and SYNC0 after OP was requested
 constexpr std::int64_t op_timeout_ns = 200'000'000;
 constexpr std::int64_t lost_pulses = 10;
+constexpr std::uint8_t mode_bits = 0x0f;
+constexpr std::uint8_t buffered_outputs = 0x04;
+constexpr std::uint8_t buffered_inputs = 0x00;
 
 int rank(State s) noexcept {
     if (s == State::op) return 4;
@@ -38,17 +41,6 @@ bool may_change(State from, State to) noexcept {
 
 Firmware::Firmware(Design design, std::unique_ptr<Behaviour> behaviour)
     : design_(std::move(design)), behaviour_(std::move(behaviour)) {
-    for (unsigned n = 0; n < design_.sii.sync_managers.size(); ++n) {
-        const auto& sm = design_.sii.sync_managers[n];
-        if (sm.type == sii::SmType::outputs) {
-            sm_out_ = n;
-            out_start_ = sm.start;
-        }
-        if (sm.type == sii::SmType::inputs) {
-            sm_in_ = n;
-            in_start_ = sm.start;
-        }
-    }
     auto& dictionary = *design_.dictionary;
     if (design_.coe) {
         mailbox_.add(std::make_unique<CoeServer>(dictionary));
@@ -58,19 +50,59 @@ Firmware::Firmware(Design design, std::unique_ptr<Behaviour> behaviour)
     }
     design_.services.clear();
     dictionary.guard_with(this);
-    outputs_.attach(dictionary, static_cast<std::uint16_t>(coe::assignment + sm_out_), true,
-                    design_.max_output_bytes);
-    inputs_.attach(dictionary, static_cast<std::uint16_t>(coe::assignment + sm_in_), false,
-                   design_.max_input_bytes);
+    outputs_ = areas(sii::SmType::outputs);
+    inputs_ = areas(sii::SmType::inputs);
     image_.resize(std::max({design_.max_output_bytes, design_.max_input_bytes, std::size_t{1}}));
+}
+
+/// Returns the process data of all sync managers of a type.
+std::vector<SyncArea> Firmware::areas(sii::SmType type) const {
+    const bool output = type == sii::SmType::outputs;
+    std::vector<SyncArea> out;
+    for (unsigned n = 0; n < design_.sii.sync_managers.size(); ++n) {
+        const sii::SyncManager& sm = design_.sii.sync_managers[n];
+        if (sm.type != type) continue;
+        SyncArea& area = out.emplace_back();
+        area.sync_manager = n;
+        area.start = sm.start;
+        area.mode = static_cast<std::uint8_t>(sm.control & mode_bits);
+        if (sm.control == 0) {
+            area.mode = output ? buffered_outputs : buffered_inputs;
+        }
+        area.data.attach(*design_.dictionary, static_cast<std::uint16_t>(coe::assignment + n),
+                         output, output ? design_.max_output_bytes : design_.max_input_bytes);
+    }
+    return out;
+}
+
+std::size_t Firmware::bytes(const std::vector<SyncArea>& areas) noexcept {
+    std::size_t sum = 0;
+    for (const SyncArea& area : areas) {
+        sum += area.data.bytes();
+    }
+    return sum;
+}
+
+void Firmware::build(std::vector<SyncArea>& areas) noexcept {
+    for (SyncArea& area : areas) {
+        area.data.build();
+    }
+}
+
+void Firmware::clear_outputs() noexcept {
+    for (SyncArea& area : outputs_) {
+        area.data.clear();
+    }
 }
 
 coe::Abort Firmware::check(const DictionaryObject& o, const DictionaryEntry& e,
                            std::span<const std::uint8_t> value) noexcept {
-    const auto outputs = outputs_.check(o, e, value);
-    if (outputs != coe::Abort::none) return outputs;
-    const auto inputs = inputs_.check(o, e, value);
-    if (inputs != coe::Abort::none) return inputs;
+    for (const auto* areas : {&outputs_, &inputs_}) {
+        for (const SyncArea& area : *areas) {
+            const auto code = area.data.check(o, e, value);
+            if (code != coe::Abort::none) return code;
+        }
+    }
     return behaviour_->check(o.index, e.sub, value);
 }
 
@@ -109,18 +141,22 @@ void Firmware::run(esc::Pdi& pdi, std::int64_t now_ns) noexcept {
     }
 }
 
+/// Takes new outputs out of all sync managers. Returns whether there are any.
 bool Firmware::read_outputs(esc::Pdi& pdi) noexcept {
-    if (outputs_.bytes() == 0) return false;
-    const std::size_t n = pdi.read_sync_manager(sm_out_, image_);
-    if (n < outputs_.bytes()) return false;
-    received_ = true;
-    if (state_ == State::op) {
-        outputs_.unpack({image_.data(), n});
-        outputs_.each_object([this](std::uint16_t index, std::uint8_t sub) noexcept {
+    bool is_new = false;
+    for (SyncArea& area : outputs_) {
+        if (area.data.bytes() == 0) continue;
+        const std::size_t n = pdi.read_sync_manager(area.sync_manager, image_);
+        if (n < area.data.bytes()) continue;
+        is_new = true;
+        received_ = true;
+        if (state_ != State::op) continue;
+        area.data.unpack({image_.data(), n});
+        area.data.each_object([this](std::uint16_t index, std::uint8_t sub) noexcept {
             behaviour_->written(index, sub);
         });
     }
-    return true;
+    return is_new;
 }
 
 void Firmware::run_process_data(esc::Pdi& pdi) noexcept {
@@ -129,7 +165,7 @@ void Firmware::run_process_data(esc::Pdi& pdi) noexcept {
         if (sync.pulses == pulses_) return;
         const auto pulses = static_cast<std::int64_t>(sync.pulses - pulses_);
         pulses_ = sync.pulses;
-        if (!read_outputs(pdi) && state_ == State::op && outputs_.bytes() != 0) {
+        if (!read_outputs(pdi) && state_ == State::op && bytes(outputs_) != 0) {
             missed_.fetch_add(1, std::memory_order_relaxed);
             if (auto* count = design_.dictionary->at(0x1c32, 0x0b)) {
                 put(count, static_cast<std::uint16_t>(get<std::uint16_t>(count) + 1));
@@ -151,10 +187,13 @@ void Firmware::step(esc::Pdi& pdi, std::int64_t dt_ns, std::int64_t sync_cycle_n
     if (design_.coe) {
         send(s.emergencies);
     }
-    if (inputs_.bytes() == 0) return;
-    std::memset(image_.data(), 0, inputs_.bytes());
-    inputs_.pack({image_.data(), inputs_.bytes()});
-    pdi.write_sync_manager(sm_in_, {image_.data(), inputs_.bytes()});
+    for (const SyncArea& area : inputs_) {
+        if (area.data.bytes() == 0) continue;
+        const std::span<std::uint8_t> image{image_.data(), area.data.bytes()};
+        std::fill(image.begin(), image.end(), std::uint8_t{0});
+        area.data.pack(image);
+        pdi.write_sync_manager(area.sync_manager, image);
+    }
 }
 
 void Firmware::send(const Emergencies& emergencies) noexcept {
@@ -245,20 +284,24 @@ std::uint16_t Firmware::check_mailbox(esc::Pdi& pdi, const sii::Mailboxes& m,
     return fits(out, m.receive, 4) && fits(in, m.send, 0) ? std::uint16_t{0} : code;
 }
 
+bool Firmware::fits(esc::Pdi& pdi, const SyncArea& area) const noexcept {
+    if (area.start == 0) return true;
+    const auto sm = pdi.sync_manager(area.sync_manager);
+    const std::size_t length = area.data.bytes();
+    if (length == 0) return !sm.enabled || sm.length == 0;
+    return sm.enabled && sm.start == area.start && sm.length == length &&
+           (sm.control & mode_bits) == area.mode;
+}
+
 std::uint16_t Firmware::check_process_data(esc::Pdi& pdi) noexcept {
-    outputs_.build();
-    inputs_.build();
-    const auto fits = [&](unsigned number, std::uint16_t start, std::size_t bytes,
-                          unsigned direction) {
-        const auto sm = pdi.sync_manager(number);
-        if (bytes == 0) return !sm.enabled || sm.length == 0;
-        return sm.enabled && sm.start == start && sm.length == bytes &&
-               (sm.control & 0x0fU) == direction;
+    build(outputs_);
+    build(inputs_);
+    const auto all_fit = [&](const std::vector<SyncArea>& areas) {
+        return std::all_of(areas.begin(), areas.end(),
+                           [&](const SyncArea& area) { return fits(pdi, area); });
     };
-    const bool has_out = out_start_ != 0;
-    const bool has_in = in_start_ != 0;
-    if (has_out && !fits(sm_out_, out_start_, outputs_.bytes(), 4)) return 0x001d;
-    if (has_in && !fits(sm_in_, in_start_, inputs_.bytes(), 0)) return 0x001e;
+    if (!all_fit(outputs_)) return 0x001d;
+    if (!all_fit(inputs_)) return 0x001e;
     return 0;
 }
 
@@ -280,7 +323,7 @@ std::uint16_t Firmware::check_sync(esc::Pdi& pdi) const noexcept {
 /// Completes SAFE-OP to OP once outputs were received and SYNC0 runs.
 void Firmware::wait_for_op(esc::Pdi& pdi) noexcept {
     if (op_since_ns_ < 0 || state_ != State::safeop) return;
-    const bool outputs = outputs_.bytes() == 0 || received_;
+    const bool outputs = bytes(outputs_) == 0 || received_;
     const auto sync = pdi.sync();
     const bool synchronised = !sync.active || sync.pulses != 0;
     if (outputs && synchronised) {
@@ -297,10 +340,12 @@ void Firmware::watch(esc::Pdi& pdi) noexcept {
     if (const auto code = faults_.fail.exchange(0, std::memory_order_relaxed)) {
         return fail(pdi, State::safeop, code);
     }
-    const bool watched = outputs_.bytes() != 0 && (pdi.sync_manager(sm_out_).control & 0x40) != 0;
-    if (watched && pdi.watchdog_expired()) return fail(pdi, State::safeop, 0x001b);
-    if (outputs_.bytes() != 0 && !pdi.sync_manager(sm_out_).enabled) {
-        return fail(pdi, State::safeop, 0x001d);
+    for (const SyncArea& area : outputs_) {
+        if (area.data.bytes() == 0) continue;
+        const auto sm = pdi.sync_manager(area.sync_manager);
+        const bool watched = (sm.control & 0x40) != 0;
+        if (watched && pdi.watchdog_expired()) return fail(pdi, State::safeop, 0x001b);
+        if (!sm.enabled) return fail(pdi, State::safeop, 0x001d);
     }
     const auto sync = pdi.sync();
     if (sync.active && sync.last_pulse_ns != 0 &&
@@ -312,7 +357,7 @@ void Firmware::watch(esc::Pdi& pdi) noexcept {
 void Firmware::enter(esc::Pdi& pdi, State to) noexcept {
     const bool leaves_op = state_ == State::op && to != State::op;
     if (leaves_op) {
-        outputs_.clear();
+        clear_outputs();
     }
     if (to == State::init) {
         mailbox_.stop();
@@ -346,7 +391,7 @@ void Firmware::fail(esc::Pdi& pdi, State stay, std::uint16_t code) noexcept {
     if (stay != state_) {
         const bool leaves_op = state_ == State::op;
         if (leaves_op) {
-            outputs_.clear();
+            clear_outputs();
             received_ = false;
         }
         state_ = stay;

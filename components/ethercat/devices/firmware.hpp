@@ -93,6 +93,14 @@ struct Design {
     std::size_t max_input_bytes = 0;
 };
 
+/// The process data of one sync manager.
+struct SyncArea {
+    unsigned sync_manager = 0;
+    std::uint16_t start = 0;
+    std::uint8_t mode = 0;  ///< bits 0 to 3 of its control byte: buffers or mailbox, direction
+    ProcessData data{};
+};
+
 class Firmware final : public esc::Application, private DictionaryGuard {
 public:
     Firmware(Design, std::unique_ptr<Behaviour>);  ///< [setup]
@@ -133,6 +141,11 @@ private:
     void fail(esc::Pdi&, State stay, std::uint16_t code) noexcept;
 
     // Process data.
+    std::vector<SyncArea> areas(sii::SmType) const;
+    static std::size_t bytes(const std::vector<SyncArea>&) noexcept;
+    static void build(std::vector<SyncArea>&) noexcept;
+    bool fits(esc::Pdi&, const SyncArea&) const noexcept;
+    void clear_outputs() noexcept;
     void run_process_data(esc::Pdi&) noexcept;
     void step(esc::Pdi&, std::int64_t dt_ns, std::int64_t sync_cycle_ns) noexcept;
     void send(const Emergencies&) noexcept;
@@ -142,12 +155,8 @@ private:
     std::unique_ptr<Behaviour> behaviour_;
     FirmwareFaults faults_;
     FirmwareMailbox mailbox_{faults_};
-    ProcessData outputs_, inputs_;
-    std::vector<std::uint8_t> image_;  ///< of outputs or inputs
-    unsigned sm_out_ = 2;
-    unsigned sm_in_ = 3;
-    std::uint16_t out_start_ = 0;
-    std::uint16_t in_start_ = 0;
+    std::vector<SyncArea> outputs_, inputs_;
+    std::vector<std::uint8_t> image_;  ///< of one area
 
     State state_ = State::init;
     State target_ = State::init;

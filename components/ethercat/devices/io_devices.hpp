@@ -5,6 +5,8 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "ethercat/devices/builder.hpp"
 #include "ethercat/devices/device_options.hpp"

@@ -34,8 +34,15 @@ std::vector<std::uint8_t> bytes_of_text(std::string_view text) {
 template <class T>
 Idn idn_of(std::uint16_t number, std::uint32_t attribute, std::string name, std::string unit,
            std::vector<T> values, std::int64_t low = 0, std::int64_t high = 0) {
-    Idn i{number, {attribute}, std::move(name), std::move(unit), {}, values.size() * sizeof(T),
-          low,    high};
+    Idn i{number,
+          {attribute},
+          std::move(name),
+          std::move(unit),
+          {},
+          values.size() * sizeof(T),
+          low,
+          high,
+          0};
     i.value.resize(i.length);
     std::memcpy(i.value.data(), values.data(), i.length);
     return i;

@@ -28,7 +28,7 @@ constexpr DeviceRow device_rows[] = {
     {"analog_out", "channels", [](const DeviceOptions& o) { return make_analog(o, true); }},
     {"servo", "axes dc modes motor", make_servo},
     {"mailbox_device", "", make_mailbox_device},
-    {"esi", "file device revision", make_esi_device},
+    {"esi", "file device revision modules", make_esi_device},
 };
 
 const DeviceRow* device_row(std::string_view name) {
@@ -115,6 +115,8 @@ constexpr OptionRow option_rows[] = {
     {"dc", [](Text, Text v, DeviceOptions& o) { return parse_dc(v, o.dc_required); }},
     {"file", [](Text k, Text v, DeviceOptions& o) { return parse_text(k, v, "FILE.xml", o.file); }},
     {"device", [](Text k, Text v, DeviceOptions& o) { return parse_text(k, v, "NAME", o.device); }},
+    {"modules",
+     [](Text k, Text v, DeviceOptions& o) { return parse_text(k, v, "NAME,NAME", o.modules); }},
     {"motor", [](Text, Text v, DeviceOptions& o) { return cia402::parse_motor(v, o.motor); }},
 };
 
@@ -137,6 +139,30 @@ std::string parse_option(const DeviceRow& device, std::string_view word, DeviceO
     const OptionRow* option = option_row(device, key);
     if (option == nullptr) return "unknown option '" + key + "' of " + std::string(device.name);
     return option->parse(key, word.substr(equals + 1), options);
+}
+
+/// Finds the modules of an esi device. Returns what is wrong, or an empty text.
+std::string read_modules(DeviceOptions& o, const esi::File& file, const esi::Device& device,
+                         std::string& help) {
+    o.module_idents = esi::default_modules(device);
+    if (o.modules.empty()) return {};
+    o.module_idents.clear();
+    for (const std::string& name : device_list(o.modules)) {
+        const auto ident = esi::find_module(file, name);
+        if (!ident) {
+            std::vector<std::string> types;
+            for (const esi::Module& m : file.modules) {
+                types.push_back(m.type);
+            }
+            help = types.empty() ? "leave out modules=" : "the modules are: " + list_of(types);
+            return "unknown module '" + name + "'";
+        }
+        o.module_idents.push_back(*ident);
+    }
+    if (o.module_idents.size() <= std::max<std::size_t>(device.slots.size(), 1)) return {};
+    help = "leave out some of them";
+    return std::to_string(o.module_idents.size()) + " modules, but '" + device.order + "' has " +
+           std::to_string(device.slots.size()) + " slots";
 }
 
 /// Reads the description of an esi device. Returns what is wrong, or an empty text; `help` has what
@@ -166,9 +192,8 @@ std::string read_description(DeviceOptions& o, const FindFile& find, std::string
         return "'" + path + "' does not describe revision " + esi::number_text(*o.revision) +
                " of '" + match.device->order + "'";
     }
-    if (std::string why = why_not_emulated(*match.device); !why.empty()) {
-        help = "choose another device, or correct the description";
-        return "'" + path + "', device '" + match.device->order + "': " + why;
+    if (std::string why = read_modules(o, *description, *match.device, help); !why.empty()) {
+        return why;
     }
     o.description = std::move(description);
     o.described = match.device;

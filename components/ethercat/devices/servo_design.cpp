@@ -106,6 +106,41 @@ cia402::MotorSettings servo_motor() {
     return motor;
 }
 
+namespace {
+
+/// Adds the PDOs of an axis: one of each direction is assigned, the others are there to be mapped and
+/// assigned by the master.
+void add_pdos(DesignBuilder& b, unsigned n, const std::string& axis) {
+    constexpr unsigned most = 12;  // entries
+    const auto at = [&](std::uint16_t index) { return cia402::of_axis(index, n); };
+    const auto rx = static_cast<std::uint16_t>(coe::rx_pdo + 0x10 * n);
+    const auto tx = static_cast<std::uint16_t>(coe::tx_pdo + 0x10 * n);
+    const PdoEntry control{at(o402::controlword), 0, "Controlword"};
+    const PdoEntry mode{at(o402::modes_of_operation), 0, "Modes of operation"};
+    const PdoEntry position{at(o402::target_position), 0, "Target position"};
+    const PdoEntry velocity{at(o402::target_velocity), 0, "Target velocity"};
+    const PdoEntry torque{at(o402::target_torque), 0, "Target torque"};
+    const PdoEntry status{at(o402::statusword), 0, "Statusword"};
+    const PdoEntry actual{at(o402::position_actual), 0, "Position actual value"};
+    const auto other = [](std::uint16_t first, unsigned number) {
+        return static_cast<std::uint16_t>(first + number);
+    };
+    b.pdo(true, rx, "Outputs" + axis, {control, mode, position, velocity, torque}, true, most);
+    b.pdo(true, other(rx, 1), "Position" + axis, {control, position}, false, most);
+    b.pdo(true, other(rx, 2), "Velocity" + axis, {control, velocity}, false, most);
+    b.pdo(true, other(rx, 3), "Torque" + axis, {control, torque}, false, most);
+    b.pdo(false, tx, "Inputs" + axis,
+          {status,
+           {at(o402::modes_of_operation_display), 0, "Modes of operation display"},
+           actual,
+           {at(o402::velocity_actual), 0, "Velocity actual value"},
+           {at(o402::torque_actual), 0, "Torque actual value"}},
+          true, most);
+    b.pdo(false, other(tx, 1), "Position" + axis, {status, actual}, false, most);
+}
+
+}  // namespace
+
 Parts make_servo(const DeviceOptions& options) {
     const cia402::AxisSettings settings = cia402::possible({.motor = options.motor});
     DesignBuilder b("servo", 0x0402'0000 + options.axes);
@@ -120,22 +155,8 @@ Parts make_servo(const DeviceOptions& options) {
         add_axis(d, n, settings, options.modes);
     }
     for (unsigned n = 0; n < options.axes; ++n) {
-        const auto at = [&](std::uint16_t index) { return cia402::of_axis(index, n); };
         const std::string axis = options.axes == 1 ? "" : " axis " + std::to_string(n + 1);
-        b.pdo(true, static_cast<std::uint16_t>(coe::rx_pdo + 0x10 * n), "Outputs" + axis,
-              {{at(o402::controlword), 0, "Controlword"},
-               {at(o402::modes_of_operation), 0, "Modes of operation"},
-               {at(o402::target_position), 0, "Target position"},
-               {at(o402::target_velocity), 0, "Target velocity"},
-               {at(o402::target_torque), 0, "Target torque"}},
-              true, 12);
-        b.pdo(false, static_cast<std::uint16_t>(coe::tx_pdo + 0x10 * n), "Inputs" + axis,
-              {{at(o402::statusword), 0, "Statusword"},
-               {at(o402::modes_of_operation_display), 0, "Modes of operation display"},
-               {at(o402::position_actual), 0, "Position actual value"},
-               {at(o402::velocity_actual), 0, "Velocity actual value"},
-               {at(o402::torque_actual), 0, "Torque actual value"}},
-              true, 12);
+        add_pdos(b, n, axis);
     }
     b.dc(options.dc_required);
     b.design().sii.general.ds402_channels = static_cast<std::uint8_t>(options.axes);

@@ -20,11 +20,17 @@ unsigned phase_of(State state) noexcept {
 
 }  // namespace
 
-Idn* SoeServer::find(std::uint16_t number) noexcept {
+Idn* SoeServer::find(std::uint8_t drive, std::uint16_t number) noexcept {
     for (auto& i : idns_) {
-        if (i.number == number) return &i;
+        if (i.drive == drive && i.number == number) return &i;
     }
     return nullptr;
+}
+
+bool SoeServer::has_drive(std::uint8_t drive) const noexcept {
+    if (drive == 0) return true;
+    return std::any_of(idns_.begin(), idns_.end(),
+                       [drive](const Idn& i) { return i.drive == drive; });
 }
 
 void SoeServer::refuse(const soe::Header& h, std::uint16_t code, Outbox& out) noexcept {
@@ -44,7 +50,7 @@ void SoeServer::take(const MailboxMessage& message, State state, Outbox& out) no
         return out.send(MailboxType::error,
                         write_mailbox_error(out.payload(), MailboxError::too_short));
     }
-    if (h->drive != 0) return refuse(*h, soe::error::no_drive, out);
+    if (!has_drive(h->drive)) return refuse(*h, soe::error::no_drive, out);
     if (h->opcode == soe::Opcode::read) return read(*h, out);
     if (h->opcode == soe::Opcode::write) {
         return write(*h, message.payload.subspan(soe::header_bytes), state, out);
@@ -54,7 +60,7 @@ void SoeServer::take(const MailboxMessage& message, State state, Outbox& out) no
 }
 
 void SoeServer::read(const soe::Header& h, Outbox& out) noexcept {
-    const Idn* idn = find(h.idn);
+    const Idn* idn = find(h.drive, h.idn);
     if (idn == nullptr) return refuse(h, soe::error::no_idn, out);
     if (h.elements == 0) return refuse(h, soe::error::no_element, out);
     if ((h.elements & soe::element::unit) != 0 && idn->unit.empty()) {
@@ -139,7 +145,7 @@ void SoeServer::write(const soe::Header& h, std::span<const std::uint8_t> data, 
     written_ += data.size();
     if (h.incomplete) return;
     const std::size_t length = std::exchange(written_, 0);
-    Idn* idn = find(h.idn);
+    Idn* idn = find(h.drive, h.idn);
     if (idn == nullptr) return refuse(h, soe::error::no_idn, out);
     if (h.elements != soe::element::value) {
         return refuse(h, h.elements == 0 ? soe::error::no_element : soe::error::name_read_only,

@@ -21,8 +21,9 @@ struct Idn {
     std::size_t length = 0;
     std::int64_t low = 0;
     std::int64_t high = 0;    ///< equal: no limits
+    std::uint8_t drive = 0;   ///< 0..7
 };
-/// Parameters of one drive.
+/// Parameters of one or several drives.
 class SoeServer : public MailboxService {
 public:
     explicit SoeServer(std::vector<Idn> idns) : idns_(std::move(idns)) {}
@@ -38,7 +39,8 @@ private:
     void read(const soe::Header&, Outbox&) noexcept;
     void write(const soe::Header&, std::span<const std::uint8_t> data, State, Outbox&) noexcept;
     void refuse(const soe::Header&, std::uint16_t code, Outbox&) noexcept;
-    Idn* find(std::uint16_t number) noexcept;
+    Idn* find(std::uint8_t drive, std::uint16_t number) noexcept;
+    bool has_drive(std::uint8_t drive) const noexcept;
 
     std::vector<Idn> idns_;
     std::array<std::uint8_t, 4096> buffer_{};

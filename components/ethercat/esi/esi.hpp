@@ -148,6 +148,8 @@ struct Device {
     std::vector<Object> objects;               ///< by index
     std::uint16_t profile = 0;                 ///< 402 for a drive
     std::vector<Slot> slots;
+    /// whether the module list is written to F030h; nullopt: not given
+    std::optional<bool> download_modules;
     unsigned slot_pdo_increment = 1;
     unsigned slot_index_increment = 0;
     std::vector<std::uint8_t> eeprom;          ///< whole image, if the file has one
@@ -186,6 +188,11 @@ File read(std::string_view xml);
 /// Returns a modular device with its modules in place, one for each slot from the first on; 0: an
 /// empty slot. An unknown ident adds nothing.
 Device with_modules(const File&, const Device&, const std::vector<std::uint32_t>& idents);
+
+/// Returns the default modules of the slots; 0: an empty slot.
+std::vector<std::uint32_t> default_modules(const Device&);
+/// Returns the ident of the module with this type, name or ident, 0 for `-`; nullopt: unknown.
+std::optional<std::uint32_t> find_module(const File&, std::string_view text);
 
 /// Returns which entry of a PDO has more bits than its object in the dictionary, as a sentence;
 /// empty: none.

@@ -6,6 +6,7 @@
 #include "ethercat/esi/esi.hpp"
 #include "ethercat/wire/byte_order.hpp"
 #include "text/characters.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::ethercat::esi {
 
@@ -45,6 +46,26 @@ const Pdo* Device::find_pdo(std::uint16_t index) const {
     return nullptr;
 }
 
+namespace {
+
+/// Adds a PDO of a module. It replaces the PDO of the device with its number, which is there for the
+/// case that the slot is empty; a number that two modules use counts once.
+void add_module_pdo(Pdo&& pdo, const std::vector<Pdo>& of_device, std::vector<Pdo>& to) {
+    const auto has_index = [&](const Pdo& other) { return other.index == pdo.index; };
+    const auto at = std::find_if(to.begin(), to.end(), has_index);
+    if (at == to.end()) {
+        to.push_back(std::move(pdo));
+        return;
+    }
+    if (std::none_of(of_device.begin(), of_device.end(), has_index)) return;
+    if (!pdo.sync_manager) {
+        pdo.sync_manager = at->sync_manager;
+    }
+    *at = std::move(pdo);
+}
+
+}  // namespace
+
 Device with_modules(const File& file, const Device& device,
                     const std::vector<std::uint32_t>& idents) {
     Device out = device;
@@ -53,7 +74,7 @@ Device with_modules(const File& file, const Device& device,
                                          [&](const Module& m) { return m.ident == idents[slot]; });
         if (idents[slot] == 0 || module == file.modules.end()) continue;
         const auto add = [&](const std::vector<Pdo>& from, const std::vector<bool>& depends,
-                             std::vector<Pdo>& to) {
+                             const std::vector<Pdo>& of_device, std::vector<Pdo>& to) {
             for (std::size_t i = 0; i < from.size(); ++i) {
                 Pdo p = from[i];
                 if (depends[i]) {
@@ -66,11 +87,11 @@ Device with_modules(const File& file, const Device& device,
                                                              slot * device.slot_index_increment);
                     }
                 }
-                to.push_back(std::move(p));
+                add_module_pdo(std::move(p), of_device, to);
             }
         };
-        add(module->rx, module->rx_depends, out.rx);
-        add(module->tx, module->tx_depends, out.tx);
+        add(module->rx, module->rx_depends, device.rx, out.rx);
+        add(module->tx, module->tx_depends, device.tx, out.tx);
         out.init_commands.insert(out.init_commands.end(), module->init_commands.begin(),
                                  module->init_commands.end());
         for (Object o : module->objects) {
@@ -84,6 +105,24 @@ Device with_modules(const File& file, const Device& device,
         }
     }
     return out;
+}
+
+std::vector<std::uint32_t> default_modules(const Device& device) {
+    std::vector<std::uint32_t> idents;
+    for (const Slot& slot : device.slots) {
+        idents.push_back(slot.default_module);
+    }
+    return idents;
+}
+
+std::optional<std::uint32_t> find_module(const File& file, std::string_view text) {
+    if (text == "-") return 0;
+    const auto number = parse_natural(text);
+    for (const Module& m : file.modules) {
+        const bool has_number = number && *number == m.ident;
+        if (has_number || same_word(m.type, text) || same_word(m.name, text)) return m.ident;
+    }
+    return std::nullopt;
 }
 
 std::string longer_entry(const Device& device, const Pdo& pdo) {

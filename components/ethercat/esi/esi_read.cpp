@@ -108,6 +108,8 @@ private:
         }
         pdos(node, "RxPdo", d.rx);
         pdos(node, "TxPdo", d.tx);
+        correct_direction(node, d, d.tx, sii::SmType::outputs, sii::SmType::inputs);
+        correct_direction(node, d, d.rx, sii::SmType::inputs, sii::SmType::outputs);
         default_sync_manager(d, d.rx, sii::SmType::outputs);
 
         default_sync_manager(d, d.tx, sii::SmType::inputs);
@@ -123,6 +125,9 @@ private:
         const Xml slots = node.child("Slots");
         d.slot_pdo_increment = context_.attribute<unsigned>(slots, "SlotPdoIncrement", 1);
         d.slot_index_increment = context_.attribute<unsigned>(slots, "SlotIndexIncrement", 0);
+        if (slots.attribute("DownloadModuleIdentList")) {
+            d.download_modules = Context::flag(slots, "DownloadModuleIdentList");
+        }
         for (const Xml s : slots.children("Slot")) {
             slot(s, d);
         }
@@ -239,6 +244,26 @@ private:
             to.push_back(std::move(pdo));
         }
     }
+    /// A sync manager with the PDOs of the other direction than its name has that of its PDOs.
+    void correct_direction(const Xml& node, Device& d, const std::vector<Pdo>& pdos,
+                           sii::SmType named, sii::SmType used) {
+        for (const Pdo& p : pdos) {
+            if (!p.sync_manager || *p.sync_manager >= d.sync_managers.size()) continue;
+            SyncManager& manager = d.sync_managers[*p.sync_manager];
+            const auto& others = used == sii::SmType::inputs ? d.rx : d.tx;
+            const bool is_shared = std::any_of(others.begin(), others.end(), [&](const Pdo& other) {
+                return other.sync_manager == p.sync_manager;
+            });
+            if (manager.type != named || is_shared) continue;
+            manager.type = used;
+            context_.warn(node, "sync manager " + std::to_string(*p.sync_manager) +
+                                    (used == sii::SmType::inputs
+                                         ? " is named Outputs, but has TxPDOs; it is read as Inputs"
+                                         : " is named Inputs, but has RxPDOs; it is read as "
+                                           "Outputs"));
+        }
+    }
+
     /// A mandatory PDO without a sync manager has the first one of its direction.
     static void default_sync_manager(const Device& d, std::vector<Pdo>& to, sii::SmType type) {
         for (Pdo& p : to) {

@@ -149,6 +149,19 @@ TEST(Esi, A_list_of_the_IgH_master_has_a_device_per_slave) {
     }
 }
 
+TEST(Esi, A_sync_manager_has_the_direction_of_its_PDOs) {
+    const File file = read(
+        "<EtherCATInfo><Descriptions><Devices><Device><Type ProductCode='1'>BOX</Type>"
+        "<Sm StartAddress='#xf00'>Outputs</Sm><Sm StartAddress='#x1000'>Outputs</Sm>"
+        "<RxPdo Sm='0'><Index>#x1600</Index></RxPdo><TxPdo Sm='1'><Index>#x1a00</Index></TxPdo>"
+        "</Device></Devices></Descriptions></EtherCATInfo>");
+    EXPECT_EQ(file.devices.at(0).sync_managers.at(0).type, sii::SmType::outputs);
+    EXPECT_EQ(file.devices.at(0).sync_managers.at(1).type, sii::SmType::inputs);
+    ASSERT_EQ(file.messages.size(), 1U);
+    EXPECT_EQ(file.messages[0].sentence,
+              "sync manager 1 is named Outputs, but has TxPDOs; it is read as Inputs");
+}
+
 TEST(Esi, Dictionary_resolves_records_arrays_and_enumerations) {
     const File file = read(servo_text());
     const Device& d = *look_up(file, {.product = 0x402}).device;

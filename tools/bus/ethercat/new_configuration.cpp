@@ -41,6 +41,7 @@ std::string devices_of(const std::string& emulate) {
 struct Source {
     std::vector<config::Found> slaves;
     std::string link, segment;  ///< segment: devices of an emulated line, or empty
+    std::string notes;  ///< what the emulation leaves out, a line for each device
 };
 
 /// Takes the slaves from a bus. Returns false after printing the reason.
@@ -153,10 +154,11 @@ bool add_description(const EthercatConfigOptions& options, const std::string& it
     const std::string beside =
         path.starts_with('/') ? path : std::filesystem::proximate(path, folder).string();
     const std::string code = esi::number_text(device.product);
-    const auto key =
-        name_of(file, device,
-                {.vendor = device.vendor, .product = device.product, .revision = device.revision},
-                {device.order, device.name, ""}, fits_configuration);
+    // a configuration names no product 0
+    const auto product = device.product != 0 ? std::optional(device.product) : std::nullopt;
+    const auto key = name_of(
+        file, device, {.vendor = device.vendor, .product = product, .revision = device.revision},
+        {device.order, device.name, ""}, fits_configuration);
     if (!key || !fits_configuration(beside)) {
         fail(options, fmt::format("'{}': the path cannot be written to a configuration; rename "
                                   "the file so that it has no ' #', ' ;' or control characters",
@@ -171,7 +173,10 @@ bool add_description(const EthercatConfigOptions& options, const std::string& it
     found.vendor = device.vendor;
     found.product = device.product;
     found.revision = device.revision;
-    if (!emulate || !ethercat::devices::why_not_emulated(device).empty()) return true;
+    if (!emulate) return true;
+    if (const std::string left_out = ethercat::devices::not_emulated(device); !left_out.empty()) {
+        to.notes += fmt::format("'{}' is emulated without {}\n", device.order, left_out);
+    }
     const auto word = name_of(file, device, {.revision = device.revision},
                               {code, device.order, device.name}, fits_netlist);
     if (!word || !fits_netlist(beside)) {
@@ -258,8 +263,9 @@ int run_ethercat_config(const EthercatConfigOptions& options) {
                    ? 0
                    : 1;
     }
-    return print(fmt::format("{} and {} written, {} slave{}; next: hal run {}\n", file, netlist,
-                             source.slaves.size(), source.slaves.size() == 1 ? "" : "s", netlist))
+    return print(source.notes + fmt::format("{} and {} written, {} slave{}; next: hal run {}\n",
+                                            file, netlist, source.slaves.size(),
+                                            source.slaves.size() == 1 ? "" : "s", netlist))
                ? 0
                : 1;
 }

@@ -1,0 +1,127 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""esi_corpus.py [--sample N] [--reasons] FOLDER: generates a configuration and a netlist for each device of the device descriptions
+(ESI) below a folder, runs them in memory, and counts the devices that reach OP. Prints each other device with its reason. No file of
+vendors is in the tree: clone public repositories with ESI files into a folder outside of it. HAL_BIN names the program, else build/release."""
+import argparse
+import collections
+import os
+import random
+import re
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+HAL = os.environ.get("HAL_BIN", str(ROOT / "build/release/bin/hal"))
+
+
+def local(element):
+    return element.tag.rsplit("}", 1)[-1]
+
+
+def text_of(element, tag):
+    child = next((child for child in element if local(child) == tag), None)
+    return "" if child is None else (child.text or "").strip()
+
+
+def devices_of(path):
+    """What selects each type of device of a file: its order code, its name or its product code. Nothing for other XML files."""
+    try:
+        root = xml.etree.ElementTree.parse(path).getroot()
+    except (xml.etree.ElementTree.ParseError, UnicodeDecodeError, ValueError):
+        return []
+    if not local(root).startswith("EtherCATInfo"):
+        return []
+    types = {}
+    for device in (element for element in root.iter() if local(element) == "Device"):
+        kind = next((child for child in device if local(child) == "Type"), None)
+        if kind is None:
+            continue
+        code = (kind.get("ProductCode") or "0").lower().replace("#x", "0x")
+        order = (kind.text or "").strip()
+        types[order.lower(), code] = (order, text_of(device, "Name"), code)
+    columns = [
+        collections.Counter(word.lower() for word in column) for column in zip(*types.values())
+    ]
+    selectors = []
+    for words in types.values():
+        unique = [word for word, count in zip(words, columns) if word and count[word.lower()] == 1]
+        selectors.append(unique[0] if unique else words[0])
+    return selectors
+
+
+def hal(folder, *words):
+    done = subprocess.run(
+        [HAL, *words], cwd=folder, capture_output=True, text=True, errors="replace", timeout=120
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+def last_cause(text):
+    """The message of a run that names why the slave is not operational, without the names of the slave."""
+    lines = [line for line in text.splitlines() if re.search(r"slave 0|error:|cannot|fault", line)]
+    lines = [line for line in lines if "operational after" not in line]
+    return (
+        re.sub(r"slave 0 \([^)]*\)", "slave", lines[0]) if lines else "no message: " + text[-200:]
+    )
+
+
+def run(path, order):
+    """The reason why a device does not reach OP; None: it does."""
+    with tempfile.TemporaryDirectory(prefix="hal-esi-") as folder:
+        quoted = "'" + f"{path}:{order}".replace("'", "''") + "'"
+        code, text = hal(folder, "ethercat", "config", "--esi", quoted, "one")
+        if code != 0:
+            return "config: " + text.strip().splitlines()[-1]
+        netlist = (Path(folder) / "one.hal").read_text()
+        if "ethercat_segment" not in netlist:
+            return "not emulated: " + text.strip().splitlines()[0]
+        code, text = hal(folder, "sim", "one.hal", "--for", "8s")
+        if "is operational after" in text:
+            return None
+        return "run: " + last_cause(text)
+
+
+def kind_of(reason):
+    """A reason without the numbers and names of one device."""
+    short = re.sub(r"'[^']*'|0x[0-9A-Fa-f]+|\b[0-9A-F]{4}\b|\d+", "…", reason)
+    return short[:140]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--sample", type=int, help="run so many devices, chosen by a fixed seed")
+    parser.add_argument("--reasons", action="store_true", help="print the kinds of reasons only")
+    options = parser.parse_args()
+    files = {path: devices_of(path) for path in sorted(options.folder.rglob("*.[xX][mM][lL]"))}
+    files = {path: devices for path, devices in files.items() if devices}
+    every = [(path, order) for path, devices in files.items() for order in devices]
+    if options.sample is not None and options.sample < len(every):
+        every = sorted(random.Random(1).sample(every, options.sample))
+    good = 0
+    kinds = collections.Counter()
+    for path, order in every:
+        reason = run(path, order)
+        if reason is None:
+            good += 1
+            continue
+        kinds[kind_of(reason)] += 1
+        if not options.reasons:
+            print(f"{path.name}: {order}: {reason}", flush=True)
+    for kind, count in kinds.most_common():
+        print(f"{count:5}  {kind}")
+    if not every:
+        print("no device description in the folder")
+        return 1
+    print(
+        f"{good} of {len(every)} devices of {len(files)} files reach OP, {100 * good / len(every):.1f} %"
+    )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
