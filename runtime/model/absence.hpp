@@ -52,6 +52,9 @@ public:
     /// have any name.
     std::optional<Cause> assumed(const std::string& component);
 
+    /// Returns whether `name` was passed to assume().
+    bool is_assumed(const std::string& name) const { return assumed_.contains(name); }
+
     /// `hal check` does not start programs: the names that this one would register as components.
     void note_program(const std::string& program, const std::vector<std::string>& names);
     bool has_programs() const { return has_programs_; }

@@ -43,7 +43,8 @@ bool take_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
                              "': letters, digits and - _ . : are valid");
     }
     auto pin = std::make_unique<Pin>();
-    pin->name = whole_names(c.instance) ? decl->name : c.instance.name + "." + decl->name;
+    const bool whole = c.whole_pin_names || whole_names(c.instance);
+    pin->name = whole ? decl->name : c.instance.name + "." + decl->name;
     pin->type = decl->type;
     pin->dir = decl->dir;
     pin->flags = decl->flags;
@@ -168,9 +169,21 @@ void name_instance(const hal_host* host, const char* prefix, unsigned digits) {
         return true;
     });
 }
+constexpr hal_pin_names pin_names_extension{
+    sizeof pin_names_extension,
+    [](const hal_host* host, bool whole) { construction_of(host).whole_pin_names = whole; }};
+
+constexpr hal_assumed assumed_extension{sizeof assumed_extension,
+                                        [](const hal_host* host, const char* name) {
+    const Construction& c = construction_of(host);
+    return c.edit != nullptr && c.edit->absences().is_assumed(name);
+}};
+
 const void* extension_of(const hal_host* host, const char* id) {
     if (std::strcmp(id, "hal.faults/1") == 0) return construction_of(host).request.faults;
     if (std::strcmp(id, HAL_NAMING) == 0) return &naming_extension;
+    if (std::strcmp(id, HAL_PIN_NAMES) == 0) return &pin_names_extension;
+    if (std::strcmp(id, HAL_ASSUMED) == 0) return &assumed_extension;
     if (std::strcmp(id, HAL_MODULES) == 0) return &modules_extension;
     if (std::strcmp(id, HAL_MODULE_CALLS) == 0) return &module_calls_extension;
     return std::strcmp(id, HAL_TEXTS) == 0 ? &texts_extension : nullptr;

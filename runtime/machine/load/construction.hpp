@@ -15,8 +15,10 @@
 #include <utility>
 #include <vector>
 
+#include "hal/assumed.h"
 #include "hal/modules.h"
 #include "hal/naming.h"
+#include "hal/pin_names.h"
 #include "hal/texts.h"
 #include "machine/load/construct.hpp"
 
@@ -50,6 +52,7 @@ struct Construction {
     bool no_memory = false;
     std::string serial = {};             // of an instance that is named after its component
     bool whole_function_names = false;
+    bool whole_pin_names = false;
     Sources* sources = nullptr;
     Diagnostics* diagnostics = nullptr;
     std::string text_name = {};

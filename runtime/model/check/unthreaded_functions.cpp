@@ -7,6 +7,24 @@ namespace hal {
 
 namespace {
 
+/// Returns whether a thread calls the same steps by other functions, as `lcec.0.read` does those of
+/// `lcec.read-all`.
+bool runs_by_another(const LoadedFunction& function) {
+    for (std::size_t i = 0; i < function.steps.size(); ++i) {
+        const plan::Step& step = function.steps[i];
+        const auto& others = function.instances[i]->functions;
+        const bool runs =
+            std::any_of(others.begin(), others.end(), [&](const LoadedFunction* other) {
+            return other->thread && std::any_of(other->steps.begin(), other->steps.end(),
+                                                [&](const plan::Step& one) {
+                return one.step == step.step && one.self == step.self;
+            });
+        });
+        if (!runs) return false;
+    }
+    return true;
+}
+
 /// Returns a function in a thread that does not work without `function`; nullptr without one.
 const LoadedFunction* waiting_for(const LoadedFunction& function) {
     if (!function.required) return nullptr;
@@ -24,7 +42,7 @@ void check_unthreaded_functions(const Model& model, Unthreaded which, Diagnostic
     for (const auto& component : model.components) {
         for (const auto& function : component->functions) {
             if (which == Unthreaded::removed && !function->was_in_thread) continue;
-            if (function->thread) continue;
+            if (function->thread || runs_by_another(*function)) continue;
             if (const LoadedFunction* const other = waiting_for(*function)) {
                 diagnostics.warning("unthreaded-function", function->instances.front()->loaded,
                                     "function '" + function->name + "' is in no thread, but '" +
