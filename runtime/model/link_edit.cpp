@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "model/namesakes.hpp"
 #include "text/netlist_name.hpp"
 #include "text/quoting.hpp"
 
@@ -91,7 +92,10 @@ void LinkEdit::unknown_name(Code code, Word name, const char* what, NameGroup gr
 Pin* LinkEdit::pin(Word name) {
     if (Pin* const found = model_.find_pin(name.text)) return found;
     if (is_absent(name.text, Absences::Kind::pin)) return nullptr;
-    std::string help = pins_of_instance(model_, name.text);
+    std::string help = namesake_help(model_, name.text);
+    if (help.empty()) {
+        help = pins_of_instance(model_, name.text);
+    }
     if (model_.find_signal(name.text)) {
         help = hal::quoted(name.text) +
                " is a signal; gets and sets take signals, net takes one signal and then pins";

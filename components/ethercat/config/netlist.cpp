@@ -152,7 +152,7 @@ std::string netlist(const Bus& bus, const std::string& file, const std::string& 
         names += (names.empty() ? "" : ",") + axis.name();
     }
     if (!names.empty()) {
-        text += "loadrt cia402 names=" + names + "\n";
+        text += "loadrt --native cia402 names=" + names + "\n";
     }
     text += "\n";
 
