@@ -95,15 +95,30 @@ class Slaves(Ethercat):
         self.assertIn("aoe.ethercat:7:", said)
         (self.folder / "ethercat-conf.xml").write_text('<masters><master idx="0"/></masters>')
         (self.folder / "no-link.hal").write_text("loadrt lcec\n")
-        said = self.bad("check", "no-link.hal")
+        self.good("check", "no-link.hal")
+        (self.folder / "no-link.hal").write_text("loadrt lcec\nstart\n")
+        said = self.bad("sim", "no-link.hal")
         self.assertIn(
-            "no-link.hal:1:8: error: component 'lcec' cannot make 'lcec.0': link= is missing: this format has no interface, and no file ethercat.conf has MASTER0_DEVICE [construct-failed]\n",
+            "no-link.hal:1:8: error: 'lcec.0' (lcec) cannot start: link= is missing: ethercat-conf.xml has no interface, and no file ethercat.conf has MASTER0_DEVICE; "
+            "write loadrt lcec link=eth:enp3s0, or link=sim:NAME for an emulated line; or MASTER0_DEVICE=\"enp3s0\" in an ethercat.conf beside 'ethercat-conf.xml' [start-failed]\n",
             said,
         )
-        self.assertIn(
-            "help: write link=eth:enp3s0, or link=sim:NAME for an emulated line; or MASTER0_DEVICE=\"enp3s0\" in an ethercat.conf beside 'ethercat-conf.xml'\n",
-            said,
+
+    def test_a_type_of_lcec_that_is_not_supported_can_be_assumed(self):
+        (self.folder / "ethercat-conf.xml").write_text(
+            '<masters><master idx="0" appTimePeriod="1000000">\n<slave idx="0" type="EL6090" name="x"/>'
+            '<slave idx="1" type="EL1008" name="y"/></master></masters>'
         )
+        (self.folder / "unknown.hal").write_text(
+            "loadrt lcec\nnet a lcec.0.x.keyboard\nnet b lcec.0.y.din-0\nnet c lcec.0.y.din-77\n"
+        )
+        said = self.bad("check", "unknown.hal")
+        self.assertIn("error: lcec's driver 'EL6090' is not supported [ethercat-slave]\n", said)
+        self.assertIn("`hal check --assume lcec.0.x` checks the rest\n", said)
+        said = self.bad("check", "--assume", "lcec.0.x", "unknown.hal")
+        self.assertIn("warning: lcec's driver 'EL6090' is not supported: slave 'x' has no pins", said)
+        self.assertIn("1 line depends on 'lcec.0.x', which is assumed to exist", said)
+        self.assertIn("error: unknown pin 'lcec.0.y.din-77' [no-such-pin]\n", said)
 
     def test_states_requests_one_and_says_why_it_is_refused(self):
         self.assertEqual("0    INIT\n1    INIT\n2    INIT\n3    INIT\n", self.on("states"))

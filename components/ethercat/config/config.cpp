@@ -406,9 +406,10 @@ bool read_from_disk(const std::string& path, std::string& bytes) {
     return read_regular_file(path, 64'000'000, bytes);
 }
 
-Reading read(std::string_view text, const std::string& path, const ReadFile& read_file) {
+Reading read(std::string_view text, const std::string& path, const ReadFile& read_file,
+             const IsAssumed& is_assumed) {
     return trimmed(text).starts_with('<') || trimmed(text).starts_with("\xef\xbb\xbf<")
-               ? read_lcec(text, path, read_file)
+               ? read_lcec(text, path, read_file, is_assumed)
                : ConfigFile(text, path, read_file).read();
 }
 

@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "ethercat/config/lcec_channel.hpp"
 #include "ethercat/esi/esi.hpp"
 #include "ethercat/master/setup.hpp"
 #include "text/config_text.hpp"
@@ -47,6 +48,25 @@ struct HostInterface {
     unsigned prefix = 24;
 };
 
+/// The safety frames of a terminal: command, then data and CRC of each channel, then connection.
+struct FsoeFrame {
+    unsigned slave_bytes = 0;  ///< of a channel, from the terminal
+    unsigned master_bytes = 0;  ///< of a channel, to the terminal
+    unsigned channels = 0;  ///< 0: not a safe terminal
+    /// Returns the bytes of a frame with so many bytes of data in each channel.
+    unsigned size(unsigned data_bytes) const { return 1 + channels * (data_bytes + 2) + 2; }
+};
+
+/// Bytes that the master copies in each cycle from the inputs of a slave to the outputs of another.
+/// The outputs are 0 while one of the two is not operational.
+struct FrameCopy {
+    std::size_t from_slave = 0;
+    ChannelObject from;  ///< the first object of the frame
+    std::size_t to_slave = 0;
+    ChannelObject to;
+    unsigned bytes = 0;
+};
+
 /// A slave as the user sees it; the slave of the same number in the setup is how the master sees
 /// it.
 struct SlaveInfo {
@@ -55,6 +75,9 @@ struct SlaveInfo {
     std::string description;  ///< path of its ESI; empty: none
     unsigned cia402_axes = 0;  ///< drives of CiA 402
     std::vector<std::pair<std::string, PinInfo>> pins;  ///< by name
+    std::vector<Channel> channels;  ///< LinuxCNC's format: pins that are computed
+    FsoeFrame fsoe;
+    bool fsoe_logic = false;  ///< a logic terminal, whose process data come from its modParams
     Span at{};
     /// of a slave with EoE, unless the bus has a switch
     HostInterface eoe;
@@ -69,6 +92,8 @@ struct Bus {
     unsigned index = 0;
     /// link addresses; a backup closes a ring
     std::string link = "sim:ethercat", backup;
+    /// why LinuxCNC's format has no link; the master cannot start then
+    std::string missing_link;
     /// IPv4 address on which the mailbox gateway listens; empty: no gateway
     std::string gateway;
     std::uint16_t gateway_port = 34980;
@@ -77,6 +102,7 @@ struct Bus {
     bool cycle_given = false;
     master::Setup setup;
     std::vector<SlaveInfo> slaves;  ///< as many as in setup.slaves
+    std::vector<FrameCopy> frame_copies;
     Span at{};
 };
 
@@ -91,9 +117,14 @@ struct Reading {
 using ReadFile = std::function<bool(const std::string& path, std::string& bytes)>;
 bool read_from_disk(const std::string& path, std::string& bytes);
 
+/// Returns whether the pins of a slave are assumed to exist ("lcec.0.x").
+using IsAssumed = std::function<bool(const std::string& slave)>;
+
 /// Reads a configuration of either format: XML if its first character is `<`. Relative paths in it
-/// start at the folder of `path`.
-Reading read(std::string_view text, const std::string& path, const ReadFile& = read_from_disk);
+/// start at the folder of `path`. A slave of an unknown type of lcec is an error, unless its pins
+/// are assumed to exist; it then has none.
+Reading read(std::string_view text, const std::string& path, const ReadFile& = read_from_disk,
+             const IsAssumed& = {});
 
 /// Return the keys of [bus], of a slave, of its clocks and of its objects, as tables in Markdown.
 std::string bus_reference();

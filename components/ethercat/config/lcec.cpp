@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-// LinuxCNC's ethercat-conf.xml (the format of the lcec component): generic slaves and the class
-// basic_cia402.
+// LinuxCNC's ethercat-conf.xml (the format of the lcec component): generic slaves, the class
+// basic_cia402, and the devices of the table.
 #include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "ethercat/config/lcec_cia402.hpp"
+#include "ethercat/config/lcec_devices.hpp"
+#include "ethercat/config/lcec_fsoe.hpp"
 #include "ethercat/config/lcec_init_commands.hpp"
 #include "ethercat/config/lcec_xml.hpp"
 #include "ethercat/master/soe_client.hpp"
@@ -19,10 +21,12 @@ using master::Type;
 
 class Lcec : private LcecXml {
 public:
-    Lcec(std::string_view text, const std::string& path, const ReadFile& read_file)
+    Lcec(std::string_view text, const std::string& path, const ReadFile& read_file,
+         const IsAssumed& is_assumed)
         : LcecXml(text),
           folder_(path.find('/') == path.npos ? "" : path.substr(0, path.rfind('/') + 1)),
-          read_file_(read_file) {}
+          read_file_(read_file),
+          is_assumed_(is_assumed) {}
 
     Reading read() {
         out_.lcec = true;
@@ -117,7 +121,15 @@ private:
         }
         const auto reference = number(node, "refClockSlaveIdx", -1, 65535).value_or(-1);
         bus_ = &bus;
+        fsoe_logics_.clear();
         children(node, {"slave"}, [&](const Xml& slave) { slave_of(slave); });
+        for (const auto& [number, at, parameters] : fsoe_logics_) {
+            std::vector<std::string> problems;
+            build_fsoe_logic(bus, number, parameters, problems);
+            for (const std::string& problem : problems) {
+                error(Topic::value, at, problem, "correct the modParam");
+            }
+        }
         for (std::size_t i = 0; i < bus.setup.slaves.size(); ++i) {
             if (bus.setup.slaves[i].position == reference) {
                 bus.setup.reference_slave = static_cast<std::uint16_t>(i);
@@ -139,6 +151,7 @@ private:
         info_ = {};
         pins_.clear();
         parameters_.clear();
+        fsoe_parameters_.clear();
         info_.at = esi::span_of(node, text_);
         s.line = info_.at.line;
         info_.type = node.attribute("type").value();
@@ -148,17 +161,19 @@ private:
             node.attribute("name") ? node.attribute("name").value() : std::to_string(s.position);
         const bool generic = info_.type == "generic";
         const bool drive = info_.type == "basic_cia402";
-        if (!generic && !drive) {
-            error(Topic::slave, node,
-                  info_.type.empty() ? "missing attribute 'type' of <slave>"
-                                     : "unsupported slave type '" + info_.type + "'",
-                  "write type=\"generic\" with the PDOs of the device, or type=\"basic_cia402\"");
+        device_ = generic || drive ? std::nullopt : find_lcec_device(info_.type);
+        if (!generic && !drive && !device_) {
+            unknown_type(node, s.name);
         }
         if (const auto vid = number(node, "vid", 0, 0xffffffff, true, generic || drive)) {
             s.identity.vendor = static_cast<std::uint32_t>(*vid);
         }
         if (const auto pid = number(node, "pid", 0, 0xffffffff, true, generic || drive)) {
             s.identity.product = static_cast<std::uint32_t>(*pid);
+        }
+        if (device_) {
+            s.identity.vendor = s.identity.vendor != 0 ? s.identity.vendor : device_->vendor;
+            s.identity.product = s.identity.product != 0 ? s.identity.product : device_->product;
         }
         configure_ = flag(node, "configPdos", false);
         if (const std::string unit = node.attribute("syncUnit").value();
@@ -189,15 +204,47 @@ private:
                       "delete it, or write type=\"generic\"");
             }
         });
+        std::vector<std::string> problems;
         if (drive) {
-            std::vector<std::string> problems;
             build_cia402(parameters_, s, info_, problems);
-            for (const std::string& problem : problems) {
-                error(Topic::value, node, problem);
-            }
+        }
+        if (device_) {
+            build_lcec_device(*device_, parameters_, bus_->setup.cycle_ns, s, info_, problems);
+        }
+        for (const std::string& problem : problems) {
+            error(Topic::value, node, problem);
+        }
+        if (info_.fsoe_logic) {
+            fsoe_logics_.push_back({bus_->setup.slaves.size(), node, fsoe_parameters_});
         }
         bus_->setup.slaves.push_back(std::move(s));
         bus_->slaves.push_back(std::move(info_));
+    }
+
+    void unknown_type(const Xml& node, const std::string& slave) {
+        if (info_.type.empty()) {
+            return error(Topic::slave, node, "missing attribute 'type' of <slave>",
+                         "write the type of the device, as in type=\"EL1008\", or "
+                         "type=\"generic\" with its PDOs");
+        }
+        const auto unsupported = unsupported_lcec_devices();
+        const bool of_lcec =
+            std::find(unsupported.begin(), unsupported.end(), info_.type) != unsupported.end();
+        const std::string what = of_lcec ? "lcec's driver '" + info_.type + "' is not supported"
+                                         : "unknown slave type '" + info_.type + "'";
+        const std::string pins = "lcec." + bus_->name + "." + slave;
+        if (is_assumed_ && is_assumed_(pins)) {
+            return report_.warning(Topic::slave, esi::span_of(node, text_),
+                                   what + ": slave '" + slave + "' has no pins",
+                                   "they are assumed to exist");
+        }
+        const std::string near =
+            of_lcec ? std::string() : did_you_mean(info_.type, lcec_device_names());
+        error(Topic::slave, node, what,
+              (near.empty() ? std::string() : near + " Or ") +
+                  "write type=\"generic\" with vid, pid and the PDOs of the device; `hal check "
+                  "--assume " +
+                  pins + "` checks the rest");
     }
 
     void domain(const Xml& node, master::Slave& s, const std::string& unit) {
@@ -338,20 +385,22 @@ private:
     void parameter(const Xml& node, bool drive) {
         attributes(node, {"name", "value"});
         const std::string name = node.attribute("name").value();
-        if (!drive) {
-            return error(Topic::line, node,
-                         "<modParam> applies only to drivers such as basic_cia402", "delete it");
-        }
-        const auto known = cia402_parameters();
         std::vector<std::string> names;
-        for (const auto& p : known) {
-            names.emplace_back(p);
+        if (device_) {
+            names = lcec_parameters(*device_);
+        } else if (drive) {
+            names = cia402_parameters();
+        }
+        if (names.empty()) {
+            return error(Topic::line, node,
+                         "<modParam> has no effect on type=\"" + info_.type + "\"", "delete it");
         }
         if (std::find(names.begin(), names.end(), name) == names.end()) {
             return error(Topic::line, node, "unsupported modParam '" + name + "'",
                          suggestion(name, names, "the parameters are"));
         }
         parameters_[name] = node.attribute("value").value();
+        fsoe_parameters_.emplace_back(name, node.attribute("value").value());
     }
 
     void sync_manager(const Xml& node, master::Slave& s) {
@@ -543,18 +592,29 @@ private:
 
     std::string folder_;  // of the file, with a slash at its end
     const ReadFile& read_file_;
+    const IsAssumed& is_assumed_;
     Reading out_;
     Bus* bus_ = nullptr;
     SlaveInfo info_;
     std::set<std::string> pins_;
     std::map<std::string, std::string> parameters_;
+    FsoeParameters fsoe_parameters_;  // the same in the order of the file
+    /// A logic terminal, whose safe terminals may follow it.
+    struct FsoeLogicNode {
+        std::size_t number;
+        Xml at;
+        FsoeParameters parameters;
+    };
+    std::vector<FsoeLogicNode> fsoe_logics_;
+    std::optional<LcecDevice> device_;  // of the table; not set: generic or basic_cia402
     bool configure_ = false;
 };
 
 }  // namespace
 
-Reading read_lcec(std::string_view xml, const std::string& path, const ReadFile& read_file) {
-    return Lcec(xml, path, read_file).read();
+Reading read_lcec(std::string_view xml, const std::string& path, const ReadFile& read_file,
+                  const IsAssumed& is_assumed) {
+    return Lcec(xml, path, read_file, is_assumed).read();
 }
 
 }  // namespace hal::ethercat::config

@@ -68,6 +68,16 @@ public:
         const bool prefixed = value.starts_with("0x") || value.starts_with("0X") || !hexadecimal;
         const auto n = esi::number(prefixed ? std::string(value) : "0x" + std::string(value));
         if (n && *n >= least && *n <= most) return n;
+        if (const auto lenient = hexadecimal ? leading_digits(value) : std::nullopt;
+            lenient && *lenient >= least && *lenient <= most) {
+            char digits[20];
+            std::snprintf(digits, sizeof digits, "%llX", static_cast<long long>(*lenient));
+            report_.warning(Topic::value, esi::span_of(node, text_),
+                            std::string(name) + " '" + std::string(value) + "' of <" + node.name() +
+                                "> is read as " + digits + ", as lcec does",
+                            "write " + std::string(name) + "=\"" + digits + "\"");
+            return lenient;
+        }
         char range[96];
         std::snprintf(range, sizeof range,
                       hexadecimal ? "a hexadecimal number of %llX..%llX" : "a number of %lld..%lld",
@@ -78,6 +88,15 @@ public:
               "write " + std::string(range));
         return {};
     }
+    /// Returns what lcec reads of a hexadecimal number with a wrong character: the digits before it.
+    /// The letter O is read as 0.
+    static std::optional<std::int64_t> leading_digits(std::string_view value) {
+        if (value == "O" || value == "o") return 0;
+        const std::size_t end = value.find_first_not_of("0123456789abcdefABCDEF");
+        if (end == 0 || end == std::string_view::npos) return {};
+        return esi::number("0x" + std::string(value.substr(0, end)));
+    }
+
     bool flag(const Xml& node, const char* name, bool otherwise) {
         const std::string_view value = node.attribute(name).value();
         if (value.empty()) return otherwise;

@@ -11,6 +11,7 @@
 #include "ethercat/config/config.hpp"
 #include "ethercat/config/igh_conf.hpp"
 #include "ethercat/config/lcec_handover.hpp"
+#include "hal/assumed.h"
 #include "hal/component.hpp"
 #include "hal/naming.hpp"
 #include "hal/texts.hpp"
@@ -88,7 +89,11 @@ struct EthercatArguments {
                         "config=FILE.xml"
                       : "");
         }
-        config::Reading reading = config::read(text, path);
+        config::Reading reading =
+            config::read(text, path, config::read_from_disk, [](const std::string& slave) {
+            const auto* const assumed = hal::extension<hal_assumed>(HAL_ASSUMED);
+            return assumed != nullptr && assumed->is_assumed(hal::detail::creating, slave.c_str());
+        });
         report(texts, reading, path, text);
         const auto wanted =
             number >= 0 ? static_cast<std::size_t>(number) : own_master(reading.buses.size());
@@ -141,6 +146,8 @@ private:
         }
         return static_cast<std::size_t>(*n);
     }
+    /// Finds the interface of LinuxCNC's format. Without one the netlist can be checked, but the
+    /// master cannot start.
     static void find_links(const std::string& path, config::Bus& bus) {
         const std::size_t slash = path.rfind('/');
         config::IghLinks found =
@@ -151,14 +158,14 @@ private:
                 "correct the file, or write link=eth:enp3s0; `ip link` lists the addresses");
         }
         if (found.file.empty()) {
-            throw hal::ArgumentError(
-                "link",
-                "link= is missing: this format has no interface, and no file ethercat.conf has "
-                "MASTER" +
-                    std::to_string(bus.index) + "_DEVICE",
-                "write link=eth:enp3s0, or link=sim:NAME for an emulated line; or MASTER" +
-                    std::to_string(bus.index) + "_DEVICE=\"enp3s0\" in an ethercat.conf beside '" +
-                    path + "'");
+            const std::string device = "MASTER" + std::to_string(bus.index) + "_DEVICE";
+            bus.missing_link =
+                "link= is missing: ethercat-conf.xml has no interface, and no file ethercat.conf "
+                "has " +
+                device +
+                "; write loadrt lcec link=eth:enp3s0, or link=sim:NAME for an emulated line; or " +
+                device + "=\"enp3s0\" in an ethercat.conf beside '" + path + "'";
+            return;
         }
         bus.link = std::move(found.link);
         bus.backup = std::move(found.backup);

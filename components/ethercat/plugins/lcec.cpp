@@ -42,6 +42,8 @@ The netlist, with an emulated drive. On a machine the first line and the last `a
     addf ethercat-segment.0.update servo-thread
     net x-status lcec.0.x.srv-cia-statusword
 
+`lcec.N.read` and `lcec.N.write` are the same for one master. `initf lcec.activate` has no effect: the masters start with the machine.
+
 Without `link=`, the interface of a master is `MASTER0_DEVICE` of the file `ethercat.conf` beside `ethercat-conf.xml`, or else of `/etc/ethercat.conf`,
 the file of the IgH master: a MAC address, an interface (`enp3s0`) or a link address (`eth:enp3s0`, `sim:NAME`). `MASTER0_BACKUP` closes a ring. Without
 `loadusr lcec_conf`, the file is `config=`, or `ethercat-conf.xml` beside the netlist.

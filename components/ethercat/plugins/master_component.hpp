@@ -18,6 +18,7 @@
 #include "ethercat/master/gateway.hpp"
 #include "ethercat/master/master.hpp"
 #include "ethercat/master/request_queue.hpp"
+#include "ethercat/plugins/channels/make_channel.hpp"
 #include "ethercat/plugins/emergencies.hpp"
 #include "ethercat/plugins/entry_pins.hpp"
 #include "ethercat/plugins/eoe_interfaces.hpp"
@@ -53,8 +54,26 @@ public:
                 }
                 places_.push_back({s, n});
             }
+            for (const config::Channel& channel : bus_.slaves[s].channels) {
+                declare_channel(s, channel);
+            }
+        }
+        for (const config::FrameCopy& copy : bus_.frame_copies) {
+            const FieldSearch from{this, copy.from_slave};
+            const FieldSearch to{this, copy.to_slave};
+            copies_.push_back({copy.from_slave, find_field(&from, copy.from), copy.to_slave,
+                               find_field(&to, copy.to), copy.bytes});
         }
         areas_.resize(places_.size());
+        if constexpr (Names::shared) {
+            read_.emplace(*this, "read", &MasterComponent::receive,
+                          "read-all of this master alone");
+            write_.emplace(*this, "write", &MasterComponent::transmit,
+                           "write-all of this master alone");
+            activate_.emplace(*this, "activate", &MasterComponent::activate,
+                              "without effect: the master starts with the machine; for initf",
+                              FunctionOptions{.shared = true});
+        }
         period_text_ = "the period of the thread is {} us, the cycle of the configuration " +
                        std::to_string(bus_.setup.cycle_ns / 1000) + " us; change one of them: " +
                        (bus_.lcec ? "appTimePeriod of <master>" : "cycle in [bus]") +
@@ -62,6 +81,9 @@ public:
     }
 
     void start() {
+        if (!bus_.missing_link.empty()) {
+            throw std::runtime_error(bus_.missing_link);
+        }
         hal::ethernet::Options options;
         options.types = {ethertype};
         auto primary = open(bus_.link, options);
@@ -85,6 +107,10 @@ public:
             return master_->status().scanned ? master_->numbered(n) : nullptr;
         }, 2);
         server_->set_poll_interval(emergencies_every_ns);
+        channel_requests_ = &server_->open(channels_.size() + 1);
+        for (const SlaveChannel& channel : channels_) {
+            channel.channel->restart();
+        }
         if (has_eoe()) {
             eoe_ = std::make_unique<EoeInterfaces>(name_, bus_, *mailboxes_);
             server_->set_switch(&eoe_->frames());
@@ -167,6 +193,9 @@ public:
                 [this](std::size_t n) -> const master::BusSlave& { return master_->found(n); });
         }
         entries_.show(areas_);
+        for (const SlaveChannel& channel : channels_) {
+            channel.channel->read(image_of(channel.slave, cycle));
+        }
     }
 
     void transmit(hal::Cycle cycle) noexcept {
@@ -180,12 +209,19 @@ public:
         // The thread was declared hung, but its cycle goes on.
         if (interrupted()) return;
         entries_.take(areas_);
+        for (const SlaveChannel& channel : channels_) {
+            channel.channel->write(image_of(channel.slave, cycle));
+        }
+        copy_frames();
         if (eoe_) {
             eoe_->step(*master_);
         }
         server_->step(cycle.start_ns());
         master_->transmit(cycle.start_ns());
     }
+
+    /// The function of LinuxCNC that starts the masters. [realtime]
+    void activate(hal::Cycle) noexcept {}
 
     void make_safe(hal::Cycle) noexcept {
         interrupt();
@@ -201,6 +237,92 @@ private:
         std::size_t slave = 0;
         std::size_t sync_manager = 0;
     };
+
+    /// A channel of a slave.
+    struct SlaveChannel {
+        std::size_t slave;
+        std::unique_ptr<Channel> channel;
+    };
+    /// A config::FrameCopy in the process data.
+    struct Copy {
+        std::size_t from_slave;
+        ImageField from;
+        std::size_t to_slave;
+        ImageField to;
+        unsigned bytes;
+    };
+    /// Copies frames between slaves, received and sent in the same cycle. While one of both slaves is
+    /// not operational its frame is not fresh: 0 is sent, an invalid safety frame, and the safe
+    /// terminals go to their safe state by their watchdog. [realtime]
+    void copy_frames() noexcept {
+        for (const Copy& copy : copies_) {
+            if (!copy.from.present() || !copy.to.present()) continue;
+            const bool valid = master_->slave_status(copy.from_slave).operational &&
+                               master_->slave_status(copy.to_slave).operational;
+            const auto source = areas_[copy.from.area].subspan(copy.from.at / 8);
+            const auto target = areas_[copy.to.area].subspan(copy.to.at / 8);
+            const std::size_t bytes =
+                std::min({std::size_t{copy.bytes}, source.size(), target.size()});
+            for (std::size_t i = 0; i < bytes; ++i) {
+                target[i] = valid ? source[i] : 0;
+            }
+        }
+    }
+
+    /// What find_field() searches.
+    struct FieldSearch {
+        const MasterComponent* master;
+        std::size_t slave;
+    };
+
+    /// Declares the pins of a channel. [setup]
+    void declare_channel(std::size_t slave, const config::Channel& channel) {
+        const FieldSearch search{this, slave};
+        const ChannelPlan plan(*this, receive_, transmit_, bus_.setup.slaves[slave].name, channel,
+                               &MasterComponent::find_field, &search);
+        channels_.push_back({slave, make_channel(plan)});
+    }
+    /// Returns where an object of a slave is in the process data; an absent field if it has no such
+    /// object. [setup]
+    static ImageField find_field(const void* context, const config::ChannelObject& object) {
+        const auto& search = *static_cast<const FieldSearch*>(context);
+        const MasterComponent& self = *search.master;
+        for (std::size_t area = 0; area < self.places_.size(); ++area) {
+            const Place& place = self.places_[area];
+            if (place.slave != search.slave) continue;
+            std::size_t at = 0;
+            ImageField found;
+            const auto& sm = self.bus_.setup.slaves[place.slave].sync_managers[place.sync_manager];
+            for (const master::Pdo& pdo : sm.pdos) {
+                for (const master::Entry& e : pdo.entries) {
+                    const bool same = e.index == object.index && e.sub == object.sub;
+                    if (found.present() && !(same && e.part)) break;
+                    if (same) {
+                        found.area = area;
+                        found.at = found.present() ? found.at : at;
+                        found.bits += e.bits;
+                    }
+                    at += e.bits;
+                }
+                if (found.present()) break;
+            }
+            if (!found.present()) continue;
+            found.at += object.first_bit;
+            found.bits = object.bits != 0 ? object.bits : found.bits;
+            return found;
+        }
+        return {};
+    }
+    SlaveImage image_of(std::size_t slave, hal::Cycle cycle) const noexcept {
+        const master::SlaveStatus status = master_->slave_status(slave);
+        const bool reachable = status.online && status.state >= State::preop;
+        return {areas_,
+                status.operational,
+                cycle.period_ns(),
+                reachable,
+                static_cast<std::uint16_t>(slave),
+                channel_requests_};
+    }
 
     static std::unique_ptr<hal::ethernet::Port> open(const std::string& address,
                                                      const hal::ethernet::Options& options) {
@@ -446,9 +568,13 @@ private:
         *this, &MasterComponent::make_safe,
         "takes the slaves to SAFE-OP at once, where outputs are off; they are started again "
         "when the thread runs again"};
+    std::optional<hal::Function> read_, write_, activate_;  // of lcec
     typename Names::BusPins bus_pins_{*this, receive_};
     std::deque<typename Names::SlavePins> slaves_;
     EntryPins entries_{*this, receive_, transmit_};
+    std::vector<SlaveChannel> channels_;
+    std::vector<Copy> copies_;
+    master::RequestPort* channel_requests_ = nullptr;  // of server_
     std::vector<Place> places_;  // of the process data, in the order of areas_
     std::vector<std::span<std::uint8_t>> areas_;
     std::vector<Event> failed_;  // why a slave is not started, or slave_operational

@@ -3,47 +3,15 @@
 
 #include <array>
 #include <bit>
-#include <cstdlib>
 #include <limits>
-#include <map>
 #include <memory>
-#include <vector>
+
+#include "tests/unit/ethercat/pin_host.hpp"
 
 namespace hal::ethercat {
 namespace {
 
-/// A host that gives memory and finds the pins again by their names.
-class Host {
-public:
-    const hal_host* get() const noexcept { return &host_; }
-    template <class T>
-    T& value(const std::string& pin) {
-        return *reinterpret_cast<T*>(pins_.at(pin)->slot);
-    }
-
-private:
-    static Host& of(const hal_host* host) { return *static_cast<Host*>(host->data); }
-    static bool pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* memory) {
-        of(host).pins_[decl->name] = memory;
-        return true;
-    }
-    static bool function(const hal_host*, const hal_function_decl*) { return true; }
-    static void* allocate(const hal_host* host, std::size_t bytes, std::size_t) {
-        return of(host).memory_.emplace_back(std::calloc(1, bytes), &std::free).get();
-    }
-
-    std::map<std::string, hal_pin*> pins_;
-    std::vector<std::unique_ptr<void, void (*)(void*)>> memory_;
-    hal_host host_ = [this] {
-        hal_host host{};
-        host.size = sizeof host;
-        host.data = this;
-        host.pin = &pin;
-        host.function = &function;
-        host.allocate = &allocate;
-        return host;
-    }();
-};
+using Host = PinHost;
 
 struct Entries : Component {
     using Component::Component;

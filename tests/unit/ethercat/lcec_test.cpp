@@ -93,7 +93,8 @@ TEST(Lcec, Drive_class_has_the_pins_of_its_parameters) {
     }
     EXPECT_EQ(info.find("srv-actual-torque"), nullptr);
     EXPECT_EQ(y.sync_managers.at(1).pdos.at(0).mapping(0), 0x60410010U);
-    EXPECT_EQ(y.sync_managers.at(1).pdos.at(0).mapping(3), 0x60fd0020U);
+    EXPECT_EQ(y.sync_managers.at(1).pdos.at(0).mapping(3), 0x60610008U);
+    EXPECT_EQ(y.sync_managers.at(1).pdos.at(0).mapping(4), 0x60fd0020U) << "last, as in lcec";
 }
 
 TEST(Lcec, Errors_name_the_element_and_its_line) {
@@ -103,9 +104,10 @@ TEST(Lcec, Errors_name_the_element_and_its_line) {
               "c.xml:2:2: error: unknown attribute 'alias' of <slave>; the attributes are: idx, "
               "type, name, vid, pid, configPdos, "
               "syncUnit, syncUnitCycle");
-    EXPECT_EQ(errors("<slave idx=\"0\" type=\"EL1008\"/>"),
-              "c.xml:2:2: error: unsupported slave type 'EL1008'; write type=\"generic\" with the "
-              "PDOs of the device, or type=\"basic_cia402\"");
+    EXPECT_EQ(
+        errors("<slave idx=\"0\"/>"),
+        "c.xml:2:2: error: missing attribute 'type' of <slave>; write the type of the device, "
+        "as in type=\"EL1008\", or type=\"generic\" with its PDOs");
     EXPECT_EQ(
         errors("<slave idx=\"0\" type=\"generic\" vid=\"xy\" pid=\"2\"/>"),
         "c.xml:2:2: error: invalid vid 'xy' of <slave>; write a hexadecimal number of 0..FFFFFFFF");

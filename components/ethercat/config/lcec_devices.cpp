@@ -1,0 +1,546 @@
+// SPDX-License-Identifier: MIT
+#include "ethercat/config/lcec_devices.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+
+#include "ethercat/config/lcec_cia402.hpp"
+
+namespace hal::ethercat::config {
+
+namespace {
+
+using master::Type;
+using Words = std::vector<std::string>;
+
+Words split(std::string_view text, char separator) {
+    Words words;
+    std::size_t begin = 0;
+    while (begin <= text.size()) {
+        const std::size_t end = std::min(text.find(separator, begin), text.size());
+        if (end > begin) {
+            words.emplace_back(text.substr(begin, end - begin));
+        }
+        begin = end + 1;
+    }
+    return words;
+}
+
+std::uint32_t hexadecimal(const std::string& text) {
+    return static_cast<std::uint32_t>(std::strtoul(text.c_str(), nullptr, 16));
+}
+
+/// Returns the words of each line of the table that has some.
+std::vector<Words> read_table() {
+    std::vector<Words> lines;
+    for (const std::string& line : split(lcec_device_table, '\n')) {
+        if (Words words = split(line, ' '); !words.empty()) {
+            lines.push_back(std::move(words));
+        }
+    }
+    return lines;
+}
+
+/// Calls `action` with the words of each line of the table.
+void each_line(const std::function<void(const Words&)>& action) {
+    static const std::vector<Words> lines = read_table();
+    for (const Words& words : lines) {
+        action(words);
+    }
+}
+
+/// Calls `action` with each device of the table.
+void each_device(const std::function<void(const LcecDevice&)>& action) {
+    std::string shape;
+    std::uint32_t vendor = 0;
+    bool in_devices = false;
+    each_line([&](const Words& words) {
+        if (words[0] == "devices") {
+            in_devices = true;
+            shape = words.at(1);
+            vendor = hexadecimal(words.at(2));
+            return;
+        }
+        if (words[0] == "shape" || words[0] == "unsupported") {
+            in_devices = false;
+        }
+        if (!in_devices) return;
+        LcecDevice device;
+        device.name = words[0];
+        device.vendor = vendor;
+        device.product = hexadecimal(words.at(1));
+        device.shape = shape;
+        for (std::size_t i = 2; i < words.size(); ++i) {
+            const std::size_t equals = words[i].find('=');
+            if (equals == std::string::npos) {
+                device.count = static_cast<unsigned>(std::atoi(words[i].c_str()));
+            } else {
+                device.options.emplace_back(words[i].substr(0, equals),
+                                            words[i].substr(equals + 1));
+            }
+        }
+        action(device);
+    });
+}
+
+/// Calls `action` with each line of a shape.
+void each_line_of(const std::string& shape, const std::function<void(const Words&)>& action) {
+    bool inside = false;
+    each_line([&](const Words& words) {
+        if (words[0] == "shape" || words[0] == "devices" || words[0] == "unsupported") {
+            inside = words[0] == "shape" && words.at(1) == shape;
+        } else if (inside) {
+            action(words);
+        }
+    });
+}
+
+/// Reads the lines of a shape for one slave.
+class ShapeReader {
+public:
+    ShapeReader(const LcecDevice& device, const std::map<std::string, std::string>& parameters,
+                std::int64_t cycle_ns, master::Slave& slave, SlaveInfo& info,
+                std::vector<std::string>& problems)
+        : device_(device),
+          parameters_(parameters),
+          cycle_ns_(cycle_ns),
+          slave_(slave),
+          info_(info),
+          problems_(problems) {}
+
+    void read() {
+        each_line_of(device_.shape, [&](const Words& words) { line(words); });
+        std::erase_if(slave_.sync_managers,
+                      [](const master::SyncManager& sm) { return sm.pdos.empty(); });
+    }
+
+private:
+    /// Reads a line: `[OPTION=VALUE] COUNT* KEYWORD ...`; the first two may be missing.
+    void line(Words words) {
+        while (words[0].starts_with('[')) {
+            const std::string condition = words[0].substr(1, words[0].size() - 2);
+            const std::size_t equals = condition.find('=');
+            if (!same_word(option(condition.substr(0, equals)), condition.substr(equals + 1))) {
+                return;
+            }
+            words.erase(words.begin());
+        }
+        unsigned repeated = 1;
+        if (words[0].ends_with('*')) {
+            repeated = number_of(words[0].substr(0, words[0].size() - 1));
+            words.erase(words.begin());
+        }
+        for (step_ = 0; step_ < repeated; ++step_) {
+            once(words);
+        }
+    }
+
+    unsigned number_of(const std::string& text) const {
+        return text == "N" ? device_.count : static_cast<unsigned>(std::atoi(text.c_str()));
+    }
+
+    void once(const Words& words) {
+        const std::string& keyword = words[0];
+        if (keyword == "option") {
+            read_option(words);
+        } else if (keyword == "sm") {
+            sync_manager(words);
+        } else if (keyword == "pdo") {
+            pdo(words);
+        } else if (keyword == "sdo") {
+            write(words[1], fixed_value(words[2]));
+        } else if (keyword == "param") {
+            parameter(words);
+        } else if (keyword == "dc") {
+            clocks(words);
+        } else if (keyword == "cia402") {
+            drive(words);
+        } else if (keyword == "fsoe") {
+            info_.fsoe = {number_of(words[1]), number_of(words[2]), number_of(words[3])};
+        } else if (keyword == "fsoe-logic") {
+            info_.fsoe_logic = true;
+        } else {
+            channel(words);
+        }
+    }
+
+    /// `option NAME DEFAULT OTHER...`: a modParam that selects lines.
+    void read_option(const Words& words) {
+        const std::string name = with_step(words[1]);
+        std::string value = words[2];
+        for (const auto& [of_device, of_value] : device_.options) {
+            if (of_device == name) {
+                value = of_value;
+            }
+        }
+        if (const auto given = parameters_.find(name); given != parameters_.end()) {
+            value = given->second;
+            const bool on = same_word(value, "true");
+            if (on || same_word(value, "false")) {
+                value = on ? "1" : "0";
+            }
+        }
+        const bool known = std::any_of(words.begin() + 2, words.end(),
+                                       [&](const std::string& w) { return same_word(w, value); });
+        if (!known) {
+            problems_.push_back("invalid value '" + value + "' of modParam '" + name +
+                                "': expected " + list(Words(words.begin() + 2, words.end())));
+            value = words[2];
+        }
+        options_[name] = value;
+    }
+    std::string option(const std::string& name) const {
+        const auto at = options_.find(name);
+        return at == options_.end() ? std::string() : at->second;
+    }
+
+    /// `sm NUMBER in|out [write]`: with `write` the assignment and the mapping are written.
+    void sync_manager(const Words& words) {
+        master::SyncManager sm;
+        sm.number = static_cast<std::uint8_t>(std::atoi(words[1].c_str()));
+        sm.output = words[2] == "out";
+        writes_ = words.size() > 3;
+        sm.write_assignment = writes_;
+        slave_.sync_managers.push_back(std::move(sm));
+    }
+
+    /// `pdo INDEX ENTRY...`
+    void pdo(const Words& words) {
+        master::Pdo p;
+        p.index = static_cast<std::uint16_t>(stepped(words[1], step_));
+        p.write_mapping = writes_;
+        for (std::size_t i = 2; i < words.size(); ++i) {
+            const std::size_t star = words[i].find('*');
+            const unsigned repeated =
+                star == std::string::npos ? 1 : number_of(words[i].substr(0, star));
+            const std::string entry_text =
+                star == std::string::npos ? words[i] : words[i].substr(star + 1);
+            for (unsigned n = 0; n < repeated; ++n) {
+                entry(entry_text, star == std::string::npos ? step_ : n, p);
+            }
+        }
+        slave_.sync_managers.back().pdos.push_back(std::move(p));
+    }
+
+    /// `INDEX:SUB/BITS`, then `s` if it is signed, then `=PIN` or `{PIN,PIN,...}` for its bits, where
+    /// `-` is a bit without a pin. `/BITS` is a gap.
+    void entry(const std::string& text, unsigned step, master::Pdo& to) {
+        master::Entry e;
+        const std::size_t slash = text.find('/');
+        if (slash > 0) {
+            const ChannelObject object = address(text.substr(0, slash), step);
+            e.index = object.index;
+            e.sub = object.sub;
+        }
+        const std::string rest = text.substr(slash + 1);
+        e.bits = static_cast<std::uint16_t>(std::atoi(rest.c_str()));
+        const std::size_t behind = rest.find_first_not_of("0123456789");
+        e.is_signed = behind != std::string::npos && rest[behind] == 's';
+        e.type = e.bits == 1 ? Type::bit : type_of(e.bits, e.is_signed);
+        if (const std::size_t equals = rest.find('='); equals != std::string::npos) {
+            e.name = with_step(rest.substr(equals + 1), step);
+            add_pin(e);
+        }
+        if (const std::size_t brace = rest.find('{'); brace != std::string::npos) {
+            return add_bits(e, split(rest.substr(brace + 1, rest.size() - brace - 2), ','), step,
+                            to);
+        }
+        to.entries.push_back(std::move(e));
+    }
+    void add_bits(const master::Entry& e, const Words& names, unsigned step, master::Pdo& to) {
+        for (std::size_t bit = 0; bit < names.size(); ++bit) {
+            master::Entry part = e;
+            part.bits = 1;
+            part.type = Type::bit;
+            part.part = bit != 0;
+            if (names[bit] != "-") {
+                part.name = with_step(names[bit], step);
+                add_pin(part);
+            }
+            to.entries.push_back(std::move(part));
+        }
+        if (names.size() < e.bits) {
+            master::Entry rest = e;
+            rest.bits = static_cast<std::uint16_t>(e.bits - names.size());
+            rest.part = true;
+            to.entries.push_back(std::move(rest));
+        }
+    }
+    void add_pin(const master::Entry& e) {
+        info_.pins.push_back({e.name, {"", object_text(e.index, e.sub)}});
+    }
+
+    /// `KIND NAME ROLE=OBJECT SETTING=NUMBER ...`; the name `-` is empty.
+    void channel(const Words& words) {
+        Channel made;
+        made.kind = words[0];
+        made.name = words[1] == "-" ? "" : with_step(words[1]);
+        for (std::size_t i = 2; i < words.size(); ++i) {
+            const std::size_t equals = words[i].find('=');
+            const std::string key = words[i].substr(0, equals);
+            const std::string value = words[i].substr(equals + 1);
+            if (value.find(':') != std::string::npos) {
+                made.objects[key] = address(value, step_);
+            } else {
+                made.settings[key] =
+                    value == "N" ? device_.count : std::strtod(value.c_str(), nullptr);
+            }
+        }
+        for (const auto& [name, settings] : effects_) {
+            if (name != made.name) continue;
+            for (const auto& [key, value] : settings) {
+                made.settings[key] = value;
+            }
+        }
+        info_.channels.push_back(std::move(made));
+    }
+
+    /// `cia402 NAME=VALUE...`: the process data and the pins of basic_cia402 with these modParams,
+    /// which those of the file replace.
+    void drive(const Words& words) {
+        std::map<std::string, std::string> all;
+        for (std::size_t i = 1; i < words.size(); ++i) {
+            const std::size_t equals = words[i].find('=');
+            all[words[i].substr(0, equals)] = words[i].substr(equals + 1);
+        }
+        for (const auto& [name, value] : parameters_) {
+            all[name] = value;
+        }
+        build_cia402(all, slave_, info_, problems_);
+        writes_ = true;
+    }
+
+    void clocks(const Words& words) {
+        if (slave_.dc) return;  // the file has its own
+        master::Dc dc;
+        dc.assign_activate = static_cast<std::uint16_t>(hexadecimal(words[1]));
+        dc.sync0_cycle_ns = cycle_ns_;
+        slave_.dc = dc;
+    }
+
+    /// A number, or a part of the cycle time as CiA 402 has it: mantissa * 10^exponent seconds.
+    std::int64_t fixed_value(const std::string& text) const {
+        if (!text.starts_with('@')) return std::strtoll(text.c_str(), nullptr, 0);
+        std::int64_t mantissa = cycle_ns_;
+        int exponent = -9;
+        while (mantissa > 255 || (mantissa % 10 == 0 && mantissa > 0)) {
+            mantissa /= 10;
+            ++exponent;
+        }
+        return text == "@mantissa" ? mantissa : exponent;
+    }
+
+    /// `param NAME OBJECT/BITS [*FACTOR] [WORD=VALUE[;SETTING=NUMBER...],...] [for=CHANNEL]`
+    void parameter(const Words& words) {
+        const std::string name = with_step(words[1]);
+        const auto given = parameters_.find(name);
+        if (given == parameters_.end()) return;
+        double factor = 1;
+        Words values;
+        std::string target;
+        for (std::size_t i = 3; i < words.size(); ++i) {
+            if (words[i].starts_with('*')) {
+                factor = std::strtod(words[i].c_str() + 1, nullptr);
+            } else if (words[i].starts_with("for=")) {
+                target = with_step(words[i].substr(4));
+            } else {
+                values = split(words[i], ',');
+            }
+        }
+        if (values.empty()) return write_number(name, words[2], given->second, factor);
+        Words known;
+        for (const std::string& value : values) {
+            const std::string word = value.substr(0, value.find('='));
+            known.push_back(word);
+            if (same_word(word, given->second)) {
+                const Words parts = split(value.substr(value.find('=') + 1), ';');
+                apply_effects(target, parts);
+                return write(words[2], std::atoll(parts[0].c_str()));
+            }
+        }
+        problems_.push_back("invalid value '" + given->second + "' of modParam '" + name +
+                            "': expected " + list(known));
+    }
+    void write_number(const std::string& name, const std::string& object, const std::string& text,
+                      double factor) {
+        std::string number = text;
+        if (same_word(text, "true")) {
+            number = "1";
+        }
+        if (same_word(text, "false")) {
+            number = "0";
+        }
+        const auto value = parse_real(number);
+        if (!value) {
+            problems_.push_back("invalid value '" + text + "' of modParam '" + name +
+                                "': expected a number");
+            return;
+        }
+        write(object, std::llround(*value * factor));
+    }
+    /// `scale=0.1` replaces a setting of a channel, `scale*=0.1` multiplies it.
+    void apply_effects(const std::string& channel, const Words& parts) {
+        auto& settings = effects_[channel];
+        for (std::size_t i = 1; i < parts.size(); ++i) {
+            const std::size_t equals = parts[i].find('=');
+            const bool multiplies = parts[i][equals - 1] == '*';
+            const std::string key = parts[i].substr(0, multiplies ? equals - 1 : equals);
+            const double value = std::strtod(parts[i].c_str() + equals + 1, nullptr);
+            if (multiplies) {
+                settings.emplace(key, 0.1).first->second *= value;
+            } else {
+                settings[key] = value;
+            }
+        }
+    }
+
+    void write(const std::string& object, std::int64_t value) {
+        const std::size_t slash = object.find('/');
+        const ChannelObject to = address(object.substr(0, slash), step_);
+        master::StartupWrite w;
+        w.index = to.index;
+        w.sub = to.sub;
+        w.line = slave_.line;
+        w.data = little_endian(static_cast<std::uint64_t>(value),
+                               static_cast<unsigned>(std::atoi(object.c_str() + slash + 1)));
+        slave_.startup.push_back(std::move(w));
+    }
+
+    /// `INDEX[+STEP]:SUB[+STEP]`, hexadecimal, and in channels `.BIT[/BITS]` behind it, decimal.
+    static ChannelObject address(const std::string& text, unsigned step) {
+        ChannelObject object;
+        const std::size_t colon = text.find(':');
+        object.index = static_cast<std::uint16_t>(stepped(text.substr(0, colon), step));
+        std::string sub = text.substr(colon + 1);
+        if (const std::size_t dot = sub.find('.'); dot != std::string::npos) {
+            const std::string bits = sub.substr(dot + 1);
+            const std::size_t slash = bits.find('/');
+            object.first_bit = static_cast<unsigned>(std::atoi(bits.c_str()));
+            object.bits = slash == std::string::npos
+                              ? 1
+                              : static_cast<unsigned>(std::atoi(bits.c_str() + slash + 1));
+            sub.erase(dot);
+        }
+        object.sub = static_cast<std::uint8_t>(stepped(sub, step));
+        return object;
+    }
+    static std::uint32_t stepped(const std::string& text, unsigned step) {
+        const std::size_t plus = text.find('+');
+        const std::uint32_t first = hexadecimal(text.substr(0, plus));
+        return plus == std::string::npos ? first
+                                         : first + step * hexadecimal(text.substr(plus + 1));
+    }
+
+    std::string with_step(const std::string& text) const { return with_step(text, step_); }
+    /// Replaces `##` with the number of the step from 1, and `#` with that from 0.
+    static std::string with_step(const std::string& text, unsigned step) {
+        std::string out;
+        for (std::size_t i = 0; i < text.size(); ++i) {
+            if (text[i] != '#') {
+                out += text[i];
+            } else if (i + 1 < text.size() && text[i + 1] == '#') {
+                out += std::to_string(step + 1);
+                ++i;
+            } else {
+                out += std::to_string(step);
+            }
+        }
+        return out;
+    }
+    static std::string list(const Words& words) {
+        std::string out;
+        for (std::size_t i = 0; i < words.size(); ++i) {
+            if (i != 0) {
+                out += i + 1 == words.size() ? " or " : ", ";
+            }
+            out += words[i];
+        }
+        return out;
+    }
+
+    const LcecDevice& device_;
+    const std::map<std::string, std::string>& parameters_;
+    const std::int64_t cycle_ns_;
+    master::Slave& slave_;
+    SlaveInfo& info_;
+    std::vector<std::string>& problems_;
+    std::map<std::string, std::string> options_;
+    std::map<std::string, std::map<std::string, double>> effects_;  // settings by channel
+    unsigned step_ = 0;
+    bool writes_ = false;
+};
+
+}  // namespace
+
+std::optional<LcecDevice> find_lcec_device(std::string_view name) {
+    std::optional<LcecDevice> found;
+    each_device([&](const LcecDevice& device) {
+        if (!found && device.name == name) {
+            found = device;
+        }
+    });
+    return found;
+}
+
+std::vector<std::string> lcec_device_names() {
+    std::vector<std::string> names;
+    each_device([&](const LcecDevice& device) { names.push_back(device.name); });
+    return names;
+}
+
+std::vector<std::string> unsupported_lcec_devices() {
+    std::vector<std::string> names;
+    each_line([&](const Words& words) {
+        if (words[0] == "unsupported") {
+            names.insert(names.end(), words.begin() + 1, words.end());
+        }
+    });
+    return names;
+}
+
+std::vector<std::string> lcec_parameters(const LcecDevice& device) {
+    std::vector<std::string> names;
+    each_line_of(device.shape, [&](const Words& words) {
+        if (words[0] == "fsoe-logic") {
+            names.insert(names.end(), {"fsoeSlaveIdx", "stdInName", "stdOutName"});
+        }
+        if (words[0] == "cia402") {
+            const auto of_drive = cia402_parameters();
+            names.insert(names.end(), of_drive.begin(), of_drive.end());
+        }
+        std::size_t at = 0;
+        while (words[at].starts_with('[')) {
+            ++at;
+        }
+        unsigned repeated = 1;
+        if (words[at].ends_with('*')) {
+            repeated = words[at] == "N*" ? device.count
+                                         : static_cast<unsigned>(std::atoi(words[at].c_str()));
+            ++at;
+        }
+        if (words[at] != "param" && words[at] != "option") return;
+        for (unsigned step = 0; step < repeated; ++step) {
+            std::string name = words[at + 1];
+            if (const std::size_t two = name.find("##"); two != std::string::npos) {
+                name.replace(two, 2, std::to_string(step + 1));
+            }
+            if (const std::size_t one = name.find('#'); one != std::string::npos) {
+                name.replace(one, 1, std::to_string(step));
+            }
+            if (std::find(names.begin(), names.end(), name) == names.end()) {
+                names.push_back(name);
+            }
+        }
+    });
+    return names;
+}
+
+void build_lcec_device(const LcecDevice& device,
+                       const std::map<std::string, std::string>& parameters, std::int64_t cycle_ns,
+                       master::Slave& slave, SlaveInfo& info, std::vector<std::string>& problems) {
+    ShapeReader(device, parameters, cycle_ns, slave, info, problems).read();
+}
+
+}  // namespace hal::ethercat::config
