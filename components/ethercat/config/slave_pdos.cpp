@@ -206,9 +206,19 @@ master::SyncManager SlavePdos::further_manager(const master::SyncManager& first,
     return sm;
 }
 
+/// Returns whether a start-up command writes the mapping of a PDO, which the master restores then.
+bool SlavePdos::is_commanded(const esi::Pdo& pdo) const {
+    const bool can_map = device_->mailbox && device_->mailbox->pdo_config && !pdo.fixed;
+    const auto& commands = device_->init_commands;
+    return can_map && std::any_of(commands.begin(), commands.end(), [&](const esi::InitCmd& c) {
+        return c.protocol == esi::InitCmd::Protocol::coe && c.index == pdo.index;
+    });
+}
+
 void SlavePdos::assign(const esi::Pdo& from, master::SyncManager& to) {
     master::Pdo p;
     p.index = from.index;
+    p.write_mapping = is_commanded(from);
     for (const esi::Entry& e : from.entries) {
         master::Entry entry;
         entry.index = e.index;

@@ -50,6 +50,7 @@ private:
                    std::vector<master::Entry>&);
     void assign(std::uint16_t pdo, const Word& item, master::SyncManager&);
     const std::vector<esi::Pdo>& described(bool output) const;
+    bool is_commanded(const esi::Pdo&) const;
     void assign(const esi::Pdo&, master::SyncManager&);
 
     SlaveInput in_;

@@ -79,6 +79,19 @@ void add_complete(const esi::InitCmd& command, PlannedObject& object) {
     }
 }
 
+/// Adds an entry for what a write with complete access has beyond the last one.
+void add_rest(const esi::InitCmd& command, PlannedObject& object) {
+    std::size_t bits = command.sub == 0 ? 16 : 0;
+    for (const auto& [sub, entry] : object.entries) {
+        bits += sub != 0 ? entry.bits : 0U;
+    }
+    const std::size_t written = 8 * command.data.size();
+    if (written <= bits || object.entries.rbegin()->first == 0xff) return;
+    const auto next = static_cast<std::uint8_t>(object.entries.rbegin()->first + 1);
+    object.entries[next] = {
+        "", 0, static_cast<std::uint16_t>(written - bits), access::read_write, {}};
+}
+
 /// Adds what the start-up commands write: objects that are missing in the dictionary, and the right
 /// to write those that have it not.
 void add_commands(const esi::Device& device, Plan& plan) {
@@ -95,13 +108,18 @@ void add_commands(const esi::Device& device, Plan& plan) {
         if (command.complete) {
             if (is_new) {
                 add_complete(command, object);
+            } else if (object.code != coe::ObjectCode::variable && !object.entries.empty()) {
+                add_rest(command, object);
             }
             continue;
         }
         PlannedEntry& entry = object.entries[command.sub];
         const auto bits = static_cast<std::uint16_t>(std::min<std::size_t>(
             8 * command.data.size(), std::numeric_limits<std::uint16_t>::max()));
-        if ((entry.bits + 7) / 8 != bits / 8) {
+        // what a PDO maps is never shortened
+        const bool is_mapped = (entry.rights & (access::rx_mappable | access::tx_mappable)) != 0;
+        const unsigned bytes = (entry.bits + 7U) / 8;
+        if (bytes < command.data.size() || (bytes > command.data.size() && !is_mapped)) {
             entry.bits = bits;
             entry.type = 0;
             entry.initial.clear();
@@ -392,9 +410,9 @@ Parts make_esi_device(const DeviceOptions& o) {
 
     Plan plan;
     add_objects(device, plan);
-    add_commands(device, plan);
     add_mapped(device.rx, true, plan);
     add_mapped(device.tx, false, plan);
+    add_commands(device, plan);
     if (design.coe && !o.module_idents.empty()) {
         add_module_lists(o.module_idents, plan);
     }
