@@ -68,10 +68,11 @@ def run(log):
     names = [(s.name, s.man) for s in master.slaves]
     check(
         "names and vendors",
-        [n for n, _ in names] == ["servo", "mailbox_device", "digital_out", "digital_in"],
+        [n for n, _ in names]
+        == ["servo", "mailbox_device", "digital_out", "digital_in", "analog_in", "analog_out"],
         names,
     )
-    servo, mailbox, outputs, inputs = master.slaves
+    servo, mailbox, outputs, inputs, analog_in, analog_out = master.slaves
     check(
         "vendor of 1018h is that of the EEPROM",
         int.from_bytes(servo.sdo_read(0x1018, 1), "little") == servo.man,
@@ -110,6 +111,12 @@ def run(log):
         (len(outputs.output), len(inputs.input)) == (1, 1),
         len(outputs.output),
         len(inputs.input),
+    )
+    check(
+        "channels of the analog terminals",
+        (len(analog_in.input), len(analog_out.output)) == (8, 4),
+        len(analog_in.input),
+        len(analog_out.output),
     )
     outputs.output = b"\xa5"
     exchange(20)
@@ -172,12 +179,13 @@ def run(log):
 
 ethercat_line.network()
 with ethercat_line.line(
-    HAL, "servo\nmailbox_device\ndigital_out bits=8\ndigital_in bits=8\n"
+    HAL,
+    "servo\nmailbox_device\ndigital_out bits=8\ndigital_in bits=8\nanalog_in channels=4\nanalog_out channels=2\n",
 ) as node:
     master = pysoem.Master()
     try:
         master.open("m0")
-        check("four slaves", wait_for(lambda: master.config_init() == 4), len(master.slaves))
+        check("six slaves", wait_for(lambda: master.config_init() == 6), len(master.slaves))
         run(node.log)
     finally:
         master.close()
