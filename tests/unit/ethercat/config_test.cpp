@@ -144,6 +144,32 @@ TEST(EthercatConfig, Revision_selects_the_description) {
     EXPECT_FALSE(slave("device = BOX: x\n").identity.revision);
 }
 
+/// A device that can be mapped anew, and whose start-up commands clear PDO 1600h.
+bool read_commanded(const std::string&, std::string& bytes) {
+    const auto pdo = [](const char* index) {
+        return std::string("<RxPdo Sm='2'><Index>#x") + index +
+               "</Index><Name>P</Name><Entry><Index>#x7000</Index><SubIndex>1</SubIndex>"
+               "<BitLen>8</BitLen><Name>V</Name><DataType>USINT</DataType></Entry></RxPdo>";
+    };
+    bytes =
+        "<EtherCATInfo><Vendor><Id>2</Id></Vendor><Descriptions><Devices><Device>"
+        "<Type ProductCode='7'>BOX</Type><Sm>MBoxOut</Sm><Sm>MBoxIn</Sm><Sm>Outputs</Sm>" +
+        pdo("1600") + pdo("1601") +
+        "<Mailbox><CoE PdoAssign='1' PdoConfig='1'><InitCmd><Transition>PS</Transition>"
+        "<Index>#x1600</Index><SubIndex>0</SubIndex><Data>00</Data></InitCmd></CoE></Mailbox>"
+        "</Device></Devices></Descriptions></EtherCATInfo>";
+    return true;
+}
+
+TEST(EthercatConfig, A_mapping_that_start_up_commands_write_is_restored) {
+    const Reading r = read("[bus]\n[slave 0 a]\nesi = box.xml\n", "m.ethercat", read_commanded);
+    EXPECT_EQ(to_string(r, "m.ethercat"), "");
+    const auto& pdos = r.buses.at(0).setup.slaves.at(0).sync_managers.at(0).pdos;
+    ASSERT_EQ(pdos.size(), 2U);
+    EXPECT_TRUE(pdos[0].write_mapping);
+    EXPECT_FALSE(pdos[1].write_mapping);
+}
+
 TEST(EthercatConfig, A_product_with_several_types_and_an_unknown_revision_are_reported) {
     const auto first = [](const std::string& lines) {
         const Reading r =

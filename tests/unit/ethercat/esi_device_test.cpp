@@ -92,6 +92,19 @@ TEST_F(EsiDevice, Objects_of_start_up_commands_can_be_written) {
     EXPECT_EQ(download(0x8020, 1, 1, 1), 0x06020000U) << "nobody named it";
 }
 
+TEST_F(EsiDevice, A_complete_write_longer_than_the_object_is_accepted) {
+    start("esi", described(mailbox_managers + pdo("TxPdo", 2, "1a00", "6000") +
+                           "<Sm StartAddress='#x1100' ControlByte='#x20' Enable='1'>Inputs</Sm>"
+                           "<Mailbox><CoE CompleteAccess='1'>" +
+                           command("6000", "1", "0102030405", true) + "</CoE></Mailbox>"));
+    to_preop();
+    const auto command = static_cast<std::uint8_t>(
+        coe::command::download | coe::command::size_given | coe::command::complete);
+    const auto answer = coe::read_sdo(sdo(command, 0x6000, 1, 5, {1, 2, 3, 4, 5}));
+    ASSERT_TRUE(answer);
+    EXPECT_FALSE(answer->is(coe::command::abort)) << std::hex << answer->value;
+}
+
 TEST_F(EsiDevice, Every_device_with_CoE_has_both_assignments) {
     start("esi", described(mailbox_managers + pdo("TxPdo", 2, "1a00", "6000") +
                            "<Sm StartAddress='#x1100' ControlByte='#x20' Enable='1'>Inputs</Sm>"
