@@ -95,7 +95,8 @@ class Slaves(Ethercat):
         self.assertIn("aoe.ethercat:7:", said)
         (self.folder / "ethercat-conf.xml").write_text('<masters><master idx="0"/></masters>')
         (self.folder / "no-link.hal").write_text("loadrt lcec\n")
-        self.good("check", "no-link.hal")
+        checked = self.run_program("check", "no-link.hal")
+        self.assertEqual((0, "no-link.hal: no errors\n"), (checked.returncode, checked.stderr))
         (self.folder / "no-link.hal").write_text("loadrt lcec\nstart\n")
         said = self.bad("sim", "no-link.hal")
         self.assertIn(
