@@ -38,6 +38,10 @@ OPTIONAL = {
             "fsoe-%d-master-crc%d",
         )
     },
+    "lcec_el7211.c": {
+        form: "of the EL7201-9014"
+        for form in ("input-0", "input-0-not", "input-1", "input-1-not", "input-sto")
+    },
     "lcec_rtec.c": {form: "not with two axes" for form in ("status-code", "alarm-code", "voltage")},
 }
 # classes whose pins depend on the device
@@ -108,6 +112,13 @@ class Upstream:
                         classes |= descriptors(
                             without_comments((source / "devices" / part).read_text())
                         )
+            for name in re.findall(r'#include "(lcec_el\w+)\.h"', both):
+                if name != path.stem and (source / "devices" / (name + ".c")).exists():
+                    other = (source / "devices" / (name + ".c")).read_text(errors="replace")
+                    classes |= descriptors(without_comments(other))
+                    for part in re.findall(r'#include "(lcec_class_\w+)\.h"', other):
+                        file = source / "devices" / (part + ".c")
+                        classes |= descriptors(without_comments(file.read_text(errors="replace")))
             self.drivers[path.name] = (descriptors(both), classes)
             plain = re.sub(r"\.(name|vid|pid)\s*=\s*", "", text)
             for macro, number in re.findall(r"#define\s+(\w+_PID)\s+(0x[0-9a-fA-F]+)", both):
