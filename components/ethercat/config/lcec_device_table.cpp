@@ -563,8 +563,10 @@ shape dc-motor-2
   pdo 1a09 6030:11/16s=srv-1-raw-info1 6030:12/16s=srv-1-raw-info2
   2* counter enc-# count=6000+10:11 latch=6000+10:12 valid-ext=6000+10:02 set-done=6000+10:03 enable-pos=7000+10:02 set=7000+10:03 enable-neg=7000+10:04 set-value=7000+10:11
   2* aout srv-# val=7020+10:21 enable=7020+10:01 motor=1
-  2* number srv-#-sel-info1 unsigned=1
-  2* number srv-#-sel-info2 unsigned=1
+  object-value srv-0-sel-info1 index=0x8022 sub=0x11 bits=8
+  object-value srv-0-sel-info2 index=0x8022 sub=0x19 bits=8
+  object-value srv-1-sel-info1 index=0x8032 sub=0x11 bits=8
+  object-value srv-1-sel-info2 index=0x8032 sub=0x19 bits=8
 devices dc-motor-2 00000002
   EL7342          1CAE3052
 
@@ -788,6 +790,180 @@ shape omron-mx2
 devices omron-mx2 00000083
   OMMX2           00000053
 
+shape servo-terminal
+  sm 2 out write
+  pdo 1600 7010:01/16
+  pdo 1601 7010:06/32s
+  sm 3 in write
+  pdo 1a00 6000:11/32s
+  pdo 1a01 6010:01/16
+  pdo 1a02 6010:07/32s
+  velocity-drive - status=6010:01 control=7010:01 target=7010:06 velocity=6010:07 position=6000:11
+devices servo-terminal 00000002
+  EL7211          1C2B3052
+  EL7221          1C353052
+
+shape servo-terminal-inputs
+  sdo 8010:39/8 10
+  sm 2 out write
+  pdo 1600 7010:01/16
+  pdo 1601 7010:06/32s
+  sm 3 in write
+  pdo 1a00 6000:11/32s
+  pdo 1a01 6010:01/16
+  pdo 1a02 6010:07/32s
+  pdo 1a04 6010:12/16
+  velocity-drive - status=6010:01 control=7010:01 target=7010:06 velocity=6010:07 position=6000:11
+  din input-0 in=6010:12.0
+  din input-1 in=6010:12.1
+  flag input-sto val=6010:12.8
+devices servo-terminal-inputs 00000002
+  EL7201_9014     1C213052
+
+shape servo-terminal-dc
+  sdo 7010:03/8 9
+  sdo 8010:64/8 2
+  sdo 800a:02/8 1
+  param dcLinkNominal 8010:19/32
+  param dcLinkMin 8010:1a/32
+  param dcLinkMax 8010:1b/32
+  param maxCurrent 8011:11/32
+  param ratedCurrent 8011:12/32
+  param ratedVoltage 8011:2f/32
+  param polePairs 8011:13/8
+  param coilRes 8011:30/32
+  param coilInd 8011:19/16
+  param torqueConst 8011:16/32
+  param voltageConst 8011:31/32
+  param rotorInertia 8011:18/32
+  param maxSpeed 8011:1b/32
+  param ratedSpeed 8011:2e/32
+  param thermalTimeConst 8011:2d/16
+  param hallVoltage 800a:11/32
+  param hallAdjust 800a:13/8
+  sm 2 out write
+  pdo 1600 7010:01/16
+  pdo 1601 7010:06/32s
+  sm 3 in write
+  pdo 1a00 6000:11/32s
+  pdo 1a01 6010:01/16
+  pdo 1a02 6010:07/32s
+  velocity-drive - status=6010:01 control=7010:01 target=7010:06 velocity=6010:07 position=6000:11
+devices servo-terminal-dc 00000002
+  EL7411          1CF33052
+
+shape leadshine-stepper-2
+  dc 700 sync1
+  param ch1peakCurrent_amps 2000:00/16 *1000
+  param ch2peakCurrent_amps 2800:00/16 *1000
+  cia402 ciaChannels=2 enablePV=0 enableCSP=1 enableDigitalOutput=1 digitalOutChannels=2
+  entries 60fd:00/32 68fd:00/32
+  din srv-1-din-negative-limit in=60fd:00.0
+  din srv-1-din-positive-limit in=60fd:00.1
+  din srv-1-din-home in=60fd:00.2
+  din srv-1-din-probe1 in=60fd:00.26
+  din srv-1-din-probe2 in=60fd:00.27
+  din srv-1-din-index-z in=60fd:00.31
+  din srv-1-din-quick-stop in=60fd:00.23
+  din srv-1-din-1 in=60fd:00.4
+  din srv-1-din-2 in=60fd:00.5
+  din srv-1-din-3 in=60fd:00.6
+  din srv-1-din-4 in=60fd:00.7
+  din srv-2-din-negative-limit in=68fd:00.0
+  din srv-2-din-positive-limit in=68fd:00.1
+  din srv-2-din-home in=68fd:00.2
+  din srv-2-din-probe1 in=68fd:00.26
+  din srv-2-din-probe2 in=68fd:00.27
+  din srv-2-din-index-z in=68fd:00.31
+  din srv-2-din-quick-stop in=68fd:00.23
+  din srv-2-din-1 in=68fd:00.4
+  din srv-2-din-2 in=68fd:00.5
+  din srv-2-din-3 in=68fd:00.6
+  din srv-2-din-4 in=68fd:00.7
+devices leadshine-stepper-2 00004321
+  2EM3E-D522      0000A300
+  2EM3E-D556      0000A100
+  2EM3E-D870      0000A200
+
+shape leadshine-stepper-2-closed
+  dc 700 sync1
+  param ch1peakCurrent_amps 2000:00/16 *10
+  param ch1controlMode 2024:00/16 openloop=0,closedloop=2
+  param ch2peakCurrent_amps 2800:00/16 *10
+  param ch2controlMode 2824:00/16 openloop=0,closedloop=2
+  cia402 ciaChannels=2 enablePV=0 enableCSP=1 enableDigitalOutput=1 digitalOutChannels=2
+  entries 60fd:00/32 68fd:00/32
+  din srv-1-din-negative-limit in=60fd:00.0
+  din srv-1-din-positive-limit in=60fd:00.1
+  din srv-1-din-home in=60fd:00.2
+  din srv-1-din-probe1 in=60fd:00.26
+  din srv-1-din-probe2 in=60fd:00.27
+  din srv-1-din-index-z in=60fd:00.31
+  din srv-1-din-quick-stop in=60fd:00.23
+  din srv-1-din-1 in=60fd:00.4
+  din srv-1-din-2 in=60fd:00.5
+  din srv-1-din-3 in=60fd:00.6
+  din srv-1-din-4 in=60fd:00.7
+  din srv-2-din-negative-limit in=68fd:00.0
+  din srv-2-din-positive-limit in=68fd:00.1
+  din srv-2-din-home in=68fd:00.2
+  din srv-2-din-probe1 in=68fd:00.26
+  din srv-2-din-probe2 in=68fd:00.27
+  din srv-2-din-index-z in=68fd:00.31
+  din srv-2-din-quick-stop in=68fd:00.23
+  din srv-2-din-1 in=68fd:00.4
+  din srv-2-din-2 in=68fd:00.5
+  din srv-2-din-3 in=68fd:00.6
+  din srv-2-din-4 in=68fd:00.7
+devices leadshine-stepper-2-closed 00004321
+  2CS3E-D503      00002200
+  2CS3E-D507      00002100
+
+shape leadshine-stepper
+  dc 300
+  param peakCurrent_amps 2000:00/16 *1000
+  cia402 enablePV=0 enableCSP=1 enableDigitalOutput=1 digitalOutChannels=2
+  entries 60fd:00/32
+  din srv-din-negative-limit in=60fd:00.0
+  din srv-din-positive-limit in=60fd:00.1
+  din srv-din-home in=60fd:00.2
+  din srv-din-probe1 in=60fd:00.26
+  din srv-din-probe2 in=60fd:00.27
+  din srv-din-index-z in=60fd:00.31
+  din srv-din-quick-stop in=60fd:00.23
+  din srv-din-1 in=60fd:00.4
+  din srv-din-2 in=60fd:00.5
+  din srv-din-3 in=60fd:00.6
+  din srv-din-4 in=60fd:00.7
+devices leadshine-stepper 00004321
+  EM3E-522E       00008800
+  EM3E-556E       00008600
+  EM3E-870E       00008700
+
+shape leadshine-stepper-closed
+  dc 300
+  param peakCurrent_amps 2000:00/16 *10
+  param controlMode 2024:00/16 openloop=0,closedloop=2
+  cia402 enablePV=0 enableCSP=1 enableDigitalOutput=1 digitalOutChannels=2
+  entries 60fd:00/32
+  din srv-din-negative-limit in=60fd:00.0
+  din srv-din-positive-limit in=60fd:00.1
+  din srv-din-home in=60fd:00.2
+  din srv-din-probe1 in=60fd:00.26
+  din srv-din-probe2 in=60fd:00.27
+  din srv-din-index-z in=60fd:00.31
+  din srv-din-quick-stop in=60fd:00.23
+  din srv-din-1 in=60fd:00.4
+  din srv-din-2 in=60fd:00.5
+  din srv-din-3 in=60fd:00.6
+  din srv-din-4 in=60fd:00.7
+devices leadshine-stepper-closed 00004321
+  CS3E-D503       00001300
+  CS3E-D507       00001100
+  CS3E-D1008      00001200
+  CS3E-D503E      00000700
+  CS3E-D507E      00000500
+
 shape safety-logic
   fsoe-logic
 devices safety-logic 00000002
@@ -796,7 +972,7 @@ devices safety-logic 00000002
 shape safe-inputs
   fsoe 1 1 1
   sm 2 out
-  pdo 1600 7000:01/8 7000:02/16 7000:03/16
+  pdo 1600 7000:01/8 /8 7000:02/16 7000:03/16
   sm 3 in
   pdo 1a00 6000:01/8=fsoe-slave-cmd 4*6001:01+1/1 /4 6000:03/16=fsoe-slave-crc 6000:04/16=fsoe-slave-connid
   number fsoe-master-cmd val=7000:01 unsigned=1
@@ -821,10 +997,7 @@ devices safe-outputs 00000002
   EL2904          0B583052
 
 unsupported AX5101 AX5103 AX5106 AX5112 AX5118 AX5203 AX5206 AX5805 EasyIO EL1918_LOGIC
-unsupported EL2521 EL2564 EL6090 EL7201_9014 EL7211 EL7221 EL7411 EL9576 EP9214
-unsupported EpoCAT Ph3LM2RM StMDS5k
-unsupported EM3E-522E EM3E-556E EM3E-870E CS3E-D503 CS3E-D507 CS3E-D1008 CS3E-D503E
-unsupported CS3E-D507E 2EM3E-D522 2EM3E-D556 2EM3E-D870 2CS3E-D503 2CS3E-D507
+unsupported EL2521 EL2564 EL6090 EL9576 EP9214 EpoCAT Ph3LM2RM StMDS5k
 )";
 // clang-format on
 

@@ -149,6 +149,8 @@ private:
             sync_manager(words);
         } else if (keyword == "pdo") {
             pdo(words);
+        } else if (keyword == "entries") {
+            add_entries(words, 1, slave_.sync_managers.back().pdos.back());
         } else if (keyword == "sdo") {
             write(words[1], fixed_value(words[2]));
         } else if (keyword == "param") {
@@ -211,7 +213,11 @@ private:
         master::Pdo p;
         p.index = static_cast<std::uint16_t>(stepped(words[1], step_));
         p.write_mapping = writes_;
-        for (std::size_t i = 2; i < words.size(); ++i) {
+        add_entries(words, 2, p);
+        slave_.sync_managers.back().pdos.push_back(std::move(p));
+    }
+    void add_entries(const Words& words, std::size_t first, master::Pdo& p) {
+        for (std::size_t i = first; i < words.size(); ++i) {
             const std::size_t star = words[i].find('*');
             const unsigned repeated =
                 star == std::string::npos ? 1 : number_of(words[i].substr(0, star));
@@ -221,7 +227,6 @@ private:
                 entry(entry_text, star == std::string::npos ? step_ : n, p);
             }
         }
-        slave_.sync_managers.back().pdos.push_back(std::move(p));
     }
 
     /// `INDEX:SUB/BITS`, then `s` if it is signed, then `=PIN` or `{PIN,PIN,...}` for its bits, where
@@ -317,6 +322,9 @@ private:
         master::Dc dc;
         dc.assign_activate = static_cast<std::uint16_t>(hexadecimal(words[1]));
         dc.sync0_cycle_ns = cycle_ns_;
+        if (words.size() > 2) {
+            dc.sync1_cycle_ns = cycle_ns_;
+        }
         slave_.dc = dc;
     }
 

@@ -333,6 +333,30 @@ TEST(LcecDevices, Drives_of_CiA_402_have_the_pins_of_their_modParams) {
     EXPECT_FALSE(two.field(0x68ff, 0).present());
 }
 
+TEST(LcecDevices, Servo_terminal_has_target_0_until_its_resolution_is_known) {
+    Bench bench("EL7211");
+    bench.pin<bool>("enable") = true;
+    bench.pin<double>("velo-cmd") = 3;
+    bench.pin<double>("max-accel") = 1000;
+    bench.set(0x6010, 1, 0x40);
+    bench.read();
+    bench.write();
+    EXPECT_DOUBLE_EQ(bench.pin<double>("velo-cmd-out"), 1.0) << "1000 units/s^2 for 1 ms";
+    EXPECT_EQ(bench.get(0x7010, 6), 0);
+    EXPECT_EQ(bench.get(0x7010, 1), 0x06);
+    bench.set(0x6010, 1, 0x23);
+    bench.read();
+    bench.write();
+    EXPECT_EQ(bench.get(0x7010, 1), 0x0f);
+    bench.set(0x6010, 1, 0x08);
+    for (int cycle = 0; cycle < 101; ++cycle) {
+        bench.read();
+        bench.write();
+    }
+    EXPECT_EQ(bench.get(0x7010, 1), 0x80);
+    EXPECT_TRUE(bench.pin<bool>("fault")) << "the reset has failed for 100 ms";
+}
+
 TEST(LcecDevices, Safety_frames_are_copied_between_the_logic_and_its_terminals) {
     const std::string text =
         "<masters><master idx=\"0\">\n<slave idx=\"1\" type=\"EL6900\" name=\"logic\">"

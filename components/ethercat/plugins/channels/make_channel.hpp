@@ -16,11 +16,13 @@
 #include "ethercat/plugins/channels/motor_reset.hpp"
 #include "ethercat/plugins/channels/number.hpp"
 #include "ethercat/plugins/channels/object_pin.hpp"
+#include "ethercat/plugins/channels/object_value.hpp"
 #include "ethercat/plugins/channels/position_drive.hpp"
 #include "ethercat/plugins/channels/power_values.hpp"
 #include "ethercat/plugins/channels/pulse_train.hpp"
 #include "ethercat/plugins/channels/scaled_value.hpp"
 #include "ethercat/plugins/channels/stepper_drive.hpp"
+#include "ethercat/plugins/channels/velocity_drive.hpp"
 
 namespace hal::ethercat {
 
@@ -42,6 +44,8 @@ inline std::unique_ptr<Channel> make_channel(const ChannelPlan& plan) {
         {"ain", of(std::type_identity<AnalogInput>())},
         {"aout", of(std::type_identity<AnalogOutput>())},
         {"counter", of(std::type_identity<Counter>())},
+        {"velocity-drive", of(std::type_identity<VelocityDrive>())},
+        {"object-value", of(std::type_identity<ObjectValue>())},
         {"object-pin", of(std::type_identity<ObjectPin>())},
         {"drive-modes", of(std::type_identity<DriveModes>())},
         {"number", of(std::type_identity<Number>())},
