@@ -2,6 +2,10 @@
 // save: the state as commands that make it again. LinuxCNC's sections and formats; linear in what
 // there is.
 #include <algorithm>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -17,48 +21,25 @@ namespace {
 
 using Text = TextWriter;
 
-/// Words of the arguments of a loadrt.
-std::vector<std::string> words_of(const std::string& arguments) {
-    std::vector<std::string> words;
-    for (std::size_t at = 0; at < arguments.size();) {
-        const auto end = std::min(arguments.find(' ', at), arguments.size());
-        words.push_back(arguments.substr(at, end - at));
-        at = end + 1;
-    }
-    return words;
-}
-
-/// True for name1 when period1 is 0 or less: loadrt does not create that thread.
-bool is_omitted(std::string_view name, const std::vector<std::string>& words) {
-    const std::string period = "period" + std::string(name.substr(4)) + "=";
-    return std::any_of(words.begin(), words.end(), [&](const std::string& word) {
-        if (!word.starts_with(period)) return false;
-        const auto ns = parse_duration_ns(word.substr(period.size()), 1.0);
-        return ns && *ns <= 0;
-    });
-}
-
 bool is_of(const LoadedComponent& threads, const Thread* thread) {
     return thread && thread->component == &threads;
 }
 
-/// Threads of `loadrt threads` that a delthread removed again.
-std::vector<std::string> deleted_threads(const Model& model) {
-    std::vector<std::string> gone;
-    const LoadedComponent* const threads = model.find_component("threads");
-    if (!threads) return gone;
-    for (const std::string& arguments : threads->arguments) {
-        const auto words = words_of(arguments);
-        for (const std::string& word : words) {
-            const auto equals = word.find('=');
-            if (word.starts_with("name") && equals != word.npos &&
-                !is_of(*threads, model.find_thread(word.substr(equals + 1))) &&
-                !is_omitted(word.substr(0, equals), words)) {
-                gone.push_back(word.substr(equals + 1));
-            }
+/// The threads that a load of `threads` made and a delthread removed again.
+std::vector<std::string> deleted_threads(const Model& model, const LoadedComponent& threads,
+                                         std::size_t load) {
+    std::vector<std::string> deleted;
+    for (const std::string& name : threads.loads[load].names) {
+        const bool made_again =
+            std::any_of(threads.loads.begin() + static_cast<std::ptrdiff_t>(load) + 1,
+                        threads.loads.end(), [&](const Load& later) {
+            return std::ranges::find(later.names, name) != later.names.end();
+        });
+        if (made_again || !is_of(threads, model.find_thread(name))) {
+            deleted.push_back(name);
         }
     }
-    return gone;
+    return deleted;
 }
 
 void new_thread(Text& text, const Thread& thread) {
@@ -105,33 +86,55 @@ std::vector<const Instance*> remaining(const LoadedComponent& component, std::si
     return all;
 }
 
-/// The names that names= lists.
-std::vector<std::string> listed_names(const std::string& arguments) {
-    std::vector<std::string> names;
-    for (const std::string& word : words_of(arguments)) {
-        const auto begin = word.find("names=");
-        if (begin > 1) continue;  // it may begin with a quote
-        std::string list = word.substr(begin + 6);
-        std::erase_if(list, [](char c) { return c == '"' || c == '\''; });
-        for (std::size_t at = 0; at < list.size();) {
-            const auto end = std::min(list.find(',', at), list.size());
-            names.push_back(list.substr(at, end - at));
-            at = end + 1;
-        }
-    }
-    return names;
+/// Returns true for `mux-gen.07` and 7.
+bool has_number(std::string_view instance, std::size_t number) {
+    const std::size_t digits = instance.rfind('.') + 1;
+    const std::size_t first = std::min(instance.find_first_not_of('0', digits), instance.size());
+    const std::string_view shown = first == instance.size() ? "0" : instance.substr(first);
+    return digits > 0 && digits < instance.size() && shown == std::to_string(number);
 }
 
 /// True when no instance was unloaded that has a number in place of a name.
 bool has_all_numbered(const LoadedComponent& component) {
     std::size_t number = 0;
     for (const auto& instance : component.instances) {
-        if (listed_names(component.arguments[instance->load]).empty() &&
-            !instance->name.ends_with("." + std::to_string(number++))) {
+        if (component.loads[instance->load].names.empty() &&
+            !has_number(instance->name, number++)) {
             return false;
         }
     }
     return number == component.next_number;
+}
+
+/// Returns the elements of a comma list that belong to these instances; nothing when the list is
+/// too short for all of them.
+std::optional<std::string> elements_of(std::string_view list,
+                                       const std::vector<const Instance*>& instances) {
+    std::vector<std::string_view> elements;
+    for (std::size_t from = 0; from <= list.size();) {
+        const std::size_t end = std::min(list.find(',', from), list.size());
+        elements.push_back(list.substr(from, end - from));
+        from = end + 1;
+    }
+    std::optional<std::string> text;
+    for (const Instance* const instance : instances) {
+        if (instance->number >= elements.size()) break;
+        text = text ? *text + "," : "";
+        *text += elements[instance->number];
+    }
+    return text;
+}
+
+/// Returns the value that an argument has for what remains of its load; nothing when these instances
+/// are made without it.
+std::optional<std::string> value_for(const LoadArgument& argument,
+                                     const std::vector<const Instance*>& instances) {
+    switch (argument.use) {
+    case LoadArgument::Use::common: return argument.value;
+    case LoadArgument::Use::per_instance: return elements_of(argument.value, instances);
+    case LoadArgument::Use::count: return std::nullopt;  // names= gives it
+    }
+    return std::nullopt;
 }
 
 /// " names=a,c personality=1,3": instead of the arguments as they were written, for what remains.
@@ -145,31 +148,44 @@ std::string arguments_for(const std::vector<const Instance*>& instances, const L
                 comma + load.personalities[instance->number % load.personalities.size()];
         }
     }
-    for (const auto& [name, value] : load.arguments) {
-        text += " " + written(name + "=" + value);
+    for (const auto& [name, argument] : load.arguments) {
+        if (const auto value = value_for(argument, instances)) {
+            text += " " + written(name + "=" + *value);
+        }
     }
     return " names=" + names + (personalities.empty() ? "" : " personality=" + personalities) +
            text;
 }
 
+/// Returns true when a load of which something remains is saved as it was written: none of its
+/// instances was unloaded.
+bool is_complete(const LoadedComponent& component, std::size_t load, std::size_t remaining,
+                 bool all_numbered) {
+    constexpr auto one_only = HAL_COMPONENT_WHOLE_NAMES | HAL_COMPONENT_SINGLETON;
+    if (component.plugin->flags & one_only) return true;
+    const auto& names = component.loads[load].names;
+    return names.empty() ? all_numbered : remaining == names.size();
+}
+
 /// A loadrt for each by which the component was loaded, as far as its instances remain.
-void save_loads(Text& text, const LoadedComponent& component, const std::string& name) {
-    const bool whole =
-        !component.plugin || is_module(component) ||
-        (component.plugin->flags & (HAL_COMPONENT_WHOLE_NAMES | HAL_COMPONENT_SINGLETON)) != 0;
-    const bool all_numbered = whole || has_all_numbered(component);
+void save_loads(Text& text, const Model& model, const LoadedComponent& component,
+                const std::string& name) {
+    const bool has_instances = component.plugin && !is_module(component);
+    const bool all_numbered = has_instances && has_all_numbered(component);
     for (std::size_t i = 0; i < component.arguments.size(); ++i) {
         const std::string& arguments = component.arguments[i];
         const auto instances = remaining(component, i);
-        if (!whole && instances.empty()) continue;
-        const auto names = listed_names(arguments);
-        const bool complete = names.empty() ? all_numbered : instances.size() == names.size();
-        if (!whole && !complete) {
+        if (has_instances && instances.empty()) continue;
+        if (has_instances && !is_complete(component, i, instances.size(), all_numbered)) {
             text.add("loadrt {}{}\n", name, arguments_for(instances, component.loads[i]));
         } else if (arguments.empty()) {
             text.add("loadrt {}\n", name);
         } else {
             text.add("loadrt {} {}\n", name, arguments);
+        }
+        if (component.plugin) continue;
+        for (const std::string& thread : deleted_threads(model, component, i)) {
+            text.add("delthread {}\n", thread);
         }
     }
 }
@@ -195,10 +211,7 @@ void save_comp(Context& context, Text& text) {
     for (const LoadedComponent* const component : oldest_first) {
         if (component->process != 0) continue;
         const bool ambiguous = is_module(*component) && contains(ours, component->name);
-        save_loads(text, *component, (ambiguous ? "--linuxcnc " : "") + component->name);
-    }
-    for (const std::string& name : deleted_threads(model)) {
-        text.add("delthread {}\n", name);
+        save_loads(text, model, *component, (ambiguous ? "--linuxcnc " : "") + component->name);
     }
     for (const auto& thread : model.threads) {  // fastest first, so that periods fit
         if (!thread->component && !made_by_module(*thread, model)) {

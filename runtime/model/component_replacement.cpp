@@ -35,7 +35,8 @@ void swap_contents(Instance& a, Instance& b) {
                  &Instance::constructed, &Instance::started);
 }
 void swap_contents(LoadedComponent& a, LoadedComponent& b) {
-    swap_members(a, b, &LoadedComponent::plugin, &LoadedComponent::library, &LoadedComponent::path);
+    swap_members(a, b, &LoadedComponent::plugin, &LoadedComponent::library, &LoadedComponent::path,
+                 &LoadedComponent::loads);
 }
 
 /// Replaces a pointer by what stands for it, if anything does.

@@ -142,9 +142,21 @@ struct Instance {
     std::vector<PathDelay> path_delays;  ///< while it is started
 };
 
-/// What one loadrt gave its instances beside their names.
+/// An argument of a loadrt, and how its constructors declare it.
+struct LoadArgument {
+    enum class Use {
+        common,  ///< the same value for all instances
+        per_instance,  ///< a comma list with an element per instance
+        count,  ///< the number of instances
+    };
+    std::string value;
+    Use use = Use::common;
+};
+
+/// What one loadrt gave its instances.
 struct Load {
-    std::map<std::string, std::string> arguments;
+    std::vector<std::string> names;  ///< empty: numbered
+    std::map<std::string, LoadArgument> arguments;
     std::vector<std::string> personalities;
 };
 
@@ -156,7 +168,7 @@ struct LoadedComponent {
     std::shared_ptr<void> library;
     std::string path;
     std::vector<std::string> arguments;  ///< one text per loadrt, for `save`
-    std::vector<Load> loads;  ///< the same, taken apart, for `reload`
+    std::vector<Load> loads;  ///< the same, taken apart, for `save` and `reload`
     std::vector<std::unique_ptr<Instance>> instances;
     std::vector<std::unique_ptr<LoadedFunction>> functions;
     /// Pins of its instances without a function are used by the functions of all components that

@@ -99,6 +99,16 @@ void report_failure(const LoadedComponent& component, const LoadRequest& request
                       "", why.help);
 }
 
+/// Notes which of the arguments the constructor declares as lists or as the number of instances.
+void note_uses(Load& load, const Construction& c) {
+    for (const auto& [name, use] : c.uses) {
+        const auto argument = load.arguments.find(name);
+        if (argument != load.arguments.end()) {
+            argument->second.use = use;
+        }
+    }
+}
+
 // One instance: memory, constructor, declarations into the model.
 bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& request,
                    Sources& sources, Diagnostics& diagnostics, std::unique_ptr<Instance> instance,
@@ -141,6 +151,7 @@ bool construct_one(Edit& edit, LoadedComponent& component, const LoadRequest& re
     for (const auto& [function, step] : c.extended) {
         edit.extend_function(*function, step, made);
     }
+    note_uses(component.loads[made.load], c);
     return true;
 }
 
@@ -260,19 +271,34 @@ bool all_known(const LoadedComponent& component, const LoadRequest& request,
     return true;
 }
 
+namespace {
+
+/// The loads as they were given: a new version may declare their arguments otherwise.
+std::vector<Load> without_uses(std::vector<Load> loads) {
+    for (Load& load : loads) {
+        for (auto& [name, argument] : load.arguments) {
+            argument.use = LoadArgument::Use::common;
+        }
+    }
+    return loads;
+}
+
+}  // namespace
+
 bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, LoadedComponent& fresh,
                      Span at, const hal_faults* faults, Sources& sources,
                      Diagnostics& diagnostics) {
     edit.diagnostics = &diagnostics;
     const std::shared_ptr<void> storage = block_of(*fresh.plugin, old.instances.size());
+    fresh.loads = without_uses(old.loads);
     for (std::size_t i = 0; i < old.instances.size(); ++i) {
         const Instance& before = *old.instances[i];
         const Load& load = old.loads[before.load];
         LoadRequest request;
         request.at = at;
         request.faults = faults;
-        for (const auto& [name, value] : load.arguments) {
-            request.arguments.emplace(name, GivenArgument{value, at});
+        for (const auto& [name, argument] : load.arguments) {
+            request.arguments.emplace(name, GivenArgument{argument.value, at});
         }
         auto instance = std::make_unique<Instance>();
         instance->component = &fresh;
@@ -286,8 +312,7 @@ bool construct_again(Model& beside, Edit& edit, const LoadedComponent& old, Load
             load.personalities.empty()
                 ? ""
                 : load.personalities[before.number % load.personalities.size()];
-        Construction c{beside, request, *instance, before.number, personality, {}, {}, {}, {},
-                       0,      {},      {}};
+        Construction c{beside, request, *instance, before.number, personality};
         if (!construct_one(edit, fresh, request, sources, diagnostics, std::move(instance), c)) {
             return false;
         }
@@ -328,7 +353,7 @@ public:
             auto instance = new_instance(i);
             const std::string serial = name(*instance, i);
             const std::string personality = personality_of(i);
-            Construction c{model_, request_, *instance, i, personality, {}, {}, {}, {}, 0, {}, {}};
+            Construction c{model_, request_, *instance, i, personality};
             c.serial = serial;
             if (!construct_one(edit_, component_, request_, sources_, diagnostics_,
                                std::move(instance), c)) {
@@ -375,7 +400,7 @@ private:
         instance->loaded = request_.at;
         instance->memory = static_cast<char*>(storage_.get()) + in_block_++ * stride_of(plugin_);
         instance->storage = storage_;
-        instance->load = component_.loads.empty() ? 0 : component_.loads.size() - 1;
+        instance->load = component_.loads.size() - 1;
         instance->number = i;
         return instance;
     }
@@ -402,7 +427,7 @@ private:
     /// may.
     bool fits_lists(const Construction& first, std::size_t total) {
         if (first.list_length <= total) return true;
-        const auto list = request_.arguments.find(*first.lists.begin());
+        const auto list = request_.arguments.find(first.longest_list);
         if (list == request_.arguments.end()) return true;
         diagnostics_.error("bad-argument", list->second.at,
                            "argument '" + list->first + "' lists " +

@@ -104,6 +104,12 @@ bool take_function(const hal_host* host, const hal_function_decl* decl) {
     return true;
 }
 
+void note_list(Construction& c, const char* argument, std::size_t length) {
+    if (length <= c.list_length) return;
+    c.list_length = length;
+    c.longest_list = argument;
+}
+
 const char* find_argument(const hal_host* host, const hal_argument_decl* decl) {
     Construction& c = construction_of(host);
     c.asked.insert(decl->name);
@@ -114,8 +120,8 @@ const char* find_argument(const hal_host* host, const hal_argument_decl* decl) {
     if (given == c.request.arguments.end()) return decl->fallback;
     if (!(decl->flags & HAL_ARGUMENT_PER_INSTANCE)) return given->second.value.c_str();
     const auto elements = split(given->second.value, ',');
-    c.lists.insert(decl->name);
-    c.list_length = std::max(c.list_length, elements.size());
+    c.uses[decl->name] = LoadArgument::Use::per_instance;
+    note_list(c, decl->name, elements.size());
     if (c.number >= elements.size()) return decl->fallback;
     c.texts.push_back(elements[c.number]);
     return c.texts.back().c_str();
@@ -216,9 +222,11 @@ constexpr hal_naming naming_extension{sizeof naming_extension, name_instance,
     construction_of(host).whole_function_names = true;
 }, [](const hal_host* host, const char* argument, uint64_t instances) {
     Construction& c = construction_of(host);
-    guarded(c, false, [&] { return c.lists.insert(argument).second; });
-    c.list_length = std::max(c.list_length, static_cast<std::size_t>(instances));
     c.declared_count = static_cast<std::size_t>(instances);
+    guarded(c, false, [&] {
+        note_list(c, argument, c.declared_count);
+        return c.uses.emplace(argument, LoadArgument::Use::count).second;
+    });
 }, [](const hal_host* host) { return construction_of(host).instance.name.c_str(); }};
 
 hal_host host_for(Construction& c) {

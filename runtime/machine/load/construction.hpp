@@ -42,12 +42,14 @@ struct Construction {
     std::size_t number;                 // of this instance in the request
     std::string personality;
     // with the identity of their function
-    std::vector<std::pair<std::unique_ptr<Pin>, const void*>> pins;
-    std::vector<DeclaredFunction> functions;
-    std::set<std::string> asked, lists;  // arguments it asked for; those that are per instance
-    std::size_t list_length = 0;
+    std::vector<std::pair<std::unique_ptr<Pin>, const void*>> pins = {};
+    std::vector<DeclaredFunction> functions = {};
+    std::set<std::string> asked = {};    // arguments it asked for
+    std::size_t list_length = 0;         // of the longest list among them
+    std::string longest_list = {};       // its argument
+    std::map<std::string, LoadArgument::Use> uses = {};  // of those that are not common
     std::size_t declared_count = 0;  ///< instances by hal_naming::count; precedes the lists
-    std::vector<std::string> texts;      // keeps what argument() gave
+    std::vector<std::string> texts = {};  // keeps what argument() gave
     Failure failure = {};
     bool no_memory = false;
     std::string serial = {};             // of an instance that is named after its component

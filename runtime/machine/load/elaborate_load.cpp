@@ -49,7 +49,11 @@ void load_threads(Elaboration& on, const Token& name, Args args, const std::stri
     if (!component) {
         component = &on.edit.add_component("threads", name.span);
     }
-    on.edit.note_arguments(*component, written, {});
+    Load load;
+    for (const NewThread& thread : threads) {
+        load.names.push_back(thread.name);
+    }
+    on.edit.note_arguments(*component, written, std::move(load));
     for (NewThread& thread : threads) {
         fit_period(on.model, thread, on.diagnostics);
         if (Thread* const made = on.edit.add_thread({thread.name, thread.at}, thread.options)) {
@@ -204,8 +208,9 @@ bool make_instances(Elaboration& on, const Token& name, Origin origin, const Loa
     }
     Load load;
     for (const auto& [key, given] : request.arguments) {
-        load.arguments.emplace(key, given.value);
+        load.arguments.emplace(key, LoadArgument{given.value});
     }
+    load.names = request.names;
     load.personalities = request.personalities;
     on.edit.note_arguments(*component, written, std::move(load));
     return construct(on.model, on.edit, *component, request, on.sources, on.diagnostics);
