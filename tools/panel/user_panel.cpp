@@ -100,10 +100,14 @@ std::string UserPanel::write(std::string_view name, const Json& value) {
     }
     const auto i = static_cast<std::size_t>(at - layout_.pins.begin());
     shown_[i] = text_of(converted);
-    if (std::find(changed_.begin(), changed_.end(), i) == changed_.end()) {
+    if (!is_changed(i)) {
         changed_.push_back(i);
     }
     return "";
+}
+
+bool UserPanel::is_changed(std::size_t pin) const {
+    return std::ranges::find(changed_, pin) != changed_.end();
 }
 
 void UserPanel::page_active() {
@@ -205,12 +209,7 @@ void UserPanel::machine_line(std::string_view line, std::string_view) {
     }
     if (reply["id"] == 1 && good) {
         registered_ = true;
-        changed_.clear();
-        for (std::size_t i = 0; i < layout_.pins.size(); ++i) {
-            if (layout_.pins[i].output) {
-                changed_.push_back(i);
-            }
-        }
+        take_over(reply.value("values", Json::array()));
         if (on_values) {
             on_values(values());
         }
@@ -219,6 +218,21 @@ void UserPanel::machine_line(std::string_view line, std::string_view) {
         waiting_ = false;
         if (good) {
             inputs(reply.value("values", Json::array()));
+        }
+    }
+}
+
+void UserPanel::take_over(const Json& current) {
+    for (std::size_t i = 0; i < layout_.pins.size(); ++i) {
+        const PanelPin& pin = layout_.pins[i];
+        if (!pin.output || is_changed(i)) continue;
+        if (!pin.safe.is_null()) {
+            changed_.push_back(i);
+            continue;
+        }
+        Json kept;
+        if (i < current.size() && convert(pin, current[i], kept)) {
+            shown_[i] = text_of(kept);
         }
     }
 }

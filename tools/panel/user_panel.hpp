@@ -44,6 +44,10 @@ private:
     void machine_down() override;
     void machine_line(std::string_view line, std::string_view payload) override;
     void inputs(const nlohmann::json& values);
+    /// Adopts the machine's values of outputs without a safe value, which a panel that ended may
+    /// have left, unless a page has set them since. The other outputs are written.
+    void take_over(const nlohmann::json& current);
+    bool is_changed(std::size_t pin) const;
 
     PanelLayout layout_;
     std::string text_;
