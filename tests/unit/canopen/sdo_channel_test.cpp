@@ -39,8 +39,8 @@ TEST(SdoServer, Does_not_acknowledge_before_the_end_of_a_block_of_a_slow_client)
     turn(&start);
     for (unsigned segment = 0; segment < data.size() / 7; ++segment) {
         Frame f = make_frame(0x605, 8);
-        f.data[0] = static_cast<std::uint8_t>(segment % 127 + 1 |
-                                              (segment + 1 == data.size() / 7 ? 0x80 : 0));
+        const bool is_last = segment + 1 == data.size() / 7;
+        f.data[0] = static_cast<std::uint8_t>((segment % 127 + 1) | (is_last ? 0x80U : 0U));
         std::copy_n(data.begin() + segment * 7, 7, f.data.begin() + 1);
         turn(&f);
         if (segment % 127 == 60) {

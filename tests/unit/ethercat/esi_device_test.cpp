@@ -190,9 +190,9 @@ TEST_F(EsiDevice, The_servo_accepts_a_mapping_that_is_written_object_by_object) 
         {0x1a00, 0, 1, 1},          {0x1a01, 0, 1, 1},          {0x1c12, 1, 0x1600, 2},
         {0x1c12, 2, 0x1603, 2},     {0x1c13, 1, 0x1a00, 2},     {0x1c13, 2, 0x1a01, 2},
         {0x1c12, 0, 2, 1},          {0x1c13, 0, 2, 1}};
-    for (const Write& w : writes) {
-        ASSERT_EQ(download(w.index, w.sub, w.value, w.bytes), 0U)
-            << std::hex << w.index << ":" << unsigned{w.sub};
+    for (const Write& write : writes) {
+        ASSERT_EQ(download(write.index, write.sub, write.value, write.bytes), 0U)
+            << std::hex << write.index << ":" << unsigned{write.sub};
     }
     sync_manager(2, area(sii::SmType::outputs).start, 7, 0x64);
     sync_manager(3, area(sii::SmType::inputs).start, 6, 0x20);
