@@ -133,8 +133,10 @@ ROWS = {
         "components/bus/config",
         "components/bus/events",
     ],
+    "components/ethercat/recorded": ["components/ethercat/wire", "drivers/link"],
     "components/ethercat/plugins": [
         "components/ethercat/config",
+        "components/ethercat/recorded",
         "components/ethercat/devices",
         "components/bus/component",
         "drivers/tap",

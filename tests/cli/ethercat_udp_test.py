@@ -185,7 +185,7 @@ class Udp(Case):
 
 
 class Capture(Case):
-    """A capture has no slaves that answer; its frames can be listed."""
+    """The frames of a capture are listed, and its slaves answer a master."""
 
     def setUp(self):
         super().setUp()
@@ -194,7 +194,7 @@ class Capture(Case):
             "loadrt threads name1=bus period1=1000000\nloadrt ethercat_segment devices=servo link=sim:line\n"
             "loadrt ethercat config=one.ethercat\nloadrt segment_record link=sim:line file=seen.pcapng\n"
             "addf ethercat.0.receive bus\naddf ethercat.0.transmit bus\naddf ethercat-segment.0.update bus\naddf segment-record.0.update bus\n"
-            "start\nadvance 200ms\n",
+            "start\nadvance 500ms\n",
         )
         self.write(
             "one.ethercat",
@@ -216,14 +216,41 @@ class Capture(Case):
             ],
         )
 
-    def test_a_master_and_a_line_need_somebody_at_the_other_end(self):
+    def test_dump_states_the_direction_in_a_capture(self):
+        lines = self.good("ethercat", "dump", "seen.pcapng", "--count", "20").splitlines()
+        self.assertEqual(10 * ["->", "<-"], [line.split()[1] for line in lines])
+
+    def test_the_slaves_of_a_capture_answer_a_master(self):
         self.write(
             "again.hal",
             "loadrt threads name1=bus period1=1000000\nloadrt ethercat config=one.ethercat link=replay:seen.pcapng\n"
-            "addf ethercat.0.receive bus\naddf ethercat.0.transmit bus\nstart\nadvance 10ms\n",
+            "addf ethercat.0.receive bus\naddf ethercat.0.transmit bus\nstart\nadvance 2s\ngetp ethercat.0.x.operational\n",
         )
-        words = "replay:seen.pcapng is a capture, whose slaves do not answer; to see what is in it: hal ethercat dump FILE"
-        self.assertIn(words, self.bad("sim", "again.hal"))
+        done = self.run_program("sim", "again.hal")
+        self.assertEqual("TRUE\n", done.stdout, done.stderr)
+        self.assertIn("on replay:seen.pcapng\n", done.stderr)
+
+    def test_a_capture_without_answers_is_rejected(self):
+        self.write(
+            "other.hal",
+            "loadrt threads name1=bus period1=1000000\nloadrt segment_record link=sim:net0/recorder file=other.pcapng\n"
+            'loadrt tdma link=sim:net0/master station=master schedule="master:; cycle 1000; slot 0 100"\n'
+            "addf tdma.0.receive bus\naddf tdma.0.transmit bus\naddf segment-record.0.update bus\nstart\nadvance 50ms\n",
+        )
+        self.good("sim", "other.hal")
+        self.write(
+            "none.hal",
+            "loadrt threads name1=bus period1=1000000\nloadrt ethercat config=one.ethercat link=replay:other.pcapng\n"
+            "addf ethercat.0.receive bus\naddf ethercat.0.transmit bus\nstart\n",
+        )
+        self.assertIn(
+            "'ethercat.0' (ethercat) cannot start: other.pcapng has no EtherCAT frame that returned from slaves; capture both "
+            "directions at the interface of the master: tcpdump -i eth0 -w bus.pcap ether proto 0x88a4 [start-failed]\n",
+            self.bad("sim", "none.hal"),
+        )
+
+    def test_a_master_and_a_line_need_somebody_at_the_other_end(self):
+        words = "replay:seen.pcapng is a capture, whose slaves answer a master only; to see what is in it: hal ethercat dump FILE"
         self.assertEqual(
             f"hal ethercat scan: {words}\n", self.bad("ethercat", "scan", "replay:seen.pcapng")
         )

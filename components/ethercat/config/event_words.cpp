@@ -518,8 +518,14 @@ std::string no_link_words(const std::string& link) {
 
 std::string recorded_words(const std::string& link) {
     return link +
-           " is a capture, whose slaves do not answer; to see what is in it: hal ethercat dump "
-           "FILE";
+           " is a capture, whose slaves answer a master only; to see what is in it: hal ethercat "
+           "dump FILE";
+}
+
+std::string unanswered_words(const std::string& file) {
+    return file +
+           " has no EtherCAT frame that returned from slaves; capture both directions at the "
+           "interface of the master: tcpdump -i eth0 -w bus.pcap ether proto 0x88a4";
 }
 
 std::string slave_words(std::uint32_t slave, const master::Setup& setup) {

@@ -46,4 +46,7 @@ std::string no_link_words(const std::string& link);
 /// Returns the sentence for a link that is a capture, for a program that needs answers. [setup]
 std::string recorded_words(const std::string& link);
 
+/// Returns the sentence for a capture without answers of slaves. [setup]
+std::string unanswered_words(const std::string& file);
+
 }  // namespace hal::ethercat::config

@@ -23,9 +23,11 @@
 #include "ethercat/plugins/entry_pins.hpp"
 #include "ethercat/plugins/eoe_interfaces.hpp"
 #include "ethercat/plugins/ethercat_arguments.hpp"
+#include "ethercat/recorded/recorded_port.hpp"
 #include "ethercat/wire/registers.hpp"
 #include "hal/clock.hpp"
 #include "hal/reporter.hpp"
+#include "link/ethernet_capture.hpp"
 
 namespace hal::ethercat {
 
@@ -326,12 +328,20 @@ private:
 
     static std::unique_ptr<hal::ethernet::Port> open(const std::string& address,
                                                      const hal::ethernet::Options& options) {
-        if (hal::ethernet::describe(address).recorded) {
-            throw std::runtime_error(config::recorded_words(address));
-        }
+        if (hal::ethernet::describe(address).recorded) return open_recorded(address);
         auto opened = hal::ethernet::open(address, options);
         if (!opened) throw std::runtime_error(opened.problem);
         return std::move(opened.port);
+    }
+
+    /// Opens a capture: its slaves answer. [setup]
+    static std::unique_ptr<hal::ethernet::Port> open_recorded(const std::string& address) {
+        const std::string file = hal::ethernet::describe(address).interface;
+        const hal::ethernet::Capture capture = hal::ethernet::read_capture(file);
+        if (!capture.problem.empty()) throw std::runtime_error(capture.problem);
+        auto port = std::make_unique<RecordedPort>(address, capture.frames);
+        if (port->answers() != 0) return port;
+        throw std::runtime_error(config::unanswered_words(file));
     }
 
     /// Lets other programs reach the mailboxes of the slaves. [setup]

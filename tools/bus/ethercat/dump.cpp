@@ -10,6 +10,7 @@
 #include "bus/ethercat/words.hpp"
 #include "cli/output.hpp"
 #include "cli/signals.hpp"
+#include "ethercat/recorded/frame_directions.hpp"
 #include "hal/clock.hpp"
 #include "link/ethernet.hpp"
 #include "link/ethernet_capture.hpp"
@@ -23,14 +24,15 @@ using namespace hal::ethercat;
 /// Prints the datagrams of frames.
 class Dump {
 public:
-    explicit Dump(const EthercatDumpOptions& options) : options_(options) {}
+    Dump(const EthercatDumpOptions& options, bool is_live) : options_(options), is_live_(is_live) {}
 
     /// Returns false when nothing more is wanted.
     bool frame(std::int64_t time_ns, std::span<std::uint8_t> bytes) {
-        // the first slave marks the source address
-        const bool passed = bytes.size() > 6 && (bytes[6] & 0x02) != 0;
         FrameReader reader(bytes);
         if (!reader.valid()) return true;
+        // what an interface receives has passed the slaves, the first of which marks its address
+        const bool is_marked = bytes.size() > 6 && (bytes[6] & 0x02) != 0;
+        const bool passed = is_live_ ? is_marked : directions_.take(bytes).returned;
         if (first_ns_ < 0) {
             first_ns_ = time_ns;
         }
@@ -102,6 +104,8 @@ private:
     }
 
     const EthercatDumpOptions& options_;
+    const bool is_live_;
+    FrameDirections directions_;
     std::int64_t first_ns_ = -1;
     std::uint64_t frames_ = 0;
     std::uint64_t datagrams_ = 0;
@@ -112,7 +116,7 @@ int dump_file(const EthercatDumpOptions& options, const std::string& file) {
     if (!capture.problem.empty() && capture.frames.empty()) {
         return fail(options, fmt::format("{}: {}", file, capture.problem));
     }
-    Dump dump(options);
+    Dump dump(options, false);
     for (ethernet::Captured frame : capture.frames) {
         if (!dump.frame(frame.time_ns, frame.bytes)) break;
     }
@@ -151,7 +155,7 @@ int run_ethercat_dump(const EthercatDumpOptions& options) {
     StopRequest stop;
     auto opened = ethernet::open(what, how);
     if (!opened) return fail(options, opened.problem);
-    Dump dump(options);
+    Dump dump(options, !about.recorded);
     std::vector<std::uint8_t> bytes;
     const std::int64_t began = monotonic_ns();
 
