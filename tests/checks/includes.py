@@ -61,6 +61,7 @@ ROWS = {
         "components/fieldbus/tdma/tunnel",
         "components/fieldbus/scocan/plan",
         "components/ethercat/master",
+        "components/ethercat/recorded",
         "components/ethercat/devices",
         "components/ethercat/config",
     ],  # hal can, ethercat, node, tdma

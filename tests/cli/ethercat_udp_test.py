@@ -237,7 +237,7 @@ class Capture(Case):
             'loadrt tdma link=sim:net0/master station=master schedule="master:; cycle 1000; slot 0 100"\n'
             "addf tdma.0.receive bus\naddf tdma.0.transmit bus\naddf segment-record.0.update bus\nstart\nadvance 50ms\n",
         )
-        self.good("sim", "other.hal")
+        self.run_program("sim", "other.hal")
         self.write(
             "none.hal",
             "loadrt threads name1=bus period1=1000000\nloadrt ethercat config=one.ethercat link=replay:other.pcapng\n"
