@@ -348,11 +348,38 @@ private:
     std::vector<std::uint32_t> configured_modules(const Line& line) {
         std::vector<std::uint32_t> idents;
         for (const Word& word : list_of(line.value)) {
-            if (const auto ident = module_ident(word)) {
-                idents.push_back(*ident);
-            }
+            const auto ident = module_ident(word);
+            if (!ident) continue;
+            check_slot(word, idents.size(), *ident);
+            idents.push_back(*ident);
         }
         return idents;
+    }
+
+    /// Reports a module without a slot, and one that its slot does not name.
+    void check_slot(const Word& word, std::size_t number, std::uint32_t ident) {
+        const auto& slots = device_->slots;
+        if (slots.empty()) return;
+        if (number >= slots.size()) {
+            report_.error(Topic::slave, word.at,
+                          "module '" + word.text + "' has no slot: '" + device_->order + "' has " +
+                              std::to_string(slots.size()),
+                          "leave it out");
+            return;
+        }
+        const auto& modules = slots[number].modules;
+        const bool is_named = std::find(modules.begin(), modules.end(), ident) != modules.end();
+        if (ident == 0 || modules.empty() || is_named) return;
+        std::vector<std::string> names;
+        for (const esi::Module& m : file_->modules) {
+            if (std::find(modules.begin(), modules.end(), m.ident) != modules.end()) {
+                names.push_back(m.type);
+            }
+        }
+        report_.warning(Topic::slave, word.at,
+                        "slot " + std::to_string(number + 1) + " of '" + device_->order +
+                            "' does not name module '" + word.text + "'",
+                        "the modules of the slot are: " + listed(names));
     }
 
     /// Returns the number of a module, 0 for an empty slot; nothing after reporting an unknown one.

@@ -170,6 +170,41 @@ TEST(EthercatConfig, A_mapping_that_start_up_commands_write_is_restored) {
     EXPECT_FALSE(pdos[1].write_mapping);
 }
 
+bool read_modular(const std::string&, std::string& bytes) {
+    const auto module = [](const char* ident, const char* type) {
+        return std::string("<Module><Type ModuleIdent='") + ident + "'>" + type +
+               "</Type></Module>";
+    };
+    bytes =
+        "<EtherCATInfo><Vendor><Id>2</Id></Vendor><Descriptions><Devices><Device>"
+        "<Type ProductCode='7'>BOX</Type><Slots DownloadModuleIdentList='0'>"
+        "<Slot><ModuleIdent Default='1'>1</ModuleIdent></Slot></Slots></Device></Devices>"
+        "<Modules>" +
+        module("1", "IN") + module("2", "OUT") + "</Modules></Descriptions></EtherCATInfo>";
+    return true;
+}
+
+TEST(EthercatConfig, Modules_that_do_not_fit_are_reported) {
+    const auto messages = [](const std::string& modules) {
+        const Reading r = read("[bus]\n[slave 0 a]\nesi = box.xml\nmodules = " + modules + "\n",
+                               "m.ethercat", read_modular);
+        std::string text;
+        for (const Message& m : r.messages) {
+            text += text::message_text("", m.severity, m.at, m.sentence, m.help) + "\n";
+        }
+        EXPECT_TRUE(!r.good() || r.buses.at(0).setup.slaves.at(0).startup.empty())
+            << "the device wants no module list";
+        return text;
+    };
+    EXPECT_EQ(messages("IN"), "");
+    EXPECT_EQ(messages("IN, OUT"),
+              ":4:15: error: module 'OUT' has no slot: 'BOX' has 1; leave it out\n");
+    EXPECT_EQ(messages("OUT"),
+              ":4:11: warning: slot 1 of 'BOX' does not name module 'OUT'; the modules of the slot "
+              "are: IN\n");
+    EXPECT_EQ(messages("INN"), ":4:11: error: unknown module 'INN'; did you mean 'IN'?\n");
+}
+
 TEST(EthercatConfig, A_product_with_several_types_and_an_unknown_revision_are_reported) {
     const auto first = [](const std::string& lines) {
         const Reading r =
