@@ -27,6 +27,14 @@ def text_of(element, tag):
     return "" if child is None else (child.text or "").strip()
 
 
+def number_text(text):
+    """A number of an ESI as hexadecimal, in one spelling; the text itself where it is none."""
+    try:
+        return hex(int(text.strip().lower().replace("#x", "0x"), 0))
+    except ValueError:
+        return text
+
+
 def devices_of(path):
     """What selects each type of device of a file: its order code, its name or its product code. Nothing for other XML files."""
     try:
@@ -40,7 +48,7 @@ def devices_of(path):
         kind = next((child for child in device if local(child) == "Type"), None)
         if kind is None:
             continue
-        code = (kind.get("ProductCode") or "0").lower().replace("#x", "0x")
+        code = number_text(kind.get("ProductCode") or "0")
         order = (kind.text or "").strip()
         types[order.lower(), code] = (order, text_of(device, "Name"), code)
     columns = [
