@@ -195,9 +195,8 @@ public:
                 [this](std::size_t n) -> const master::BusSlave& { return master_->found(n); });
         }
         entries_.show(areas_);
-        for (const SlaveChannel& channel : channels_) {
-            channel.channel->read(image_of(channel.slave, cycle));
-        }
+        each_channel(
+            cycle, [](Channel& channel, const SlaveImage& image) noexcept { channel.read(image); });
     }
 
     void transmit(hal::Cycle cycle) noexcept {
@@ -211,9 +210,9 @@ public:
         // The thread was declared hung, but its cycle goes on.
         if (interrupted()) return;
         entries_.take(areas_);
-        for (const SlaveChannel& channel : channels_) {
-            channel.channel->write(image_of(channel.slave, cycle));
-        }
+        each_channel(cycle, [](Channel& channel, const SlaveImage& image) noexcept {
+            channel.write(image);
+        });
         copy_frames();
         if (eoe_) {
             eoe_->step(*master_);
@@ -245,6 +244,20 @@ private:
         std::size_t slave;
         std::unique_ptr<Channel> channel;
     };
+    /// Calls `action` with each channel, in the order of the slaves. [realtime]
+    template <class Action>
+    void each_channel(hal::Cycle cycle, Action action) const noexcept {
+        std::size_t slave = slaves_.size();
+        SlaveImage image;
+        for (const SlaveChannel& channel : channels_) {
+            if (channel.slave != slave) {
+                slave = channel.slave;
+                image = image_of(slave, cycle);
+            }
+            action(*channel.channel, image);
+        }
+    }
+
     /// A config::FrameCopy in the process data.
     struct Copy {
         std::size_t from_slave;
