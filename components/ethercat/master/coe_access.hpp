@@ -52,6 +52,9 @@ public:
     virtual Task<SdoResult> set_ip(Channel&, BusSlave&, const eoe::Ip&) noexcept {
         co_return SdoResult{SdoResult::Outcome::refused};
     }
+    /// Forgets the counters of the mailbox and ends the exchange under way, after the sync managers
+    /// of the slave were configured anew. [realtime]
+    virtual void reset_mailbox(const BusSlave&) noexcept {}
 };
 
 }  // namespace hal::ethercat::master

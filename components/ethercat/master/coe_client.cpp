@@ -79,6 +79,12 @@ Task<SdoResult> CoeClient::write_other(Channel& channel, BusSlave& slave,
     co_return result;
 }
 
+void CoeClient::reset_mailbox(const BusSlave& slave) noexcept {
+    if (SlaveMailbox* const mailbox = mailboxes_.find(slave)) {
+        mailbox->reset();
+    }
+}
+
 Task<SdoResult> CoeClient::upload(Channel& channel, BusSlave& slave, std::uint16_t index,
                                   std::uint8_t sub, bool complete,
                                   std::span<std::uint8_t> to) noexcept {

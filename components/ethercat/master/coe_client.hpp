@@ -56,6 +56,7 @@ public:
     Task<SdoResult> set_ip(Channel& channel, BusSlave& slave, const eoe::Ip& ip) noexcept override {
         return eoe_.set_ip(channel, slave, ip);
     }
+    void reset_mailbox(const BusSlave&) noexcept override;
 
 private:
     Task<SdoResult> upload_segments(Channel&, BusSlave&, SlaveMailbox&, std::uint16_t index,

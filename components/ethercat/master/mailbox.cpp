@@ -66,6 +66,7 @@ Task<MailboxResult> SlaveMailbox::send(Channel& channel, BusSlave& slave, Mailbo
     unsigned absent = 0;
     bool unknown = false;  // a lost datagram may have been executed
     for (;;) {
+        if (interrupted_) co_return failed(MailboxResult::Outcome::timed_out);
         std::memcpy(channel.data(), request_.data(), mailbox_header_bytes + length);
         std::memset(channel.data() + mailbox_header_bytes + length, 0,
                     size - mailbox_header_bytes - length);
@@ -101,6 +102,7 @@ Task<MailboxResult> SlaveMailbox::receive(Channel& channel, BusSlave& slave,
     if (!slave.area().usable()) co_return refused();
     unsigned absent = 0;
     for (;;) {
+        if (interrupted_) co_return failed(MailboxResult::Outcome::timed_out);
         Full full = Full::lost;
         // loss at regular intervals must not hit each read: vary the number of datagrams before it
         if (lost_reads_ % 3 != 0) {
@@ -141,7 +143,7 @@ Task<MailboxResult> SlaveMailbox::wait_for(Channel& channel, BusSlave& slave, Ma
     for (;;) {
         const MailboxResult result = co_await receive(channel, slave, until);
         if (!result) {
-            stale_ = true;  // the reply may still come
+            stale_ = !interrupted_;  // the reply may still come
             co_return result;
         }
         if (reply_.type == MailboxType::error) {
@@ -207,14 +209,14 @@ Task<bool> SlaveMailbox::repeat(Channel& channel, BusSlave& slave, std::int64_t 
             answer = co_await channel.exchange(Command::fpwr, address, 1);
             toggled = answer && answer.wkc != 0;
         }
-        if (!toggled && channel.now_ns() >= until_ns) co_return false;
+        if (interrupted_ || (!toggled && channel.now_ns() >= until_ns)) co_return false;
     }
     for (;;) {
         const Answer answer = co_await channel.exchange(Command::fprd, address, 2);
         if (answer && answer.wkc != 0 && ((channel.data()[1] ^ wanted) & sm_repeat) == 0) {
             co_return true;
         }
-        if (channel.now_ns() >= until_ns) co_return false;
+        if (interrupted_ || channel.now_ns() >= until_ns) co_return false;
     }
 }
 

@@ -63,7 +63,10 @@ public:
     class Hold {
     public:
         Hold() = default;
-        explicit Hold(SlaveMailbox& mailbox) noexcept : mailbox_(&mailbox) { mailbox.held_ = true; }
+        explicit Hold(SlaveMailbox& mailbox) noexcept : mailbox_(&mailbox) {
+            mailbox.held_ = true;
+            mailbox.interrupted_ = false;
+        }
         Hold(Hold&& o) noexcept : mailbox_(std::exchange(o.mailbox_, nullptr)) {}
         Hold& operator=(Hold&& o) noexcept {
             std::swap(mailbox_, o.mailbox_);
@@ -122,13 +125,15 @@ public:
     /// Sets the consumer of messages to another station than the master. [setup]
     void set_router(MailboxSink* router) noexcept { router_ = router; }
     const MailboxCounters& counters() const noexcept { return counters_; }
-    /// Forgets what is under way, after the slave's sync managers were configured anew.
+    /// Forgets what is under way, after the slave's sync managers were configured anew: its first
+    /// message repeats a counter. The exchange of the present holder times out at once.
     void reset() noexcept {
+        interrupted_ = held_;
         stale_ = false;
         advances_ = false;
         repeats_counter_ = false;
-
-        last_counter_ = lost_reads_ = 0;
+        last_counter_ = 0;
+        lost_reads_ = 0;
     }
 
 private:
@@ -160,6 +165,8 @@ private:
     // it sends different messages with the same counter: not to be relied on
     bool repeats_counter_ = false;
     bool held_ = false;
+    // reset() came after the present hold: the slave no longer knows of its exchange
+    bool interrupted_ = false;
     bool stale_ = false;
 };
 

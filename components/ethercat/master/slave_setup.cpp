@@ -86,7 +86,7 @@ Task<void> clear_process_data(Channel& c, Bus& bus, Device& d) noexcept {
     bus.image.set_counting(static_cast<std::size_t>(d.slave.configured), false, false, false);
 }
 
-Task<bool> set_mailbox(Channel& c, Bus&, Device& d) noexcept {
+Task<bool> set_mailbox(Channel& c, Bus& bus, Device& d) noexcept {
     const MailboxArea& m = d.slave.area();
     d.slave.mailbox_status = nullptr;  // the FMMU that carried it is cleared
     if (!m.usable()) co_return true;
@@ -94,7 +94,9 @@ Task<bool> set_mailbox(Channel& c, Bus&, Device& d) noexcept {
     put_sync_manager(c.data() + 8, m.in_start, m.in_size, mailbox_in_control);
     const Answer a = co_await c.exchange(Command::fpwr,
                                          at_station(d.slave.station, registers::sync_manager), 16);
+    // the slave counts from 1 again, and answers nothing that was requested before
     d.slave.mailbox_counter = 0;
+    bus.coe.reset_mailbox(d.slave);
     co_return a.wkc == 1;
 }
 

@@ -94,6 +94,10 @@ public:
     const hal::ethernet::Address& address() const noexcept override { return mine_; }
     hal::ethernet::Sent send(std::span<const std::uint8_t> frame, const hal::ethernet::Launch&,
                              std::int64_t now_ns) noexcept override {
+        if (now_ns == hal::ethernet::unclocked) {
+            now_ns = last_ns_;
+        }
+        last_ns_ = now_ns;
         copy_.assign(frame.begin(), frame.end());
         const bool hit = fault != Fault::none && has(copy_, kind) && ++seen_ % every == 0;
         hits += hit ? 1 : 0;
@@ -169,6 +173,7 @@ private:
     std::vector<std::uint8_t> current_, copy_, spare_;
     std::uint64_t seen_ = 0;
     std::uint64_t order_ = 0;
+    std::int64_t last_ns_ = 0;
 };
 
 /// Keeps the newest events only, in one place of memory.
