@@ -136,7 +136,6 @@ void ProcessImage::build() noexcept {
     if (frames_used_ == 0) {
         build_frames(1);  // for the clock alone
     }
-    set_reference(reference_, write_time_);
     recount();
 }
 
@@ -264,25 +263,20 @@ void ProcessImage::clear_mailbox_status(std::size_t slave) noexcept {
 void ProcessImage::set_reference(std::uint16_t station, bool write_time) noexcept {
     reference_ = station;
     write_time_ = write_time;
-    const auto address = [&](Frame& f, std::uint16_t at, Command command) {
-        if (at == 0) return;
-        f.bytes[at] = static_cast<std::uint8_t>(station != 0 ? command : Command::nop);
-        put(&f.bytes[at + 2U], at_station(station, registers::dc_system_time));
-    };
-    for (Frame& f : frames()) {
-        address(f, f.clock_write, write_time ? Command::fpwr : Command::nop);
-        address(f, f.clock_read, Command::frmw);
-    }
 }
 
-void ProcessImage::fill(Frame& frame, std::uint8_t index, std::uint64_t dc_time_ns) noexcept {
-    const auto clock = [&](std::uint16_t at) {
+void ProcessImage::fill(Frame& frame, std::uint8_t index,
+                        std::optional<std::uint64_t> dc_time_ns) noexcept {
+    const bool has_time = dc_time_ns && reference_ != 0;
+    const auto clock = [&](std::uint16_t at, Command command) {
         if (at == 0) return;
+        frame.bytes[at] = static_cast<std::uint8_t>(has_time ? command : Command::nop);
         frame.bytes[at + 1U] = index;
-        put(&frame.bytes[at + datagram_header_bytes], dc_time_ns);
+        put(&frame.bytes[at + 2U], at_station(reference_, registers::dc_system_time));
+        put(&frame.bytes[at + datagram_header_bytes], dc_time_ns.value_or(0));
     };
-    clock(frame.clock_write);
-    clock(frame.clock_read);
+    clock(frame.clock_write, write_time_ ? Command::fpwr : Command::nop);
+    clock(frame.clock_read, Command::frmw);
     for (unsigned n = frame.first; n < frame.last; ++n) {
         Datagram& d = datagrams_[n];
         std::uint8_t* header = &frame.bytes[d.offset];

@@ -11,6 +11,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -98,13 +99,14 @@ public:
     /// Clears the inputs of a lost slave's mailbox status, so that no client waits for a missing
     /// mail. [realtime]
     void clear_mailbox_status(std::size_t slave) noexcept;
-    /// Addresses the datagrams of the reference clock; 0: nobody. [realtime]
+    /// Sets the slave with the reference clock, for the frames that are filled from now on; 0: none.
+    /// `write_time`: it gets the time of fill(). [realtime]
     void set_reference(std::uint16_t station, bool write_time) noexcept;
 
     std::span<Frame> frames() noexcept { return {frames_.data(), frames_used_}; }  ///< [realtime]
-    /// Copies outputs into a frame that is about to leave, with its index and the time for the
-    /// reference clock. [realtime]
-    void fill(Frame& frame, std::uint8_t index, std::uint64_t dc_time_ns) noexcept;
+    /// Copies outputs into a frame that is about to leave, with its index and the time at which it
+    /// leaves; nullopt: it distributes no time. [realtime]
+    void fill(Frame& frame, std::uint8_t index, std::optional<std::uint64_t> dc_time_ns) noexcept;
     /// Returns whether `answer` has the datagrams of `frame`. [realtime]
     bool matches(const Frame& frame, std::span<const std::uint8_t> answer) const noexcept;
     /// Takes the inputs and counters of an answer that matches. [realtime]

@@ -139,6 +139,10 @@ void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domai
     sent_after_ns_ = now_ns - cycle_start_ns_;
     now_ns_ = now_ns;
     std::size_t cyclic_bytes = 0;
+    // Frames behind the first one leave later than at this time, and slaves before the reference
+    // clock follow it. They distribute it all the same while the first one may be lost.
+    const bool first_returned = clock_.fresh;
+    std::optional<std::uint64_t> time = dc_time_ns;
     if (process_data) {
         const auto frames = image_.frames();
         for (std::size_t n = 0; n < frames.size(); ++n) {
@@ -146,7 +150,10 @@ void WireEngine::transmit(std::int64_t now_ns, bool process_data, bool all_domai
             if (!all_domains && frame.every > 1 && cycle_ % frame.every != 0) continue;
             const int index = take_index();
             if (index < 0) break;
-            image_.fill(frame, static_cast<std::uint8_t>(index), dc_time_ns);
+            image_.fill(frame, static_cast<std::uint8_t>(index), time);
+            if (first_returned) {
+                time.reset();
+            }
             Flight& f = flights_[static_cast<std::size_t>(index)];
             f.copies = send({frame.bytes.data(), frame.size}, true);
             cyclic_bytes += frame.size + frame_overhead;
