@@ -28,7 +28,7 @@ def text_of(element, tag):
 
 
 def number_text(text):
-    """A number of an ESI as hexadecimal, in one spelling; the text itself where it is none."""
+    """A number of an ESI as hexadecimal, in one spelling; an invalid number as it is."""
     try:
         return hex(int(text.strip().lower().replace("#x", "0x"), 0))
     except ValueError:
