@@ -459,5 +459,47 @@ TEST(Runner, What_came_while_no_cycles_ran_is_dropped) {
     EXPECT_TRUE(w.runner.operational(0));
 }
 
+struct RunnerRestart : testing::TestWithParam<Time> {};
+
+TEST_P(RunnerRestart, Is_operational_again_whenever_the_boot_before_was_stopped) {
+    constexpr int limit = 30'000;
+    Wire w;
+    w.node->faults().set(Fault::late_sdo, {.every = GetParam() != 0 ? 1U : 0U, .time = GetParam()});
+    const auto boot = [&] {
+        int cycles = 0;
+        while (cycles < limit && !w.runner.operational(0)) {
+            w.step();
+            ++cycles;
+        }
+        return cycles;
+    };
+    const auto stop = [&] {
+        w.runner.make_safe();
+        for (int n = 0; n < 10; ++n) {  // the node goes on
+            w.now += millisecond;
+            w.node->turn(w.now);
+        }
+        w.runner.receive(w.now);  // the cycle that begins anew
+    };
+    ASSERT_LT(boot(), limit);
+    stop();
+    const int usual = boot();
+    ASSERT_GT(usual, 0);
+    ASSERT_LT(usual, limit);
+    int after = 1;
+    while (after <= usual) {
+        stop();
+        for (int n = 0; n < after; ++n) {
+            w.step();
+        }
+        stop();
+        ASSERT_LE(boot(), usual + 1'000) << "stopped " << after << " ms after the start";
+        after += after < 60 ? 1 : 1 + usual / 50;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(LateAnswers, RunnerRestart,
+                         testing::Values(0, 5 * millisecond, 20 * millisecond, 100 * millisecond));
+
 }  // namespace
 }  // namespace hal::canopen::test
