@@ -13,7 +13,7 @@ TABLE = (
     "node bridge A bridge; node watch B monitor; mode 0 run; 0 sync; "
     '1 private n 0x100; message a 0x100 fields x:f64"'
 )
-# Arguments of components that are not made with their defaults, or whose instances would not differ.
+# Arguments of components that are not made with their defaults, or make two equal instances.
 GIVEN = {
     "can-receive": "id=256,300",
     "can-send": "id=256,300 link=sim:a,sim:b",
