@@ -390,9 +390,9 @@ TEST(DeviceLine, Description_reports_what_is_invalid) {
          "'servo' is a device of its own; write it on the next line, or after a comma",
          "options of coupler: alias serial"},
         {"esi file=", "option 'file' has no value; write file=FILE.xml",
-         "options of esi: file device revision alias serial"},
+         "options of esi: file device revision modules alias serial"},
         {"esi device=", "option 'device' has no value; write device=NAME",
-         "options of esi: file device revision alias serial"},
+         "options of esi: file device revision modules alias serial"},
         {"# only a comment", "the line has no device", "write one device per line"},
     };
     for (const auto& row : rows) {
