@@ -285,6 +285,9 @@ constexpr bus::EventRow<Event> event_rows[] = {
     {Event::dc_timeout, Effect::none,
      "{who} deviates by {deviation} from the reference clock, more than the window of {window}; it "
      "is not started: check the cycle of the thread{sync_window}"},
+    {Event::dc_tolerated, Effect::none,
+     "{who} deviates by {deviation} from the reference clock, more than the window of {window}; it "
+     "is started, because 10 us are tolerable: check the cycle of the thread{sync_window}"},
     {Event::dc_not_set, Effect::none,
      "{who} has a clock that could not be set within {first} ms: its receive times were not "
      "readable, or the ring is broken; it is not started: check its cables, or {no_dc}"},

@@ -193,6 +193,8 @@ Task<bool> map_process_data(Channel&, Bus&, Device&) noexcept;
 Task<void> start_clocks(Channel&, Bus&) noexcept;
 /// Waits for a clock to be within the window.
 Task<bool> synchronise(Channel&, Bus&, Device&) noexcept;
+/// Reports a clock that synchronise() accepted outside the window.
+void report_tolerated_clock(Bus&, const Device&) noexcept;
 Task<bool> start_sync_signals(Channel&, Bus&, Device&) noexcept;
 /// Takes the time of the reference clock that the newest frame carried.
 void take_clock(Bus&) noexcept;

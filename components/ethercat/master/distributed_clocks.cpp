@@ -260,6 +260,14 @@ Task<bool> synchronise(Channel& c, Bus& bus, Device& d) noexcept {
     co_return true;
 }
 
+void report_tolerated_clock(Bus& bus, const Device& d) noexcept {
+    const Slave* config = bus.config(d);
+    if (config == nullptr || !config->dc || d.slave.number == bus.reference) return;
+    const std::int64_t deviation = d.status.dc_deviation_ns;
+    if (deviation <= bus.setup.sync_window_ns) return;
+    bus.report(Event::dc_tolerated, d, deviation, bus.setup.sync_window_ns);
+}
+
 Task<bool> start_sync_signals(Channel& c, Bus& bus, Device& d) noexcept {
     const Slave& config = *bus.config(d);
     d.sync_begins_ns = 0;

@@ -51,6 +51,8 @@ enum class Event : std::uint8_t {
     dc_unsupported,  ///< configured, but the slave has no clock
     /// clock not within the window in time [deviation ns, window ns]
     dc_timeout,
+    /// clock not within the window in time, but near enough to start [deviation ns, window ns]
+    dc_tolerated,
     dc_not_set,  ///< the time of its clock could not be set [ms waited, -]
     /// clock far beyond the window while operational [deviation ns, window ns]
     dc_lost,

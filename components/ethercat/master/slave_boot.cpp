@@ -76,6 +76,7 @@ Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
     // a clock may have jumped while the slave waited for its SYNC signals
     ok = co_await synchronise(c, bus, d);
     if (!ok) co_return false;
+    report_tolerated_clock(bus, d);
     bus.note_in_op(d, true);
     ok = co_await request_state(c, bus, d, State::op, t.to_safeop_op);
     if (!ok) co_return false;

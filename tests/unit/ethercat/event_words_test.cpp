@@ -71,6 +71,10 @@ TEST(EthercatEventWords, Objects_and_aborts_are_written_as_in_the_standard) {
               "reference clock, "
               "more than 10 us; check that the thread misses no cycles, and its manual for what it "
               "does without synchronisation");
+    EXPECT_EQ(words(Event::dc_tolerated, 1, 3'000, 1'000),
+              "slave 4 (x-axis) deviates by 3 us from the reference clock, more than the window of "
+              "1 us; it is started, because 10 us are tolerable: check the cycle of the thread, or "
+              "raise `sync-window`");
     EXPECT_EQ(
         words(Event::dc_not_set, 1, 5000),
         "slave 4 (x-axis) has a clock that could not be set within 5000 ms: its receive times were "

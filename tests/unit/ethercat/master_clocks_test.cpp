@@ -203,6 +203,29 @@ TEST(EthercatClocks, A_slave_out_of_step_waits_in_SAFE_OP_where_the_setup_says_s
     EXPECT_EQ(w.log.count(Event::dc_lost), 2U) << "again";
 }
 
+TEST(EthercatClocks, A_slave_that_starts_with_its_clock_outside_the_window_is_reported) {
+    World w;
+    for (unsigned n = 0; n < 2; ++n) {
+        w.add(0x100 + n);
+    }
+    auto setup = with_clocks(2);
+    setup.sync_window_ns = 10;
+    w.begin(setup);
+    std::int64_t jump_ns = 3'000;
+    for (unsigned n = 0; n < 20'000 && !w.master->status().operational; ++n) {
+        w.cycle();
+        if (n % 5 == 0) {
+            w.line.controller(1).jump_clock(jump_ns, w.now_ns);
+            jump_ns = -jump_ns;
+        }
+    }
+    ASSERT_TRUE(w.master->status().operational) << w.log.text();
+    ASSERT_EQ(w.log.count(Event::dc_tolerated), 1U) << w.log.text();
+    EXPECT_EQ(w.log.last(Event::dc_tolerated)->slave, 1U);
+    EXPECT_GT(w.log.last(Event::dc_tolerated)->first, 10);
+    EXPECT_EQ(w.log.last(Event::dc_tolerated)->second, 10);
+}
+
 TEST(EthercatClocks, A_slave_that_stays_out_of_step_is_started_anew) {
     World w;
     for (unsigned n = 0; n < 2; ++n) {
