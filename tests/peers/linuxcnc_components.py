@@ -46,6 +46,7 @@ ORDER = (
 )  # of functions in the thread; the others follow by name
 WITNESS_CYCLES = 400
 CRASHED = "LinuxCNC's module crashed or hung"
+ENDS = ("crashed", "hangs", f"SEGV ({MODULES}/")  # the last in words of a sanitizer
 
 
 def our_components():
@@ -150,7 +151,7 @@ class Comparison:
             try:
                 results.append(side.run(variant, both, inputs, cycles))
             except RunError as error:
-                if who != "ours" and any(word in str(error) for word in ("crashed", "hangs")):
+                if who != "ours" and any(word in str(error) for word in ENDS):
                     print(
                         f"{variant} | {inputs.seed} | LinuxCNC's own: {str(error)[:150]}",
                         flush=True,
