@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""tiers.py ROOT: every row of cmake/packages has a page and folders that exist, and a row in the tables of README.md and of
-docs/internals/core-and-packages.md, which name no other package; every packages line of a test names packages of the table; tools/part.hpp
-names the packages that have commands, which are in their folders; the core includes no header of a package but the listed ones."""
+"""tiers.py ROOT: every row of cmake/packages has a page and folders that exist, and a row in the
+tables of README.md and of docs/internals/core-and-packages.md, which name no other package;
+every packages line of a test names packages of the table; tools/part.hpp names the packages
+that have commands, which are in their folders; the core includes no header of a package but the
+listed ones."""
 import re
 import sys
 from pathlib import Path
@@ -52,7 +54,8 @@ def of_the_programs(root, rows):
 
 
 def included(root, source):
-    """The files of the tree that the source includes, from the root of the includes or from its own folder."""
+    """The files of the tree that the source includes, from the root of the includes or from its
+    own folder."""
     for path in re.findall(r'(?m)^#include "([^"]+)"', source.read_text(encoding="utf-8")):
         for start in (source.parent, *(root / folder for folder in SOURCES), root):
             if (start / path).is_file():
@@ -69,7 +72,8 @@ def owner(rows, path):
 
 
 def of_the_table(root, rows):
-    """Reports commands whose functions are not in the package that their rows state: one of them would be missing without the package."""
+    """Reports commands whose functions are not in the package that their rows state: one of them
+    would be missing without the package."""
     table = root / TABLE_OF_COMMANDS
     headers = [(path, (root / path).read_text(encoding="utf-8")) for path in included(root, table)]
     stated = re.findall(

@@ -117,7 +117,9 @@ class Slaves(Ethercat):
         self.assertIn("error: lcec's driver 'EL6090' is not supported [ethercat-slave]\n", said)
         self.assertIn("`hal check --assume lcec.0.x` checks the rest\n", said)
         said = self.bad("check", "--assume", "lcec.0.x", "unknown.hal")
-        self.assertIn("warning: lcec's driver 'EL6090' is not supported: slave 'x' has no pins", said)
+        self.assertIn(
+            "warning: lcec's driver 'EL6090' is not supported: slave 'x' has no pins", said
+        )
         self.assertIn("1 line depends on 'lcec.0.x', which is assumed to exist", said)
         self.assertIn("error: unknown pin 'lcec.0.y.din-77' [no-such-pin]\n", said)
 

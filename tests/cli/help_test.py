@@ -40,7 +40,8 @@ class Help(Case):
 
     def test_version(self):
         self.assertRegex(
-            self.good("--version"), r"^hal \d+\.\d+\.\d+ \(commit ([0-9a-f]{10}|unknown)\)\npackages: "
+            self.good("--version"),
+            r"^hal \d+\.\d+\.\d+ \(commit ([0-9a-f]{10}|unknown)\)\npackages: ",
         )
 
 

@@ -119,9 +119,7 @@ class Tdma(Case):
             + "".join(one.format(n) for n in range(1, 7))
             + r"6 pings from tdma\.0, 6 answered, 0 lost \(0 %\); min \d+\.\d\d, mean \d+\.\d\d, max \d+\.\d\d us\n$",
         )
-        self.assertRegex(
-            self.answered("master", 1), r"1 ping from tdma\.1, 1 answered, 0 lost"
-        )
+        self.assertRegex(self.answered("master", 1), r"1 ping from tdma\.1, 1 answered, 0 lost")
         self.assertEqual(
             "hal tdma ping: unknown station 'nobody'; tdma.0 knows away, x; tdma.1 knows away, master\n",
             self.bad("tdma", "ping", "nobody"),

@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""esi_corpus.py [--sample N] [--reasons] FOLDER: generates a configuration and a netlist for each device of the device descriptions
-(ESI) below a folder, runs them in memory, and counts the devices that reach OP. Prints each other device with its reason. No file of
-vendors is in the tree: clone public repositories with ESI files into a folder outside of it. HAL_BIN names the program, else build/release."""
+"""esi_corpus.py [--sample N] [--reasons] FOLDER: generates a configuration and a netlist for each
+device of the device descriptions (ESI) below a folder, runs them in memory, and counts the
+devices that reach OP. Prints each other device with its reason. No file of vendors is in the
+tree: clone public repositories with ESI files into a folder outside of it. HAL_BIN names the
+program, else build/release."""
 import argparse
 import collections
 import os
@@ -36,7 +38,8 @@ def number_text(text):
 
 
 def devices_of(path):
-    """What selects each type of device of a file: its order code, its name or its product code. Nothing for other XML files."""
+    """What selects each type of device of a file: its order code, its name or its product code.
+    Nothing for other XML files."""
     try:
         root = xml.etree.ElementTree.parse(path).getroot()
     except (xml.etree.ElementTree.ParseError, UnicodeDecodeError, ValueError):
@@ -69,7 +72,8 @@ def hal(folder, *words):
 
 
 def last_cause(text):
-    """The message of a run that names why the slave is not operational, without the names of the slave."""
+    """The message of a run that names why the slave is not operational, without the names of the
+    slave."""
     lines = [line for line in text.splitlines() if re.search(r"slave 0|error:|cannot|fault", line)]
     lines = [line for line in lines if "operational after" not in line]
     return (

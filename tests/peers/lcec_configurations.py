@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: MIT
 """Loads ethercat-conf.xml files of other people's machines: lcec_configurations.py HAL FOLDER
 
-HAL is our program, FOLDER has the files, at any depth. Each one is loaded by the component lcec in `hal check`, which needs neither a bus nor
-ethercat.conf. Files beside it that it names (initCmds) must be there as well. Prints the number that load, and for each other one the first error.
-"""
+HAL is our program, FOLDER has the files, at any depth. Each one is loaded by the component lcec in
+`hal check`, which needs neither a bus nor ethercat.conf. Files beside it that it names (initCmds)
+must be there as well. Prints the number that load, and for each other one the first error."""
 import re
 import subprocess
 import sys
@@ -20,7 +20,9 @@ def check(hal, path):
         done = subprocess.run(
             [hal, "check", str(netlist)], capture_output=True, text=True, timeout=60
         )
-    return [line for line in done.stderr.splitlines() + done.stdout.splitlines() if ": error: " in line]
+    return [
+        line for line in done.stderr.splitlines() + done.stdout.splitlines() if ": error: " in line
+    ]
 
 
 def main():

@@ -2,15 +2,16 @@
 # SPDX-License-Identifier: MIT
 """Compares our lcec devices with the drivers of lcec: lcec_pins.py HAL SOURCE [--list]
 
-HAL is our program, SOURCE the folder `src` of a copy of lcec (linuxcnc-ethercat). Its drivers are read, never built: the table of their types with vendor
-and product, and each pin that a descriptor names, with type and direction. Compared are
+HAL is our program, SOURCE the folder `src` of a copy of lcec (linuxcnc-ethercat). Its drivers are
+read, never built: the table of their types with vendor and product, and each pin that a descriptor
+names, with type and direction. Compared are
 
 * vendor and product of each type that we have,
 * each of our pins: its driver must have a descriptor with this name, type and direction,
 * each descriptor of a driver: each of its types must have a pin for it, unless the reason is in OPTIONAL.
 
-Prints counts, each difference, and the types that we do not have. The exit status is 0 without a difference.
-"""
+Prints counts, each difference, and the types that we do not have. The exit status is 0 without a
+difference."""
 import argparse
 import re
 import subprocess
@@ -45,11 +46,19 @@ OPTIONAL = {
     "lcec_rtec.c": {form: "not with two axes" for form in ("status-code", "alarm-code", "voltage")},
 }
 # classes whose pins depend on the device
-CLASSES = {"lcec_class_ain.c", "lcec_class_aout.c", "lcec_class_din.c", "lcec_class_dout.c", "lcec_class_enc.c"}
+CLASSES = {
+    "lcec_class_ain.c",
+    "lcec_class_aout.c",
+    "lcec_class_din.c",
+    "lcec_class_dout.c",
+    "lcec_class_enc.c",
+}
 DESCRIPTOR = re.compile(r"\{\s*(HAL_\w+),\s*(HAL_\w+),\s*offsetof\([^)]*\),\s*\"([^\"]*)\"\s*\}")
 VENDORS = re.compile(r"#define\s+(LCEC_\w+_VID)\s+(0x[0-9a-fA-F]+)")
 OWN_VENDORS = re.compile(r"#define\s+(\w*VID\w*)\s+(0x[0-9a-fA-F]+|LCEC_\w+)")
-NAMED = re.compile(r"\{\s*\"([\w.-]+)\",\s*(\w+),\s*(0x[0-9a-fA-F]+)|\w+\(\s*\"([\w.-]+)\",\s*(0x[0-9a-fA-F]+)")
+NAMED = re.compile(
+    r"\{\s*\"([\w.-]+)\",\s*(\w+),\s*(0x[0-9a-fA-F]+)|\w+\(\s*\"([\w.-]+)\",\s*(0x[0-9a-fA-F]+)"
+)
 
 
 def without_comments(text):
@@ -73,7 +82,9 @@ def drive_pins(source):
     kinds = dict(re.findall(r"#define PDO_PIN_TYPE_(\w+)\s+(HAL_\w+)", text))
     found = set()
     for group, direction in (("READ_PDOS", "out"), ("WRITE_PDOS", "in"), ("WRITE_SDOS", "in")):
-        body = re.search(r"#define FOR_ALL_" + group + r"_DO\(action\)((?:.*\\\n)*.*)", text).group(1)
+        body = re.search(r"#define FOR_ALL_" + group + r"_DO\(action\)((?:.*\\\n)*.*)", text).group(
+            1
+        )
         for pin in re.findall(r"action\((\w+)\)", body):
             if pin in names and pin in kinds:
                 found.add(("%s-" + names[pin], TYPES[kinds[pin]], direction))
@@ -81,7 +92,11 @@ def drive_pins(source):
 
 
 def pattern(name):
-    return re.compile("^" + re.sub(r"%d", r"[0-9]+", re.sub(r"%s", r"[\\w.-]+?", re.escape(name).replace(r"\%", "%"))) + "$")
+    return re.compile(
+        "^"
+        + re.sub(r"%d", r"[0-9]+", re.sub(r"%s", r"[\\w.-]+?", re.escape(name).replace(r"\%", "%")))
+        + "$"
+    )
 
 
 class Upstream:
@@ -97,10 +112,16 @@ class Upstream:
             if path.name in CLASSES or path.name.startswith("lcec_class"):
                 continue
             header = path.with_suffix(".h")
-            both = text + (without_comments(header.read_text(errors="replace")) if header.exists() else "")
+            both = text + (
+                without_comments(header.read_text(errors="replace")) if header.exists() else ""
+            )
             own_vendors = dict(vendors)
             for name, value in OWN_VENDORS.findall(both):
-                own_vendors[name] = own_vendors.get(value) or int(value, 16) if value.startswith("0x") else own_vendors.get(value, 0)
+                own_vendors[name] = (
+                    own_vendors.get(value) or int(value, 16)
+                    if value.startswith("0x")
+                    else own_vendors.get(value, 0)
+                )
             classes = set()
             for name in re.findall(r'#include "(lcec_class_\w+)\.h"', both):
                 file = source / "devices" / (name + ".c")
@@ -133,7 +154,9 @@ class Upstream:
 
 def our_devices(hal):
     """Our types with vendor and product, from the table in the sources."""
-    table = (Path(__file__).resolve().parents[2] / "components/ethercat/config/lcec_device_table.cpp").read_text()
+    table = (
+        Path(__file__).resolve().parents[2] / "components/ethercat/config/lcec_device_table.cpp"
+    ).read_text()
     found, vendor = {}, None
     for line in table.splitlines():
         words = line.split()
@@ -153,11 +176,15 @@ def our_pins(hal, types):
     names = list(types)
     pins = {name: {} for name in names}
     with tempfile.TemporaryDirectory() as folder:
-        slaves = "".join(f'<slave idx="{i}" type="{name}" name="s{i}"/>' for i, name in enumerate(names))
+        slaves = "".join(
+            f'<slave idx="{i}" type="{name}" name="s{i}"/>' for i, name in enumerate(names)
+        )
         Path(folder, "ethercat-conf.xml").write_text(
             f'<masters><master idx="0" appTimePeriod="1000000">{slaves}</master></masters>'
         )
-        Path(folder, "pins.hal").write_text("loadrt lcec link=sim:none\nshow pin lcec.0.\nshow param lcec.0.\n")
+        Path(folder, "pins.hal").write_text(
+            "loadrt lcec link=sim:none\nshow pin lcec.0.\nshow param lcec.0.\n"
+        )
         done = subprocess.run(
             [hal, "sim", "pins.hal"], cwd=folder, capture_output=True, text=True, timeout=120
         )
@@ -169,11 +196,21 @@ def our_pins(hal, types):
             if full is None:
                 continue
             kind = next((w.lower() for w in words if w.lower() in TYPES.values()), None)
-            direction = next((w.lower() for w in words if w.lower() in ("in", "out", "i/o", "io", "rw", "ro", "param")), None)
+            direction = next(
+                (
+                    w.lower()
+                    for w in words
+                    if w.lower() in ("in", "out", "i/o", "io", "rw", "ro", "param")
+                ),
+                None,
+            )
             number, name = re.match(r"lcec\.0\.s(\d+)\.(.*)", full).groups()
             if name.startswith("slave-"):
                 continue
-            pins[names[int(number)]][name] = (kind, {"i/o": "io", "rw": "param", "ro": "out"}.get(direction, direction))
+            pins[names[int(number)]][name] = (
+                kind,
+                {"i/o": "io", "rw": "param", "ro": "out"}.get(direction, direction),
+            )
     return pins
 
 
@@ -207,7 +244,8 @@ def main():
             if form in optional:
                 continue
             if not any(
-                pattern(form).match(pin) and value == (kind, direction) for pin, value in pins[name].items()
+                pattern(form).match(pin) and value == (kind, direction)
+                for pin, value in pins[name].items()
             ):
                 differences.append(f"{name}: has no {direction} {kind} {form}")
     missing = sorted(set(upstream.types) - set(ours))

@@ -276,7 +276,7 @@ private:
     }
 
     /// Finds the device of the ESI by `device`, `vendor`, `product` and `revision`, or because it
-    /// is the only one. Returns nullptr after reporting that there is none.
+    /// is the only one. Reports a missing one, and then returns nullptr.
     const esi::Device* find_device(const Line& esi, const Line* name) {
         const bool is_named = name != nullptr && !same_word(name->value.text, "cia402");
         esi::Wanted wanted;

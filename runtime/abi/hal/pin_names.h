@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Extension "hal.pin_names/1", offered while an instance is created: pins whose names do not begin with that of the instance.
+ * Extension "hal.pin_names/1", offered while an instance is created: pins whose names do not begin
+ * with that of the instance.
  */
 #ifndef HAL_PIN_NAMES_H
 #define HAL_PIN_NAMES_H

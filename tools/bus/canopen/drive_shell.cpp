@@ -305,15 +305,18 @@ Completion DriveShell::complete(std::string_view line, std::size_t cursor) {
             completion.candidates.push_back({std::move(text), hint});
         }
     };
-    const bool value = line.find(" set ") < begin || line.starts_with("set ");
-    if (!value) {
-        for (const Verb& v : verbs) {
-            offer(v.name, v.what);
+    const bool is_set = line.find(" set ") < begin || line.starts_with("set ");
+    if (is_set) {
+        for (const std::string& name : value_names(false)) {
+            offer(name, "");
         }
+        return completion;
     }
-    const std::string question = value ? "" : "?";
-    for (const std::string& name : value_names(!value)) {
-        offer(name + question, "");
+    for (const Verb& v : verbs) {
+        offer(v.name, v.what);
+    }
+    for (const std::string& name : value_names(true)) {
+        offer(name + "?", "");  // to read it
     }
     return completion;
 }

@@ -91,7 +91,7 @@ bool fits_netlist(const std::string& text) {
 using Fits = bool (*)(const std::string&);
 
 /// Returns the shortest text that means this device in a look-up with `wanted`: one of `names`, or
-/// an empty text if the rest of `wanted` is enough. nullopt: there is none.
+/// an empty text if the rest of `wanted` is enough; nullopt if no text does.
 std::optional<std::string> name_of(const ethercat::esi::File& file,
                                    const ethercat::esi::Device& device,
                                    ethercat::esi::Wanted wanted,
