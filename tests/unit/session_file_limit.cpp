@@ -59,6 +59,11 @@ TEST(FileLimit, is_raised_again_and_reported_once_per_minute_with_the_number_of_
             text += limit.restore(at * second).value_or("");
             text += soft_limit() == 512 ? "" : "not raised\n";
         }
+        lower(32, 1024);
+        text += limit.restore(63 * second).value_or("not yet\n");
+        // it is lowered no more, and the last time is reported all the same
+        text += limit.restore(122 * second).value_or("nothing\n");
+        text += limit.restore(200 * second).value_or("nothing\n");
         return text;
     });
     EXPECT_EQ(lines,
@@ -66,13 +71,18 @@ TEST(FileLimit, is_raised_again_and_reported_once_per_minute_with_the_number_of_
               "hal: the limit of open files was lowered from 512 to 64 by a component or another "
               "process; it was raised again\n"
               "hal: the limit of open files was lowered from 512 to 64 by a component or another "
-              "process, 3 times; it was raised again\n");
+              "process, 3 times; it was raised again\n"
+              "not yet\n"
+              "hal: the limit of open files was lowered from 512 to 32 by a component or another "
+              "process; it was raised again\n"
+              "nothing\n");
 }
 
 TEST(FileLimit, that_the_hard_limit_holds_down_is_raised_to_it_and_reported_once) {
     const std::string lines = in_child(1024, [](FileLimit& limit) {
         // without the capability to raise a hard limit, root too
-        if (geteuid() == 0 && (setresgid(65534, 65534, 65534) != 0 || setresuid(65534, 65534, 65534) != 0)) {
+        if (geteuid() == 0 &&
+            (setresgid(65534, 65534, 65534) != 0 || setresuid(65534, 65534, 65534) != 0)) {
             return std::string("cannot drop privileges\n");
         }
         lower(64, 100);

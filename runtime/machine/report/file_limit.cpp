@@ -25,17 +25,19 @@ std::optional<std::string> FileLimit::restore(std::int64_t now_ns) {
     const rlimit now = limit_of_files();
     if (now.rlim_cur >= begun_.rlim_cur) {
         failure_reported_ = false;
-        return std::nullopt;
+        return due_line(now_ns);
     }
     // the hard limit can be raised with the capability CAP_SYS_RESOURCE only
-    if (setrlimit(RLIMIT_NOFILE, &begun_) == 0) return raised(now.rlim_cur, now_ns);
-    return not_raised(now);
+    if (setrlimit(RLIMIT_NOFILE, &begun_) != 0) return not_raised(now);
+    ++times_;
+    lowered_to_ = now.rlim_cur;
+    return due_line(now_ns);
 }
 
-std::optional<std::string> FileLimit::raised(rlim_t lowered_to, std::int64_t now_ns) {
-    ++times_;
-    if (now_ns - printed_ns_ < interval_ns) return std::nullopt;
-    std::string text = lowered_text(begun_.rlim_cur, lowered_to);
+/// Returns the line about the times since the last one, once its minute is over.
+std::optional<std::string> FileLimit::due_line(std::int64_t now_ns) {
+    if (times_ == 0 || now_ns - printed_ns_ < interval_ns) return std::nullopt;
+    std::string text = lowered_text(begun_.rlim_cur, lowered_to_);
     if (times_ > 1) {
         text += ", " + std::to_string(times_) + " times";
     }
@@ -53,7 +55,8 @@ std::optional<std::string> FileLimit::not_raised(const rlimit& lowered) {
     failure_reported_ = true;
     return lowered_text(begun_.rlim_cur, lowered.rlim_cur) + ", and cannot be raised beyond " +
            std::to_string(limit_of_files().rlim_cur) +
-           ": a client for which no file is left cannot connect; SIGTERM ends the machine; to raise "
+           ": a client for which no file is left cannot connect; SIGTERM ends the machine; to "
+           "raise "
            "it, type as root: prlimit --nofile=" +
            std::to_string(begun_.rlim_cur) + " --pid " + std::to_string(getpid()) + "\n";
 }

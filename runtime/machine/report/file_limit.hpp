@@ -23,11 +23,12 @@ public:
     std::optional<std::string> restore(std::int64_t now_ns);
 
 private:
-    std::optional<std::string> raised(rlim_t lowered_to, std::int64_t now_ns);
+    std::optional<std::string> due_line(std::int64_t now_ns);
     std::optional<std::string> not_raised(const rlimit& lowered);
 
     const rlimit begun_;
     unsigned times_ = 0;  // since the last line
+    rlim_t lowered_to_ = 0;  // the last time
     std::int64_t printed_ns_ = -interval_ns;
     bool failure_reported_ = false;
 };

@@ -200,11 +200,14 @@ void ThreadPlans::warn_of_missing_cpu(const Thread& thread, const Core& core,
     if (state_.executor->granted(core).cpu == wanted) return;
     const int count = get_nprocs_conf();
     const std::string cpu = "CPU " + std::to_string(wanted);
-    const std::string why = wanted >= count ? "this machine has no " + cpu
-                                            : cpu + " is offline, or not one of this process";
+    std::string why = cpu + " is offline, or not one of this process";
+    std::string help = "write a cpu= of: grep Cpus_allowed_list /proc/self/status; or none";
+    if (wanted >= count) {
+        why = "this machine has no " + cpu;
+        help = "write a cpu= from 0 to " + std::to_string(count - 1) + ", or none";
+    }
     diagnostics.warning("ignored-option", thread.made,
-                        "thread '" + thread.name + "' is not bound to a CPU: " + why, "",
-                        "write a cpu= from 0 to " + std::to_string(count - 1) + ", or none");
+                        "thread '" + thread.name + "' is not bound to a CPU: " + why, "", help);
 }
 
 bool ThreadPlans::end(std::vector<std::unique_ptr<Thread>>& threads, Diagnostics& diagnostics) {
