@@ -86,7 +86,14 @@ void RecordedAnswers::add(const DatagramView& sent, const DatagramView& returned
     answer.returned = keep(returned);
     answer.position = returned.position();
     answer.wkc = returned.wkc();
-    series_[key_of(sent)].answers.push_back(answer);
+    Series& series = series_[key_of(sent)];
+    series.answers.push_back(answer);
+    series.changed.resize(sent.length);
+    for (std::size_t i = 0; i < sent.length; ++i) {
+        if (sent.data[i] != returned.data[i]) {
+            series.changed[i] = true;
+        }
+    }
     Target& target = targets_[target_of(sent)];
     if (is_write(sent.command)) {
         target.writes.push_back(answer.order);
@@ -131,10 +138,9 @@ bool RecordedAnswers::answer(const DatagramView& d) noexcept {
     const bool writes = is_write(d.command);
     const Answer* const one = writes ? find_write(found->second, target->second, d)
                                      : find_read(found->second, target->second);
-    const std::uint8_t* const sent = bytes_.data() + one->sent;
     const std::uint8_t* const returned = bytes_.data() + one->returned;
     for (std::size_t i = 0; i < d.length; ++i) {
-        if (sent[i] != returned[i]) {
+        if (found->second.changed[i]) {
             d.data[i] = returned[i];
         }
     }

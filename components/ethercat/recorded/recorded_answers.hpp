@@ -18,7 +18,8 @@ namespace hal::ethercat {
 /// length) has in the capture: the next one for each repetition, the last one again when there are
 /// no more. What a master writes to a slave moves the position in the capture: reads that follow
 /// get answers from behind the same write there, and none from behind a write that has not been
-/// repeated. Bytes of process data that a slave did not change stay as they are sent.
+/// repeated. Bytes that no answer to the same datagram changed stay as they are sent: the outputs in
+/// process data.
 class RecordedAnswers {
 public:
     /// Reads the EtherCAT frames of a capture. [setup]
@@ -46,8 +47,10 @@ private:
         std::uint16_t position = 0;
         std::uint16_t wkc = 0;
     };
+    /// The answers to the same datagram.
     struct Series {
         std::vector<Answer> answers;
+        std::vector<bool> changed;  ///< by byte: one of the answers differs from what was sent
         std::size_t next = 0;
     };
     /// A slave, or all of them: how far its writes have been repeated.
