@@ -33,6 +33,10 @@ Sent RecordedPort::send(std::span<const std::uint8_t> frame, const hal::ethernet
     Frame& to = frames_[(first_ + waiting_) % capacity];
     std::copy(frame.begin(), frame.end(), to.bytes.begin());
     to.size = frame.size();
+    if (!FrameReader({to.bytes.data(), to.size}).valid()) {
+        add(dropped_);
+        return Sent::rejected;
+    }
     to.time_ns = now_ns != hal::ethernet::unclocked ? now_ns : hal::link::monotonic_ns();
     add(unknown_, answers_.answer({to.bytes.data(), to.size}));
     ++waiting_;

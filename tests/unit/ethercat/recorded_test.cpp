@@ -289,4 +289,16 @@ TEST(EthercatRecordedPort, Sent_frames_return_in_order_with_their_answers) {
     EXPECT_EQ(port.statistics().errors, 1U) << "datagrams without answer";
 }
 
+TEST(EthercatRecordedPort, Other_frames_are_rejected_and_a_full_queue_drops) {
+    RecordedPort port("replay:a.pcapng", {});
+    EXPECT_EQ(port.send(Bytes(60, 0xff), {}, 0), hal::ethernet::Sent::rejected);
+    EXPECT_FALSE(port.receive(0));
+    const Bytes frame = frame_of(Datagram{}, unmarked);
+    while (port.send(frame, {}, 0) == hal::ethernet::Sent::queued) {
+    }
+    EXPECT_EQ(port.send(frame, {}, 0), hal::ethernet::Sent::full);
+    EXPECT_EQ(port.statistics().sent, 64U);
+    EXPECT_EQ(port.statistics().dropped, 3U);
+}
+
 }  // namespace
