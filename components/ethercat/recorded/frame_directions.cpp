@@ -33,11 +33,6 @@ bool was_processed(std::span<const std::uint8_t> frame) {
     return false;
 }
 
-bool is_marked(std::span<const std::uint8_t> frame) {
-    constexpr std::size_t source = 6;
-    return frame.size() > source && (frame[source] & 0x02) != 0;
-}
-
 }  // namespace
 
 FrameDirections::Direction FrameDirections::take(std::span<const std::uint8_t> frame) {

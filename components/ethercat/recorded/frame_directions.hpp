@@ -10,11 +10,17 @@
 
 namespace hal::ethercat {
 
-/// Takes the EtherCAT frames of a capture in order. The first slave sets bit 1 of the first byte of
-/// the source address (ETG.1000.4, 5.3.2), so a frame without it was sent by a master. The bit
-/// distinguishes nothing when the address of the master has it already; then the second of two
-/// frames with the same commands, indices and lengths has returned, and so has one with a working
-/// counter. [setup]
+/// Returns whether the source address of a frame has the mark that the first slave sets: bit 1 of
+/// the first byte (ETG.1000.4, 5.3.2). [any]
+constexpr bool is_marked(std::span<const std::uint8_t> frame) noexcept {
+    constexpr std::size_t source = 6;
+    return frame.size() > source && (frame[source] & 0x02) != 0;
+}
+
+/// Takes the EtherCAT frames of a capture in order. A frame without the mark of the first slave was
+/// sent by a master. The mark distinguishes nothing when the address of the master has it already;
+/// then the second of two frames with the same commands, indices and lengths has returned, and so
+/// has one with a working counter. [setup]
 class FrameDirections {
 public:
     /// A frame that returned, with the number of the frame that was sent; `sent` of others is npos.

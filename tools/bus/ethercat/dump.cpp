@@ -31,8 +31,7 @@ public:
         FrameReader reader(bytes);
         if (!reader.valid()) return true;
         // what an interface receives has passed the slaves, the first of which marks its address
-        const bool is_marked = bytes.size() > 6 && (bytes[6] & 0x02) != 0;
-        const bool passed = is_live_ ? is_marked : directions_.take(bytes).returned;
+        const bool passed = is_live_ ? is_marked(bytes) : directions_.take(bytes).returned;
         if (first_ns_ < 0) {
             first_ns_ = time_ns;
         }
