@@ -308,8 +308,8 @@ std::size_t add_assignment(const std::vector<esi::Pdo>& pdos, unsigned number, b
     return (bits + 7) / 8;
 }
 
-/// Adds 1C12h and 1C13h where no sync manager of process data has that number: masters write them in
-/// every device.
+/// Adds 1C12h and 1C13h where no sync manager of process data has that number: masters write them
+/// in every device.
 void add_empty_assignments(const sii::Contents& s, Dictionary& d) {
     for (unsigned n = 2; n <= 3; ++n) {
         const sii::SmType type =

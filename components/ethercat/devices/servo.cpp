@@ -55,8 +55,8 @@ coe::Abort ServoAxis::check(std::uint16_t index,
 
 void ServoAxis::written(std::uint16_t index, std::uint8_t sub) noexcept {
     const std::uint16_t object = cia402::of_first_axis(index);
-    // Without valid outputs nobody commands the drive. The first outputs are written before the step
-    // that has them.
+    // Without valid outputs nobody commands the drive. The first outputs are written before the
+    // step that has them.
     if (object == o402::controlword && !outputs_valid_) {
         command_waits_ = true;
         return;

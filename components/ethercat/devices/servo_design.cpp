@@ -108,8 +108,8 @@ cia402::MotorSettings servo_motor() {
 
 namespace {
 
-/// Adds the PDOs of an axis: one of each direction is assigned, the others are there to be mapped and
-/// assigned by the master.
+/// Adds the PDOs of an axis: one of each direction is assigned, the master can map and assign the
+/// others.
 void add_pdos(DesignBuilder& b, unsigned n, const std::string& axis) {
     constexpr unsigned most = 12;  // entries
     const auto at = [&](std::uint16_t index) { return cia402::of_axis(index, n); };

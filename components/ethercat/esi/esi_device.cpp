@@ -48,8 +48,8 @@ const Pdo* Device::find_pdo(std::uint16_t index) const {
 
 namespace {
 
-/// Adds a PDO of a module. It replaces the PDO of the device with its number, which is there for the
-/// case that the slot is empty; a number that two modules use counts once.
+/// Adds a PDO of a module. It replaces the PDO of the device with its number, which applies to an
+/// empty slot; a number that two modules use counts once.
 void add_module_pdo(Pdo&& pdo, const std::vector<Pdo>& of_device, std::vector<Pdo>& to) {
     const auto has_index = [&](const Pdo& other) { return other.index == pdo.index; };
     const auto at = std::find_if(to.begin(), to.end(), has_index);

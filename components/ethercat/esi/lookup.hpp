@@ -36,7 +36,7 @@ struct Match {
     };
     const Device* device = nullptr;
     Revision revision = Revision::newest;
-    /// why there is no device, as a sentence about the file: "describes no product 0x00000007"
+    /// why there is no device, as what the file does: "does not describe a product 0x00000007"
     std::string problem{};
     /// order codes or product codes that distinguish the devices; empty: there is no choice
     std::vector<std::string> choices{};

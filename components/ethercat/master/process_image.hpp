@@ -99,7 +99,7 @@ public:
     /// Clears the inputs of a lost slave's mailbox status, so that no client waits for a missing
     /// mail. [realtime]
     void clear_mailbox_status(std::size_t slave) noexcept;
-    /// Sets the slave with the reference clock, for the frames that are filled from now on; 0: none.
+    /// Sets the slave with the reference clock, for frames that are filled from now on; 0: none.
     /// `write_time`: it gets the time of fill(). [realtime]
     void set_reference(std::uint16_t station, bool write_time) noexcept;
 

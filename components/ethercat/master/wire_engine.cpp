@@ -90,7 +90,6 @@ double WireEngine::max_task_share() const noexcept {
     return share;
 }
 
-
 void WireEngine::ready() {
     active_.assign((channels_.size() + 7) / 8 * 8, 0);
     for (std::size_t n = 0; n < channels_.size(); ++n) {

@@ -18,8 +18,7 @@ namespace hal::ethercat {
 /// length) has in the capture: the next one for each repetition, the last one again when there are
 /// no more. What a master writes to a slave moves the position in the capture: reads that follow
 /// get answers from behind the same write there, and none from behind a write that has not been
-/// repeated. Bytes that no answer to the same datagram changed stay as they are sent: the outputs in
-/// process data.
+/// repeated. Bytes that no answer to the same datagram changed stay as they are sent: outputs.
 class RecordedAnswers {
 public:
     /// Reads the EtherCAT frames of a capture. [setup]

@@ -98,7 +98,8 @@ struct Machine {
     LastEvents events;
     master::Setup setup;
     master::Mailboxes mailboxes{8};
-    master::RequestServer server{mailboxes, [this](std::uint16_t n) { return master->numbered(n); }};
+    master::RequestServer server{mailboxes,
+                                 [this](std::uint16_t n) { return master->numbered(n); }};
     master::RequestPort& requests{server.open()};
     std::unique_ptr<master::Master> master;
     std::int64_t now_ns = 0;

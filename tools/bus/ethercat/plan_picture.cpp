@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "bus/ethercat/plan_picture.hpp"
-#include "text/quoting.hpp"
 
 #include <algorithm>
 #include <fmt/core.h>
+
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
