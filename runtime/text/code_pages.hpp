@@ -229,8 +229,9 @@ inline constexpr CodePage code_pages[] = {
      "An option of a thread has no effect, because another one excludes it or the machine cannot "
      "do it. The thread runs without it.\n\n"
      "Only threads with `policy=fifo`, the default, have a priority. Threads with "
-     "`policy=deadline` run on all CPUs. A thread with `cpu=N` that the machine does not have runs "
-     "where the kernel puts it; `hal doctor` lists the CPUs."},
+     "`policy=deadline` run on all CPUs. A thread whose `cpu=N` does not exist, is offline or is "
+     "outside the cpuset of the process runs where the kernel puts it; `lscpu -e` lists the CPUs, "
+     "and `taskset -pc PID` those of a process."},
     {"ini-version",
      "LinuxCNC 2.9 and later start a configuration only if its INI file has `[EMC]VERSION = 1.1`. "
      "Files of 2.7 and before have another version, or none: "

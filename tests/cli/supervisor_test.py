@@ -44,7 +44,7 @@ class Supervisor(HungCase):
             err,
             r"^\S*t\.hal:1:11: warning: thread 'servo' is not bound to a CPU: this machine has no CPU 1023 \[ignored-option\]\n",
         )
-        self.assertRegex(err, r"(?m)^ +\S help: write a cpu= from 0 to \d+, or none$")
+        self.assertRegex(err, r"(?m)^ +\S help: write a cpu= from 0 to \d+, or omit it$")
 
     def test_blocked_function(self):
         machine = self.machine()

@@ -200,11 +200,11 @@ void ThreadPlans::warn_of_missing_cpu(const Thread& thread, const Core& core,
     if (state_.executor->granted(core).cpu == wanted) return;
     const int count = get_nprocs_conf();
     const std::string cpu = "CPU " + std::to_string(wanted);
-    std::string why = cpu + " is offline, or not one of this process";
-    std::string help = "write a cpu= of: grep Cpus_allowed_list /proc/self/status; or none";
+    std::string why = cpu + " is offline, or outside the cpuset of this process";
+    std::string help = "to list the CPUs that are online, type: lscpu -e; or omit cpu=";
     if (wanted >= count) {
         why = "this machine has no " + cpu;
-        help = "write a cpu= from 0 to " + std::to_string(count - 1) + ", or none";
+        help = "write a cpu= from 0 to " + std::to_string(count - 1) + ", or omit it";
     }
     diagnostics.warning("ignored-option", thread.made,
                         "thread '" + thread.name + "' is not bound to a CPU: " + why, "", help);
