@@ -42,6 +42,11 @@ function read_program(path,    line) {
     close(path)
 }
 
+# Names the bus tools for a program and its first word that are in them, as `hal can`.
+function emit_bus(program, word) {
+    if (program ~ /(^|\/)hal$/ && word ~ /^(can|canopen|node|ethercat|scocan)$/) emit("bus")
+}
+
 # A command of a netlist, or several words of the command line that may be one.
 function read_command(text, folder,    words, count, i) {
     sub(/#.*/, "", text)
@@ -52,13 +57,13 @@ function read_command(text, folder,    words, count, i) {
             else emit(words[i + 1])
         }
         if (words[i] == "source") read_file(words[i + 1], folder)
-        if (words[i] ~ /(^|\/)hal$/ && words[i + 1] ~ /^(can|canopen|node|ethercat|scocan)$/) emit("bus")
+        emit_bus(words[i], words[i + 1])
         if (words[i] == "loadusr") for (; i <= count; ++i) {
             if (words[i] ~ /[.]py$/) {
                 read_program(words[i])
                 read_program(folder words[i])
             }
-            if (words[i] ~ /(^|\/)hal$/ && words[i + 1] ~ /^(can|canopen|node|ethercat|scocan)$/) emit("bus")
+            emit_bus(words[i], words[i + 1])
         }
     }
 }
