@@ -4,97 +4,20 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <functional>
 
 #include "ethercat/config/lcec_cia402.hpp"
+#include "ethercat/config/lcec_table.hpp"
 
 namespace hal::ethercat::config {
 
 namespace {
 
 using master::Type;
-using Words = std::vector<std::string>;
+using Words = TableWords;
 
-Words split(std::string_view text, char separator) {
-    Words words;
-    std::size_t begin = 0;
-    while (begin <= text.size()) {
-        const std::size_t end = std::min(text.find(separator, begin), text.size());
-        if (end > begin) {
-            words.emplace_back(text.substr(begin, end - begin));
-        }
-        begin = end + 1;
-    }
-    return words;
-}
-
-std::uint32_t hexadecimal(const std::string& text) {
-    return static_cast<std::uint32_t>(std::strtoul(text.c_str(), nullptr, 16));
-}
-
-/// Returns the words of each line of the table that has some.
-std::vector<Words> read_table() {
-    std::vector<Words> lines;
-    for (const std::string& line : split(lcec_device_table, '\n')) {
-        if (Words words = split(line, ' '); !words.empty()) {
-            lines.push_back(std::move(words));
-        }
-    }
-    return lines;
-}
-
-/// Calls `action` with the words of each line of the table.
-void each_line(const std::function<void(const Words&)>& action) {
-    static const std::vector<Words> lines = read_table();
-    for (const Words& words : lines) {
-        action(words);
-    }
-}
-
-/// Calls `action` with each device of the table.
-void each_device(const std::function<void(const LcecDevice&)>& action) {
-    std::string shape;
-    std::uint32_t vendor = 0;
-    bool in_devices = false;
-    each_line([&](const Words& words) {
-        if (words[0] == "devices") {
-            in_devices = true;
-            shape = words.at(1);
-            vendor = hexadecimal(words.at(2));
-            return;
-        }
-        if (words[0] == "shape" || words[0] == "unsupported") {
-            in_devices = false;
-        }
-        if (!in_devices) return;
-        LcecDevice device;
-        device.name = words[0];
-        device.vendor = vendor;
-        device.product = hexadecimal(words.at(1));
-        device.shape = shape;
-        for (std::size_t i = 2; i < words.size(); ++i) {
-            const std::size_t equals = words[i].find('=');
-            if (equals == std::string::npos) {
-                device.count = static_cast<unsigned>(std::atoi(words[i].c_str()));
-            } else {
-                device.options.emplace_back(words[i].substr(0, equals),
-                                            words[i].substr(equals + 1));
-            }
-        }
-        action(device);
-    });
-}
-
-/// Calls `action` with each line of a shape.
-void each_line_of(const std::string& shape, const std::function<void(const Words&)>& action) {
-    bool inside = false;
-    each_line([&](const Words& words) {
-        if (words[0] == "shape" || words[0] == "devices" || words[0] == "unsupported") {
-            inside = words[0] == "shape" && words.at(1) == shape;
-        } else if (inside) {
-            action(words);
-        }
-    });
+const LcecTable& table() {
+    static const LcecTable read(lcec_device_table);
+    return read;
 }
 
 /// Reads the lines of a shape for one slave.
@@ -111,37 +34,25 @@ public:
           problems_(problems) {}
 
     void read() {
-        each_line_of(device_.shape, [&](const Words& words) { line(words); });
+        for (const TableLine& line : table().lines_of(device_)) {
+            if (!applies(line)) continue;
+            step_ = line.step;
+            read(line.words);
+        }
         std::erase_if(slave_.sync_managers,
                       [](const master::SyncManager& sm) { return sm.pdos.empty(); });
     }
 
 private:
-    /// Reads a line: `[OPTION=VALUE] COUNT* KEYWORD ...`; the first two may be missing.
-    void line(Words words) {
-        while (words[0].starts_with('[')) {
-            const std::string condition = words[0].substr(1, words[0].size() - 2);
+    bool applies(const TableLine& line) const {
+        return std::all_of(line.conditions.begin(), line.conditions.end(),
+                           [&](const std::string& condition) {
             const std::size_t equals = condition.find('=');
-            if (!same_word(option(condition.substr(0, equals)), condition.substr(equals + 1))) {
-                return;
-            }
-            words.erase(words.begin());
-        }
-        unsigned repeated = 1;
-        if (words[0].ends_with('*')) {
-            repeated = number_of(words[0].substr(0, words[0].size() - 1));
-            words.erase(words.begin());
-        }
-        for (step_ = 0; step_ < repeated; ++step_) {
-            once(words);
-        }
+            return same_word(option(condition.substr(0, equals)), condition.substr(equals + 1));
+        });
     }
 
-    unsigned number_of(const std::string& text) const {
-        return text == "N" ? device_.count : static_cast<unsigned>(std::atoi(text.c_str()));
-    }
-
-    void once(const Words& words) {
+    void read(const Words& words) {
         const std::string& keyword = words[0];
         if (keyword == "option") {
             read_option(words);
@@ -160,7 +71,8 @@ private:
         } else if (keyword == "cia402") {
             drive(words);
         } else if (keyword == "fsoe") {
-            info_.fsoe = {number_of(words[1]), number_of(words[2]), number_of(words[3])};
+            info_.fsoe = {count_of(device_, words[1]), count_of(device_, words[2]),
+                          count_of(device_, words[3])};
         } else if (keyword == "fsoe-logic") {
             info_.fsoe_logic = true;
         } else {
@@ -188,7 +100,8 @@ private:
                                        [&](const std::string& w) { return same_word(w, value); });
         if (!known) {
             problems_.push_back("invalid value '" + value + "' of modParam '" + name +
-                                "': expected " + list(Words(words.begin() + 2, words.end())));
+                                "': expected " +
+                                bus::choice_form(Words(words.begin() + 2, words.end())).expected);
             value = words[2];
         }
         options_[name] = value;
@@ -220,7 +133,7 @@ private:
         for (std::size_t i = first; i < words.size(); ++i) {
             const std::size_t star = words[i].find('*');
             const unsigned repeated =
-                star == std::string::npos ? 1 : number_of(words[i].substr(0, star));
+                star == std::string::npos ? 1 : count_of(device_, words[i].substr(0, star));
             const std::string entry_text =
                 star == std::string::npos ? words[i] : words[i].substr(star + 1);
             for (unsigned n = 0; n < repeated; ++n) {
@@ -245,7 +158,7 @@ private:
         e.is_signed = behind != std::string::npos && rest[behind] == 's';
         e.type = e.bits == 1 ? Type::bit : type_of(e.bits, e.is_signed);
         if (const std::size_t equals = rest.find('='); equals != std::string::npos) {
-            e.name = with_step(rest.substr(equals + 1), step);
+            e.name = config::with_step(rest.substr(equals + 1), step);
             add_pin(e);
         }
         if (const std::size_t brace = rest.find('{'); brace != std::string::npos) {
@@ -261,7 +174,7 @@ private:
             part.type = Type::bit;
             part.part = bit != 0;
             if (names[bit] != "-") {
-                part.name = with_step(names[bit], step);
+                part.name = config::with_step(names[bit], step);
                 add_pin(part);
             }
             to.entries.push_back(std::move(part));
@@ -340,7 +253,7 @@ private:
         return text == "@mantissa" ? mantissa : exponent;
     }
 
-    /// `param NAME OBJECT/BITS [*FACTOR] [WORD=VALUE[;SETTING=NUMBER...],...] [for=CHANNEL]`
+    /// `param NAME OBJECT/BITS [*FACTOR] [for=CHANNEL] [WORD=VALUE[;SETTING=NUMBER...]...]`
     void parameter(const Words& words) {
         const std::string name = with_step(words[1]);
         const auto given = parameters_.find(name);
@@ -354,7 +267,8 @@ private:
             } else if (words[i].starts_with("for=")) {
                 target = with_step(words[i].substr(4));
             } else {
-                values = split(words[i], ',');
+                const Words more = split(words[i], ',');
+                values.insert(values.end(), more.begin(), more.end());
             }
         }
         if (values.empty()) return write_number(name, words[2], given->second, factor);
@@ -369,7 +283,7 @@ private:
             }
         }
         problems_.push_back("invalid value '" + given->second + "' of modParam '" + name +
-                            "': expected " + list(known));
+                            "': expected " + bus::choice_form(known).expected);
     }
     void write_number(const std::string& name, const std::string& object, const std::string& text,
                       double factor) {
@@ -441,32 +355,7 @@ private:
                                          : first + step * hexadecimal(text.substr(plus + 1));
     }
 
-    std::string with_step(const std::string& text) const { return with_step(text, step_); }
-    /// Replaces `##` with the number of the step from 1, and `#` with that from 0.
-    static std::string with_step(const std::string& text, unsigned step) {
-        std::string out;
-        for (std::size_t i = 0; i < text.size(); ++i) {
-            if (text[i] != '#') {
-                out += text[i];
-            } else if (i + 1 < text.size() && text[i + 1] == '#') {
-                out += std::to_string(step + 1);
-                ++i;
-            } else {
-                out += std::to_string(step);
-            }
-        }
-        return out;
-    }
-    static std::string list(const Words& words) {
-        std::string out;
-        for (std::size_t i = 0; i < words.size(); ++i) {
-            if (i != 0) {
-                out += i + 1 == words.size() ? " or " : ", ";
-            }
-            out += words[i];
-        }
-        return out;
-    }
+    std::string with_step(const std::string& text) const { return config::with_step(text, step_); }
 
     const LcecDevice& device_;
     const std::map<std::string, std::string>& parameters_;
@@ -483,65 +372,39 @@ private:
 }  // namespace
 
 std::optional<LcecDevice> find_lcec_device(std::string_view name) {
-    std::optional<LcecDevice> found;
-    each_device([&](const LcecDevice& device) {
-        if (!found && device.name == name) {
-            found = device;
-        }
-    });
-    return found;
+    for (const LcecDevice& device : table().devices()) {
+        if (device.name == name) return device;
+    }
+    return std::nullopt;
 }
 
 std::vector<std::string> lcec_device_names() {
     std::vector<std::string> names;
-    each_device([&](const LcecDevice& device) { names.push_back(device.name); });
+    for (const LcecDevice& device : table().devices()) {
+        names.push_back(device.name);
+    }
     return names;
 }
 
-std::vector<std::string> unsupported_lcec_devices() {
-    std::vector<std::string> names;
-    each_line([&](const Words& words) {
-        if (words[0] == "unsupported") {
-            names.insert(names.end(), words.begin() + 1, words.end());
-        }
-    });
-    return names;
-}
+std::vector<std::string> unsupported_lcec_devices() { return table().unsupported(); }
 
 std::vector<std::string> lcec_parameters(const LcecDevice& device) {
     std::vector<std::string> names;
-    each_line_of(device.shape, [&](const Words& words) {
+    const auto add = [&](const std::string& name) {
+        if (std::find(names.begin(), names.end(), name) == names.end()) {
+            names.push_back(name);
+        }
+    };
+    for (const auto& [conditions, words, step] : table().lines_of(device)) {
         if (words[0] == "fsoe-logic") {
             names.insert(names.end(), {"fsoeSlaveIdx", "stdInName", "stdOutName"});
-        }
-        if (words[0] == "cia402") {
+        } else if (words[0] == "cia402") {
             const auto of_drive = cia402_parameters();
             names.insert(names.end(), of_drive.begin(), of_drive.end());
+        } else if (words[0] == "param" || words[0] == "option") {
+            add(with_step(words[1], step));
         }
-        std::size_t at = 0;
-        while (words[at].starts_with('[')) {
-            ++at;
-        }
-        unsigned repeated = 1;
-        if (words[at].ends_with('*')) {
-            repeated = words[at] == "N*" ? device.count
-                                         : static_cast<unsigned>(std::atoi(words[at].c_str()));
-            ++at;
-        }
-        if (words[at] != "param" && words[at] != "option") return;
-        for (unsigned step = 0; step < repeated; ++step) {
-            std::string name = words[at + 1];
-            if (const std::size_t two = name.find("##"); two != std::string::npos) {
-                name.replace(two, 2, std::to_string(step + 1));
-            }
-            if (const std::size_t one = name.find('#'); one != std::string::npos) {
-                name.replace(one, 1, std::to_string(step));
-            }
-            if (std::find(names.begin(), names.end(), name) == names.end()) {
-                names.push_back(name);
-            }
-        }
-    });
+    }
     return names;
 }
 
