@@ -165,7 +165,8 @@ def our_devices(hal):
         elif words[0] == "devices":
             vendor = int(words[2], 16)
         elif vendor is not None and line.startswith("  "):
-            found[words[0]] = (vendor, int(words[1], 16))
+            for name in words[0].split(","):
+                found[name] = (vendor, int(words[1], 16))
         else:
             vendor = None
     return found

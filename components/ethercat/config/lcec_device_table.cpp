@@ -115,27 +115,18 @@ devices digital-outputs-16 00000002
   EL2809          0AF93052
   EP2809          0AF94052
 
-shape digital-8-8-from-8
+shape digital-in-and-out-from-8
   sm 0 out
-  8* pdo 1608+1 7080+10:01/1
+  N* pdo 1608+1 7080+10:01/1
   sm 1 in
-  8* pdo 1a00+1 6000+10:01/1
-  8* din din-# in=6000+10:01
-  8* dout dout-# out=7080+10:01
-devices digital-8-8-from-8 00000002
-  EL1852          073C3052
-  EL1859          07433052
-  EJ1859          07432852
-
-shape digital-4-4-from-8
-  sm 0 out
-  4* pdo 1608+1 7080+10:01/1
-  sm 1 in
-  4* pdo 1a00+1 6000+10:01/1
-  4* din din-# in=6000+10:01
-  4* dout dout-# out=7080+10:01
-devices digital-4-4-from-8 00000002
-  EK1814          07162C52
+  N* pdo 1a00+1 6000+10:01/1
+  N* din din-# in=6000+10:01
+  N* dout dout-# out=7080+10:01
+devices digital-in-and-out-from-8 00000002
+  EL1852          073C3052 8
+  EL1859          07433052 8
+  EJ1859          07432852 8
+  EK1814          07162C52 4
 
 shape digital-4-4-from-4
   sm 0 out
@@ -206,28 +197,23 @@ shape digital-outputs-tristate
 devices digital-outputs-tristate 00000002
   EL2202          089A3052
 
-shape valves-32
+values valves sol-#-1a sol-#-1b sol-#-2a sol-#-2b sol-#-3a sol-#-3b sol-#-4a sol-#-4b
+shape valves
   sm 2 out
-  pdo 1600 3101:01/8{sol-0-1a,sol-0-1b,sol-0-2a,sol-0-2b,sol-0-3a,sol-0-3b,sol-0-4a,sol-0-4b}
-  pdo 1601 3101:02/8{sol-1-1a,sol-1-1b,sol-1-2a,sol-1-2b,sol-1-3a,sol-1-3b,sol-1-4a,sol-1-4b}
-  pdo 1602 3101:03/8{sol-2-1a,sol-2-1b,sol-2-2a,sol-2-2b,sol-2-3a,sol-2-3b,sol-2-4a,sol-2-4b}
-  pdo 1603 3101:04/8{sol-3-1a,sol-3-1b,sol-3-2a,sol-3-2b,sol-3-3a,sol-3-3b,sol-3-4a,sol-3-4b}
-devices valves-32 00000114
-  EX260-SEC1      01000001
-  EX260-SEC2      01000002
+  N* pdo 1600+1 3101:01+1/8{$valves}
+devices valves 00000114
+  EX260-SEC1      01000001 4
+  EX260-SEC2      01000002 4
+  EX260-SEC3      01000003 2
+  EX260-SEC4      01000004 2
 
-shape valves-16
-  sm 2 out
-  pdo 1600 3101:01/8{sol-0-1a,sol-0-1b,sol-0-2a,sol-0-2b,sol-0-3a,sol-0-3b,sol-0-4a,sol-0-4b}
-  pdo 1601 3101:02/8{sol-1-1a,sol-1-1b,sol-1-2a,sol-1-2b,sol-1-3a,sol-1-3b,sol-1-4a,sol-1-4b}
-devices valves-16 00000114
-  EX260-SEC3      01000003
-  EX260-SEC4      01000004
+values analog-status 6000+10:01/1 6000+10:02/1 6000+10:03/2 6000+10:05/2 6000+10:07/1
+values analog-errors under=6000+10:01 over=6000+10:02 error=6000+10:07
 
 shape analog-inputs
   sm 3 in
-  N* pdo 1a00+2 6000+10:01/1 6000+10:02/1 6000+10:03/2 6000+10:05/2 6000+10:07/1 /7 6000+10:0f/1 6000+10:10/1 6000+10:11/16s
-  N* ain ain-# val=6000+10:11 under=6000+10:01 over=6000+10:02 error=6000+10:07
+  N* pdo 1a00+2 $analog-status /7 6000+10:0f/1 6000+10:10/1 6000+10:11/16s
+  N* ain ain-# val=6000+10:11 $analog-errors
 devices analog-inputs 00000002
   EL3001          0BB93052 1
   EL3002          0BBA3052 2
@@ -254,15 +240,15 @@ devices analog-inputs 00000002
 
 shape analog-inputs-3-of-4
   sm 3 in
-  4* pdo 1a00+2 6000+10:01/1 6000+10:02/1 6000+10:03/2 6000+10:05/2 6000+10:07/1 /7 6000+10:0f/1 6000+10:10/1 6000+10:11/16s
-  3* ain ain-# val=6000+10:11 under=6000+10:01 over=6000+10:02 error=6000+10:07
+  4* pdo 1a00+2 $analog-status /7 6000+10:0f/1 6000+10:10/1 6000+10:11/16s
+  3* ain ain-# val=6000+10:11 $analog-errors
 devices analog-inputs-3-of-4 00000002
   EL3014          0BC63052
 
 shape analog-inputs-16-bit
   sm 3 in
-  N* pdo 1a00+2 6000+10:01/1 6000+10:02/1 6000+10:03/2 6000+10:05/2 6000+10:07/1 /6 6000+10:0e/1 6000+10:0f/1 6000+10:10/1 6000+10:11/16s
-  N* ain ain-# val=6000+10:11 under=6000+10:01 over=6000+10:02 error=6000+10:07 sync=6000+10:0e
+  N* pdo 1a00+2 $analog-status /6 6000+10:0e/1 6000+10:0f/1 6000+10:10/1 6000+10:11/16s
+  N* ain ain-# val=6000+10:11 $analog-errors sync=6000+10:0e
 devices analog-inputs-16-bit 00000002
   EL3101          0C1D3052 1
   EL3104          0C203052 4
@@ -295,18 +281,21 @@ devices analog-inputs-2-status-byte 00000002
 
 shape potentiometers
   sm 3 in write
-  5* pdo 1a00+2 6000+10:01/1 6000+10:02/1 6000+10:03/2 6000+10:05/2 6000+10:07/1 /1 /5 6000+10:0e/1 6000+10:0f/1 6000+10:10/1 6000+10:11/16s
-  5* ain pot-# val=6000+10:11 under=6000+10:01 over=6000+10:02 error=6000+10:07 sync=6000+10:0e
+  5* pdo 1a00+2 $analog-status /1 /5 6000+10:0e/1 6000+10:0f/1 6000+10:10/1 6000+10:11/16s
+  5* ain pot-# val=6000+10:11 $analog-errors sync=6000+10:0e
 devices potentiometers 00000002
   EL3255          0CB73052
 
 shape temperature-inputs
-  N* param ch#Sensor 8000+10:19/16 Pt100=0;scale=0.1,Ni100=1;scale=0.1,Pt1000=2;scale=0.1,Pt500=3;scale=0.1,Pt200=4;scale=0.1,Ni1000=5;scale=0.1,Ni1000-TK5000=6;scale=0.1,Ni120=7;scale=0.1,Ohm/16=8;scale=0.0625;unsigned=1,Ohm/64=9;scale=0.015625;unsigned=1 for=temp-#
+  N* param ch#Sensor 8000+10:19/16 for=temp-# Pt100=0;scale=0.1 Ni100=1;scale=0.1
+      Pt1000=2;scale=0.1 Pt500=3;scale=0.1 Pt200=4;scale=0.1 Ni1000=5;scale=0.1
+      Ni1000-TK5000=6;scale=0.1 Ni120=7;scale=0.1 Ohm/16=8;scale=0.0625;unsigned=1
+      Ohm/64=9;scale=0.015625;unsigned=1
   N* param ch#Resolution 8000+10:02/8 Signed=0,Standard=0,High=2;scale*=0.1 for=temp-#
   N* param ch#Wires 8000+10:1a/16 2=0,3=1,4=2
   sm 3 in
-  N* pdo 1a00+1 6000+10:01/1 6000+10:02/1 6000+10:03/2 6000+10:05/2 6000+10:07/1 /7 6000+10:0f/1 6000+10:10/1 6000+10:11/16s
-  N* ain temp-# val=6000+10:11 under=6000+10:01 over=6000+10:02 error=6000+10:07 temperature=1
+  N* pdo 1a00+1 $analog-status /7 6000+10:0f/1 6000+10:10/1 6000+10:11/16s
+  N* ain temp-# val=6000+10:11 $analog-errors temperature=1
 devices temperature-inputs 00000002
   EJ3202          0C822852 2
   EJ3214          0C8E2852 4
@@ -320,7 +309,7 @@ devices temperature-inputs 00000002
 
 shape pressure-inputs
   sm 3 in
-  N* pdo 1a00+1 6000+10:01/1 6000+10:02/1 6000+10:03/2 6000+10:05/2 6000+10:07/1 /7 6000+10:0f/1 /1 6000+10:11/16s
+  N* pdo 1a00+1 $analog-status /7 6000+10:0f/1 /1 6000+10:11/16s
   N* ain press-# val=6000+10:11 pressure=1
   N* flag pressure-#-error val=6000+10:07
   N* flag pressure-#-overrange val=6000+10:02
@@ -334,8 +323,11 @@ shape power-measurement
   sm 2 out write
   3* pdo 1600+1 7000+10:01/8
   sm 3 in write
-  3* pdo 1a00+1 /13 6000+10:0e/1=l#.sync-error /1 1800+1:09/1=l#.txpdo-toggle 6000+10:11/32s 6000+10:12/32s 6000+10:13/32s 6000+10:14/8 /8 6000+10:1d/32s
-  pdo 1a03 /3 f100:04/1=l0.missing-zero-crossing f100:05/1=l1.missing-zero-crossing f100:06/1=l2.missing-zero-crossing /2 f100:09/1=sync-error-status /4 f100:0e/1=phase-sequence-error /2
+  3* pdo 1a00+1 /13 6000+10:0e/1=l#.sync-error /1 1800+1:09/1=l#.txpdo-toggle 6000+10:11/32s
+      6000+10:12/32s 6000+10:13/32s 6000+10:14/8 /8 6000+10:1d/32s
+  pdo 1a03 /3 f100:04/1=l0.missing-zero-crossing f100:05/1=l1.missing-zero-crossing
+      f100:06/1=l2.missing-zero-crossing /2 f100:09/1=sync-error-status /4
+      f100:0e/1=phase-sequence-error /2
   3* scaled l#.current val=6000+10:11 factor=0.000005
   3* scaled l#.voltage val=6000+10:12 factor=0.0001
   3* scaled l#.active-power val=6000+10:13 factor=0.01
@@ -388,7 +380,8 @@ devices analog-outputs-2-legacy 00000002
   EJ4132          10242852
 
 shape pulse-train-2
-  2* param ch##OutputMode 8000+10:0e/8 FrequencyModulation=0,PulseDirection=1,IncrementalEncoder=2
+  2* param ch##OutputMode 8000+10:0e/8
+      FrequencyModulation=0,PulseDirection=1,IncrementalEncoder=2
   2* param ch##FrequencyLimit 8000+10:12/32
   sm 2 out write
   pdo 1601 /3 7000:04/1 7000:05/1 7000:06/1 /10 7000:12/32
@@ -396,7 +389,8 @@ shape pulse-train-2
   pdo 160b /2 7020:03/1 /12 7020:10/1 7020:11/32
   pdo 160d /2 7030:03/1 /12 7030:10/1 7030:11/32
   sm 3 in write
-  2* pdo 1a03+2 /2 6020+10:03/1 6020+10:04/1 6020+10:05/1 /8 6020+10:0e/1 6020+10:0f/1 6020+10:10/1 6020+10:11/32
+  2* pdo 1a03+2 /2 6020+10:03/1 6020+10:04/1 6020+10:05/1 /8 6020+10:0e/1 6020+10:0f/1
+      6020+10:10/1 6020+10:11/32
   2* pulse-train ch##. count=6020+10:11 enable=7000+10:04 target=7000+10:12
 devices pulse-train-2 00000002
   EL2522          09DA3052
@@ -414,7 +408,9 @@ shape ssi-2
   2* param ch#MinInhibitTime 8000+10:13/16
   2* param ch#NoClkBursts 8000+10:14/16
   sm 3 in write
-  2* pdo 1a00+1 6000+10:01/1=enc-#-err-data 6000+10:02/1=enc-#-err-frame 6000+10:03/1=enc-#-err-power 6000+10:04/1 /9 6000+10:0e/1=enc-#-err-sync 6000+10:0f/1=enc-#-tx-state 6000+10:10/1=enc-#-tx-toggle 6000+10:11/32s
+  2* pdo 1a00+1 6000+10:01/1=enc-#-err-data 6000+10:02/1=enc-#-err-frame
+      6000+10:03/1=enc-#-err-power 6000+10:04/1 /9 6000+10:0e/1=enc-#-err-sync
+      6000+10:0f/1=enc-#-tx-state 6000+10:10/1=enc-#-tx-toggle 6000+10:11/32s
   2* counter enc-# count=6000+10:11 absolute=1
 devices ssi-2 00000002
   EL5002          138A3052
@@ -422,11 +418,16 @@ devices ssi-2 00000002
 
 shape endat-2
   sm 3 in write
-  2* pdo 1a00+1 6000+10:01/1=enc-#-warn 6000+10:02/1=enc-#-error 6000+10:03/1=enc-#-ready /5 /4 6000+10:0d/1=enc-#-diag 6000+10:0e/1=enc-#-tx-state 6000+10:0f/2s 6000+10:11/64s
+  2* pdo 1a00+1 6000+10:01/1=enc-#-warn 6000+10:02/1=enc-#-error 6000+10:03/1=enc-#-ready /5 /4
+      6000+10:0d/1=enc-#-diag 6000+10:0e/1=enc-#-tx-state 6000+10:0f/2s 6000+10:11/64s
   2* number enc-#-cyc-cnt val=6000+10:0f
   2* counter enc-# count=6000+10:11 absolute=1
 devices endat-2 00000002
   EL5032          13A83052
+
+values counter count=6000+10:11 latch=6000+10:12 valid-ext=6000+10:02 set-done=6000+10:03
+      enable-pos=7000+10:02 set=7000+10:03 enable-neg=7000+10:04 set-value=7000+10:11
+values counter-c valid-c=6000+10:01 enable-c=7000+10:01
 
 shape encoder-5101
   sm 2 out write
@@ -434,7 +435,10 @@ shape encoder-5101
   sm 3 in write
   pdo 1a00 6000:01/8{-,-,-,enc-underflow,enc-overflow,enc-inext} 6000:02/16s 6000:03/16s
   pdo 1a02 6000:04/32 6000:05/16 6000:06/16
-  counter enc count=6000:02 latch=6000:03 valid-c=6000:01.0 valid-ext=6000:01.1 set-done=6000:01.2 enable-c=7000:01.0 enable-pos=7000:01.1 set=7000:01.2 enable-neg=7000:01.3 set-value=7000:02 frequency=6000:04 period=6000:05 window=6000:06 period-scale=5e-7
+  counter enc count=6000:02 latch=6000:03 valid-c=6000:01.0 valid-ext=6000:01.1
+      set-done=6000:01.2 enable-c=7000:01.0 enable-pos=7000:01.1 set=7000:01.2
+      enable-neg=7000:01.3 set-value=7000:02 frequency=6000:04 period=6000:05 window=6000:06
+      period-scale=5e-7
 devices encoder-5101 00000002
   EL5101          13ED3052
 
@@ -442,8 +446,11 @@ shape encoder-5102
   sm 2 out
   2* pdo 1605+6 7000+10:01/1 7000+10:02/1 7000+10:03/1 7000+10:04/1 /12 7000+10:11/16s
   sm 3 in
-  2* pdo 1a05+d 6000+10:01/1 6000+10:02/1 6000+10:03/1 6000+10:04/1=enc-#-underflow 6000+10:05/1=enc-#-overflow 6000+10:06/1 6000+10:07/1 6000+10:08/1 6000+10:09/1 6000+10:0a/1 6000+10:0b/1 6000+10:0c/1 6000+10:0d/1=enc-#-inext 6000+10:0e/1 6000+10:0f/1 6000+10:10/1 6000+10:11/16s 6000+10:12/16s
-  2* counter enc-# count=6000+10:11 latch=6000+10:12 valid-c=6000+10:01 valid-ext=6000+10:02 set-done=6000+10:03 enable-c=7000+10:01 enable-pos=7000+10:02 set=7000+10:03 enable-neg=7000+10:04 set-value=7000+10:11
+  2* pdo 1a05+d 6000+10:01/1 6000+10:02/1 6000+10:03/1 6000+10:04/1=enc-#-underflow
+      6000+10:05/1=enc-#-overflow 6000+10:06/1 6000+10:07/1 6000+10:08/1 6000+10:09/1
+      6000+10:0a/1 6000+10:0b/1 6000+10:0c/1 6000+10:0d/1=enc-#-inext 6000+10:0e/1 6000+10:0f/1
+      6000+10:10/1 6000+10:11/16s 6000+10:12/16s
+  2* counter enc-# $counter $counter-c
 devices encoder-5102 00000002
   EL5102          13EE3052
 
@@ -451,21 +458,25 @@ shape encoder-5151
   sm 2 out write
   pdo 1600 7000:01/1 7000:02/1 7000:03/1 7000:04/1 /4 /8 7000:11/32s
   sm 3 in write
-  pdo 1a00 6000:01/1 6000:02/1 6000:03/1 /4 6000:08/1=enc-expol-stall 6000:09/1=enc-ina 6000:0a/1=enc-inb 6000:0b/1=enc-inc /1 6000:0d/1=enc-inext 1c32:20/1=enc-sync-error /1 1800:09/1=enc-tx-toggle 6000:11/32s 6000:12/32s
+  pdo 1a00 6000:01/1 6000:02/1 6000:03/1 /4 6000:08/1=enc-expol-stall 6000:09/1=enc-ina
+      6000:0a/1=enc-inb 6000:0b/1=enc-inc /1 6000:0d/1=enc-inext 1c32:20/1=enc-sync-error /1
+      1800:09/1=enc-tx-toggle 6000:11/32s 6000:12/32s
   pdo 1a02 6000:14/32
-  counter enc count=6000:11 latch=6000:12 valid-c=6000:01 valid-ext=6000:02 set-done=6000:03 enable-c=7000:01 enable-pos=7000:02 set=7000:03 enable-neg=7000:04 set-value=7000:11 period=6000:14
+  counter enc $counter $counter-c period=6000:14
 devices encoder-5151 00000002
   EL5151          141F3052
 
+shape encoder-5152-inputs
+  pdo 1a00+4 /2 6000+10:03/1 /4 6000+10:08/1=enc-#-expol-stall 6000+10:09/1=enc-#-ina
+      6000+10:0a/1=enc-#-inb /3 1c32:20/1 /1 1800+4:09/1=enc-#-tx-toggle 6000+10:11/32s
+  pdo 1a02+4 6000+10:14/32
 shape encoder-5152
   sm 2 out write
   2* pdo 1600+2 /1 /1 7000+10:03/1 /1 /4 /8 7000+10:11/32s
   sm 3 in write
-  pdo 1a00 /2 6000:03/1 /4 6000:08/1=enc-0-expol-stall 6000:09/1=enc-0-ina 6000:0a/1=enc-0-inb /3 1c32:20/1 /1 1800:09/1=enc-0-tx-toggle 6000:11/32s
-  pdo 1a02 6000:14/32
-  pdo 1a04 /2 6010:03/1 /4 6010:08/1=enc-1-expol-stall 6010:09/1=enc-1-ina 6010:0a/1=enc-1-inb /3 1c32:20/1 /1 1804:09/1=enc-1-tx-toggle 6010:11/32s
-  pdo 1a06 6010:14/32
-  2* counter enc-# count=6000+10:11 set-done=6000+10:03 set=7000+10:03 set-value=7000+10:11 period=6000+10:14 index=1
+  2* like encoder-5152-inputs
+  2* counter enc-# count=6000+10:11 set-done=6000+10:03 set=7000+10:03 set-value=7000+10:11
+      period=6000+10:14 index=1
 devices encoder-5152 00000002
   EL5152          14203052
 
@@ -476,13 +487,21 @@ shape axis-interface-4
   4* pdo 1606+1 /1 7060+10:02/1 7060+10:03/1 7060+10:04/1 /12 7060+10:11/16s
   sm 3 in
   pdo 1a00 16*6000:01+1/1
-  4* pdo 1a06+1 /1 6060+10:02/1 6060+10:03/1 /5 6060+10:09/1=enc-#-ina 6060+10:0a/1=enc-#-inb /1 6060+10:0c/1=enc-#-ingate 6060+10:0d/1=enc-#-inext /3 6060+10:11/16s 6060+10:12/16s
+  4* pdo 1a06+1 /1 6060+10:02/1 6060+10:03/1 /5 6060+10:09/1=enc-#-ina 6060+10:0a/1=enc-#-inb /1
+      6060+10:0c/1=enc-#-ingate 6060+10:0d/1=enc-#-inext /3 6060+10:11/16s 6060+10:12/16s
   16* din din-# in=6000:01+1
   16* dout dout-# out=7010:01+1
   4* aout aout-# val=7020+10:11
-  4* counter enc-# count=6060+10:11 latch=6060+10:12 valid-ext=6060+10:02 set-done=6060+10:03 enable-pos=7060+10:02 set=7060+10:03 enable-neg=7060+10:04 set-value=7060+10:11
+  4* counter enc-# count=6060+10:11 latch=6060+10:12 valid-ext=6060+10:02 set-done=6060+10:03
+      enable-pos=7060+10:02 set=7060+10:03 enable-neg=7060+10:04 set-value=7060+10:11
 devices axis-interface-4 00000002
   EM7004          1B5C3452
+
+values stepper-status 6010:01/1=srv-ready-to-enable 6010:02/1=srv-ready 6010:03/1=srv-warning
+      6010:04/1=srv-error 6010:05/1=srv-move-pos 6010:06/1=srv-move-neg
+      6010:07/1=srv-torque-reduced
+values stepper-inputs 6010:0c/1=srv-din1 6010:0d/1=srv-din2 6010:0e/1=srv-sync-error /1
+      6010:10/1=srv-tx-toggle
 
 shape stepper-7041
   param maxCurrent 8010:01/16 *1000
@@ -503,65 +522,70 @@ shape stepper-7041
   pdo 1602 7010:01/1 7010:02/1 7010:03/1=srv-reduce-torque /5 /8
   pdo 1604 7010:21/16s
   sm 3 in write
-  pdo 1a00 6000:01/1 6000:02/1 6000:03/1 6000:04/1=enc-count-underflow 6000:05/1=enc-count-overflow /2 6000:08/1=enc-expol-stall 6000:09/1=enc-ina 6000:0a/1=enc-inb 6000:0b/1=enc-inc /1 6000:0d/1=enc-inext 6000:0e/1=enc-sync-error /1 6000:10/1=enc-tx-toggle 6000:11/16s 6000:12/16s
-  pdo 1a03 6010:01/1=srv-ready-to-enable 6010:02/1=srv-ready 6010:03/1=srv-warning 6010:04/1=srv-error 6010:05/1=srv-move-pos 6010:06/1=srv-move-neg 6010:07/1=srv-torque-reduced /4 6010:0c/1=srv-din1 6010:0d/1=srv-din2 6010:0e/1=srv-sync-error /1 6010:10/1=srv-tx-toggle
-  counter enc count=6000:11 latch=6000:12 valid-c=6000:01 valid-ext=6000:02 set-done=6000:03 enable-c=7000:01 enable-pos=7000:02 set=7000:03 enable-neg=7000:04 set-value=7000:11 latch-c-name=1
+  pdo 1a00 6000:01/1 6000:02/1 6000:03/1 6000:04/1=enc-count-underflow
+      6000:05/1=enc-count-overflow /2 6000:08/1=enc-expol-stall 6000:09/1=enc-ina
+      6000:0a/1=enc-inb 6000:0b/1=enc-inc /1 6000:0d/1=enc-inext 6000:0e/1=enc-sync-error /1
+      6000:10/1=enc-tx-toggle 6000:11/16s 6000:12/16s
+  pdo 1a03 $stepper-status /4 $stepper-inputs
+  counter enc $counter $counter-c latch-c-name=1
   aout srv val=7010:21 enable=7010:01 motor=1
   motor-reset srv error=6010:04 enable=7010:01 reset=7010:02
 devices stepper-7041 00000002
-  EL7041          1B813052
-  EP7041          1B813052
-  EL7041_1000     1B813052
-  EL7041-1000     1B813052
+  EL7041,EP7041,EL7041_1000,EL7041-1000 1B813052
 
-shape stepper-7031
+shape stepper-settings
   param maxCurrent 8010:01/16
   param redCurrent 8010:02/16
   param nomVoltage 8010:03/16
   param coilRes 8010:04/16
   param motorEMF 8010:05/16
   sdo 8012:01/8 3
+shape stepper-7031
+  like stepper-settings
   sm 2 out write
   pdo 1601 /1 7000:02/1 7000:03/1 7000:04/1 /4 /8 7000:11/32
   pdo 1602 7010:01/1 7010:02/1 7010:03/1 /5 /8
   pdo 1603 7010:11/32s
   sm 3 in write
-  pdo 1a01 /1 6000:02/1 6000:03/1 6000:04/1 6000:05/1 /3 /4 6000:0d/1 6000:0e/1 /1 6000:10/1 6000:11/32 6000:12/32
-  pdo 1a03 6010:01/1=srv-ready-to-enable 6010:02/1=srv-ready 6010:03/1=srv-warning 6010:04/1=srv-error 6010:05/1=srv-move-pos 6010:06/1=srv-move-neg 6010:07/1=srv-torque-reduced /1 /3 6010:0c/1=srv-din1 6010:0d/1=srv-din2 6010:0e/1=srv-sync-error /1 6010:10/1=srv-tx-toggle
+  pdo 1a01 /1 6000:02/1 6000:03/1 6000:04/1 6000:05/1 /3 /4 6000:0d/1 6000:0e/1 /1 6000:10/1
+      6000:11/32 6000:12/32
+  pdo 1a03 $stepper-status /1 /3 $stepper-inputs
   stepper - enable=7010:01 reset=7010:02 reduce=7010:03 target=7010:11
 devices stepper-7031 00000002
   EL7031          1B773052
 
 shape stepper-7041-0052
-  param maxCurrent 8010:01/16
-  param redCurrent 8010:02/16
-  param nomVoltage 8010:03/16
-  param coilRes 8010:04/16
-  param motorEMF 8010:05/16
-  sdo 8012:01/8 3
+  like stepper-settings
   sm 2 out write
   pdo 1602 7010:01/1 7010:02/1 7010:03/1 /5 /8
   pdo 1603 7010:11/32s
   sm 3 in write
-  pdo 1a03 6010:01/1=srv-ready-to-enable 6010:02/1=srv-ready 6010:03/1=srv-warning 6010:04/1=srv-error 6010:05/1=srv-move-pos 6010:06/1=srv-move-neg 6010:07/1=srv-torque-reduced /1 /3 6010:0c/1=srv-din1 6010:0d/1=srv-din2 6010:0e/1=srv-sync-error /1 6010:10/1=srv-tx-toggle
+  pdo 1a03 $stepper-status /1 /3 $stepper-inputs
   stepper - enable=7010:01 reset=7010:02 reduce=7010:03 target=7010:11
 devices stepper-7041-0052 00000002
   EL7041-0052     1B813052
 
+shape dc-motor-outputs
+  pdo 1604+3 7020+10:01/1 7020+10:02/1=srv-#-reset 7020+10:03/1=srv-#-reduce-torque /5 /8
+  pdo 1606+3 7020+10:21/16s
+shape dc-motor-inputs
+  pdo 1a06+2 6020+10:01/1=srv-#-ready-to-enable 6020+10:02/1=srv-#-ready
+      6020+10:03/1=srv-#-warning 6020+10:04/1=srv-#-error 6020+10:05/1=srv-#-move-pos
+      6020+10:06/1=srv-#-move-neg 6020+10:07/1=srv-#-torque-reduced /1 /3
+      6020+10:0c/1=srv-#-din1 6020+10:0d/1=srv-#-din2 1c32:20/1=srv-#-sync-error /1
+      1806+2:09/1=srv-#-tx-toggle
+  pdo 1a07+2 6020+10:11/16s=srv-#-raw-info1 6020+10:12/16s=srv-#-raw-info2
 shape dc-motor-2
   sm 2 out write
   2* pdo 1600+2 /1 7000+10:02/1 7000+10:03/1 7000+10:04/1 /4 /8 7000+10:11/16s
-  pdo 1604 7020:01/1 7020:02/1=srv-0-reset 7020:03/1=srv-0-reduce-torque /5 /8
-  pdo 1606 7020:21/16s
-  pdo 1607 7030:01/1 7030:02/1=srv-1-reset 7030:03/1=srv-1-reduce-torque /5 /8
-  pdo 1609 7030:21/16s
+  2* like dc-motor-outputs
   sm 3 in write
-  2* pdo 1a00+3 /1 6000+10:02/1 6000+10:03/1 6000+10:04/1=enc-#-count-underflow 6000+10:05/1=enc-#-count-overflow /2 6000+10:08/1=enc-#-expol-stall 6000+10:09/1=enc-#-ina 6000+10:0a/1=enc-#-inb /1 /1 6000+10:0d/1=enc-#-inext 1c32:20/1=enc-#-sync-error /1 1800+3:09/1=enc-#-tx-toggle 6000+10:11/16s 6000+10:12/16s
-  pdo 1a06 6020:01/1=srv-0-ready-to-enable 6020:02/1=srv-0-ready 6020:03/1=srv-0-warning 6020:04/1=srv-0-error 6020:05/1=srv-0-move-pos 6020:06/1=srv-0-move-neg 6020:07/1=srv-0-torque-reduced /1 /3 6020:0c/1=srv-0-din1 6020:0d/1=srv-0-din2 1c32:20/1=srv-0-sync-error /1 1806:09/1=srv-0-tx-toggle
-  pdo 1a07 6020:11/16s=srv-0-raw-info1 6020:12/16s=srv-0-raw-info2
-  pdo 1a08 6030:01/1=srv-1-ready-to-enable 6030:02/1=srv-1-ready 6030:03/1=srv-1-warning 6030:04/1=srv-1-error 6030:05/1=srv-1-move-pos 6030:06/1=srv-1-move-neg 6030:07/1=srv-1-torque-reduced /1 /3 6030:0c/1=srv-1-din1 6030:0d/1=srv-1-din2 1c32:20/1=srv-1-sync-error /1 1808:09/1=srv-1-tx-toggle
-  pdo 1a09 6030:11/16s=srv-1-raw-info1 6030:12/16s=srv-1-raw-info2
-  2* counter enc-# count=6000+10:11 latch=6000+10:12 valid-ext=6000+10:02 set-done=6000+10:03 enable-pos=7000+10:02 set=7000+10:03 enable-neg=7000+10:04 set-value=7000+10:11
+  2* pdo 1a00+3 /1 6000+10:02/1 6000+10:03/1 6000+10:04/1=enc-#-count-underflow
+      6000+10:05/1=enc-#-count-overflow /2 6000+10:08/1=enc-#-expol-stall 6000+10:09/1=enc-#-ina
+      6000+10:0a/1=enc-#-inb /1 /1 6000+10:0d/1=enc-#-inext 1c32:20/1=enc-#-sync-error /1
+      1800+3:09/1=enc-#-tx-toggle 6000+10:11/16s 6000+10:12/16s
+  2* like dc-motor-inputs
+  2* counter enc-# $counter
   2* aout srv-# val=7020+10:21 enable=7020+10:01 motor=1
   object-value srv-0-sel-info1 index=0x8022 sub=0x11 bits=8
   object-value srv-0-sel-info2 index=0x8022 sub=0x19 bits=8
@@ -577,13 +601,20 @@ shape delta-inverter
   sm 3 in write
   pdo 1a00 6041:00/16 6043:00/16s 6061:00/8s /8
   pdo 1a01 3021:05/16 3021:01/16 3022:0f/16
-  inverter - status=6041:00 control=6040:00 target=6042:00 velocity=6043:00 mode=6060:00 mode-display=6061:00
+  inverter - status=6041:00 control=6040:00 target=6042:00 velocity=6043:00 mode=6060:00
+      mode-display=6061:00
   scaled act-current val=3021:05 factor=0.01 unsigned=1
   scaled drive-temp val=3022:0f factor=0.1 unsigned=1
   number error-code val=3021:01.0/8 unsigned=1
   number warn-code val=3021:01.8/8 unsigned=1
 devices delta-inverter 000001DD
   DeMS300         10400200
+
+values delta-outputs - - - - - - - - - - - - - - - - dout-d01 dout-d02 dout-d03 dout-d04
+values delta-inputs din-neg-lim din-pos-lim din-home - - - - - - - - - - - - - din-1 din-2 din-3
+      din-4 din-5 din-6 din-7
+values delta-servo status=6041:00 control=6040:00 velocity=606c:00 position=6064:00
+      external=2511:00 torque=6077:00 steps=N
 
 shape delta-servo
   option opmode CSV CSP
@@ -594,26 +625,33 @@ shape delta-servo
   sdo 60c2:01/8 @mantissa
   sdo 60c2:02/8 @exponent
   sm 2 out write
-  [opmode=CSV] [enableDigitalOutput=1] pdo 1602 6040:00/16 60ff:00/32s 60fe:01/32{-,-,-,-,-,-,-,-,-,-,-,-,-,-,-,-,dout-d01,dout-d02,dout-d03,dout-d04}
-  [opmode=CSV] [enableDigitalOutput=0] pdo 1602 6040:00/16 60ff:00/32s
-  [opmode=CSP] [enableDigitalOutput=1] pdo 1602 6040:00/16 607a:00/32s 60fe:01/32{-,-,-,-,-,-,-,-,-,-,-,-,-,-,-,-,dout-d01,dout-d02,dout-d03,dout-d04}
-  [opmode=CSP] [enableDigitalOutput=0] pdo 1602 6040:00/16 607a:00/32s
+  [opmode=CSV] pdo 1602 6040:00/16 60ff:00/32s
+  [opmode=CSP] pdo 1602 6040:00/16 607a:00/32s
+  [enableDigitalOutput=1] entries 60fe:01/32{$delta-outputs}
   sm 3 in write
-  pdo 1a02 6041:00/16 606c:00/32s 6064:00/32s 2511:00/32s 6077:00/16s 60fd:00/32{din-neg-lim,din-pos-lim,din-home,-,-,-,-,-,-,-,-,-,-,-,-,-,din-1,din-2,din-3,din-4,din-5,din-6,din-7}
-  [opmode=CSV] delta-servo - status=6041:00 control=6040:00 target=60ff:00 velocity=606c:00 position=6064:00 external=2511:00 torque=6077:00 velocity-mode=1 steps=N
-  [opmode=CSP] delta-servo - status=6041:00 control=6040:00 target=607a:00 velocity=606c:00 position=6064:00 external=2511:00 torque=6077:00 velocity-mode=0 steps=N
+  pdo 1a02 6041:00/16 606c:00/32s 6064:00/32s 2511:00/32s 6077:00/16s 60fd:00/32{$delta-inputs}
+  [opmode=CSV] delta-servo - target=60ff:00 velocity-mode=1 $delta-servo
+  [opmode=CSP] delta-servo - target=607a:00 velocity-mode=0 $delta-servo
 devices delta-servo 000001DD
   DeASDA          10305070 1280000
   DeASDA3         00006010 16777216
   DeASDB3         00006080 16777216 enableDigitalOutput=0
+
+values omron-status stat-switchon-ready stat-switched-on stat-op-enabled stat-fault
+      stat-volt-enabled stat-quick-stop stat-switchon-disabled stat-warning - stat-remote
+values omron-inputs din-not din-pot din-dec - - - - - - - - - - - - - din-pc din-ext1 din-ext2
+      din-ext3 din-mon0 din-mon1 din-mon2 din-pcl din-ncl din-stop din-bkir din-sf1 din-sf2
+      din-edm
 
 shape omron-servo
   sdo 6060:00/8 8
   sm 2 out write
   pdo 1701 6040:00/16 607a:00/32s 60b8:00/16 60fe:01/32
   sm 3 in write
-  pdo 1b01 603f:00/16=error-code 6041:00/16{stat-switchon-ready,stat-switched-on,stat-op-enabled,stat-fault,stat-volt-enabled,stat-quick-stop,stat-switchon-disabled,stat-warning,-,stat-remote} 6064:00/32s 6077:00/16s 60f4:00/32s 60b9:00/16 60ba:00/32s 60bc:00/32s 60fd:00/32{din-not,din-pot,din-dec,-,-,-,-,-,-,-,-,-,-,-,-,-,din-pc,din-ext1,din-ext2,din-ext3,din-mon0,din-mon1,din-mon2,din-pcl,din-ncl,din-stop,din-bkir,din-sf1,din-sf2,din-edm}
-  position-drive - status=6041:00 control=6040:00 target=607a:00 position=6064:00 following-error=60f4:00 torque=6077:00 scale=N
+  pdo 1b01 603f:00/16=error-code 6041:00/16{$omron-status} 6064:00/32s 6077:00/16s 60f4:00/32s
+      60b9:00/16 60ba:00/32s 60bc:00/32s 60fd:00/32{$omron-inputs}
+  position-drive - status=6041:00 control=6040:00 target=607a:00 position=6064:00
+      following-error=60f4:00 torque=6077:00 scale=N
 devices omron-servo 00000083
   R88D-1SN01H-ECT 000000AE 8388608
   R88D-1SN01L-ECT 000000AB 8388608
@@ -637,73 +675,60 @@ devices omron-servo 00000083
   R88D-1SN75H-ECT 000000E8 8388608
   R88D-1SN150F-ECT 000000EC 8388608
   R88D-1SN150H-ECT 000000E9 8388608
-  R88D-KNA5L-ECT  00000001 1048576
-  R88D-KN01L-ECT  00000002 1048576
-  R88D-KN02L-ECT  00000003 1048576
-  R88D-KN04L-ECT  00000004 1048576
-  R88D-KN01H-ECT  00000005 1048576
-  R88D-KN02H-ECT  00000006 1048576
-  R88D-KN04H-ECT  00000007 1048576
-  R88D-KN08H-ECT  00000008 1048576
-  R88D-KN10H-ECT  00000009 1048576
-  R88D-KN15H-ECT  0000000A 1048576
-  R88D-KN20H-ECT  00000056 1048576
-  R88D-KN30H-ECT  00000057 1048576
-  R88D-KN50H-ECT  00000058 1048576
-  R88D-KN75H-ECT  00000059 1048576
-  R88D-KN150H-ECT 0000005A 1048576
-  R88D-KN06F-ECT  0000000B 1048576
-  R88D-KN10F-ECT  0000000C 1048576
-  R88D-KN15F-ECT  0000000D 1048576
-  R88D-KN20F-ECT  0000005B 1048576
-  R88D-KN30F-ECT  0000005C 1048576
-  R88D-KN50F-ECT  0000005D 1048576
-  R88D-KN75F-ECT  0000005E 1048576
-  R88D-KN150F-ECT 0000005F 1048576
-  OmrG5_KNA5L     00000001 1048576
-  OmrG5_KN01L     00000002 1048576
-  OmrG5_KN02L     00000003 1048576
-  OmrG5_KN04L     00000004 1048576
-  OmrG5_KN01H     00000005 1048576
-  OmrG5_KN02H     00000006 1048576
-  OmrG5_KN04H     00000007 1048576
-  OmrG5_KN08H     00000008 1048576
-  OmrG5_KN10H     00000009 1048576
-  OmrG5_KN15H     0000000A 1048576
-  OmrG5_KN20H     00000056 1048576
-  OmrG5_KN30H     00000057 1048576
-  OmrG5_KN50H     00000058 1048576
-  OmrG5_KN75H     00000059 1048576
-  OmrG5_KN150H    0000005A 1048576
-  OmrG5_KN06F     0000000B 1048576
-  OmrG5_KN10F     0000000C 1048576
-  OmrG5_KN15F     0000000D 1048576
-  OmrG5_KN20F     0000005B 1048576
-  OmrG5_KN30F     0000005C 1048576
-  OmrG5_KN50F     0000005D 1048576
-  OmrG5_KN75F     0000005E 1048576
-  OmrG5_KN150F    0000005F 1048576
+  R88D-KNA5L-ECT,OmrG5_KNA5L 00000001 1048576
+  R88D-KN01L-ECT,OmrG5_KN01L 00000002 1048576
+  R88D-KN02L-ECT,OmrG5_KN02L 00000003 1048576
+  R88D-KN04L-ECT,OmrG5_KN04L 00000004 1048576
+  R88D-KN01H-ECT,OmrG5_KN01H 00000005 1048576
+  R88D-KN02H-ECT,OmrG5_KN02H 00000006 1048576
+  R88D-KN04H-ECT,OmrG5_KN04H 00000007 1048576
+  R88D-KN08H-ECT,OmrG5_KN08H 00000008 1048576
+  R88D-KN10H-ECT,OmrG5_KN10H 00000009 1048576
+  R88D-KN15H-ECT,OmrG5_KN15H 0000000A 1048576
+  R88D-KN20H-ECT,OmrG5_KN20H 00000056 1048576
+  R88D-KN30H-ECT,OmrG5_KN30H 00000057 1048576
+  R88D-KN50H-ECT,OmrG5_KN50H 00000058 1048576
+  R88D-KN75H-ECT,OmrG5_KN75H 00000059 1048576
+  R88D-KN150H-ECT,OmrG5_KN150H 0000005A 1048576
+  R88D-KN06F-ECT,OmrG5_KN06F 0000000B 1048576
+  R88D-KN10F-ECT,OmrG5_KN10F 0000000C 1048576
+  R88D-KN15F-ECT,OmrG5_KN15F 0000000D 1048576
+  R88D-KN20F-ECT,OmrG5_KN20F 0000005B 1048576
+  R88D-KN30F-ECT,OmrG5_KN30F 0000005C 1048576
+  R88D-KN50F-ECT,OmrG5_KN50F 0000005D 1048576
+  R88D-KN75F-ECT,OmrG5_KN75F 0000005E 1048576
+  R88D-KN150F-ECT,OmrG5_KN150F 0000005F 1048576
 
+values rtelligent-stepper-outputs custom=0 general=0 alarm=1 brake=2 in-place=3
+values rtelligent-stepper-inputs general=0 cw_limit=1 cw-limit=1 ccw_limit=2 ccw-limit=2 home=3
+      clear_fault=4 clear-fault=4 emergency_stop=5 emergency-stop=5 motor_offline=6
+      motor-offline=6 probe1=7 probe2=8
+values rtelligent-stepper enablePV=0 enableCSP=1 enableHM=1 enableHomeAccel=1
+      enableActualFollowingError=1 enableActualTorque=1 enableErrorCode=1 enableDigitalInput=1
+      enableDigitalOutput=1 digitalInChannels=6 digitalOutChannels=2
+
+shape rtelligent-stepper-axis
+  param %peakCurrent_amps 2000+800:00/16 *1000
+  param %motorResolution_pulses 2001+800:00/16
+  param %standbyTime_ms 2002+800:00/16
+  param %standbyCurrent_pct 2003+800:00/16
+  param %output1Func 2005+800:01/16 $rtelligent-stepper-outputs
+  param %output2Func 2005+800:02/16 $rtelligent-stepper-outputs
+  param %input3Func 2007+800:03/16 $rtelligent-stepper-inputs
+  param %input4Func 2007+800:04/16 $rtelligent-stepper-inputs
+  param %input5Func 2007+800:05/16 $rtelligent-stepper-inputs
+  param %input6Func 2007+800:06/16 $rtelligent-stepper-inputs
+  param %filterTime_us 2009+800:00/16
+  param %shaftLockTime_us 200a+800:00/16
+  param %motorAutoTune 200b+800:01/16
+  param %stepperPhases 200c+800:01/16 2=0,3=1
+  param %controlMode 2011+800:00/16 openloop=0,closedloop=1,foc=2
+  param %encoderResolution 2020+800:00/16
+  param %positionErrorLimit 2022+800:00/16
 shape rtelligent-stepper
   dc 300
-  param peakCurrent_amps 2000:00/16 *1000
-  param motorResolution_pulses 2001:00/16
-  param standbyTime_ms 2002:00/16
-  param standbyCurrent_pct 2003:00/16
-  param output1Func 2005:01/16 custom=0,general=0,alarm=1,brake=2,in-place=3
-  param output2Func 2005:02/16 custom=0,general=0,alarm=1,brake=2,in-place=3
-  param input3Func 2007:03/16 general=0,cw_limit=1,cw-limit=1,ccw_limit=2,ccw-limit=2,home=3,clear_fault=4,clear-fault=4,emergency_stop=5,emergency-stop=5,motor_offline=6,motor-offline=6,probe1=7,probe2=8
-  param input4Func 2007:04/16 general=0,cw_limit=1,cw-limit=1,ccw_limit=2,ccw-limit=2,home=3,clear_fault=4,clear-fault=4,emergency_stop=5,emergency-stop=5,motor_offline=6,motor-offline=6,probe1=7,probe2=8
-  param input5Func 2007:05/16 general=0,cw_limit=1,cw-limit=1,ccw_limit=2,ccw-limit=2,home=3,clear_fault=4,clear-fault=4,emergency_stop=5,emergency-stop=5,motor_offline=6,motor-offline=6,probe1=7,probe2=8
-  param input6Func 2007:06/16 general=0,cw_limit=1,cw-limit=1,ccw_limit=2,ccw-limit=2,home=3,clear_fault=4,clear-fault=4,emergency_stop=5,emergency-stop=5,motor_offline=6,motor-offline=6,probe1=7,probe2=8
-  param filterTime_us 2009:00/16
-  param shaftLockTime_us 200a:00/16
-  param motorAutoTune 200b:01/16
-  param stepperPhases 200c:01/16 2=0,3=1
-  param controlMode 2011:00/16 openloop=0,closedloop=1,foc=2
-  param encoderResolution 2020:00/16
-  param positionErrorLimit 2022:00/16
-  cia402 enablePV=0 enableCSP=1 enableHM=1 enableHomeAccel=1 enableActualFollowingError=1 enableActualTorque=1 enableErrorCode=1 enableDigitalInput=1 enableDigitalOutput=1 digitalInChannels=6 digitalOutChannels=2
+  like rtelligent-stepper-axis
+  cia402 $rtelligent-stepper
   pdo 1a01 200e:00/16=alarm-code 200f:00/16=status-code 2048:00/16
   scaled voltage val=2048:00 factor=0.01 unsigned=1
 devices rtelligent-stepper 00000A88
@@ -714,74 +739,57 @@ devices rtelligent-stepper 00000A88
 
 shape rtelligent-stepper-2
   dc 300
-  param ch1peakCurrent_amps 2000:00/16 *1000
-  param ch1motorResolution_pulses 2001:00/16
-  param ch1standbyTime_ms 2002:00/16
-  param ch1standbyCurrent_pct 2003:00/16
-  param ch1output1Func 2005:01/16 custom=0,general=0,alarm=1,brake=2,in-place=3
-  param ch1output2Func 2005:02/16 custom=0,general=0,alarm=1,brake=2,in-place=3
-  param ch1input3Func 2007:03/16 general=0,cw_limit=1,cw-limit=1,ccw_limit=2,ccw-limit=2,home=3,clear_fault=4,clear-fault=4,emergency_stop=5,emergency-stop=5,motor_offline=6,motor-offline=6,probe1=7,probe2=8
-  param ch1input4Func 2007:04/16 general=0,cw_limit=1,cw-limit=1,ccw_limit=2,ccw-limit=2,home=3,clear_fault=4,clear-fault=4,emergency_stop=5,emergency-stop=5,motor_offline=6,motor-offline=6,probe1=7,probe2=8
-  param ch1input5Func 2007:05/16 general=0,cw_limit=1,cw-limit=1,ccw_limit=2,ccw-limit=2,home=3,clear_fault=4,clear-fault=4,emergency_stop=5,emergency-stop=5,motor_offline=6,motor-offline=6,probe1=7,probe2=8
-  param ch1input6Func 2007:06/16 general=0,cw_limit=1,cw-limit=1,ccw_limit=2,ccw-limit=2,home=3,clear_fault=4,clear-fault=4,emergency_stop=5,emergency-stop=5,motor_offline=6,motor-offline=6,probe1=7,probe2=8
-  param ch1filterTime_us 2009:00/16
-  param ch1shaftLockTime_us 200a:00/16
-  param ch1motorAutoTune 200b:01/16
-  param ch1stepperPhases 200c:01/16 2=0,3=1
-  param ch1controlMode 2011:00/16 openloop=0,closedloop=1,foc=2
-  param ch1encoderResolution 2020:00/16
-  param ch1positionErrorLimit 2022:00/16
-  param ch2peakCurrent_amps 2800:00/16 *1000
-  param ch2motorResolution_pulses 2801:00/16
-  param ch2standbyTime_ms 2802:00/16
-  param ch2standbyCurrent_pct 2803:00/16
-  param ch2output1Func 2805:01/16 custom=0,general=0,alarm=1,brake=2,in-place=3
-  param ch2output2Func 2805:02/16 custom=0,general=0,alarm=1,brake=2,in-place=3
-  param ch2input3Func 2807:03/16 general=0,cw_limit=1,cw-limit=1,ccw_limit=2,ccw-limit=2,home=3,clear_fault=4,clear-fault=4,emergency_stop=5,emergency-stop=5,motor_offline=6,motor-offline=6,probe1=7,probe2=8
-  param ch2input4Func 2807:04/16 general=0,cw_limit=1,cw-limit=1,ccw_limit=2,ccw-limit=2,home=3,clear_fault=4,clear-fault=4,emergency_stop=5,emergency-stop=5,motor_offline=6,motor-offline=6,probe1=7,probe2=8
-  param ch2input5Func 2807:05/16 general=0,cw_limit=1,cw-limit=1,ccw_limit=2,ccw-limit=2,home=3,clear_fault=4,clear-fault=4,emergency_stop=5,emergency-stop=5,motor_offline=6,motor-offline=6,probe1=7,probe2=8
-  param ch2input6Func 2807:06/16 general=0,cw_limit=1,cw-limit=1,ccw_limit=2,ccw-limit=2,home=3,clear_fault=4,clear-fault=4,emergency_stop=5,emergency-stop=5,motor_offline=6,motor-offline=6,probe1=7,probe2=8
-  param ch2filterTime_us 2809:00/16
-  param ch2shaftLockTime_us 280a:00/16
-  param ch2motorAutoTune 280b:01/16
-  param ch2stepperPhases 280c:01/16 2=0,3=1
-  param ch2controlMode 2811:00/16 openloop=0,closedloop=1,foc=2
-  param ch2encoderResolution 2820:00/16
-  param ch2positionErrorLimit 2822:00/16
-  cia402 ciaChannels=2 pdoIncrement=16 enablePV=0 enableCSP=1 enableHM=1 enableHomeAccel=1 enableActualFollowingError=1 enableActualTorque=1 enableErrorCode=1 enableDigitalInput=1 enableDigitalOutput=1 digitalInChannels=6 digitalOutChannels=2
+  2* like rtelligent-stepper-axis ch##
+  cia402 ciaChannels=2 pdoIncrement=16 $rtelligent-stepper
 devices rtelligent-stepper-2 00000A88
   ECR60x2         0A880005
   ECT60x2         0A880006
 
+values rtelligent-servo-inputs general=0 normal=0 gpio=0 servo_enable=1 alarm_clear=2
+      pulse_command_prohibition=3 clear_position_deviation=4 positive_limit=5 negative_limit=6
+      gain_switching=7 egear_switching=8 zero-speed_clamp=9 control_mode_selection_1=10 estop=11
+      position_command_prohibition=12 step_position_trigger=13
+      multi_segment_run_command_switching_1=14 multi_segment_run_command_switching_2=15
+      multi_segment_run_command_switching_3=16 multi_segment_run_command_switching_4=17
+      torque_command_direction_setting=18 speed_command_direction_setting=19
+      position_command_direction_setting=20 multi_segment_position_command_enable=21
+      back_to_home_input=22 home=23 user1=24 user2=25 user3=26 user4=27 user5=28
+      control_mode_selection_2=29 probe1=30 probe2=31
+values rtelligent-servo-outputs brake=0 alarm=1 position_reached=2 speed_reached=3 servo_ready=4
+      internal_position_command_stop=5 return_to_origin_completed=6 user1=7 user2=8 user3=9
+      user4=10 user5=11 torque_reached=12 out_of_tolerance_output=13 general=31 gpio=31
+
 shape rtelligent-servo
   dc 300
-  param input1Func 2004:01/16 general=0,normal=0,gpio=0,servo_enable=1,alarm_clear=2,pulse_command_prohibition=3,clear_position_deviation=4,positive_limit=5,negative_limit=6,gain_switching=7,egear_switching=8,zero-speed_clamp=9,control_mode_selection_1=10,estop=11,position_command_prohibition=12,step_position_trigger=13,multi_segment_run_command_switching_1=14,multi_segment_run_command_switching_2=15,multi_segment_run_command_switching_3=16,multi_segment_run_command_switching_4=17,torque_command_direction_setting=18,speed_command_direction_setting=19,position_command_direction_setting=20,multi_segment_position_command_enable=21,back_to_home_input=22,home=23,user1=24,user2=25,user3=26,user4=27,user5=28,control_mode_selection_2=29,probe1=30,probe2=31
-  param input2Func 2004:03/16 general=0,normal=0,gpio=0,servo_enable=1,alarm_clear=2,pulse_command_prohibition=3,clear_position_deviation=4,positive_limit=5,negative_limit=6,gain_switching=7,egear_switching=8,zero-speed_clamp=9,control_mode_selection_1=10,estop=11,position_command_prohibition=12,step_position_trigger=13,multi_segment_run_command_switching_1=14,multi_segment_run_command_switching_2=15,multi_segment_run_command_switching_3=16,multi_segment_run_command_switching_4=17,torque_command_direction_setting=18,speed_command_direction_setting=19,position_command_direction_setting=20,multi_segment_position_command_enable=21,back_to_home_input=22,home=23,user1=24,user2=25,user3=26,user4=27,user5=28,control_mode_selection_2=29,probe1=30,probe2=31
-  param input3Func 2004:05/16 general=0,normal=0,gpio=0,servo_enable=1,alarm_clear=2,pulse_command_prohibition=3,clear_position_deviation=4,positive_limit=5,negative_limit=6,gain_switching=7,egear_switching=8,zero-speed_clamp=9,control_mode_selection_1=10,estop=11,position_command_prohibition=12,step_position_trigger=13,multi_segment_run_command_switching_1=14,multi_segment_run_command_switching_2=15,multi_segment_run_command_switching_3=16,multi_segment_run_command_switching_4=17,torque_command_direction_setting=18,speed_command_direction_setting=19,position_command_direction_setting=20,multi_segment_position_command_enable=21,back_to_home_input=22,home=23,user1=24,user2=25,user3=26,user4=27,user5=28,control_mode_selection_2=29,probe1=30,probe2=31
-  param input4Func 2004:07/16 general=0,normal=0,gpio=0,servo_enable=1,alarm_clear=2,pulse_command_prohibition=3,clear_position_deviation=4,positive_limit=5,negative_limit=6,gain_switching=7,egear_switching=8,zero-speed_clamp=9,control_mode_selection_1=10,estop=11,position_command_prohibition=12,step_position_trigger=13,multi_segment_run_command_switching_1=14,multi_segment_run_command_switching_2=15,multi_segment_run_command_switching_3=16,multi_segment_run_command_switching_4=17,torque_command_direction_setting=18,speed_command_direction_setting=19,position_command_direction_setting=20,multi_segment_position_command_enable=21,back_to_home_input=22,home=23,user1=24,user2=25,user3=26,user4=27,user5=28,control_mode_selection_2=29,probe1=30,probe2=31
-  param input5Func 2004:09/16 general=0,normal=0,gpio=0,servo_enable=1,alarm_clear=2,pulse_command_prohibition=3,clear_position_deviation=4,positive_limit=5,negative_limit=6,gain_switching=7,egear_switching=8,zero-speed_clamp=9,control_mode_selection_1=10,estop=11,position_command_prohibition=12,step_position_trigger=13,multi_segment_run_command_switching_1=14,multi_segment_run_command_switching_2=15,multi_segment_run_command_switching_3=16,multi_segment_run_command_switching_4=17,torque_command_direction_setting=18,speed_command_direction_setting=19,position_command_direction_setting=20,multi_segment_position_command_enable=21,back_to_home_input=22,home=23,user1=24,user2=25,user3=26,user4=27,user5=28,control_mode_selection_2=29,probe1=30,probe2=31
-  param input6Func 2004:0b/16 general=0,normal=0,gpio=0,servo_enable=1,alarm_clear=2,pulse_command_prohibition=3,clear_position_deviation=4,positive_limit=5,negative_limit=6,gain_switching=7,egear_switching=8,zero-speed_clamp=9,control_mode_selection_1=10,estop=11,position_command_prohibition=12,step_position_trigger=13,multi_segment_run_command_switching_1=14,multi_segment_run_command_switching_2=15,multi_segment_run_command_switching_3=16,multi_segment_run_command_switching_4=17,torque_command_direction_setting=18,speed_command_direction_setting=19,position_command_direction_setting=20,multi_segment_position_command_enable=21,back_to_home_input=22,home=23,user1=24,user2=25,user3=26,user4=27,user5=28,control_mode_selection_2=29,probe1=30,probe2=31
-  param input7Func 2004:0d/16 general=0,normal=0,gpio=0,servo_enable=1,alarm_clear=2,pulse_command_prohibition=3,clear_position_deviation=4,positive_limit=5,negative_limit=6,gain_switching=7,egear_switching=8,zero-speed_clamp=9,control_mode_selection_1=10,estop=11,position_command_prohibition=12,step_position_trigger=13,multi_segment_run_command_switching_1=14,multi_segment_run_command_switching_2=15,multi_segment_run_command_switching_3=16,multi_segment_run_command_switching_4=17,torque_command_direction_setting=18,speed_command_direction_setting=19,position_command_direction_setting=20,multi_segment_position_command_enable=21,back_to_home_input=22,home=23,user1=24,user2=25,user3=26,user4=27,user5=28,control_mode_selection_2=29,probe1=30,probe2=31
-  param input8Func 2004:0f/16 general=0,normal=0,gpio=0,servo_enable=1,alarm_clear=2,pulse_command_prohibition=3,clear_position_deviation=4,positive_limit=5,negative_limit=6,gain_switching=7,egear_switching=8,zero-speed_clamp=9,control_mode_selection_1=10,estop=11,position_command_prohibition=12,step_position_trigger=13,multi_segment_run_command_switching_1=14,multi_segment_run_command_switching_2=15,multi_segment_run_command_switching_3=16,multi_segment_run_command_switching_4=17,torque_command_direction_setting=18,speed_command_direction_setting=19,position_command_direction_setting=20,multi_segment_position_command_enable=21,back_to_home_input=22,home=23,user1=24,user2=25,user3=26,user4=27,user5=28,control_mode_selection_2=29,probe1=30,probe2=31
-  param output1Func 2005:01/16 brake=0,alarm=1,position_reached=2,speed_reached=3,servo_ready=4,internal_position_command_stop=5,return_to_origin_completed=6,user1=7,user2=8,user3=9,user4=10,user5=11,torque_reached=12,out_of_tolerance_output=13,general=31,gpio=31
-  param output2Func 2005:03/16 brake=0,alarm=1,position_reached=2,speed_reached=3,servo_ready=4,internal_position_command_stop=5,return_to_origin_completed=6,user1=7,user2=8,user3=9,user4=10,user5=11,torque_reached=12,out_of_tolerance_output=13,general=31,gpio=31
-  param output3Func 2005:05/16 brake=0,alarm=1,position_reached=2,speed_reached=3,servo_ready=4,internal_position_command_stop=5,return_to_origin_completed=6,user1=7,user2=8,user3=9,user4=10,user5=11,torque_reached=12,out_of_tolerance_output=13,general=31,gpio=31
-  param output4Func 2005:07/16 brake=0,alarm=1,position_reached=2,speed_reached=3,servo_ready=4,internal_position_command_stop=5,return_to_origin_completed=6,user1=7,user2=8,user3=9,user4=10,user5=11,torque_reached=12,out_of_tolerance_output=13,general=31,gpio=31
-  cia402 ciaRxPDOEntryLimit=32 ciaTxPDOEntryLimit=32 enablePP=1 enablePV=1 enableCSP=1 enableActualFollowingError=1 enableActualTorque=1 enableErrorCode=1 enablePositionDemand=1 enableProbeStatus=1 enableTorqueDemand=1 enableProfileVelocity=1 enableTargetTorque=1 enableDigitalInput=1 enableDigitalOutput=1 digitalInChannels=8 digitalOutChannels=4 enableFollowingErrorTimeout=1 enableFollowingErrorWindow=1 enableHomeAccel=1 enableMaximumCurrent=1 enableMaximumTorque=1 enablePolarity=1 enablePositioningTime=1 enablePositioningWindow=1 enableProfileAccel=1 enableProfileDecel=1 enableProfileMaxVelocity=1 enableTorqueSlope=1 enableVelocityErrorTime=1 enableVelocityErrorWindow=1
+  8* param input##Func 2004:01+2/16 $rtelligent-servo-inputs
+  4* param output##Func 2005:01+2/16 $rtelligent-servo-outputs
+  cia402 ciaRxPDOEntryLimit=32 ciaTxPDOEntryLimit=32 enablePP=1 enablePV=1 enableCSP=1
+      enableActualFollowingError=1 enableActualTorque=1 enableErrorCode=1 enablePositionDemand=1
+      enableProbeStatus=1 enableTorqueDemand=1 enableProfileVelocity=1 enableTargetTorque=1
+      enableDigitalInput=1 enableDigitalOutput=1 digitalInChannels=8 digitalOutChannels=4
+      enableFollowingErrorTimeout=1 enableFollowingErrorWindow=1 enableHomeAccel=1
+      enableMaximumCurrent=1 enableMaximumTorque=1 enablePolarity=1 enablePositioningTime=1
+      enablePositioningWindow=1 enableProfileAccel=1 enableProfileDecel=1
+      enableProfileMaxVelocity=1 enableTorqueSlope=1 enableVelocityErrorTime=1
+      enableVelocityErrorWindow=1
 devices rtelligent-servo 00000A88
   DRV400E         0A880042
   DRV750E         0A880043
   DRV1500E        0A880044
 
+values lichuan-stepper pdoIncrement=16 enableCSP=1 enableCSV=1 enablePV=0 enableHM=1
+      enableActualFollowingError=1 enableErrorCode=1 enableDigitalInput=1 enableDigitalOutput=1
+      digitalInChannels=3 digitalOutChannels=2
+
 shape lichuan-stepper-4
   dc 300
-  cia402 ciaChannels=4 pdoIncrement=16 enableCSP=1 enableCSV=1 enablePV=0 enableHM=1 enableActualFollowingError=1 enableActualTorque=1 enableErrorCode=1 enableDigitalInput=1 enableDigitalOutput=1 digitalInChannels=3 digitalOutChannels=2
+  cia402 ciaChannels=4 $lichuan-stepper enableActualTorque=1
 devices lichuan-stepper-4 00000A79
   CL57E-4A        00006100
 
 shape lichuan-stepper-4-open
   dc 300
-  cia402 ciaChannels=4 pdoIncrement=16 enableCSP=1 enableCSV=1 enablePV=0 enableHM=1 enableActualFollowingError=1 enableErrorCode=1 enableDigitalInput=1 enableDigitalOutput=1 digitalInChannels=3 digitalOutChannels=2
+  cia402 ciaChannels=4 $lichuan-stepper
 devices lichuan-stepper-4-open 00000A79
   OL57E-4A        00006000
 
@@ -798,22 +806,16 @@ shape servo-terminal
   pdo 1a00 6000:11/32s
   pdo 1a01 6010:01/16
   pdo 1a02 6010:07/32s
-  velocity-drive - status=6010:01 control=7010:01 target=7010:06 velocity=6010:07 position=6000:11
+  velocity-drive - status=6010:01 control=7010:01 target=7010:06 velocity=6010:07
+      position=6000:11
 devices servo-terminal 00000002
   EL7211          1C2B3052
   EL7221          1C353052
 
 shape servo-terminal-inputs
   sdo 8010:39/8 10
-  sm 2 out write
-  pdo 1600 7010:01/16
-  pdo 1601 7010:06/32s
-  sm 3 in write
-  pdo 1a00 6000:11/32s
-  pdo 1a01 6010:01/16
-  pdo 1a02 6010:07/32s
+  like servo-terminal
   pdo 1a04 6010:12/16
-  velocity-drive - status=6010:01 control=7010:01 target=7010:06 velocity=6010:07 position=6000:11
   din input-0 in=6010:12.0
   din input-1 in=6010:12.1
   flag input-sto val=6010:12.8
@@ -841,45 +843,32 @@ shape servo-terminal-dc
   param thermalTimeConst 8011:2d/16
   param hallVoltage 800a:11/32
   param hallAdjust 800a:13/8
-  sm 2 out write
-  pdo 1600 7010:01/16
-  pdo 1601 7010:06/32s
-  sm 3 in write
-  pdo 1a00 6000:11/32s
-  pdo 1a01 6010:01/16
-  pdo 1a02 6010:07/32s
-  velocity-drive - status=6010:01 control=7010:01 target=7010:06 velocity=6010:07 position=6000:11
+  like servo-terminal
 devices servo-terminal-dc 00000002
   EL7411          1CF33052
 
+shape leadshine-inputs
+  entries 60fd+800:00/32
+  din %-din-negative-limit in=60fd+800:00.0
+  din %-din-positive-limit in=60fd+800:00.1
+  din %-din-home in=60fd+800:00.2
+  din %-din-probe1 in=60fd+800:00.26
+  din %-din-probe2 in=60fd+800:00.27
+  din %-din-index-z in=60fd+800:00.31
+  din %-din-quick-stop in=60fd+800:00.23
+  din %-din-1 in=60fd+800:00.4
+  din %-din-2 in=60fd+800:00.5
+  din %-din-3 in=60fd+800:00.6
+  din %-din-4 in=60fd+800:00.7
+shape leadshine-closed-settings
+  param %peakCurrent_amps 2000+800:00/16 *10
+  param %controlMode 2024+800:00/16 openloop=0,closedloop=2
+
 shape leadshine-stepper-2
   dc 700 sync1
-  param ch1peakCurrent_amps 2000:00/16 *1000
-  param ch2peakCurrent_amps 2800:00/16 *1000
+  2* param ch##peakCurrent_amps 2000+800:00/16 *1000
   cia402 ciaChannels=2 enablePV=0 enableCSP=1 enableDigitalOutput=1 digitalOutChannels=2
-  entries 60fd:00/32 68fd:00/32
-  din srv-1-din-negative-limit in=60fd:00.0
-  din srv-1-din-positive-limit in=60fd:00.1
-  din srv-1-din-home in=60fd:00.2
-  din srv-1-din-probe1 in=60fd:00.26
-  din srv-1-din-probe2 in=60fd:00.27
-  din srv-1-din-index-z in=60fd:00.31
-  din srv-1-din-quick-stop in=60fd:00.23
-  din srv-1-din-1 in=60fd:00.4
-  din srv-1-din-2 in=60fd:00.5
-  din srv-1-din-3 in=60fd:00.6
-  din srv-1-din-4 in=60fd:00.7
-  din srv-2-din-negative-limit in=68fd:00.0
-  din srv-2-din-positive-limit in=68fd:00.1
-  din srv-2-din-home in=68fd:00.2
-  din srv-2-din-probe1 in=68fd:00.26
-  din srv-2-din-probe2 in=68fd:00.27
-  din srv-2-din-index-z in=68fd:00.31
-  din srv-2-din-quick-stop in=68fd:00.23
-  din srv-2-din-1 in=68fd:00.4
-  din srv-2-din-2 in=68fd:00.5
-  din srv-2-din-3 in=68fd:00.6
-  din srv-2-din-4 in=68fd:00.7
+  2* like leadshine-inputs srv-##
 devices leadshine-stepper-2 00004321
   2EM3E-D522      0000A300
   2EM3E-D556      0000A100
@@ -887,34 +876,9 @@ devices leadshine-stepper-2 00004321
 
 shape leadshine-stepper-2-closed
   dc 700 sync1
-  param ch1peakCurrent_amps 2000:00/16 *10
-  param ch1controlMode 2024:00/16 openloop=0,closedloop=2
-  param ch2peakCurrent_amps 2800:00/16 *10
-  param ch2controlMode 2824:00/16 openloop=0,closedloop=2
+  2* like leadshine-closed-settings ch##
   cia402 ciaChannels=2 enablePV=0 enableCSP=1 enableDigitalOutput=1 digitalOutChannels=2
-  entries 60fd:00/32 68fd:00/32
-  din srv-1-din-negative-limit in=60fd:00.0
-  din srv-1-din-positive-limit in=60fd:00.1
-  din srv-1-din-home in=60fd:00.2
-  din srv-1-din-probe1 in=60fd:00.26
-  din srv-1-din-probe2 in=60fd:00.27
-  din srv-1-din-index-z in=60fd:00.31
-  din srv-1-din-quick-stop in=60fd:00.23
-  din srv-1-din-1 in=60fd:00.4
-  din srv-1-din-2 in=60fd:00.5
-  din srv-1-din-3 in=60fd:00.6
-  din srv-1-din-4 in=60fd:00.7
-  din srv-2-din-negative-limit in=68fd:00.0
-  din srv-2-din-positive-limit in=68fd:00.1
-  din srv-2-din-home in=68fd:00.2
-  din srv-2-din-probe1 in=68fd:00.26
-  din srv-2-din-probe2 in=68fd:00.27
-  din srv-2-din-index-z in=68fd:00.31
-  din srv-2-din-quick-stop in=68fd:00.23
-  din srv-2-din-1 in=68fd:00.4
-  din srv-2-din-2 in=68fd:00.5
-  din srv-2-din-3 in=68fd:00.6
-  din srv-2-din-4 in=68fd:00.7
+  2* like leadshine-inputs srv-##
 devices leadshine-stepper-2-closed 00004321
   2CS3E-D503      00002200
   2CS3E-D507      00002100
@@ -923,18 +887,7 @@ shape leadshine-stepper
   dc 300
   param peakCurrent_amps 2000:00/16 *1000
   cia402 enablePV=0 enableCSP=1 enableDigitalOutput=1 digitalOutChannels=2
-  entries 60fd:00/32
-  din srv-din-negative-limit in=60fd:00.0
-  din srv-din-positive-limit in=60fd:00.1
-  din srv-din-home in=60fd:00.2
-  din srv-din-probe1 in=60fd:00.26
-  din srv-din-probe2 in=60fd:00.27
-  din srv-din-index-z in=60fd:00.31
-  din srv-din-quick-stop in=60fd:00.23
-  din srv-din-1 in=60fd:00.4
-  din srv-din-2 in=60fd:00.5
-  din srv-din-3 in=60fd:00.6
-  din srv-din-4 in=60fd:00.7
+  like leadshine-inputs srv
 devices leadshine-stepper 00004321
   EM3E-522E       00008800
   EM3E-556E       00008600
@@ -942,21 +895,9 @@ devices leadshine-stepper 00004321
 
 shape leadshine-stepper-closed
   dc 300
-  param peakCurrent_amps 2000:00/16 *10
-  param controlMode 2024:00/16 openloop=0,closedloop=2
+  like leadshine-closed-settings
   cia402 enablePV=0 enableCSP=1 enableDigitalOutput=1 digitalOutChannels=2
-  entries 60fd:00/32
-  din srv-din-negative-limit in=60fd:00.0
-  din srv-din-positive-limit in=60fd:00.1
-  din srv-din-home in=60fd:00.2
-  din srv-din-probe1 in=60fd:00.26
-  din srv-din-probe2 in=60fd:00.27
-  din srv-din-index-z in=60fd:00.31
-  din srv-din-quick-stop in=60fd:00.23
-  din srv-din-1 in=60fd:00.4
-  din srv-din-2 in=60fd:00.5
-  din srv-din-3 in=60fd:00.6
-  din srv-din-4 in=60fd:00.7
+  like leadshine-inputs srv
 devices leadshine-stepper-closed 00004321
   CS3E-D503       00001300
   CS3E-D507       00001100
@@ -974,7 +915,8 @@ shape safe-inputs
   sm 2 out
   pdo 1600 7000:01/8 /8 7000:02/16 7000:03/16
   sm 3 in
-  pdo 1a00 6000:01/8=fsoe-slave-cmd 4*6001:01+1/1 /4 6000:03/16=fsoe-slave-crc 6000:04/16=fsoe-slave-connid
+  pdo 1a00 6000:01/8=fsoe-slave-cmd 4*6001:01+1/1 /4 6000:03/16=fsoe-slave-crc
+      6000:04/16=fsoe-slave-connid
   number fsoe-master-cmd val=7000:01 unsigned=1
   number fsoe-master-crc val=7000:02 unsigned=1
   number fsoe-master-connid val=7000:03 unsigned=1
