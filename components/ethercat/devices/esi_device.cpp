@@ -7,6 +7,9 @@
 #include <map>
 #include <set>
 
+#include "ethercat/devices/aoe_server.hpp"
+#include "ethercat/devices/eoe_host.hpp"
+#include "ethercat/devices/foe_server.hpp"
 #include "ethercat/devices/soe_server.hpp"
 
 namespace hal::ethercat::devices {
@@ -365,18 +368,36 @@ void add_sync_manager_types(const sii::Contents& s, Plan& plan) {
     }
 }
 
+/// The messages of VoE are defined by each maker.
+bool is_emulated(MailboxType type) { return type != MailboxType::voe; }
+
+/// Returns the server of a protocol; null for CoE, which the firmware serves itself, and for a
+/// protocol that is not emulated.
+std::unique_ptr<MailboxService> service_of(MailboxType type, const esi::Device& device,
+                                           const std::shared_ptr<Dictionary>& dictionary) {
+    switch (type) {
+    case MailboxType::aoe: return std::make_unique<AoeServer>(dictionary);
+    case MailboxType::eoe: return std::make_unique<EoeHost>();
+    case MailboxType::foe: {
+        auto files = std::make_unique<FoeServer>();
+        files->accept_new();
+        return files;
+    }
+    case MailboxType::soe: return std::make_unique<SoeServer>(idns_of(device));
+    default: return nullptr;
+    }
+}
+
 }  // namespace
 
 std::string not_emulated(const esi::Device& d) {
     if (!d.mailbox) return {};
     std::string protocols;
     for (const MailboxProtocol& protocol : ethercat::mailbox_protocols) {
-        const bool is_emulated =
-            protocol.type == MailboxType::coe || protocol.type == MailboxType::soe;
-        if (is_emulated || (d.mailbox->protocols & protocol.bit) == 0) continue;
+        if (is_emulated(protocol.type) || !d.mailbox->has(protocol.type)) continue;
         protocols += (protocols.empty() ? "" : ", ") + std::string(protocol.name);
     }
-    return protocols.empty() ? "" : "its mailbox protocols " + protocols;
+    return protocols.empty() ? "" : "its mailbox protocol " + protocols;
 }
 
 Parts make_esi_device(const DeviceOptions& o) {
@@ -404,8 +425,11 @@ Parts make_esi_device(const DeviceOptions& o) {
     const bool assignable =
         design.coe && ((s.general.coe_details & sii::coe_pdo_assign) != 0 ||
                        is_commanded(device, coe::assignment, coe::assignment + sync_manager_count));
-    if (s.has_mailbox() && (s.protocols & bit_of(MailboxType::soe)) != 0) {
-        design.services.push_back(std::make_unique<SoeServer>(idns_of(device)));
+    for (const MailboxProtocol& protocol : ethercat::mailbox_protocols) {
+        if (!s.has_mailbox() || (s.protocols & protocol.bit) == 0) continue;
+        if (auto service = service_of(protocol.type, device, design.dictionary)) {
+            design.services.push_back(std::move(service));
+        }
     }
 
     Plan plan;

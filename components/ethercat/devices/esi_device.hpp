@@ -12,7 +12,7 @@
 
 namespace hal::ethercat::devices {
 
-/// Returns what the emulation of a device leaves out, as in "its protocols EoE, FoE"; empty:
+/// Returns what the emulation of a device leaves out, as in "its mailbox protocol VoE"; empty:
 /// nothing. [setup]
 std::string not_emulated(const esi::Device&);
 

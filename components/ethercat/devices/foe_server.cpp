@@ -14,6 +14,27 @@ void FoeServer::add(std::string name, std::vector<std::uint8_t> content, std::ui
     files_.push_back(std::move(file));
 }
 
+void FoeServer::accept_new() {
+    new_ = files_.size();
+    add({}, {});
+    files_.back().name.reserve(largest_mailbox);
+}
+
+FoeServer::File* FoeServer::find(std::string_view name) noexcept {
+    const auto found = std::find_if(files_.begin(), files_.end(),
+                                    [&](const File& file) { return file.name == name; });
+    return found == files_.end() ? nullptr : &*found;
+}
+
+FoeServer::File* FoeServer::rename_new(std::string_view name) noexcept {
+    if (!new_ || name.empty()) return nullptr;
+    File& file = files_[*new_];
+    if (name.size() > file.name.capacity()) return nullptr;
+    file.name.assign(name);
+    file.length = 0;
+    return &file;
+}
+
 std::span<const std::uint8_t> FoeServer::content(std::string_view name) const noexcept {
     for (const auto& f : files_) {
         if (f.name == name) {
@@ -34,11 +55,9 @@ void FoeServer::refuse(Outbox& out, foe::Error error) noexcept {
 }
 
 void FoeServer::open(const foe::Message& m, bool write, State state, Outbox& out) noexcept {
-    file_ = nullptr;
-    for (auto& f : files_) {
-        if (f.name == m.text()) {
-            file_ = &f;
-        }
+    file_ = find(m.text());
+    if (file_ == nullptr && write) {
+        file_ = rename_new(m.text());
     }
     if (file_ == nullptr) return refuse(out, foe::Error::not_found);
     if (file_->password != 0 && file_->password != m.value) {

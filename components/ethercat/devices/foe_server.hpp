@@ -2,6 +2,7 @@
 // The FoE server of an emulated slave: files.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -19,6 +20,8 @@ public:
     /// Adds a file. [setup]
     void add(std::string name, std::vector<std::uint8_t> content, std::uint32_t password = 0,
              bool boot_only = false);
+    /// Keeps the file of an unknown name that is written, instead of the one kept before. [setup]
+    void accept_new();
     /// Answers each n-th data packet with BUSY first; 0: never. [setup]
     void busy_every(unsigned n) noexcept { busy_every_ = n; }
     /// Returns the present content of a file; empty for an unknown name. [setup]
@@ -36,12 +39,15 @@ private:
         std::uint32_t password = 0;
         bool boot_only = false;
     };
+    File* find(std::string_view name) noexcept;
+    File* rename_new(std::string_view name) noexcept;
     void open(const foe::Message&, bool write, State, Outbox&) noexcept;
     void send_packet(Outbox&) noexcept;
     static void send(Outbox&, foe::Opcode, std::uint32_t value) noexcept;
     void refuse(Outbox&, foe::Error) noexcept;
 
     std::vector<File> files_;
+    std::optional<std::size_t> new_;  ///< index of the file for unknown names
     File* file_ = nullptr;
     std::size_t at_ = 0;
     std::size_t max_bytes_;

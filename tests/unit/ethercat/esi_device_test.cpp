@@ -2,6 +2,8 @@
 // Emulated devices made from descriptions: sync managers, start-up commands, modules, assignments.
 #include "ethercat/devices/esi_device.hpp"
 #include "ethercat/esi/lookup.hpp"
+#include "ethercat/wire/aoe.hpp"
+#include "ethercat/wire/foe.hpp"
 #include "ethercat/wire/soe.hpp"
 #include "tests/unit/ethercat/device_bench.hpp"
 
@@ -199,10 +201,53 @@ TEST_F(EsiDevice, The_servo_accepts_a_mapping_that_is_written_object_by_object) 
     EXPECT_EQ(request(State::safeop), 4U);
 }
 
+TEST_F(EsiDevice, Keeps_the_last_file_of_an_unknown_name_that_was_written) {
+    start("esi", described(mailbox_managers + std::string("<Mailbox><FoE/></Mailbox>")));
+    to_preop();
+    const auto packet = [](foe::Opcode opcode, std::uint32_t value, std::string_view text) {
+        Bytes bytes(foe::header_bytes);
+        foe::write_header(bytes.data(), opcode, value);
+        bytes.insert(bytes.end(), text.begin(), text.end());
+        return bytes;
+    };
+    const auto read_file = [&](std::string_view name) {
+        const Bytes answer = ask(MailboxType::foe, packet(foe::Opcode::read, 0, name));
+        return std::string(foe::read(answer)->text());
+    };
+    const auto write_file = [&](std::string_view name, std::string_view content) {
+        ask(MailboxType::foe, packet(foe::Opcode::write, 0, name));
+        ask(MailboxType::foe, packet(foe::Opcode::data, 1, content));
+    };
+    const Bytes missing = ask(MailboxType::foe, packet(foe::Opcode::read, 0, "a.efw"));
+    EXPECT_EQ(foe::read(missing)->value, static_cast<std::uint32_t>(foe::Error::not_found));
+    write_file("a.efw", "long content");
+    EXPECT_EQ(read_file("a.efw"), "long content");
+    write_file("b.efw", "short");
+    EXPECT_EQ(read_file("b.efw"), "short");
+    const Bytes replaced = ask(MailboxType::foe, packet(foe::Opcode::read, 0, "a.efw"));
+    EXPECT_EQ(foe::read(replaced)->value, static_cast<std::uint32_t>(foe::Error::not_found));
+}
+
+TEST_F(EsiDevice, Serves_objects_by_AoE) {
+    start("esi", described(mailbox_managers + std::string("<Mailbox><AoE/><CoE/></Mailbox>")));
+    to_preop();
+    Bytes ads(aoe::header_bytes + aoe::address_bytes);
+    aoe::Header header;
+    header.command = aoe::Command::read;
+    header.length = aoe::address_bytes;
+    aoe::write(ads.data(), header);
+    put(&ads[32], aoe::group_sdo);
+    put(&ads[36], aoe::sdo_offset(0x1018, 2));
+    put<std::uint32_t>(&ads[40], 4);
+    const Bytes answer = ask(MailboxType::aoe, ads);
+    ASSERT_EQ(answer.size(), aoe::header_bytes + 12U);
+    EXPECT_EQ(get<std::uint32_t>(&answer[40]), 7U);
+}
+
 TEST(EsiDeviceNotes, Name_the_protocols_that_are_not_emulated) {
-    const DeviceOptions options = described(mailbox_managers + std::string("<Mailbox><EoE/><CoE/>"
+    const DeviceOptions options = described(mailbox_managers + std::string("<Mailbox><VoE/><CoE/>"
                                                                            "<FoE/></Mailbox>"));
-    EXPECT_EQ(not_emulated(*options.described), "its mailbox protocols EoE, FoE");
+    EXPECT_EQ(not_emulated(*options.described), "its mailbox protocol VoE");
     EXPECT_EQ(not_emulated(*described("").described), "");
 }
 
