@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # packages: ethercat
 """hal ethercat on an emulated line."""
+
 import json
 import os
 import subprocess
@@ -302,8 +303,7 @@ class Configuration(Ethercat):
             "ethercat", "config", "--esi", "drive.xml:SERVO-1, drive.xml:SERVO-1", "two"
         )
         self.assertEqual(
-            "'SERVO-1' is emulated without its mailbox protocols FoE\n" * 2
-            + "two.ethercat and two.hal written, 2 slaves; next: hal run two.hal\n",
+            "two.ethercat and two.hal written, 2 slaves; next: hal run two.hal\n",
             said,
         )
         text = (self.folder / "two.ethercat").read_text()
@@ -340,6 +340,72 @@ class Configuration(Ethercat):
         self.assertEqual(
             "hal ethercat config: type: hal ethercat config --esi FILE.xml:DEVICE NAME, or eth:INTERFACE before NAME\n",
             bad("--esi", "drive.xml"),
+        )
+
+    def test_config_of_a_bus_takes_descriptions_of_a_folder(self):
+        text = (ROOT / "tests/unit/ethercat/data/servo.xml").read_text()
+        folder = self.folder / "makers"
+        folder.mkdir()
+        (folder / "drive.xml").write_text(text)
+        (folder / "broken.xml").write_text("<EtherCATInfo><Vendor")
+        line = "coupler, esi file=makers/drive.xml device=SERVO-1"
+        said = self.good("ethercat", "config", "--emulate", line, "--descriptions", "makers", "bus")
+        self.assertRegex(
+            said,
+            r"^makers/broken\.xml:1: [^\n]+; the file is skipped\n"
+            r"slave 0 \(coupler\): process data as its EEPROM has it, because no file describes it\n"
+            r"bus\.ethercat and bus\.hal written, 2 slaves; next: hal run bus\.hal\n$",
+        )
+        written = (self.folder / "bus.ethercat").read_text()
+        self.assertIn(
+            "[slave 1 servo-1]  # Servo drive\nesi      = makers/drive.xml\ndevice   = SERVO-1\n",
+            written,
+        )
+        self.assertNotIn("[slave 0 coupler]  # coupler\nesi", written)
+        run = self.run_program("sim", "bus.hal", "--for", "3s")
+        self.assertIn("slave 1 (servo-1) is operational", run.stdout + run.stderr)
+        # the same slave, a folder that has other revisions only
+        newer = text.replace('RevisionNo="#x00010001"', 'RevisionNo="#x00090000"')
+        (folder / "drive.xml").write_text(newer)
+        (self.folder / "old.xml").write_text(text)
+        summary = json.loads(
+            self.good(
+                "ethercat",
+                "config",
+                "--json",
+                "--emulate",
+                "esi file=old.xml device=SERVO-1",
+                "--descriptions",
+                "makers/drive.xml",
+                "other",
+            )
+        )
+        self.assertEqual(
+            {
+                "configuration": "other.ethercat",
+                "netlist": "other.hal",
+                "slaves": 1,
+                "notes": [
+                    "slave 0 (SERVO-1): process data as its EEPROM has it, because 'makers/drive.xml' "
+                    "describes revision 0x00090000, not 0x00010001"
+                ],
+            },
+            summary,
+        )
+        self.assertNotIn("esi ", (self.folder / "other.ethercat").read_text())
+        bad = lambda *words: self.bad("ethercat", "config", "--emulate", "coupler", *words)
+        (self.folder / "empty").mkdir()
+        self.assertEqual(
+            "hal ethercat config: 'empty' contains no files *.xml; name the folder of the descriptions (ESI)\n",
+            bad("--descriptions", "empty", "x"),
+        )
+        self.assertEqual(
+            "hal ethercat config: cannot read 'none': No such file or directory\n",
+            bad("--descriptions", "none", "x"),
+        )
+        self.assertEqual(
+            "hal ethercat config: --esi and --descriptions exclude each other\n",
+            self.bad("ethercat", "config", "--esi", "old.xml", "--descriptions", "makers", "x"),
         )
 
     def test_names_with_blanks_commas_and_colons_survive_in_the_generated_files(self):

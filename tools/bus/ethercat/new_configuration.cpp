@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 #include <optional>
 
+#include "bus/ethercat/description_folder.hpp"
 #include "bus/ethercat/wire.hpp"
 #include "bus/ethercat/words.hpp"
 #include "cli/output.hpp"
@@ -41,35 +42,9 @@ std::string devices_of(const std::string& emulate) {
 struct Source {
     std::vector<config::Found> slaves;
     std::string link, segment;  ///< segment: devices of an emulated line, or empty
-    std::string notes;  ///< what the emulation leaves out, a line for each device
+    /// what the emulation leaves out, which slaves have no description
+    std::vector<std::string> notes;
 };
-
-/// Takes the slaves from a bus. Returns false after printing the reason.
-bool from_bus(const EthercatConfigOptions& options, const std::string& name, EthercatWire& wire,
-              Source& to) {
-    wire.identify();
-    for (std::size_t n = 0; n < wire.size(); ++n) {
-        const auto& c = wire.contents(n);
-        config::Found& found = to.slaves.emplace_back();
-        found.name = c.general.order.empty() ? c.general.name : c.general.order;
-        found.device = c.general.name;
-        found.vendor = c.vendor;
-        found.product = c.product;
-        found.revision = c.revision;
-
-        found.alias = c.alias();
-        found.rx = c.rx;
-        found.tx = c.tx;
-        found.sync_managers = c.sync_managers;
-        if (!c.dc.empty()) {
-            found.assign_activate = c.dc.front().assign_activate;
-        }
-    }
-    const bool emulated = !options.emulate.empty();
-    to.link = emulated ? "sim:" + name : wire.address();
-    to.segment = emulated ? devices_of(options.emulate) : "";
-    return true;
-}
 
 /// Returns whether a text arrives as it is when it is the value of a key in a `.ethercat` file.
 bool fits_configuration(const std::string& text) {
@@ -102,6 +77,98 @@ std::optional<std::string> name_of(const ethercat::esi::File& file,
         if (ethercat::esi::look_up(file, wanted).device == &device) return name;
     }
     return std::nullopt;
+}
+
+std::filesystem::path folder_of(const std::filesystem::path& stem) {
+    return stem.has_parent_path() ? stem.parent_path() : ".";
+}
+
+/// Returns the path of a description as it is written to a file in `folder`.
+std::string written_path(const std::filesystem::path& path, const std::filesystem::path& folder) {
+    return path.is_absolute() ? path.string() : std::filesystem::proximate(path, folder).string();
+}
+
+/// Returns the device key of a configuration that means this device of the file; nullopt if no text
+/// does.
+std::optional<std::string> key_of(const ethercat::esi::File& file,
+                                  const ethercat::esi::Device& device, std::uint32_t revision) {
+    // a configuration names no product 0
+    const auto product = device.product != 0 ? std::optional(device.product) : std::nullopt;
+    return name_of(file, device,
+                   {.vendor = device.vendor, .product = product, .revision = revision},
+                   {device.order, device.name, ""}, fits_configuration);
+}
+
+/// Lets a description replace what the EEPROM of a slave has. Returns why there is none, as what the
+/// process data of the slave is taken from its EEPROM for; empty: it has been replaced.
+std::string describe(const DescriptionFolder& descriptions, const std::filesystem::path& folder,
+                     config::Found& found) {
+    const auto [file, path, match] = descriptions.find(found.vendor, found.product, found.revision);
+    if (match.device == nullptr) return "no file describes it";
+    const ethercat::esi::Device& device = *match.device;
+    if (match.revision == ethercat::esi::Match::Revision::other) {
+        return fmt::format("'{}' describes revision {}, not {}", path.string(),
+                           ethercat::esi::number_text(device.revision),
+                           ethercat::esi::number_text(found.revision));
+    }
+    if (!device.slots.empty()) return "its identity does not name its modules";
+    const std::string beside = written_path(path, folder);
+    const auto key = key_of(*file, device, found.revision);
+    if (!key || !fits_configuration(beside)) {
+        return fmt::format("the path '{}' cannot be written to a configuration", path.string());
+    }
+    found.name = device.order.empty() ? found.name : device.order;
+    found.device = device.name;
+    found.esi = beside;
+    found.order = *key;
+    return {};
+}
+
+/// Describes all slaves. Returns false after printing the reason.
+bool describe_all(const EthercatConfigOptions& options, const std::filesystem::path& folder,
+                  Source& to) {
+    DescriptionFolder descriptions;
+    if (const std::string problem = descriptions.open(options.descriptions); !problem.empty()) {
+        fail(options, problem);
+        return false;
+    }
+    to.notes = descriptions.notes();
+    for (std::size_t n = 0; n < to.slaves.size(); ++n) {
+        config::Found& found = to.slaves[n];
+        const std::string name = found.name.empty() ? found.device : found.name;
+        if (const std::string why = describe(descriptions, folder, found); !why.empty()) {
+            to.notes.push_back(
+                fmt::format("slave {}{}: process data as its EEPROM has it, because {}", n,
+                            name.empty() ? "" : " (" + name + ")", why));
+        }
+    }
+    return true;
+}
+
+/// Takes the slaves from a bus. Returns false after printing the reason.
+bool from_bus(const EthercatConfigOptions& options, const std::filesystem::path& stem,
+              EthercatWire& wire, Source& to) {
+    wire.identify();
+    for (std::size_t n = 0; n < wire.size(); ++n) {
+        const auto& c = wire.contents(n);
+        config::Found& found = to.slaves.emplace_back();
+        found.name = c.general.order.empty() ? c.general.name : c.general.order;
+        found.device = c.general.name;
+        found.vendor = c.vendor;
+        found.product = c.product;
+        found.revision = c.revision;
+        found.alias = c.alias();
+        found.rx = c.rx;
+        found.tx = c.tx;
+        found.sync_managers = c.sync_managers;
+        if (!c.dc.empty()) {
+            found.assign_activate = c.dc.front().assign_activate;
+        }
+    }
+    const bool emulated = !options.emulate.empty();
+    to.link = emulated ? "sim:" + stem.filename().string() : wire.address();
+    to.segment = emulated ? devices_of(options.emulate) : "";
+    return options.descriptions.empty() || describe_all(options, folder_of(stem), to);
 }
 
 /// Splits FILE or FILE:DEVICE. The path is the longest beginning that names a file.
@@ -150,15 +217,9 @@ bool add_description(const EthercatConfigOptions& options, const std::string& it
         return false;
     }
     const esi::Device& device = *match.device;
-    // paths in the files start at their own folder
-    const std::string beside =
-        path.starts_with('/') ? path : std::filesystem::proximate(path, folder).string();
+    const std::string beside = written_path(path, folder);
     const std::string code = esi::number_text(device.product);
-    // a configuration names no product 0
-    const auto product = device.product != 0 ? std::optional(device.product) : std::nullopt;
-    const auto key = name_of(
-        file, device, {.vendor = device.vendor, .product = product, .revision = device.revision},
-        {device.order, device.name, ""}, fits_configuration);
+    const auto key = key_of(file, device, device.revision);
     if (!key || !fits_configuration(beside)) {
         fail(options, fmt::format("'{}': the path cannot be written to a configuration; rename "
                                   "the file so that it has no ' #', ' ;' or control characters",
@@ -175,7 +236,7 @@ bool add_description(const EthercatConfigOptions& options, const std::string& it
     found.revision = device.revision;
     if (!emulate) return true;
     if (const std::string left_out = ethercat::devices::not_emulated(device); !left_out.empty()) {
-        to.notes += fmt::format("'{}' is emulated without {}\n", device.order, left_out);
+        to.notes.push_back(fmt::format("'{}' is emulated without {}", device.order, left_out));
     }
     const auto word = name_of(file, device, {.revision = device.revision},
                               {code, device.order, device.name}, fits_netlist);
@@ -198,13 +259,31 @@ bool add_description(const EthercatConfigOptions& options, const std::string& it
 bool from_descriptions(const EthercatConfigOptions& options, const std::filesystem::path& stem,
                        const std::string& address, Source& to) {
     const std::string name = stem.filename().string();
-    const std::filesystem::path folder =
-        stem.has_parent_path() ? stem.parent_path() : std::filesystem::path(".");
+    const std::filesystem::path folder = folder_of(stem);
     for (const std::string& item : ethercat::devices::device_list(options.esi)) {
         if (!add_description(options, item, folder, address.empty(), to)) return false;
     }
     to.link = address.empty() ? "sim:" + name : address;
     return true;
+}
+
+std::string json_summary(const std::string& file, const std::string& netlist,
+                         const Source& source) {
+    std::string notes;
+    for (const std::string& note : source.notes) {
+        notes += (notes.empty() ? "" : ",") + json_string(note);
+    }
+    return fmt::format("{{\"configuration\":{},\"netlist\":{},\"slaves\":{},\"notes\":[{}]}}\n",
+                       json_string(file), json_string(netlist), source.slaves.size(), notes);
+}
+
+std::string summary(const std::string& file, const std::string& netlist, const Source& source) {
+    std::string lines;
+    for (const std::string& note : source.notes) {
+        lines += note + "\n";
+    }
+    return lines + fmt::format("{} and {} written, {} slave{}; next: hal run {}\n", file, netlist,
+                               source.slaves.size(), source.slaves.size() == 1 ? "" : "s", netlist);
 }
 
 }  // namespace
@@ -214,6 +293,9 @@ int run_ethercat_config(const EthercatConfigOptions& options) {
     const bool described = !options.esi.empty();
     if (described && !options.emulate.empty()) {
         return fail(options, "--esi and --emulate exclude each other");
+    }
+    if (described && !options.descriptions.empty()) {
+        return fail(options, "--esi and --descriptions exclude each other");
     }
     if (!described && !wire.open(options)) return 1;
     const std::vector<std::string>& words = described ? options.words : wire.arguments();
@@ -238,7 +320,7 @@ int run_ethercat_config(const EthercatConfigOptions& options) {
     Source source;
     const std::string address = described && words.size() == 2 ? words.front() : "";
     if (!(described ? from_descriptions(options, stem, address, source)
-                    : from_bus(options, name, wire, source))) {
+                    : from_bus(options, stem, wire, source))) {
         return 1;
     }
     constexpr std::int64_t millisecond = 1'000'000;
@@ -257,17 +339,9 @@ int run_ethercat_config(const EthercatConfigOptions& options) {
             return fail(options, problem);
         }
     }
-    if (options.json) {
-        return print(fmt::format("{{\"configuration\":{},\"netlist\":{},\"slaves\":{}}}\n",
-                                 json_string(file), json_string(netlist), source.slaves.size()))
-                   ? 0
-                   : 1;
-    }
-    return print(source.notes + fmt::format("{} and {} written, {} slave{}; next: hal run {}\n",
-                                            file, netlist, source.slaves.size(),
-                                            source.slaves.size() == 1 ? "" : "s", netlist))
-               ? 0
-               : 1;
+    const std::string said =
+        options.json ? json_summary(file, netlist, source) : summary(file, netlist, source);
+    return print(said) ? 0 : 1;
 }
 
 }  // namespace hal::tools

@@ -31,6 +31,7 @@ protected:
 /// Options of `config`, which writes files for a bus or for descriptions.
 struct EthercatConfigOptions : EthercatOptions {
     std::string esi;
+    std::string descriptions;
 
     void declare(OptionSet& set) override {
         set.words("ADDRESS NAME",
@@ -42,6 +43,9 @@ struct EthercatConfigOptions : EthercatOptions {
                   "write the files for these descriptions instead of the slaves on a bus: "
                   "FILE.xml, or FILE.xml:DEVICE, separated by commas; between single quotes if it "
                   "contains commas");
+        set.value("--descriptions", descriptions, "FOLDER",
+                  "take what the makers' files (ESI) of this folder, or this file, have on the "
+                  "slaves of the bus instead of what their EEPROMs have");
     }
 };
 
@@ -101,7 +105,8 @@ struct EthercatPlanOptions : Options {
     void declare(OptionSet& set) override {
         set.words("FILE",
                   "configuration of the bus, NAME.ethercat or LinuxCNC's ethercat-conf.xml");
-        set.value("--svg", svg, "FILE", "draw the timing of a cycle to this file; -: standard output");
+        set.value("--svg", svg, "FILE",
+                  "draw the timing of a cycle to this file; -: standard output");
         set.flag("--json", json, "print JSON");
     }
 };
