@@ -75,6 +75,20 @@ void parse_integer(std::string_view text, const char* type, LeadingZero zero, T&
     value = static_cast<T>(negative ? 0 - magnitude : magnitude);
 }
 
+/// Returns what to write in place of "1,5"; empty for any other text, and for "1,500", which may be
+/// 1500.
+std::string decimal_comma_help(std::string_view text) {
+    const std::size_t comma = text.find(',');
+    const std::string_view whole = text.substr(text.starts_with('-') ? 1 : 0);
+    if (comma == text.npos || whole.front() == ',' || comma + 1 == text.size() ||
+        text.size() - comma == 4 || whole.find_first_not_of("0123456789,") != whole.npos ||
+        text.find_first_not_of("0123456789", comma + 1) != text.npos) {
+        return {};
+    }
+    return "; write " + std::string(text.substr(0, comma)) + "." +
+           std::string(text.substr(comma + 1));
+}
+
 void parse_float(std::string_view text, double& value, std::string& problem) {
     // strtod reads what users of LinuxCNC may write (hexadecimal floats, inf); the locale must not
     // turn "0.5" into "0,5".
@@ -84,7 +98,7 @@ void parse_float(std::string_view text, double& value, std::string& problem) {
     const double read = strtod_l(copy.c_str(), &end, c_locale);
     const bool blank_first = copy.empty() || std::strchr(" \t\n\v\f\r", copy[0]) != nullptr;
     if (blank_first || end != copy.c_str() + copy.size()) {
-        problem = quoted(text) + " is not a number";
+        problem = quoted(text) + " is not a number" + decimal_comma_help(text);
         return;
     }
     // "inf" in any case; no digit of any base is an n

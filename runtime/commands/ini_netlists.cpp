@@ -19,13 +19,18 @@ void print_diagnostics(const Diagnostics& diagnostics, const Shell& shell, Outpu
     output.err(render(diagnostics, shell.session().sources, shell.options.color));
 }
 
-int report_unreadable(const Shell& shell, Output& output, const std::string& path,
-                      const std::string& problem, Code code, std::string help) {
+int report(const Shell& shell, Output& output, Code code, std::string sentence, std::string help) {
     Diagnostics diagnostics;
-    diagnostics.error(code, {}, "'" + path + "' cannot be read: " + problem, "", std::move(help));
+    diagnostics.error(code, {}, std::move(sentence), "", std::move(help));
     const auto lock = shell.session().lock();
     print_diagnostics(diagnostics, shell, output);
     return 1;
+}
+
+int report_unreadable(const Shell& shell, Output& output, const std::string& path,
+                      const std::string& problem, Code code, std::string help) {
+    return report(shell, output, code, "'" + path + "' cannot be read: " + problem,
+                  std::move(help));
 }
 
 namespace {

@@ -12,6 +12,8 @@ namespace hal {
 
 /// Prints diagnostics as the options of the shell ask for. The session's lock must be held.
 void print_diagnostics(const Diagnostics& diagnostics, const Shell& shell, Output& output);
+/// Prints an error without a place. Takes the session's lock. Returns 1, the exit status.
+int report(const Shell& shell, Output& output, Code code, std::string sentence, std::string help);
 /// Prints that a file cannot be read. Takes the session's lock. Returns 1, the exit status.
 int report_unreadable(const Shell& shell, Output& output, const std::string& path,
                       const std::string& problem, Code code, std::string help);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "commands/files.hpp"
+#include "commands/foreign_file.hpp"
 #include "commands/two_pass.hpp"
 #include "text/quoting.hpp"
 
@@ -478,6 +479,11 @@ bool Script::reports_recursion(Context& context, const std::string& canonical) {
 void Script::source(Context& context) {
     std::string path, text;
     if (!read_source(context, path, text)) return;
+    if (auto foreign = foreign_file(path, text)) {
+        context.diagnostics.error("unsupported-file", context.span(0), std::move(foreign->sentence),
+                                  "", std::move(foreign->help));
+        return;
+    }
     const std::string canonical = canonical_path(path);
     if (reports_recursion(context, canonical)) return;
     const std::uint32_t source = add_text(path, std::move(text));

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "commands/files.hpp"
+#include "commands/foreign_file.hpp"
 #include "commands/ini_netlists.hpp"
 #include "commands/script.hpp"
 #include "commands/shell_state.hpp"
@@ -131,7 +132,11 @@ int Shell::run_file(const std::string& path, Output& output) {
             "files are supported, with loops as ranges: pid.[0..5].command");
     }
     std::string text, problem;
-    if (!read_text_file(resolve_path(path, options.directory), text, problem, true)) {
+    const bool is_read = read_text_file(resolve_path(path, options.directory), text, problem, true);
+    if (const auto foreign = is_read ? foreign_file(path, text) : std::nullopt) {
+        return report(*this, output, "unsupported-file", foreign->sentence, foreign->help);
+    }
+    if (!is_read) {
         if (options.check) {
             state_->session.absences().note_missing_text(path);
         }

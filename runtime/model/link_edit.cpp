@@ -64,6 +64,13 @@ void uncount(Pin& pin, Signal& signal) {
     }
 }
 
+/// Returns the arrows of `net` for what looks like another one; empty for any other text.
+std::string arrow_help(std::string_view text) {
+    const bool looks_like_one =
+        text.find_first_not_of("-=<>") == text.npos && text.find_first_of("<>") != text.npos;
+    return looks_like_one ? "the arrows are =>, <= and <=>, and may be left out" : "";
+}
+
 std::string nothing_yet(std::string_view kind) { return "no " + std::string(kind) + "s exist yet"; }
 
 }  // namespace
@@ -92,7 +99,10 @@ void LinkEdit::unknown_name(Code code, Word name, const char* what, NameGroup gr
 Pin* LinkEdit::pin(Word name) {
     if (Pin* const found = model_.find_pin(name.text)) return found;
     if (is_absent(name.text, Absences::Kind::pin)) return nullptr;
-    std::string help = namesake_help(model_, name.text);
+    std::string help = arrow_help(name.text);
+    if (help.empty()) {
+        help = namesake_help(model_, name.text);
+    }
     if (help.empty()) {
         help = pins_of_instance(model_, name.text);
     }

@@ -88,6 +88,17 @@ const std::vector<std::vector<UsageWord>>& usage_forms(std::string_view argument
     return at->second;
 }
 
+namespace {
+
+/// Returns what to type for `NAME VALUE` with an equals sign between them; empty: there is none.
+std::string without_equals_sign(std::string_view command, std::span<const Token> args) {
+    if (args.size() != 3 || args[1].text != "=") return {};
+    return "write it without '=': " + std::string(command) + " " + args[0].text + " " +
+           args[2].text;
+}
+
+}  // namespace
+
 bool check_arity(const Usage& usage, const Token& name, std::span<const Token> args,
                  Diagnostics& diagnostics) {
     const auto& forms = usage_forms(usage.arguments);
@@ -113,6 +124,7 @@ bool check_arity(const Usage& usage, const Token& name, std::span<const Token> a
             at.end = last.end;
         }
     }
+    const std::string remedy = without_equals_sign(usage.name, args);
     diagnostics.error("wrong-arguments", at,
                       std::string(usage.name) + " takes " +
                           (min == max ? ""
@@ -121,7 +133,7 @@ bool check_arity(const Usage& usage, const Token& name, std::span<const Token> a
                           std::to_string(bound) +
                           (bound == 1 ? " argument, not " : " arguments, not ") +
                           std::to_string(given),
-                      "", to_string(usage));
+                      "", remedy.empty() ? to_string(usage) : remedy);
     return false;
 }
 

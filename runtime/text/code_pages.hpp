@@ -695,6 +695,9 @@ inline constexpr CodePage code_pages[] = {
      "separate program that accesses HAL's shared memory.\n\n"
      "The message names the alternative."},
     {"unsupported-file",
+     "The file is not a netlist: it is a device description, a configuration of a bus, a "
+     "recording, "
+     "the source of a component or a program. The help names the command for it.\n\n"
      "A Tcl file is a program: `hal run`, `hal sim` and `halrun` execute it, and nothing can be "
      "known about it before. `hal check` and clients of a "
      "running machine take .hal and .ini files only; `haltcl FILE.tcl` runs a Tcl file on a "
