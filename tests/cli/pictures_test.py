@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-# packages: canopen ethercat scocan tdma
+# packages: canopen estimation ethercat scocan tdma
 """Pictures and tables that are computed from a simulation: made again, they are the same to the byte."""
 import os
 import re
@@ -45,6 +45,28 @@ class Pictures(Case):
             said, r"^largest error of the filter: [1-4]?\d mm; of odometry alone: [2-9]\d\d mm\n$"
         )
         self.same(ROOT / "halfiles/canopen-robot/match.svg", made)
+
+    def test_swing_up_of_the_pendulum(self):
+        made = Path(self.folder, "swing-up.svg")
+        self.assertRegex(
+            self.make(ROOT / "halfiles/furuta/picture", made), r"^upright after 2\.\d\d s\n$"
+        )
+        self.same(ROOT / "docs/swing-up.svg", made)
+
+    def test_swing_up_is_not_computed_for_a_folder_that_is_missing(self):
+        done = subprocess.run(
+            [sys.executable, ROOT / "halfiles/furuta/picture", "absent/swing-up.svg"],
+            cwd=self.folder,
+            env=dict(os.environ, HAL_BIN="/bin/false"),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.assertEqual(1, done.returncode)
+        self.assertRegex(
+            done.stderr,
+            "^absent/swing-up.svg: the folder is missing or not writable; name another file: ",
+        )
 
     def test_path_of_yair(self):
         made = Path(self.folder, "path.svg")
