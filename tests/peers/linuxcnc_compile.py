@@ -8,7 +8,7 @@ SOURCE_FOLDER is `src` of a LinuxCNC source tree the user has, TESTS_FOLDER its 
 project. Every .comp and .c file of src/hal/components is compiled unmodified. A file that includes headers of the motion
 controller or of hardware is listed with them and not counted. What compiles is loaded (`loadrt NAME`); then every test of
 linuxcnc_tests.py that loads one of them runs with the compiled ones in front of our own, and those of `halcompile` with
-a program of that name that calls ours. docs/linuxcnc-compatibility.md has the results and the reasons.
+a program of that name that calls ours. docs/linuxcnc-test-runs.md has the results and the reasons.
 """
 import argparse
 import pathlib

@@ -10,7 +10,7 @@ under both halrun programs. --newer FOLDER has components of LinuxCNC 2.10, comp
 
 Each intended difference is in linuxcnc_components/entries.py with its reason; any other one fails, and so does one that no longer occurs.
 Without LinuxCNC the inventory is compared with linuxcnc_components/inventory.json, and the rest is skipped. --write-docs and --write-inventory update
-docs/linuxcnc-compatibility.md and that file.
+docs/linuxcnc-same-names.md and that file.
 """
 import argparse
 import re
@@ -330,9 +330,9 @@ def main():
     options = parser.parse_args()
 
     if options.write_docs:
-        documentation.write(ROOT / "docs" / "linuxcnc-compatibility.md")
+        documentation.write(ROOT / "docs" / "linuxcnc-same-names.md")
         return 0
-    lines = documentation.check(ROOT / "docs" / "linuxcnc-compatibility.md")
+    lines = documentation.check(ROOT / "docs" / "linuxcnc-same-names.md")
     lines += check_facts(options) if FACTS.exists() and not options.write_inventory else []
     for line in lines:
         print(line)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 # packages: linuxcnc
 """linuxcnc_modules_test.py HAL [--figures]: LinuxCNC's compiled modules as the Debian package linuxcnc-uspace installs them, unmodified. The
-steps are those of the ladder in docs/linuxcnc-compatibility.md. --figures prints what each module does. LINUXCNC_HOME names another LinuxCNC, such as a
+steps are those of the ladder in docs/linuxcnc-test-runs.md. --figures prints what each module does. LINUXCNC_HOME names another LinuxCNC, such as a
 source tree of 2.10 that was built in place. 77: the package is not installed."""
 import os
 import re
@@ -70,7 +70,7 @@ WITH = {
     "lincurve": "personality=4",
     "logic": "personality=0x104",
 }
-# Modules that do not run without their hardware or root, with a piece of the reason that the error must give; docs/linuxcnc-compatibility.md.
+# Modules that do not run without their hardware or root, with a piece of the reason that the error must give; docs/linuxcnc-test-runs.md.
 PORTS = "I/O ports"  # their access needs a capability, or is not possible with this kernel
 DECLINE = {
     "hal_bb_gpio": "cannot open /dev/mem",

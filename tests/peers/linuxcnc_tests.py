@@ -8,7 +8,7 @@ is a folder with test.hal, test.sh or test, run in a copy of it as upstream's ru
 
 A test is run when all it needs is in its folder, beside our program, or a plain system utility; a LinuxCNC that is
 installed is not looked at. Every other test is listed with what it needs, and is not counted as passed; a test.sh that is
-not about HAL is not listed. NAME is a part of a test's name. docs/linuxcnc-compatibility.md has the results and the reasons.
+not about HAL is not listed. NAME is a part of a test's name. docs/linuxcnc-test-runs.md has the results and the reasons.
 """
 import os
 import pathlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The tables of the intended differences in docs/linuxcnc-compatibility.md."""
+"""The tables of the intended differences in docs/linuxcnc-same-names.md."""
 from . import expected
 
 BEGIN = "<!-- begin: written by tests/peers/linuxcnc_components.py --write-docs -->"

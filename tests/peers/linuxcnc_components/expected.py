@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The differences from LinuxCNC that are intended, each with its reason. docs/linuxcnc-compatibility.md has them as tables, written by
+"""The differences from LinuxCNC that are intended, each with its reason. docs/linuxcnc-same-names.md has them as tables, written by
 `linuxcnc_components.py HAL --write-docs`; a test compares both.
 
 A difference of values is a Behaviour: a condition for the cycles in which it occurs. With `lasts` it remains after the first such cycle, because
@@ -82,7 +82,7 @@ class InInventory:
 
 
 # Components that follow another law on purpose, so that a comparison cycle by cycle has no meaning. "by feature": tests/peers/compare_components.py compares
-# them feature by feature; docs/linuxcnc-compatibility.md has the results. The manual page of each lists what differs; netlists test it.
+# them feature by feature; docs/linuxcnc-same-names.md has the results. The manual page of each lists what differs; netlists test it.
 FEATURES = "compared [by feature](#our-components-compared-with-linuxcncs)"
 UNLIKE = {
     "encoder": FEATURES,

@@ -389,7 +389,7 @@ def any_netlist(_netlist, _number):
 
 
 # Commands of which one side reports an error: (pattern, the side, why, and a condition on the netlist and the line's number).
-# docs/linuxcnc-compatibility.md has each.
+# docs/linuxcnc-same-names.md has each.
 ACCEPTED = [
     (
         r"net ",
