@@ -13,11 +13,11 @@ def number(value):
 
 
 class Picture:
-    """An SVG file, built from the back to the front."""
+    """An SVG file, built from the back to the front. It is shown `scale` times as large as its coordinates."""
 
-    def __init__(self, width, height, title):
+    def __init__(self, width, height, title, scale=1):
         self.parts = [
-            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
+            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width * scale}" height="{height * scale}" '
             'font-family="system-ui, sans-serif" font-size="13">',
             f"<title>{escape(title)}</title>",
             f'<rect width="{width}" height="{height}" fill="#ffffff"/>',
