@@ -330,8 +330,9 @@ constexpr Subcommand table[] = {
     command<PanelOptions, OF_PANEL(run_panel)>(
         "panel", "[FILE] [--write] [--listen ADDRESS]",
         "show a running machine in a web browser: values, graph, scope, user panels"),
-    command<DoctorOptions, IN_TOOLS(run_doctor)>("doctor", "",
-                                                 "check whether this machine is fit for real time"),
+    command<DoctorOptions, IN_TOOLS(run_doctor)>(
+        "doctor", "[--interface NAME [--try]]",
+        "check whether this machine, or a network interface, is fit for real time"),
     command<CompletionOptions, IN_CORE(run_completion)>(
         "completion", "SHELL", "print a completion script: source <(hal completion bash)"),
 };

@@ -25,26 +25,14 @@
 #include "base/types.hpp"
 #include "cli/output.hpp"
 #include "hal/privilege.hpp"
+#include "inspect/doctor_interface.hpp"
+#include "inspect/finding.hpp"
 #include "inspect/jitter.hpp"
 #include "inspect/remedies.hpp"
 
 namespace hal::tools {
 
 namespace {
-
-enum class Verdict { good, fair, poor };
-
-/// The result of one check.
-struct Finding {
-    Verdict verdict;
-    std::string subject, sentence;
-    /// what to type; empty when no action is needed. A command begins with `sudo`
-    std::string remedy = {};
-    std::string other = {};  ///< what to type instead, where there is a choice
-    std::string then = {};  ///< what remains to be done after the remedy
-
-    std::string advice() const { return then.empty() ? remedy : remedy + ", then " + then; }
-};
 
 std::string first_line(const std::string& path) {
     std::ifstream file(path);
@@ -346,67 +334,25 @@ constexpr Finding (*checks[])() = {kernel,       machine,      scheduling,  memo
                                    capabilities, raw_ethernet, throttling,  governor,
                                    isolation,    clock_source, idle_states, management_interrupts};
 
-const char* word(Verdict verdict) {
-    static constexpr const char* words[] = {"good", "fair", "poor"};
-    return words[static_cast<std::size_t>(verdict)];
-}
-
-/// `as` is an earlier finding with the same advice, or nullptr.
-std::string described(const Finding& finding, const Finding* as, bool colour) {
-    static constexpr const char* codes[] = {"\033[32m", "\033[33m", "\033[31m"};
-    const std::string verdict =
-        colour ? fmt::format("{}{}\033[0m", codes[static_cast<std::size_t>(finding.verdict)],
-                             word(finding.verdict))
-               : word(finding.verdict);
-    std::string text = fmt::format("{}  {:15} {}\n", verdict, finding.subject, finding.sentence);
-    if (as) {
-        return text + fmt::format("      {:15}   try: the same as for {}\n", "", as->subject);
-    }
-    if (!finding.remedy.empty()) {
-        text += fmt::format("      {:15}   try: {}\n", "", finding.advice());
-    }
-    if (!finding.other.empty()) {
-        text += fmt::format("      {:15}   or:  {}\n", "", finding.other);
-    }
-    return text;
-}
-
 }  // namespace
 
 int run_doctor(const DoctorOptions& options) {
     if (options.yes && !options.fix) {
         return fail(options, "--yes applies to --fix: it carries out commands without asking");
     }
-    const bool colour = colours(STDOUT_FILENO);
+    if (!options.interface.empty()) return run_interface_doctor(options);
+    if (options.trial || options.hold || options.cpu >= 0) {
+        return fail(options, "--cpu, --try and --hold apply to --interface NAME");
+    }
     nlohmann::ordered_json report;
-    std::vector<Remedy> remedies;
     std::vector<Finding> findings;
     findings.reserve(std::size(checks));
     for (const auto& check : checks) {
-        const Finding& finding = findings.emplace_back(check());
-        const Remedy remedy{finding.remedy, finding.then};
-        if (finding.remedy.starts_with("sudo ") &&
-            std::find(remedies.begin(), remedies.end(), remedy) == remedies.end()) {
-            remedies.push_back(remedy);
-        }
-        if (options.json) {
-            report["findings"].push_back({{"verdict", word(finding.verdict)},
-                                          {"subject", finding.subject},
-                                          {"sentence", finding.sentence},
-                                          {"remedy", finding.advice()},
-                                          {"other", finding.other}});
-        } else {
-            const auto as =
-                std::find_if(findings.begin(), findings.end() - 1, [&](const Finding& before) {
-                return !finding.remedy.empty() && before.advice() == finding.advice() &&
-                       (finding.other.empty() || before.other == finding.other);
-            });
-            if (!print(described(finding, as != findings.end() - 1 ? &*as : nullptr, colour))) {
-                return 1;
-            }
-        }
+        findings.push_back(check());
+        report["findings"].push_back(json_of(findings.back()));
     }
-    if (options.fix) return carry_out(options, remedies);
+    if (!options.json && !print_findings(findings)) return 1;
+    if (options.fix) return carry_out(options, remedies_of(findings));
     constexpr std::int64_t period_ns = 1'000'000;
     constexpr std::int64_t spin_ns = 200'000;
     for (const std::int64_t spin : {std::int64_t{0}, spin_ns}) {

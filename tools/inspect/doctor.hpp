@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <string>
+
 #include "cli/option_set.hpp"
 
 namespace hal::tools {
@@ -10,6 +12,10 @@ struct DoctorOptions : Options {
     bool json = false;
     bool fix = false;
     bool yes = false;
+    std::string interface{};  ///< examine this network interface instead of the machine
+    int cpu = -1;             ///< of the thread that uses the interface; -1: the isolated ones
+    bool trial = false;
+    bool hold = false;
 
     void declare(OptionSet& set) override {
         set.value("--seconds", seconds, "S", "duration of each measurement (default 2)")
@@ -18,6 +24,14 @@ struct DoctorOptions : Options {
         set.flag("--fix", fix,
                  "carry out the commands it suggests, each after asking; no measurement");
         set.flag("--yes", yes, "with --fix: without asking");
+        set.value("--interface", interface, "NAME",
+                  "examine this network interface for EtherCAT or raw Ethernet, and measure the "
+                  "round trip of frames");
+        set.value("--cpu", cpu, "N",
+                  "with --interface: CPU of the thread that uses it (default: the isolated ones)")
+            .in(0, 4095);
+        set.flag("--try", trial, "with --interface: change each setting, measure, and restore all");
+        set.flag("--hold", hold, "with --try: keep the changes until Ctrl-C");
     }
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "inspect/remedies.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <fmt/core.h>
@@ -63,6 +64,18 @@ bool agreed() {
 }
 
 }  // namespace
+
+std::vector<Remedy> remedies_of(const std::vector<Finding>& findings) {
+    std::vector<Remedy> remedies;
+    for (const Finding& finding : findings) {
+        const Remedy remedy{finding.remedy, finding.then};
+        if (finding.remedy.starts_with("sudo ") &&
+            std::find(remedies.begin(), remedies.end(), remedy) == remedies.end()) {
+            remedies.push_back(remedy);
+        }
+    }
+    return remedies;
+}
 
 int carry_out(const DoctorOptions& options, const std::vector<Remedy>& remedies) {
     if (remedies.empty()) return print("\nnothing to fix by a command\n") ? 0 : 1;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "inspect/doctor.hpp"
+#include "inspect/finding.hpp"
 
 namespace hal::tools {
 
@@ -14,6 +15,9 @@ struct Remedy {
     std::string then;     ///< what remains to be done, or ""
     bool operator==(const Remedy&) const = default;
 };
+
+/// Returns the commands of findings, each once. [setup]
+std::vector<Remedy> remedies_of(const std::vector<Finding>&);
 
 /// Shows each command, asks, and runs it; root needs no sudo. Returns the exit code: 0 when nothing
 /// that was agreed to has failed. [setup]
