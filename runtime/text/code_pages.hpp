@@ -563,6 +563,14 @@ inline constexpr CodePage code_pages[] = {
      "shows the valid values.\n\n"
      "Times have a unit: 500us, 10ms. Identifiers are 0x010..0x77F; the others belong to the "
      "discipline itself."},
+    {"repeated-function",
+     "Two functions in threads run the same code of the same instance. `lcec.read-all` runs "
+     "`lcec.0.read`, `lcec.1.read` ... of all masters: with both in a thread, the bus is read "
+     "twice in each cycle, and with `lcec.write-all` and `lcec.0.write`, two frames are sent.\n\n"
+     "LinuxCNC's lcec loads and runs such a netlist without a message. Halcyon also runs it, with "
+     "this warning, while both functions are in one thread. In two threads the same code would run "
+     "at the same time on the same data: that is an error.\n\n"
+     "Keep either the function for all masters or those of single masters."},
     {"several-nodes",
      "The netlist has `node` lines: it is for several machines, each of which loads its own "
      "part.\n\n"

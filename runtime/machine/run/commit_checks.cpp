@@ -15,6 +15,7 @@ namespace {
 void check_all(const Model& model, CommitChecks::Scope scope, Diagnostics& diagnostics) {
     check_periods(model, diagnostics);
     check_spread_pins(model, diagnostics);
+    check_repeated_steps(model, diagnostics);
     check_arrows(model, diagnostics);
     if (!scope.whole) return;
     // a file that has looked at its values before its first addf is not complete yet

@@ -15,6 +15,8 @@ namespace hal {
 void check_periods(const Model& model, Diagnostics& diagnostics);
 /// error spread-pins
 void check_spread_pins(const Model& model, Diagnostics& diagnostics);
+/// warning repeated-function in one thread, error in two
+void check_repeated_steps(const Model& model, Diagnostics& diagnostics);
 /// warning wrong-arrow
 void check_arrows(const Model& model, Diagnostics& diagnostics);
 /// Which functions the next check looks at.
