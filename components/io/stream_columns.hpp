@@ -57,14 +57,22 @@ private:
 };
 
 /// The pins `pin.0`, `pin.1` … one per letter of cfg, and the memory of the FIFO. As in LinuxCNC, a
-/// FIFO of depth N holds N - 1 records.
+/// FIFO of depth N holds N - 1 records. With several samples in a cycle, each letter has a pin for
+/// each of them: `pin.0-00`, `pin.0-01` …
 template <hal_dir direction>
 class Columns {
 public:
+    /// Where a pin is in the records of a cycle.
+    struct Slot {
+        std::size_t column = 0;
+        std::size_t sample = 0;
+    };
+
     /// Throws when cfg has another letter than b f s u l k (either case) or the FIFO would be too
     /// large. [setup]
     Columns(hal::Component& component, const std::string& cfg, std::int64_t depth, bool to_machine,
-            const char* doc) {
+            const char* doc, std::int64_t samples = 1)
+        : samples_(static_cast<std::size_t>(samples)) {
         if (cfg.empty()) {
             throw hal::ArgumentError("cfg",
                                      "cfg= is empty; give one letter per pin, of b f s u l k");
@@ -73,6 +81,11 @@ public:
         if (static_cast<std::size_t>(depth) > most_values / (cfg.size() + 1)) {
             throw hal::ArgumentError("depth", "depth=" + std::to_string(depth) +
                                                   " records of this cfg need more than 512 MB");
+        }
+        if (samples > depth - 1) {
+            throw hal::ArgumentError("samples",
+                                     "samples=" + std::to_string(samples) + ": the FIFO holds " +
+                                         std::to_string(depth - 1) + " records; raise depth=");
         }
         for (const char letter : cfg) {
             add(component, letter, doc);
@@ -107,8 +120,10 @@ public:
     }
 
     hal_stream& fifo() noexcept { return fifo_; }
-    /// The pins, each with its column in a record. [realtime]
-    const hal::AnyPins<direction, std::size_t>& pins() const noexcept { return pins_; }
+    /// The samples in a cycle. [realtime]
+    std::size_t samples() const noexcept { return samples_; }
+    /// The pins, each with its slot. [realtime]
+    const hal::AnyPins<direction, Slot>& pins() const noexcept { return pins_; }
     /// Notes when a record was made and how many records had been lost by then. [realtime]
     void stamp(std::uint64_t number, std::int64_t time_ns) noexcept {
         times_[number % fifo_.depth] = time_ns;
@@ -129,12 +144,17 @@ private:
                                         "'; valid letters are b f s u l k");
         }
         const std::size_t column = types_.size();
-        pins_.declare(component, nullptr, static_cast<hal_type>(type),
-                      "pin." + std::to_string(column), doc, column);
+        const std::string name = "pin." + std::to_string(column);
+        for (std::size_t sample = 0; sample < samples_; ++sample) {
+            const std::string number = (sample < 10 ? "-0" : "-") + std::to_string(sample);
+            pins_.declare(component, nullptr, static_cast<hal_type>(type),
+                          samples_ > 1 ? name + number : name, doc, Slot{column, sample});
+        }
         types_ += lower;
     }
 
-    hal::AnyPins<direction, std::size_t> pins_;
+    const std::size_t samples_;
+    hal::AnyPins<direction, Slot> pins_;
     std::string types_;
     std::vector<hal_value> values_;
     std::vector<std::int64_t> times_;

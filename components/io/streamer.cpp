@@ -72,8 +72,8 @@ private:
     }
 
     void read(const hal_value* from) noexcept {
-        columns.pins().each([from]<class T>(hal::Out<T>& pin, std::size_t column) {
-            pin = hal::value_as<T>(from[column]);
+        columns.pins().each([from]<class T>(hal::Out<T>& pin, const auto& slot) {
+            pin = hal::value_as<T>(from[slot.column]);
         });
     }
 
