@@ -125,8 +125,8 @@ const char* pin_type(const Entry& e) {
 
 std::string pin_line(const Entry& e, bool output, const std::string& slave) {
     const std::string object = bus::object_text(e.index, e.sub).substr(2);
-    return padded(output ? "in" : "out", 4) + padded(pin_type(e), 6) + slave + "." + e.name + "  " +
-           object + "\n";
+    return padded(output ? "in" : "out", 4) + padded(pin_type(e), 6) + slave + "." + e.pin_name() +
+           "  " + object + "\n";
 }
 
 std::string netlist(const Bus& bus, const std::string& file, const std::string& segment) {
@@ -163,7 +163,7 @@ std::string netlist(const Bus& bus, const std::string& file, const std::string& 
     std::string others;
     for (const auto& slave : bus.setup.slaves) {
         for_each_pin(slave, [&](bool output, const Entry& e) {
-            if (linked.count("ethercat.0." + slave.name + "." + e.name) == 0) {
+            if (linked.count("ethercat.0." + slave.name + "." + e.pin_name()) == 0) {
                 others += "#   " + pin_line(e, output, "ethercat.0." + slave.name);
             }
         });

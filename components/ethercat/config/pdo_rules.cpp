@@ -22,10 +22,18 @@ bool is_assigned(const std::vector<master::SyncManager>& managers, std::uint16_t
     });
 }
 
-std::vector<std::uint16_t> assigned_by_default(const esi::Device& device, bool output,
+std::vector<std::uint16_t> assigned_by_default(const PdoContext& context, bool output,
                                                unsigned manager) {
     std::vector<std::uint16_t> out;
-    for (const esi::Pdo& p : described(device, output)) {
+    if (context.mode != nullptr && context.mode->samples() != 0) {
+        for (const esi::OpMode::Assigned& one : context.mode->assigned) {
+            if (one.sync_manager == manager) {
+                out.push_back(one.pdo);
+            }
+        }
+        return out;
+    }
+    for (const esi::Pdo& p : described(context.device, output)) {
         if (p.sync_manager == manager) {
             out.push_back(p.index);
         }
@@ -42,15 +50,17 @@ std::string texts(const std::vector<std::uint16_t>& pdos) {
 }
 
 /// Returns what is wrong with the length of a sync manager, or an empty text.
-std::string too_long(const esi::Device& device, const std::string& type,
-                     const master::SyncManager& sm) {
+std::string too_long(const PdoContext& context, const master::SyncManager& sm) {
+    const esi::Device& device = context.device;
     if (sm.number >= device.sync_managers.size() || device.sync_managers[sm.number].max_size == 0) {
         return {};
     }
     unsigned bits = 0;
     for (const auto& p : sm.pdos) {
+        const esi::Pdo* const d = device.find_pdo(p.index);
+        const unsigned samples = d != nullptr && d->oversampling ? context.samples : 1;
         for (const auto& e : p.entries) {
-            bits += e.bits;
+            bits += samples * e.bits;
         }
     }
     const unsigned bytes = (bits + 7) / 8;
@@ -59,7 +69,7 @@ std::string too_long(const esi::Device& device, const std::string& type,
         return {};
     }
     return "the objects have " + std::to_string(bytes) + " bytes; sync manager " +
-           std::to_string(sm.number) + " of '" + type + "' takes " + std::to_string(most);
+           std::to_string(sm.number) + " of '" + context.type + "' takes " + std::to_string(most);
 }
 
 }  // namespace
@@ -108,9 +118,10 @@ std::vector<std::uint16_t> mappable(const esi::Device& device, bool output) {
     return out;
 }
 
-void check_pdos(const esi::Device& device, const std::string& type,
-                const std::vector<master::SyncManager>& managers, bool output,
-                const std::string& key, Span at, Report& report) {
+void check_pdos(const PdoContext& context, const std::vector<master::SyncManager>& managers,
+                bool output, const std::string& key, Span at, Report& report) {
+    const esi::Device& device = context.device;
+    const std::string& type = context.type;
     const auto error = [&](std::string sentence, std::string help) {
         report.error(Topic::object, at, std::move(sentence), std::move(help));
     };
@@ -139,14 +150,15 @@ void check_pdos(const esi::Device& device, const std::string& type,
     }
     const bool coe = device.mailbox && device.mailbox->has(MailboxType::coe);
     for (const auto& sm : managers) {
-        if (const std::string sentence = too_long(device, type, sm); !sentence.empty()) {
-            error(sentence, "leave out objects");
+        if (const std::string sentence = too_long(context, sm); !sentence.empty()) {
+            error(sentence,
+                  context.samples > 1 ? "write a smaller number of samples" : "leave out objects");
         }
         std::vector<std::uint16_t> wanted;
         for (const auto& p : sm.pdos) {
             wanted.push_back(p.index);
         }
-        const auto usual = assigned_by_default(device, output, sm.number);
+        const auto usual = assigned_by_default(context, output, sm.number);
         if ((!coe || !device.mailbox->pdo_assign) && wanted != usual) {
             error("the assignment of sync manager " + std::to_string(sm.number) + " of '" + type +
                       "' is fixed: " + (usual.empty() ? "no PDO" : texts(usual)),

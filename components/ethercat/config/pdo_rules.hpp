@@ -24,10 +24,17 @@ unsigned most_entries(const esi::Device&, std::uint16_t pdo);
 /// those that are assigned by default.
 std::vector<std::uint16_t> mappable(const esi::Device&, bool output);
 
+/// What the PDOs of a slave are checked against.
+struct PdoContext {
+    const esi::Device& device;
+    const esi::OpMode* mode;  ///< of the distributed clocks; nullptr: none
+    const std::string& type;  ///< of the slave, for messages
+    unsigned samples = 1;  ///< in a cycle, of PDOs with samples
+};
+
 /// Checks what a slave has assigned in a direction against its description, and reports at `at`.
 /// `key` is "outputs" or "inputs".
-void check_pdos(const esi::Device&, const std::string& type,
-                const std::vector<master::SyncManager>&, bool output, const std::string& key,
-                Span at, Report&);
+void check_pdos(const PdoContext&, const std::vector<master::SyncManager>&, bool output,
+                const std::string& key, Span at, Report&);
 
 }  // namespace hal::ethercat::config

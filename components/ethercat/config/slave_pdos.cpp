@@ -172,24 +172,42 @@ void SlavePdos::direction(bool output) {
         managers.erase(managers.begin());
     }
     if (device_ != nullptr && in_.report.all.size() == before) {
-        check_pdos(*device_, in_.info.type, managers, output, key,
-                   line != nullptr ? line->value.at : in_.info.at, in_.report);
+        const PdoContext context{*device_, mode_, in_.info.type, in_.slave.oversampling};
+        check_pdos(context, managers, output, key, line != nullptr ? line->value.at : in_.info.at,
+                   in_.report);
     }
     std::move(managers.begin(), managers.end(), std::back_inserter(in_.slave.sync_managers));
 }
 
 /// Assigns the PDOs of the description; those of further sync managers, to further ones.
 void SlavePdos::assign_default(std::vector<master::SyncManager>& managers) {
-    for (const esi::Pdo& p : described(managers.front().output)) {
-        if (!p.sync_manager) continue;
-        auto at = std::find_if(managers.begin(), managers.end(),
-                               [&](const auto& sm) { return sm.number == *p.sync_manager; });
-        if (at == managers.end()) {
-            at =
-                managers.insert(managers.end(), further_manager(managers.front(), *p.sync_manager));
+    const auto& pdos = described(managers.front().output);
+    if (mode_ == nullptr || mode_->samples() == 0) {
+        for (const esi::Pdo& p : pdos) {
+            if (p.sync_manager) {
+                assign(p, manager_with(*p.sync_manager, managers));
+            }
         }
-        assign(p, *at);
+        return;
     }
+    for (const esi::OpMode::Assigned& one : mode_->assigned) {
+        const auto at = std::find_if(pdos.begin(), pdos.end(),
+                                     [&](const esi::Pdo& p) { return p.index == one.pdo; });
+        if (at != pdos.end()) {
+            assign(*at, manager_with(one.sync_manager, managers));
+        }
+    }
+}
+
+/// Returns the sync manager with a number, which is added if it is missing.
+master::SyncManager& SlavePdos::manager_with(unsigned number,
+                                             std::vector<master::SyncManager>& managers) const {
+    const auto at =
+        std::find_if(managers.begin(), managers.end(),
+                     [&](const master::SyncManager& sm) { return sm.number == number; });
+    if (at != managers.end()) return *at;
+    managers.push_back(further_manager(managers.front(), number));
+    return managers.back();
 }
 
 master::SyncManager SlavePdos::further_manager(const master::SyncManager& first,

@@ -19,8 +19,10 @@ Known profile_object(std::uint16_t index, std::uint8_t sub, unsigned axes);
 
 class SlavePdos {
 public:
-    SlavePdos(SlaveInput in, const esi::Device* device, std::uint64_t entries_per_pdo)
-        : in_(in), device_(device), limit_(entries_per_pdo) {}
+    /// `mode` is the operation mode of the description; nullptr: none.
+    SlavePdos(SlaveInput in, const esi::Device* device, const esi::OpMode* mode,
+              std::uint64_t entries_per_pdo)
+        : in_(in), device_(device), mode_(mode), limit_(entries_per_pdo) {}
     void read();
     /// Returns the keys of the process data, for messages.
     static std::vector<std::string> key_names();
@@ -33,6 +35,8 @@ private:
     master::SyncManager further_manager(const master::SyncManager& first, unsigned number) const;
     void direction(bool output);
     void assign_default(std::vector<master::SyncManager>& managers);
+    master::SyncManager& manager_with(unsigned number,
+                                      std::vector<master::SyncManager>& managers) const;
     /// An object, a range of them, a PDO or a gap, as `outputs` and `inputs` list them.
     struct Item {
         Word object;
@@ -55,6 +59,7 @@ private:
 
     SlaveInput in_;
     const esi::Device* device_;
+    const esi::OpMode* mode_;
     std::uint64_t limit_;
 };
 

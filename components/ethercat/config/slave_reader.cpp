@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "ethercat/config/slave_oversampling.hpp"
 #include "ethercat/config/slave_pdos.hpp"
 #include "ethercat/config/slave_writes.hpp"
 #include "ethercat/esi/lookup.hpp"
@@ -153,32 +154,18 @@ const bus::KeyTable<master::Dc>& clock_keys() {
         {"assign-activate", bus::number(&D::assign_activate, 0, 0xffff),
          "from the ESI; otherwise `0x300` for `sync0`, `0x700` for `sync0+sync1`",
          "value of registers 0980h and 0981h"},
+        {"oversampling", "1..1000", "from the mode of `dc`; otherwise `1`",
+         "samples in a cycle, of a device that takes one at each pulse of SYNC0; see "
+         "[Oversampling](#oversampling)"},
         {"sync0-cycle", bus::time(&D::sync0_cycle_ns, 10 * us, second),
          "from the ESI; otherwise the cycle time of the bus", "cycle time of SYNC0"},
         {"sync1-cycle", bus::time(&D::sync1_cycle_ns, 0, second), "from the ESI",
-         "cycle time of SYNC1"},
+         "time from a pulse of SYNC0 to the one of SYNC1 (register 09A4h); the next SYNC0 after it "
+         "starts it again"},
         {"sync1-shift", bus::time(&D::sync1_shift_ns, -second, second), "from the ESI; otherwise 0",
-         "shift of SYNC1"},
+         "added to `sync1-cycle`"},
     }};
     return table;
-}
-
-/// Returns the clock settings of an operation mode of a description.
-master::Dc clocks_of(const esi::OpMode& mode, std::int64_t cycle) {
-    master::Dc dc;
-    dc.assign_activate = mode.assign_activate;
-    if (mode.sync0_cycle_ns != 0) {
-        dc.sync0_cycle_ns = mode.sync0_cycle_ns;
-    } else if (mode.sync0_factor > 1) {
-        dc.sync0_cycle_ns = cycle * mode.sync0_factor;
-    } else if (mode.sync0_factor < -1) {
-        dc.sync0_cycle_ns = cycle / -std::int64_t{mode.sync0_factor};
-    }
-    const std::int64_t base = dc.sync0_cycle_ns != 0 ? dc.sync0_cycle_ns : cycle;
-    dc.sync1_cycle_ns = mode.sync1_cycle_ns != 0 ? mode.sync1_cycle_ns : base * mode.sync1_factor;
-    dc.sync0_shift_ns = mode.sync0_shift_ns;
-    dc.sync1_shift_ns = mode.sync1_shift_ns;
-    return dc;
 }
 
 /// Finds the operation mode with this name, or the first one with the signals that `sync0` or
@@ -213,9 +200,10 @@ public:
         clocks();
         description_writes();
         if (!described) return;  // unknown objects follow from it and are not reported
-        SlavePdos pdos(in_, device(), slave_.entries_per_pdo);
+        SlavePdos pdos(in_, device(), mode_, slave_.entries_per_pdo);
         SlaveWrites(in_, device(), pdos).read();
         pdos.read();
+        SlaveOversampling(in_, device()).expand();
         keys_.report_rest("of a slave", names());
     }
 
@@ -422,12 +410,50 @@ private:
     /// `sync0`, `sync0 250us`, `sync0+sync1`, the name of an operation mode, `clock`, `none`.
     void clocks() {
         const Line* line = keys_.find("dc");
-        if (line == nullptr || same_word(line->value.text, "none")) return reject_clock_keys();
+        if (line == nullptr && keys_.find("oversampling") != nullptr) return oversampled_clocks();
+        if (line == nullptr || same_word(line->value.text, "none")) {
+            reject_clock_keys();
+            return reject_oversampling(line);
+        }
         const auto words = words_of(line->value);
         auto dc = clock_mode(*line, words[0].text);
         if (!dc || !read_shift(*line, words, *dc)) return;
         clock_keys().apply(keys_, *dc, key_report_);
         slave_.dc = dc;
+    }
+
+    /// Sets the clocks of the first operation mode with the samples of `oversampling`.
+    void oversampled_clocks() {
+        mode_ = SlaveOversampling(in_, device()).read(nullptr);
+        if (mode_ == nullptr) return;
+        slave_.dc = clocks_of_mode();
+        clock_keys().apply(keys_, *slave_.dc, key_report_);
+    }
+
+    /// Reports `oversampling` beside a `dc` without an operation mode of the description.
+    void reject_oversampling(const Line* dc) {
+        const Line* const line = keys_.find("oversampling");
+        if (line == nullptr || dc == nullptr) return;
+        if (device_ == nullptr || device_->op_modes.empty()) {
+            SlaveOversampling(in_, device()).read(nullptr);
+            return;
+        }
+        report_.error(Topic::value, line->key.at,
+                      "'oversampling' needs SYNC0, but dc is '" + dc->value.text + "'",
+                      "delete the line dc, or name an operation mode: " + mode_names());
+    }
+
+    std::string mode_names() const {
+        std::vector<std::string> names;
+        for (const esi::OpMode& mode : device_->op_modes) {
+            names.push_back(mode.name);
+        }
+        return listed(names);
+    }
+
+    /// Returns the clocks of the operation mode, with the samples of the slave.
+    master::Dc clocks_of_mode() const {
+        return SlaveOversampling::clocks_of(*mode_, in_.bus.setup.cycle_ns, slave_.oversampling);
     }
 
     void reject_clock_keys() {
@@ -449,15 +475,20 @@ private:
                               "delete the line");
             }
             if (const esi::OpMode* found = find_mode(*device_, mode)) {
-                return clocks_of(*found, in_.bus.setup.cycle_ns);
+                mode_ = SlaveOversampling(in_, device()).read(found);
+                return clocks_of_mode();
             }
             for (const esi::OpMode& m : device_->op_modes) {
                 names.push_back(m.name);
             }
         }
         master::Dc dc;
-        if (same_word(mode, "clock")) return dc;
+        if (same_word(mode, "clock")) {
+            reject_oversampling(&line);
+            return dc;
+        }
         if (same_word(mode, "sync0") || same_word(mode, "sync0+sync1")) {
+            reject_oversampling(&line);
             dc.assign_activate = same_word(mode, "sync0") ? 0x300 : 0x700;
             return dc;
         }
@@ -513,6 +544,7 @@ private:
     const esi::File* file_ = nullptr;
     const esi::Device* device_ = nullptr;
     std::optional<esi::Device> modular_;
+    const esi::OpMode* mode_ = nullptr;  ///< of the description, with distributed clocks
 };
 
 }  // namespace

@@ -10,7 +10,9 @@
 #include "ethercat/devices/aoe_server.hpp"
 #include "ethercat/devices/eoe_host.hpp"
 #include "ethercat/devices/foe_server.hpp"
+#include "ethercat/devices/sampled_io.hpp"
 #include "ethercat/devices/soe_server.hpp"
+#include "text/characters.hpp"
 
 namespace hal::ethercat::devices {
 namespace {
@@ -325,6 +327,60 @@ void add_empty_assignments(const sii::Contents& s, Dictionary& d) {
     }
 }
 
+/// Returns the PDOs of a device that have several samples in a cycle.
+SampledPdos sampled_pdos(const esi::Device& device) {
+    SampledPdos out;
+    for (const auto* pdos : {&device.rx, &device.tx}) {
+        for (const esi::Pdo& pdo : *pdos) {
+            if (!pdo.oversampling) continue;
+            out.indices.push_back(pdo.index);
+            out.max_samples = std::max(out.max_samples, pdo.oversampling.max);
+        }
+    }
+    return out;
+}
+
+/// Returns how many bytes the PDOs of a sync manager have with all their samples.
+std::size_t max_sampled_bytes(const std::vector<esi::Pdo>& pdos, unsigned number) {
+    std::size_t bits = 0;
+    for (const esi::Pdo& pdo : pdos) {
+        if (pdo.sync_manager == number) {
+            bits += std::size_t{pdo.bits()} * std::max(pdo.oversampling.max, 1U);
+        }
+    }
+    return (bits + 7) / 8;
+}
+
+/// Returns the entries of PDOs with samples, and of other PDOs those that count cycles.
+struct SampledEntries {
+    std::vector<SampledEntry> values, counters;
+};
+SampledEntries sampled_entries(const std::vector<esi::Pdo>& pdos, Dictionary& d) {
+    SampledEntries out;
+    for (const esi::Pdo& pdo : pdos) {
+        for (const esi::Entry& e : pdo.entries) {
+            std::uint8_t* const data = e.index != 0 ? d.at(e.index, e.sub) : nullptr;
+            if (data == nullptr || e.bits == 0 || e.bits > 64) continue;
+            const bool is_signed = e.type.ends_with("INT") && !e.type.starts_with("U");
+            const SampledEntry entry{data, e.bits, is_signed};
+            if (pdo.oversampling) {
+                out.values.push_back(entry);
+            } else if (lower(e.name).find("cyclecount") != std::string::npos) {
+                out.counters.push_back(entry);
+            }
+        }
+    }
+    return out;
+}
+
+std::unique_ptr<Behaviour> behaviour_of(const esi::Device& device, const Design& design) {
+    if (design.sampled.indices.empty()) return std::make_unique<Idle>();
+    SampledEntries inputs = sampled_entries(device.tx, *design.dictionary);
+    SampledEntries outputs = sampled_entries(device.rx, *design.dictionary);
+    return std::make_unique<SampledIo>(design.dictionary, std::move(inputs.values),
+                                       std::move(outputs.values), std::move(inputs.counters));
+}
+
 void add_identity(const sii::Contents& s, Plan& plan) {
     const auto number = [](std::uint32_t value) {
         std::vector<std::uint8_t> bytes(4);
@@ -419,6 +475,10 @@ Parts make_esi_device(const DeviceOptions& o) {
     }
     design.coe = s.has_mailbox() && (s.protocols & bit_of(MailboxType::coe)) != 0;
     design.dc = device.has_dc;
+    design.sampled = sampled_pdos(device);
+    if (!design.sampled.indices.empty()) {
+        design.shortest_cycle_ns = 10'000;
+    }
     const bool configurable =
         design.coe && ((s.general.coe_details & sii::coe_pdo_config) != 0 ||
                        is_commanded(device, coe::rx_pdo, coe::tx_pdo + 0x1ff));
@@ -458,7 +518,9 @@ Parts make_esi_device(const DeviceOptions& o) {
         if (!output && s.sync_managers[n].type != sii::SmType::inputs) continue;
         const std::size_t bytes = add_assignment(output ? device.rx : device.tx, n, assignable, d);
         s.sync_managers[n].length = static_cast<std::uint16_t>(bytes);
-        const std::size_t most = std::max<std::size_t>(bytes, device.sync_managers[n].max_size);
+        const std::size_t sampled = max_sampled_bytes(output ? device.rx : device.tx, n);
+        const std::size_t most =
+            std::max({bytes, sampled, std::size_t{device.sync_managers[n].max_size}});
         std::size_t& max_bytes = output ? design.max_output_bytes : design.max_input_bytes;
         const bool changes = configurable || assignable;
         max_bytes = std::max({max_bytes, most, changes ? usual_max_bytes : std::size_t{0}});
@@ -467,7 +529,8 @@ Parts make_esi_device(const DeviceOptions& o) {
         add_empty_assignments(s, d);
     }
     d.finish();
-    return {std::move(design), std::make_unique<Idle>()};
+    auto behaviour = behaviour_of(device, design);
+    return {std::move(design), std::move(behaviour)};
 }
 
 }  // namespace hal::ethercat::devices

@@ -52,7 +52,6 @@ Firmware::Firmware(Design design, std::unique_ptr<Behaviour> behaviour)
     dictionary.guard_with(this);
     outputs_ = areas(sii::SmType::outputs);
     inputs_ = areas(sii::SmType::inputs);
-    image_.resize(std::max({design_.max_output_bytes, design_.max_input_bytes, std::size_t{1}}));
 }
 
 /// Returns the process data of all sync managers of a type.
@@ -69,8 +68,10 @@ std::vector<SyncArea> Firmware::areas(sii::SmType type) const {
         if (sm.control == 0) {
             area.mode = output ? buffered_outputs : buffered_inputs;
         }
+        const std::size_t max_bytes = output ? design_.max_output_bytes : design_.max_input_bytes;
         area.data.attach(*design_.dictionary, static_cast<std::uint16_t>(coe::assignment + n),
-                         output, output ? design_.max_output_bytes : design_.max_input_bytes);
+                         output, max_bytes, design_.sampled);
+        area.image.resize(std::max<std::size_t>(max_bytes, 1));
     }
     return out;
 }
@@ -83,9 +84,11 @@ std::size_t Firmware::bytes(const std::vector<SyncArea>& areas) noexcept {
     return sum;
 }
 
-void Firmware::build(std::vector<SyncArea>& areas) noexcept {
-    for (SyncArea& area : areas) {
-        area.data.build();
+void Firmware::build(unsigned samples) noexcept {
+    for (auto* areas : {&outputs_, &inputs_}) {
+        for (SyncArea& area : *areas) {
+            area.data.build(samples);
+        }
     }
 }
 
@@ -141,17 +144,18 @@ void Firmware::run(esc::Pdi& pdi, std::int64_t now_ns) noexcept {
     }
 }
 
-/// Takes new outputs out of all sync managers. Returns whether there are any.
+/// Takes new outputs out of all sync managers. Returns whether there are any. Their first sample is
+/// in the dictionary then.
 bool Firmware::read_outputs(esc::Pdi& pdi) noexcept {
     bool is_new = false;
     for (SyncArea& area : outputs_) {
         if (area.data.bytes() == 0) continue;
-        const std::size_t n = pdi.read_sync_manager(area.sync_manager, image_);
+        const std::size_t n = pdi.read_sync_manager(area.sync_manager, area.image);
         if (n < area.data.bytes()) continue;
         is_new = true;
         received_ = true;
         if (state_ != State::op) continue;
-        area.data.unpack({image_.data(), n});
+        area.data.unpack({area.image.data(), n}, 0);
         area.data.each_object([this](std::uint16_t index, std::uint8_t sub) noexcept {
             behaviour_->written(index, sub);
         });
@@ -161,38 +165,96 @@ bool Firmware::read_outputs(esc::Pdi& pdi) noexcept {
 
 void Firmware::run_process_data(esc::Pdi& pdi) noexcept {
     const auto sync = pdi.sync();
-    if (sync.active) {
-        if (sync.pulses == pulses_) return;
-        const auto pulses = static_cast<std::int64_t>(sync.pulses - pulses_);
-        pulses_ = sync.pulses;
-        if (!read_outputs(pdi) && state_ == State::op && bytes(outputs_) != 0) {
-            missed_.fetch_add(1, std::memory_order_relaxed);
-            if (auto* count = design_.dictionary->at(0x1c32, 0x0b)) {
-                put(count, static_cast<std::uint16_t>(get<std::uint16_t>(count) + 1));
-            }
-        }
-        step(pdi, pulses * sync.sync0_cycle_ns, sync.sync0_cycle_ns);
-    } else {
+    if (samples_ > 1) return run_samples(pdi, sync);
+    if (!sync.active) {
         read_outputs(pdi);
         if (now_ns_ > last_step_ns_) {
-            step(pdi, now_ns_ - last_step_ns_, 0);
+            step(pdi, now_ns_ - last_step_ns_);
         }
+        return;
+    }
+    if (sync.pulses == pulses_) return;
+    const auto pulses = static_cast<std::int64_t>(sync.pulses - pulses_);
+    pulses_ = sync.pulses;
+    if (!read_outputs(pdi)) {
+        count_missed();
+    }
+    work({now_ns_, pulses * sync.sync0_cycle_ns, state_ == State::op, sync.sync0_cycle_ns,
+          sync.last_pulse_dc_ns});
+    pack(0);
+    write_inputs(pdi);
+}
+
+/// Takes a sample at each pulse of SYNC0. The inputs are complete at SYNC1, or without it when all
+/// samples of a cycle were taken; then the outputs of the next cycle begin.
+void Firmware::run_samples(esc::Pdi& pdi, const esc::Pdi::Sync& sync) noexcept {
+    if (sync.pulses != pulses_) {
+        const auto pulses = static_cast<std::int64_t>(sync.pulses - pulses_);
+        pulses_ = sync.pulses;
+        if (sample_ == 0 && !read_outputs(pdi)) {
+            count_missed();
+        }
+        const unsigned sample = std::min(sample_, samples_ - 1);
+        for (SyncArea& area : outputs_) {
+            if (state_ == State::op && received_) {
+                area.data.unpack(area.image, sample);
+            }
+        }
+        work({now_ns_, pulses * sync.sync0_cycle_ns, state_ == State::op, sync.sync0_cycle_ns,
+              sync.last_pulse_dc_ns, sample});
+        pack(sample);
+        ++sample_;
+    }
+    const bool complete =
+        sync.sync1_active ? sync.sync1_pulses != sync1_pulses_ : sample_ >= samples_;
+    sync1_pulses_ = sync.sync1_pulses;
+    if (complete) {
+        write_inputs(pdi);
+        sample_ = 0;
     }
 }
 
-void Firmware::step(esc::Pdi& pdi, std::int64_t dt_ns, std::int64_t sync_cycle_ns) noexcept {
-    Step s{now_ns_, dt_ns, state_ == State::op, sync_cycle_ns};
+/// Counts a pulse of SYNC0 without new outputs.
+void Firmware::count_missed() noexcept {
+    if (state_ != State::op || bytes(outputs_) == 0) return;
+    missed_.fetch_add(1, std::memory_order_relaxed);
+    if (auto* count = design_.dictionary->at(0x1c32, 0x0b)) {
+        put(count, static_cast<std::uint16_t>(get<std::uint16_t>(count) + 1));
+    }
+}
+
+/// Works once without SYNC0: all samples of the inputs are the same.
+void Firmware::step(esc::Pdi& pdi, std::int64_t dt_ns) noexcept {
+    work({now_ns_, dt_ns, state_ == State::op});
+    for (unsigned sample = 0; sample < samples_; ++sample) {
+        pack(sample);
+    }
+    write_inputs(pdi);
+}
+
+void Firmware::work(Step s) noexcept {
     behaviour_->step(s);
     last_step_ns_ = now_ns_;
     if (design_.coe) {
         send(s.emergencies);
     }
+}
+
+/// Copies the inputs of a sample out of the dictionary.
+void Firmware::pack(unsigned sample) noexcept {
+    for (SyncArea& area : inputs_) {
+        const std::span<std::uint8_t> image{area.image.data(), area.data.bytes()};
+        if (sample == 0) {
+            std::fill(image.begin(), image.end(), std::uint8_t{0});
+        }
+        area.data.pack(image, sample);
+    }
+}
+
+void Firmware::write_inputs(esc::Pdi& pdi) noexcept {
     for (const SyncArea& area : inputs_) {
         if (area.data.bytes() == 0) continue;
-        const std::span<std::uint8_t> image{image_.data(), area.data.bytes()};
-        std::fill(image.begin(), image.end(), std::uint8_t{0});
-        area.data.pack(image);
-        pdi.write_sync_manager(area.sync_manager, image);
+        pdi.write_sync_manager(area.sync_manager, {area.image.data(), area.data.bytes()});
     }
 }
 
@@ -293,9 +355,34 @@ bool Firmware::fits(esc::Pdi& pdi, const SyncArea& area) const noexcept {
            (sm.control & mode_bits) == area.mode;
 }
 
+/// Returns the samples in a cycle: the pulses of SYNC0 until SYNC1, or what the length of a sync
+/// manager holds.
+unsigned Firmware::find_samples(esc::Pdi& pdi) noexcept {
+    const unsigned max = design_.sampled.max_samples;
+    if (max < 2) return 1;
+    const auto sync = pdi.sync();
+    if (sync.sync1_active && sync.sync0_cycle_ns != 0) {
+        return std::min(sync.sync1_cycle_ns / sync.sync0_cycle_ns + 1, max);
+    }
+    for (auto* areas : {&outputs_, &inputs_}) {
+        for (SyncArea& area : *areas) {
+            area.data.build(1);
+            const std::size_t one = area.data.bits();
+            if (!area.data.has_samples()) continue;
+            area.data.build(2);
+            const std::size_t per_sample = area.data.bits() - one;
+            const std::size_t rest = one - per_sample;
+            const std::size_t bits = 8 * std::size_t{pdi.sync_manager(area.sync_manager).length};
+            if (per_sample == 0 || bits <= rest) continue;
+            return std::clamp(static_cast<unsigned>((bits - rest) / per_sample), 1U, max);
+        }
+    }
+    return 1;
+}
+
 std::uint16_t Firmware::check_process_data(esc::Pdi& pdi) noexcept {
-    build(outputs_);
-    build(inputs_);
+    samples_ = find_samples(pdi);
+    build(samples_);
     const auto all_fit = [&](const std::vector<SyncArea>& areas) {
         return std::all_of(areas.begin(), areas.end(),
                            [&](const SyncArea& area) { return fits(pdi, area); });
@@ -309,7 +396,7 @@ std::uint16_t Firmware::check_sync(esc::Pdi& pdi) const noexcept {
     const std::uint8_t activation = *pdi.memory(registers::dc_activation);
     const bool requested = (activation & 1) != 0;
     if (!requested) {
-        if (design_.dc_required) return 0x0027;
+        if (design_.dc_required || samples_ > 1) return 0x0027;
         return 0;
     }
     if (!design_.dc) return 0x0028;
@@ -373,8 +460,10 @@ void Firmware::enter(esc::Pdi& pdi, State to) noexcept {
         received_ = false;
         last_step_ns_ = now_ns_;
         pulses_ = sync.active ? sync.pulses : 0;
+        sync1_pulses_ = sync.sync1_pulses;
+        sample_ = 0;
         state_ = to;
-        step(pdi, 0, 0);  // inputs are valid in SAFE-OP
+        step(pdi, 0);  // inputs are valid in SAFE-OP
     }
     state_ = to;
     if (to != State::op) {
@@ -382,7 +471,7 @@ void Firmware::enter(esc::Pdi& pdi, State to) noexcept {
     }
     shown_.store(to, std::memory_order_relaxed);
     if (leaves_op) {
-        step(pdi, 0, 0);  // below SAFE-OP it is the last one: outputs are off
+        step(pdi, 0);  // below SAFE-OP it is the last one: outputs are off
     }
     pdi.set_al_status(static_cast<std::uint16_t>(to), 0);
 }
@@ -397,7 +486,7 @@ void Firmware::fail(esc::Pdi& pdi, State stay, std::uint16_t code) noexcept {
         state_ = stay;
         shown_.store(stay, std::memory_order_relaxed);
         if (leaves_op) {
-            step(pdi, 0, 0);
+            step(pdi, 0);
         }
     }
     error_ = true;

@@ -58,6 +58,8 @@ struct Step {
     /// OP: the outputs in the dictionary are the master's; else they are 0
     bool outputs_valid = false;
     std::int64_t sync_cycle_ns = 0;  ///< of SYNC0, whose pulse the step belongs to; 0: free run
+    std::uint64_t sync_time_ns = 0;  ///< system time of that pulse
+    unsigned sample = 0;  ///< which sample of the cycle the step takes
     Emergencies emergencies{};  ///< put into the outbox of the mailbox after the step
 };
 
@@ -87,6 +89,7 @@ struct Design {
     bool dc = false;  ///< has SYNC0
     bool dc_required = false;  ///< rejects free run
     std::uint32_t shortest_cycle_ns = 62'500;
+    SampledPdos sampled{};
     /// explicit device identification; 0: none set
     std::uint16_t device_id = 0;
     std::size_t max_output_bytes = 0;
@@ -99,6 +102,7 @@ struct SyncArea {
     std::uint16_t start = 0;
     std::uint8_t mode = 0;  ///< bits 0 to 3 of its control byte: buffers or mailbox, direction
     ProcessData data{};
+    std::vector<std::uint8_t> image{};  ///< of all samples of a cycle
 };
 
 class Firmware final : public esc::Application, private DictionaryGuard {
@@ -143,11 +147,17 @@ private:
     // Process data.
     std::vector<SyncArea> areas(sii::SmType) const;
     static std::size_t bytes(const std::vector<SyncArea>&) noexcept;
-    static void build(std::vector<SyncArea>&) noexcept;
+    void build(unsigned samples) noexcept;
+    unsigned find_samples(esc::Pdi&) noexcept;
     bool fits(esc::Pdi&, const SyncArea&) const noexcept;
     void clear_outputs() noexcept;
     void run_process_data(esc::Pdi&) noexcept;
-    void step(esc::Pdi&, std::int64_t dt_ns, std::int64_t sync_cycle_ns) noexcept;
+    void run_samples(esc::Pdi&, const esc::Pdi::Sync&) noexcept;
+    void step(esc::Pdi&, std::int64_t dt_ns) noexcept;
+    void work(Step) noexcept;
+    void pack(unsigned sample) noexcept;
+    void write_inputs(esc::Pdi&) noexcept;
+    void count_missed() noexcept;
     void send(const Emergencies&) noexcept;
     bool read_outputs(esc::Pdi&) noexcept;
 
@@ -156,7 +166,6 @@ private:
     FirmwareFaults faults_;
     FirmwareMailbox mailbox_{faults_};
     std::vector<SyncArea> outputs_, inputs_;
-    std::vector<std::uint8_t> image_;  ///< of one area
 
     State state_ = State::init;
     State target_ = State::init;
@@ -170,6 +179,9 @@ private:
     std::int64_t op_since_ns_ = 0;
     std::int64_t change_at_ns_ = -1;
     std::uint64_t pulses_ = 0;
+    std::uint64_t sync1_pulses_ = 0;
+    unsigned samples_ = 1;  ///< in a cycle
+    unsigned sample_ = 0;  ///< the next one
 };
 
 }  // namespace hal::ethercat::devices

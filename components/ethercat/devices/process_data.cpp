@@ -9,15 +9,16 @@
 namespace hal::ethercat::devices {
 
 void ProcessData::attach(Dictionary& dictionary, std::uint16_t assignment, bool output,
-                         std::size_t max_bytes) {
+                         std::size_t max_bytes, const SampledPdos& sampled) {
     dictionary_ = &dictionary;
+    sampled_ = &sampled;
     assignment_ = assignment;
     output_ = output;
     max_bytes_ = max_bytes;
     std::size_t entries = 0;
     for (const auto& o : dictionary.objects()) {
         if (is_pdo(o.index)) {
-            entries += o.entries.size();
+            entries += o.entries.size() * (sampled.contains(o.index) ? sampled.max_samples : 1);
         }
     }
     const auto* o = dictionary.find(assignment);
@@ -39,22 +40,29 @@ std::size_t ProcessData::pdo_bits(const DictionaryObject& pdo, unsigned entries)
     return bits;
 }
 
-void ProcessData::build() noexcept {
+void ProcessData::build(unsigned samples) noexcept {
     bits_ = 0;
     used_ = 0;
+    has_samples_ = false;
     const auto* assignment = dictionary_->find(assignment_);
     if (assignment == nullptr) return;
     for (const auto& slot : assignment->entries) {
         if (slot.sub == 0 || slot.sub > dictionary_->count(*assignment)) continue;
         const auto* pdo = dictionary_->find(get<std::uint16_t>(dictionary_->data(slot)));
-        if (pdo != nullptr) {
-            add(*pdo);
+        if (pdo == nullptr) continue;
+        if (!sampled_->contains(pdo->index)) {
+            add(*pdo, every_sample);
+            continue;
+        }
+        has_samples_ = true;
+        for (unsigned n = 0; n < samples; ++n) {
+            add(*pdo, static_cast<std::uint16_t>(n));
         }
     }
 }
 
-/// Appends the objects of a PDO.
-void ProcessData::add(const DictionaryObject& pdo) noexcept {
+/// Appends the objects of a PDO, or of one of its samples.
+void ProcessData::add(const DictionaryObject& pdo, std::uint16_t sample) noexcept {
     for (const auto& e : pdo.entries) {
         if (e.sub == 0 || e.sub > dictionary_->count(pdo)) continue;
         const auto mapping = coe::Mapping::of(get<std::uint32_t>(dictionary_->data(e)));
@@ -62,23 +70,25 @@ void ProcessData::add(const DictionaryObject& pdo) noexcept {
             mapping.index != 0 ? dictionary_->find(mapping.index, mapping.sub) : nullptr;
         if (entry != nullptr && mapping.bits <= entry->bits && used_ < copies_.size()) {
             copies_[used_++] = {dictionary_->data(*entry), static_cast<std::uint32_t>(bits_),
-                                mapping};
+                                mapping, sample};
         }
         bits_ += mapping.bits;
     }
 }
 
-void ProcessData::unpack(std::span<const std::uint8_t> from) noexcept {
+void ProcessData::unpack(std::span<const std::uint8_t> from, unsigned sample) noexcept {
     for (std::size_t i = 0; i < used_; ++i) {
-        if (copies_[i].bit + copies_[i].object.bits <= from.size() * 8) {
+        if (copies_[i].belongs_to(sample) &&
+            copies_[i].bit + copies_[i].object.bits <= from.size() * 8) {
             copy_bits(copies_[i].data, 0, from.data(), copies_[i].bit, copies_[i].object.bits);
         }
     }
 }
 
-void ProcessData::pack(std::span<std::uint8_t> to) const noexcept {
+void ProcessData::pack(std::span<std::uint8_t> to, unsigned sample) const noexcept {
     for (std::size_t i = 0; i < used_; ++i) {
-        if (copies_[i].bit + copies_[i].object.bits <= to.size() * 8) {
+        if (copies_[i].belongs_to(sample) &&
+            copies_[i].bit + copies_[i].object.bits <= to.size() * 8) {
             copy_bits(to.data(), copies_[i].bit, copies_[i].data, 0, copies_[i].object.bits);
         }
     }

@@ -3,6 +3,7 @@
 // (1C10h + sync manager) make of it.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -11,20 +12,34 @@
 
 namespace hal::ethercat::devices {
 
+/// PDOs whose entries occur several times in the process data, once for each sample of a cycle.
+struct SampledPdos {
+    std::vector<std::uint16_t> indices;
+    unsigned max_samples = 1;
+
+    bool contains(std::uint16_t pdo) const noexcept {
+        return std::find(indices.begin(), indices.end(), pdo) != indices.end();
+    }
+};
+
 /// Copies objects to and from one sync manager.
 class ProcessData {
 public:
     /// `assignment` is 1C10h + the number of the sync manager; it may be missing in the dictionary.
-    /// `max_bytes` limits its length. [setup]
-    void attach(Dictionary&, std::uint16_t assignment, bool output, std::size_t max_bytes);
-    /// Computes the copies from the present mapping. [realtime]
-    void build() noexcept;
+    /// `max_bytes` limits its length. `sampled` must outlive this object. [setup]
+    void attach(Dictionary&, std::uint16_t assignment, bool output, std::size_t max_bytes,
+                const SampledPdos& sampled);
+    /// Computes the copies from the present mapping, with so many samples. [realtime]
+    void build(unsigned samples) noexcept;
     /// Returns the length of the process data. [realtime]
     std::size_t bytes() const noexcept { return (bits_ + 7) / 8; }
-    /// Copies outputs into the dictionary. [realtime]
-    void unpack(std::span<const std::uint8_t> from) noexcept;
-    /// Copies inputs out of the dictionary. [realtime]
-    void pack(std::span<std::uint8_t> to) const noexcept;
+    std::size_t bits() const noexcept { return bits_; }  ///< the same, before rounding. [realtime]
+    /// Returns whether the length depends on the number of samples. [realtime]
+    bool has_samples() const noexcept { return has_samples_; }
+    /// Copies outputs into the dictionary: what has no samples, and those of `sample`. [realtime]
+    void unpack(std::span<const std::uint8_t> from, unsigned sample) noexcept;
+    /// Copies inputs out of the dictionary: what has no samples, and those of `sample`. [realtime]
+    void pack(std::span<std::uint8_t> to, unsigned sample) const noexcept;
     void clear() noexcept;  ///< Sets all mapped outputs to 0. [realtime]
     std::uint16_t assignment() const noexcept { return assignment_; }
 
@@ -42,12 +57,16 @@ public:
                      std::span<const std::uint8_t> value) const noexcept;
 
 private:
+    static constexpr std::uint16_t every_sample = 0xffff;
     struct Copy {
         std::uint8_t* data = nullptr;
         std::uint32_t bit = 0;
         coe::Mapping object;
+        std::uint16_t sample = every_sample;
+
+        bool belongs_to(unsigned n) const noexcept { return sample == every_sample || sample == n; }
     };
-    void add(const DictionaryObject& pdo) noexcept;
+    void add(const DictionaryObject& pdo, std::uint16_t sample) noexcept;
     coe::Abort check_assigning(const DictionaryObject& assignment,
                                std::span<const std::uint8_t> value) const noexcept;
     coe::Abort check_assigned(const DictionaryObject& assignment, unsigned count) const noexcept;
@@ -59,8 +78,10 @@ private:
     bool is_pdo(std::uint16_t index) const noexcept;
 
     Dictionary* dictionary_ = nullptr;
+    const SampledPdos* sampled_ = nullptr;
     std::uint16_t assignment_ = 0;
     bool output_ = false;
+    bool has_samples_ = false;
     std::size_t bits_ = 0;
     std::size_t max_bytes_ = 0;
     std::size_t used_ = 0;

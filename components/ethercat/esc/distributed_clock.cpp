@@ -146,7 +146,7 @@ void DistributedClock::activate(std::int64_t now_ns) noexcept {
     const bool on = (activation & 0x03) == 0x03;
     if (on == sync0_on_) return;
     sync0_on_ = sync_.active = on;
-    sync1_on_ = on && (activation & 0x04) != 0;
+    sync1_on_ = sync_.sync1_active = on && (activation & 0x04) != 0;
     sync0_dc_ = sync1_dc_ = INT64_MAX;
     memory_[dc_registers::activation_status] = 0;
     if (on) {
@@ -198,6 +198,7 @@ std::uint32_t DistributedClock::pulse() noexcept {
         events |= dc_registers::sync1_event;
     }
     if ((events & dc_registers::sync1_event) != 0) {
+        ++sync_.sync1_pulses;
         memory_[registers::dc_sync0_status + 1] |= 1;
         memory_[dc_registers::activation_status] &= 0xfd;
     }

@@ -58,7 +58,9 @@ public:
         bool active = false;  ///< SYNC0 is generated (0981h bits 0 and 1)
         std::uint32_t sync0_cycle_ns = 0;
         std::uint32_t sync1_cycle_ns = 0;
+        bool sync1_active = false;  ///< SYNC1 is generated (0981h bit 2)
         std::uint64_t pulses = 0;  ///< SYNC0 pulses so far
+        std::uint64_t sync1_pulses = 0;  ///< SYNC1 pulses so far
         std::int64_t last_pulse_ns = 0;  ///< time of the newest SYNC0 pulse, on the clock of run()
         std::uint64_t last_pulse_dc_ns = 0;  ///< the same, system time
     };

@@ -22,6 +22,9 @@
 
 namespace hal::ethercat::esi {
 
+/// The largest number of samples of a PDO in a cycle that is read.
+inline constexpr unsigned max_samples = 1000;
+
 enum class Topic : std::uint8_t { file, value };
 using Message = text::Message<Topic>;
 
@@ -32,10 +35,21 @@ struct Entry {
     std::string name, type;   ///< data type, such as "UINT"
 };
 
+/// How many samples a PDO has in a cycle, if the device takes them at a multiple of the cycle
+/// (ETG.2000, attributes OSFac, OSMin, OSMax, OSIndexInc of RxPdo and TxPdo).
+struct Oversampling {
+    unsigned min = 1;
+    unsigned max = 0;  ///< below 2: the PDO has no samples
+    std::uint16_t index_increment = 0;  ///< from the object of a sample to that of the next one
+
+    explicit operator bool() const noexcept { return max > 1; }
+};
+
 struct Pdo {
     std::uint16_t index = 0;
     std::string name;
     std::optional<std::uint8_t> sync_manager;  ///< set: assigned by default
+    Oversampling oversampling;  ///< the entries are those of one sample
     bool fixed = false;
     bool mandatory = false;
     /// PDOs that cannot be assigned together with this one
@@ -66,15 +80,27 @@ struct InitCmd {
 };
 
 struct OpMode {
+    /// A PDO that the mode assigns.
+    struct Assigned {
+        std::uint8_t sync_manager = 0;
+        std::uint16_t pdo = 0;
+        unsigned samples = 0;  ///< OSFac; 0: the mode does not name a number of samples
+    };
+
     std::string name, description;
     std::uint16_t assign_activate = 0;
-    /// 0: the master's cycle times the factor, if that is not 0
+    /// 0: the master's cycle times the factor; a negative factor -n divides it by n
     std::int64_t sync0_cycle_ns = 0;
+    /// 0: the cycle of SYNC0 times the factor; a negative factor -n divides the master's cycle by n
     std::int64_t sync1_cycle_ns = 0;
     int sync0_factor = 1;
     int sync1_factor = 0;
     std::int64_t sync0_shift_ns = 0;
     std::int64_t sync1_shift_ns = 0;
+    std::vector<Assigned> assigned;
+
+    /// Returns the samples in a cycle of a PDO with samples; 0: the mode assigns none.
+    unsigned samples() const noexcept;
 };
 
 /// One value of the object dictionary.
@@ -145,14 +171,14 @@ struct Device {
     /// the first is the default; empty: no distributed clocks
     std::vector<OpMode> op_modes;
     bool has_dc = false;
-    std::vector<Object> objects;               ///< by index
-    std::uint16_t profile = 0;                 ///< 402 for a drive
+    std::vector<Object> objects;  ///< by index
+    std::uint16_t profile = 0;  ///< 402 for a drive
     std::vector<Slot> slots;
     /// whether the module list is written to F030h; nullopt: not given
     std::optional<bool> download_modules;
     unsigned slot_pdo_increment = 1;
     unsigned slot_index_increment = 0;
-    std::vector<std::uint8_t> eeprom;          ///< whole image, if the file has one
+    std::vector<std::uint8_t> eeprom;  ///< whole image, if the file has one
     std::vector<std::uint8_t> config_data, bootstrap;
     std::size_t eeprom_bytes = 0;
     std::vector<sii::OtherCategory> categories;

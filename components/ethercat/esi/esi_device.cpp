@@ -18,6 +18,14 @@ unsigned Pdo::bits() const {
     return sum;
 }
 
+unsigned OpMode::samples() const noexcept {
+    unsigned most = 0;
+    for (const Assigned& one : assigned) {
+        most = std::max(most, one.samples);
+    }
+    return most;
+}
+
 const Value* Object::find(std::uint8_t sub) const {
     for (const Value& v : values) {
         if (v.sub == sub) return &v;

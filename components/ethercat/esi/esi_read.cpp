@@ -204,6 +204,7 @@ private:
             if (p.attribute("Sm")) {
                 pdo.sync_manager = context_.attribute<std::uint8_t>(p, "Sm");
             }
+            pdo.oversampling = oversampling(p);
             pdo.fixed = Context::flag(p, "Fixed");
             pdo.mandatory = Context::flag(p, "Mandatory");
             for (const Xml e : p.children("Exclude")) {
@@ -243,6 +244,14 @@ private:
             }
             to.push_back(std::move(pdo));
         }
+    }
+    Oversampling oversampling(const Xml& pdo) {
+        Oversampling o;
+        const auto usual = context_.attribute<unsigned>(pdo, "OSFac");
+        o.max = std::min(context_.attribute<unsigned>(pdo, "OSMax", usual), max_samples);
+        o.min = std::clamp(context_.attribute<unsigned>(pdo, "OSMin", 1), 1U, std::max(o.max, 1U));
+        o.index_increment = context_.attribute<std::uint16_t>(pdo, "OSIndexInc");
+        return o;
     }
     /// A sync manager with the PDOs of the other direction than its name has that of its PDOs.
     void correct_direction(const Xml& node, Device& d, const std::vector<Pdo>& pdos,
@@ -333,6 +342,14 @@ private:
         m.sync0_shift_ns = context_.child<std::int64_t>(node, "ShiftTimeSync0");
 
         m.sync1_shift_ns = context_.child<std::int64_t>(node, "ShiftTimeSync1");
+        for (const Xml manager : node.children("Sm")) {
+            for (const Xml pdo : manager.children("Pdo")) {
+                m.assigned.push_back(
+                    {context_.attribute<std::uint8_t>(manager, "No"),
+                     context_.number_of<std::uint16_t>(pdo, "Pdo", pdo.child_value()),
+                     std::min(context_.attribute<unsigned>(pdo, "OSFac"), max_samples)});
+            }
+        }
         d.op_modes.push_back(std::move(m));
     }
 

@@ -288,15 +288,19 @@ Task<bool> start_sync_signals(Channel& c, Bus& bus, Device& d) noexcept {
                                    at_station(d.slave.station, registers::dc_sync0_cycle), 8);
     if (a.wkc != 1) co_return false;
     // The grid of all slaves starts at system time 0, so all SYNC0 of one cycle time coincide but
-    // for their shift.
-    const auto grid = static_cast<std::int64_t>(cycle);
+    // for their shift. With a SYNC0 at a fraction of the cycle, its first pulse begins a cycle, from
+    // which SYNC1 and the samples are counted.
+    const auto period = static_cast<std::uint64_t>(bus.setup.cycle_ns);
+    const bool is_fraction = cycle < period && period % cycle == 0;
+    const std::uint64_t step = is_fraction ? period : cycle;
+    const auto grid = static_cast<std::int64_t>(step);
     // of any length: it begins soon
     const auto shift = static_cast<std::uint64_t>((dc.sync0_shift_ns % grid + grid) % grid);
     // Each write takes a cycle, and some are repeated: the start must still be in the future when
     // the unit is activated.
     const std::int64_t ahead = std::max(sync_start_ns, sync_start_cycles * bus.setup.cycle_ns);
     const std::uint64_t start =
-        (bus.dc_now() + static_cast<std::uint64_t>(ahead)) / cycle * cycle + cycle + shift;
+        (bus.dc_now() + static_cast<std::uint64_t>(ahead)) / step * step + step + shift;
     d.sync_begins_ns = c.now_ns() + static_cast<std::int64_t>(start - bus.dc_now());
     a = co_await write(c, d.slave, registers::dc_start_time, start);
     if (a.wkc != 1) co_return false;

@@ -178,6 +178,22 @@ Master::Phase Master::dc_phase() const noexcept {
     return {true, phase > cycle / 2 ? phase - cycle : phase};
 }
 
+std::optional<std::int64_t> Master::first_sample_ns(std::size_t slave) const noexcept {
+    const Slave& config = bus_->setup.slaves[slave];
+    const int device = bus_->device_of[slave];
+    if (!config.dc || device < 0 || !slave_status(slave).operational || !dc_phase().fresh) {
+        return std::nullopt;
+    }
+    const std::int64_t cycle = bus_->setup.cycle_ns;
+    const std::int64_t step = cycle / config.oversampling;
+    const std::int64_t until_last = (config.oversampling - 1) * step;
+    const std::int64_t shift = config.dc->sync0_shift_ns;
+    const std::int64_t passed_ns = static_cast<std::int64_t>(bus_->status.dc_time_ns) +
+                                   bus_->devices[static_cast<std::size_t>(device)]->slave.delay_ns;
+    const std::int64_t first = (passed_ns - until_last - shift) / cycle * cycle + shift;
+    return first - bus_->skew_ns;
+}
+
 std::size_t Master::found() const noexcept { return bus_->by_position.size(); }
 BusSlave& Master::found(std::size_t position) noexcept {
     return bus_->devices[bus_->by_position[position]]->slave;

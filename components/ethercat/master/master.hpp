@@ -13,6 +13,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "ethercat/master/bus_slave.hpp"
@@ -89,6 +90,12 @@ public:
         std::int64_t error_ns = 0;
     };
     Phase dc_phase() const noexcept;
+
+    /// Returns when the first sample of the inputs of a slave was taken that samples several times in
+    /// a cycle, on the clock of the cycle, ns; nullopt: without the time of the reference clock, or
+    /// while the slave is not operational. The samples of a cycle are complete at the last of their
+    /// pulses; those that are complete when the frame passes are in it. [realtime]
+    std::optional<std::int64_t> first_sample_ns(std::size_t slave) const noexcept;
 
     // Slaves as found, for tools and mailbox clients.
     /// Returns the number of slaves on the bus after the scan. [realtime]

@@ -31,6 +31,14 @@ struct Entry {
     bool is_signed = false;
     /// a further part of the object of the entry before it: in the mapping both are one
     bool part = false;
+    /// number of the sample in the cycle, of an entry that is oversampled
+    std::optional<std::uint16_t> sample;
+
+    /// Returns the name of its pin: NAME, or NAME-07 for sample 7. [setup]
+    std::string pin_name() const {
+        if (!sample) return name;
+        return name + (*sample < 10 ? "-0" : "-") + std::to_string(*sample);
+    }
 };
 
 struct Pdo {
@@ -94,6 +102,7 @@ struct Dc {
     /// 0980h and 0981h: 0300h SYNC0, 0700h SYNC0 and SYNC1; 0: clock only
     std::uint16_t assign_activate = 0;
     std::int64_t sync0_cycle_ns = 0;  ///< 0: the master's cycle
+    /// from a pulse of SYNC0 to the one of SYNC1 (09A4h); after it, the next SYNC0 counts
     std::int64_t sync1_cycle_ns = 0;
     std::int64_t sync0_shift_ns = 0;
     std::int64_t sync1_shift_ns = 0;
@@ -141,6 +150,7 @@ struct Slave {
     bool use_lrw = true;  ///< the SII's "no LRW" wins over true
     bool complete_access = false;  ///< for mapping and assignment
     unsigned entries_per_pdo = 0;  ///< limit; 0: none known
+    unsigned oversampling = 1;  ///< samples in a cycle
     bool eoe = false;  ///< exchanges Ethernet frames with an interface of the host
     std::optional<eoe::Ip> eoe_ip;  ///< settings of its IP stack, written in PRE-OP
     State target = State::op;  ///< the state to bring it to

@@ -28,7 +28,7 @@ public:
     void declare(const std::string& prefix, const master::Entry& e, bool output, std::size_t area,
                  std::size_t at) {
         if (e.name.empty() || e.bits == 0 || e.bits > 64) return;
-        const std::string name = prefix + e.name;
+        const std::string name = prefix + e.pin_name();
         if (e.type == master::Type::bit && e.bits > 1 && !e.scaled) {
             for (unsigned bit = 0; bit < e.bits; ++bit) {
                 add(name + "-" + std::to_string(bit), e, HAL_TYPE_BIT, output,

@@ -111,6 +111,7 @@ struct EthercatArguments {
                              ": the cycle of this format is appTimePeriod; change it in the file");
         }
         if (cycle_ns != 0) {
+            check_samples(bus, cycle_ns);
             bus.setup.cycle_ns = cycle_ns;
         }
         if (!link.get().empty()) {
@@ -131,6 +132,19 @@ struct EthercatArguments {
     }
 
 private:
+    /// Rejects a cycle that is not the one whose parts are the samples of a slave.
+    static void check_samples(const config::Bus& bus, std::int64_t cycle_ns) {
+        if (cycle_ns == bus.setup.cycle_ns) return;
+        for (const master::Slave& slave : bus.setup.slaves) {
+            if (slave.oversampling < 2) continue;
+            throw hal::ArgumentError("cycle",
+                                     "cycle=" + std::to_string(cycle_ns) + ": '" + slave.name +
+                                         "' has " + std::to_string(slave.oversampling) +
+                                         " samples in the cycle of the file, " +
+                                         std::to_string(bus.setup.cycle_ns) + " ns",
+                                     "change cycle in [bus]");
+        }
+    }
     /// Returns which master an instance lcec.N drives: N. The first one lets the host make one for
     /// each. [setup]
     static std::size_t own_master(std::size_t masters) {

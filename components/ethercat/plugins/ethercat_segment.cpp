@@ -106,6 +106,9 @@ public:
         for (EmulatedAxisPins& pins : axes_) {
             pins.update();
         }
+        for (SampledIoPins& pins : sampled_) {
+            pins.update();
+        }
         for (auto& c : digital_in_) {
             c.io.set_input(c.number, c.pin ? 1 : 0);
         }
@@ -175,6 +178,8 @@ private:
                     name + (servo->axes() > 1 ? ".axis-" + std::to_string(a) + "." : "."),
                     servo->axis(a));
             }
+        } else if (auto* sampled = dynamic_cast<devices::SampledIo*>(&behaviour)) {
+            sampled_.emplace_back(*this, update_, name, *sampled);
         } else if (auto* io = dynamic_cast<devices::IoBehaviour*>(&behaviour)) {
             for (unsigned c = 0; c < io->channels(); ++c) {
                 const std::string number = (c < 10 ? "0" : "") + std::to_string(c);
@@ -212,6 +217,7 @@ private:
     // Deques: a pin may not move once it is declared.
     std::deque<EmulatedSlavePins> slaves_;
     std::deque<EmulatedAxisPins> axes_;
+    std::deque<SampledIoPins> sampled_;
     std::deque<ChannelPin<hal::In<bool>>> digital_in_;
     std::deque<ChannelPin<hal::Out<bool>>> digital_out_;
     std::deque<ChannelPin<hal::In<std::int32_t>>> analog_in_;
@@ -240,6 +246,9 @@ cables and devices, at the same times in every run of `hal sim`.
 Each axis of a servo is the simulated one of `canopen_drive`: all modes of CiA 402, homing methods 1 to 37, touch probes, limits, a brake and faults,
 with 10 000 increments per revolution, an absolute encoder and an endless travel. `motor` changes the parameters that `canopen_drive` lists, separated by
 semicolons.
+
+A device of an ESI file whose PDOs have samples (OSFac) takes one at each pulse of SYNC0. Its inputs are `offset-NN` + `sine-amplitude-NN` times a sine of
+`sine-frequency-NN`, which is 0 at system time 0; `value-NN` is the newest sample of an output.
 
 A master on the same segment is `loadrt ethercat config=machine.ethercat link=sim:line`.
 

@@ -23,6 +23,7 @@
 #include "ethercat/plugins/entry_pins.hpp"
 #include "ethercat/plugins/eoe_interfaces.hpp"
 #include "ethercat/plugins/ethercat_arguments.hpp"
+#include "ethercat/plugins/sample_time.hpp"
 #include "ethercat/recorded/recorded_port.hpp"
 #include "ethercat/wire/registers.hpp"
 #include "hal/clock.hpp"
@@ -195,6 +196,7 @@ public:
                 [this](std::size_t n) -> const master::BusSlave& { return master_->found(n); });
         }
         entries_.show(areas_);
+        sample_times_.show(*master_);
         each_channel(
             cycle, [](Channel& channel, const SlaveImage& image) noexcept { channel.read(image); });
     }
@@ -595,6 +597,7 @@ private:
     typename Names::BusPins bus_pins_{*this, receive_};
     std::deque<typename Names::SlavePins> slaves_;
     EntryPins entries_{*this, receive_, transmit_};
+    SampleTimes sample_times_{*this, receive_, bus_.setup};
     std::vector<SlaveChannel> channels_;
     std::vector<Copy> copies_;
     master::RequestPort* channel_requests_ = nullptr;  // of server_

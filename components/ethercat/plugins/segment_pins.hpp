@@ -6,9 +6,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <deque>
 #include <string>
 
 #include "ethercat/devices/io_devices.hpp"
+#include "ethercat/devices/sampled_io.hpp"
 #include "ethercat/devices/servo.hpp"
 #include "ethercat/esc/line.hpp"
 #include "hal/component.hpp"
@@ -217,6 +219,51 @@ struct EmulatedAxisPins {
     hal::In<double> load_torque, dc_link;
     hal::In<bool> encoder_broken;
     std::uint32_t was_error = 0;
+};
+
+/// Pins of an emulated device that takes several samples in a cycle.
+struct SampledIoPins {
+    SampledIoPins(hal::Component& c, const hal::Function& f, const std::string& name,
+                  devices::SampledIo& its_io)
+        : io(its_io),
+          samples(c, f, (name + ".samples").c_str(),
+                  "samples taken since power-on: one at each pulse of SYNC0") {
+        for (std::size_t n = 0; n < io.inputs(); ++n) {
+            const std::string number = (n < 10 ? "-0" : "-") + std::to_string(n);
+            offset.emplace_back(c, f, (name + ".offset" + number).c_str(),
+                                "value of the input, to which the sine is added",
+                                hal::PinOptions<double>{.unit = "counts"});
+            amplitude.emplace_back(c, f, (name + ".sine-amplitude" + number).c_str(),
+                                   "amplitude of the sine at the input",
+                                   hal::PinOptions<double>{.unit = "counts"});
+            frequency.emplace_back(c, f, (name + ".sine-frequency" + number).c_str(),
+                                   "frequency of the sine at the input",
+                                   hal::PinOptions<double>{.unit = "Hz"});
+        }
+        for (std::size_t n = 0; n < io.outputs(); ++n) {
+            const std::string number = (n < 10 ? "-0" : "-") + std::to_string(n);
+            value.emplace_back(c, f, (name + ".value" + number).c_str(),
+                               "newest sample of the output",
+                               hal::PinOptions<double>{.unit = "counts"});
+        }
+    }
+
+    /// Copies the pins to the device and back. [realtime]
+    void update() noexcept {
+        for (std::size_t n = 0; n < offset.size(); ++n) {
+            io.set_input(n, offset[n], amplitude[n], frequency[n]);
+        }
+        for (std::size_t n = 0; n < value.size(); ++n) {
+            value[n] = static_cast<double>(io.output(n));
+        }
+        samples = io.samples();
+    }
+
+    devices::SampledIo& io;
+    hal::Out<std::uint32_t> samples;
+    // deques: a pin may not move once it is declared
+    std::deque<hal::In<double>> offset, amplitude, frequency;
+    std::deque<hal::Out<double>> value;
 };
 
 /// Pin of one channel of an I/O device.

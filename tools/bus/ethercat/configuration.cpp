@@ -82,8 +82,9 @@ std::string pins_json(const config::Bus& bus) {
     for_each_pin(bus, [&](const auto& entry, bool output, const std::string& slave) {
         text += fmt::format(
             R"({}{{"name":{},"type":"{}","direction":"{}","owner":{},"index":{},"sub":{}}})",
-            text.empty() ? "" : ",", json_string(slave + "." + entry.name), config::pin_type(entry),
-            output ? "in" : "out", json_string(slave), entry.index, entry.sub);
+            text.empty() ? "" : ",", json_string(slave + "." + entry.pin_name()),
+            config::pin_type(entry), output ? "in" : "out", json_string(slave), entry.index,
+            entry.sub);
     });
     return text;
 }
