@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "ethercat/config/config_text.hpp"
+#include "ethercat/config/data_copies.hpp"
 #include "hal/read_file.hpp"
 
 namespace hal::ethercat::config {
@@ -16,6 +17,7 @@ constexpr bus::SectionKind kinds[] = {
     {"bus", "[bus]", bus::SectionUse::once},
     {"domain", "[domain NAME]", bus::SectionUse::named},
     {"slave", "[slave POSITION NAME]", bus::SectionUse::any},
+    {"copy", "[copy]", bus::SectionUse::once},
 };
 
 constexpr std::int64_t us = 1'000;
@@ -139,6 +141,9 @@ public:
         }
         if (reference_ != nullptr) {
             reference();
+        }
+        if (Section* const copies = sections_.one("copy")) {
+            DataCopyReader(out_.buses[0], report_).read(*copies);
         }
         sections_.warn_unused_types("[slave …]");
         if (sections_.all("slave").empty() && bus != nullptr) {

@@ -57,14 +57,20 @@ struct FsoeFrame {
     unsigned size(unsigned data_bytes) const { return 1 + channels * (data_bytes + 2) + 2; }
 };
 
-/// Bytes that the master copies in each cycle from the inputs of a slave to the outputs of another.
-/// The outputs are 0 while one of the two is not operational.
-struct FrameCopy {
-    std::size_t from_slave = 0;
-    ChannelObject from;  ///< the first object of the frame
-    std::size_t to_slave = 0;
-    ChannelObject to;
-    unsigned bytes = 0;
+/// Where a value begins in the process data.
+struct DataLocation {
+    std::size_t slave = 0;  ///< index in Setup::slaves
+    std::size_t sync_manager = 0;  ///< index in Slave::sync_managers
+    std::size_t bit = 0;
+};
+
+/// Bits that the master copies in each cycle from the inputs of a slave to the outputs of one.
+struct DataCopy {
+    DataLocation from, to;
+    unsigned bits = 0;
+    /// while one of both slaves is not operational: the outputs stay; else they are `safe`
+    bool hold = false;
+    std::uint64_t safe = 0;  ///< the first 64 bits; further ones are 0
 };
 
 /// A slave as the user sees it; the slave of the same number in the setup is how the master sees
@@ -102,7 +108,7 @@ struct Bus {
     bool cycle_given = false;
     master::Setup setup;
     std::vector<SlaveInfo> slaves;  ///< as many as in setup.slaves
-    std::vector<FrameCopy> frame_copies;
+    std::vector<DataCopy> copies;
     Span at{};
 };
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "ethercat/config/data_copies.hpp"
+
 namespace hal::ethercat::config {
 
 namespace {
@@ -45,9 +47,32 @@ public:
         standard_bits(parameters, "stdOutName", 0x1bf1, 0xf101, inputs);
         auto& slave = bus_.setup.slaves[logic_];
         slave.sync_managers = {std::move(outputs), std::move(inputs)};
+        for (const Frame& frame : frames_) {
+            copy(frame);
+        }
     }
 
 private:
+    /// A safety frame, by its first objects.
+    struct Frame {
+        std::size_t from_slave = 0;
+        std::uint16_t from = 0;
+        std::size_t to_slave = 0;
+        std::uint16_t to = 0;
+        unsigned bytes = 0;
+    };
+
+    /// Copies a frame in each cycle. While one of both terminals is not operational, 0 is sent: an
+    /// invalid frame, so that the safe terminals go to their safe state by their watchdog.
+    void copy(const Frame& frame) {
+        const auto from = locate(bus_, frame.from_slave, false, frame.from, 1);
+        const auto to = locate(bus_, frame.to_slave, true, frame.to, 1);
+        if (!from || !to) return;
+        const std::size_t bits = std::min(
+            {std::size_t{8} * frame.bytes, bits_behind(bus_, *from), bits_behind(bus_, *to)});
+        bus_.copies.push_back({*from, *to, static_cast<unsigned>(bits)});
+    }
+
     /// Returns false after reporting a slave that is not a safe terminal.
     bool add_connection(const std::string& value, std::size_t connection,
                         master::SyncManager& outputs, master::SyncManager& inputs) {
@@ -74,16 +99,8 @@ private:
                                          frame.slave_bytes, frame.channels));
         inputs.pdos.push_back(frame_pdo(static_cast<std::uint16_t>(0x1a00 + connection), from_logic,
                                         frame.master_bytes, frame.channels));
-        bus_.frame_copies.push_back({terminal,
-                                     {0x6000, 1, 0, 0},
-                                     logic_,
-                                     {to_logic, 1, 0, 0},
-                                     frame.size(frame.slave_bytes)});
-        bus_.frame_copies.push_back({logic_,
-                                     {from_logic, 1, 0, 0},
-                                     terminal,
-                                     {0x7000, 1, 0, 0},
-                                     frame.size(frame.master_bytes)});
+        frames_.push_back({terminal, 0x6000, logic_, to_logic, frame.size(frame.slave_bytes)});
+        frames_.push_back({logic_, from_logic, terminal, 0x7000, frame.size(frame.master_bytes)});
         const std::string name = "fsoe-" + std::to_string(connection) + "-";
         for (const auto& [role, index] :
              {std::pair{"master", from_logic}, std::pair{"slave", to_logic}}) {
@@ -158,6 +175,7 @@ private:
     Bus& bus_;
     const std::size_t logic_;
     std::vector<std::string>& problems_;
+    std::vector<Frame> frames_;
 };
 
 }  // namespace

@@ -55,7 +55,11 @@ public:
           first_(number == 0),
           bus_("ethercat.0." + slave.name + "."),
           prefix_(axes > 1 ? "axis-" + std::to_string(number + 1) + "-" : "") {
-        for_each_pin(slave, [&](bool, const Entry& e) { mapped_.insert(e.name); });
+        for_each_pin(slave, [&](bool, const Entry& e) {
+            if (!e.copied) {
+                mapped_.insert(e.name);
+            }
+        });
     }
     const std::string& name() const { return name_; }
     /// Returns whether the drive can be switched on by its process data.
@@ -125,8 +129,8 @@ const char* pin_type(const Entry& e) {
 
 std::string pin_line(const Entry& e, bool output, const std::string& slave) {
     const std::string object = bus::object_text(e.index, e.sub).substr(2);
-    return padded(output ? "in" : "out", 4) + padded(pin_type(e), 6) + slave + "." + e.pin_name() +
-           "  " + object + "\n";
+    return padded(output && !e.copied ? "in" : "out", 4) + padded(pin_type(e), 6) + slave + "." +
+           e.pin_name() + "  " + object + "\n";
 }
 
 std::string netlist(const Bus& bus, const std::string& file, const std::string& segment) {

@@ -31,6 +31,8 @@ struct Entry {
     bool is_signed = false;
     /// a further part of the object of the entry before it: in the mapping both are one
     bool part = false;
+    /// an output that the master copies from an input: its pin shows what is sent
+    bool copied = false;
     /// number of the sample in the cycle, of an entry that is oversampled
     std::optional<std::uint16_t> sample;
 

@@ -110,8 +110,9 @@ private:
     }
     void add(const std::string& name, const master::Entry& e, hal_type type, bool output,
              const Place& place) {
-        char about[48];
-        std::snprintf(about, sizeof about, "object 0x%04X:%u, %u bits", e.index, e.sub, e.bits);
+        char about[96];
+        std::snprintf(about, sizeof about, "object 0x%04X:%u, %u bits%s", e.index, e.sub, e.bits,
+                      e.copied ? ", copied from another slave: what was sent" : "");
         if (output) {
             ins_.declare(component_, &takes_, type, name, about, place);
         } else {

@@ -19,6 +19,7 @@
 #include "ethercat/master/master.hpp"
 #include "ethercat/master/request_queue.hpp"
 #include "ethercat/plugins/channels/make_channel.hpp"
+#include "ethercat/plugins/data_copies.hpp"
 #include "ethercat/plugins/emergencies.hpp"
 #include "ethercat/plugins/entry_pins.hpp"
 #include "ethercat/plugins/eoe_interfaces.hpp"
@@ -50,8 +51,9 @@ public:
                 std::size_t at = 0;
                 for (const master::Pdo& pdo : slave.sync_managers[n].pdos) {
                     for (const master::Entry& e : pdo.entries) {
-                        entries_.declare(slave.name + ".", e, slave.sync_managers[n].output,
-                                         places_.size(), at);
+                        entries_.declare(slave.name + ".", e,
+                                         slave.sync_managers[n].output && !e.copied, places_.size(),
+                                         at);
                         at += e.bits;
                     }
                 }
@@ -60,12 +62,6 @@ public:
             for (const config::Channel& channel : bus_.slaves[s].channels) {
                 declare_channel(s, channel);
             }
-        }
-        for (const config::FrameCopy& copy : bus_.frame_copies) {
-            const FieldSearch from{this, copy.from_slave};
-            const FieldSearch to{this, copy.to_slave};
-            copies_.push_back({copy.from_slave, find_field(&from, copy.from), copy.to_slave,
-                               find_field(&to, copy.to), copy.bytes});
         }
         areas_.resize(places_.size());
         if constexpr (Names::shared) {
@@ -215,7 +211,7 @@ public:
         each_channel(cycle, [](Channel& channel, const SlaveImage& image) noexcept {
             channel.write(image);
         });
-        copy_frames();
+        copies_.run(areas_, *master_);
         if (eoe_) {
             eoe_->step(*master_);
         }
@@ -257,32 +253,6 @@ private:
                 image = image_of(slave, cycle);
             }
             action(*channel.channel, image);
-        }
-    }
-
-    /// A config::FrameCopy in the process data.
-    struct Copy {
-        std::size_t from_slave;
-        ImageField from;
-        std::size_t to_slave;
-        ImageField to;
-        unsigned bytes;
-    };
-    /// Copies frames between slaves, received and sent in the same cycle. While one of both slaves is
-    /// not operational its frame is not fresh: 0 is sent, an invalid safety frame, and the safe
-    /// terminals go to their safe state by their watchdog. [realtime]
-    void copy_frames() noexcept {
-        for (const Copy& copy : copies_) {
-            if (!copy.from.present() || !copy.to.present()) continue;
-            const bool valid = master_->slave_status(copy.from_slave).operational &&
-                               master_->slave_status(copy.to_slave).operational;
-            const auto source = areas_[copy.from.area].subspan(copy.from.at / 8);
-            const auto target = areas_[copy.to.area].subspan(copy.to.at / 8);
-            const std::size_t bytes =
-                std::min({std::size_t{copy.bytes}, source.size(), target.size()});
-            for (std::size_t i = 0; i < bytes; ++i) {
-                target[i] = valid ? source[i] : 0;
-            }
         }
     }
 
@@ -599,7 +569,7 @@ private:
     EntryPins entries_{*this, receive_, transmit_};
     SampleTimes sample_times_{*this, receive_, bus_.setup};
     std::vector<SlaveChannel> channels_;
-    std::vector<Copy> copies_;
+    const DataCopies copies_{bus_};
     master::RequestPort* channel_requests_ = nullptr;  // of server_
     std::vector<Place> places_;  // of the process data, in the order of areas_
     std::vector<std::span<std::uint8_t>> areas_;

@@ -32,9 +32,9 @@ std::string described(const std::string& activate) {
     return text.replace(text.find('%'), 1, activate);
 }
 
-config::Bus bus_with(const std::string& activate, unsigned samples) {
+config::Bus bus_with(const std::string& activate, unsigned samples, const std::string& more = {}) {
     const std::string file =
-        "[bus]\n[slave 0 x]\nesi = x.xml\noversampling = " + std::to_string(samples) + "\n";
+        "[bus]\n[slave 0 x]\nesi = x.xml\noversampling = " + std::to_string(samples) + "\n" + more;
     const auto reading =
         config::read(file, "x.ethercat", [&](const std::string&, std::string& bytes) {
         bytes = described(activate);
@@ -148,6 +148,17 @@ TEST(EthercatOversampling, SYNC0_divides_the_cycle_and_SYNC1_comes_at_its_last_p
     ASSERT_EQ(entries.size(), 4U);
     EXPECT_EQ(entries[3].index, 0x6030);
     EXPECT_EQ(entries[3].pin_name(), "in-03");
+}
+
+TEST(EthercatOversampling, A_copy_takes_all_samples) {
+    const config::Bus bus = bus_with("#x0730", 4, "[copy]\nx.out = x.in\n");
+    ASSERT_EQ(bus.copies.size(), 4U);
+    EXPECT_EQ(bus.copies[3].from.sync_manager, 1U);
+    EXPECT_EQ(bus.copies[3].from.bit, 48U);
+    EXPECT_EQ(bus.copies[3].to.sync_manager, 0U);
+    EXPECT_EQ(bus.copies[3].to.bit, 48U);
+    EXPECT_EQ(bus.copies[3].bits, 16U);
+    EXPECT_TRUE(bus.setup.slaves[0].sync_managers[0].pdos[0].entries[3].copied);
 }
 
 TEST(EthercatOversampling, The_first_pulse_is_at_the_shift_from_the_begin_of_a_cycle) {

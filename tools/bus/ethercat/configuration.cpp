@@ -83,7 +83,7 @@ std::string pins_json(const config::Bus& bus) {
         text += fmt::format(
             R"({}{{"name":{},"type":"{}","direction":"{}","owner":{},"index":{},"sub":{}}})",
             text.empty() ? "" : ",", json_string(slave + "." + entry.pin_name()),
-            config::pin_type(entry), output ? "in" : "out", json_string(slave), entry.index,
+            config::pin_type(entry), output && !entry.copied ? "in" : "out", json_string(slave), entry.index,
             entry.sub);
     });
     return text;
