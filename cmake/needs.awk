@@ -47,6 +47,11 @@ function emit_bus(program, word) {
     if (program ~ /(^|\/)hal$/ && word ~ /^(can|canopen|node|ethercat|scocan)$/) emit("bus")
 }
 
+# Whether a command loads components, or prints their pages.
+function needs_components() {
+    return command ~ /^(run|sim|check|graph|doc|shell|build|halrun)$/
+}
+
 # A command of a netlist, or several words of the command line that may be one.
 function read_command(text, folder,    words, count, i) {
     sub(/#.*/, "", text)
@@ -98,6 +103,8 @@ function read_file(name, folder,    path, line, text, ini) {
 }
 
 BEGIN {
+    emit_bus("hal", command)
+    if (!needs_components()) exit
     for (i = 2; i < ARGC; ++i) {  # the first is the command itself
         if (ARGV[i] == "--node" || ARGV[i] ~ /^--node=/) nodes = 1
         if (command == "doc" && ARGV[i] == "--all") emit("all")
