@@ -11,33 +11,13 @@ namespace hal {
 
 namespace {
 
-/// A name that two components have. Each is recognised by pins that the other does not have.
+/// A component of LinuxCNC's users that has the name of one of Halcyon's.
 struct Namesake {
     const char* component;
-    const char* other;  ///< where the other component comes from
-    std::span<const char* const> own_pins;
-    std::span<const char* const> other_pins;
+    const char* other;  ///< what the other component is
+    std::span<const char* const> other_pins;  ///< those that ours does not have
 };
 
-constexpr const char* own_cia402[] = {"modes-of-operation",
-                                      "modes-of-operation-display",
-                                      "position-actual-value",
-                                      "velocity-actual-value",
-                                      "torque-actual-value",
-                                      "target-position",
-                                      "target-velocity",
-                                      "target-torque",
-                                      "position-cmd",
-                                      "position-fb",
-                                      "position-scale",
-                                      "velocity-scale",
-                                      "fault",
-                                      "reset",
-                                      "mode",
-                                      "mode-fb",
-                                      "enabled",
-                                      "active",
-                                      "operational"};
 constexpr const char* community_cia402[] = {"opmode",
                                             "opmode-display",
                                             "drv-actual-position",
@@ -62,11 +42,7 @@ constexpr const char* community_cia402[] = {"opmode",
                                             "opmode-cyclic-position",
                                             "opmode-cyclic-velocity"};
 constexpr Namesake namesakes[] = {
-    {"cia402", "the community's cia402.comp for LinuxCNC", own_cia402, community_cia402}};
-
-bool contains(std::span<const char* const> names, std::string_view name) {
-    return std::find(names.begin(), names.end(), name) != names.end();
-}
+    {"cia402", "the community's cia402.comp for LinuxCNC", community_cia402}};
 
 }  // namespace
 
@@ -76,21 +52,17 @@ std::string namesake_help(const Model& model, std::string_view pin) {
     const Instance* const instance = model.find_instance(pin.substr(0, dot));
     if (instance == nullptr) return {};
     const std::string& component = instance->component->name;
-    const auto found =
-        std::find_if(std::begin(namesakes), std::end(namesakes),
-                     [&](const Namesake& one) { return component == one.component; });
+    const auto found = std::ranges::find(namesakes, component, &Namesake::component);
     if (found == std::end(namesakes)) return {};
+    const bool is_linuxcncs = instance->component->shares_pins;
+    if (is_linuxcncs) {
+        return "this is " + std::string(found->other) + "; for Halcyon's " + component +
+               ", type: loadrt --native " + component;
+    }
     const std::string_view name = pin.substr(dot + 1);
-    const std::string begin = hal::quoted(std::string(name)) + " is a pin of ";
-    if (contains(found->other_pins, name)) {
-        return begin + found->other + "; this is Halcyon's " + component +
-               ". Type: loadrt --linuxcnc " + component + ", where that one is installed";
-    }
-    if (contains(found->own_pins, name)) {
-        return begin + "Halcyon's " + component + "; this is " + found->other +
-               ". Type: loadrt --native " + component;
-    }
-    return {};
+    if (std::ranges::find(found->other_pins, name) == found->other_pins.end()) return {};
+    return hal::quoted(name) + " is a pin of " + found->other + "; this is Halcyon's " + component +
+           ". Type: loadrt --linuxcnc " + component + ", where that one is installed";
 }
 
 }  // namespace hal
