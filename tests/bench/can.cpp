@@ -265,8 +265,8 @@ void can(const Options& options, Report& report) {
     tell_without_wire(all, report);
     tell_beside_python(all, report);
     report.note(
-        "lely-core and CANopenNode are not installed as programs; docs/performance.md has their "
-        "figures by the same method.");
+        "lely-core and CANopenNode are not installed as programs; docs/performance-figures.md has "
+        "their figures by the same method.");
     report.note(fmt::format(
         "Over {}. Both sides on one CPU{}. Best of {} rounds, all pairs in turn; median of the "
         "same rounds: SDO upload {:.0f}/s "
