@@ -63,24 +63,30 @@ struct Current {  // outlives no core: on the virtual clock the session's own th
     ~Current() { current_core = nullptr; }
 };
 
+/// A re-execution is not real time: it keeps what other threads read later.
 struct Guard {
-    Guard() noexcept {
-        if (__rtsan_realtime_enter) {
+    explicit Guard(bool is_realtime) noexcept : on(is_realtime) {
+        if (on && __rtsan_realtime_enter) {
             __rtsan_realtime_enter();
         }
     }
     ~Guard() {
-        if (__rtsan_realtime_exit) {
+        if (on && __rtsan_realtime_exit) {
             __rtsan_realtime_exit();
         }
     }
+    const bool on;
 };
+
+/// values that the checksum of one cycle covers
+constexpr std::size_t checked_values = 256;
 }  // namespace
 
 Core* Core::current() noexcept { return current_core; }
 
 Core::Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board,
-           Timeline& timeline, const std::atomic<bool>& running, bool measure, CycleMark* mark)
+           Timeline& timeline, const std::atomic<bool>& running, bool measure, CycleMark* mark,
+           CycleInputs* inputs)
     : monitor(period_ns),
       id_(id),
       period_ns_(period_ns),
@@ -89,7 +95,8 @@ Core::Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard
       timeline_(timeline),
       running_(running),
       measure_(measure),
-      mark_(mark ? mark : &own_mark_) {
+      mark_(mark ? mark : &own_mark_),
+      inputs_(inputs) {
     info_.size = sizeof info_;
     info_.period_ns = period_ns;
     info_.period_s = static_cast<double>(period_ns) * 1e-9;
@@ -128,7 +135,7 @@ Core::Condition Core::condition(const FaultEvent& event) const noexcept {
 
 void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns) noexcept {
     const Current current(this);
-    const Guard guard;
+    const Guard guard(!inputs_ || !inputs_->replays());
     grid_ns_ = grid_ns;
     info_.start_ns = due_ns;
     std::int64_t end_ns = woke_ns;
@@ -136,6 +143,10 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
     if (measure_) {
         monitor.begin_cycle(due_ns, woke_ns);
         wakeup.add(woke_ns - due_ns);
+    }
+    if (inputs_) {
+        inputs_->begin(CycleRecord::cycle, info_.number, grid_ns, due_ns, woke_ns,
+                       monitor.missed());
     }
     take_over();
     if (plan_) {
@@ -154,7 +165,11 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
         if (probes_) {
             sample_probes();
         }
-        answer();
+        if (inputs_) {
+            end_record();
+        } else {
+            answer();
+        }
         if (tracing_) [[unlikely]] {
             tracing_->put(TraceEvent::cycle, woke_ns, monotonic_ns(), info_.number,
                           static_cast<std::uint64_t>(std::max<std::int64_t>(woke_ns - due_ns, 0)));
@@ -169,23 +184,41 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
 
 void Core::service() noexcept {
     const Current current(this);
+    const std::uint64_t applied = applied_.load(std::memory_order_relaxed);
+    const plan::Plan* const before = plan_;
+    if (inputs_) {
+        inputs_->begin(CycleRecord::service, info_.number, grid_ns_, info_.start_ns, monotonic_ns(),
+                       monitor.missed());
+    }
     take_over();
     // before running_ is read: who asks has stopped it before
     const std::uint64_t asked = halt_asked_.load(std::memory_order_acquire);
+    bool acts = false;
     if (int free = nobody; !live() && !safe_ &&
                            turn_.compare_exchange_strong(free, thread, std::memory_order_acq_rel)) {
         make_safe();
         turn_.store(nobody, std::memory_order_release);
+        acts = true;
     }
     halt_seen_.store(asked, std::memory_order_release);
-    if (plan_) {
+    if (!plan_) return;
+    if (!inputs_) {
         answer();
+    } else if (acts || plan_ != before || inputs_->replays() || observation_.load() ||
+               applied_.load(std::memory_order_relaxed) != applied) {
+        end_record();
     }
 }
 
 void Core::output() noexcept {
     int free = nobody;
-    if (!turn_.compare_exchange_strong(free, thread, std::memory_order_acq_rel)) return;
+    const bool mine = turn_.compare_exchange_strong(free, thread, std::memory_order_acq_rel);
+    if (note(mine) == 0 || !mine) {
+        if (mine) {
+            turn_.store(nobody, std::memory_order_release);
+        }
+        return;
+    }
     // before running_ is read: who asks has stopped it before
     const std::uint64_t asked = halt_asked_.load(std::memory_order_acquire);
     if (!live() && !safe_) {
@@ -236,8 +269,12 @@ void Core::skip(std::uint64_t periods) noexcept {
 // The inbox first: a write that was queued before a plan was offered goes to the places of the plan
 // before it, and those places are gone once the new plan has been taken.
 void Core::take_over() noexcept {
-    plan::Plan* const offered = inbox_.exchange(nullptr, std::memory_order_acq_rel);
-    drain_writes();
+    plan::Plan* const offered = offered_plan();
+    const bool replays = inputs_ && inputs_->replays();
+    drain_writes(replays ? inputs_->record().writes_before : UINT64_MAX);
+    if (inputs_) {
+        inputs_->took(offered ? offered->epoch : 0, applied_.load(std::memory_order_relaxed));
+    }
     if (offered) {
         TraceRing* const tracing = trace_.load(std::memory_order_acquire);
         const std::int64_t begin_ns = tracing ? monotonic_ns() : 0;
@@ -246,6 +283,16 @@ void Core::take_over() noexcept {
             tracing->put(TraceEvent::plan, begin_ns, monotonic_ns(), info_.number, 0);
         }
     }
+    take_probes();
+}
+
+/// Empties the inbox; in a re-execution in the cycle that did so.
+plan::Plan* Core::offered_plan() noexcept {
+    if (inputs_ && inputs_->replays() && inputs_->record().epoch == 0) return nullptr;
+    return inbox_.exchange(nullptr, std::memory_order_acq_rel);
+}
+
+void Core::take_probes() noexcept {
     if (!probe_inbox_.load(std::memory_order_relaxed)) return;
     if (plan::ProbeSet* const probes = probe_inbox_.exchange(nullptr, std::memory_order_acq_rel)) {
         probes_ = probes->probes.empty() ? nullptr : probes;
@@ -283,29 +330,62 @@ void Core::take(plan::Plan* plan) noexcept {
     probes_ = plan->probes.get();
     shown_.store(plan, std::memory_order_release);
     sampled_ = 0;
+    if (inputs_ && inputs_->replays()) {
+        keep_history();
+    }
     taken_.store(plan->epoch, std::memory_order_release);
 }
 
-void Core::drain_writes() noexcept {
-    for (Write write; writes_.pop(write);) {
+/// `until`: the total of applied writes at which a journaled cycle stopped.
+void Core::drain_writes(std::uint64_t until) noexcept {
+    for (Write write; applied_.load(std::memory_order_relaxed) < until && writes_.pop(write);) {
         __atomic_store_n(&write.to->raw, write.value.raw, __ATOMIC_RELAXED);
         applied_.store(applied_.load(std::memory_order_relaxed) + 1, std::memory_order_release);
     }
 }
 
 void Core::import() noexcept {
+    if (inputs_) {
+        inputs_->reads(plan_->imports.size());
+    }
     for (plan::Import& from : plan_->imports) {
-        plan::Channel& channel = *from.channel;
-        if (!(channel.middle.load(std::memory_order_acquire) & plan::Channel::fresh)) continue;
-        channel.front = channel.middle.exchange(channel.front, std::memory_order_acq_rel) & 3;
-        const hal_value* values = channel.buffers[channel.front].get();
-        for (std::size_t i = 0; i < from.to.size(); ++i) {
-            __atomic_store_n(&from.to[i]->raw, values[i].raw, __ATOMIC_RELAXED);
+        if (!inputs_) {
+            import(*from.channel, from.to);
+        } else if (inputs_->replays()) {
+            import(*from.channel, from.to, inputs_->note(0));
+        } else {
+            inputs_->note(import(*from.channel, from.to));
         }
     }
     for (const plan::CellImport& from : plan_->cell_imports) {
-        __atomic_store_n(&from.to->raw, __atomic_load_n(&from.cell->raw, __ATOMIC_RELAXED),
-                         __ATOMIC_RELAXED);
+        const std::uint64_t value = note(__atomic_load_n(&from.cell->raw, __ATOMIC_RELAXED));
+        __atomic_store_n(&from.to->raw, value, __ATOMIC_RELAXED);
+    }
+}
+
+/// Returns which finished cycle of the writer was taken; 0: none is newer than the last one.
+std::uint64_t Core::import(plan::Channel& channel, const std::vector<hal_value*>& to) noexcept {
+    if (!(channel.middle.load(std::memory_order_acquire) & plan::Channel::fresh)) return 0;
+    channel.front = channel.middle.exchange(channel.front, std::memory_order_acq_rel) & 3;
+    const hal_value* values = channel.buffers[channel.front].get();
+    for (std::size_t i = 0; i < to.size(); ++i) {
+        __atomic_store_n(&to[i]->raw, values[i].raw, __ATOMIC_RELAXED);
+    }
+    return channel.sequences[channel.front];
+}
+
+/// Takes the finished cycle that the journaled one took; 0: none.
+void Core::import(plan::Channel& channel, const std::vector<hal_value*>& to,
+                  std::uint64_t sequence) noexcept {
+    if (sequence == 0 || !channel.history) return;
+    auto& entries = channel.history->entries;
+    while (!entries.empty() && entries.front().first < sequence) {
+        entries.pop_front();
+    }
+    if (entries.empty()) return;
+    const std::vector<hal_value>& values = entries.front().second;
+    for (std::size_t i = 0; i < to.size(); ++i) {
+        to[i]->raw = values[i].raw;
     }
 }
 
@@ -317,21 +397,123 @@ void Core::publish(plan::Plan& plan) noexcept {
         for (std::size_t i = 0; i < to.from.size(); ++i) {
             values[i].raw = __atomic_load_n(&to.from[i]->raw, __ATOMIC_RELAXED);
         }
+        channel.sequences[channel.back] = ++channel.published;
+        if (channel.history) [[unlikely]] {
+            channel.history->entries.emplace_back(
+                channel.published, std::vector<hal_value>(values, values + channel.size));
+        }
         channel.back = channel.middle.exchange(channel.back | plan::Channel::fresh,
                                                std::memory_order_acq_rel) &
                        3;
     }
 }
 
-void Core::answer() noexcept {
-    Observation* const wish = observation_.exchange(nullptr, std::memory_order_acq_rel);
-    if (!wish) return;
-    drain_writes();  // who reads after having written sees what was written
-    for (std::size_t i = 0; i < wish->count; ++i) {
-        wish->to[i].raw = __atomic_load_n(&wish->from[i]->raw, __ATOMIC_RELAXED);
+/// Returns false when nobody asked.
+bool Core::answer() noexcept {
+    const bool replays = inputs_ && inputs_->replays();
+    if (replays && inputs_->record().observation == 0) return false;
+    Observation* const request = observation_.exchange(nullptr, std::memory_order_acq_rel);
+    if (!request) return false;
+    // who reads after having written sees what was written
+    drain_writes(replays ? inputs_->record().writes_after : UINT64_MAX);
+    for (std::size_t i = 0; i < request->count; ++i) {
+        request->to[i].raw = __atomic_load_n(&request->from[i]->raw, __ATOMIC_RELAXED);
     }
-    wish->cycle = info_.number;
-    wish->done.store(true, std::memory_order_release);
+    if (inputs_ && !replays) {
+        inputs_->answered(request->number);
+    }
+    request->cycle = info_.number;
+    request->done.store(true, std::memory_order_release);
+    return true;
+}
+
+void Core::end_record() noexcept {
+    const std::uint64_t sum = checksum();
+    answer();
+    if (inputs_->replays()) {
+        drain_writes(inputs_->record().writes_after);
+    }
+    inputs_->end(applied_.load(std::memory_order_relaxed), sum);
+}
+
+/// Covers all values of a small thread, and the next ones in each cycle of a large one.
+std::uint64_t Core::checksum() const noexcept {
+    constexpr std::uint64_t factor = 0x9E3779B97F4A7C15;
+    const std::vector<plan::Checked>& all = plan_->checked;
+    const std::size_t count = std::min(all.size(), checked_values);
+    std::size_t at = count == 0 ? 0 : info_.number * count % all.size();
+    std::uint64_t lanes[4] = {1, 2, 3, 4};
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint64_t raw = __atomic_load_n(&all[at].value->raw, __ATOMIC_RELAXED);
+        std::uint64_t& lane = lanes[i % 4];
+        lane = (lane ^ (raw & all[at].mask)) * factor;
+        lane ^= lane >> 29;
+        at = at + 1 == all.size() ? 0 : at + 1;
+    }
+    return ((lanes[0] * factor + lanes[1]) * factor + lanes[2]) * factor + lanes[3];
+}
+
+std::int64_t Core::clock_ns() noexcept {
+    const std::int64_t now_ns = unnoted_clock_ns();
+    return static_cast<std::int64_t>(note(static_cast<std::uint64_t>(now_ns)));
+}
+
+/// The time for messages and traces, on which no value depends.
+std::int64_t Core::unnoted_clock_ns() noexcept {
+    reads_itself_ = true;
+    const std::int64_t now_ns = monotonic_ns();
+    reads_itself_ = false;
+    return now_ns;
+}
+
+/// What this thread publishes is kept until its reader takes it.
+void Core::keep_history() noexcept {
+    for (plan::Export& to : plan_->exports) {
+        if (!to.channel->history) {
+            to.channel->history = std::make_unique<plan::Channel::History>();
+        }
+    }
+}
+
+Core::Missing Core::missing() const noexcept {
+    const CycleRecord& record = inputs_->record();
+    const plan::Plan* plan = plan_;
+    if (record.epoch != 0) {
+        plan = inbox_.load(std::memory_order_acquire);
+        if (!plan || plan->epoch != record.epoch) return Missing::edit;
+    }
+    if (record.writes_after > pushed_) return Missing::edit;
+    if (record.observation != 0) {
+        const Observation* const asked = observation_.load(std::memory_order_acquire);
+        if (!asked || asked->number != record.observation) return Missing::edit;
+    }
+    const std::size_t imports = plan ? plan->imports.size() : 0;
+    for (std::size_t i = 0; i < imports && i < record.imports; ++i) {
+        if (plan->imports[i].channel->published < inputs_->notes()[i]) return Missing::cycle;
+    }
+    return Missing::nothing;
+}
+
+void Core::replay() noexcept {
+    const CycleRecord record = inputs_->record();
+    if (record.kind == CycleRecord::service) return service();
+    if (record.missed > monitor.missed()) {
+        skip(record.missed - monitor.missed());
+    }
+    info_.number = record.number;
+    cycle(record.grid_ns, record.due_ns, record.woke_ns);
+}
+
+void Core::serve_at_rest() noexcept {
+    take_probes();
+    Observation* const request = observation_.load(std::memory_order_acquire);
+    if (!request || request->number != 0) return;
+    observation_.store(nullptr, std::memory_order_release);
+    for (std::size_t i = 0; i < request->count; ++i) {
+        request->to[i].raw = request->from[i]->raw;
+    }
+    request->cycle = info_.number;
+    request->done.store(true, std::memory_order_release);
 }
 
 void Core::run() noexcept {
@@ -370,7 +552,7 @@ void Core::run_functions() noexcept {
     const plan::Row* row = plan_->rows.data();
     if (!measure_) {
         run_rows(row, steps, steps + functions.back().end);
-    } else if (profile_every.load(std::memory_order_relaxed) || tracing_) {
+    } else if (note(profile_every.load(std::memory_order_relaxed) || tracing_) != 0) {
         for (const plan::Function& function : functions) {
             run_timed(function, steps);
         }
@@ -389,7 +571,8 @@ void Core::run_functions() noexcept {
 void Core::run_checked() noexcept {
     const auto& functions = plan_->functions;
     const plan::Step* const steps = plan_->steps.data();
-    const bool time_all = profile_every.load(std::memory_order_relaxed) || tracing_ != nullptr;
+    const bool time_all =
+        note(profile_every.load(std::memory_order_relaxed) || tracing_ != nullptr) != 0;
     const std::size_t sampled = sampled_;
     sampled_ = sampled_ + 1 == functions.size() ? 0 : sampled_ + 1;
     for (std::size_t i = 0; i < functions.size(); ++i) {
@@ -494,9 +677,9 @@ void Core::run_steps(const plan::Step* first, const plan::Step* last) noexcept {
 }
 
 void Core::run_timed(const plan::Function& function, const plan::Step* steps) noexcept {
-    const std::int64_t begin = monotonic_ns();
+    const std::int64_t begin = clock_ns();
     run_steps(steps + function.begin, steps + function.end);
-    const std::int64_t end = monotonic_ns();
+    const std::int64_t end = clock_ns();
     if (tracing_) {
         tracing_->put(TraceEvent::function, begin, end, info_.number, function.id);
     }
@@ -519,7 +702,7 @@ void Core::run_timed(const plan::Function& function, const plan::Step* steps) no
 std::int64_t Core::account(std::int64_t woke_ns, bool ran) noexcept {
     store(*pins_.beat, pins_.beat->slot->u32 + 1);
     if (!measure_) return woke_ns;
-    const std::int64_t now_ns = monotonic_ns();
+    const std::int64_t now_ns = clock_ns();
     const std::int64_t busy_ns = now_ns - woke_ns;
     busy.add(busy_ns);
     if (ran) {  // as in LinuxCNC, cycles without functions have no times
@@ -542,7 +725,8 @@ std::int64_t Core::account(std::int64_t woke_ns, bool ran) noexcept {
                 info_.start_ns, static_cast<double>(busy_ns), nullptr,
                 nullptr};
     };
-    const CycleMonitor::Length length = monitor.length(woke_ns, now_ns);
+    const auto length = static_cast<CycleMonitor::Length>(
+        note(static_cast<std::uint64_t>(monitor.length(woke_ns, now_ns))));
     const bool is_gap = length == CycleMonitor::Length::gap;
     if (length == CycleMonitor::Length::silent) {
         // otherwise the supervisor has reported it
@@ -641,7 +825,7 @@ std::uint32_t Core::slow_function(std::int64_t woke_ns) const noexcept {
 }
 
 void Core::raise(FaultEvent event) noexcept {
-    event.time_ns = measure_ ? monotonic_ns() : info_.start_ns;
+    event.time_ns = measure_ ? unnoted_clock_ns() : info_.start_ns;
     board_.count(event, id_);
     // when full the newest is lost but counted
     limiter_.raise(event, [this](const FaultEvent& e) noexcept { faults_.push(e); });
@@ -660,7 +844,7 @@ void Core::end_copy() noexcept {
 
 void Core::trace_frame(TraceEvent::Kind kind, std::uint32_t id, std::size_t bytes) noexcept {
     if (!tracing_ || !in_function()) return;
-    const std::int64_t now_ns = monotonic_ns();
+    const std::int64_t now_ns = unnoted_clock_ns();
     tracing_->put(kind, now_ns, now_ns, info_.number, id, bytes);
 }
 

@@ -8,6 +8,7 @@
 #include <csetjmp>
 #include <cstdint>
 
+#include "execute/cycle_inputs.hpp"
 #include "execute/cycle_mark.hpp"
 #include "execute/cycle_monitor.hpp"
 #include "execute/faults.hpp"
@@ -36,6 +37,8 @@ struct Observation {
     hal_value* to = nullptr;
     std::size_t count = 0;
     std::uint64_t cycle = 0;              ///< number of that cycle; written by the thread
+    /// Not 0: cycles depend on the answer, and a journal has which cycle gave it.
+    std::uint64_t number = 0;
     std::atomic<bool> done{false};
 };
 
@@ -48,7 +51,7 @@ class Core {
 public:
     Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board,
          Timeline& timeline, const std::atomic<bool>& running, bool measure,
-         CycleMark* mark = nullptr);
+         CycleMark* mark = nullptr, CycleInputs* inputs = nullptr);
     ~Core();
     Core(const Core&) = delete;
 
@@ -72,6 +75,11 @@ public:
     /// Does the same at the end of the thread; waits while the supervisor does it. Not in a cycle
     void make_safe_at_end() noexcept;
     void raise(FaultEvent event) noexcept;
+    /// Notes what the running function reads outside of the machine: a clock, a random number.
+    /// Returns what it gets, which is from the journal in a re-execution. [realtime]
+    std::uint64_t note_reading(std::uint64_t value) noexcept {
+        return inputs_ && in_function() && !reads_itself_ ? inputs_->note(value) : value;
+    }
     /// Records a frame that the running function sends or receives. [realtime]
     void trace_frame(TraceEvent::Kind kind, std::uint32_t id, std::size_t bytes) noexcept;
     /// Shifts the grid for all positions after that of this cycle; does nothing outside a function.
@@ -89,6 +97,19 @@ public:
     void stand_in(std::int64_t now_ns, bool emergency) noexcept;
     /// Returns the function that the cycle is running; 0: none.
     std::uint32_t hung_function() const noexcept;
+
+    // --- by a re-execution, between two cycles ---------------------------------------------------
+    enum class Missing : std::uint8_t {
+        nothing,
+        edit,  ///< a plan, a write or an observation of the session
+        cycle,  ///< the finished cycle of another thread
+    };
+    /// Returns what the record in the inputs of this thread needs and does not exist yet.
+    Missing missing() const noexcept;
+    /// Executes the cycle of the record in the inputs.
+    void replay() noexcept;
+    /// Takes offered probes, and answers an observation without a number.
+    void serve_at_rest() noexcept;
 
     // --- by the session ---------------------------------------------------------------------------------------------
     /// Puts a plan in the inbox; the thread answers by storing its epoch in taken().
@@ -112,6 +133,8 @@ public:
         return true;
     }
     static constexpr std::size_t most_writes = 4096;  ///< largest batch
+    /// Returns how many writes were queued since the thread exists.
+    std::uint64_t queued_writes() const { return pushed_; }
     /// Returns the remaining capacity in writes; the thread only increases it.
     std::size_t room() const { return writes_.capacity() - writes_.size(); }
     /// Returns true when all queued writes have been applied.
@@ -183,15 +206,28 @@ public:
 private:
     void take_over() noexcept;
     void take(plan::Plan* plan) noexcept;
-    void drain_writes() noexcept;
+    plan::Plan* offered_plan() noexcept;
+    void drain_writes(std::uint64_t until = UINT64_MAX) noexcept;
     void import() noexcept;
+    std::uint64_t import(plan::Channel& channel, const std::vector<hal_value*>& to) noexcept;
+    void import(plan::Channel& channel, const std::vector<hal_value*>& to,
+                std::uint64_t sequence) noexcept;
+    std::int64_t clock_ns() noexcept;
+    std::int64_t unnoted_clock_ns() noexcept;
+    std::uint64_t note(std::uint64_t value) noexcept {
+        return inputs_ ? inputs_->note(value) : value;
+    }
+    void end_record() noexcept;
+    std::uint64_t checksum() const noexcept;
+    void keep_history() noexcept;
     static void publish(plan::Plan& plan) noexcept;
     void output() noexcept;
-    void answer() noexcept;
+    bool answer() noexcept;
+    void take_probes() noexcept;
     void sample_probes() noexcept;
-    bool live() const noexcept {
-        return running_.load(std::memory_order_acquire) &&
-               !stopped_.load(std::memory_order_relaxed);
+    bool live() noexcept {
+        return note(running_.load(std::memory_order_acquire) &&
+                    !stopped_.load(std::memory_order_relaxed)) != 0;
     }
     std::uint32_t slow_function(std::int64_t woke_ns) const noexcept;
     void run() noexcept;
@@ -251,6 +287,8 @@ private:
     std::int64_t grid_ns_ = 0;  // position of the cycle that runs
     CycleMark own_mark_;
     CycleMark* const mark_;  // own_mark_, or one in shared memory
+    CycleInputs* const inputs_;  // nullptr: no journal
+    bool reads_itself_ = false;  // not the running function
     bool safe_ = true;
     std::size_t sampled_ = 0;
     bool in_budget_ = true;

@@ -20,6 +20,9 @@ Executor::Executor(bool virtual_clock)
       background_(virtual_clock),
       epoch_ns_(virtual_clock ? 0 : monotonic_ns()) {}
 
+Executor::Executor(CycleSchedule& schedule)
+    : virtual_(true), schedule_(&schedule), background_(true), epoch_ns_(0) {}
+
 Executor::~Executor() {
     while (!runners_.empty()) {
         if (remove(runners_.back()->core, 2'000'000'000)) continue;
@@ -61,8 +64,12 @@ Executor::Halt Executor::halted(std::uint64_t ticket) const {
 }
 
 Core& Executor::add(const CoreOptions& options, ThreadPins pins) {
-    auto owned = std::make_unique<Runner>(next_id_++, options, pins, board_, timeline_, running_,
-                                          !virtual_, epoch_ns_);
+    CoreOptions wanted = options;
+    if (schedule_) {
+        wanted.inputs = &schedule_->inputs_of(next_id_);
+    }
+    auto owned = std::make_unique<Runner>(next_id_++, wanted, pins, board_, timeline_, running_,
+                                          !virtual_ || schedule_, epoch_ns_);
     Runner& runner = *owned;
     const auto place = std::upper_bound(
         runners_.begin(), runners_.end(), options.period_ns,
@@ -74,6 +81,10 @@ Core& Executor::add(const CoreOptions& options, ThreadPins pins) {
     }
     list_core(runner.core);
     timeline_.bound(runners_.front()->options.period_ns);
+    if (schedule_) {
+        schedule_->begin(runner.core);
+        return runner.core;
+    }
     if (virtual_) {
         runner.place(clock_.now_ns());
         return runner.core;
@@ -138,6 +149,9 @@ bool hangs(const Core& core, std::int64_t timeout_ns) {
 
 bool Executor::remove(Core& core, std::int64_t timeout_ns) {
     Runner& leaving = runner(core);
+    if (schedule_) {
+        schedule_->end(core);
+    }
     if (virtual_) {
         core.make_safe_at_end();
     } else if (leaving.started()) {
@@ -171,11 +185,23 @@ bool Executor::reset(Core& core) {
 }
 
 void Executor::call(Runner& runner) {
-    if (virtual_) {
+    if (schedule_) {
+        runner.core.serve_at_rest();
+    } else if (virtual_) {
         runner.core.service();
     } else {
         runner.call();
     }
+}
+
+/// Waits for a thread; in a re-execution, executes cycles until it has done its part.
+template <class Ready>
+bool Executor::wait(Ready ready, std::int64_t timeout_ns) {
+    if (!schedule_) return wait_for(ready, timeout_ns);
+    while (!ready()) {
+        if (!schedule_->step()) return false;
+    }
+    return true;
 }
 
 std::vector<Core*> Executor::hanging(std::int64_t timeout_ns) const {
@@ -209,8 +235,8 @@ std::vector<Core*> Executor::swap(const std::vector<std::pair<Core*, plan::Plan*
     }
     for (const auto& [core, plan] : plans) {
         const auto taken = [core = core, plan = plan] { return core->taken() == plan->epoch; };
-        wait_for([&, core = core] { return taken() || core->monitor.hung(); },
-                 timeout_ns + 2 * core->period_ns());
+        wait([&, core = core] { return taken() || core->monitor.hung(); },
+             timeout_ns + 2 * core->period_ns());
         if (taken()) continue;
         if (core->withdraw(plan)) {
             silent.push_back(core);
@@ -259,8 +285,8 @@ bool Executor::observe(const std::vector<std::pair<Core*, Observation*>>& wishes
     bool all = true;
     for (const auto& [core, wish] : wishes) {
         const auto done = [wish = wish] { return wish->done.load(std::memory_order_acquire); };
-        wait_for([&, core = core] { return done() || hangs(*core, timeout_ns); },
-                 timeout_ns + 2 * core->period_ns());
+        wait([&, core = core] { return done() || hangs(*core, timeout_ns); },
+             timeout_ns + 2 * core->period_ns());
         if (done()) continue;
         if (core->withdraw(wish)) {
             all = false;
@@ -279,7 +305,7 @@ bool Executor::write(const std::vector<std::pair<Core*, std::vector<Write>>>& ro
     for (const auto& [core, row] : rows) {
         const auto fits = [&, core = core, needed = row.size()] { return core->room() >= needed; };
         if (fits()) continue;
-        wait_for([&, core = core] {
+        wait([&, core = core] {
             call(runner(*core));
             return fits() || hangs(*core, timeout_ns);
         }, timeout_ns + 2 * core->period_ns());
@@ -287,7 +313,7 @@ bool Executor::write(const std::vector<std::pair<Core*, std::vector<Write>>>& ro
     }
     for (const auto& [core, row] : rows) {
         core->write(row.data(), row.size());
-        if (virtual_) {
+        if (virtual_ && !schedule_) {
             core->service();
         }
     }
@@ -328,7 +354,10 @@ void Executor::lead() {
     }
 }
 
-std::int64_t Executor::now_ns() const { return virtual_ ? clock_.now_ns() : monotonic_ns(); }
+std::int64_t Executor::now_ns() const {
+    if (schedule_) return schedule_->now_ns();
+    return virtual_ ? clock_.now_ns() : monotonic_ns();
+}
 
 Granted Executor::granted(const Core& core) const { return runner(core).granted; }
 

@@ -12,6 +12,7 @@
 
 #include "execute/background.hpp"
 #include "execute/core.hpp"
+#include "execute/cycle_schedule.hpp"
 #include "execute/runner.hpp"
 #include "execute/supervisor.hpp"
 #include "execute/virtual_clock.hpp"
@@ -22,12 +23,16 @@ class Executor {
 public:
     /// `virtual_clock`: no operating-system threads; cycles run in advance().
     explicit Executor(bool virtual_clock);
+    /// The cycles of a journal in the place of a clock: waiting for a thread executes them.
+    explicit Executor(CycleSchedule& schedule);
     ~Executor();
     Executor(const Executor&) = delete;
 
     /// Creates a thread, which serves its inbox at once. Returns its core, which lives until
     /// remove().
     Core& add(const CoreOptions& options, ThreadPins pins);
+    /// Returns the number of the next thread that add() creates.
+    std::uint32_t next_id() const { return next_id_; }
     /// Sets a thread's outputs to their safe values and ends it. Returns false when it hangs or
     /// does not end within `timeout_ns`.
     bool remove(Core& core, std::int64_t timeout_ns);
@@ -78,6 +83,8 @@ public:
     void advance(std::int64_t ns);
     std::int64_t now_ns() const;
     bool is_virtual() const { return virtual_; }
+    /// Returns true when the cycles of a journal are executed again.
+    bool replays() const { return schedule_ != nullptr; }
 
     Granted granted(const Core& core) const;
     /// Returns the number that the system gave the thread; 0 under the virtual clock.
@@ -97,9 +104,12 @@ public:
 
 private:
     void call(Runner& runner);  // the virtual clock's is served at once
+    template <class Ready>
+    bool wait(Ready ready, std::int64_t timeout_ns);
     Runner& runner(const Core& core) const;
     void forget(const Runner& leaving);
     const bool virtual_;
+    CycleSchedule* const schedule_ = nullptr;
     std::atomic<bool> running_{false};
     FaultBoard board_;
     Supervisor supervisor_{board_};

@@ -79,7 +79,7 @@ bool use_deadline(const CoreOptions& options) noexcept {
 Runner::Runner(std::uint32_t id, const CoreOptions& o, ThreadPins pins, FaultBoard& board,
                Timeline& timeline, const std::atomic<bool>& running, bool measure,
                std::int64_t epoch_ns)
-    : core(id, o.period_ns, pins, board, timeline, running, measure, o.mark),
+    : core(id, o.period_ns, pins, board, timeline, running, measure, o.mark, o.inputs),
       options(o),
       timeline_(timeline),
       epoch_ns_(epoch_ns),

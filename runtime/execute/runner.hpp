@@ -30,6 +30,7 @@ struct CoreOptions {
     std::int64_t max_gap_realtime_ns = 0;
     std::string name{};  ///< as the system shows it: top -H, a debugger; its first 15 bytes
     CycleMark* mark = nullptr;  ///< nullptr: one of the thread's own
+    CycleInputs* inputs = nullptr;  ///< records its cycles, or has those to be executed again
 };
 
 /// What the system granted a thread.

@@ -471,11 +471,32 @@ private:
         } else if (!plan && (moves || &now != pin.memory)) {
             out_.session_rebinds.push_back({pin.memory, slot, now.slot, pin.type != HAL_TYPE_PORT});
         }
+        if (plan && input_.journaled) {
+            check(pin, slot, *plan);
+        }
         if (pin.pointer) {
             (plan ? plan->pointers : out_.session_pointers).push_back({pin.pointer, slot});
         }
         if (plan && (pin.flags & HAL_PIN_SAFE)) {
             plan->safe.push_back({pin.memory, pin.safe});
+        }
+    }
+
+    // What the checksum of a journaled cycle covers: each value once, but no cell, which other
+    // threads write at any time, and no port, whose value is an address.
+    void check(const Pin& pin, const hal_value* slot, plan::Plan& plan) {
+        if (pin.type == HAL_TYPE_PORT) return;
+        if (pin.signal && in_cell(out_.places[pin.signal->index], pin)) return;
+        if (!checked_.insert(slot).second) return;
+        plan.checked.push_back({slot, mask_of(pin.type)});
+    }
+
+    static std::uint64_t mask_of(hal_type type) {
+        switch (type) {
+        case HAL_TYPE_BIT: return 0xff;
+        case HAL_TYPE_S32:
+        case HAL_TYPE_U32: return 0xffffffff;
+        default: return ~std::uint64_t{0};
         }
     }
 
@@ -496,6 +517,7 @@ private:
     std::map<std::pair<Thread*, Thread*>, std::pair<std::size_t, std::size_t>> channels_;
     plan::Import* import_ = nullptr;
     std::vector<Unknown> unknown_;
+    std::unordered_set<const hal_value*> checked_;
 };
 
 }  // namespace

@@ -28,6 +28,7 @@ struct CompileInput {
     const std::unordered_map<const Pin*, hal_pin*>* old_memory = nullptr;
     std::function<void*(const Thread&)> core_of;  ///< the sink of finite checks
     hal_step check_finite = nullptr;
+    bool journaled = false;  ///< the threads have a journal, whose checksums cover their values
 };
 
 /// Where things will be once all threads have taken their plans.

@@ -6,7 +6,9 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "hal/abi.h"
@@ -74,6 +76,15 @@ struct Channel {
     std::uint32_t back = 0;  ///< writer only
     std::uint32_t front = 1;  ///< reader only
     std::atomic<std::uint32_t> middle{2};
+    /// of the values in each buffer, counted by the writer from 1: which of its finished cycles
+    std::uint64_t sequences[3]{};
+    std::uint64_t published = 0;  ///< writer only
+    /// In a re-execution: what the reader has not taken yet, oldest first, and its sequence. A
+    /// thread that reads an older cycle than the newest finds it here.
+    struct History {
+        std::deque<std::pair<std::uint64_t, std::vector<hal_value>>> entries;
+    };
+    std::unique_ptr<History> history;  ///< nullptr: live
 };
 
 struct Export {
@@ -118,6 +129,12 @@ struct Safe {
     hal_value value;
 };
 
+/// A value that the checksum of a journaled cycle covers.
+struct Checked {
+    const hal_value* value;
+    std::uint64_t mask;  ///< the bits that its type has
+};
+
 /// Bytes in a row that the cycle works on.
 struct Memory {
     const void* begin;
@@ -147,6 +164,8 @@ struct Plan {
     std::size_t image_size = 0;
     /// steps, image, code, instances in the order of their steps: see Core::warm
     std::vector<Memory> working_set;
+    /// values of the thread, in order of the model; empty: it has no journal
+    std::vector<Checked> checked;
     /// what must outlive the plan: cells shared between threads
     std::vector<std::shared_ptr<void>> keep;
     /// nullptr: nothing is probed. The session replaces it when a newer one has been taken

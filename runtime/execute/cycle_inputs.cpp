@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+#include "execute/cycle_inputs.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <stdexcept>
+
+namespace hal {
+
+CycleInputs::CycleInputs(std::size_t ring_words)
+    : notes_(std::make_unique<std::uint64_t[]>(max_notes)),
+      mask_(std::bit_ceil(std::max(ring_words, head_words)) - 1),
+      ring_(std::make_unique<std::uint64_t[]>(mask_ + 1)) {}
+
+CycleInputs::CycleInputs() : notes_(std::make_unique<std::uint64_t[]>(max_notes)), mask_(0) {}
+
+void CycleInputs::begin(CycleRecord::Kind kind, std::uint64_t number, std::int64_t grid_ns,
+                        std::int64_t due_ns, std::int64_t woke_ns, std::uint64_t missed) noexcept {
+    count_ = 0;
+    if (replays()) return;
+    record_.kind = kind;
+    record_.number = number;
+    record_.grid_ns = grid_ns;
+    record_.due_ns = due_ns;
+    record_.woke_ns = woke_ns;
+    record_.missed = missed;
+    record_.epoch = 0;
+    record_.observation = 0;
+    record_.imports = 0;
+}
+
+void CycleInputs::took(std::uint64_t epoch, std::uint64_t writes) noexcept {
+    if (replays()) return;
+    record_.epoch = epoch;
+    record_.writes_before = writes;
+}
+
+void CycleInputs::reads(std::uint64_t count) noexcept {
+    if (!replays()) {
+        record_.imports = count;
+    }
+}
+
+void CycleInputs::end(std::uint64_t writes, std::uint64_t checksum) noexcept {
+    if (replays()) {
+        if (count_ != record_.notes) {
+            match_ = Match::other_reads;
+        } else {
+            match_ = checksum == record_.checksum ? Match::same : Match::other_values;
+        }
+        return;
+    }
+    record_.writes_after = writes;
+    record_.checksum = checksum;
+    record_.notes = count_;
+    put();
+    count_ = 0;
+}
+
+void CycleInputs::put() noexcept {
+    const std::size_t words = head_words + count_;
+    const std::size_t head = head_.load(std::memory_order_relaxed);
+    const auto fits = [&] { return head + words - seen_tail_ <= mask_ + 1; };
+    if (!fits()) {
+        seen_tail_ = tail_.load(std::memory_order_acquire);
+    }
+    if (count_ > max_notes || !fits()) {
+        record_.lost = lost_.load(std::memory_order_relaxed) + 1;
+        lost_.store(record_.lost, std::memory_order_release);
+        return;
+    }
+    const auto copy = [&](std::size_t to, const void* from, std::size_t count) noexcept {
+        const std::size_t at = to & mask_;
+        const std::size_t first = std::min(count, mask_ + 1 - at);
+        std::memcpy(&ring_[at], from, first * sizeof(std::uint64_t));
+        std::memcpy(&ring_[0], static_cast<const std::uint64_t*>(from) + first,
+                    (count - first) * sizeof(std::uint64_t));
+    };
+    copy(head, &record_, head_words);
+    copy(head + head_words, notes_.get(), count_);
+    head_.store(head + words, std::memory_order_release);
+}
+
+CycleRecord CycleInputs::record_at(const std::uint64_t* words) noexcept {
+    CycleRecord record;
+    std::memcpy(static_cast<void*>(&record), words, sizeof record);
+    return record;
+}
+
+void CycleInputs::load(const CycleRecord& record, std::span<const std::uint64_t> notes) {
+    if (notes.size() > max_notes || notes.size() != record.notes) {
+        throw std::invalid_argument("invalid number of notes in a record of a cycle");
+    }
+    record_ = record;
+    std::copy(notes.begin(), notes.end(), notes_.get());
+    count_ = 0;
+    match_ = Match::same;
+}
+
+}  // namespace hal
