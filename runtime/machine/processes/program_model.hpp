@@ -18,6 +18,15 @@ class Transaction;
 struct Instance;
 struct SessionState;
 
+/// The first word of what a journal of the execution notes of the members below; the others are
+/// their arguments. No command begins like these.
+namespace program_words {
+inline constexpr std::string_view add = ":program";
+inline constexpr std::string_view remove = ":remove-program";
+inline constexpr std::string_view add_pin = ":program-pin";
+inline constexpr std::string_view remove_pins = ":remove-program-pins";
+}  // namespace program_words
+
 /// All members need the session's lock. [setup]
 class ProgramModel {
 public:

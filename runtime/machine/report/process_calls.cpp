@@ -9,7 +9,6 @@
 #include <cstdio>
 #include <cstring>
 
-#include <dlfcn.h>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/syscall.h>
@@ -18,9 +17,10 @@
 #include "base/own_descriptors.hpp"
 #include "base/process_copy.hpp"
 #include "execute/core.hpp"
-#include "machine/report/crash.hpp"
 #include "machine/load/foreign_code.hpp"
 #include "machine/load/setup_call.hpp"
+#include "machine/report/crash.hpp"
+#include "machine/report/next_function.hpp"
 
 namespace hal {
 namespace {
@@ -69,25 +69,8 @@ void ForeignCode::over() noexcept {
 
 namespace {
 
-/// The function of the C library that stands behind one of ours.
 template <class Function>
-class Next {
-public:
-    explicit constexpr Next(const char* name) noexcept : name_(name) {}
-    Function* operator*() noexcept {
-        // no guarded initialisation: the guard may need a system call
-        Function* found = found_.load(std::memory_order_relaxed);
-        if (found == nullptr) {
-            found = reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name_));
-            found_.store(found, std::memory_order_relaxed);
-        }
-        return found;
-    }
-
-private:
-    const char* const name_;
-    std::atomic<Function*> found_{nullptr};
-};
+using Next = hal::NextFunction<Function>;
 
 constinit Next<long(long, ...)> next_syscall{"syscall"};
 constinit Next<int(int)> next_close{"close"};

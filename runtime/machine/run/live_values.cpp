@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "machine/run/execution_sink.hpp"
 #include "machine/run/state.hpp"
 
 namespace hal {
@@ -148,6 +149,13 @@ std::vector<std::optional<Reading>> LiveValues::read(const std::vector<std::stri
 }
 
 void LiveValues::write(const std::vector<std::pair<Pin*, hal_value>>& values) {
+    if (state_.options.sink) {
+        std::vector<std::pair<std::string, std::uint64_t>> noted;
+        for (const auto& [pin, value] : values) {
+            noted.emplace_back(pin->name, value.raw);
+        }
+        state_.options.sink->written(std::move(noted));
+    }
     Notes<Signal, hal_value> row;
     const auto flush = [&] {
         Diagnostics ignored;  // a thread that hangs is found by every edit; it takes no values

@@ -7,6 +7,7 @@
 
 #include "base/keep.hpp"
 #include "machine/load/construct.hpp"
+#include "machine/run/execution_sink.hpp"
 #include "machine/run/replaced_instances.hpp"
 #include "machine/run/state.hpp"
 
@@ -54,6 +55,7 @@ void OpenTransaction::begin() {
     if (open_) throw std::logic_error("a transaction is open already");
     open_ = true;
     commands_ = 0;
+    words_.clear();
 }
 
 Edit& OpenTransaction::editing(Diagnostics& diagnostics) {
@@ -92,6 +94,8 @@ bool OpenTransaction::commit(Diagnostics& diagnostics) {
     if (edit_) {
         edit_->absences().report(diagnostics);
     }
+    const std::uint64_t epoch = state_.threads.epoch();
+    const bool edits = edit_ != nullptr;
     bool good = false;
     try {
         if (std::exchange(needs_threads_, false)) {
@@ -110,6 +114,9 @@ bool OpenTransaction::commit(Diagnostics& diagnostics) {
         withdraw(&diagnostics);
     }
     open_ = false;
+    if (ExecutionSink* const sink = state_.options.sink; sink && good && edits) {
+        sink->edited(epoch, std::exchange(words_, {}), state_.model);
+    }
     const auto actions = std::exchange(actions_, {});
     if (good) {
         for (const auto& action : actions) {
@@ -179,6 +186,9 @@ bool OpenTransaction::start_added(Diagnostics& diagnostics) {
 
 /// Undoes the transaction, in the model and in threads that have taken it.
 void OpenTransaction::withdraw(Diagnostics* diagnostics) {
+    if (touched_ && state_.options.sink) {
+        state_.options.sink->withdrawn();
+    }
     edit_->undo();
     Diagnostics ignored;
     if (!touched_ || restore_threads(diagnostics ? *diagnostics : ignored)) {

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "machine/load/elaborate.hpp"
@@ -32,6 +34,8 @@ public:
     Edit& editing(Diagnostics& diagnostics);
     std::vector<AutoOrder>& auto_orders() { return auto_orders_; }
     void count_command() { ++commands_; }
+    /// Adds the words of a command to what the journal of the execution gets at the commit.
+    void note(std::vector<std::string> words) { words_.push_back(std::move(words)); }
     /// As Transaction::when_committed().
     void when_committed(std::function<void()> action) { actions_.push_back(std::move(action)); }
     /// It does not take effect while a thread hangs.
@@ -62,6 +66,7 @@ private:
     bool needs_threads_ = false;
     std::vector<AutoOrder> auto_orders_;
     std::size_t commands_ = 0;
+    std::vector<std::vector<std::string>> words_;
     /// threads may have been made, ended or given a plan
     bool touched_ = false;
     EarlierValues before_;

@@ -11,14 +11,22 @@
 #include "execute/process_setup.hpp"
 #include "machine/load/construct.hpp"
 #include "machine/report/crash.hpp"
+#include "machine/run/acquisition.hpp"
 #include "machine/run/state.hpp"
 
 namespace hal {
 
+namespace {
+
+std::unique_ptr<Executor> make_executor(const SessionOptions& options) {
+    if (options.schedule) return std::make_unique<Executor>(*options.schedule);
+    return std::make_unique<Executor>(options.virtual_clock);
+}
+
+}  // namespace
+
 SessionState::SessionState(SessionOptions o)
-    : options(std::move(o)),
-      plugins(options.plugin_path),
-      executor(std::make_unique<Executor>(options.virtual_clock)) {
+    : options(std::move(o)), plugins(options.plugin_path), executor(make_executor(options)) {
     if (!options.virtual_clock && !options.check_only) {
         refused = prepare_process();
     }
@@ -36,7 +44,17 @@ void SessionState::offer_names(Diagnostics& diagnostics) {
 }
 
 Failure SessionState::start(Instance& instance) {
-    return start_instance(instance, model, *executor, status, journal.for_plugins());
+    if (!options.sink) {
+        return start_instance(instance, model, *executor, status, journal.for_plugins());
+    }
+    const Acquisition acquisition;
+    Failure failure = start_instance(instance, model, *executor, status, journal.for_plugins());
+    OutsideWorld outside = acquisition.result();
+    outside.streams = instance.streams.size();
+    if (failure.empty() && !outside.empty()) {
+        options.sink->opened(instance.name, instance.component->name, outside);
+    }
+    return failure;
 }
 
 void end_conditions(Executor& executor, const Instance& instance) {

@@ -31,6 +31,8 @@ namespace hal {
 
 struct SessionState;
 
+class CycleSchedule;
+class ExecutionSink;
 class ExitObserver;
 
 struct SessionOptions {
@@ -44,6 +46,10 @@ struct SessionOptions {
     std::vector<std::string> plugin_path;  ///< searched first
     /// made before the session, and outlives it; nullptr: none
     ExitObserver* observer = nullptr;
+    /// outlives the session; nullptr: the execution has no journal
+    ExecutionSink* sink = nullptr;
+    /// outlives the session: the cycles of a journal are executed again; with virtual_clock
+    CycleSchedule* schedule = nullptr;
 };
 
 /// Groups of commands that the `lock` command locks; LinuxCNC's names and bits.

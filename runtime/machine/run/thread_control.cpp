@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "base/own_descriptors.hpp"
+#include "machine/run/execution_sink.hpp"
 #include "machine/run/state.hpp"
 
 namespace hal {
@@ -27,6 +28,9 @@ bool ThreadControl::start(Diagnostics* diagnostics) {
     }
     if (all) {
         s.executor->start();
+        if (s.options.sink) {
+            s.options.sink->switched(true);
+        }
         was_started_ = true;
     }
     return all;
@@ -49,6 +53,9 @@ bool ThreadControl::stop(Diagnostics* diagnostics) {
     Diagnostics ignored;
     if (!s.executor->running()) return !report_hung(diagnostics ? *diagnostics : ignored);
     s.executor->stop();
+    if (s.options.sink) {
+        s.options.sink->switched(false);
+    }
     // every thread makes its outputs safe at the end of its next cycle; see it done
     std::deque<Observation> observations;
     std::vector<std::pair<Core*, Observation*>> requests;
@@ -77,6 +84,8 @@ ThreadControl::Halt ThreadControl::halted(std::uint64_t ticket) const {
     }
     return Halt::hung;
 }
+
+void ThreadControl::continue_after(std::uint64_t epoch) { state_.threads.continue_after(epoch); }
 
 bool ThreadControl::running() const { return state_.executor->running(); }
 

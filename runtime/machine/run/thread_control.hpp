@@ -27,6 +27,9 @@ public:
     /// Reports the threads that hang as errors. Returns false when no thread hangs.
     bool report_hung(Diagnostics& diagnostics) const;
     bool running() const;
+    /// Makes the plans of the next edit have the epochs that they had in a journaled machine;
+    /// `epoch` is that of the plans before it.
+    void continue_after(std::uint64_t epoch);
     /// Returns true when start() was successful once.
     bool was_started() const { return was_started_; }
     /// Notes a command that lets time pass. Returns true for the first one, whose text is needed

@@ -10,6 +10,8 @@
 
 #include "machine/report/cpu_occupant.hpp"
 #include "machine/report/exit_observer.hpp"
+#include "machine/report/journaled_calls.hpp"
+#include "machine/run/execution_sink.hpp"
 #include "machine/run/plan_adoption.hpp"
 #include "machine/run/state.hpp"
 
@@ -171,6 +173,13 @@ bool ThreadPlans::add(Thread& thread, int priority, Diagnostics& diagnostics) {
                           &thread.beat, &thread.missed, &thread.wakeup};
     if (options.observer) {
         wanted.mark = options.observer->take_mark();
+    }
+    if (options.sink || options.schedule) {
+        prepare_journaled_calls();
+    }
+    if (options.sink) {
+        wanted.inputs =
+            options.sink->thread_made(thread.name, o.period_ns, state_.executor->next_id());
     }
     Core*& entry = cores_.try_emplace(&thread, nullptr).first->second;
     try {
@@ -375,6 +384,7 @@ bool ThreadPlans::swap(Edit& edit, EarlierValues& before,
     input.old_memory = &edit.old_memory;
     input.core_of = [this](const Thread& thread) -> void* { return core(&thread); };
     input.check_finite = check_finite;
+    input.journaled = state_.options.sink || state_.executor->replays();
     Compiled compiled = compile(state_.model, input);
     state_.probes.enter(compiled);
     observe_unknowns(compiled);
@@ -467,6 +477,7 @@ void ThreadPlans::observe_unknowns(Compiled& compiled) {
         request.from = sources.data();
         request.to = values.data();
         request.count = sources.size();
+        request.number = epoch_;
         requests.emplace_back(owner, &request);
     }
     if (requests.empty()) return;

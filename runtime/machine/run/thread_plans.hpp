@@ -45,6 +45,10 @@ public:
     const Cores& cores() const { return cores_; }
     /// What each thread runs.
     const Plans& plans() const { return plans_; }
+    /// Returns the epoch of the newest plans.
+    std::uint64_t epoch() const { return epoch_; }
+    /// Makes the next plans have the epochs that they had in a journaled machine, which are larger.
+    void continue_after(std::uint64_t epoch) { epoch_ = epoch; }
 
     /// Makes the threads of the model that have no core yet. False after reporting.
     bool make(Diagnostics& diagnostics);

@@ -33,12 +33,23 @@ void elaborate(Elaboration& on, const EditForm& form, const Command& plain) {
     }
 }
 
+std::vector<std::string> words_of(const Command& command) {
+    std::vector<std::string> words{command.name.text};
+    for (const Token& token : command.args) {
+        words.push_back(token.text);
+    }
+    return words;
+}
+
 }  // namespace
 
 void Transaction::apply(const EditForm& form, const Command& command, Diagnostics& diagnostics) {
     SessionState& s = *machine_->state_;
     try {
         Edit& edit = s.transaction.editing(diagnostics);
+        if (s.options.sink) {
+            s.transaction.note(words_of(command));
+        }
         for (const auto& thread : s.model.threads) {
             if (const Core* const core = s.threads.core(thread.get())) {
                 thread->init_done = core->passed();
