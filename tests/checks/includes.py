@@ -35,6 +35,7 @@ ROWS = {
     "runtime/commands": ["runtime/machine"],
     "runtime/control": ["runtime/commands"],
     "runtime/cells": ["runtime/control", "components/dds/links"],
+    "runtime/journal": ["runtime/machine", "components/recording/mcap"],
     "tools": [
         "tools/inspect",
         "tools/linuxcnc",
@@ -44,7 +45,7 @@ ROWS = {
         "tools/panel",
     ],  # the table of subcommands
     "tools/cli": ["runtime/control"],
-    "tools/run": ["tools/record", "tools/tcl", "runtime/cells"],
+    "tools/run": ["tools/record", "tools/tcl", "runtime/cells", "runtime/journal"],
     "tools/record": ["tools/cli", "drivers/link", "components/recording/mcap"],
     "tools/inspect": ["tools/run", "tools/scope"],
     "tools/tcl": ["tools/comp"],
@@ -219,7 +220,10 @@ BANS = {
         "components",
         None,
     ): "components include only the sdk and text (bus components also drivers/link)",
-    (None, "runtime/machine"): "only commands, control, cells, tools and tests include machine",
+    (
+        None,
+        "runtime/machine",
+    ): "only commands, control, cells, journal, tools and tests include machine",
 }
 
 # Libraries that only some folders may include.
@@ -232,7 +236,13 @@ LIBRARIES = {
     r"fmt/": ["runtime", "tools"],
     r"pugixml": ["components/canopen", "components/ethercat", "tools/panel"],
     r"libwebsockets": ["tools/panel"],
-    r"nlohmann/": ["runtime/machine", "runtime/commands", "runtime/control", "tools"],
+    r"nlohmann/": [
+        "runtime/machine",
+        "runtime/commands",
+        "runtime/control",
+        "runtime/journal",
+        "tools",
+    ],
 }
 
 INCLUDE_ROOTS = [

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: MIT
+#include "journal/execution_journal.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <ctime>
+
+#include "hal/clock.hpp"
+#include "journal/file_hash.hpp"
+#include "journal/journal_format.hpp"
+#include "model/model.hpp"
+#include "recording/mcap/bytes.hpp"
+
+namespace hal {
+namespace {
+
+constexpr auto drain_every = std::chrono::milliseconds(20);
+constexpr std::int64_t batch_ns = 200'000'000;  // of cycles in a batch
+constexpr std::size_t batch_bytes = std::size_t{1} << 16;
+constexpr std::int64_t flush_every_ns = 1'000'000'000;
+
+std::int64_t offset_to_unix_ns() {
+    timespec real{};
+    clock_gettime(CLOCK_REALTIME, &real);
+    return std::int64_t{real.tv_sec} * 1'000'000'000 + real.tv_nsec - monotonic_ns();
+}
+
+/// Two seconds of cycles that read little.
+std::size_t ring_words(std::int64_t period_ns) {
+    constexpr std::int64_t seconds_ns = 2'000'000'000;
+    constexpr std::int64_t words_per_cycle = 32;
+    constexpr std::int64_t min_words = std::int64_t{1} << 16;
+    constexpr std::int64_t max_words = std::int64_t{1} << 22;
+    const std::int64_t words = seconds_ns / std::max<std::int64_t>(period_ns, 1) * words_per_cycle;
+    return static_cast<std::size_t>(std::clamp(words, min_words, max_words));
+}
+
+}  // namespace
+
+ExecutionJournal::ExecutionJournal(const std::string& path, const JournalOrigin& origin)
+    : writer_(path), unix_offset_ns_(offset_to_unix_ns()) {
+    if (writer_.error() != 0) return;
+    writer_.metadata("halcyon", {{"instance", origin.instance},
+                                 {"version", origin.version},
+                                 {"unix_offset_ns", std::to_string(unix_offset_ns_)}});
+    writer_.metadata(journal_format::head, {{"format", std::string(journal_format::version)},
+                                            {"version", origin.version},
+                                            {"commit", origin.commit},
+                                            {"program", file_hash("/proc/self/exe")},
+                                            {"unix_offset_ns", std::to_string(unix_offset_ns_)}});
+    entries_ = writer_.add_channel(
+        writer_.add_schema("halcyon.JournalEntry", "jsonschema", journal_format::entry_schema),
+        journal_format::entries_topic, "json", {});
+    cycles_schema_ =
+        writer_.add_schema(journal_format::cycles_type, "ros2msg", journal_format::cycles_schema);
+    worker_ = std::thread([this] { work(); });
+}
+
+ExecutionJournal::~ExecutionJournal() { close(); }
+
+std::uint64_t ExecutionJournal::unix_ns(std::int64_t monotonic_ns) const {
+    return static_cast<std::uint64_t>(monotonic_ns + unix_offset_ns_);
+}
+
+CycleInputs* ExecutionJournal::thread_made(const std::string& name, std::int64_t period_ns,
+                                           std::uint32_t id) {
+    const std::scoped_lock own(mutex_);
+    auto thread = std::make_unique<Thread>();
+    thread->name = name;
+    thread->inputs = std::make_unique<CycleInputs>(ring_words(period_ns));
+    thread->channel = writer_.add_channel(
+        cycles_schema_, std::string(journal_format::cycles_topic) + std::to_string(id), "cdr",
+        {{"journaled_thread", name},
+         {"number", std::to_string(id)},
+         {"journaled_period_ns", std::to_string(period_ns)}});
+    threads_.push_back(std::move(thread));
+    return threads_.back()->inputs.get();
+}
+
+void ExecutionJournal::add(ExecutionEntry entry) {
+    const std::scoped_lock own(mutex_);
+    writer_.message(entries_, entry_count_++, unix_ns(monotonic_ns()), to_json(entry));
+}
+
+void ExecutionJournal::edited(std::uint64_t epoch, std::vector<std::vector<std::string>> commands,
+                              const Model& model) {
+    ExecutionEntry entry{.kind = ExecutionEntry::Kind::edit, .epoch = epoch};
+    entry.commands = std::move(commands);
+    const auto loads = [](const std::vector<std::string>& words) {
+        const std::string& name = words.front();
+        return name == "loadrt" || name == "reload" || name == "newinst" || name == "loadusr";
+    };
+    if (std::ranges::any_of(entry.commands, loads)) {
+        for (const auto& component : model.components) {
+            if (component->path.empty()) continue;
+            const std::string hash = file_hash(component->path);
+            if (files_.insert({component->path, hash}).second) {
+                entry.files.push_back({component->name, component->path, hash});
+            }
+        }
+    }
+    add(std::move(entry));
+}
+
+void ExecutionJournal::withdrawn() { add({.kind = ExecutionEntry::Kind::withdrawn}); }
+
+void ExecutionJournal::written(std::vector<std::pair<std::string, std::uint64_t>> values) {
+    ExecutionEntry entry{.kind = ExecutionEntry::Kind::written};
+    entry.values = std::move(values);
+    add(std::move(entry));
+}
+
+void ExecutionJournal::switched(bool running) {
+    add({.kind = running ? ExecutionEntry::Kind::start : ExecutionEntry::Kind::stop});
+}
+
+void ExecutionJournal::opened(const std::string& instance, const std::string& component,
+                              const OutsideWorld& outside) {
+    ExecutionEntry entry{.kind = ExecutionEntry::Kind::opened};
+    entry.instance = instance;
+    entry.component = component;
+    entry.resources = outside.files;
+    entry.threads = outside.threads;
+    entry.streams = outside.streams;
+    add(std::move(entry));
+}
+
+void ExecutionJournal::sampled(std::vector<std::string> names) {
+    ExecutionEntry entry{.kind = ExecutionEntry::Kind::sampled};
+    entry.names = std::move(names);
+    add(std::move(entry));
+}
+
+void ExecutionJournal::attach(const std::string& name, const std::string& text) {
+    const std::scoped_lock own(mutex_);
+    writer_.attachment(name, "text/plain", text, unix_ns(monotonic_ns()));
+}
+
+void ExecutionJournal::work() {
+    std::unique_lock own(mutex_);
+    while (!ends_) {
+        wake_.wait_for(own, drain_every);
+        drain();
+    }
+}
+
+void ExecutionJournal::drain() {
+    const std::int64_t now_ns = monotonic_ns();
+    for (const auto& thread : threads_) {
+        thread->inputs->take(thread->words);
+        encode(*thread);
+        const bool is_old =
+            thread->encoder.records() > 0 && now_ns - thread->batch_begin_ns > batch_ns;
+        if (ends_ || is_old) {
+            write_batch(*thread);
+        }
+    }
+    if (now_ns - flushed_ns_ > flush_every_ns) {
+        flushed_ns_ = now_ns;
+        writer_.flush();
+    }
+}
+
+void ExecutionJournal::encode(Thread& thread) {
+    const std::vector<std::uint64_t>& words = thread.words;
+    for (std::size_t at = 0; at < words.size();) {
+        const CycleRecord record = CycleInputs::record_at(&words[at]);
+        at += CycleInputs::head_words;
+        if (thread.encoder.records() == 0) {
+            thread.batch_begin_ns = record.woke_ns;
+        }
+        thread.newest_ns = record.woke_ns;
+        thread.encoder.add(record, {words.data() + at, record.notes});
+        at += record.notes;
+        ++cycles_;
+        if (thread.encoder.bytes() >= batch_bytes) {
+            write_batch(thread);
+        }
+    }
+    thread.words.clear();
+}
+
+void ExecutionJournal::write_batch(Thread& thread) {
+    if (thread.encoder.records() == 0) return;
+    std::string payload("\0\1\0\0", 4);  // CDR, little-endian
+    mcap::put(payload, static_cast<std::uint32_t>(thread.encoder.records()));
+    mcap::put_text(payload, thread.encoder.take());
+    writer_.message(thread.channel, thread.batches++, unix_ns(thread.newest_ns), payload);
+}
+
+bool ExecutionJournal::close() {
+    if (worker_.joinable()) {
+        {
+            const std::scoped_lock own(mutex_);
+            ends_ = true;
+        }
+        wake_.notify_one();
+        worker_.join();
+        add({.kind = ExecutionEntry::Kind::end});
+    }
+    const std::scoped_lock own(mutex_);
+    if (!closed_) {
+        closed_ = true;
+        writer_.close();
+    }
+    return writer_.error() == 0;
+}
+
+std::string ExecutionJournal::problem() const {
+    const std::scoped_lock own(mutex_);
+    if (!writer_.problem().empty()) return writer_.problem();
+    if (writer_.error() != 0) return std::strerror(writer_.error());
+    return "";
+}
+
+std::vector<std::pair<std::string, std::uint64_t>> ExecutionJournal::lost() const {
+    const std::scoped_lock own(mutex_);
+    std::vector<std::pair<std::string, std::uint64_t>> found;
+    for (const auto& thread : threads_) {
+        if (const std::uint64_t lost = thread->inputs->lost(); lost > 0) {
+            found.emplace_back(thread->name, lost);
+        }
+    }
+    return found;
+}
+
+}  // namespace hal

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+namespace hal {
+
+/// Returns a hash of the content of a file: 64 bits of FNV-1a as 16 hexadecimal digits; "" when it
+/// cannot be read. It distinguishes versions of a program and protects against nothing. [setup]
+std::string file_hash(const std::string& path);
+
+}  // namespace hal

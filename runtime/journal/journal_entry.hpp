@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// What happened to a journaled machine besides its cycles, in order.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace hal {
+
+/// A file that code of the machine was loaded from.
+struct JournaledFile {
+    std::string component;
+    std::string path;
+    std::string hash;  ///< of file_hash()
+};
+
+/// One entry; which members are used depends on the kind.
+struct ExecutionEntry {
+    enum class Kind {
+        edit,       ///< a transaction took effect: epoch, commands, files
+        withdrawn,  ///< a transaction was rolled back after threads had taken it
+        written,    ///< programs wrote pins: values
+        start,      ///< functions were started
+        stop,
+        opened,  ///< an instance reads what the journal does not have: instance, component,
+                 ///< resources, threads, streams
+        sampled,  ///< the values of these names are recorded from here on: names
+        end,      ///< the machine ended in order
+    };
+    Kind kind = Kind::end;
+    std::uint64_t epoch = 0;
+    std::vector<std::vector<std::string>> commands = {};
+    std::vector<JournaledFile> files = {};
+    std::vector<std::pair<std::string, std::uint64_t>> values = {};
+    std::string instance = {};
+    std::string component = {};
+    std::vector<std::string> resources = {};
+    std::uint64_t threads = 0;
+    std::uint64_t streams = 0;
+    std::vector<std::string> names = {};
+};
+
+/// Returns an entry as a line of JSON. [setup]
+std::string to_json(const ExecutionEntry& entry);
+/// Returns the entry of such a line; nothing when it is damaged or of a later version. [setup]
+std::optional<ExecutionEntry> execution_entry(std::string_view json);
+
+}  // namespace hal

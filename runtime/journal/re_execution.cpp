@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: MIT
+#include "journal/re_execution.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <fmt/core.h>
+#include <string_view>
+#include <utility>
+
+#include "machine/processes/programs.hpp"
+#include "machine/session.hpp"
+
+namespace hal {
+namespace {
+
+template <class Number>
+Number number_of(const std::string& text) {
+    Number value{};
+    std::from_chars(text.data(), text.data() + text.size(), value);
+    return value;
+}
+
+Command command_of(const std::vector<std::string>& words) {
+    Command command;
+    command.name.text = words.front();
+    for (std::size_t i = 1; i < words.size(); ++i) {
+        command.args.emplace_back().text = words[i];
+    }
+    return command;
+}
+
+std::string text_of(const std::vector<std::vector<std::string>>& commands) {
+    if (commands.empty()) return "an edit";
+    std::string text;
+    for (const std::string& word : commands.front()) {
+        text += (text.empty() ? "" : " ") + word;
+    }
+    constexpr std::size_t max_length = 80;
+    if (text.size() > max_length) {
+        text = text.substr(0, max_length) + "...";
+    }
+    text = "'" + text + "'";
+    if (commands.size() > 1) {
+        text += fmt::format(" and {} more", commands.size() - 1);
+    }
+    return text;
+}
+
+}  // namespace
+
+ReExecution::ReExecution(JournalFile& file) : file_(file) {
+    for (auto& [number, thread] : file.threads()) {
+        Cursor& cursor = cursors_[number];
+        cursor.thread = &thread;
+        load(cursor);
+        if (const CycleRecord* const first = thread.record()) {
+            begin_ns_ = std::min(begin_ns_.value_or(first->woke_ns), first->woke_ns);
+        }
+    }
+    now_ns_ = begin_ns_.value_or(0);
+}
+
+ReExecution::~ReExecution() = default;
+
+void ReExecution::attach(Session& session, Apply apply,
+                         std::function<void(const std::vector<std::string>&)> sampled) {
+    session_ = &session;
+    apply_ = std::move(apply);
+    sampled_ = std::move(sampled);
+}
+
+bool ReExecution::fail(State state, std::string reason) {
+    if (state_ == State::goes_on) {
+        state_ = state;
+        reason_ = std::move(reason);
+    }
+    return false;
+}
+
+// --- the schedule ---
+
+CycleInputs& ReExecution::inputs_of(std::uint32_t id) { return *cursors_[id].inputs; }
+
+void ReExecution::begin(Core& core) { cursors_[core.id()].core = &core; }
+
+void ReExecution::end(Core& core) {
+    Cursor& cursor = cursors_[core.id()];
+    const auto remain = [&cursor] { return cursor.thread && cursor.thread->record(); };
+    while (remain() && step()) {
+    }
+    cursor.core = nullptr;
+    cursor.ended = true;
+}
+
+/// Executed inside an edit that waits for its threads.
+bool ReExecution::step() {
+    if (state_ != State::goes_on || finished_) return false;
+    bool needs_edit = false;
+    Cursor* const cursor = next(needs_edit, true);
+    if (!cursor) return false;
+    execute(*cursor);
+    return state_ == State::goes_on;
+}
+
+/// Returns the thread whose cycle began first, of those that can execute theirs; nullptr: none can,
+/// or the first one needs an edit.
+ReExecution::Cursor* ReExecution::next(bool& needs_edit, bool in_edit) {
+    std::vector<Cursor*> waiting;
+    for (auto& [number, cursor] : cursors_) {
+        if (cursor.thread && cursor.thread->record() && !cursor.ended) {
+            waiting.push_back(&cursor);
+        }
+    }
+    std::ranges::sort(waiting, {},
+                      [](const Cursor* cursor) { return cursor->thread->record()->woke_ns; });
+    for (Cursor* const cursor : waiting) {
+        const Core::Missing missing = cursor->core ? cursor->core->missing() : Core::Missing::edit;
+        if (missing == Core::Missing::nothing) return cursor;
+        if (missing != Core::Missing::edit) continue;
+        needs_edit = true;
+        if (!in_edit) return nullptr;
+    }
+    return nullptr;
+}
+
+void ReExecution::load(Cursor& cursor) {
+    if (const CycleRecord* const record = cursor.thread->record()) {
+        cursor.inputs->load(*record, cursor.thread->notes());
+    } else if (!cursor.thread->gap().empty()) {
+        fail(State::ends, cursor.thread->gap());
+    }
+}
+
+void ReExecution::execute(Cursor& cursor) {
+    const CycleRecord record = cursor.inputs->record();
+    now_ns_ = record.woke_ns;
+    newest_ = {cursor.thread->name, record.number, record.woke_ns - begin_ns_.value_or(0)};
+    cursor.core->replay();
+    ++cycles_;
+    match_ = cursor.inputs->match();
+    if (match_ != CycleInputs::Match::same) {
+        fail(State::differs, "");
+    }
+    cursor.thread->next();
+    load(cursor);
+}
+
+ReExecution::State ReExecution::advance() {
+    while (state_ == State::goes_on) {
+        bool needs_edit = false;
+        if (Cursor* const cursor = next(needs_edit, false)) {
+            execute(*cursor);
+            return state_;
+        }
+        if (!needs_edit) return state_ = end_of_journal();
+        if (!make_next_edit()) break;
+    }
+    return state_;
+}
+
+ReExecution::State ReExecution::end_of_journal() {
+    for (const auto& [number, cursor] : cursors_) {
+        if (!cursor.thread || !cursor.thread->record() || cursor.ended) continue;
+        reason_ = fmt::format(
+            "thread '{}': its cycle {} reads a cycle of another thread that is "
+            "not in the journal",
+            cursor.thread->name, cursor.thread->record()->number);
+        return State::ends;
+    }
+    return State::complete;
+}
+
+// --- the edits ---
+
+bool ReExecution::make_next_edit() {
+    if (entry_ == file_.entries().size()) {
+        return fail(State::ends, "the next cycle needs an edit that is not in the journal");
+    }
+    const std::vector<ExecutionEntry>& entries = file_.entries();
+    if (!make(entries[entry_++])) return false;
+    const auto waits_for_nothing = [](const ExecutionEntry& entry) {
+        return entry.kind != ExecutionEntry::Kind::edit &&
+               entry.kind != ExecutionEntry::Kind::written &&
+               entry.kind != ExecutionEntry::Kind::withdrawn;
+    };
+    while (entry_ < entries.size() && waits_for_nothing(entries[entry_])) {
+        make(entries[entry_++]);
+    }
+    return true;
+}
+
+bool ReExecution::make(const ExecutionEntry& entry) {
+    switch (entry.kind) {
+    case ExecutionEntry::Kind::edit: return make_edit(entry);
+    case ExecutionEntry::Kind::written: return write(entry);
+    case ExecutionEntry::Kind::withdrawn:
+        return fail(State::ends,
+                    "an edit was rolled back after threads had taken it: its cycles "
+                    "cannot be executed again");
+    case ExecutionEntry::Kind::sampled: sampled_(entry.names); return true;
+    case ExecutionEntry::Kind::start:
+    case ExecutionEntry::Kind::stop:
+    case ExecutionEntry::Kind::opened:
+    case ExecutionEntry::Kind::end: return true;  // the cycles have it
+    }
+    return true;
+}
+
+bool ReExecution::make_edit(const ExecutionEntry& entry) {
+    ++edits_;
+    session_->threads().continue_after(entry.epoch);
+    Diagnostics diagnostics;
+    bool done = false;
+    {
+        Transaction transaction = session_->begin();
+        for (const auto& words : entry.commands) {
+            if (words.empty() || !make_command(transaction, words, diagnostics)) {
+                return fail(State::fails,
+                            "invalid entry of the journal: " + text_of(entry.commands));
+            }
+        }
+        done = transaction.commit(diagnostics);
+    }
+    if (done || state_ != State::goes_on) return done;
+    std::string why = "it is rejected";
+    for (const Diagnostic& one : diagnostics.all()) {
+        if (one.severity == Severity::error) {
+            why = one.message;
+            break;
+        }
+    }
+    return fail(State::fails,
+                fmt::format("{} cannot be executed again: {}", text_of(entry.commands), why));
+}
+
+bool ReExecution::make_command(Transaction& transaction, const std::vector<std::string>& words,
+                               Diagnostics& diagnostics) {
+    if (words.front().starts_with(':')) return make_of_program(transaction, words);
+    apply_(transaction, command_of(words), diagnostics);
+    return true;
+}
+
+/// The pins of programs, which are not started again.
+bool ReExecution::make_of_program(Transaction& transaction, const std::vector<std::string>& words) {
+    ProgramModel& model = session_->programs().model();
+    if (words[0] == program_words::add && words.size() == 3) {
+        model.add_component(transaction, words[1], 1, command_of({"loadusr", words[2]}));
+        return true;
+    }
+    if (words[0] == program_words::remove && words.size() == 2) {
+        model.remove_component(transaction, words[1]);
+        return true;
+    }
+    if (words[0] == program_words::add_pin && words.size() == 6) {
+        ProgramPin pin;
+        pin.name = words[2];
+        pin.type = static_cast<hal_type>(number_of<int>(words[3]));
+        pin.dir = static_cast<hal_dir>(number_of<int>(words[4]));
+        pin.initial.raw = number_of<std::uint64_t>(words[5]);
+        std::string problem;
+        return model.add_pin(transaction, words[1], pin, problem) != nullptr;
+    }
+    if (words[0] != program_words::remove_pins || words.size() < 2) return false;
+    std::vector<Pin*> pins;
+    for (std::size_t i = 2; i < words.size(); ++i) {
+        if (Pin* const pin = session_->model().find_pin(words[i])) {
+            pins.push_back(pin);
+        }
+    }
+    model.remove_pins(transaction, words[1], pins);
+    return true;
+}
+
+bool ReExecution::write(const ExecutionEntry& entry) {
+    std::vector<std::pair<Pin*, hal_value>> values;
+    for (const auto& [name, raw] : entry.values) {
+        if (Pin* const pin = session_->model().find_pin(name)) {
+            values.emplace_back(pin, hal_value{.raw = raw});
+        }
+    }
+    session_->values().write(values);
+    return true;
+}
+
+}  // namespace hal

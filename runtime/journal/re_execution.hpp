@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: MIT
+// Executes a journal again: each cycle with its recorded inputs, in the order in which the cycles
+// began; an edit of the session when the first cycle needs it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "execute/core.hpp"
+#include "execute/cycle_schedule.hpp"
+#include "journal/journal_file.hpp"
+#include "netlist/netlist.hpp"
+#include "text/diagnostic.hpp"
+
+namespace hal {
+
+class Session;
+class Transaction;
+
+/// A cycle of a thread of the journaled machine.
+struct JournaledCycle {
+    std::string thread;
+    std::uint64_t number = 0;
+    std::int64_t time_ns = 0;  ///< when it woke, since the first record of the journal
+};
+
+/// [setup] throughout. All cycles run on the calling thread, which holds the session's lock.
+class ReExecution final : public CycleSchedule {
+public:
+    /// Elaborates a command of the journal in a transaction.
+    using Apply = std::function<void(Transaction&, const Command&, Diagnostics&)>;
+
+    /// `file` outlives it.
+    explicit ReExecution(JournalFile& file);
+    ~ReExecution() override;
+
+    /// The session has this as its schedule. `sampled` is called where values are recorded from.
+    void attach(Session& session, Apply apply,
+                std::function<void(const std::vector<std::string>&)> sampled);
+
+    enum class State {
+        goes_on,
+        complete,  ///< all cycles of the journal have been executed
+        ends,  ///< what follows is missing in the journal: reason()
+        fails,  ///< an edit cannot be made again: reason()
+        differs,  ///< the last cycle has other values than the journaled one
+    };
+    /// Executes the next cycle and the edits before it.
+    State advance();
+    /// Nothing more is executed, although the journal may have more: the machine may end.
+    void finish() { finished_ = true; }
+    State state() const { return state_; }
+    /// Returns why the execution cannot go on, as sentences.
+    const std::string& reason() const { return reason_; }
+    const JournaledCycle& newest() const { return newest_; }
+    std::uint64_t cycles() const { return cycles_; }
+    std::uint64_t edits() const { return edits_; }
+    /// Returns what `differs` is about: other values, or another number of inputs.
+    CycleInputs::Match match() const { return match_; }
+
+    // CycleSchedule
+    CycleInputs& inputs_of(std::uint32_t id) override;
+    void begin(Core& core) override;
+    void end(Core& core) override;
+    bool step() override;
+    std::int64_t now_ns() const override { return now_ns_; }
+
+private:
+    struct Cursor {
+        JournaledThread* thread = nullptr;
+        std::unique_ptr<CycleInputs> inputs = std::make_unique<CycleInputs>();
+        Core* core = nullptr;  // nullptr: the thread does not exist yet, or no more
+        bool ended = false;
+    };
+    Cursor* next(bool& needs_edit, bool in_edit);
+    void execute(Cursor& cursor);
+    void load(Cursor& cursor);
+    State end_of_journal();
+    bool make_next_edit();
+    bool make(const ExecutionEntry& entry);
+    bool make_edit(const ExecutionEntry& entry);
+    bool make_command(Transaction& transaction, const std::vector<std::string>& words,
+                      Diagnostics& diagnostics);
+    bool make_of_program(Transaction& transaction, const std::vector<std::string>& words);
+    bool write(const ExecutionEntry& entry);
+    bool fail(State state, std::string reason);
+
+    JournalFile& file_;
+    Session* session_ = nullptr;
+    Apply apply_;
+    std::function<void(const std::vector<std::string>&)> sampled_;
+    std::map<std::uint32_t, Cursor> cursors_;
+    std::size_t entry_ = 0;  // the next one
+    State state_ = State::goes_on;
+    bool finished_ = false;
+    std::string reason_;
+    JournaledCycle newest_;
+    CycleInputs::Match match_ = CycleInputs::Match::same;
+    std::uint64_t cycles_ = 0;
+    std::uint64_t edits_ = 0;
+    std::optional<std::int64_t> begin_ns_;
+    std::int64_t now_ns_ = 0;
+};
+
+}  // namespace hal

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: MIT
+// The records of cycles: their ring, their bytes, and the entries of a journal.
+#include <cstdint>
+#include <cstring>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "execute/cycle_inputs.hpp"
+#include "journal/cycle_codec.hpp"
+#include "journal/journal_entry.hpp"
+
+namespace hal::test {
+namespace {
+
+using Words = std::vector<std::uint64_t>;
+
+void record(CycleInputs& inputs, std::uint64_t number, std::uint64_t notes) {
+    inputs.begin(CycleRecord::cycle, number, 1000, 1000, 1010, 0);
+    inputs.took(0, 7);
+    inputs.reads(0);
+    for (std::uint64_t i = 0; i < notes; ++i) {
+        inputs.note(100 * number + i);
+    }
+    inputs.end(9, 5);
+}
+
+TEST(CycleInputs, Has_the_words_of_each_cycle_in_its_ring) {
+    CycleInputs inputs(1024);
+    record(inputs, 1, 2);
+    record(inputs, 2, 1);
+    Words words;
+    inputs.take(words);
+    ASSERT_EQ(words.size(), 2 * CycleInputs::head_words + 3);
+    const CycleRecord first = CycleInputs::record_at(words.data());
+    EXPECT_EQ(first.number, 1u);
+    EXPECT_EQ(first.writes_before, 7u);
+    EXPECT_EQ(first.writes_after, 9u);
+    EXPECT_EQ(first.checksum, 5u);
+    EXPECT_EQ(first.notes, 2u);
+    EXPECT_EQ(words[CycleInputs::head_words + 1], 101u);
+    const CycleRecord second = CycleInputs::record_at(&words[CycleInputs::head_words + 2]);
+    EXPECT_EQ(second.number, 2u);
+    EXPECT_EQ(words.back(), 200u);
+}
+
+TEST(CycleInputs, Drops_a_record_that_does_not_fit_and_the_next_one_has_the_number) {
+    CycleInputs inputs(64);
+    Words words;
+    std::uint64_t number = 0;
+    for (; inputs.lost() == 0; ++number) {
+        record(inputs, number, 0);
+    }
+    record(inputs, number, 0);
+    EXPECT_EQ(inputs.lost(), 2u);
+    inputs.take(words);
+    EXPECT_EQ(words.size() % CycleInputs::head_words, 0u);
+    words.clear();
+    for (std::uint64_t more = 0; more < 20; ++more) {  // around the end of the ring
+        record(inputs, 1000 + more, 1);
+        words.clear();
+        inputs.take(words);
+        ASSERT_EQ(words.size(), CycleInputs::head_words + 1);
+        EXPECT_EQ(CycleInputs::record_at(words.data()).lost, 2u);
+        EXPECT_EQ(words.back(), 100 * (1000 + more));
+    }
+}
+
+TEST(CycleInputs, Drops_a_cycle_that_reads_too_much) {
+    CycleInputs inputs(std::size_t{1} << 16);
+    record(inputs, 1, CycleInputs::max_notes + 1);
+    EXPECT_EQ(inputs.lost(), 1u);
+    record(inputs, 2, CycleInputs::max_notes);
+    EXPECT_EQ(inputs.lost(), 1u);
+}
+
+TEST(CycleInputs, Gives_back_what_was_read_and_compares_the_end) {
+    CycleInputs inputs;
+    const Words notes{11, 12};
+    CycleRecord cycle;
+    cycle.checksum = 5;
+    cycle.notes = 2;
+    const auto execute = [&](int reads, std::uint64_t checksum) {
+        inputs.load(cycle, notes);
+        inputs.begin(CycleRecord::cycle, 0, 0, 0, 0, 0);
+        std::uint64_t sum = 0;
+        for (int i = 0; i < reads; ++i) {
+            sum += inputs.note(1);
+        }
+        inputs.end(0, checksum);
+        return sum;
+    };
+    EXPECT_EQ(execute(2, 5), 23u);
+    EXPECT_EQ(inputs.match(), CycleInputs::Match::same);
+    EXPECT_EQ(execute(2, 6), 23u);
+    EXPECT_EQ(inputs.match(), CycleInputs::Match::other_values);
+    EXPECT_EQ(execute(1, 5), 11u);
+    EXPECT_EQ(inputs.match(), CycleInputs::Match::other_reads);
+    EXPECT_EQ(execute(3, 5), 24u);
+    EXPECT_EQ(inputs.match(), CycleInputs::Match::other_reads);
+    EXPECT_THROW(inputs.load(cycle, {}), std::invalid_argument);
+}
+
+struct Sample {
+    CycleRecord record;
+    Words notes;
+};
+
+std::vector<Sample> random_samples(std::size_t count) {
+    std::mt19937_64 dice(34);
+    std::vector<Sample> all;
+    for (std::size_t i = 0; i < count; ++i) {
+        Sample& one = all.emplace_back();
+        one.record.kind = dice() % 2;
+        one.record.lost = i / 3;
+        one.record.number = i;
+        one.record.grid_ns = static_cast<std::int64_t>(dice());
+        one.record.due_ns = static_cast<std::int64_t>(1'000'000 * i);
+        one.record.woke_ns = one.record.due_ns + static_cast<std::int64_t>(dice() % 1000);
+        one.record.missed = dice() % 3;
+        one.record.epoch = dice() % 2;
+        one.record.writes_before = dice() % 100;
+        one.record.writes_after = one.record.writes_before + dice() % 5;
+        one.record.observation = dice() % 2;
+        one.record.checksum = dice();
+        one.notes.resize(dice() % 6);
+        for (std::uint64_t& note : one.notes) {
+            note = dice() >> (dice() % 64);
+        }
+        one.record.notes = one.notes.size();
+        one.record.imports = dice() % (one.notes.size() + 1);
+    }
+    return all;
+}
+
+std::string encoded(const std::vector<Sample>& samples) {
+    CycleEncoder encoder;
+    for (const Sample& one : samples) {
+        encoder.add(one.record, one.notes);
+    }
+    EXPECT_EQ(encoder.records(), samples.size());
+    return encoder.take();
+}
+
+TEST(CycleCodec, Decodes_what_it_has_encoded) {
+    const std::vector<Sample> samples = random_samples(500);
+    CycleDecoder decoder(encoded(samples));
+    CycleRecord record;
+    Words notes;
+    for (const Sample& one : samples) {
+        ASSERT_TRUE(decoder.next(record, notes));
+        EXPECT_EQ(std::memcmp(&record, &one.record, sizeof record), 0) << one.record.number;
+        EXPECT_EQ(notes, one.notes);
+    }
+    EXPECT_FALSE(decoder.next(record, notes));
+    EXPECT_FALSE(decoder.damaged());
+}
+
+TEST(CycleCodec, Ends_where_a_batch_is_cut_off_or_damaged) {
+    const std::string bytes = encoded(random_samples(20));
+    std::mt19937 dice(1);
+    for (std::size_t size = 0; size < bytes.size(); ++size) {
+        std::string changed = bytes;
+        changed[size] = static_cast<char>(dice());
+        for (const std::string& one : {bytes.substr(0, size), changed}) {
+            CycleDecoder decoder(one);
+            CycleRecord record;
+            Words notes;
+            std::size_t count = 0;
+            while (decoder.next(record, notes)) {
+                ASSERT_LE(notes.size(), CycleInputs::max_notes);
+                ASSERT_LT(++count, bytes.size());
+            }
+        }
+    }
+}
+
+TEST(ExecutionEntry, Is_the_same_after_a_way_through_JSON) {
+    ExecutionEntry edit{.kind = ExecutionEntry::Kind::edit, .epoch = 3};
+    edit.commands = {{"net", "a b", "\"x\""}, {"setp", "p", "1"}};
+    edit.files = {{"pid", "/lib/pid.so", "0123"}};
+    const auto again = execution_entry(to_json(edit));
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->epoch, 3u);
+    EXPECT_EQ(again->commands, edit.commands);
+    EXPECT_EQ(again->files.at(0).hash, "0123");
+    ExecutionEntry written{.kind = ExecutionEntry::Kind::written};
+    written.values = {{"panel.x", 0xffff'ffff'ffff'ffff}};
+    EXPECT_EQ(execution_entry(to_json(written))->values, written.values);
+}
+
+TEST(ExecutionEntry, Is_nothing_when_it_is_damaged) {
+    for (const char* const text :
+         {"", "{", "[]", R"({"kind":"other"})", R"({"kind":"edit"})", R"({"kind":1})",
+          R"({"kind":"edit","epoch":-1,"commands":[1],"files":[]})"}) {
+        EXPECT_FALSE(execution_entry(text)) << text;
+    }
+}
+
+}  // namespace
+}  // namespace hal::test
