@@ -47,6 +47,7 @@
 #include "run/fmt.hpp"
 #include "run/replay.hpp"
 #include "run/run.hpp"
+#include "run/run_journal.hpp"
 #include "run/sim.hpp"
 #include "run/sim_record.hpp"
 #include "scope/meter.hpp"
@@ -75,9 +76,23 @@ constexpr Subcommand sim_command() {
     return row;
 }
 
+constexpr Subcommand run_command() {
+    Subcommand row = command<RunOptions, IN_CORE(run_run)>(
+        "run", "FILE… [-- ARG…]", "load netlists and run them in real-time threads");
+#ifdef HALCYON_TOOLS_PROGRAM
+    row.run = [](const Options& options) {
+        return run_journaled(static_cast<const RunOptions&>(options));
+    };
+#else
+    row.needs_tools = [](const Options& options) {
+        return !static_cast<const RunOptions&>(options).journal.empty();
+    };
+#endif
+    return row;
+}
+
 constexpr Subcommand table[] = {
-    command<RunOptions, IN_CORE(run_run)>("run", "FILE… [-- ARG…]",
-                                          "load netlists and run them in real-time threads"),
+    run_command(),
     command<ExamplesOptions, IN_CORE(run_examples)>("examples", "[NAME [OPTION of hal run…]]",
                                                     "list the machines to start from, or run one",
                                                     true),
@@ -143,9 +158,9 @@ constexpr Subcommand table[] = {
     command<FlashOptions, OF_CANOPEN(run_can_flash)>(
         "can flash", "ADDRESS NODE IMAGE [--program N]",
         "download a program to a node: stop, erase, download, start"),
-    command<NmtOptions, OF_CANOPEN(run_can_nmt)>("can nmt",
-                                             "ADDRESS start|stop|preop|reset|reset-comm NODE|all",
-                                             "send an NMT command to CANopen nodes"),
+    command<NmtOptions, OF_CANOPEN(run_can_nmt)>(
+        "can nmt", "ADDRESS start|stop|preop|reset|reset-comm NODE|all",
+        "send an NMT command to CANopen nodes"),
     command<ScanOptions, OF_CANOPEN(run_can_scan)>(
         "can scan", "ADDRESS [--for TIME] [--json]",
         "scan a bus for CANopen nodes: state, device type, identity"),
@@ -159,23 +174,23 @@ constexpr Subcommand table[] = {
         "can read-all", "ADDRESS NODE --eds FILE [-o FILE.csv] [--json]",
         "read all objects of a node that its EDS lists, including read-only objects"),
     command<DcfReadOptions, OF_CANOPEN(run_can_dcf_read)>("can dcf read",
-                                                      "ADDRESS NODE --eds FILE [-o FILE]",
-                                                      "read the settings of a node into a DCF"),
+                                                          "ADDRESS NODE --eds FILE [-o FILE]",
+                                                          "read the settings of a node into a DCF"),
     command<DcfWriteOptions, OF_CANOPEN(run_can_dcf_write)>(
         "can dcf write", "ADDRESS NODE FILE [--check]",
         "write the settings of a DCF to a node: only differences, verified"),
-    command<PdoShowOptions, OF_CANOPEN(run_can_pdo_show)>("can pdo show",
-                                                      "ADDRESS NODE [--eds FILE] [--json]",
-                                                      "show the PDOs of a node and their mapping"),
+    command<PdoShowOptions, OF_CANOPEN(run_can_pdo_show)>(
+        "can pdo show", "ADDRESS NODE [--eds FILE] [--json]",
+        "show the PDOs of a node and their mapping"),
     command<PdoMapOptions, OF_CANOPEN(run_can_pdo_map)>(
         "can pdo map",
         "ADDRESS NODE PDO [OBJECT[/BITS]…] [--transmission N] [--id ID] [--inhibit TIME] [--event "
         "TIME]",
         "configure a PDO in the order of CiA 301"),
     command<PdoSwitchOptions, OF_CANOPEN(run_can_pdo_enable)>("can pdo enable", "ADDRESS NODE PDO",
-                                                          "enable a PDO"),
-    command<PdoSwitchOptions, OF_CANOPEN(run_can_pdo_disable)>("can pdo disable", "ADDRESS NODE PDO",
-                                                           "disable a PDO"),
+                                                              "enable a PDO"),
+    command<PdoSwitchOptions, OF_CANOPEN(run_can_pdo_disable)>("can pdo disable",
+                                                               "ADDRESS NODE PDO", "disable a PDO"),
     command<PdoWatchOptions, OF_CANOPEN(run_can_pdo_watch)>(
         "can pdo watch", "ADDRESS NODE [--eds FILE] [--for TIME] [--count N] [--json]",
         "print the values in the PDOs of a node as they are sent"),
@@ -252,9 +267,9 @@ constexpr Subcommand table[] = {
     command<EthercatPositionOptions, OF_ETHERCAT(run_ethercat_xml)>(
         "ethercat xml", "ADDRESS|--emulate LINE [-p N] [--json] > FILE",
         "print a device description (ESI) of a slave from its EEPROM"),
-    command<EthercatOptions, OF_ETHERCAT(run_ethercat_graph)>("ethercat graph",
-                                                         "ADDRESS|--emulate LINE [--json] > FILE",
-                                                         "draw the topology of a bus as SVG"),
+    command<EthercatOptions, OF_ETHERCAT(run_ethercat_graph)>(
+        "ethercat graph", "ADDRESS|--emulate LINE [--json] > FILE",
+        "draw the topology of a bus as SVG"),
     command<EthercatOptions, OF_ETHERCAT(run_ethercat_dc)>(
         "ethercat dc", "ADDRESS|--emulate LINE [--json]",
         "print the deviations of the clocks of the slaves"),
@@ -310,8 +325,8 @@ constexpr Subcommand table[] = {
     command<EthercatLineOptions, OF_ETHERCAT(run_node_ethercat)>(
         "node ethercat", "FILE --link ADDRESS [--backup ADDRESS] [--for TIME]",
         "emulate a line of EtherCAT slaves on a network interface"),
-    command<Options, OF_CANOPEN(run_node_faults)>("node faults", "",
-                                              "list the faults that simulated devices can inject"),
+    command<Options, OF_CANOPEN(run_node_faults)>(
+        "node faults", "", "list the faults that simulated devices can inject"),
     command<TopOptions, IN_TOOLS(run_top)>(
         "top", "", "show all instances on this machine and the network, their threads and faults"),
     command<WatchOptions, IN_TOOLS(run_watch)>(

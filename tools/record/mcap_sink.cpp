@@ -57,21 +57,16 @@ std::string message_name(const std::string& thread) {
 
 class McapSink final : public Sink {
 public:
-    McapSink(const std::string& path, const std::vector<ProbeColumn>& columns, const Origin& origin)
+    /// `own`: nullptr when another one completes the file of `writer`.
+    McapSink(std::unique_ptr<mcap::Writer> own, mcap::Writer& writer,
+             const std::vector<ProbeColumn>& columns, const Origin& origin)
         : columns_(columns),
           offset_ns_(origin.unix_offset_ns),
           ros_(origin.profile == "ros2"),
-          writer_(path, origin.profile) {
-        std::map<std::string, std::string> about{
-            {"instance", origin.instance},
-            {"version", origin.version},
-            {"unix_offset_ns", std::to_string(origin.unix_offset_ns)}};
-        if (!origin.cause.empty()) {
-            about["cause"] = origin.cause;
-        }
-        writer_.metadata("halcyon", about);
-        if (!origin.netlist.empty()) {
-            writer_.attachment("netlist.hal", "text/plain", origin.netlist, 0);
+          own_(std::move(own)),
+          writer_(writer) {
+        if (own_) {
+            describe(origin);
         }
         const std::uint16_t schema =
             ros_ ? writer_.add_schema(log_message, "ros2msg", log_schema)
@@ -139,7 +134,7 @@ public:
     }
 
     bool flush() override { return writer_.flush(); }
-    bool close() override { return writer_.close(); }
+    bool close() override { return own_ ? writer_.close() : writer_.flush(); }
     std::uint64_t bytes() const override { return writer_.bytes(); }
     int error() const override { return writer_.error(); }
     std::string problem() const override {
@@ -159,6 +154,21 @@ public:
     }
 
 private:
+    /// Writes where the recording comes from.
+    void describe(const Origin& origin) {
+        std::map<std::string, std::string> about{
+            {"instance", origin.instance},
+            {"version", origin.version},
+            {"unix_offset_ns", std::to_string(origin.unix_offset_ns)}};
+        if (!origin.cause.empty()) {
+            about["cause"] = origin.cause;
+        }
+        writer_.metadata("halcyon", about);
+        if (!origin.netlist.empty()) {
+            writer_.attachment("netlist.hal", "text/plain", origin.netlist, 0);
+        }
+    }
+
     /// Returns a topic of its own for a thread: ROS allows no dash in it, and two threads may
     /// differ in that only.
     std::string topic_of(const std::string& thread, const std::string& suffix) {
@@ -191,7 +201,8 @@ private:
     const std::int64_t offset_ns_;
     const bool ros_;
     std::set<std::string> topics_{"/hal/events"}, types_;
-    mcap::Writer writer_;
+    const std::unique_ptr<mcap::Writer> own_;
+    mcap::Writer& writer_;
     std::vector<Group> groups_;
     std::map<std::string, int> layouts_;
     std::uint16_t events_ = 0;
@@ -206,7 +217,14 @@ private:
 std::unique_ptr<Sink> make_mcap_sink(const std::string& path,
                                      const std::vector<ProbeColumn>& columns,
                                      const Origin& origin) {
-    return std::make_unique<McapSink>(path, columns, origin);
+    auto writer = std::make_unique<mcap::Writer>(path, origin.profile);
+    mcap::Writer& of_file = *writer;
+    return std::make_unique<McapSink>(std::move(writer), of_file, columns, origin);
+}
+
+std::unique_ptr<Sink> make_mcap_sink(mcap::Writer& writer, const std::vector<ProbeColumn>& columns,
+                                     const Origin& origin) {
+    return std::make_unique<McapSink>(nullptr, writer, columns, origin);
 }
 
 }  // namespace hal::tools

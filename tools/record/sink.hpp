@@ -9,6 +9,10 @@
 
 #include "control/probe_client.hpp"
 
+namespace hal::mcap {
+class Writer;
+}
+
 namespace hal::tools {
 
 /// Where a recording comes from.
@@ -52,6 +56,11 @@ std::unique_ptr<Sink> make_mcap_sink(const std::string& path,
                                      const std::vector<ProbeColumn>& columns, const Origin& origin);
 std::unique_ptr<Sink> make_csv_sink(const std::string& path,
                                     const std::vector<ProbeColumn>& columns);
+
+/// The same into a file that another one writes, too: close() writes only what is waiting. The
+/// writer outlives the sink.
+std::unique_ptr<Sink> make_mcap_sink(mcap::Writer& writer, const std::vector<ProbeColumn>& columns,
+                                     const Origin& origin);
 
 /// Returns why a file cannot have that profile; "" when it can.
 std::string unsupported_profile(const std::string& profile, const std::string& path);

@@ -21,8 +21,10 @@ namespace hal::tools {
 namespace {
 
 SessionOptions session_options(const NetlistOptions& of, const std::string& name,
-                               bool virtual_clock, ExitObserver* observer) {
+                               bool virtual_clock, ExitObserver* observer, Execution execution) {
     SessionOptions options;
+    options.sink = execution.sink;
+    options.schedule = execution.schedule;
     options.observer = observer;
     options.name = name;
     options.virtual_clock = virtual_clock;
@@ -117,16 +119,14 @@ std::string own_name(const NetlistOptions& options) {
 }
 
 HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& name,
-                             bool virtual_clock)
+                             bool virtual_clock, Execution execution)
     : observer_(start_observer(name, virtual_clock)),
-      session(session_options(options, name, virtual_clock, observer_.get())),
+      session(session_options(options, name, virtual_clock, observer_.get(), execution)),
       shell(session, shell_options(options)),
       options_(options),
-      descriptor_watch_([this] { halt_ticket_ = session.threads().halt(); },
-                        [this] {
-                            return session.threads().halted(halt_ticket_) !=
-                                   ThreadControl::Halt::pending;
-                        }) {
+      descriptor_watch_([this] { halt_ticket_ = session.threads().halt(); }, [this] {
+          return session.threads().halted(halt_ticket_) != ThreadControl::Halt::pending;
+      }) {
     export_variables(options, name);
     // a machine that is stopped from the terminal would leave its outputs as they are
     if (!virtual_clock) {

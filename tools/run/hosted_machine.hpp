@@ -20,11 +20,18 @@
 
 namespace hal::tools {
 
+/// How a journal takes part in an execution; what these point to outlives the machine.
+struct Execution {
+    ExecutionSink* sink = nullptr;  ///< gets the journal
+    CycleSchedule* schedule = nullptr;  ///< has the cycles to be executed again
+};
+
 class HostedMachine {
 public:
     /// Handles the signals that end a run. Programs started from its netlists find it through
     /// $HALCYON_INSTANCE.
-    HostedMachine(const NetlistOptions& options, const std::string& name, bool virtual_clock);
+    HostedMachine(const NetlistOptions& options, const std::string& name, bool virtual_clock,
+                  Execution execution = {});
     ~HostedMachine();  ///< outputs safe, processes ended, instances destroyed
     HostedMachine(const HostedMachine&) = delete;
 

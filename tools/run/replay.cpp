@@ -18,6 +18,7 @@
 #include "cli/output.hpp"
 #include "recording/mcap/playback_pin.hpp"
 #include "recording/mcap/recording.hpp"
+#include "run/exact_replay.hpp"
 #include "run/hosted_machine.hpp"
 #include "run/sim_summary.hpp"
 #include "text/quoting.hpp"
@@ -481,6 +482,11 @@ private:
 }  // namespace
 
 int run_replay(const ReplayOptions& options) {
+    if (options.exact) return run_exact_replay(options);
+    if (!options.until.empty() || !options.break_condition.empty() || !options.show.empty() ||
+        options.anyway) {
+        return fail(options, "--until, --break, --show and --anyway need --exact");
+    }
     if (options.words.size() < 2) return fail(options, "missing netlist: hal replay FILE NETLIST");
     const std::string file = std::filesystem::absolute(options.words.front()).string();
     mcap::Recording recording;

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
-// `hal replay`: a recording drives the inputs of a netlist on the virtual clock, and the netlist's own values are compared with it.
+// `hal replay`: a recording drives the inputs of a netlist on the virtual clock, and the netlist's
+// own values are compared with it; with --exact the cycles of a journal are executed again.
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "run/netlist_options.hpp"
 
@@ -14,10 +16,16 @@ struct ReplayOptions : NetlistOptions {
     double tolerance = -1;
     std::string names = "*", thread;
     bool quiet = false;
+    bool exact = false;
+    bool anyway = false;
+    std::string until;              ///< a time or a cycle number
+    std::string break_condition;    ///< NAME > VALUE
+    std::vector<std::string> show;  ///< names, separated by commas
 
     void declare(OptionSet& set) override {
         set.words("FILE NETLIST",
-                  "a recording (.mcap or .csv), then netlists that have values of the same names");
+                  "a recording (.mcap or .csv), then netlists that have values of the same names; "
+                  "with --exact a journal only");
         set.duration("--for", for_ns, "replay this much (default: all)", 1);
         set.value("--tolerance", tolerance, "X",
                   "end with status 1 when a value differs from the recording by more than X")
@@ -28,6 +36,18 @@ struct ReplayOptions : NetlistOptions {
                   "the thread that plays the recording (default: the one that was recorded, else "
                   "the fastest)");
         set.flag("-q,--quiet", quiet, "print only values that differ by more than the tolerance");
+        set.flag("--exact", exact,
+                 "execute the journal of hal run --journal again, cycle by cycle, and compare");
+        set.value("--until", until, "CYCLE|TIME",
+                  "with --exact: stop after this cycle of the fastest thread, or this time");
+        set.value("--break", break_condition, "CONDITION",
+                  "with --exact: stop after the first cycle with 'NAME > VALUE' (< >= <= == !=)");
+        set.values("--show", show, "NAMES",
+                   "with --exact: print these pins, parameters and signals at the end; may be "
+                   "repeated");
+        set.flag("--anyway", anyway,
+                 "with --exact: also with another program or plugin, and when instances open "
+                 "devices or sockets again");
         declare_netlists(set);
     }
 };

@@ -64,11 +64,14 @@ bool attach_watchdog(HostedMachine& machine, const RunOptions& options, ServiceN
 }
 
 int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<NodeLine> nodes,
-              ServiceNotifier& service) {
+              ServiceNotifier& service, RunJournal* journal) {
     int status =
         options.part.empty() ? machine.load() : load_node(machine, options, std::move(nodes));
     if ((status != 0 && !options.keep_going) || machine.stop.requested()) return status;
     if (!attach_watchdog(machine, options, service)) return 1;
+    if (journal) {
+        if (const int failed = journal->begin(machine); failed != 0) return failed;
+    }
     machine.start_threads();
     const std::string& name = machine.session.options().name;
     service.ready(fmt::format("machine '{}' runs; to control it: hal shell --name {}", name, name));
@@ -92,6 +95,9 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
     }
     const bool faulted = machine.faulted();
     service.stopping();
+    if (journal) {
+        journal->end_values();
+    }
     // the threads take their figures with them
     const std::string report = timing_report(machine.session);
     machine.shut_down();
@@ -109,7 +115,9 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
 
 }  // namespace
 
-int run_run(const RunOptions& options) {
+int run_run(const RunOptions& options) { return run_machine(options, nullptr); }
+
+int run_machine(const RunOptions& options, RunJournal* journal) {
     if (options.words.empty() && !options.interactive && !options.classic) {
         print(list_of(find_examples()) + "\n");
         return fail(options,
@@ -122,17 +130,21 @@ int run_run(const RunOptions& options) {
                     "dds_publish and dds_subscribe take " +
                         options.dds + " themselves");
     }
+    if (!options.values.empty() && options.journal.empty()) {
+        return fail(options, "--values needs --journal FILE; hal record records a running machine");
+    }
     if (options.interactive && options.for_ns >= 0) {
         return fail(options, "-I and --for exclude each other; leave one out");
     }
     const auto nodes = requested_nodes(options);
     if (!nodes) return 1;
     ServiceNotifier service;  // before there are other threads, because it changes the environment
-    HostedMachine machine(options, own_name(options), false);
+    HostedMachine machine(options, own_name(options), false,
+                          {.sink = journal ? &journal->sink() : nullptr});
     machine.stop_at_once();
     if (!machine.serve(true)) return 1;
     return options.classic ? run_classic(machine, options)
-                           : run_plain(machine, options, *nodes, service);
+                           : run_plain(machine, options, *nodes, service, journal);
 }
 
 }  // namespace hal::tools

@@ -3,14 +3,21 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "run/netlist_options.hpp"
+
+namespace hal {
+class ExecutionSink;
+}
 
 namespace hal::tools {
 
 struct RunOptions : NetlistOptions {
     std::int64_t for_ns = -1;  ///< -1: not given
     std::string watchdog;      ///< a device of the Linux watchdog API
+    std::string journal;       ///< file
+    std::vector<std::string> values;  ///< to be recorded with it: names and patterns
     std::string dds;  ///< arguments of the DDS participant: "interfaces=10.0.0.1 domain=3"
     bool interactive = false;
     bool no_picture = false;
@@ -26,6 +33,12 @@ struct RunOptions : NetlistOptions {
         declare_netlists(set);
         set.value("--watchdog", watchdog, "DEVICE",
                   "write to this device (/dev/watchdog) while every thread makes progress");
+        set.value("--journal", journal, "FILE",
+                  "write the inputs of every cycle and all edits to FILE.mcap, for hal replay "
+                  "--exact");
+        set.values("--values", values, "NAMES",
+                   "with --journal: record these pins, parameters and signals in every cycle, too; "
+                   "patterns; may be repeated");
         set.flag("--no-picture", no_picture, "no live picture in the terminal");
         set.value("--node", part, "NAME",
                   "load the part of this node of a netlist for several machines");
@@ -35,7 +48,25 @@ struct RunOptions : NetlistOptions {
     }
 };
 
-/// Runs `hal run`, and halrun. Returns the exit code.
+class HostedMachine;
+
+/// The journal of a run, while it is written.
+class RunJournal {
+public:
+    virtual ~RunJournal() = default;
+    virtual ExecutionSink& sink() = 0;
+    /// The netlists are loaded: begins to record values. Returns an exit status.
+    virtual int begin(HostedMachine& machine) = 0;
+    /// The machine is about to shut down: no more values are recorded.
+    virtual void end_values() = 0;
+    /// The machine has ended: completes the file. Returns an exit status.
+    virtual int end() = 0;
+};
+
+/// Runs `hal run` without --journal, and halrun. Returns the exit code.
 int run_run(const RunOptions&);
+
+/// Runs `hal run`; nullptr: without --journal. Returns the exit code.
+int run_machine(const RunOptions&, RunJournal* journal);
 
 }  // namespace hal::tools

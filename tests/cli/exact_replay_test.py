@@ -1,0 +1,306 @@
+# SPDX-License-Identifier: MIT
+"""The journal of a live machine and its exact re-execution: hal run --journal, hal replay --exact."""
+
+import contextlib
+import json
+import random
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import unittest
+from pathlib import Path
+
+from harness import PLUGINS, SANITIZED, SERVO, TIMEOUT, Case, wait_until
+
+# Three threads that read each other: jitter and missed periods decide which cycles they read. The
+# execution time of a thread is a value like any other.
+MACHINE = """loadrt threads name1=fast period1=500000 name2=servo period2=1000000 name3=slow period3=7000000
+loadrt siggen
+loadrt pid names=pid.x
+loadrt lowpass
+loadrt sum2 names=add.0,add.1
+loadrt comp names=above
+loadrt integ names=plant,drift
+loadrt conv_s32_float names=time
+addf siggen.0.update fast
+addf add.0 fast
+addf time fast
+addf pid.x.do-pid-calcs servo
+addf plant servo
+addf above servo
+addf lowpass.0 slow
+addf add.1 slow
+addf drift slow
+net sine siggen.0.sine => add.0.in0 pid.x.command above.in0
+net sum add.0.out => lowpass.0.in
+net smooth lowpass.0.out => add.1.in0 add.0.in1
+net effort pid.x.output => plant.in
+net position plant.out => pid.x.feedback add.1.in1
+net total add.1.out => above.in1
+net spent servo.time => time.in
+net spent-float time.out => drift.in
+setp siggen.0.frequency 3
+setp lowpass.0.gain 0.2
+setp pid.x.Pgain 4
+setp pid.x.enable 1
+setp plant.gain 2
+start
+"""
+
+STREAM = """loadrt threads name1=servo period1=1000000
+loadrt streamer
+loadrt integ names=sum
+addf streamer.0 servo
+addf sum servo
+net value streamer.0.pin.0 => sum.in
+net total sum.out
+"""
+
+
+def edits(count, values):
+    """Lines that change the machine while it runs, and as many values."""
+    dice = random.Random(34)
+    lines = []
+    for number in range(count // 4):
+        thread = dice.choice(["fast", "servo", "slow"])
+        lines += [
+            f"loadrt sum2 names=extra.{number}",
+            f"net sum => extra.{number}.in0",
+            f"addf extra.{number} {thread}",
+        ]
+        if dice.random() < 0.5:
+            lines += ["unlinkp pid.x.feedback", "net position => pid.x.feedback"]
+        else:
+            lines += [f"delf extra.{number} {thread}", f"unload extra.{number}"]
+    lines.insert(len(lines) // 3, "stop")
+    lines.insert(len(lines) // 3 + 9, "start")
+    lines.insert(len(lines) // 2, "reload lowpass")
+    pins = ["siggen.0.frequency", "siggen.0.amplitude", "pid.x.Pgain", "add.0.gain0"]
+    for _ in range(values):
+        line = f"setp {dice.choice(pins)} {dice.uniform(0, 4):.17g}"
+        lines.insert(dice.randrange(len(lines) + 1), line)
+    return lines
+
+
+@contextlib.contextmanager
+def load(count):
+    """Processes that compete for the CPUs."""
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for one in busy:
+            one.kill()
+            one.wait()
+
+
+class Program:
+    """A program with pins, at the control socket."""
+
+    def __init__(self, folder, declaration):
+        self.socket = socket.socket(socket.AF_UNIX)
+        self.socket.settimeout(TIMEOUT)
+        self.socket.connect(str(folder / "halcyon" / "default.sock"))
+        self.lines = self.socket.makefile("rb")
+        self.lines.readline()
+        self.ask(declaration)
+
+    def close(self):
+        self.lines.close()
+        self.socket.close()
+
+    def ask(self, request):
+        self.socket.sendall(json.dumps(request).encode() + b"\n")
+        reply = json.loads(self.lines.readline())
+        assert reply["ok"], reply
+        return reply
+
+
+class ExactReplay(Case):
+    def run_journaled(self, text, *options, name="run.mcap"):
+        return self.start("run", self.write("a.hal", text), "--journal", name, *options)
+
+    def give(self, lines):
+        done = self.run_program("shell", given="\n".join(lines) + "\n")
+        self.assertEqual(0, done.returncode, done.stdout + done.stderr)
+
+    def finish(self, machine):
+        out, error = self.end(machine)
+        self.assertEqual(0, machine.returncode, out + error)
+        return error
+
+    def wait_for_cycles(self, count):
+        start = int(self.shell("getp", "servo.threadbeat").stdout)
+        wait_until(
+            lambda: int(self.shell("getp", "servo.threadbeat").stdout) >= start + count,
+            f"{count} cycles",
+        )
+
+    def replay(self, *options, name="run.mcap", status=0):
+        done = self.run_program("replay", "--exact", name, *options)
+        self.assertEqual(status, done.returncode, done.stdout + done.stderr)
+        return done.stdout + done.stderr
+
+    def test_a_machine_that_is_edited_under_load_is_executed_again(self):
+        with load(2):
+            machine = self.run_journaled(MACHINE, "--values", "*")
+            self.give(edits(200, 1000))
+            self.wait_for_cycles(500)
+            self.finish(machine)
+        text = self.replay()
+        found = re.match(r"(\d+) cycles of 3 threads, (\d+) edits and ", text)
+        self.assertIsNotNone(found, text)
+        self.assertGreater(int(found[1]), 1000)
+        self.assertGreater(int(found[2]), 1200)
+        self.assertRegex(text, r"\nno difference, \d{5,} values compared\n$")
+
+    def test_it_stops_at_a_time_a_cycle_or_a_condition(self):
+        machine = self.run_journaled(MACHINE, "--values", "position")
+        self.wait_for_cycles(300)
+        self.finish(machine)
+        text = self.replay("--until", "0.1s", "--show", "position,sine,nowhere")
+        self.assertRegex(text, r"\nstopped; no difference so far, \d+ values compared\n")
+        self.assertRegex(text, r"\nposition \S+\nsine \S+\nnowhere unknown\n$")
+        self.assertRegex(
+            self.replay("--until", "120"), r"newest: cycle 120 of 'fast' at .*\nstopped"
+        )
+        text = self.replay("--break", "position > 0.01", "--show", "position")
+        self.assertRegex(text, r"(?s)newest: cycle \d+ of 'servo'.*stopped.*position 0\.01\d*\n$")
+        self.assertIn(
+            "--break: the machine has no 'wheel'", self.replay("--break", "wheel > 1", status=1)
+        )
+        for words, problem in [
+            (["--until", "soon"], "--until: invalid cycle or time 'soon'"),
+            (["--break", "> 3"], "--break: invalid condition '> 3'"),
+            (["--break", "position => 3"], "--break: invalid condition 'position => 3'"),
+            (["--break", "position > x"], "--break: invalid condition 'position > x'"),
+            ([self.write("b.hal", SERVO)], "--exact takes one journal and no netlist"),
+        ]:
+            self.assertIn(problem, self.replay(*words, status=1))
+
+    def test_what_a_killed_machine_left_is_executed(self):
+        machine = self.run_journaled(MACHINE)
+        self.wait_for_cycles(3000)
+        machine.send_signal(signal.SIGKILL)
+        machine.wait()
+        part = self.folder / "run.mcap.part"
+        wait_until(part.exists, "the part")
+        text = self.replay(name="run.mcap.part")
+        self.assertIn("the file has no end: it is read up to its last complete chunk", text)
+        self.assertGreater(int(re.search(r"(\d+) cycles of 3 threads", text)[1]), 3000)
+        again = self.run_journaled(MACHINE)
+        error = self.finish(again)
+        self.assertIn("the unfinished journal of an earlier run is now", error)
+
+    def test_a_damaged_file_is_executed_up_to_the_damage(self):
+        machine = self.run_journaled(MACHINE)
+        self.wait_for_cycles(2500)
+        self.finish(machine)
+        whole = (self.folder / "run.mcap").read_bytes()
+        for at in (len(whole) * 2 // 3, len(whole) // 4, 40):
+            changed = bytearray(whole)
+            changed[at] ^= 0xFF
+            (self.folder / "changed.mcap").write_bytes(changed)
+            (self.folder / "cut.mcap").write_bytes(whole[:at])
+            for name in ("changed.mcap", "cut.mcap"):
+                done = self.run_program("replay", "--exact", name)
+                self.assertIn(done.returncode, (0, 1), done.stderr)
+                self.assertNotIn("first difference", done.stdout)
+                self.assertTrue(done.stderr or done.returncode == 0, done.stdout)
+        (self.folder / "changed.mcap").write_bytes(whole[: len(whole) // 2])
+        self.assertRegex(self.replay(name="changed.mcap"), r"the file has no end")
+
+    def test_another_file_is_no_journal(self):
+        self.good("sim", self.write("a.hal", SERVO), "-q", "--for", "10ms", "--record", "run.mcap")
+        self.assertIn("it is not a journal: hal run --journal writes one", self.replay(status=1))
+        self.assertIn("missing.mcap", self.replay(name="missing.mcap", status=1))
+        for words, problem in [
+            (["--journal", "run.csv"], "--journal: unknown format of 'run.csv'"),
+            (["--journal", "nowhere/run.mcap"], "cannot write 'nowhere/run.mcap'"),
+            (["--values", "total"], "--values needs --journal FILE"),
+            (["--journal", "b.mcap", "--values", "wheel", "--for", "1s"], "matches 'wheel'"),
+        ]:
+            self.assertIn(problem, self.bad("run", self.folder / "a.hal", *words))
+        self.assertIn(
+            "need --exact", self.bad("replay", "run.mcap", self.folder / "a.hal", "--until", "3")
+        )
+
+    def test_another_plugin_is_rejected(self):
+        own = self.folder / "plugins"
+        own.mkdir()
+        shutil.copy(Path(PLUGINS) / "sum2.so", own)
+        self.environment["HALCYON_PLUGIN_PATH"] = f"{own}:{PLUGINS}"
+        machine = self.run_journaled(SERVO)
+        self.wait_for_cycles(50)
+        self.finish(machine)
+        self.replay()
+        with open(own / "sum2.so", "ab") as plugin:
+            plugin.write(b"x")
+        text = self.replay(status=1)
+        self.assertRegex(
+            text, r"the plugin of 'sum2' was changed: \S+sum2.so has hash [0-9a-f]{16}"
+        )
+        self.assertIn("type: hal replay --exact --anyway", text)
+        self.assertIn("\nno difference\n", self.replay("--anyway"))
+
+    def test_values_of_programs_are_written_again(self):
+        machine = self.run_journaled(SERVO, "--values", "*")
+        program = Program(
+            self.folder,
+            {"component": "panel", "pins": [{"name": "speed", "type": "float", "dir": "out"}]},
+        )
+        self.give(["net speed panel.speed => adder.in0"])
+        self.addCleanup(program.close)
+        for value in range(50):
+            program.ask({"exchange": "panel", "write": [0, value / 7]})
+            self.wait_for_cycles(2)
+        self.finish(machine)
+        text = self.replay("--show", "total")
+        self.assertRegex(text, r"no difference, \d{3,} values compared\ntotal 10\n")
+
+    def test_the_first_difference_is_named(self):
+        machine = self.run_journaled(STREAM, "--values", "*")
+        self.write("in.txt", "".join(f"{value}\n" for value in range(1, 40)))
+        self.good("play", "in.txt")
+        self.comes("streamer.0.pin.0", "39")
+        self.finish(machine)
+        text = self.replay(status=1)
+        self.assertIn(
+            "'streamer.0' (streamer) has 1 stream, whose data are not in the journal", text
+        )
+        self.assertRegex(
+            text,
+            r"first difference: '(streamer\.0\.\S+|value)' \('streamer\.0' of streamer, function "
+            r"'streamer\.0'\) in cycle \d+ of thread 'servo': \S+ instead of \S+",
+        )
+        machine = self.run_journaled(STREAM, name="b.mcap")
+        self.good("play", "in.txt")
+        self.comes("streamer.0.pin.0", "39")
+        self.finish(machine)
+        self.assertRegex(
+            self.replay(name="b.mcap", status=1),
+            r"first difference: cycle \d+ of thread 'servo' at \S+ s has values with another "
+            r"checksum\nto have the value named, write the journal with: --values '\*'",
+        )
+
+    @unittest.skipIf(SANITIZED, "a sanitizer has the functions of the clock")
+    def test_a_component_gets_the_time_that_it_has_read(self):
+        machine = self.run_journaled(
+            """loadrt threads name1=servo period1=1000000
+loadrt timedelta
+addf timedelta.0 servo
+""",
+            "--values",
+            "*",
+        )
+        self.wait_for_cycles(300)
+        self.finish(machine)
+        text = self.replay("--show", "timedelta.0.max")
+        self.assertRegex(text, r"no difference, \d{4,} values compared\ntimedelta.0.max \d{7,}\n")
+
+
+if __name__ == "__main__":
+    unittest.main()

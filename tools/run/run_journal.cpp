@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: MIT
+#include "run/run_journal.hpp"
+
+#include <atomic>
+#include <chrono>
+#include <fmt/core.h>
+#include <memory>
+#include <thread>
+
+#include "cli/output.hpp"
+#include "commands/files.hpp"
+#include "journal/execution_journal.hpp"
+#include "paths.hpp"
+#include "recording/mcap/held_file.hpp"
+#include "run/chosen_values.hpp"
+#include "run/hosted_machine.hpp"
+#include "run/sim_summary.hpp"
+#include "text/quoting.hpp"
+
+namespace hal::tools {
+namespace {
+
+/// Takes the rows of a probe in a thread of its own, and writes them to the file of a journal.
+class RecordedValues {
+public:
+    RecordedValues(Session& session, ExecutionJournal& journal)
+        : session_(session), journal_(journal) {}
+    ~RecordedValues() { end(); }
+
+    /// Returns why the values cannot be recorded; "" when they are.
+    std::string begin(const std::vector<std::string>& patterns) {
+        const auto lock = session_.lock();
+        if (std::string unknown = unknown_value(session_.model(), patterns); !unknown.empty()) {
+            return "--values: " + unknown;
+        }
+        std::vector<std::string> names = chosen_values(session_.model(), patterns);
+        std::string problem;
+        probe_ = session_.probes().attach({names}, problem);
+        if (!probe_) return "--values: " + problem;
+        journal_.sampled(std::move(names));
+        layout_ = Probes::layout(*probe_);
+        journal_.with_writer([this](mcap::Writer& writer) {
+            sink_ = make_mcap_sink(writer, Probes::columns(*probe_),
+                                   {.instance = {},
+                                    .version = {},
+                                    .netlist = {},
+                                    .cause = {},
+                                    .unix_offset_ns = journal_.unix_offset_ns()});
+            sink_->layout(layout_.groups);
+        });
+        thread_ = std::thread([this] {
+            while (!ends_) {
+                std::this_thread::sleep_for(std::chrono::milliseconds(50));
+                take();
+            }
+        });
+        return "";
+    }
+    void end() {
+        if (!thread_.joinable()) return;
+        ends_ = true;
+        thread_.join();
+        take();
+        const auto lock = session_.lock();
+        session_.probes().detach(probe_);
+    }
+
+private:
+    void take() {
+        std::vector<ProbeRows> batches;
+        {
+            const auto lock = session_.lock();
+            batches = session_.probes().take(*probe_, std::size_t{1} << 24);
+        }
+        journal_.with_writer([&](mcap::Writer&) {
+            for (const ProbeRows& rows : batches) {
+                add_rows(*sink_, rows, layout_, rows_);
+            }
+        });
+    }
+
+    Session& session_;
+    ExecutionJournal& journal_;
+    std::shared_ptr<LiveProbe> probe_;
+    ProbeLayout layout_;
+    std::unique_ptr<Sink> sink_;
+    std::uint64_t rows_ = 0;
+    std::atomic<bool> ends_{false};
+    std::thread thread_;
+};
+
+class FileOfRun final : public RunJournal {
+public:
+    explicit FileOfRun(const RunOptions& options)
+        : options_(options),
+          journal_(options.journal,
+                   {own_name(options), std::string(paths::version), std::string(paths::commit)}) {}
+
+    /// Returns an exit status after printing why the file cannot be written.
+    int check() {
+        if (const std::string problem = journal_.problem(); !problem.empty()) {
+            return fail(options_, fmt::format("cannot write '{}': {}", options_.journal, problem));
+        }
+        if (!journal_.kept().empty()) {
+            write_all(2, fmt::format("{}: the unfinished journal of an earlier run is now '{}'\n",
+                                     options_.program, journal_.kept()));
+        }
+        return 0;
+    }
+
+    ExecutionSink& sink() override { return journal_; }
+
+    int begin(HostedMachine& machine) override {
+        std::vector<std::string> files = options_.words;
+        if (!options_.ini.empty()) {
+            files.push_back(options_.ini);
+        }
+        for (const std::string& path : files) {
+            std::string text;
+            std::string ignored;
+            if (read_text_file(path, text, ignored)) {
+                journal_.attach(path, text);
+            }
+        }
+        const std::vector<std::string> patterns = names_in(options_.values);
+        if (patterns.empty()) return 0;
+        values_ = std::make_unique<RecordedValues>(machine.session, journal_);
+        const std::string problem = values_->begin(patterns);
+        return problem.empty() ? 0 : fail(options_, problem);
+    }
+
+    void end_values() override { values_.reset(); }
+
+    int end() override {
+        const bool written = journal_.close();
+        for (const auto& [thread, lost] : journal_.lost()) {
+            write_all(2, fmt::format("{}: thread '{}': {} did not fit the buffer of the journal; "
+                                     "hal replay --exact ends before the first of them\n",
+                                     options_.program, thread, counted(lost, "cycle")));
+        }
+        if (!written) {
+            return fail(options_,
+                        fmt::format("cannot write '{}': {}; what was written is in '{}'",
+                                    options_.journal, journal_.problem(), journal_.where()));
+        }
+        write_all(2,
+                  fmt::format("{}: {}\n", options_.journal, counted(journal_.cycles(), "cycle")));
+        return 0;
+    }
+
+private:
+    const RunOptions& options_;
+    ExecutionJournal journal_;
+    std::unique_ptr<RecordedValues> values_;
+};
+
+}  // namespace
+
+int run_journaled(const RunOptions& options) {
+    if (options.journal.empty()) return run_run(options);
+    if (!options.journal.ends_with(".mcap")) {
+        return fail(options, fmt::format("--journal: unknown format of '{}'; name the file .mcap",
+                                         options.journal));
+    }
+    if (const std::string problem = mcap::unwritable(options.journal); !problem.empty()) {
+        return fail(options, fmt::format("cannot write '{}': {}", options.journal, problem));
+    }
+    FileOfRun journal(options);
+    if (const int status = journal.check(); status != 0) return status;
+    const int status = run_machine(options, &journal);
+    const int end_status = journal.end();
+    return status != 0 ? status : end_status;
+}
+
+}  // namespace hal::tools

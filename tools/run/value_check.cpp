@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+#include "run/value_check.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+
+namespace hal::tools {
+namespace {
+
+/// Returns the pin whose function computes the value; nullptr: none does.
+const Pin* writer_of(const Model& model, const std::string& name) {
+    if (const Pin* const pin = model.find_pin(name)) {
+        const bool reads = pin->signal && pin->dir == HAL_DIR_IN;
+        return reads ? pin->signal->writer : pin;
+    }
+    const Signal* const signal = model.find_signal(name);
+    return signal ? signal->writer : nullptr;
+}
+
+}  // namespace
+
+ValueCheck::ValueCheck(const std::string& path, std::int64_t unix_offset_ns)
+    : unix_offset_ns_(unix_offset_ns) {
+    if (!mcap::load(path, recording_, problem_)) return;
+    for (const mcap::Table& table : recording_.tables) {
+        if (!table.thread.empty()) {
+            tables_[table.thread].push_back({&table});
+        }
+    }
+}
+
+void ValueCheck::begin(Session& session, const std::vector<std::string>& names) {
+    session_ = &session;
+    probe_ = session.probes().attach({names}, problem_);
+    if (probe_) {
+        layout_ = Probes::layout(*probe_);
+    }
+}
+
+bool ValueCheck::compare() {
+    if (difference_) return false;
+    if (!probe_) return true;
+    for (const ProbeRows& rows : session_->probes().take(*probe_, std::size_t{1} << 28)) {
+        compare(rows);
+    }
+    return !difference_;
+}
+
+void ValueCheck::compare(const ProbeRows& rows) {
+    if (rows.layout) {
+        layout_ = *rows.layout;
+    }
+    std::size_t at = 0;
+    for (const auto& part : rows.parts) {
+        const ProbeGroup& group = layout_.groups[part.group];
+        std::vector<std::uint64_t> words(group.columns.size() + 2);
+        for (std::size_t i = 0; i < part.rows; ++i, at += words.size() * 8) {
+            std::memcpy(words.data(), rows.bytes.data() + at, words.size() * 8);
+            if (group.thread.empty()) continue;
+            compare({group.thread, words[0], static_cast<std::int64_t>(words[1]), &group.columns,
+                     words.data() + 2});
+        }
+    }
+}
+
+/// The order in which functions run: the first value that is wrong is the cause of the others.
+std::size_t ValueCheck::rank(const std::string& name) const {
+    constexpr std::size_t last = std::numeric_limits<std::size_t>::max();
+    const Pin* const pin = writer_of(session_->model(), name);
+    if (!pin || !pin->home || !pin->instance) return last;
+    const auto& functions = pin->home->functions;
+    for (std::size_t i = 0; i < functions.size(); ++i) {
+        const bool own = pin->function == functions[i];
+        const bool shared =
+            !pin->function && std::ranges::find(functions[i]->instances, pin->instance) !=
+                                  functions[i]->instances.end();
+        if (own || shared) return i;
+    }
+    return last;
+}
+
+void ValueCheck::compare(const Row& row) {
+    const std::int64_t time_ns = row.time_ns + unix_offset_ns_;
+    std::optional<ValueDifference> first;
+    std::size_t others = 0;
+    for (Position& position : tables_[row.thread]) {
+        const mcap::Table& table = *position.table;
+        auto& at = position.row;
+        while (at < table.rows() && table.times_ns[at] < time_ns) {
+            ++at;
+        }
+        if (at == table.rows() || table.times_ns[at] != time_ns) continue;
+        for (std::size_t i = 0; i < row.columns->size(); ++i) {
+            const std::string& name = Probes::columns(*probe_)[(*row.columns)[i]].name;
+            const auto column = std::ranges::find(table.columns, name, &mcap::Column::name);
+            if (column == table.columns.end()) continue;
+            const auto index = static_cast<std::size_t>(column - table.columns.begin());
+            const std::uint64_t recorded = table.word(at, index);
+            ++values_;
+            if (recorded == row.words[i]) continue;
+            ++others;
+            if (!first || rank(name) < rank(first->name)) {
+                first = {name,         row.thread, row.cycle,    row.time_ns,
+                         column->type, recorded,   row.words[i], 0};
+            }
+        }
+    }
+    if (first && (!difference_ || first->time_ns < difference_->time_ns)) {
+        difference_ = first;
+        difference_->others = others - 1;
+    }
+}
+
+}  // namespace hal::tools
