@@ -11,9 +11,8 @@ import socket
 import subprocess
 import sys
 import unittest
-from pathlib import Path
 
-from harness import PLUGINS, SANITIZED, SERVO, TIMEOUT, Case, wait_until
+from harness import HAL, PLUGINS, SANITIZED, SERVO, TIMEOUT, Case, wait_until
 
 # Three threads that read each other: jitter and missed periods decide which cycles they read. The
 # execution time of a thread is a value like any other.
@@ -231,7 +230,7 @@ class ExactReplay(Case):
     def test_another_plugin_is_rejected(self):
         own = self.folder / "plugins"
         own.mkdir()
-        shutil.copy(Path(PLUGINS) / "sum2.so", own)
+        shutil.copy(HAL.parent.parent / "components" / "sum2.so", own)
         self.environment["HALCYON_PLUGIN_PATH"] = f"{own}:{PLUGINS}"
         machine = self.run_journaled(SERVO)
         self.wait_for_cycles(50)
