@@ -19,11 +19,16 @@ constexpr const char* drive_inputs[] = {"statusword",
                                         "position-actual-value",
                                         "velocity-actual-value",
                                         "torque-actual-value",
-                                        "error-code"};
+                                        "error-code",
+                                        "touch-probe-status",
+                                        "touch-probe-1-positive-edge",
+                                        "touch-probe-1-negative-edge",
+                                        "touch-probe-2-positive-edge",
+                                        "touch-probe-2-negative-edge"};
 constexpr const char* drive_outputs[] = {
-    "controlword",          "modes-of-operation",  "target-position", "target-velocity",
-    "target-torque",        "velocity-offset",     "torque-offset",   "profile-velocity",
-    "profile-acceleration", "profile-deceleration"};
+    "controlword",          "modes-of-operation",   "target-position",     "target-velocity",
+    "target-torque",        "velocity-offset",      "torque-offset",       "profile-velocity",
+    "profile-acceleration", "profile-deceleration", "touch-probe-function"};
 
 /// Calls `use(output, entry)` for each entry with a pin.
 template <class Use>

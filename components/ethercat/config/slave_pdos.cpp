@@ -63,6 +63,24 @@ Known SlavePdos::known(std::uint16_t index, std::uint8_t sub) const {
     return profile_object(index, sub, in_.info.cia402_axes);
 }
 
+std::optional<ObjectAddress> SlavePdos::find(std::string_view name) const {
+    if (device_ != nullptr) {
+        for (const esi::Object& object : device_->objects) {
+            for (const esi::Value& value : object.values) {
+                if (dictionary_object(*device_, object.index, value.sub).name != name) continue;
+                ObjectAddress address;
+                address.index = object.index;
+                address.sub = value.sub;
+                return address;
+            }
+        }
+    }
+    const unsigned axes = in_.info.cia402_axes;
+    const auto found = profile_address(name, device_ == nullptr ? std::max(axes, 1U) : axes);
+    if (!found || known(found->index, found->sub).bits == 0) return std::nullopt;
+    return found;
+}
+
 const std::vector<esi::Pdo>& SlavePdos::described(bool output) const {
     static const std::vector<esi::Pdo> none;
     if (device_ == nullptr) return none;

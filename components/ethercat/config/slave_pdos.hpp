@@ -17,6 +17,9 @@ struct Known {
 /// n are 800h higher for each axis.
 Known profile_object(std::uint16_t index, std::uint8_t sub, unsigned axes);
 
+/// Returns the object of the profile with this name; nullopt: unknown.
+std::optional<ObjectAddress> profile_address(std::string_view name, unsigned axes);
+
 class SlavePdos {
 public:
     /// `mode` is the operation mode of the description; nullptr: none.
@@ -28,6 +31,8 @@ public:
     static std::vector<std::string> key_names();
     /// Finds an object in the description, or else in the profile.
     Known known(std::uint16_t index, std::uint8_t sub) const;
+    /// Finds an object by the name of its pin, in the description or in the profile.
+    std::optional<ObjectAddress> find(std::string_view name) const;
 
 private:
     std::uint8_t manager_number(bool output);

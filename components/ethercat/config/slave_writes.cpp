@@ -35,18 +35,22 @@ void SlaveWrites::read() {
     }
 }
 
-/// `sdo 6060 = 8`, `sdo 2000:1 u16 = 5`, `sdo 8000 complete = 01 00 02`,
+/// `sdo 6060 = 8`, `sdo gear-ratio-1 = 5`, `sdo 2000:1 u16 = 5`, `sdo 8000 complete = 01 00 02`,
 /// `register 0420 u16 = 1000`.
 void SlaveWrites::sdo(const Line& line, const std::vector<Word>& words) {
     const bool is_register = words[0].text == "register";
-    const auto at = parse_address(words[1], in_.report);
+    auto at = parse_address(words[1], in_.report);
+    if (!at && !is_register) {
+        at = pdos_.find(words[1].text);
+    }
     if (!at || words.size() > 3) {
         return in_.report.error(Topic::value, line.key.at,
                                 "invalid " + words[0].text + " '" +
                                     line.key.text.substr(words[0].text.size() + 1) + "'",
                                 is_register
                                     ? "write register 0420 u16 = 1000"
-                                    : "write sdo 6060 = 8, or with a type: sdo 2000:1 u16 = 5");
+                                    : "write sdo 6060 = 8, with a name: sdo gear-ratio-1 = 5, or "
+                                      "with a type: sdo 2000:1 u16 = 5");
     }
     StartupWrite w = startup_write(at->index, at->sub, {}, State::safeop);
     w.line = line.key.at.line;
