@@ -131,6 +131,13 @@ public:
 
     /// does not wrap with the drive's counter
     double position() const noexcept { return position_; }
+    /// Returns where a reading of the drive's counter is that lies within half its range of the
+    /// present one, in user units: a latched position. The present one, if the scale is invalid.
+    double position_of(std::int32_t reading, const AxisRules& rules) const noexcept {
+        if (!rules.position.sound()) return position_;
+        return rules.position.to_user(
+            static_cast<double>(counter_.count_of(reading, rules.counter_bits)));
+    }
     double velocity() const noexcept { return velocity_; }
     double torque() const noexcept { return torque_; }
     /// position sent to the drive; while not active, the feedback

@@ -48,8 +48,13 @@ public:
     /// half its range since the last call. [realtime]
     void follow(std::int32_t raw, unsigned bits) noexcept {
         if (!known_) return put(raw);
-        count_ +=
-            low_bits(static_cast<std::uint32_t>(raw) - static_cast<std::uint32_t>(count_), bits);
+        count_ = count_of(raw, bits);
+    }
+    /// Returns the count of a reading that is less than half the range away from the last one.
+    /// [any]
+    std::int64_t count_of(std::int32_t raw, unsigned bits) const noexcept {
+        return count_ +
+               low_bits(static_cast<std::uint32_t>(raw) - static_cast<std::uint32_t>(count_), bits);
     }
     /// Restarts at a reading. [realtime]
     void put(std::int32_t raw) noexcept {

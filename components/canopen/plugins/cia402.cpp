@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "canopen/plugins/probe_pins.hpp"
 #include "cia402/axis.hpp"
 #include "hal/component.hpp"
 #include "hal/function_monitor.hpp"
@@ -167,6 +168,7 @@ struct Cia402 : hal::Component {
     hal::In<std::int32_t> vl_velocity{*this, "vl-velocity-actual-value",
                                       "6044h; if linked, source of velocity-fb in mode vl"};
     hal::In<std::int32_t> torque{*this, "torque-actual-value", "6077h"};
+    hal::In<std::uint32_t> probe_status{*this, "touch-probe-status", "60B9h; optional"};
     hal::In<std::uint32_t> error_code{*this, "error-code",
                                       "603Fh, or the emcy pin of the node; optional"};
     hal::Out<std::uint32_t> controlword{*this, "controlword", "6040h", {.safe = 0U}};
@@ -178,9 +180,13 @@ struct Cia402 : hal::Component {
     hal::Out<std::int32_t> velocity_offset{*this, "velocity-offset", "60B1h", {.safe = 0}};
     hal::Out<std::int32_t> torque_offset{*this, "torque-offset", "60B2h", {.safe = 0}};
     hal::Out<std::int32_t> interpolation{*this, "interpolation-data-record", "60C1h:1"};
+    hal::Out<std::uint32_t> probe_function{*this, "touch-probe-function", "60B8h", {.safe = 0U}};
     hal::Out<std::uint32_t> profile_velocity{*this, "profile-velocity", "6081h"};
     hal::Out<std::uint32_t> profile_acceleration{*this, "profile-acceleration", "6083h"};
     hal::Out<std::uint32_t> profile_deceleration{*this, "profile-deceleration", "6084h"};
+
+    ProbePins probe_1{*this, 1};
+    ProbePins probe_2{*this, 2};
 
     hal::Function read{*this, "read-all", &Cia402::read_all,
                        "updates the feedback from the drive; after the bus receives"};
@@ -214,6 +220,9 @@ struct Cia402 : hal::Component {
         position_fb = axis_.position();
         velocity_fb = axis_.velocity();
         torque_fb = axis_.torque();
+        const std::uint32_t probes = probe_status;
+        probe_1.read(operational, static_cast<std::uint8_t>(probes), axis_, rules_);
+        probe_2.read(operational, static_cast<std::uint8_t>(probes >> 8), axis_, rules_);
         mode_fb = static_cast<std::int32_t>(in.mode);
         warning = (in.statusword & status::warning) != 0;
         remote = (in.statusword & status::remote) != 0;
@@ -280,6 +289,8 @@ private:
         set_points = static_cast<std::uint32_t>(axis_.set_points());
         homed = axis_.homed();
         homing = axis_.homing();
+        const std::uint32_t second = probe_2.write();
+        probe_function = probe_1.write() | second << 8;
     }
 
     void record_missing(hal::LastingFault& record, bool missing, const std::string& text) noexcept {
@@ -373,6 +384,12 @@ the state machine of the drive and steps it towards the commanded state, one tra
 * `home` selects mode hm, starts homing as configured in the drive's objects 6098h, 6099h and 609Ah, waits for its end, and returns to
   `mode`. Then `position-fb` is the position counted by the drive.
 * `position-fb` = counts * `position-scale-divisor` / `position-scale`; it does not wrap with the drive's counter.
+
+The drive latches positions at its touch probes (60B8h to 60BDh) by itself, between two cycles. `probe-1-enable` arms probe 1: at the first
+rising edge of its input, `probe-1-latched` is TRUE and `probe-1-position` is the position of the edge. `probe-1-falling` and `probe-1-index` choose
+the falling edge and the index pulse; with `probe-1-continuous`, `probe-1-position` follows each further edge. FALSE and TRUE at `probe-1-enable` arm it again; so does another choice. Probe 2 has
+the same pins. `probe-1-armed` stays FALSE while the drive does not show the probe as enabled: `touch-probe-function`, `touch-probe-status` and the edges belong in
+the process data. In LinuxCNC, `probe-1-latched` fits `motion.probe-input`; motion then stops at the position of its own cycle, and `probe-1-position` has the exact one.
 
 Call `read-all` after the function that receives from the bus and `write-all` before the one that sends, with the controller of the axis
 between the two.
