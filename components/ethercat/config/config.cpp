@@ -354,12 +354,27 @@ void check_watchdog(const Bus& bus, std::size_t n, Report& report) {
             " in its section, watchdog = none, or a shorter cycle");
 }
 
+/// The samples of a cycle are lost if the process data are not exchanged in each cycle.
+void check_samples(const Bus& bus, std::size_t n, Report& report) {
+    const master::Slave& s = bus.setup.slaves[n];
+    if (s.oversampling < 2 || s.domain >= bus.setup.domains.size()) return;
+    const master::Domain& domain = bus.setup.domains[s.domain];
+    if (domain.every == 1) return;
+    report.error(Topic::slave, bus.slaves[n].at,
+                 "'" + s.name + "' has " + std::to_string(s.oversampling) +
+                     " samples in each cycle, but domain '" + domain.name +
+                     "' is exchanged in every " + std::to_string(domain.every) +
+                     " cycles: the samples between are lost",
+                 "write a domain with every = 1, or delete oversampling in its section");
+}
+
 }  // namespace
 
 void check_bus(const Bus& bus, Report& report) {
     const auto& slaves = bus.setup.slaves;
     for (std::size_t i = 0; i < slaves.size(); ++i) {
         check_watchdog(bus, i, report);
+        check_samples(bus, i, report);
     }
     for (std::size_t i = 0; i < slaves.size(); ++i) {
         for (std::size_t j = 0; j < i; ++j) {

@@ -150,6 +150,24 @@ TEST(EthercatOversampling, SYNC0_divides_the_cycle_and_SYNC1_comes_at_its_last_p
     EXPECT_EQ(entries[3].pin_name(), "in-03");
 }
 
+TEST(EthercatOversampling, SYNC1_in_every_cycle_of_SYNC0_follows_it_by_its_shift) {
+    std::string text = described("#x0700");
+    const std::string factor = "<CycleTimeSync1 Factor=\"-1\">0</CycleTimeSync1>";
+    text.replace(text.find(factor), factor.size(),
+                 "<CycleTimeSync1 Factor=\"1\">0</CycleTimeSync1>"
+                 "<ShiftTimeSync1>25000</ShiftTimeSync1>");
+    const auto reading = config::read("[bus]\n[slave 0 x]\nesi = x.xml\ndc = DC\n", "x.ethercat",
+                                      [&](const std::string&, std::string& bytes) {
+        bytes = text;
+        return true;
+    });
+    ASSERT_TRUE(reading.good()) << config::to_string(reading, "x.ethercat");
+    const Slave& slave = reading.buses.front().setup.slaves.front();
+    EXPECT_EQ(slave.oversampling, 1U);
+    EXPECT_EQ(slave.dc->sync1_cycle_ns, 0) << "09A4h is the shift alone";
+    EXPECT_EQ(slave.dc->sync1_shift_ns, 25'000);
+}
+
 TEST(EthercatOversampling, A_copy_takes_all_samples) {
     const config::Bus bus = bus_with("#x0730", 4, "[copy]\nx.out = x.in\n");
     ASSERT_EQ(bus.copies.size(), 4U);
