@@ -96,6 +96,100 @@ TEST(EthercatGateway, Passes_requests_to_the_slave_by_UDP_and_TCP) {
     }
 }
 
+/// Answers of the master's own dictionary, without sockets.
+struct MasterDictionary {
+    std::vector<GatewaySlave> slaves{{0x1001, 0, 2, 0x1234, 0x10000, 7},
+                                     {0x1002, 1, 2, 0x5678, 0x10000, 8}};
+    std::size_t capacity = largest_mailbox;
+
+    /// Returns the payload of the answer to a CoE payload.
+    Bytes ask(const Bytes& payload) const {
+        Bytes message(capacity);
+        write_mailbox_header(message.data(), payload.size(), 0, MailboxType::coe, 2);
+        std::copy(payload.begin(), payload.end(), message.begin() + mailbox_header_bytes);
+        const std::size_t length =
+            answer_for_master(slaves, message, mailbox_header_bytes + payload.size());
+        EXPECT_LE(length, capacity);
+        const auto answer = read_mailbox(std::span(message).first(length));
+        if (!answer) return {};
+        type = answer->type;
+        return {answer->payload.begin(), answer->payload.end()};
+    }
+    Bytes upload(std::uint16_t index, std::uint8_t sub, std::uint8_t command = 0x40) const {
+        Bytes request(coe::sdo_bytes);
+        coe::write_sdo(request.data(), coe::Service::sdo_request, {command, index, sub, 0});
+        return ask(request);
+    }
+    Bytes describe(coe::Information opcode, const Bytes& parameters) const {
+        Bytes request(coe::information_header_bytes);
+        coe::write_information(request.data(), {opcode, false, 0});
+        request.insert(request.end(), parameters.begin(), parameters.end());
+        Bytes answer = ask(request);
+        answer.erase(answer.begin(), answer.begin() + 2);  // the CoE header
+        return answer;
+    }
+    mutable MailboxType type{};
+};
+
+Bytes with_text(Bytes bytes, std::string_view text) {
+    bytes.insert(bytes.end(), text.begin(), text.end());
+    return bytes;
+}
+
+TEST(EthercatMasterDictionary, Lists_its_objects) {
+    MasterDictionary f;
+    const Bytes all = f.describe(coe::Information::list_request, {1, 0});
+    ASSERT_EQ(all.size(), 4U + 2 + 2 * (4 + 2 + 16));
+    EXPECT_EQ(Bytes(all.begin(), all.begin() + 16),
+              (Bytes{2, 0, 0, 0, 1, 0, 0, 0x10, 8, 0x10, 0x18, 0x10, 0, 0x80, 1, 0x80}));
+    EXPECT_EQ(f.describe(coe::Information::list_request, {0, 0}),
+              (Bytes{2, 0, 0, 0, 0, 0, 22, 0, 0, 0, 0, 0, 0, 0, 0, 0}))
+        << "lengths of the five lists";
+    EXPECT_EQ(f.describe(coe::Information::list_request, {2, 0}), (Bytes{2, 0, 0, 0, 2, 0}));
+    EXPECT_EQ(f.describe(coe::Information::list_request, {6, 0})[0], 7) << "an error";
+    f.slaves.resize(4000, f.slaves.front());
+    EXPECT_LE(f.describe(coe::Information::list_request, {1, 0}).size(), largest_mailbox);
+}
+
+TEST(EthercatMasterDictionary, Describes_objects_and_entries) {
+    const MasterDictionary f;
+    EXPECT_EQ(f.describe(coe::Information::object_request, {1, 0x80}),
+              with_text({4, 0, 0, 0, 1, 0x80, 7, 0, 8, 9}, "Configuration of a slave"));
+    EXPECT_EQ(f.describe(coe::Information::object_request, {0x20, 0xf0}),
+              with_text({4, 0, 0, 0, 0x20, 0xf0, 6, 0, 2, 8}, "Configured addresses"));
+    EXPECT_EQ(f.describe(coe::Information::entry_request, {0, 0x80, 5, 7}),
+              with_text({6, 0, 0, 0, 0, 0x80, 5, 7, 7, 0, 32, 0, 7, 0}, "Vendor ID"));
+    const auto error = [&](coe::Information opcode, const Bytes& parameters) {
+        const Bytes answer = f.describe(opcode, parameters);
+        EXPECT_EQ(answer[0], 7);
+        return get<std::uint32_t>(answer.data() + 4);
+    };
+    EXPECT_EQ(error(coe::Information::object_request, {2, 0x80}), code_of(coe::Abort::no_object));
+    EXPECT_EQ(error(coe::Information::entry_request, {2, 0x80, 1, 0}),
+              code_of(coe::Abort::no_object));
+    EXPECT_EQ(error(coe::Information::entry_request, {1, 0x80, 2, 0}), code_of(coe::Abort::no_sub));
+    EXPECT_EQ(error(coe::Information::object_response, {1, 0x80}), code_of(coe::Abort::command));
+    f.describe(coe::Information::entry_request, {1, 0x80});
+    EXPECT_EQ(f.type, MailboxType::error) << "the sub-index is missing";
+}
+
+TEST(EthercatMasterDictionary, Uploads_whole_objects) {
+    MasterDictionary f;
+    constexpr std::uint8_t complete = 0x50;
+    const Bytes addresses = f.upload(0xf020, 0, complete);
+    EXPECT_EQ(Bytes(addresses.begin() + 2, addresses.end()),
+              (Bytes{0x51, 0x20, 0xf0, 0, 6, 0, 0, 0, 2, 0, 1, 0x10, 2, 0x10}));
+    const Bytes values = f.upload(0xf000, 1, complete);
+    EXPECT_EQ(Bytes(values.begin() + 6, values.end()), (Bytes{4, 0, 0, 0, 1, 0, 0, 0x10}))
+        << "without sub-index 0";
+    EXPECT_EQ(f.upload(0x8000, 0, complete).size(), coe::sdo_bytes + 2 + 2 + 4 * 4);
+    EXPECT_EQ(get<std::uint32_t>(f.upload(0x8000, 5, complete).data() + coe::sdo_data),
+              code_of(coe::Abort::no_complete_access));
+    f.slaves.resize(300, f.slaves.front());
+    f.capacity = 128;
+    EXPECT_EQ(f.upload(0xf020, 0, complete).size() % 2, 0U) << "as much as the message holds";
+}
+
 TEST(EthercatGateway, Answers_a_client_that_has_closed_its_sending_direction) {
     GatewayLine line(SOCK_STREAM);
     line.send(line.upload(0x1001, 0x1018, 1));
