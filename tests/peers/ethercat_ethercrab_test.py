@@ -3,53 +3,20 @@
 # packages: ethercat
 """ethercat_ethercrab_test.py HAL: the Rust crate ethercrab is master of `hal node ethercat` over a veth pair: SDO, mapping, distributed clocks, process
 data in OP. The program is built here, in build/peers/ethercrab. 77: cargo, its registry or network namespaces are missing."""
-import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent / "cli"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "cli"))
 import ethercat_line  # noqa: E402
+import ethercrab_program  # noqa: E402
 
 HAL = sys.argv[1]
-TARGET = HERE.parents[1] / "build" / "peers" / "ethercrab"
-
-
-def skip(why):
-    print(why)
-    sys.exit(77)
-
-
-if "HALCYON_ETHERCRAB" not in os.environ:  # before the namespace, which has no way to the registry
-    cargo = shutil.which("cargo") or shutil.which("cargo", path=str(Path.home() / ".cargo" / "bin"))
-    if not cargo:
-        skip("cargo is missing; type: apt-get install cargo, or install Rust with rustup")
-    build = subprocess.run(
-        [
-            cargo,
-            "build",
-            "--release",
-            "--locked",
-            "--quiet",
-            "--manifest-path",
-            HERE / "ethercrab" / "Cargo.toml",
-            "--target-dir",
-            TARGET,
-        ],
-        capture_output=True,
-        text=True,
-    )
-    if build.returncode != 0:
-        skip(
-            f"ethercrab cannot be built here: {(build.stderr.strip().splitlines() or ['no reason given'])[-1]}"
-        )
-    os.environ["HALCYON_ETHERCRAB"] = str(TARGET / "release" / "ethercrab_master")
+MASTER = ethercrab_program.build()
 ethercat_line.network()
 with ethercat_line.line(HAL, "servo\ndigital_out bits=8\ndigital_in bits=8\n") as node:
     master = subprocess.run(
-        [os.environ["HALCYON_ETHERCRAB"], "m0"], capture_output=True, text=True, timeout=60
+        [MASTER, "m0"], capture_output=True, text=True, timeout=60
     )
     log = node.said()
 print(master.stdout + master.stderr, end="")

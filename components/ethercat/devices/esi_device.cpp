@@ -169,28 +169,71 @@ void add_module_lists(const std::vector<std::uint32_t>& idents, Plan& plan) {
     }
 }
 
-/// Returns the parameters that the start-up commands write.
+/// Returns the attribute and the value of a parameter of `bytes` bytes, at most 8.
+Idn plain_idn(std::uint8_t drive, std::uint16_t number, const std::string& name,
+              std::size_t bytes) {
+    const std::size_t width = std::bit_width(std::bit_ceil(std::max<std::size_t>(bytes, 1))) - 1U;
+    const std::size_t limited = std::min<std::size_t>(width, 3);
+    Idn idn;
+    idn.drive = drive;
+    idn.number = number;
+    idn.name = name;
+    idn.attribute.raw = static_cast<std::uint32_t>(limited) << 16;
+    idn.value.resize(std::size_t{1} << limited);
+    idn.length = idn.value.size();
+    return idn;
+}
+
+/// Adds the telegram of a drive: the list of its parameters (S-0-0016 of the AT, S-0-0024 of the
+/// MDT), and these parameters. The first entry, control or status word, is not in the list
+/// (IEC 61800-7-204). The index of a PDO is the list's number, with the drive in bits 12 to 14.
+void add_telegram(const esi::Pdo& pdo, std::uint16_t list_number, std::vector<Idn>& idns) {
+    constexpr std::uint16_t number_bits = 0xfff;
+    if ((pdo.index & number_bits) != list_number || pdo.entries.empty()) return;
+    const auto drive = static_cast<std::uint8_t>((pdo.index >> 12) & 7);
+    const auto is_known = [&](std::uint16_t number) {
+        return std::any_of(idns.begin(), idns.end(), [&](const Idn& idn) {
+            return idn.drive == drive && idn.number == number;
+        });
+    };
+    Idn list;
+    list.drive = drive;
+    list.number = list_number;
+    list.name = pdo.name;
+    list.attribute.raw = soe::attribute::list | soe::attribute::bytes_2 | soe::attribute::idn;
+    for (std::size_t n = 0; n < pdo.entries.size(); ++n) {
+        const esi::Entry& entry = pdo.entries[n];
+        if (n != 0) {
+            list.value.resize(list.value.size() + 2);
+            put(&list.value[list.value.size() - 2], entry.index);
+        }
+        if (!is_known(entry.index)) {
+            idns.push_back(plain_idn(drive, entry.index, entry.name, (entry.bits + 7U) / 8));
+        }
+    }
+    list.length = list.value.size();
+    if (!is_known(list_number)) idns.push_back(std::move(list));
+}
+
+/// Returns the parameters that the start-up commands write, and those of the telegrams.
 std::vector<Idn> idns_of(const esi::Device& device) {
     std::vector<Idn> idns;
     for (const esi::InitCmd& command : device.init_commands) {
         const std::size_t size = command.data.size();
         if (command.protocol != esi::InitCmd::Protocol::soe || size == 0) continue;
-        Idn idn;
-        idn.number = command.index;
-        idn.drive = command.sub;
-        idn.name = command.comment;
-        const bool is_list = size >= 4 && get<std::uint16_t>(command.data.data()) == size - 4;
-        const std::size_t width = std::bit_width(std::bit_ceil(size)) - 1U;
-        if (is_list) {
+        Idn idn = plain_idn(command.sub, command.index, command.comment, size);
+        if (size >= 4 && get<std::uint16_t>(command.data.data()) == size - 4) {
             idn.attribute.raw = soe::attribute::list | soe::attribute::bytes_2;
             idn.value.assign(command.data.begin() + 4, command.data.end());
             idn.length = idn.value.size();
-        } else {
-            idn.attribute.raw = static_cast<std::uint32_t>(std::min<std::size_t>(width, 3)) << 16;
-            idn.value.resize(std::size_t{1} << std::min<std::size_t>(width, 3));
-            idn.length = idn.value.size();
         }
         idns.push_back(std::move(idn));
+    }
+    for (const esi::Pdo& pdo : device.tx) {
+        add_telegram(pdo, soe::idn_at_list, idns);
+    }
+    for (const esi::Pdo& pdo : device.rx) {
+        add_telegram(pdo, soe::idn_mdt_list, idns);
     }
     return idns;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 //! A master on the interface of the first argument, for three emulated slaves: a servo drive, 8 outputs, 8 inputs. Prints a line for each thing that
-//! it checks, "ok NAME" or "FAIL NAME SEEN". ethercat_ethercrab_test.py starts it.
+//! it checks, "ok NAME" or "FAIL NAME SEEN". ethercat_ethercrab_test.py starts it. With the second argument `to-op`, for any slaves: `to_op.rs`.
+mod to_op;
+
 use std::time::{Duration, Instant};
 
 use ethercrab::std::{ethercat_now, tx_rx_task};
@@ -21,10 +23,23 @@ fn check(name: &str, holds: bool, seen: impl std::fmt::Debug) {
 fn main() {
     let interface = std::env::args().nth(1).expect("the interface is missing");
     let (sender, receiver, frames) = FRAMES.try_split().expect("frames");
-    let timeouts = Timeouts { pdu: Duration::from_millis(500), state_transition: Duration::from_secs(10), ..Timeouts::default() };
+    let timeouts = Timeouts {
+        // those of the crate are for a machine that does nothing else
+        pdu: Duration::from_millis(500),
+        eeprom: Duration::from_secs(1),
+        mailbox_echo: Duration::from_secs(1),
+        mailbox_response: Duration::from_secs(5),
+        state_transition: Duration::from_secs(10),
+        ..Timeouts::default()
+    };
     let master = MainDevice::new(frames, timeouts, MainDeviceConfig { dc_static_sync_iterations: 500, ..MainDeviceConfig::default() });
     smol::spawn(tx_rx_task(&interface, sender, receiver).expect("the interface cannot be opened")).detach();
-    smol::block_on(work(&master)).expect("EtherCAT");
+    let only_states = std::env::args().nth(2).as_deref() == Some("to-op");
+    let result = if only_states { smol::block_on(to_op::to_op(&master)) } else { smol::block_on(work(&master)) };
+    if let Err(problem) = result {
+        eprintln!("EtherCAT: {problem:?}");
+        std::process::exit(1);
+    }
 }
 
 async fn work(master: &MainDevice<'static>) -> Result<(), ethercrab::error::Error> {

@@ -174,6 +174,36 @@ TEST_F(EsiDevice, Parameters_of_start_up_commands_can_be_written_in_each_drive) 
     EXPECT_FALSE(written(2, 2, {0, 0})) << "there is no such drive";
 }
 
+TEST_F(EsiDevice, A_drive_with_SoE_lists_the_parameters_of_its_telegrams) {
+    const std::string process_data =
+        "<Sm StartAddress='#x1200' ControlByte='#x24' Enable='1'>Outputs</Sm>"
+        "<Sm StartAddress='#x1300' ControlByte='#x20' Enable='1'>Inputs</Sm>"
+        "<RxPdo Sm='2'><Index>24</Index><Name>MDT</Name>"
+        "<Entry><Index>134</Index><BitLen>16</BitLen><Name>Master control word</Name></Entry>"
+        "<Entry><Index>47</Index><BitLen>32</BitLen><Name>Position command</Name></Entry></RxPdo>"
+        "<TxPdo Sm='3'><Index>#x1010</Index><Name>AT</Name>"
+        "<Entry><Index>135</Index><BitLen>16</BitLen><Name>Drive status word</Name></Entry>"
+        "<Entry><Index>51</Index><BitLen>32</BitLen><Name>Position</Name></Entry>"
+        "<Entry><Index>189</Index><BitLen>32</BitLen><Name>Distance</Name></Entry></TxPdo>";
+    start("esi",
+          described(std::string(mailbox_managers) + process_data + "<Mailbox><SoE/></Mailbox>"));
+    to_preop();
+    const auto read = [&](std::uint8_t drive, std::uint16_t number, std::uint8_t element) {
+        Bytes request(soe::header_bytes);
+        soe::write(request.data(), {soe::Opcode::read, false, false, drive, element, number});
+        Bytes answer = ask(MailboxType::soe, request);
+        const auto header = soe::read(answer);
+        EXPECT_TRUE(header && !header->error) << number;
+        answer.erase(answer.begin(), answer.begin() + soe::header_bytes);
+        return answer;
+    };
+    // IEC 61800-7-204: two lengths, then the parameters after the control or status word
+    EXPECT_EQ(read(0, soe::idn_mdt_list, soe::element::value), (Bytes{2, 0, 2, 0, 47, 0}));
+    EXPECT_EQ(read(1, soe::idn_at_list, soe::element::value), (Bytes{4, 0, 4, 0, 51, 0, 189, 0}));
+    EXPECT_EQ(read(0, 47, soe::element::attribute), (Bytes{0, 0, 2, 0})) << "4 bytes";
+    EXPECT_EQ(read(0, 134, soe::element::attribute), (Bytes{0, 0, 1, 0})) << "2 bytes";
+}
+
 TEST_F(EsiDevice, The_servo_accepts_a_mapping_that_is_written_object_by_object) {
     start("servo");
     to_preop();
