@@ -47,11 +47,35 @@ std::string error_words(std::uint16_t code) {
     return print(", error 0x%04X: ", code) + error_word(code);
 }
 
-/// Returns false for causes that neither a statusword nor another number explains.
-bool has_number(Cause cause) noexcept {
-    return cause != Cause::lost && cause != Cause::not_enabled && cause != Cause::unwritten &&
-           cause != Cause::unread;
-}
+/// The number that explains a failure.
+enum class Number : std::uint8_t { none, value, time, statusword };
+
+struct CauseRow {
+    Number number;
+    const char* placeholder;  ///< of the number, in a message formatted in advance
+};
+// by Cause
+constexpr CauseRow cause_rows[] = {
+    {Number::statusword, " (statusword {x})"},  // none
+    {Number::time, " for {} s"},                // stays
+    {Number::statusword, " (statusword {x})"},  // drive_fault
+    {Number::statusword, " (statusword {x})"},  // left
+    {Number::none, ""},                         // lost
+    {Number::time, " for {} s"},                // mode_rejected
+    {Number::value, ": {}"},                    // following_error
+    {Number::value, ": {}"},                    // step_rejected
+    {Number::value, ": {}"},                    // bad_command
+    {Number::value, ": {}"},                    // bad_factor
+    {Number::statusword, " (statusword {x})"},  // homing_error
+    {Number::time, " within {} s"},             // homing_timeout
+    {Number::time, " for {} s"},                // set_point
+    {Number::none, ""},                         // not_enabled
+    {Number::none, ""},                         // unwritten
+    {Number::none, ""},                         // unread
+};
+static_assert(std::size(cause_rows) == causes);
+
+const CauseRow& row_of(Cause cause) noexcept { return cause_rows[static_cast<std::size_t>(cause)]; }
 
 /// Returns a hint derived from the other bits of the statusword.
 std::string hint(const Failure& f) {
@@ -126,20 +150,15 @@ std::string sentence(const Failure& f) {
 
 std::string text(const Failure& f) {
     std::string all = sentence(f);
-    if (f.cause == Cause::stays || f.cause == Cause::mode_rejected || f.cause == Cause::set_point) {
-        all += print(" for %.2f s", seconds(f.after));
-    }
-    if (f.cause == Cause::homing_timeout) {
-        all += print(" within %.2f s", seconds(f.after));
-    }
+    const Number number = row_of(f.cause).number;
     if (f.cause == Cause::following_error || f.cause == Cause::step_rejected) {
         return all + print(" (%g, limit %g)", f.value, f.limit);
     }
-    if (f.cause == Cause::bad_command || f.cause == Cause::bad_factor) {
-        return all + print(" (%g)", f.value);
-    }
-    if (f.cause == Cause::none || !has_number(f.cause)) {
-        return all;
+    if (number == Number::value) return all + print(" (%g)", f.value);
+    if (f.cause == Cause::none || number == Number::none) return all;
+    if (number == Number::time) {
+        const char* const relation = f.cause == Cause::homing_timeout ? "within" : "for";
+        all += print(" %s %.2f s", relation, seconds(f.after));
     }
     return all + print(" (statusword 0x%04X", f.statusword) + error_words(f.error_code) + ")" +
            hint(f);
@@ -184,27 +203,8 @@ std::uint32_t key_of(const Failure& f) noexcept {
 
 /// Returns the message with a placeholder for its number and with the reaction of the axis.
 std::string reason(const Failure& f) {
-    const char* number = " (statusword {x})";
-    switch (f.cause) {
-    case Cause::lost:
-    case Cause::not_enabled:
-    case Cause::unwritten:
-    case Cause::unread: number = ""; break;
-    case Cause::stays:
-    case Cause::mode_rejected:
-    case Cause::set_point: number = " for {} s"; break;
-    case Cause::homing_timeout: number = " within {} s"; break;
-    case Cause::drive_fault:
-        if (f.error_code != 0) {
-            number = " (error code {x})";
-        }
-        break;
-    case Cause::following_error:
-    case Cause::step_rejected:
-    case Cause::bad_command:
-    case Cause::bad_factor: number = ": {}"; break;
-    default: break;
-    }
+    const bool has_error_code = f.cause == Cause::drive_fault && f.error_code != 0;
+    const char* const number = has_error_code ? " (error code {x})" : row_of(f.cause).placeholder;
     return sentence(f) + number + (f.request == Request::run ? "; axis stopped" : "; axis off");
 }
 
@@ -282,22 +282,14 @@ const char* Sentences::find(const Failure& f) const noexcept {
 }
 
 double Sentences::number(const Failure& f) noexcept {
-    switch (f.cause) {
-    case Cause::stays:
-    case Cause::mode_rejected:
-    case Cause::homing_timeout:
-    case Cause::set_point: return seconds(f.after);
-    case Cause::drive_fault: return f.error_code != 0 ? f.error_code : f.statusword;
-    case Cause::lost:
-    case Cause::not_enabled:
-    case Cause::unwritten:
-    case Cause::unread: return std::numeric_limits<double>::quiet_NaN();
-    case Cause::following_error:
-    case Cause::step_rejected:
-    case Cause::bad_command:
-    case Cause::bad_factor: return f.value;
-    default: return f.statusword;
+    if (f.cause == Cause::drive_fault && f.error_code != 0) return f.error_code;
+    switch (row_of(f.cause).number) {
+    case Number::none: break;
+    case Number::value: return f.value;
+    case Number::time: return seconds(f.after);
+    case Number::statusword: return f.statusword;
     }
+    return std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace hal::cia402
