@@ -8,6 +8,7 @@
 
 #include "fieldbus/tdma/station/station.hpp"
 #include "fieldbus/tdma/wire/rtcfg_frames.hpp"
+#include "hal/task.hpp"
 
 namespace hal::tdma::rtcfg {
 
@@ -29,7 +30,7 @@ public:
     virtual void on_other_server(const Address&) noexcept = 0;
 };
 
-class Client final : public Companion {
+class Client final : public Companion, private hal::TaskChannel {
 public:
     /// `own`: identifies this station besides its MAC address. Requests stage 2 when `wants_file`. [setup]
     Client(Station& station, Logical own, ClientEvents& events, bool wants_file = true);
@@ -39,16 +40,39 @@ public:
     void begin() noexcept;  ///< forgets the server. [realtime]
     /// Accepts a server whose stage 1 is used, and announces this station to it. [realtime]
     void accept(const Address& server, std::uint16_t heartbeat_ms) noexcept;
-    bool configured() const noexcept { return step_ != Step::waiting; }
-    bool complete() const noexcept { return step_ == Step::ready; }
+    /// A server was accepted. [realtime]
+    bool configured() const noexcept { return busy(); }
+    /// The stage 2 file, if wanted, is complete, and the server knows it. [realtime]
+    bool complete() const noexcept { return ready_; }
     /// frames ignored: truncated, forged, of others
     std::uint64_t foreign() const noexcept { return foreign_; }
 
 private:
     static constexpr Time retry_after = 1'000'000'000;
-    enum class Step : std::uint8_t { waiting, announcing, receiving, finished, ready };
-    void take(const Message&, std::span<const std::uint8_t> data, Time now) noexcept;
-    bool send(Message& m) noexcept;
+    static constexpr std::size_t task_bytes = 2048;
+    enum class File : std::uint8_t { not_announced, expected, arriving, complete };
+
+    /// Waits for the next slots of the station: a task may send then.
+    struct NextSlots {
+        Client& client;
+        bool await_ready() const noexcept { return false; }
+        void await_suspend(std::coroutine_handle<> task) const noexcept { client.suspend(task); }
+        void await_resume() const noexcept {}
+    };
+    NextSlots next_slots() noexcept { return {*this}; }
+    hal::Task<> work() noexcept;
+    hal::Task<> receive_file() noexcept;
+    hal::Task<> sent(Id) noexcept;
+
+    Message message(Id) const noexcept;
+    bool send(Message) noexcept;
+    bool send(Id) noexcept;
+    bool is_late() const noexcept { return now_ - sent_at_ >= retry_after; }
+    bool arrived_stage_1(const Message&) noexcept;
+    bool arrived_stage_2(const Message&) noexcept;
+    bool arrived_fragment(const Message&) noexcept;
+    bool arrived(const Message&) noexcept;
+    void store(std::uint32_t offset, std::span<const std::uint8_t> data) noexcept;
     bool is_for_us(const Message&) const noexcept;
 
     Station& station_;
@@ -56,7 +80,8 @@ private:
     ClientEvents& events_;
     const bool wants_file_;
     std::vector<std::uint8_t> file_;
-    Step step_ = Step::waiting;
+    File file_state_ = File::not_announced;
+    bool ready_ = false;
     Address server_{};
     std::uint32_t length_ = 0;
     std::uint32_t received_ = 0;
@@ -66,6 +91,8 @@ private:
     bool acknowledge_ = false;
     std::uint16_t heartbeat_ms_ = 1000;
     std::uint64_t foreign_ = 0;
+    Time now_ = 0;
+    // when the newest frame to the server was sent, or one of the file received
     Time sent_at_ = INT64_MIN / 2;
     Address reply_to_{};
     bool reply_ = false;
