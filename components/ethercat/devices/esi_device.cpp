@@ -370,6 +370,26 @@ void add_empty_assignments(const sii::Contents& s, Dictionary& d) {
     }
 }
 
+/// Assigns the PDOs of the default operation mode, in its order, if it names numbers of samples:
+/// such a device follows the modes rather than the attributes of its PDOs.
+void assign_by_mode(esi::Device& device) {
+    if (device.op_modes.empty() || device.op_modes.front().samples() == 0) return;
+    for (auto* pdos : {&device.rx, &device.tx}) {
+        for (esi::Pdo& pdo : *pdos) {
+            pdo.sync_manager.reset();
+        }
+        auto next = pdos->begin();
+        for (const esi::OpMode::Assigned& one : device.op_modes.front().assigned) {
+            const auto at = std::find_if(next, pdos->end(),
+                                         [&](const esi::Pdo& p) { return p.index == one.pdo; });
+            if (at == pdos->end()) continue;
+            at->sync_manager = one.sync_manager;
+            std::rotate(next, at, at + 1);
+            ++next;
+        }
+    }
+}
+
 /// Returns the PDOs of a device that have several samples in a cycle.
 SampledPdos sampled_pdos(const esi::Device& device) {
     SampledPdos out;
@@ -402,10 +422,10 @@ SampledEntries sampled_entries(const std::vector<esi::Pdo>& pdos, Dictionary& d)
     SampledEntries out;
     for (const esi::Pdo& pdo : pdos) {
         for (const esi::Entry& e : pdo.entries) {
-            std::uint8_t* const data = e.index != 0 ? d.at(e.index, e.sub) : nullptr;
-            if (data == nullptr || e.bits == 0 || e.bits > 64) continue;
+            const DictionaryEntry* const object = e.index != 0 ? d.find(e.index, e.sub) : nullptr;
+            if (object == nullptr || object->bits < e.bits || e.bits == 0 || e.bits > 64) continue;
             const bool is_signed = e.type.ends_with("INT") && !e.type.starts_with("U");
-            const SampledEntry entry{data, e.bits, is_signed};
+            const SampledEntry entry{d.data(*object), e.bits, is_signed};
             if (pdo.oversampling) {
                 out.values.push_back(entry);
             } else if (lower(e.name).find("cyclecount") != std::string::npos) {
@@ -500,7 +520,8 @@ std::string not_emulated(const esi::Device& d) {
 }
 
 Parts make_esi_device(const DeviceOptions& o) {
-    const esi::Device device = esi::with_modules(*o.description, *o.described, o.module_idents);
+    esi::Device device = esi::with_modules(*o.description, *o.described, o.module_idents);
+    assign_by_mode(device);
     Design design;
     design.name = device.order;
     design.sii = esi::sii_contents(device);

@@ -22,7 +22,8 @@ void ProcessData::attach(Dictionary& dictionary, std::uint16_t assignment, bool 
         }
     }
     const auto* o = dictionary.find(assignment);
-    copies_.resize(o == nullptr ? 0 : entries * o->entries.size());
+    const std::size_t max_copies = 8 * max_bytes;  // of a bit each
+    copies_.resize(o == nullptr ? 0 : std::min(entries * o->entries.size(), max_copies));
 }
 
 bool ProcessData::is_pdo(std::uint16_t index) const noexcept {
