@@ -385,11 +385,15 @@ the state machine of the drive and steps it towards the commanded state, one tra
   `mode`. Then `position-fb` is the position counted by the drive.
 * `position-fb` = counts * `position-scale-divisor` / `position-scale`; it does not wrap with the drive's counter.
 
-The drive latches positions at its touch probes (60B8h to 60BDh) by itself, between two cycles. `probe-1-enable` arms probe 1: at the first
-rising edge of its input, `probe-1-latched` is TRUE and `probe-1-position` is the position of the edge. `probe-1-falling` and `probe-1-index` choose
-the falling edge and the index pulse; with `probe-1-continuous`, `probe-1-position` follows each further edge. FALSE and TRUE at `probe-1-enable` arm it again; so does another choice. Probe 2 has
-the same pins. `probe-1-armed` stays FALSE while the drive does not show the probe as enabled: `touch-probe-function`, `touch-probe-status` and the edges belong in
-the process data. In LinuxCNC, `probe-1-latched` fits `motion.probe-input`; motion then stops at the position of its own cycle, and `probe-1-position` has the exact one.
+The drive latches positions at its touch probes (60B8h to 60BDh) by itself, between two cycles:
+
+* `probe-1-enable` arms probe 1. At the first rising edge of its input, `probe-1-latched` becomes TRUE, and `probe-1-position` is the position of
+  the edge. `probe-1-falling` selects the falling edge, `probe-1-index` the index pulse of the encoder. With `probe-1-continuous`,
+  `probe-1-position` follows each further edge. Probe 2 has the same pins.
+* A rising edge of `probe-1-enable` arms the probe again, and so does another selection. What was latched before does not count.
+* `probe-1-armed` stays FALSE while the drive does not report the probe as enabled. `touch-probe-function`, `touch-probe-status` and the positions
+  of the edges must be in the process data.
+* For LinuxCNC, link `probe-1-latched` to `motion.probe-input`. Motion takes the position of its own cycle; `probe-1-position` is the exact one.
 
 Call `read-all` after the function that receives from the bus and `write-all` before the one that sends, with the controller of the axis
 between the two.
