@@ -938,8 +938,35 @@ shape safe-outputs
 devices safe-outputs 00000002
   EL2904          0B583052
 
+shape power-distribution
+  sm 2 out
+  4* pdo 1600+1 7000+10:01/1=chan-##-enable-us 7000+10:02/1=chan-##-enable-up /2
+      7000+10:05/1=chan-##-reset-us 7000+10:06/1=chan-##-reset-up /10
+  pdo 1604 f707:01/1 /2 f707:04/1=global-reset /12
+  sm 3 in
+  4* pdo 1a00+1 6000+10:01/1=chan-##-error-us 6000+10:02/1=chan-##-error-up
+      6000+10:03/1=chan-##-warning-us 6000+10:04/1=chan-##-warning-up
+      6000+10:05/1=chan-##-poweron-us 6000+10:06/1=chan-##-poweron-up 6000+10:07/1 /6 6000+10:0e/1
+      6000+10:0f/1 6000+10:10/1
+  pdo 1a04 f607:01/1=warning-temp f607:02/1=error-temp f607:03/1=warning-us f607:04/1=error-us
+      f607:05/1=warning-up f607:06/1=error-up f607:07/1 /4 f607:0c/1 /2 f607:0f/1 f607:10/1
+  object-pin chan-1-current-limit-type index=32768 sub=17 bits=16 signed=1
+  object-pin chan-1-current-limit-us index=32768 sub=18 bits=16 per-unit=1000
+  object-pin chan-1-current-limit-up index=32768 sub=19 bits=16 per-unit=1000
+  object-pin chan-2-current-limit-type index=32784 sub=17 bits=16 signed=1
+  object-pin chan-2-current-limit-us index=32784 sub=18 bits=16 per-unit=1000
+  object-pin chan-2-current-limit-up index=32784 sub=19 bits=16 per-unit=1000
+  object-pin chan-3-current-limit-type index=32800 sub=17 bits=16 signed=1
+  object-pin chan-3-current-limit-us index=32800 sub=18 bits=16 per-unit=1000
+  object-pin chan-3-current-limit-up index=32800 sub=19 bits=16 per-unit=1000
+  object-pin chan-4-current-limit-type index=32816 sub=17 bits=16 signed=1
+  object-pin chan-4-current-limit-us index=32816 sub=18 bits=16 per-unit=1000
+  object-pin chan-4-current-limit-up index=32816 sub=19 bits=16 per-unit=1000
+devices power-distribution 00000002
+  EP9214          23FE4052
+
 unsupported AX5101 AX5103 AX5106 AX5112 AX5118 AX5203 AX5206 AX5805 EasyIO EL1918_LOGIC
-unsupported EL2521 EL2564 EL6090 EL9576 EP9214 EpoCAT Ph3LM2RM StMDS5k
+unsupported EL2521 EL2564 EL6090 EL9576 EpoCAT Ph3LM2RM StMDS5k
 )";
 // clang-format on
 
