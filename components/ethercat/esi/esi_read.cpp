@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: MIT
+#include <array>
+#include <cstdio>
+
 #include "esi_xml.hpp"
 #include "text/numbers.hpp"
 
@@ -113,6 +116,8 @@ private:
         default_sync_manager(d, d.rx, sii::SmType::outputs);
 
         default_sync_manager(d, d.tx, sii::SmType::inputs);
+        unassign_excluded(node, d.rx);
+        unassign_excluded(node, d.tx);
         if (const Xml box = node.child("Mailbox")) {
             mailbox_of(box, d);
         }
@@ -282,6 +287,31 @@ private:
                     p.sync_manager = static_cast<std::uint8_t>(i);
                 }
             }
+        }
+    }
+
+    /// Of PDOs that are assigned by default and exclude each other, only one is assigned: the
+    /// mandatory one, or else the first.
+    void unassign_excluded(const Xml& node, std::vector<Pdo>& pdos) {
+        const auto names = [](const Pdo& pdo, std::uint16_t other) {
+            return std::find(pdo.exclude.begin(), pdo.exclude.end(), other) != pdo.exclude.end();
+        };
+        const auto text = [](const Pdo& pdo) {
+            std::array<char, 8> digits{};
+            std::snprintf(digits.data(), digits.size(), "%04X", pdo.index);
+            return std::string(digits.data());
+        };
+        for (Pdo& pdo : pdos) {
+            if (!pdo.sync_manager || pdo.mandatory) continue;
+            const auto kept = std::find_if(pdos.begin(), pdos.end(), [&](const Pdo& other) {
+                return (other.mandatory || &other < &pdo) && other.sync_manager &&
+                       (names(other, pdo.index) || names(pdo, other.index));
+            });
+            if (kept == pdos.end()) continue;
+            pdo.sync_manager.reset();
+            context_.warn(node, "PDOs " + text(*kept) + " and " + text(pdo) +
+                                    " exclude each other, but both are assigned by default; " +
+                                    text(pdo) + " is left out");
         }
     }
 

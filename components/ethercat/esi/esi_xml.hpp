@@ -66,6 +66,10 @@ struct Context {
             n = number("#x" + std::string(trimmed(value)));
             warn(at, shown + " has no #x; read as hexadecimal");
         }
+        if (!n && trimmed(value).starts_with("#x0x")) {
+            n = number("#x" + std::string(trimmed(value).substr(4)));
+            if (n) warn(at, shown + " has two prefixes; read as hexadecimal");
+        }
         if (!n) {
             error(at, "invalid " + shown, "write a number, as in 12 or #x1F");
             return otherwise;

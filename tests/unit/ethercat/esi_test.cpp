@@ -162,6 +162,37 @@ TEST(Esi, A_sync_manager_has_the_direction_of_its_PDOs) {
               "sync manager 1 is named Outputs, but has TxPDOs; it is read as Inputs");
 }
 
+TEST(Esi, A_number_with_two_prefixes_is_hexadecimal) {
+    const File file = read(
+        "<EtherCATInfo><Descriptions><Devices><Device><Type ProductCode='#x0x12'>BOX</Type>"
+        "<RxPdo><Index>#x0xy</Index></RxPdo></Device></Devices></Descriptions></EtherCATInfo>");
+    EXPECT_EQ(file.devices.at(0).product, 0x12U);
+    ASSERT_EQ(file.messages.size(), 2U);
+    EXPECT_EQ(file.messages[0].sentence,
+              "ProductCode '#x0x12' has two prefixes; read as hexadecimal");
+    EXPECT_EQ(file.messages[1].sentence, "invalid Index '#x0xy'");
+}
+
+TEST(Esi, Of_PDOs_that_exclude_each_other_one_is_assigned_by_default) {
+    const auto pdo = [](const std::string& attributes, const std::string& index,
+                        const std::string& excluded) {
+        return "<TxPdo Sm='0' " + attributes + "><Index>#x" + index + "</Index><Exclude>#x" +
+               excluded + "</Exclude></TxPdo>";
+    };
+    const File file = read(
+        "<EtherCATInfo><Descriptions><Devices><Device><Type ProductCode='1'>BOX</Type>"
+        "<Sm StartAddress='#x1000'>Inputs</Sm>" +
+        pdo("", "1a00", "1a01") + pdo("", "1a01", "1a00") + pdo("", "1a02", "1a03") +
+        pdo("Mandatory='1'", "1a03", "1a02") + "</Device></Devices></Descriptions></EtherCATInfo>");
+    const std::vector<Pdo>& pdos = file.devices.at(0).tx;
+    EXPECT_TRUE(pdos.at(0).sync_manager && !pdos.at(1).sync_manager);
+    EXPECT_TRUE(!pdos.at(2).sync_manager && pdos.at(3).sync_manager) << "the mandatory one";
+    ASSERT_EQ(file.messages.size(), 2U);
+    EXPECT_EQ(file.messages[0].sentence,
+              "PDOs 1A00 and 1A01 exclude each other, but both are assigned by default; 1A01 is "
+              "left out");
+}
+
 TEST(Esi, Dictionary_resolves_records_arrays_and_enumerations) {
     const File file = read(servo_text());
     const Device& d = *look_up(file, {.product = 0x402}).device;
