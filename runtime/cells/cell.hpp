@@ -39,7 +39,7 @@ public:
     /// Returns the index of a node, or size() when it is unknown.
     std::size_t find(std::string_view node) const;
 
-    // --- on the virtual clock ---------------------------------------------------------------------------------------------
+    // --- on the virtual clock --------------------------------------------------------------------
     /// Links the signals of other nodes and starts the threads of each node whose netlist did not.
     /// Returns false after any error.
     bool start(Output& output);

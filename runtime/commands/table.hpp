@@ -152,7 +152,7 @@ bool check_lock(const CommandRow& row, const Command& command, unsigned lock, co
 /// Makes a command that sets `NAME VALUE` a sets when NAME is a signal, else a setp.
 void resolve_set(const Model& model, Command& command);
 
-// --- functions, by file ---------------------------------------------------------------------------------------------------
+// --- functions, by file --------------------------------------------------------------------------
 // show.cpp
 void command_show(Context&);
 void command_list(Context&);

@@ -55,7 +55,7 @@ public:
     ~Core();
     Core(const Core&) = delete;
 
-    // --- by the thread --------------------------------------------------------------------------------------------
+    // --- by the thread ---------------------------------------------------------------------------
     /// Runs the cycle at position `grid_ns`, which was due at `due_ns`. The thread woke at
     /// `woke_ns`, just now; the execution time counts from then. [realtime]
     void cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns) noexcept;
@@ -86,7 +86,7 @@ public:
     /// [realtime]
     void step_clock(std::int64_t ns) noexcept;
 
-    // --- by the supervisor, in a thread of its own (supervisor.hpp) ----------------------------------------------------
+    // --- by the supervisor, in a thread of its own (supervisor.hpp) ------------------------------
     /// Stops the thread's functions because the running or due cycle does not end. Returns false if
     /// they were stopped already. [any]
     bool declare_hung() noexcept;
@@ -111,7 +111,7 @@ public:
     /// Takes offered probes, and answers an observation without a number.
     void serve_at_rest() noexcept;
 
-    // --- by the session ---------------------------------------------------------------------------------------------
+    // --- by the session --------------------------------------------------------------------------
     /// Puts a plan in the inbox; the thread answers by storing its epoch in taken().
     void offer(plan::Plan* plan) { inbox_.store(plan, std::memory_order_release); }
     /// Withdraws an unanswered plan. Returns false if the thread has taken it already.

@@ -15,7 +15,7 @@ class CycleMonitor {
 public:
     explicit CycleMonitor(std::int64_t period_ns) noexcept : period_ns_(period_ns) {}
 
-    // --- by the thread --------------------------------------------------------------------------------------------
+    // --- by the thread ---------------------------------------------------------------------------
     /// Begins supervision: the thread must finish its first cycle, which is due at `due_ns`, and
     /// all others. [realtime]
     void begin(std::int64_t now_ns, std::int64_t due_ns) noexcept;
@@ -40,7 +40,7 @@ public:
     /// nullptr: that cycle has no sample. [realtime]
     const plan::Step* sampled_step(std::int64_t woke_ns) const noexcept;
 
-    // --- by the supervisor ----------------------------------------------------------------------------------------
+    // --- by the supervisor -----------------------------------------------------------------------
     /// A thread that was created now and has not begun yet must finish its first cycle one period
     /// later. [setup]
     void expect(std::int64_t now_ns) noexcept;
@@ -50,7 +50,7 @@ public:
     /// Notes the step that the running cycle is at, so that an overrun report can name it.
     void sample(const CycleMark& mark) noexcept;
 
-    // --- by everyone ----------------------------------------------------------------------------------------------
+    // --- by everyone -----------------------------------------------------------------------------
     /// Notes that the running or due cycle does not end. Returns false if that is known. [any]
     bool declare_hung() noexcept;
     /// Returns true while the thread is declared hung and no cycle has ended since. [any]

@@ -69,7 +69,7 @@ public:
     /// Runs rtapi_app_exit() and unmaps the code: that of modules that use this one first.
     void destroy();
 
-    // --- for the functions of the interface -----------------------------------------------------------------------------
+    // --- for the functions of the interface ------------------------------------------------------
     /// The module that create() is running for; nullptr: none.
     static Module* current();
     static const std::vector<Module*>& all_running();
