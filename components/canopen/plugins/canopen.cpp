@@ -278,12 +278,7 @@ private:
     void on_lost(std::size_t place, const NodeStatus& s) noexcept {
         nodes_[place].is_faulty = true;
         // A fault of a node lasts until it runs again.
-        const FaultMessages::Fault& fault = messages_->lost(place, s);
-        if (s.last_heard != 0) {
-            begin(node_faults_[place], fault, silence(s));
-        } else {
-            begin(node_faults_[place], fault.text);
-        }
+        begin(node_faults_[place], messages_->lost(place, s), silence(s));
         reporter_->node(s);
     }
     /// Raises a fault for a node that did not boot or start, once until it runs.
@@ -316,9 +311,11 @@ private:
             end(short_faults_[n]);
         }
     }
-    /// Returns the time since the last frame of the node, in ns, whole milliseconds.
+    /// Returns the time since the last frame of the node, or since its boot began if it has sent
+    /// none, in ns, whole milliseconds.
     Time silence(const NodeStatus& s) const noexcept {
-        return (now_ - s.last_heard + millisecond / 2) / millisecond * millisecond;
+        const Time since = s.last_heard != 0 ? s.last_heard : s.begun;
+        return (now_ - since + millisecond / 2) / millisecond * millisecond;
     }
     using BusComponent::begin;
     /// Raises a fault with the value of its event; it lasts until end(). [realtime]
