@@ -11,6 +11,7 @@
 #include <locale.h>
 
 #include "text/characters.hpp"
+#include "text/numbers.hpp"
 
 namespace hal {
 
@@ -52,9 +53,8 @@ void parse_integer(std::string_view text, const char* type, LeadingZero zero, T&
         digits.remove_prefix(1);
     }
     int base = 10;
-    if (digits.size() > 2 && digits[0] == '0' && lower(digits[1]) == 'x') {
+    if (remove_hex_prefix(digits)) {
         base = 16;
-        digits.remove_prefix(2);
     } else if (digits.size() > 1 && digits[0] == '0' && zero == LeadingZero::octal) {
         base = 8;
     }

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "machine/processes/programs.hpp"
+#include "text/characters.hpp"
 
 namespace hal {
 namespace {
@@ -43,8 +44,7 @@ public:
             const std::size_t line = paragraph.find('\n');
             const bool whole = line != paragraph.npos;
             // "2 errors" of one node
-            const bool count =
-                !whole && !paragraph.empty() && paragraph[0] >= '0' && paragraph[0] <= '9';
+            const bool count = !whole && !paragraph.empty() && is_digit(paragraph[0]);
             if (paragraph.empty() || count ||
                 (whole && !printed_.insert(std::string(paragraph)).second)) {
                 continue;
@@ -149,7 +149,7 @@ bool Cell::connect(Output& output) {
     return !found.failed();
 }
 
-// --- on the virtual clock ---------------------------------------------------------------------------------------------------
+// --- on the virtual clock ------------------------------------------------------------------------
 
 bool Cell::start(Output& output) {
     bool good = true;

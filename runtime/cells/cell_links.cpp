@@ -7,6 +7,7 @@
 #include "cells/cell.hpp"
 #include "commands/files.hpp"
 #include "dds/links/links.hpp"
+#include "text/characters.hpp"
 
 namespace hal {
 namespace {
@@ -141,8 +142,7 @@ std::string cell_name(const std::vector<std::string>& files) {
         name.erase(dot);
     }
     for (char& c : name) {
-        if (!((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-              c == '-' || c == '_')) {
+        if (!is_name_character(c) || c == '.') {
             c = '_';
         }
     }

@@ -2,7 +2,6 @@
 // help, explain, print, echo and the other commands about the shell itself; the manual made from
 // the command table.
 #include <algorithm>
-#include <charconv>
 
 #include <fmt/format.h>
 
@@ -10,6 +9,7 @@
 #include "commands/script.hpp"
 #include "commands/table.hpp"
 #include "text/fault_pages.hpp"
+#include "text/numbers.hpp"
 
 namespace hal {
 namespace {
@@ -67,8 +67,7 @@ void command_unecho(Context& context) {
 void command_debug(Context& context) {
     const std::string& text = context.argument(0);
     int level = -1;
-    const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), level);
-    if (status != std::errc{} || end != text.data() + text.size() || level < 0 || level > 5) {
+    if (!parse_whole(text, level) || level < 0 || level > 5) {
         context.diagnostics.error("unknown-word", context.span(0),
                                   "'" + text + "' is not a valid level", "",
                                   "levels are 0..5: 0 prints nothing, 5 everything");

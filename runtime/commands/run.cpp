@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // start, stop, advance, lock, unlock: commands that act on the machine as a whole.
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <thread>
 
 #include "commands/table.hpp"
+#include "text/numbers.hpp"
 
 namespace hal {
 namespace {
@@ -14,9 +14,7 @@ constexpr auto look_again = std::chrono::milliseconds(1);
 
 std::optional<std::uint64_t> whole_number(std::string_view text) {
     std::uint64_t number = 0;
-    const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), number);
-    return status == std::errc{} && end == text.data() + text.size() ? std::optional(number)
-                                                                     : std::nullopt;
+    return parse_whole(text, number) ? std::optional(number) : std::nullopt;
 }
 
 /// Waits, without holding the lock of the session, until `done` (called with it) returns true.

@@ -42,7 +42,7 @@ std::string summary(std::size_t errors, std::size_t warnings, std::size_t notes)
     std::string text;
     const auto add = [&](std::size_t number, const char* noun) {
         if (number > 0) {
-            text += (text.empty() ? "" : ", ") + counted(number, noun);
+            append_item(text, counted(number, noun));
         }
     };
     add(errors, "error");
@@ -107,7 +107,7 @@ std::string lines_of(const Sources& sources, const std::vector<Span>& spans,
     }
     std::string text;
     for (const std::uint32_t source : order) {
-        text += (text.empty() ? "" : ", ") + text_of(runs_of(lines[source], breaks[source]));
+        append_item(text, text_of(runs_of(lines[source], breaks[source])));
         if (several) {
             text += " of " + sources.get(source).name;
         }
@@ -170,7 +170,8 @@ void ScriptEffects::report(Diagnostics& found, const ScriptOutcome& outcome) {
     }
 }
 
-std::string ScriptEffects::render_shown(const Diagnostics& shown, const ScriptOutcome& outcome) const {
+std::string ScriptEffects::render_shown(const Diagnostics& shown,
+                                        const ScriptOutcome& outcome) const {
     const bool edited = outcome.edits > 0;
     std::string text = render(shown, state_.session.sources, shell_.options.color);
     if (outcome.separately) return text;

@@ -17,6 +17,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "text/characters.hpp"
 #include "text/diagnostic.hpp"
 
 namespace hal {
@@ -311,12 +312,8 @@ Json environment_for(std::string_view text) {
         if (at < text.size() && text[at] == '(') {
             ++at;
         }
-        const auto name_character = [](char c) {
-            return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
-                   c == '_' || c == '.' || c == '-';
-        };
         std::string name;
-        while (at < text.size() && name_character(text[at])) {
+        while (at < text.size() && is_name_character(text[at])) {
             name += text[at++];
         }
         if (const char* const value = std::getenv(name.c_str())) {

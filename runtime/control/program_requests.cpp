@@ -12,6 +12,7 @@
 #include "control/streams.hpp"
 #include "machine/processes/programs.hpp"
 #include "machine/session.hpp"
+#include "text/characters.hpp"
 #include "text/netlist_name.hpp"
 
 namespace hal {
@@ -384,23 +385,18 @@ void leave_component(const Program& by, const Json& body) {
     by.session.programs().leave(owned(by, name));
 }
 
-// --- byte streams ----------------------------------------------------------------------------------------------------------
+// --- byte streams --------------------------------------------------------------------------------
 
 namespace {
 
 std::string bytes_of(const std::string& hex) {
     std::string bytes;
-    const auto digit = [&](char c) -> int {
-        if (c >= '0' && c <= '9') return c - '0';
-        if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-        if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-        throw RequestError{"bytes are written as pairs of hexadecimal digits"};
-    };
-    if (hex.size() % 2 != 0) {
+    const auto is_hex = [](char c) { return hex_digit(c) >= 0; };
+    if (hex.size() % 2 != 0 || !std::ranges::all_of(hex, is_hex)) {
         throw RequestError{"bytes are written as pairs of hexadecimal digits"};
     }
     for (std::size_t i = 0; i < hex.size(); i += 2) {
-        bytes += static_cast<char>(digit(hex[i]) * 16 + digit(hex[i + 1]));
+        bytes += static_cast<char>(hex_digit(hex[i]) * 16 + hex_digit(hex[i + 1]));
     }
     return bytes;
 }

@@ -516,9 +516,8 @@ bool Edit::add_function(Word function_name, Word thread_name, int position, Span
     const int index = position > 0 ? position - 1 : size + 1 + position;
     if (index < 0 || index > size) {
         return fail("bad-position", position_at,
-                    "thread " + hal::quoted(to->name) + " has " + std::to_string(size) +
-                        (size == 1 ? " function" : " functions") + ", position " +
-                        std::to_string(position) + " does not exist",
+                    "thread " + hal::quoted(to->name) + " has " + counted(size, "function") +
+                        ", position " + std::to_string(position) + " does not exist",
                     "",
                     "positions 1 to " + std::to_string(size + 1) +
                         " count from the beginning, -1 to -" + std::to_string(size + 1) +

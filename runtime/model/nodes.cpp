@@ -6,6 +6,8 @@
 #include <set>
 
 #include "model/edit.hpp"
+#include "text/characters.hpp"
+#include "text/quoting.hpp"
 
 namespace hal {
 namespace {
@@ -127,11 +129,7 @@ private:
 
     void cross(const Seen& writer, const std::vector<Seen>& readers) {
         const Signal& written = *writer.signal;
-        const auto sendable = [](char c) {
-            return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                   c == '-' || c == '_' || c == '.';
-        };
-        if (!std::all_of(written.name.begin(), written.name.end(), sendable)) {
+        if (!std::ranges::all_of(written.name, is_name_character)) {
             return refuse("node-crossing",
                           "signal '" + written.name + "' passes from node '" + node(writer) +
                               "' to node '" + node(readers[0]) + "', but its name cannot be sent",
@@ -202,7 +200,7 @@ bool NodeTopic::read_by(std::size_t node) const {
 std::string NodeTopic::layout() const {
     std::string text;
     for (const NodeField& field : fields) {
-        text += (text.empty() ? "" : ", ") + field.signal + ":" + name(field.type);
+        append_item(text, field.signal + ":" + name(field.type));
     }
     return text;
 }

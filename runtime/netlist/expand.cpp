@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "netlist/netlist.hpp"
+#include "text/quoting.hpp"
 
 namespace hal {
 
@@ -368,9 +369,7 @@ private:
     }
 
     std::vector<Command> mismatch(const Word& leader, const Word& word) {
-        const auto names = [](const Word& w) {
-            return std::to_string(w.count) + (w.count == 1 ? " name" : " names");
-        };
+        const auto names = [](const Word& w) { return counted(w.count, "name"); };
         Diagnostic made{.code = "range-length",
                         .message = "'" + leader.token->text + "' expands to " + names(leader) +
                                    ", '" + word.token->text + "' to " + std::to_string(word.count)};

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "text/characters.hpp"
+
 namespace hal {
 
 std::size_t Line::piece_of(std::size_t at) const {
@@ -152,11 +154,6 @@ QuoteScan scan_quotes(std::string_view text) {
 }
 
 namespace {
-
-bool is_name_character(char c) {
-    return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '.' ||
-           c == '_' || c == '-';
-}
 
 /// NAME or (NAME) at `at`, into `reference`, which starts at `start`.
 void name_at(std::string_view text, std::size_t start, std::size_t at, Reference::Kind kind,

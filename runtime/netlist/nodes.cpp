@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "base/types.hpp"
+#include "text/characters.hpp"
 
 namespace hal {
 namespace {
@@ -14,10 +15,7 @@ constexpr std::int64_t shortest_ns = 100'000;
 constexpr std::int64_t longest_ns = 60'000'000'000;
 
 bool good_name(std::string_view name) {
-    const auto good = [](char c) {
-        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-               c == '-' || c == '_';
-    };
+    const auto good = [](char c) { return is_name_character(c) && c != '.'; };
     return !name.empty() && name.size() <= longest_name &&
            std::all_of(name.begin(), name.end(), good);
 }

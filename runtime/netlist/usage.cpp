@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <unordered_map>
 
+#include "text/quoting.hpp"
+
 namespace hal {
 namespace {
 
@@ -130,9 +132,7 @@ bool check_arity(const Usage& usage, const Token& name, std::span<const Token> a
                           (min == max ? ""
                            : few      ? "at least "
                                       : "at most ") +
-                          std::to_string(bound) +
-                          (bound == 1 ? " argument, not " : " arguments, not ") +
-                          std::to_string(given),
+                          counted(bound, "argument") + ", not " + std::to_string(given),
                       "", remedy.empty() ? to_string(usage) : remedy);
     return false;
 }

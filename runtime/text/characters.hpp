@@ -15,6 +15,29 @@ constexpr bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c
 /// Returns the lower-case form of an ASCII letter, any other byte unchanged.
 constexpr char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
+/// Returns the upper-case form of an ASCII letter, any other byte unchanged.
+constexpr char upper(char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; }
+
+/// Returns whether `c` is a decimal digit.
+constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/// Returns whether `c` is an ASCII letter.
+constexpr bool is_letter(char c) { return lower(c) >= 'a' && lower(c) <= 'z'; }
+
+/// Returns whether `c` is an ASCII letter or a digit.
+constexpr bool is_alphanumeric(char c) { return is_letter(c) || is_digit(c); }
+
+/// Returns whether `c` may be part of a name: a letter, a digit, or one of . - _
+constexpr bool is_name_character(char c) {
+    return is_alphanumeric(c) || c == '.' || c == '-' || c == '_';
+}
+
+/// Returns the value of a hexadecimal digit; -1 for any other character.
+constexpr int hex_digit(char c) {
+    if (is_digit(c)) return c - '0';
+    return lower(c) >= 'a' && lower(c) <= 'f' ? lower(c) - 'a' + 10 : -1;
+}
+
 /// Returns the text with its ASCII letters in lower case.
 inline std::string lower(std::string_view text) {
     std::string out(text);
@@ -46,7 +69,7 @@ inline std::string dashed(std::string_view name) {
     std::string out;
     for (const char c : name) {
         const char s = lower(c);
-        if ((s >= 'a' && s <= 'z') || (s >= '0' && s <= '9')) {
+        if (is_alphanumeric(s)) {
             out += s;
         } else if (!out.empty() && out.back() != '-') {
             out += '-';

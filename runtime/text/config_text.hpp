@@ -18,6 +18,7 @@
 #include <string_view>
 #include <vector>
 
+#include "text/quoting.hpp"
 #include "text/severity.hpp"
 
 namespace hal::text {
@@ -120,8 +121,7 @@ std::string errors_text(const std::vector<Message<Topic>>& messages, const std::
     std::string out;
     for (const auto& m : messages) {
         if (m.severity == Severity::error) {
-            out += (out.empty() ? "" : "\n") +
-                   message_text(file, m.severity, m.at, m.sentence, m.help);
+            append_item(out, message_text(file, m.severity, m.at, m.sentence, m.help), "\n");
         }
     }
     return out;

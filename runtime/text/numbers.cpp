@@ -20,14 +20,9 @@ constexpr Unit duration_units[] = {{"ns", 1},  {"us", 1e3},   {"µs", 1e3},  {"m
 }  // namespace
 
 std::optional<std::uint64_t> parse_natural(std::string_view text) {
-    const bool hex = text.starts_with("0x") || text.starts_with("0X");
-    if (hex) {
-        text.remove_prefix(2);
-    }
+    const int base = remove_hex_prefix(text) ? 16 : 10;
     std::uint64_t value = 0;
-    const auto [stop, status] = std::from_chars(text.begin(), text.end(), value, hex ? 16 : 10);
-    if (status != std::errc{} || stop != text.end()) return std::nullopt;
-    return value;
+    return parse_whole(text, value, base) ? std::optional(value) : std::nullopt;
 }
 
 std::optional<double> parse_real(std::string_view text) {

@@ -2,12 +2,41 @@
 // Numbers and durations as people write them. The locale never matters. Everything here is [setup].
 #pragma once
 
+#include <charconv>
+#include <concepts>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 namespace hal {
+
+/// Parses a text that is one number and nothing else, without a leading + or 0x. Returns false and
+/// leaves `to` unchanged if it is not, or if the number is out of range for the type.
+template <std::integral Number>
+bool parse_whole(std::string_view text, Number& to, int base = 10) {
+    Number value{};
+    const auto [stop, status] = std::from_chars(text.begin(), text.end(), value, base);
+    const bool good = status == std::errc{} && stop == text.end();
+    to = good ? value : to;
+    return good;
+}
+template <std::floating_point Number>
+bool parse_whole(std::string_view text, Number& to) {
+    Number value{};
+    const auto [stop, status] = std::from_chars(text.begin(), text.end(), value);
+    const bool good = status == std::errc{} && stop == text.end();
+    to = good ? value : to;
+    return good;
+}
+
+/// Removes 0x or 0X before digits. Returns whether it was there.
+constexpr bool remove_hex_prefix(std::string_view& text) {
+    const bool found = text.size() > 2 && (text.starts_with("0x") || text.starts_with("0X"));
+    text.remove_prefix(found ? 2 : 0);
+    return found;
+}
 
 /// Parses an unsigned integer, decimal or hexadecimal with 0x.
 std::optional<std::uint64_t> parse_natural(std::string_view text);

@@ -5,6 +5,7 @@
 
 #include "text/diagnostic.hpp"
 #include "text/glyphs.hpp"
+#include "text/quoting.hpp"
 #include "text/rendered_order.hpp"
 
 namespace hal {
@@ -332,7 +333,7 @@ std::string render(const Diagnostics& diagnostics, const Sources& sources, bool 
     const std::size_t all = diagnostics.all().size();
     const std::vector<std::size_t> order = rendered_order(diagnostics);
     for (const std::size_t i : order) {
-        out += (out.empty() ? "" : "\n") + render(diagnostics.all()[i], sources, color);
+        append_item(out, render(diagnostics.all()[i], sources, color), "\n");
     }
     if (all > order.size()) {
         out += "\nand " + std::to_string(all - order.size()) + " more not shown; fix these first\n";

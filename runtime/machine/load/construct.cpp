@@ -11,6 +11,7 @@
 #include "machine/load/construction.hpp"
 #include "machine/load/setup_call.hpp"
 #include "machine/load/thread_options.hpp"
+#include "text/quoting.hpp"
 
 namespace hal {
 
@@ -432,7 +433,7 @@ private:
         diagnostics_.error("bad-argument", list->second.at,
                            "argument '" + list->first + "' lists " +
                                std::to_string(first.list_length) + " values for " +
-                               std::to_string(total) + (total == 1 ? " instance" : " instances"));
+                               counted(total, "instance"));
         return false;
     }
 

@@ -270,7 +270,7 @@ bool is_used(Elaboration& on, const LoadedComponent& component, Span at) {
         if (!on.model.find_component(user)) {
             continue;  // unloaded in the same transaction
         }
-        users += (users.empty() ? "" : ", ") + user;
+        append_item(users, user);
         commands += (commands.empty() ? "unloadrt " : ", then unloadrt ") + user;
     }
     if (users.empty()) return false;
@@ -306,7 +306,7 @@ void edits::loadrt(Elaboration& on, Args args) {
     }
     std::string text;
     for (const Token& token : args.subspan(1)) {
-        text += (text.empty() ? "" : " ") + written(token.text);
+        append_item(text, written(token.text), " ");
     }
     if (args[0].text == "threads" && origin != Origin::linuxcnc) {
         return load_threads(on, args[0], args.subspan(1), text);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // newthread, delthread, addf, initf and delf.
 #include <algorithm>
-#include <charconv>
 #include <unordered_map>
 
 #include "machine/load/elaborate.hpp"
 #include "machine/load/thread_options.hpp"
 #include "model/order.hpp"
+#include "text/numbers.hpp"
 #include "text/quoting.hpp"
 
 namespace hal {
@@ -62,9 +62,7 @@ void place_function(Elaboration& on, Args args, bool init) {
     if (args.size() > 2) {
         const std::string& text = args[2].text;
         position_at = args[2].span;
-        const char* const first = text.data() + (text.starts_with('+') ? 1 : 0);
-        const auto [end, problem] = std::from_chars(first, text.data() + text.size(), position);
-        if (problem != std::errc{} || end != text.data() + text.size()) {
+        if (!parse_whole(std::string_view(text).substr(text.starts_with('+') ? 1 : 0), position)) {
             on.diagnostics.error("bad-position", position_at,
                                  hal::quoted(text) + " is not a position", "",
                                  "1 is the first place, -1 the last");

@@ -2,21 +2,17 @@
 #include "machine/load/thread_options.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <optional>
 #include <utility>
+
+#include "text/numbers.hpp"
 
 namespace hal {
 namespace {
 
 constexpr std::int64_t shortest_period_ns = 1000;
 constexpr std::int64_t longest_period_ns = 1'000'000'000'000;
-
-bool whole(std::string_view text, std::int64_t& value) {
-    const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return problem == std::errc{} && end == text.data() + text.size();
-}
 
 /// A period of 0 or below in `loadrt threads`, as LinuxCNC reads it.
 bool is_no_period(std::string_view text) {
@@ -38,9 +34,9 @@ bool set_period(NewThread& thread, std::string_view text, Span at, Diagnostics& 
 
 // Each of these sets an option of a thread, or returns false for an invalid value.
 
-bool parse_whole(std::string_view text, std::int64_t min, std::int64_t max, int& value) {
+bool parse_between(std::string_view text, std::int64_t min, std::int64_t max, int& value) {
     std::int64_t number = 0;
-    if (!whole(text, number) || number < min || number > max) return false;
+    if (!parse_whole(text, number) || number < min || number > max) return false;
     value = static_cast<int>(number);
     return true;
 }
@@ -55,11 +51,11 @@ bool parse_ns(std::string_view text, std::int64_t& value) {
 bool parse_fp(std::string_view, ThreadOptions&) { return true; }  // every thread has it
 
 bool parse_cpu(std::string_view text, ThreadOptions& o) {
-    return parse_whole(text, 0, 1023, o.cpu);
+    return parse_between(text, 0, 1023, o.cpu);
 }
 
 bool parse_priority(std::string_view text, ThreadOptions& o) {
-    return parse_whole(text, 1, 99, o.priority);
+    return parse_between(text, 1, 99, o.priority);
 }
 
 bool parse_policy(std::string_view text, ThreadOptions& o) {
@@ -195,7 +191,7 @@ bool parse_threads(std::span<const Token> args, Span at, std::vector<NewThread>&
         std::int64_t number = 0;
         bool known = false;
         if (equals != std::string_view::npos && digits < equals &&
-            whole(text.substr(digits, equals - digits), number)) {
+            parse_whole(text.substr(digits, equals - digits), number)) {
             const std::string_view key = text.substr(0, digits);
             const std::string_view value = text.substr(equals + 1);
             NewThread& thread = by_number[number];

@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "text/characters.hpp"
 #include "text/folder_entries.hpp"
 
 namespace hal {
@@ -90,12 +91,8 @@ void remove_left_behind(const std::string& name) {
 }  // namespace
 
 bool good_instance_name(std::string_view name) {
-    const auto good = [](char c) {
-        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-               c == '-' || c == '_' || c == '.';
-    };
     return !name.empty() && name.size() <= 64 && name[0] != '.' &&
-           std::all_of(name.begin(), name.end(), good);
+           std::ranges::all_of(name, is_name_character);
 }
 
 std::string socket_folder() {

@@ -11,6 +11,7 @@
 #include "machine/load/construct.hpp"
 #include "machine/run/running_model.hpp"
 #include "machine/run/state.hpp"
+#include "text/quoting.hpp"
 
 namespace hal {
 namespace {
@@ -67,7 +68,7 @@ void ProgramModel::add_component(Transaction&, const std::string& name, std::int
     component.process = pid;
     std::string text;
     for (const Token& token : command.args) {
-        text += (text.empty() ? "" : " ") + token.text;
+        append_item(text, token.text, " ");
     }
     state_.transaction.note({std::string(program_words::add), name, text});
     component.arguments.push_back(std::move(text));

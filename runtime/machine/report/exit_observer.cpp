@@ -22,6 +22,7 @@
 
 #include "base/own_descriptors.hpp"
 #include "model/model.hpp"
+#include "text/quoting.hpp"
 
 namespace hal {
 namespace {
@@ -250,8 +251,9 @@ void ExitObserver::report(pid_t machine) const {
         Described described;
         if (!mark.in_function || !read_description(names_, i, described)) continue;
         const std::string function = described.function_at(mark.current);
-        running += (running.empty() ? "" : ", ") + ("thread '" + described.thread + "' ran ") +
-                   (function.empty() ? std::string("a function") : "function " + function);
+        append_item(running,
+                    ("thread '" + described.thread + "' ran ") +
+                        (function.empty() ? std::string("a function") : "function " + function));
     }
     print_line("hal: machine '" + std::string(shared_->name) + "' (process " +
                std::to_string(machine) + ") ended without shutting down: " +

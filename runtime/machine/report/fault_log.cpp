@@ -12,6 +12,7 @@
 #include "machine/report/cpu_occupant.hpp"
 #include "model/model.hpp"
 #include "text/fault_pages.hpp"
+#include "text/quoting.hpp"
 
 namespace hal {
 
@@ -176,7 +177,7 @@ std::string modes_text(double differences) {
     std::string text;
     for (const auto& [difference, name] : names) {
         if ((static_cast<unsigned>(differences) & difference) == 0) continue;
-        text += (text.empty() ? "" : ", ") + std::string(name);
+        append_item(text, name);
     }
     return text;
 }

@@ -12,6 +12,7 @@
 #include "machine/report/fault_log.hpp"
 #include "machine/report/machine_view.hpp"
 #include "model/check/check.hpp"
+#include "text/quoting.hpp"
 
 namespace hal {
 namespace {
@@ -30,11 +31,10 @@ std::string delay_text(const PathDelay& path) {
     std::string line =
         path.pin->signal->name + ": " +
         (path.pin->dir == HAL_DIR_OUT ? path.far + " => " + pin : pin + " => " + path.far);
-    line += "  " + std::to_string(path.cycles) + (path.cycles == 1 ? " cycle" : " cycles") +
-            " on the wire, " + format_duration(static_cast<double>(path.worst_ns)) + " at worst";
+    line += "  " + counted(path.cycles, "cycle") + " on the wire, " +
+            format_duration(static_cast<double>(path.worst_ns)) + " at worst";
     if (path.round_trip != 0) {
-        line += "; there and back " + std::to_string(path.round_trip) +
-                (path.round_trip == 1 ? " cycle" : " cycles");
+        line += "; there and back " + counted(path.round_trip, "cycle");
     }
     return line;
 }
@@ -145,8 +145,8 @@ std::vector<std::string> Reports::missing_privileges() const {
         }
     }
     for (const std::string& one : refused_) {
-        what += (what.empty() ? "" : " and ") + one;
-        effect += std::string(effect.empty() ? "" : ", and ") + "a page fault can delay a cycle";
+        append_item(what, one, " and ");
+        append_item(effect, "a page fault can delay a cycle", ", and ");
     }
     if (!what.empty()) {
         missing.push_back("no " + what + " here: " + effect + "; grant it with: " +
