@@ -13,6 +13,7 @@
 #include "can/udp/can_udp.hpp"
 #include "link/address.hpp"
 #include "link/can.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::can {
 
@@ -57,9 +58,7 @@ std::optional<std::uint32_t> rate(std::string_view text) {
 
 std::optional<std::uint32_t> number(std::string_view text) {
     std::uint32_t value = 0;
-    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (wrong != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-    return value;
+    return parse_whole(text, value) ? std::optional(value) : std::nullopt;
 }
 
 /// Applies an option. Returns the problem, or "".

@@ -9,6 +9,7 @@
 #include "ethernet/udp/ethernet_udp.hpp"
 #include "link/address.hpp"
 #include "link/ethernet.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::ethernet {
 
@@ -27,9 +28,7 @@ using link::quoted;
 template <class T>
 std::string to_number(std::string_view key, std::string_view value, T& to, long min, long max) {
     long number = 0;
-    const auto [end, wrong] = std::from_chars(value.data(), value.data() + value.size(), number);
-    if (wrong != std::errc{} || end != value.data() + value.size() || number < min ||
-        number > max) {
+    if (!parse_whole(value, number) || number < min || number > max) {
         return "invalid " + std::string(key) + " " + quoted(value) + "; write a number " +
                std::to_string(min) + ".." + std::to_string(max);
     }

@@ -5,12 +5,12 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 
 #include "cane.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::can::cane {
 
@@ -27,11 +27,8 @@ bool is_in(const auto& keys, std::string_view key) {
 
 std::optional<unsigned> number(std::string_view text, unsigned min, unsigned max) {
     unsigned value = 0;
-    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (wrong != std::errc{} || end != text.data() + text.size() || value < min || value > max) {
-        return std::nullopt;
-    }
-    return value;
+    const bool good = parse_whole(text, value) && value >= min && value <= max;
+    return good ? std::optional(value) : std::nullopt;
 }
 
 std::string is(std::string_view key, std::string_view value, std::string_view write) {
@@ -56,9 +53,7 @@ std::string read_key(const std::string& file, std::optional<Key>& key) {
     std::array<std::uint8_t, 16> bytes{};
     bool good = text.size() == 32 && !(in >> more);
     for (std::size_t n = 0; good && n < 16; ++n) {
-        const auto [end, wrong] =
-            std::from_chars(text.data() + 2 * n, text.data() + 2 * n + 2, bytes[n], 16);
-        good = wrong == std::errc{} && end == text.data() + 2 * n + 2;
+        good = parse_whole(std::string_view(text).substr(2 * n, 2), bytes[n], 16);
     }
     if (!good) {
         return "invalid key file '" + file +

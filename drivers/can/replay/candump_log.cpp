@@ -12,20 +12,14 @@
 #include <vector>
 
 #include "link/capture.hpp"
+#include "text/characters.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::can {
 
 namespace {
 
-bool hex(std::string_view text, std::uint32_t& value) {
-    value = 0;
-    for (const char c : text) {
-        const auto digit = std::string_view("0123456789ABCDEFabcdef").find(c);
-        if (digit == std::string_view::npos) return false;
-        value = value << 4 | static_cast<std::uint32_t>(digit < 16 ? digit : digit - 6);
-    }
-    return !text.empty();
-}
+bool hex(std::string_view text, std::uint32_t& value) { return parse_whole(text, value, 16); }
 
 /// Parses the fraction; digits after the ninth are ignored.
 bool time_of(std::string_view text, std::int64_t& ns) {
@@ -37,7 +31,7 @@ bool time_of(std::string_view text, std::int64_t& ns) {
     for (const char c : text) {
         if (c == '.' && !point) {
             point = true;
-        } else if (c >= '0' && c <= '9') {
+        } else if (is_digit(c)) {
             digits = true;
             if (!point) {
                 whole = whole * 10 + (c - '0');
@@ -160,19 +154,14 @@ std::string_view next_word(std::string_view& line) {
 /// else.
 bool parse_length(std::string_view word, bool& fd, std::uint32_t& length) {
     if (word.size() < 3 || word.size() > 4) return false;
-    const bool raw = word.front() == '{' && word.back() == '}';
-    if (!raw && (word.front() != '[' || word.back() != ']')) return false;
     fd = word.size() == 4;
-    std::int64_t ns = 0;
-    if (raw && !hex(word.substr(1, word.size() - 2), length)) return false;
-    if (!raw && !time_of(word.substr(1, word.size() - 2), ns)) return false;
-    if (!raw) {
-        length = static_cast<std::uint32_t>(ns / 1'000'000'000);
+    const std::string_view digits = word.substr(1, word.size() - 2);
+    if (word.front() == '{' && word.back() == '}') {
+        const bool good = hex(digits, length);
+        length = std::min(length, 8U);
+        return good;
     }
-    if (raw && length > 8) {
-        length = 8;
-    }
-    return length <= 64;
+    return word.front() == '[' && word.back() == ']' && parse_whole(digits, length) && length <= 64;
 }
 
 enum class Screen : std::uint8_t { other, frame, no_time, not_hexadecimal };

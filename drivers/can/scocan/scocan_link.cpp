@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "scocan_link.hpp"
 
-#include <charconv>
 #include <ctime>
 
 #include "discipline/slot_exchange.hpp"
 #include "link/filtering.hpp"
+#include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::can::scocan {
 
@@ -44,10 +45,7 @@ Place parse(const std::string& text) {
     const std::string option = text.substr(question + 1);
 
     const std::string value = option.substr(std::min(option.find('=') + 1, option.size()));
-    const auto [end, wrong] =
-        std::from_chars(value.data(), value.data() + value.size(), target.slot);
-    if (wrong != std::errc{} || end != value.data() + value.size() || target.slot == 0 ||
-        target.slot > 255) {
+    if (!parse_whole(value, target.slot) || target.slot == 0 || target.slot > 255) {
         target.problem = "invalid slot '" + value + "'; write the number of a private slot of " +
                          target.node + ", as in scocan:" + target.node + "?slot=3";
     }
@@ -156,7 +154,7 @@ Opened open(const std::string& text, const Options& options) {
     if (!exchange) {
         std::string names;
         for (const auto& name : offered_slots()) {
-            names += (names.empty() ? "" : ", ") + name;
+            append_item(names, name);
         }
         return {nullptr,
                 "no node '" + target.node + "' in this process; " +

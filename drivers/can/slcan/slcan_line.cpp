@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "slcan_line.hpp"
 
+#include "text/characters.hpp"
+
 namespace hal::can::slcan {
 
 namespace {
@@ -11,12 +13,9 @@ constexpr char digits[] = "0123456789ABCDEF";
 bool number(std::string_view text, std::uint32_t& value) noexcept {
     value = 0;
     for (const char c : text) {
-        const unsigned digit = c >= '0' && c <= '9'   ? static_cast<unsigned>(c - '0')
-                               : c >= 'A' && c <= 'F' ? static_cast<unsigned>(c - 'A' + 10)
-                               : c >= 'a' && c <= 'f' ? static_cast<unsigned>(c - 'a' + 10)
-                                                      : 16U;
-        if (digit > 15) return false;
-        value = value << 4 | digit;
+        const int digit = hex_digit(c);
+        if (digit < 0) return false;
+        value = value << 4 | static_cast<unsigned>(digit);
     }
     return true;
 }

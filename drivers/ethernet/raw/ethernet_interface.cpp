@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "link/system.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::ethernet::rawether {
 
@@ -58,7 +59,7 @@ std::string interfaces() {
     std::string names;
     if (auto* const all = if_nameindex()) {
         for (const auto* i = all; i->if_index != 0; ++i) {
-            names += (names.empty() ? "" : ", ") + std::string(i->if_name);
+            append_item(names, i->if_name);
         }
         if_freenameindex(all);
     }

@@ -8,11 +8,11 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <charconv>
 #include <cstring>
 
 #include "link/system.hpp"
 #include "link/trace_frame.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::ethernet {
 
@@ -378,13 +378,11 @@ Opened open(const std::string& target, const Options& options) {
         return {nullptr, "missing host; write udp:127.0.0.1 for this machine"};
     }
     unsigned number = options.types.front();
-    if (colon != target.size()) {
-        const auto [end, wrong] = std::from_chars(port.data(), port.data() + port.size(), number);
-        if (wrong != std::errc{} || end != port.data() + port.size() || number == 0 ||
-            number > 65535) {
-            return {nullptr, "invalid port '" + port + "'; write udp:" + host + ":" +
-                                 std::to_string(options.types.front())};
-        }
+    const bool valid_port =
+        colon == target.size() || (parse_whole(port, number) && number != 0 && number <= 65535);
+    if (!valid_port) {
+        return {nullptr, "invalid port '" + port + "'; write udp:" + host + ":" +
+                             std::to_string(options.types.front())};
     }
     addrinfo wanted{}, *found = nullptr;
     wanted.ai_family = AF_INET;
