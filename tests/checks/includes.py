@@ -90,7 +90,7 @@ ROWS = {
     "components/sim": ["components"],
     "components/estimation": ["components"],
     "components/recording": ["components", "components/recording/mcap"],
-    "components/recording/mcap": ["runtime/sdk"],
+    "components/recording/mcap": ["runtime/sdk", "runtime/text"],
     "components/mobile": ["components"],
     "components/vision": ["components"],
     "components/dds": ["components", "components/dds/links"],

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -15,6 +14,8 @@
 #include "hal/pin_type.hpp"
 #include "recording/mcap/missing_rows.hpp"
 #include "recording/mcap/reader.hpp"
+#include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::mcap {
 namespace {
@@ -38,23 +39,17 @@ std::vector<std::string> csv_words(const std::string& line) {
     return words;
 }
 
-bool number_of(const std::string& text, double& value) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return error == std::errc() && end == text.data() + text.size();
-}
-
 template <class Int>
 bool whole_number(const std::string& text, std::uint64_t& word) {
     Int value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error == std::errc() && end == text.data() + text.size()) {
+    if (parse_whole(text, value)) {
         word = static_cast<std::uint64_t>(
             static_cast<std::conditional_t<std::is_signed_v<Int>, std::int64_t, std::uint64_t>>(
                 value));
         return true;
     }
     double real = 0;  // "1.0", "1e3": of another program
-    if (!number_of(text, real) || real != std::floor(real) || std::abs(real) > 0x1p53) return false;
+    if (!parse_whole(text, real) || real != std::floor(real) || std::abs(real) > 0x1p53) return false;
     if (real < static_cast<double>(std::numeric_limits<Int>::min()) ||
         real > static_cast<double>(std::numeric_limits<Int>::max())) {
         return false;
@@ -73,7 +68,7 @@ bool word_of(const std::string& text, hal_type type, std::uint64_t& word) {
             word = bit;
         } else if constexpr (std::is_same_v<T, double>) {
             double real = 0;
-            if (!number_of(text, real)) return false;
+            if (!parse_whole(text, real)) return false;
             word = std::bit_cast<std::uint64_t>(real);
         } else {
             return whole_number<T>(text, word);
@@ -85,8 +80,7 @@ bool word_of(const std::string& text, hal_type type, std::uint64_t& word) {
 /// What a reader of a table must know, though it was read; empty: nothing.
 std::string note_of_csv(std::size_t equal) {
     if (equal == 0) return "";
-    return std::to_string(equal) + (equal == 1 ? " row has" : " rows have") +
-           " the time of the row before";
+    return counted(equal, "row has", "rows have") + " the time of the row before";
 }
 
 /// Columns of which a row has values together: those of one thread. Columns that share a row, or are
@@ -226,7 +220,7 @@ private:
         const std::vector<std::string> words = csv_words(line);
         if (is_cut && words.size() < names_.size()) return end_here();
         double time_s = 0;
-        const bool is_row = words.size() == names_.size() && number_of(words[0], time_s);
+        const bool is_row = words.size() == names_.size() && parse_whole(words[0], time_s);
         if (!is_row || !(std::abs(time_s) < 9e9)) return not_numbers();
 
         std::size_t first_filled = 0;  // column

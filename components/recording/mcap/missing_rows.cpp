@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "text/quoting.hpp"
+
 namespace hal::mcap {
 namespace {
 
@@ -31,6 +33,14 @@ std::string of_tables(const Recording& recording) {
             table.topic.empty() ? values : "'" + table.topic.substr(0, 60) + "' (" + values + ")");
     }
     return tables.empty() ? "" : ", of " + listed(tables);
+}
+
+/// Returns "from 0.25 s to 0.5 s": the times of a chunk, counted from the first row that was read.
+std::string span_of(const ChunkIndex& chunk, std::int64_t first_row_ns) {
+    const std::int64_t begin = static_cast<std::int64_t>(chunk.begin_time) - first_row_ns;
+    const std::int64_t end = static_cast<std::int64_t>(chunk.end_time) - first_row_ns;
+    if (end < 0) return "before the first readable row";
+    return (begin < 0 ? "up to " : "from " + seconds(begin) + " to ") + seconds(end);
 }
 
 bool has_rows(const Recording& recording) {
@@ -61,18 +71,12 @@ std::string missing_rows(const Recording& recording) {
 std::string missing_rows(const Recording& recording, const std::vector<ChunkIndex>& damaged) {
     if (!has_rows(recording)) return missing_rows(recording);
     constexpr std::size_t max_named = 3;
-    const auto since_begin = [&](std::uint64_t ns) {
-        return seconds(static_cast<std::int64_t>(ns) - recording.begin_ns());
-    };
     std::vector<std::string> spans;
     for (std::size_t i = 0; i < damaged.size() && i < max_named; ++i) {
-        spans.push_back("from " + since_begin(damaged[i].begin_time) + " to " +
-                        since_begin(damaged[i].end_time));
+        spans.push_back(span_of(damaged[i], recording.begin_ns()));
     }
     if (damaged.size() > max_named) {
-        const std::size_t others = damaged.size() - max_named;
-        spans.push_back("in " + std::to_string(others) +
-                        (others == 1 ? " further chunk" : " further chunks"));
+        spans.push_back("in " + counted(damaged.size() - max_named, "further chunk"));
     }
     return "rows " + listed(spans) + " are missing" + of_tables(recording);
 }

@@ -16,7 +16,7 @@ std::string listed(const std::vector<std::string>& fields);
 /// is not read to its end.
 std::string missing_rows(const Recording& recording);
 /// Returns "rows from 0.25 s to 0.5 s are missing, ...": those of the damaged chunks of a file that
-/// has others.
+/// has others. Times count from the first readable row.
 std::string missing_rows(const Recording& recording, const std::vector<ChunkIndex>& damaged);
 
 }  // namespace hal::mcap

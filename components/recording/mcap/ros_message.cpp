@@ -3,8 +3,9 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <map>
+
+#include "text/numbers.hpp"
 
 namespace hal::mcap {
 namespace {
@@ -107,9 +108,7 @@ bool split_array(std::string_view type, Field& field, std::string_view& element)
     field.count = Field::Count::any;
     if (length.empty() || length.starts_with("<=")) return true;
     field.count = Field::Count::fixed;
-    const auto [end, error] =
-        std::from_chars(length.data(), length.data() + length.size(), field.length);
-    return error == std::errc() && end == length.data() + length.size() && field.length != 0;
+    return parse_whole(length, field.length) && field.length != 0;
 }
 
 /// Builds the tree of fields of a message.

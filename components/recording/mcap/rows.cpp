@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "recording/mcap/bytes.hpp"
+#include "text/characters.hpp"
 
 namespace hal::mcap {
 namespace {
@@ -34,19 +35,16 @@ const Kind& kind_of(hal_type type) {
 std::string ros_name(const std::string& name) {
     std::string field;
     for (const char c : name) {
-        const bool plain = (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9');
-        const char lower = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a')
-                           : plain              ? c
-                                                : '_';
-        if (lower != '_' || (!field.empty() && field.back() != '_')) {
-            field += lower;
+        const char plain = is_alphanumeric(c) ? lower(c) : '_';
+        if (plain != '_' || (!field.empty() && field.back() != '_')) {
+            field += plain;
         }
     }
     while (!field.empty() && field.back() == '_') {
         field.pop_back();
     }
     if (field.empty()) return "v";
-    if (field.front() >= '0' && field.front() <= '9') {
+    if (is_digit(field.front())) {
         field.insert(0, "v_");
     }
     return field;

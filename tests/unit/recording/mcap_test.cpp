@@ -205,6 +205,16 @@ TEST_F(DamagedFile, Names_all_damaged_chunks) {
     EXPECT_EQ(rows(), 3000u);
 }
 
+TEST_F(DamagedFile, Counts_time_from_the_first_readable_row) {
+    damage({0, 2});
+    EXPECT_NE(
+        recording.missing.find("; rows before the first readable row, from 1 s to 1.999 s are "
+                               "missing, of '"),
+        std::string::npos)
+        << recording.missing;
+    EXPECT_EQ(rows(), 3000u);
+}
+
 TEST_F(DamagedFile, Names_three_of_many_damaged_chunks) {
     damage({0, 1, 2, 3});
     EXPECT_NE(recording.missing.find(", in 1 further chunk are missing, of '"), std::string::npos)
