@@ -11,6 +11,7 @@
 #include "ethercat/wire/coe.hpp"
 #include "ethercat/wire/soe.hpp"
 #include "link/ethernet.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::ethercat::config {
 
@@ -48,10 +49,6 @@ std::string abort_words(std::int64_t code) {
     return "SDO abort " + hex(code, 8) + " (" + coe::abort_text(number) + ")";
 }
 
-std::string bytes_words(std::size_t bytes) {
-    return std::to_string(bytes) + (bytes == 1 ? " byte" : " bytes");
-}
-
 /// Returns what the master wrote into the sync managers, where a state was rejected because of
 /// them.
 std::string configured_words(std::int64_t code, const master::Slave& slave) {
@@ -66,7 +63,7 @@ std::string configured_words(std::int64_t code, const master::Slave& slave) {
                 bits += e.bits;
             }
         }
-        list += (list.empty() ? "" : " and ") + bytes_words((bits + 7) / 8) +
+        list += (list.empty() ? "" : " and ") + counted((bits + 7) / 8, "byte") +
                 (sm.output ? " of outputs" : " of inputs") + " in sync manager " +
                 std::to_string(sm.number);
     }
@@ -109,7 +106,7 @@ std::string write_words(std::int64_t object, std::int64_t code, const master::Sl
     }
     const std::string value =
         at->complete || at->data.size() > 8
-            ? bytes_words(at->data.size())
+            ? counted(at->data.size(), "byte")
             : hex(static_cast<std::int64_t>(number), static_cast<int>(2 * at->data.size()));
     return "rejects " + value + " for " + what + ": " + why + "; " +
            (at->line != 0
@@ -336,10 +333,6 @@ struct Source {
         return lcec ? of_lcec : own;
     }
 };
-
-std::string counted(std::int64_t number, const char* noun) {
-    return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
-}
 
 std::string identity(const Source& s) {
     const auto of = [&](const char* what, const char* key, const char* attribute) {
