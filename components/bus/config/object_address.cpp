@@ -2,7 +2,6 @@
 #include "bus/config/object_address.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cstdio>
 
 #include "text/numbers.hpp"
@@ -17,10 +16,7 @@ bool has_prefix(std::string_view text) { return text.starts_with("0x") || text.s
 
 std::optional<unsigned> parse_hex(std::string_view digits, unsigned max) {
     unsigned value = 0;
-    const auto [stop, status] = std::from_chars(digits.begin(), digits.end(), value, 16);
-    if (digits.empty() || status != std::errc{} || stop != digits.end() || value > max) {
-        return std::nullopt;
-    }
+    if (!parse_whole(digits, value, 16) || value > max) return std::nullopt;
     return value;
 }
 

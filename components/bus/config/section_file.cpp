@@ -5,6 +5,7 @@
 
 #include "bus/config/key_table.hpp"
 #include "text/characters.hpp"
+#include "text/quoting.hpp"
 #include "text/suggest.hpp"
 
 namespace hal::bus {
@@ -194,7 +195,7 @@ void SectionFile::report_unknown(const Section& section, std::span<const Section
     std::string forms;
     const auto list = [&](const SectionKind& kind) {
         names.push_back(kind.name);
-        forms += (forms.empty() ? "" : ", ") + std::string(kind.form);
+        append_item(forms, kind.form);
     };
     list(kinds.front());  // [bus]
     std::for_each(std::begin(shared_kinds), std::end(shared_kinds), list);

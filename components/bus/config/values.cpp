@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "text/characters.hpp"
+
 namespace hal::bus {
 
 namespace {
@@ -70,8 +72,7 @@ std::optional<bool> parse_flag(std::string_view text) {
 bool is_name(std::string_view text, std::string_view more) {
     constexpr std::size_t max_length = 40;
     const auto fits = [&](char c) {
-        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-               c == '-' || c == '_' || more.find(c) != more.npos;
+        return is_alphanumeric(c) || c == '-' || c == '_' || more.find(c) != more.npos;
     };
     return text.size() <= max_length && std::all_of(text.begin(), text.end(), fits);
 }

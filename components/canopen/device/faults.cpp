@@ -6,6 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include "text/numbers.hpp"
+#include "text/quoting.hpp"
+
 namespace hal::canopen {
 
 namespace {
@@ -83,7 +86,7 @@ bool parse_time(std::string_view text, Time& time) {
 std::string names() {
     std::string all;
     for (const auto& row : rows) {
-        all += (all.empty() ? "" : ", ") + std::string(row.name);
+        append_item(all, row.name);
     }
     return all;
 }
@@ -129,9 +132,7 @@ bool parse_fault(std::string_view text, Fault& fault, FaultSetting& setting, std
         const auto value = part.substr(std::min(equals + 1, part.size()));
         bool good = false;
         if (key == "every") {
-            const auto [end, wrong] =
-                std::from_chars(value.data(), value.data() + value.size(), setting.every);
-            good = wrong == std::errc{} && end == value.data() + value.size() && setting.every != 0;
+            good = parse_whole(value, setting.every) && setting.every != 0;
         } else if (key == "time" && row->time != 0) {
             good = parse_time(value, setting.time) && setting.time != 0;
         } else if (key == "from") {

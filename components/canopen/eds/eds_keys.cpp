@@ -4,21 +4,20 @@
 #include <cstdio>
 
 #include "eds_reader.hpp"
+#include "text/characters.hpp"
+#include "text/numbers.hpp"
 #include "text/suggest.hpp"
 
 namespace hal::canopen::eds {
 
 namespace {
 
-bool is_hex(char c) {
-    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
-}
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
+bool is_hex(char c) { return hex_digit(c) >= 0; }
 
 unsigned hex_value(std::string_view text) {
     unsigned value = 0;
     for (const char c : text) {
-        value = value << 4 | static_cast<unsigned>(is_digit(c) ? c - '0' : (c | 0x20) - 'a' + 10);
+        value = value << 4 | static_cast<unsigned>(hex_digit(c));
     }
     return value;
 }
@@ -39,15 +38,6 @@ std::string label(std::uint16_t index, unsigned sub) {
 }
 
 namespace {
-
-/// Removes "0x"; returns whether it was there.
-bool remove_hex_prefix(std::string_view& text) {
-    const bool is_there = text.size() > 2 && text[0] == '0' && (text[1] == 'x' || text[1] == 'X');
-    if (is_there) {
-        text.remove_prefix(2);
-    }
-    return is_there;
-}
 
 std::string without_blanks(std::string_view text) {
     std::string out(text);

@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "eds_reader.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::canopen::eds {
 
@@ -47,9 +48,8 @@ private:
         // mm-dd-yyyy
         const auto number = [&](std::size_t from, std::size_t n) {
             int value = -1;
-            const auto [end, error] =
-                std::from_chars(out.data() + from, out.data() + from + n, value);
-            return error == std::errc() && end == out.data() + from + n ? value : -1;
+            parse_whole(std::string_view(out).substr(from, n), value);
+            return value;
         };
         const bool shape = out.size() == 10 && out[2] == '-' && out[5] == '-';
         if (shape && number(0, 2) >= 1 && number(0, 2) <= 12 && number(3, 2) >= 1 &&

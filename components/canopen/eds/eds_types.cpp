@@ -11,6 +11,9 @@
 #include <iterator>
 
 #include "eds_text.hpp"
+#include "text/characters.hpp"
+#include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::canopen::eds {
 
@@ -64,23 +67,15 @@ struct Term {
 std::optional<Term> term(std::string_view text) {
     Term out;
     int base = 10;
-    if (text.size() > 2 && text[0] == '0' && (text[1] == 'x' || text[1] == 'X')) {
+    out.hex = remove_hex_prefix(text);
+    if (out.hex) {
         base = 16;
-        text.remove_prefix(2);
-        out.hex = true;
     } else if (text.size() > 1 && text[0] == '0') {
         base = text.find_first_of("89") == std::string_view::npos ? 8 : 10;
         out.spelling = base == 8 ? Spelling::octal : Spelling::decimal_with_zero;
     }
-    while (!text.empty() &&
-           (text.back() == 'u' || text.back() == 'U' || text.back() == 'l' || text.back() == 'L')) {
-        text.remove_suffix(1);
-    }
-    const auto [end, error] =
-        std::from_chars(text.data(), text.data() + text.size(), out.value, base);
-    if (text.empty() || error != std::errc() || end != text.data() + text.size()) {
-        return {};
-    }
+    text = text.substr(0, text.find_last_not_of("uUlL") + 1);
+    if (!parse_whole(text, out.value, base)) return {};
     // 00 and 007 are the same in both systems.
     if (out.spelling == Spelling::octal && out.value < 8) {
         out.spelling = Spelling::plain;
@@ -185,23 +180,13 @@ Encoded integer(std::string_view text, const DataType& type, unsigned node_id) {
     return out;
 }
 
-/// Returns the value of a hexadecimal digit; -1 for another character.
-int hexadecimal_digit(char c) {
-    if (c >= '0' && c <= '9') return c - '0';
-    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-    if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-    return -1;
-}
-
 Encoded octets(std::string_view text) {
     Encoded out;
-    if (text.size() > 2 && text[0] == '0' && (text[1] == 'x' || text[1] == 'X')) {
-        text.remove_prefix(2);
-    }
+    remove_hex_prefix(text);
     int high = -1;
     for (const char c : text) {
         if (c == ' ' || c == '\t' || c == ',') continue;
-        const int digit = hexadecimal_digit(c);
+        const int digit = hex_digit(c);
         if (digit < 0) {
             out.error = quoted(text) + " is not a sequence of hexadecimal bytes";
             out.bytes.clear();
@@ -408,11 +393,7 @@ std::optional<double> parse_real(std::string_view text) {
         text.remove_suffix(1);
     }
     double out = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
-    if (text.empty() || error != std::errc() || end != text.data() + text.size()) {
-        return {};
-    }
-    return out;
+    return parse_whole(text, out) ? std::optional(out) : std::nullopt;
 }
 
 Encoded encode(std::string_view text, std::uint16_t code, unsigned node_id) {
@@ -471,7 +452,7 @@ std::string spell(std::span<const std::uint8_t> bytes, std::uint16_t code) {
         for (const std::uint8_t byte : bytes) {
             std::array<char, 4> two{};
             std::snprintf(two.data(), two.size(), "%02X", byte);
-            out += (out.empty() ? "" : " ") + std::string(two.data());
+            append_item(out, std::string(two.data()), " ");
         }
         return out;
     }

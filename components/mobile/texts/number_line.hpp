@@ -9,6 +9,7 @@
 
 #include "text/config_text.hpp"
 #include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::mobile {
 
@@ -31,10 +32,9 @@ inline bool read_numbers(const std::vector<text::Word>& words, std::size_t first
     }
     const auto& last = words.back().at;
     if (words.size() != first + to.size()) {
-        const std::size_t count = words.size() - first;
         text::add(problems, words[0].at.offset, last.offset + last.length,
-                  "'" + words[0].text.substr(0, 60) + "' has " + std::to_string(count) +
-                      (count == 1 ? " number" : " numbers") + ", expected " +
+                  "'" + words[0].text.substr(0, 60) + "' has " +
+                      counted(words.size() - first, "number") + ", expected " +
                       std::to_string(to.size()),
                   "write " + form);
         return false;

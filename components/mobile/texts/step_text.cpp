@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "text/characters.hpp"
 #include "text/numbers.hpp"
 #include "text/suggest.hpp"
 
@@ -14,7 +15,7 @@ using Words = std::vector<text::Word>;
 
 bool is_name(const std::string& name) {
     return !name.empty() && name.size() <= 40 && std::all_of(name.begin(), name.end(), [](char c) {
-        return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-';
+        return (is_alphanumeric(c) && c == lower(c)) || c == '-';
     });
 }
 

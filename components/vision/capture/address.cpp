@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "hal/rejection.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::vision {
 namespace {
@@ -111,7 +112,7 @@ void Address::finish() const {
         if (option.asked) continue;
         std::string names;
         for (const std::string& name : known_) {
-            names += (names.empty() ? "" : ", ") + name;
+            append_item(names, name);
         }
         throw hal::ArgumentError("source", "source=" + text_ + ": " + driver_ +
                                                ": has no option '" + option.name + "'; it has " +

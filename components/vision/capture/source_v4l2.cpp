@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "hal/rejection.hpp"
+#include "text/quoting.hpp"
 #include "vision/capture/v4l2.hpp"
 
 namespace hal::vision {
@@ -219,7 +220,7 @@ private:
             if (system_.control(fd_, VIDIOC_ENUM_FMT, &one) == -1) break;
             yuyv = yuyv || one.pixelformat == V4L2_PIX_FMT_YUYV;
             grey = grey || one.pixelformat == V4L2_PIX_FMT_GREY;
-            offered += (offered.empty() ? "" : ", ") + four_letters(one.pixelformat);
+            append_item(offered, four_letters(one.pixelformat));
         }
         if (!yuyv && !grey) {
             return fail(FrameError::unusable,

@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include "hal/rejection.hpp"
+#include "text/quoting.hpp"
 
 #if CV_VERSION_MAJOR != 4 || CV_VERSION_MINOR >= 7
 #error \
@@ -47,7 +48,7 @@ int number_of(const std::string& name) {
     std::string names;
     for (const Named& d : dictionaries) {
         if (name == d.name) return d.number;
-        names += std::string(names.empty() ? "" : ", ") + d.name;
+        append_item(names, d.name);
     }
     throw hal::ArgumentError("dictionary",
                              "dictionary=" + name + " is unknown; there are " + names);

@@ -2,8 +2,9 @@
 #include "io.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+
+#include "text/numbers.hpp"
 
 namespace hal::canopen {
 
@@ -260,9 +261,7 @@ void Io::take_error_values() noexcept {
 bool Io::set(std::string_view name, double value) {
     const auto place = [&](std::string_view before, unsigned count, unsigned& n) {
         if (!name.starts_with(before)) return false;
-        const auto digits = name.substr(before.size());
-        const auto [end, wrong] = std::from_chars(digits.data(), digits.data() + digits.size(), n);
-        return wrong == std::errc{} && end == digits.data() + digits.size() && n < count;
+        return parse_whole(name.substr(before.size()), n) && n < count;
     };
     unsigned n = 0;
     if (place("in-", settings_.digital_inputs, n)) {

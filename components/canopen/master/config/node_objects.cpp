@@ -6,6 +6,8 @@
 #include <cmath>
 #include <set>
 
+#include "text/characters.hpp"
+
 namespace hal::canopen::config {
 
 namespace {
@@ -129,10 +131,7 @@ bool read_unit(ObjectTarget& to, const Line& line) {
 
 bool read_name(ObjectTarget& to, const Line& line) {
     const std::string& text = line.value.text;
-    const auto usable = [](char c) {
-        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-               c == '-' || c == '.' || c == '_' || c == '#';
-    };
+    const auto usable = [](char c) { return is_name_character(c) || c == '#'; };
     if (!std::all_of(text.begin(), text.end(), usable)) return false;
     to.object.pin = text;
     return true;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "text/characters.hpp"
+
 namespace hal::canopen::config {
 
 namespace {
@@ -10,9 +12,7 @@ namespace {
 constexpr unsigned max_pdos = 512;
 
 std::string upper(std::string text) {
-    for (char& c : text) {
-        c = static_cast<char>(c >= 'a' && c <= 'z' ? c - 'a' + 'A' : c);
-    }
+    std::ranges::transform(text, text.begin(), [](char c) { return hal::upper(c); });
     return text;
 }
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "text/characters.hpp"
+
 namespace hal::canopen::gateway {
 
 namespace {
@@ -18,11 +20,7 @@ std::string format_text(const char* form, Arguments... arguments) {
 std::string upper(const char* text) {
     std::string out = text;
     for (char& c : out) {
-        if (c == '-') {
-            c = '_';
-        } else if (c >= 'a' && c <= 'z') {
-            c = static_cast<char>(c - 'a' + 'A');
-        }
+        c = c == '-' ? '_' : hal::upper(c);
     }
     return out;
 }

@@ -3,6 +3,8 @@
 
 #include <cstdio>
 
+#include "text/quoting.hpp"
+
 namespace hal::canopen::gateway {
 
 namespace {
@@ -16,7 +18,7 @@ std::string hexadecimal(std::uint32_t value) {
 std::string identity_text(const canopen::Identity& identity) {
     std::string text;
     for (const std::uint32_t part : identity) {
-        text += (text.empty() ? "" : " ") + hexadecimal(part);
+        append_item(text, hexadecimal(part), " ");
     }
     return text;
 }
@@ -88,7 +90,7 @@ std::optional<LssJob::Response> LssJob::proceed(const Command& c, LssMaster& lss
     if (!result.answered) return Response{Error::timeout};
     switch (c.verb) {
     case Verb::lss_inquire:
-        text_ += (text_.empty() ? "" : " ") + hexadecimal(result.value);
+        append_item(text_, hexadecimal(result.value), " ");
         if (!c.numbers.empty() || part_ == 3) return Response{Error::none, text_};
         ++part_;
         started_ = false;  // for the next part

@@ -7,6 +7,8 @@
 #include <cstdio>
 
 #include "canopen/eds/eds_text.hpp"
+#include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::canopen::gateway {
 
@@ -94,8 +96,7 @@ std::uint64_t max_magnitude(const Format& format, bool negative, bool hexadecima
 
 bool real(std::string_view text, const Format& format, std::uint64_t& value) {
     double number = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (text.empty() || error != std::errc() || end != text.data() + text.size()) return false;
+    if (!parse_whole(text, number)) return false;
     if (format.type == Type::real32) {
         store(&value, static_cast<float>(number));
     } else {
@@ -130,10 +131,7 @@ bool hex_bytes(std::span<const std::string> words, std::vector<std::uint8_t>& by
         if (word.size() % 2 != 0) return false;
         for (std::size_t n = 0; n < word.size(); n += 2) {
             std::uint8_t byte = 0;
-            if (const auto r = std::from_chars(word.data() + n, word.data() + n + 2, byte, 16);
-                r.ec != std::errc() || r.ptr != word.data() + n + 2) {
-                return false;
-            }
+            if (!parse_whole(std::string_view(word).substr(n, 2), byte, 16)) return false;
             bytes.push_back(byte);
         }
     }
@@ -194,7 +192,7 @@ std::string text_of(std::span<const std::uint8_t> bytes, const Format& format) {
     for (const std::uint8_t byte : bytes) {
         std::array<char, 4> two{};
         std::snprintf(two.data(), two.size(), "%02X", byte);
-        text += (text.empty() ? "" : " ") + std::string(two.data());
+        append_item(text, std::string(two.data()), " ");
     }
     return text;
 }
@@ -223,15 +221,12 @@ bool read_number(std::string_view text, bool& negative, std::uint64_t& magnitude
         text.remove_prefix(1);
     }
     int base = 10;
-    if (text.size() > 2 && text[0] == '0' && (text[1] == 'x' || text[1] == 'X')) {
+    if (remove_hex_prefix(text)) {
         base = 16;
-        text.remove_prefix(2);
     } else if (text.size() > 1 && text[0] == '0') {
         base = 8;
     }
-    const auto [end, error] =
-        std::from_chars(text.data(), text.data() + text.size(), magnitude, base);
-    return !text.empty() && error == std::errc() && end == text.data() + text.size();
+    return parse_whole(text, magnitude, base);
 }
 
 std::string base64(std::span<const std::uint8_t> bytes) {

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "link/timing.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::scocan {
 
@@ -114,7 +115,7 @@ std::uint16_t crc16(std::string_view text) noexcept {
 std::string names(const Table& table) {
     std::string text;
     for (const Node& n : table.nodes) {
-        text += (text.empty() ? "" : ", ") + n.name;
+        append_item(text, n.name);
     }
     return text;
 }

@@ -5,6 +5,7 @@
 
 #include "bus/config/key_table.hpp"
 #include "table.hpp"
+#include "text/characters.hpp"
 #include "text/numbers.hpp"
 #include "text/quoting.hpp"
 #include "text/suggest.hpp"
@@ -52,7 +53,7 @@ private:
 
     void line(const Words& words) {
         const Word& first = words.front();
-        if (first.text[0] >= '0' && first.text[0] <= '9') return slot(words);
+        if (is_digit(first.text[0])) return slot(words);
         const auto* key = keys().find(first.text);
         if (key == nullptr) {
             return error(Topic::line, first.at, "unknown key " + quoted(first.text),

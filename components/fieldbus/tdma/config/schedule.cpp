@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "hal/read_file.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tdma::config {
 
@@ -101,7 +102,7 @@ std::optional<std::size_t> find(const Schedule& s, std::string_view which) {
 std::string names(const Schedule& s) {
     std::string text;
     for (const StationEntry& e : s.stations) {
-        text += (text.empty() ? "" : ", ") + e.name;
+        append_item(text, e.name);
     }
     return text;
 }

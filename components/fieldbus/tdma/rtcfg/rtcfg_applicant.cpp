@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "hal/replace_file.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tdma::rtcfg {
 
@@ -153,9 +154,8 @@ void Applicant::check(const Offer& offer) {
     rejections_ = 0;
     StationSetup setup = config::setup_of(reading.schedule, 0);
     const auto& entry = reading.schedule.stations[0];
-    const auto count =
-        std::to_string(setup.slots.size()) + (setup.slots.size() == 1 ? " slot" : " slots");
-    log("configured by " + server + " as station " + entry.name + ": " + count + ", cycle " +
+    log("configured by " + server + " as station " + entry.name + ": " +
+        counted(setup.slots.size(), "slot") + ", cycle " +
         config::microseconds(reading.schedule.cycle));
     SegmentFaults faults(reading.schedule, setup);
     all_.push_back(std::make_unique<Accepted>(Accepted{offer.server, std::move(text),

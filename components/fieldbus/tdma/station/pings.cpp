@@ -46,15 +46,14 @@ bool Pings::accept(std::size_t n, const Address& from, const Echo& echo, Time ar
 }
 
 void Pings::expire(Time now, Time timeout_ns, bool running) noexcept {
+    const Outcome unsent = running ? Outcome::no_room : Outcome::not_running;
     for (Entry& e : list_) {
         if (e.step == Step::idle) continue;
         if (e.began == 0) {
             e.began = now;
         }
         if (now - e.began <= timeout_ns) continue;
-        end(e, e.step == Step::sent ? Outcome::unanswered
-               : running            ? Outcome::no_room
-                                    : Outcome::not_running);
+        end(e, e.step == Step::sent ? Outcome::unanswered : unsent);
     }
 }
 

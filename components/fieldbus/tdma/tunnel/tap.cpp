@@ -6,12 +6,12 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <thread>
 
 #include "hal/message_log.hpp"
 #include "link/system.hpp"
 #include "tap/tap.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::tdma {
 
@@ -182,11 +182,7 @@ std::optional<unsigned> parse_prefix(std::string_view text) {
         return static_cast<unsigned>(std::countl_one(bits));
     }
     unsigned bits = 0;
-    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), bits);
-    if (wrong != std::errc{} || end != text.data() + text.size() || bits > 32) {
-        return {};
-    }
-    return bits;
+    return parse_whole(text, bits) && bits <= 32 ? std::optional(bits) : std::nullopt;
 }
 
 }  // namespace hal::tdma
