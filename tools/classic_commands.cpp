@@ -74,7 +74,7 @@ int complete_word() {
     for (const Candidate& candidate : client->complete(typed, typed.size()).candidates) {
         text += candidate.text + "\n";
     }
-    return print(text) ? 0 : 1;
+    return exit_code(print(text));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "cli/output.hpp"
 #include "command_line.hpp"
+#include "text/characters.hpp"
 
 namespace hal::tools {
 namespace {
@@ -38,7 +39,7 @@ int halmeter(int argc, char** argv) {
         const std::string word = argv[i];
         if (word == "-s") continue;
         if (word == "-g") {
-            while (i + 1 < argc && argv[i + 1][0] >= '0' && argv[i + 1][0] <= '9') {
+            while (i + 1 < argc && is_digit(argv[i + 1][0])) {
                 ++i;
             }
             continue;

@@ -15,6 +15,7 @@
 #include "paths.hpp"
 #include "subcommand.hpp"
 #include "text/diagnostic.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -184,7 +185,7 @@ std::string version_text() {
     std::string left_out;
     for (const TreePackage& p : tree_packages) {
         std::string& list = p.built() ? built : left_out;
-        list += fmt::format("{}{}", list.empty() ? "" : ", ", p.name);
+        append_item(list, p.name);
         if (p.state == PackageState::switched_off) {
             list += fmt::format(" ({}=OFF)", package_switch(p.name));
         } else if (!p.built()) {
@@ -202,10 +203,10 @@ std::string version_text() {
 std::string version_json() {
     std::string packages;
     for (const TreePackage& p : tree_packages) {
-        packages += fmt::format(
-            R"({}{{"name":"{}","summary":"{}","built":{},"switch":"{}","needs":"{}"}})",
-            packages.empty() ? "\n " : ",\n ", p.name, p.summary, p.built(),
-            package_switch(p.name), p.needs);
+        packages +=
+            fmt::format(R"({}{{"name":"{}","summary":"{}","built":{},"switch":"{}","needs":"{}"}})",
+                        packages.empty() ? "\n " : ",\n ", p.name, p.summary, p.built(),
+                        package_switch(p.name), p.needs);
     }
     return fmt::format(R"({{"version":"{}","commit":"{}","packages":[{}]}})", paths::version,
                        paths::commit, packages) +
@@ -227,12 +228,12 @@ int help(const std::vector<std::string>& about) {
     if (const Found found = find(about); found.row) {
         const TreePackage* const missing = found.row->missing_package();
         if (missing) return refuse(found.row->name, *missing);
-        return print(help_of(*found.row)) ? 0 : 1;
+        return exit_code(print(help_of(*found.row)));
     }
     if (const Group* group = find_group(about.front()); group && about.size() == 1) {
         const TreePackage* const missing = missing_package(group->name);
         if (missing) return refuse(group->name, *missing);
-        return print(help_of(*group)) ? 0 : 1;
+        return exit_code(print(help_of(*group)));
     }
     // The common beginning of some commands: can sdo, can eds.
     std::string start, text;

@@ -6,6 +6,7 @@
 
 #include "cli/output.hpp"
 #include "command_line.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -54,13 +55,13 @@ int run_completion(const CompletionOptions& options) {
         commands += " " + completion.name;
         std::string all;
         for (const std::string& option : completion.options) {
-            all += (all.empty() ? "" : " ") + option;
+            append_item(all, option, " ");
         }
         cases += fmt::format("            {}) options='{}' ;;\n", completion.name, all);
         if (completion.words.empty()) continue;
         std::string words;
         for (const std::string& word : completion.words) {
-            words += (words.empty() ? "" : " ") + word;
+            append_item(words, word, " ");
         }
         groups += fmt::format(
             "        {}) if [ \"$COMP_CWORD\" -eq 2 ]; then COMPREPLY=($(compgen -W '{}' -- "
@@ -72,7 +73,7 @@ int run_completion(const CompletionOptions& options) {
     replace(text, "@COMMANDS@", commands);
     replace(text, "@OPTIONS@", cases);
     replace(text, "@GROUPS@", groups);
-    return print(text) ? 0 : 1;
+    return exit_code(print(text));
 }
 
 }  // namespace hal::tools

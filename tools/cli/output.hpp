@@ -20,6 +20,9 @@ bool write_all(int descriptor, std::string_view text);
 /// stderr, unless the reader has closed the pipe (`| head`).
 bool print(std::string_view text);
 
+/// Returns the exit code of a command. [any]
+constexpr int exit_code(bool success) { return success ? 0 : 1; }
+
 /// Reads a text file ("-": standard input). On failure returns false and sets `text` to the reason.
 bool read_file(const std::string& path, std::string& text);
 

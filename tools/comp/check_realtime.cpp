@@ -88,7 +88,7 @@ int check_realtime(const Options& options, const BuiltPlugin& built, Language la
                         : fmt::format("{} cannot be checked: the check ended with status {}",
                                       built.name, WEXITSTATUS(status)));
     }
-    return found == 0 ? 0 : 1;
+    return exit_code(found == 0);
 }
 
 }  // namespace hal::tools

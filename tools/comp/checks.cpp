@@ -5,6 +5,7 @@
 #include <map>
 
 #include "comp/syntax.hpp"
+#include "text/characters.hpp"
 
 namespace hal::comp {
 namespace {
@@ -97,7 +98,7 @@ void c_names_differ(const Checking& c) {
                            keyword ? "a C keyword" : "reserved for code that hal compile adds",
                            "append '_', which keeps the name in netlists: " + name.text + "_");
         }
-        if (name.c.empty() || (name.c[0] >= '0' && name.c[0] <= '9')) {
+        if (name.c.empty() || is_digit(name.c[0])) {
             return c.error(name.span, "invalid C name '" + name.text + "'");
         }
         const auto [other, added] = names.emplace(name.c, name.span);

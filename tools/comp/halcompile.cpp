@@ -87,7 +87,7 @@ int show(const Page& page, const TemporaryFolder& folder) {
             }
         }
     }
-    return status == 0 || print(as_text(page)) ? 0 : 1;
+    return exit_code(status == 0 || print(as_text(page)));
 }
 
 int to_page(Mode mode, const CompileOptions& options, const std::string& path) {

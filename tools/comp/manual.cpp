@@ -5,6 +5,7 @@
 
 #include "base/types.hpp"
 #include "comp/syntax.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::comp {
 namespace {
@@ -168,7 +169,7 @@ private:
         Macro macro{line.substr(1, end - 1), arguments(line.substr(end)), {}};
         for (std::string& word : macro.words) {
             word = inline_text(word);
-            macro.all += (macro.all.empty() ? "" : " ") + word;
+            append_item(macro.all, word, " ");
         }
         return macro;
     }
@@ -286,7 +287,7 @@ std::string joined(const std::vector<Text>& texts, const char* between) {
     for (const Text& text : texts) {
         const std::string converted = markdown_of(text.text);
         if (!converted.empty()) {
-            all += (all.empty() ? "" : between) + converted;
+            append_item(all, converted, between);
         }
     }
     return all;

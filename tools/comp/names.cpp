@@ -2,14 +2,13 @@
 #include <algorithm>
 
 #include "comp/syntax.hpp"
+#include "text/characters.hpp"
 
 namespace hal::comp {
 namespace {
 
 bool separates(char c) { return c == '.' || c == '_' || c == '-'; }
-bool is_word(char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
-}
+bool is_word(char c) { return is_alphanumeric(c) || c == '_'; }
 
 // `code` from `at` on: behind the comment or the literal that starts there, or at itself.
 std::size_t behind_text(std::string_view code, std::size_t at) {

@@ -15,6 +15,7 @@
 #include "cli/output.hpp"
 #include "machine/load/plugins.hpp"
 #include "netlist/netlist.hpp"
+#include "text/characters.hpp"
 #include "text/diagnostic.hpp"
 #include "text/folder_entries.hpp"
 
@@ -116,31 +117,27 @@ constexpr std::string_view keywords[] = {
     "union",    "unsigned", "using",     "virtual",   "void",      "volatile",  "while",
     "xor",      "xor_eq"};
 
-bool letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
-bool digit(char c) { return c >= '0' && c <= '9'; }
-
 /// The nearest name that would do.
 std::string repaired(const std::string& name) {
     std::string good;
     for (const char c : name) {
-        if (letter(c) || (digit(c) && !good.empty())) {
+        if (is_letter(c) || (is_digit(c) && !good.empty())) {
             good += c;
         } else if (!good.empty() && good.back() != '-') {
             good += c == '_' ? '_' : '-';
         }
     }
-    while (!good.empty() && !letter(good.back()) && !digit(good.back())) {
+    while (!good.empty() && !is_alphanumeric(good.back())) {
         good.pop_back();
     }
     return good.empty() ? "my-part" : good;
 }
 
 std::string problem_of(const std::string& name) {
-    const bool plain = std::all_of(name.begin(), name.end(), [](char c) {
-        return letter(c) || digit(c) || c == '-' || c == '_';
-    });
+    const bool plain = std::all_of(name.begin(), name.end(),
+                                   [](char c) { return is_name_character(c) && c != '.'; });
     constexpr std::size_t longest = 40;
-    if (!plain || name.empty() || !letter(name.front()) || name.back() == '-' ||
+    if (!plain || name.empty() || !is_letter(name.front()) || name.back() == '-' ||
         name.back() == '_') {
         return fmt::format(
             "invalid component name '{}': use a letter, then letters, digits, - and _; try: hal "
@@ -175,7 +172,7 @@ std::string type_of(const std::string& name) {
             first = true;
             continue;
         }
-        type += first && c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+        type += first ? upper(c) : c;
         first = false;
     }
     return type == "Component" ? "TheComponent" : type;
@@ -231,7 +228,7 @@ std::string package_hint() {
 
 std::string shell_word(const std::string& word) {
     const bool plain = std::all_of(word.begin(), word.end(), [](char c) {
-        return letter(c) || digit(c) || std::strchr("-_./+,=:@%", c);
+        return is_alphanumeric(c) || std::strchr("-_./+,=:@%", c);
     });
     if (plain) return word;
     std::string quoted = "'";

@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 
 #include "base/types.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::comp {
 namespace {
@@ -191,13 +191,10 @@ bool Parser::type(Item& item) {
 
 bool Parser::array(Item& item) {
     const Text size = in_.expression(":]");
-    const auto end = size.text.data() + size.text.size();
-    const bool hex = size.text.starts_with("0x") || size.text.starts_with("0X");
-    const auto begin = hex ? size.text.data() + 2 : size.text.data();
-    const auto read = std::from_chars(begin, end, item.size, hex ? 16 : 10);
-    if (!size.given() || read.ec != std::errc{} || read.ptr != end || item.size == 0 ||
-        item.size > max_array_size) {
-        item.size = 1;
+    const std::uint64_t length = parse_natural(size.text).value_or(0);
+    const bool valid = length != 0 && length <= max_array_size;
+    item.size = valid ? static_cast<unsigned>(length) : 1;
+    if (!valid) {
         in_.error(
             size.given() ? size.span : in_.here(),
             "the size of an array must be an integer, 1.." + std::to_string(max_array_size), "",

@@ -8,12 +8,10 @@
 namespace hal::comp {
 namespace {
 
-bool is_blank(char c) {
-    return c == ' ' || c == '\t' || c == '\n' || c == '\r' || c == '\f' || c == '\v';
-}
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
-bool is_hal(char c) { return is_letter(c) || is_digit(c) || c == '#' || c == '.' || c == '-'; }
+bool is_gap(char c) { return is_blank(c) || c == '\n' || c == '\r'; }
+bool begins_word(char c) { return is_letter(c) || c == '_'; }
+bool is_word(char c) { return is_alphanumeric(c) || c == '_'; }
+bool is_hal(char c) { return is_name_character(c) || c == '#'; }
 
 void append_utf8(std::string& to, unsigned long code) {
     const auto continuation = [](unsigned long bits) {
@@ -101,7 +99,7 @@ void Scanner::error(Span at, std::string message, std::string label, std::string
 
 void Scanner::skip() {
     while (at_ < text_.size()) {
-        if (is_blank(text_[at_])) {
+        if (is_gap(text_[at_])) {
             ++at_;
         } else if (starts("//")) {
             at_ = std::min(text_.find('\n', at_), text_.size());
@@ -127,10 +125,10 @@ bool Scanner::at_code() {
     skip();
     if (!starts(";;")) return false;
     for (std::size_t i = at_; i > 0 && text_[i - 1] != '\n'; --i) {
-        if (!is_blank(text_[i - 1])) return false;
+        if (!is_gap(text_[i - 1])) return false;
     }
     for (std::size_t i = at_ + 2; i < text_.size() && text_[i] != '\n'; ++i) {
-        if (!is_blank(text_[i])) return false;
+        if (!is_gap(text_[i])) return false;
     }
     return true;
 }
@@ -148,8 +146,8 @@ Text Scanner::taken(std::size_t begin) {
 std::string_view Scanner::peek_word() {
     skip();
     std::size_t end = at_;
-    if (end < text_.size() && is_letter(text_[end])) {
-        while (end < text_.size() && (is_letter(text_[end]) || is_digit(text_[end]))) {
+    if (end < text_.size() && begins_word(text_[end])) {
+        while (end < text_.size() && is_word(text_[end])) {
             ++end;
         }
     }
@@ -169,7 +167,7 @@ Text Scanner::word() {
 Text Scanner::hal_name() {
     skip();
     const std::size_t begin = at_;
-    if (at_ < text_.size() && (is_letter(text_[at_]) || text_[at_] == '#' || text_[at_] == '.')) {
+    if (at_ < text_.size() && (begins_word(text_[at_]) || text_[at_] == '#' || text_[at_] == '.')) {
         while (at_ < text_.size() && is_hal(text_[at_])) {
             ++at_;
         }
@@ -252,10 +250,9 @@ bool Scanner::at_expression_end(std::string_view stops, const Nesting& nesting) 
 /// The length of a number or a word of C; 0 when none comes next.
 std::size_t Scanner::operand_length() const {
     const char first = text_[at_];
-    if (!is_letter(first) && !is_digit(first)) return 0;
+    if (!is_word(first)) return 0;
     std::size_t end = at_;
-    while (end < text_.size() &&
-           (is_letter(text_[end]) || is_digit(text_[end]) || (text_[end] == '.' && end > at_))) {
+    while (end < text_.size() && (is_word(text_[end]) || (text_[end] == '.' && end > at_))) {
         ++end;
     }
     return end - at_;
@@ -282,7 +279,7 @@ Text Scanner::expression(std::string_view stops) {
     Nesting nesting;
     std::string text;
     while (!at_expression_end(stops, nesting)) {
-        if (is_blank(text_[at_]) || starts("//") || starts("/*")) {
+        if (is_gap(text_[at_]) || starts("//") || starts("/*")) {
             skip();
             if (!text.empty()) {
                 text += ' ';

@@ -21,6 +21,7 @@
 #include "doc/page.hpp"
 #include "machine/load/plugins.hpp"
 #include "machine/session.hpp"
+#include "text/characters.hpp"
 #include "text/glyphs.hpp"
 
 namespace hal::tools {
@@ -94,12 +95,8 @@ class Trial {
 public:
     /// What a line of a netlist can name in loadrt and unload.
     static bool can_be_loaded(std::string_view name) {
-        const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
-        const auto good = [&](char c) {
-            return letter(c) || (c >= '0' && c <= '9') || c == '_' || c == '-' || c == '.';
-        };
-        return !name.empty() && letter(name[0]) && std::all_of(name.begin(), name.end(), good) &&
-               name != "threads" && name != "all";
+        return !name.empty() && is_letter(name[0]) &&
+               std::ranges::all_of(name, is_name_character) && name != "threads" && name != "all";
     }
 
     Trial(const std::string& name, int descriptor, bool author)

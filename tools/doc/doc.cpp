@@ -75,7 +75,7 @@ int list(const Plugins& plugins, const DocOptions& options) {
             text += fmt::format("{:{}}  {}\n", name, width, summary);
         }
     }
-    return print(text) && good ? 0 : 1;
+    return exit_code(print(text) && good);
 }
 
 /// Makes the page of one component. Returns false after printing the error.
@@ -153,7 +153,7 @@ int write_all_pages(const std::vector<Page>& pages, const Plugins& plugins, cons
     for (auto& [name, members] : by_group) {
         groups.push_back({name, std::move(members)});
     }
-    return write_page(folder / "index.html", as_html_index(groups), options) ? 0 : 1;
+    return exit_code(write_page(folder / "index.html", as_html_index(groups), options));
 }
 
 }  // namespace

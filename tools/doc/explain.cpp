@@ -34,7 +34,7 @@ int run_explain(const ExplainOptions& options) {
         for (const CodePage& code : pages) {
             text += fmt::format("{:{}}  {}\n", code.name, width, first_sentence(code.page));
         }
-        return print(text) ? 0 : 1;
+        return exit_code(print(text));
     }
     std::vector<std::string> names;
     for (const CodePage& code : pages) {

@@ -4,6 +4,8 @@
 #include <fmt/core.h>
 
 #include "base/types.hpp"
+#include "text/characters.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -17,9 +19,7 @@ namespace {
 /// "V; initial 1; safe 0; used by encoder.update-counters"
 std::string remarks(const Page::Pin& pin, bool several_functions) {
     std::string text;
-    const auto add = [&](const std::string& remark) {
-        text += (text.empty() ? "" : "; ") + remark;
-    };
+    const auto add = [&](const std::string& remark) { append_item(text, remark, "; "); };
     if (!pin.unit.empty()) {
         add(pin.unit);
     }
@@ -45,15 +45,13 @@ struct Row {
     std::string doc;
 };
 
-bool digit(char c) { return c >= '0' && c <= '9'; }
-
 /// "kind of the thing in place 3" as "kind of the thing in place #", when the number is 3.
 std::string without_number(const std::string& doc, const std::string& number) {
     std::string text = doc;
     for (std::size_t at = 0; (at = text.find(number, at)) != text.npos; ++at) {
         const std::size_t end = at + number.size();
-        const bool part = (at != 0 && (digit(text[at - 1]) || text[at - 1] == '.')) ||
-                          (end < text.size() && digit(text[end]));
+        const bool part = (at != 0 && (is_digit(text[at - 1]) || text[at - 1] == '.')) ||
+                          (end < text.size() && is_digit(text[end]));
         if (!part) {
             text.replace(at, number.size(), "#");
         }
@@ -72,15 +70,15 @@ bool follows(const Page::Pin& a, const Page::Pin& b, std::string& doc) {
     while (from < a.name.size() && from < b.name.size() && a.name[from] == b.name[from]) {
         ++from;
     }
-    while (from > 0 && digit(a.name[from - 1])) {
+    while (from > 0 && is_digit(a.name[from - 1])) {
         --from;
     }
     std::size_t a_end = from;
     std::size_t b_end = from;
-    while (a_end < a.name.size() && digit(a.name[a_end])) {
+    while (a_end < a.name.size() && is_digit(a.name[a_end])) {
         ++a_end;
     }
-    while (b_end < b.name.size() && digit(b.name[b_end])) {
+    while (b_end < b.name.size() && is_digit(b.name[b_end])) {
         ++b_end;
     }
     constexpr std::size_t max = 9;

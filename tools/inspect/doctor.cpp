@@ -29,6 +29,7 @@
 #include "inspect/finding.hpp"
 #include "inspect/jitter.hpp"
 #include "inspect/remedies.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -220,7 +221,7 @@ Finding governor() {
     }
     std::string all;
     for (const auto& g : governors) {
-        all += (all.empty() ? "" : ", ") + g;
+        append_item(all, g);
     }
     if (governors == std::set<std::string>{"performance"}) {
         return {Verdict::good, "frequency", "governor performance"};
@@ -303,8 +304,9 @@ Finding idle_states() {
             states),
         access + (has_udev ? rule : ""),
         {},
-        has_udev ? "log in again"
-                 : "log in again; udev is not installed, so repeat chgrp and chmod after each boot"};
+        has_udev
+            ? "log in again"
+            : "log in again; udev is not installed, so repeat chgrp and chmod after each boot"};
 }
 
 /// System-management interrupts stop all processors unseen; Intel counts them in a register.
@@ -382,7 +384,7 @@ int run_doctor(const DoctorOptions& options) {
             return 1;
         }
     }
-    return !options.json || print(report.dump(2) + "\n") ? 0 : 1;
+    return exit_code(!options.json || print(report.dump(2) + "\n"));
 }
 
 }  // namespace hal::tools

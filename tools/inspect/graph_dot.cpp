@@ -6,6 +6,7 @@
 #include "base/types.hpp"
 #include "cli/xml_escape.hpp"
 #include "inspect/graph_dot.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -138,9 +139,9 @@ private:
             text_ += "</tr>";
         }
         if (unlinked > 0) {
-            text_ += fmt::format(
-                "<tr><td colspan=\"2\"><font color=\"#707070\">{} unlinked pin{}</font></td></tr>",
-                unlinked, unlinked == 1 ? "" : "s");
+            text_ +=
+                fmt::format("<tr><td colspan=\"2\"><font color=\"#707070\">{}</font></td></tr>",
+                            counted(unlinked, "unlinked pin"));
         }
         text_ += "</table>>];\n";
     }

@@ -116,10 +116,10 @@ int follow(Stream& stream, const PlayOptions& options, int descriptor) {
         }
         if (records.size() < at_once && input.waiting()) continue;
         if (!feed(stream, options, std::exchange(records, json::array()), stop)) {
-            return stop.requested() ? 0 : 1;
+            return exit_code(stop.requested());
         }
     }
-    return feed(stream, options, std::move(records), stop) || stop.requested() ? 0 : 1;
+    return exit_code(feed(stream, options, std::move(records), stop) || stop.requested());
 }
 
 }  // namespace

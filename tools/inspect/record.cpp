@@ -14,6 +14,7 @@
 #include "inspect/stream.hpp"
 #include "link/record_file.hpp"
 #include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -76,7 +77,7 @@ std::string csv_header(Stream& stream, bool tag) {
         line += line.empty() ? "time_s" : ",time_s";
     }
     for (const std::string& name : names) {
-        line += (line.empty() ? "" : ",") + csv_field(name);
+        append_item(line, csv_field(name), ",");
     }
     return line + "\n";
 }
@@ -124,11 +125,10 @@ public:
     /// Prints how many records are missing in a CSV, which does not show it.
     void report_losses() const {
         if (!csv_ || lost_in_all_ == 0) return;
-        write_all(STDERR_FILENO,
-                  fmt::format("hal: {} sample{} between the lines {} lost, because the sampler was "
-                              "full: raise its depth\n",
-                              lost_in_all_, lost_in_all_ == 1 ? "" : "s",
-                              lost_in_all_ == 1 ? "was" : "were"));
+        write_all(STDERR_FILENO, fmt::format("hal: {} lost, because the sampler was "
+                                             "full: raise its depth\n",
+                                             counted(lost_in_all_, "sample between the lines was",
+                                                     "samples between the lines were")));
     }
 
 private:
@@ -147,10 +147,9 @@ int follow(Stream& stream, const RecordOptions& options, RecordFile& file) {
         const std::size_t records = file.records() - std::min(file.records(), headers);
         return fail(
             options,
-            fmt::format(
-                "cannot write{}: {}; what was written ends with a whole line, after {} record{}",
-                stream.file.empty() ? "" : " '" + stream.file + "'", std::strerror(file.error()),
-                records, records == 1 ? "" : "s"));
+            fmt::format("cannot write{}: {}; what was written ends with a whole line, after {}",
+                        stream.file.empty() ? "" : " '" + stream.file + "'",
+                        std::strerror(file.error()), counted(records, "record")));
     };
     if (options.csv && !(file.put(csv_header(stream, options.tag)) && file.flush())) return lost();
     Lines lines(stream, options);

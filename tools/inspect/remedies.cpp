@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "cli/output.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -50,7 +51,7 @@ std::string for_this_user(std::string command) {
 /// Adds what remains to be done to the list `later`, unless it is there.
 void add_later(std::string& later, const Remedy& remedy) {
     if (!remedy.then.empty() && later.find(remedy.then) == std::string::npos) {
-        later += (later.empty() ? "" : ", and ") + remedy.then;
+        append_item(later, remedy.then, ", and ");
     }
 }
 

@@ -51,7 +51,7 @@ std::optional<int> run_own(const RemoteShellOptions& options, const Client& clie
     if (options.classic || !(words >> first)) return std::nullopt;
     if (std::string topic, more;
         first == "help" && words >> topic && topic == "watch" && !(words >> more)) {
-        return print(watch_help) ? 0 : 1;
+        return exit_code(print(watch_help));
     }
     if (first != "watch") return std::nullopt;
     std::vector<std::string> arguments{"watch", "--name", client.instance()};

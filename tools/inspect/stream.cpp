@@ -11,14 +11,14 @@
 #include "base/types.hpp"
 #include "cli/output.hpp"
 #include "linuxcnc/find/programs.hpp"
+#include "text/characters.hpp"
 
 namespace hal::tools {
 
 namespace {
 
 bool number(const std::string& word) {
-    return !word.empty() &&
-           std::all_of(word.begin(), word.end(), [](char c) { return c >= '0' && c <= '9'; });
+    return !word.empty() && std::ranges::all_of(word, is_digit);
 }
 
 /// Becomes LinuxCNC's program of the same name if the machine has LinuxCNC's compiled module, whose

@@ -11,6 +11,7 @@
 #include "cli/output.hpp"
 #include "cli/signals.hpp"
 #include "inspect/tdma_stations.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -33,7 +34,7 @@ std::string names_of(const StationPins& pins) {
     constexpr std::string_view marker = ".online";
     for (const auto& [name, value] : pins) {
         if (name.ends_with(marker)) {
-            names += (names.empty() ? "" : ", ") + name.substr(0, name.size() - marker.size());
+            append_item(names, name.substr(0, name.size() - marker.size()));
         }
     }
     return names;
@@ -162,7 +163,7 @@ std::string instance_with(const std::map<std::string, StationPins>& instances,
     if (known.empty()) {
         std::string all;
         for (const auto& [instance, pins] : instances) {
-            all += (all.empty() ? "" : ", ") + instance;
+            append_item(all, instance);
         }
         problem = fmt::format("unknown station '{}' in --from; use {}", options.from, all);
     } else {
@@ -219,8 +220,8 @@ int run_tdma_ping(const TdmaPingOptions& options) {
         return 1;  // Ctrl-C
     }
     const std::uint64_t lost = done - times.size();
-    std::string text = fmt::format("{} ping{} from {}, {} answered, {} lost ({:.0f} %)", done,
-                                   done == 1 ? "" : "s", instance, times.size(), lost,
+    std::string text = fmt::format("{} from {}, {} answered, {} lost ({:.0f} %)",
+                                   counted(done, "ping"), instance, times.size(), lost,
                                    100.0 * static_cast<double>(lost) / static_cast<double>(done));
     if (!times.empty()) {
         const auto [min, max] = std::minmax_element(times.begin(), times.end());

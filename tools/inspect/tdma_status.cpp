@@ -9,6 +9,7 @@
 
 #include "cli/output.hpp"
 #include "inspect/tdma_stations.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -45,7 +46,7 @@ std::string slots_of(const Pins& pins, const std::string& station) {
     }
     std::string text;
     for (const auto& [id, words] : slots) {
-        text += (text.empty() ? "" : ", ") + words;
+        append_item(text, words);
     }
     return text.empty() ? "-" : text;
 }
@@ -138,7 +139,7 @@ int run_tdma_status(const TdmaStatusOptions& options) {
     for (const auto& [instance, pins] : instances) {
         text += rows(instance, pins);
     }
-    return print(text) ? 0 : 1;
+    return exit_code(print(text));
 }
 
 }  // namespace hal::tools

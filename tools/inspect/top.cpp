@@ -298,7 +298,7 @@ int run_top(const TopOptions& options) {
     if (!live) {
         const std::vector<SeenInstance> seen = everybody(over);
         const std::string text = options.json ? top_json(seen) : top_table(seen);
-        return print(text) ? 0 : 1;
+        return exit_code(print(text));
     }
     const auto end = options.for_ns >= 0 ? Clock::now() + std::chrono::nanoseconds(options.for_ns)
                                          : Clock::time_point::max();

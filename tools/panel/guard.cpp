@@ -8,6 +8,8 @@
 #include <fmt/core.h>
 #include <random>
 
+#include "text/characters.hpp"
+
 namespace hal::tools {
 
 namespace {
@@ -26,9 +28,7 @@ std::string without_port(std::string_view host) {
     const std::size_t colon = host.find(':', bracket);
     if (colon == host.npos) return lower(host);
     const std::string_view port = host.substr(colon + 1);
-    const bool digits =
-        !port.empty() && port.size() <= 5 &&
-        std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; });
+    const bool digits = !port.empty() && port.size() <= 5 && std::ranges::all_of(port, is_digit);
     return digits ? lower(host.substr(0, colon)) : "";
 }
 

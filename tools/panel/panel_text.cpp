@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The language of .panel files: a line per widget, `row`, `column` and `frame` up to `end`.
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <fmt/core.h>
@@ -16,7 +15,9 @@
 #include "panel/css_colours.hpp"
 #include "panel/panel_errors.hpp"
 #include "panel/panel_layout.hpp"
+#include "text/characters.hpp"
 #include "text/config_text.hpp"
+#include "text/numbers.hpp"
 #include "text/suggest.hpp"
 
 namespace hal::tools {
@@ -85,11 +86,8 @@ std::vector<Word> words_of_line(const Word& line, bool& open) {
 
 std::optional<double> number_of(std::string_view text) {
     double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) {
-        return std::nullopt;
-    }
-    return value;
+    const bool good = parse_whole(text, value) && std::isfinite(value);
+    return good ? std::optional(value) : std::nullopt;
 }
 
 class Reader {
@@ -256,17 +254,11 @@ std::optional<Json> Reader::value_of(const Kind& kind, const Word& word) {
     return std::nullopt;
 }
 
-bool is_pin_character(char c) {
-    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-    const bool digit = c >= '0' && c <= '9';
-    return letter || digit || c == '-' || c == '_' || c == '.';
-}
-
 /// Checks the name of a new pin. False after reporting.
 bool Reader::check_name(const Word& word) {
     const std::string& name = word.text;
     const bool good =
-        !name.empty() && name.size() <= 100 && std::ranges::all_of(name, is_pin_character);
+        !name.empty() && name.size() <= 100 && std::ranges::all_of(name, is_name_character);
     if (!good) {
         error(word.at, fmt::format("'{}' is not a valid name of a pin", name.substr(0, 60)),
               "use letters, digits, '-', '_' and '.'");

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <string>
 
+#include "text/characters.hpp"
+
 namespace hal::tools {
 
 namespace {
@@ -32,12 +34,7 @@ public:
 private:
     static constexpr int deepest = 20;
 
-    void skip() {
-        while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\t' ||
-                                      text_[at_] == '\n' || text_[at_] == '\r')) {
-            ++at_;
-        }
-    }
+    void skip() { at_ = std::min(text_.find_first_not_of(" \t\n\r", at_), text_.size()); }
     bool take(char c) {
         skip();
         if (at_ >= text_.size() || text_[at_] != c) return false;
@@ -93,14 +90,18 @@ private:
         return left;
     }
 
+    static double applied(double a, char sign, double b) {
+        switch (sign) {
+        case '+': return a + b;
+        case '-': return a - b;
+        case '*': return a * b;
+        default: return a / b;
+        }
+    }
+
     static std::optional<Json> calculate(const Json& left, const Json& right, char sign) {
         if (!left.is_number() || !right.is_number()) return std::nullopt;
-        const double a = left.get<double>();
-        const double b = right.get<double>();
-        const double result = sign == '+'   ? a + b
-                              : sign == '-' ? a - b
-                              : sign == '*' ? a * b
-                                            : a / b;
+        const double result = applied(left.get<double>(), sign, right.get<double>());
         if (!std::isfinite(result)) return std::nullopt;
         if (left.is_number_integer() && right.is_number_integer() && sign != '/' &&
             std::abs(result) < 1e15) {
@@ -129,7 +130,7 @@ private:
         }
         if (take('+')) return value();
         if (c == '"' || c == '\'') return string();
-        if ((c >= '0' && c <= '9') || c == '.') return number();
+        if (is_digit(c) || c == '.') return number();
         return word();
     }
 
@@ -191,9 +192,7 @@ private:
 
     std::optional<Json> word() {
         const std::size_t begin = at_;
-        while (at_ < text_.size() &&
-               ((text_[at_] >= 'A' && text_[at_] <= 'Z') ||
-                (text_[at_] >= 'a' && text_[at_] <= 'z') || text_[at_] == '_')) {
+        while (at_ < text_.size() && (is_letter(text_[at_]) || text_[at_] == '_')) {
             ++at_;
         }
         const std::string_view name = text_.substr(begin, at_ - begin);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <filesystem>
 #include <fmt/core.h>
 #include <fstream>
@@ -16,6 +15,7 @@
 #include "panel/panel_errors.hpp"
 #include "panel/python_literal.hpp"
 #include "text/config_text.hpp"
+#include "text/numbers.hpp"
 #include "text/suggest.hpp"
 
 namespace hal::tools {
@@ -55,8 +55,7 @@ Json attribute_value(std::string_view text) {
         if (auto value = python_literal(text)) return *value;
     }
     double number = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (error == std::errc{} && end == text.data() + text.size()) {
+    if (parse_whole(text, number)) {
         return text.find_first_of(".eE") == text.npos ? Json(static_cast<std::int64_t>(number))
                                                       : Json(number);
     }

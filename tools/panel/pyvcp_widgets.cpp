@@ -39,9 +39,6 @@ bool is_pyvcp_widget(std::string_view name) {
 
 namespace {
 
-bool is_letter(char c) { return c >= 'a' && c <= 'z'; }
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
 /// Returns the name without blanks, in lower case; empty for other characters than letters, digits
 /// and a leading #.
 std::string colour_name(std::string_view name) {
@@ -50,7 +47,7 @@ std::string colour_name(std::string_view name) {
         if (c == ' ') continue;
         const char low = lower(c);
         const bool begins = low == '#' && text.empty();
-        if (!is_letter(low) && !is_digit(low) && !begins) return "";
+        if (!is_alphanumeric(low) && !begins) return "";
         text += low;
     }
     return text;

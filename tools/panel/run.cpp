@@ -13,6 +13,7 @@
 #include "panel/panel.hpp"
 #include "panel/panel_layout.hpp"
 #include "panel/server.hpp"
+#include "text/characters.hpp"
 
 namespace hal::tools {
 
@@ -28,11 +29,8 @@ std::string host_name() {
 Access access_for(const PanelOptions& options) {
     Access access{{"localhost", loopback}, false, options.origins,
                   random_token(),          true,  options.write};
-    for (std::string name : options.hosts) {
-        for (char& c : name) {
-            c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
-        }
-        access.hosts.push_back(std::move(name));
+    for (const std::string& name : options.hosts) {
+        access.hosts.push_back(lower(name));
     }
     if (options.listen.empty()) return access;
     access.any_address = true;

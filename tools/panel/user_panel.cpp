@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "panel/event_log.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -244,8 +245,8 @@ void UserPanel::inputs(const Json& values) {
         std::string now = text_of(values[k]);
         if (now == shown) continue;
         shown = std::move(now);
-        event += fmt::format("{}{}:{}", event.empty() ? "" : ",",
-                             text_of(layout_.pins[inputs_[k]].name), shown);
+        append_item(event, fmt::format("{}:{}", text_of(layout_.pins[inputs_[k]].name), shown),
+                    ",");
     }
     if (!event.empty() && on_values) {
         on_values("{\"event\":\"panel\",\"ready\":true,\"values\":{" + event + "}}");

@@ -7,6 +7,9 @@
 #include <sys/statvfs.h>
 #include <utility>
 
+#include "text/characters.hpp"
+#include "text/quoting.hpp"
+
 namespace hal::tools {
 
 void FlightMemory::layout(std::vector<ProbeGroup> groups) { layouts_.push_back(std::move(groups)); }
@@ -121,10 +124,8 @@ bool FlightBacklog::may_write(std::int64_t now_ns) {
 std::string FlightBacklog::recovered() {
     if (!failing_ || !events_.empty()) return "";
     failing_ = false;
-    const std::uint64_t late = std::exchange(late_, 0);
-    const std::uint64_t lost = std::exchange(lost_, 0);
-    return fmt::format("writing again: {} event{} written late, {} lost\n", late,
-                       late == 1 ? "" : "s", lost);
+    return fmt::format("writing again: {} written late, {} lost\n",
+                       counted(std::exchange(late_, 0), "event"), std::exchange(lost_, 0));
 }
 
 std::uint64_t FlightBacklog::free_bytes() const {
@@ -142,8 +143,7 @@ std::string flight_name(const std::string& file, std::int64_t unix_ns, const std
     std::strftime(time, sizeof time, "%Y%m%dT%H%M%SZ", &utc);
     std::string word;
     for (const char c : cause) {
-        word +=
-            (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ? c : '-';
+        word += is_alphanumeric(c) ? c : '-';
     }
     const std::size_t dot = file.rfind('.');
     return fmt::format("{}-{}-{}-{:03}{}", file.substr(0, dot), time, word, number,

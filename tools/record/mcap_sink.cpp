@@ -9,6 +9,7 @@
 #include "record/sink.hpp"
 #include "recording/mcap/rows.hpp"
 #include "recording/mcap/writer.hpp"
+#include "text/characters.hpp"
 
 namespace hal::tools {
 namespace {
@@ -44,13 +45,10 @@ std::string message_name(const std::string& thread) {
     std::string name;
     bool begins = true;
     for (const char c : thread) {
-        const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-
-        const bool digit = c >= '0' && c <= '9';
-        if (letter || (digit && !name.empty())) {
-            name += begins && c >= 'a' ? static_cast<char>(c - 'a' + 'A') : c;
+        if (is_letter(c) || (is_digit(c) && !name.empty())) {
+            name += begins ? upper(c) : c;
         }
-        begins = !letter;
+        begins = !is_letter(c);
     }
     return name.empty() ? "Values" : name;
 }

@@ -83,7 +83,7 @@ int write_picture(const PlotOptions& options, const std::string& svg) {
     }
     const std::string problem = write_file(output, picture);
     if (!problem.empty()) return fail(options, problem);
-    return print(fmt::format("{}\n", output)) ? 0 : 1;
+    return exit_code(print(fmt::format("{}\n", output)));
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "run/report.hpp"
 #include "run/sim_summary.hpp"
 #include "text/diagnostic.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -92,7 +93,7 @@ std::optional<std::vector<NodeLine>> requested_nodes(const NetlistOptions& optio
     Diagnostics found;
     std::string files;
     for (const std::string& word : options.words) {
-        files += (files.empty() ? "" : " ") + word;
+        append_item(files, word, " ");
     }
     found.error("no-such-node", {}, "'" + files + "' has no node '" + options.part + "'",
                 did_you_mean(options.part, names),

@@ -136,7 +136,7 @@ int run_examples(const ExamplesOptions& options) {
         const std::string list = "Machines to start from. Each runs on any computer.\n" +
                                  list_of(examples) +
                                  "\nTo run one: hal examples NAME [OPTION of hal run]\n";
-        return print(list) ? 0 : 1;
+        return exit_code(print(list));
     }
     const std::string& name = options.words.front();
     const Example* const example = find(examples, name);

@@ -238,7 +238,7 @@ int HostedMachine::run_script(const std::string& path, const std::vector<std::st
     if (status != 0 && !stop.requested() && !path.empty()) {
         fail(options_, fmt::format("'{}' {}", path, end_description(status)));
     }
-    return status == 0 ? 0 : 1;
+    return exit_code(status == 0);
 }
 
 void HostedMachine::start_threads() {

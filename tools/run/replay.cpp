@@ -152,7 +152,7 @@ public:
             assign_players(model);
             std::string names;
             for (const auto& [thread, one] : players_) {
-                names += (names.empty() ? "" : ",") + one.name;
+                append_item(names, one.name, ",");
                 commands.push_back({"setp", one.name + ".begin", std::to_string(origin_ns_)});
                 commands.push_back({"addf", one.name + ".update", thread, "1"});
             }
@@ -335,7 +335,7 @@ private:
                     continue;
                 }
                 options.types[name] = type;
-                text += (text.empty() ? "" : ",") + name + ":" + hal::name(type);
+                append_item(text, name + ":" + hal::name(type), ",");
             }
         }
         mcap::Recording typed;

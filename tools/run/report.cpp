@@ -5,14 +5,11 @@
 #include <fmt/core.h>
 
 #include "base/types.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
 namespace {
-
-std::string counted(std::size_t n, const char* one, const char* many) {
-    return fmt::format("{} {}", n, n == 1 ? one : many);
-}
 
 /// "a b c" in lines of at most 100 columns, continued under the first word; beyond `max` words: "…
 /// 31 more".
@@ -117,11 +114,9 @@ std::string loaded_summary(Session& session) {
     for (const auto& thread : model.threads) {
         width = std::max(width, thread->name.size());
     }
-    std::string text =
-        fmt::format("{} of {}, {}, {}\n", counted(instances, "instance", "instances"),
-                    counted(shown.size(), "component", "components"),
-                    counted(model.signals.size(), "signal", "signals"),
-                    counted(model.threads.size(), "thread", "threads"));
+    std::string text = fmt::format(
+        "{} of {}, {}, {}\n", counted(instances, "instance"), counted(shown.size(), "component"),
+        counted(model.signals.size(), "signal"), counted(model.threads.size(), "thread"));
     for (const LoadedComponent* component : shown) {
         std::vector<std::string> names;
         for (const auto& instance : component->instances) {
@@ -177,7 +172,7 @@ std::string timing_report(Session& session) {
     }
     std::string policies;
     for (const ThreadReport& r : reports) {
-        policies += fmt::format("{}{}: {}", policies.empty() ? "" : "; ", r.name, r.policy);
+        append_item(policies, fmt::format("{}: {}", r.name, r.policy), "; ");
         if (r.cpu >= 0) {
             policies += fmt::format(" on cpu {}", r.cpu);
         }
@@ -210,7 +205,7 @@ std::string timing_report(Session& session) {
     }
     const std::vector<FaultRecord> faults = session.reports().faults();
     if (!faults.empty()) {
-        text += fmt::format("{}:\n", counted(session.reports().fault_count(), "fault", "faults"));
+        text += fmt::format("{}:\n", counted(session.reports().fault_count(), "fault"));
     }
     return text + sentences(faults) + busy_line(reports);
 }
@@ -219,13 +214,12 @@ std::string simulated_summary(Session& session, std::string_view before) {
     const auto lock = session.lock();
     std::string text(before);
     for (const ThreadReport& report : session.reports().threads()) {
-        text += fmt::format("; {} {}{}", report.name, counted(report.cycles, "cycle", "cycles"),
+        text += fmt::format("; {} {}{}", report.name, counted(report.cycles, "cycle"),
                             report.faulted ? ", stopped by a fault" : "");
     }
     const std::vector<FaultRecord> faults = session.reports().faults();
     if (faults.empty()) return text + "; no faults\n";
-    return text +
-           fmt::format("; {}:\n", counted(session.reports().fault_count(), "fault", "faults")) +
+    return text + fmt::format("; {}:\n", counted(session.reports().fault_count(), "fault")) +
            sentences(faults);
 }
 

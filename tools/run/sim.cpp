@@ -97,7 +97,7 @@ int show_values(const SimOptions& options, Session& session) {
     for (const Shown& one : all) {
         text += fmt::format("{:{}}  {}\n", one.name, width, one.value);
     }
-    return print(text) ? 0 : 1;
+    return exit_code(print(text));
 }
 
 std::string simulated_for(std::int64_t virtual_ns, std::chrono::steady_clock::duration wall) {

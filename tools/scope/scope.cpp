@@ -170,7 +170,7 @@ int run_once(const ScopeOptions& options, Source& source) {
             text += line + "\n";
         }
         // without the line of keys
-        return print(text.substr(0, text.rfind('\n', text.size() - 2) + 1)) ? 0 : 1;
+        return exit_code(print(text.substr(0, text.rfind('\n', text.size() - 2) + 1)));
     }
     if (const int status = write_files(options, acquisition); status != 0) return status;
     if (source.input().lost() > 0) {

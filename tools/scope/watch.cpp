@@ -136,7 +136,7 @@ int run_watch(const WatchOptions& options) {
     while (!stop.requested() && Clock::now() < end) {
         if (!input.take(20, take)) return fail(options, input.end_reason());
     }
-    return print(joined(table.lines())) ? 0 : 1;
+    return exit_code(print(joined(table.lines())));
 }
 
 }  // namespace hal::tools

@@ -2,13 +2,14 @@
 #include "bus/can/bus.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <fmt/core.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "cli/output.hpp"
 #include "link/capture.hpp"
+#include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -81,7 +82,7 @@ bool Bus::open(const Options& options, std::span<const std::string> addresses,
 void Bus::announce(const Options& options) const {
     std::string text;
     const auto add = [&text](const can::Description& d) {
-        text += fmt::format("{}{} ({}", text.empty() ? "" : ", ", d.address, d.transport);
+        append_item(text, fmt::format("{} ({}", d.address, d.transport));
         if (d.bit_rate != 0) {
             text += fmt::format(", {} bit/s", d.bit_rate);
         }
@@ -150,15 +151,10 @@ int finish_sending(Bus& bus, const Options& options, std::uint64_t wanted) {
 
 namespace {
 
-bool hex(std::string_view text, std::uint32_t& value) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
-    return !text.empty() && error == std::errc() && end == text.data() + text.size();
-}
+bool hex(std::string_view text, std::uint32_t& value) { return parse_whole(text, value, 16); }
 
 bool identifier(std::string_view text, std::uint32_t& id, bool& extended) {
-    if (text.starts_with("0x")) {
-        text.remove_prefix(2);
-    }
+    remove_hex_prefix(text);
     if (text.size() > 8 || !hex(text, id) || id > 0x1fffffff) return false;
     extended = text.size() == 8 || id > 0x7ff;
     return true;
@@ -225,11 +221,11 @@ std::string id_text(const can::Frame& f) {
 
 std::string data_text(const can::Frame& f, const char* separator) {
     if (f.remote) {
-        return fmt::format("remote request, {} byte{}", f.length, f.length == 1 ? "" : "s");
+        return "remote request, " + counted(f.length, "byte");
     }
     std::string text;
     for (const auto byte : f.bytes()) {
-        text += fmt::format("{}{:02X}", text.empty() ? "" : separator, byte);
+        append_item(text, fmt::format("{:02X}", byte), separator);
     }
     return text;
 }

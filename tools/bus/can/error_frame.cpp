@@ -4,6 +4,8 @@
 #include <fmt/core.h>
 #include <utility>
 
+#include "text/quoting.hpp"
+
 namespace hal::tools {
 
 std::string error_frame_text(const can::Frame& f) {
@@ -21,7 +23,7 @@ std::string error_frame_text(const can::Frame& f) {
     std::string text;
     for (const auto& [bit, word] : words) {
         if ((f.id & bit) != 0) {
-            text += (text.empty() ? "" : ", ") + std::string(word);
+            append_item(text, word);
         }
     }
     if ((f.id & can::error_controller) != 0) {

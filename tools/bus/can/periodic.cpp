@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "cli/output.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -27,7 +28,7 @@ int send_periodically(Bus& bus, const PeriodicOptions& options, std::int64_t int
     const int status = finish_sending(bus, options, wanted);
     if (status == 0) {
         write_all(STDERR_FILENO,
-                  fmt::format("{} frame{} in {:.2f} s\n", wanted, wanted == 1 ? "" : "s", seconds));
+                  fmt::format("{} in {:.2f} s\n", counted(wanted, "frame"), seconds));
     }
     return status;
 }

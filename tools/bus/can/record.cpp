@@ -12,6 +12,7 @@
 #include "bus/can/bus.hpp"
 #include "cli/output.hpp"
 #include "link/capture.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -56,8 +57,8 @@ int run_can_record(const CanRecordOptions& options) {
                                 file, std::strerror(errno)));
     }
     const can::Statistics s = bus.link->statistics();
-    write_all(STDERR_FILENO, fmt::format("{} frame{} in {}, {} lost\n", frames,
-                                         frames == 1 ? "" : "s", file, s.lost));
+    write_all(STDERR_FILENO,
+              fmt::format("{} in {}, {} lost\n", counted(frames, "frame"), file, s.lost));
     return 0;
 }
 
@@ -107,7 +108,7 @@ int run_can_replay(const CanReplayOptions& options) {
     const int status = finish_sending(bus, options, sent);
     if (status == 0) {
         write_all(STDERR_FILENO,
-                  fmt::format("{} frame{} in {:.2f} s{}\n", sent, sent == 1 ? "" : "s",
+                  fmt::format("{} in {:.2f} s{}\n", counted(sent, "frame"),
                               static_cast<double>(monotonic_ns() - began) / 1e9,
                               skipped ? fmt::format(", {} error frames skipped", skipped) : ""));
     }

@@ -7,6 +7,7 @@
 
 #include "bus/can/bus.hpp"
 #include "cli/output.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -53,7 +54,7 @@ int run_can_send(const SendOptions& options) {
     const int status = finish_sending(bus, options, wanted);
     if (status == 0 && options.every_ns != 0) {
         write_all(STDERR_FILENO,
-                  fmt::format("{} frame{} in {:.2f} s\n", wanted, wanted == 1 ? "" : "s", seconds));
+                  fmt::format("{} in {:.2f} s\n", counted(wanted, "frame"), seconds));
     }
     return status;
 }

@@ -7,6 +7,7 @@
 #include "canopen/protocol/emcy.hpp"
 #include "cia402/error_words.hpp"
 #include "cli/output.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -147,7 +148,7 @@ std::string AxisAccess::homing_methods(bool& missing) {
                   &missing)) {
             break;
         }
-        methods += fmt::format("{}{}", methods.empty() ? "" : ", ", method);
+        append_item(methods, std::to_string(method));
     }
     return methods;
 }

@@ -3,12 +3,13 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <fmt/core.h>
 
 #include "cli/output.hpp"
+#include "text/characters.hpp"
 #include "text/diagnostic.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::tools {
 
@@ -59,9 +60,7 @@ bool parse_integers(std::string_view text, std::vector<std::int64_t>& values) {
         const auto comma = text.find(',');
         const std::string_view part = trimmed(text.substr(0, comma));
         std::int64_t value = 0;
-        const char* const first = part.data() + (part.starts_with('+') ? 1 : 0);
-        const auto [end, error] = std::from_chars(first, part.data() + part.size(), value);
-        if (part.empty() || error != std::errc() || end != part.data() + part.size()) return false;
+        if (!parse_whole(part.substr(part.starts_with('+') ? 1 : 0), value)) return false;
         values.push_back(value);
         if (comma == text.npos) return true;
         text = text.substr(comma + 1);
@@ -70,8 +69,6 @@ bool parse_integers(std::string_view text, std::vector<std::int64_t>& values) {
     return true;
 }
 
-char upper_case(char c) { return static_cast<char>(std::toupper(static_cast<unsigned char>(c))); }
-bool is_alphanumeric(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; }
 bool is_lower_case(char c) { return std::islower(static_cast<unsigned char>(c)) != 0; }
 
 }  // namespace
@@ -129,7 +126,7 @@ std::optional<RobotShell::Line> RobotShell::parse(std::string_view text) {
     Line line;
     line.name = text.substr(0, length);
     line.is_upper_case = std::none_of(line.name.begin(), line.name.end(), is_lower_case);
-    std::transform(line.name.begin(), line.name.end(), line.name.begin(), upper_case);
+    std::transform(line.name.begin(), line.name.end(), line.name.begin(), upper);
     line.query = rest[0] == '?';
     line.arguments = trimmed(rest.substr(1));
     return line;

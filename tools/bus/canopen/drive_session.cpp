@@ -97,7 +97,7 @@ int DriveSession::end(bool leave, const char* why, bool expected) {
     }
     // An axis that could not be stopped stays supervised: the heartbeat ends with this program, and
     // the drive reacts.
-    return stopped && supervision_.release() ? 0 : 1;
+    return exit_code(stopped && supervision_.release());
 }
 
 }  // namespace hal::tools

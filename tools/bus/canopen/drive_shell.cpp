@@ -118,7 +118,7 @@ int DriveShell::execute(std::string_view line) {
     }
     over_ = over_ || (!good && session_.settings().ends_at_failure);
     session_.clear_press();
-    return good ? 0 : 1;
+    return exit_code(good);
 }
 
 std::function<void()> DriveShell::meanwhile() {

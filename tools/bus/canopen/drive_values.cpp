@@ -2,13 +2,13 @@
 #include "bus/canopen/drive_values.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fmt/core.h>
 
 #include "cia402/error_words.hpp"
 #include "cli/output.hpp"
 #include "text/diagnostic.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::tools {
 
@@ -121,9 +121,8 @@ Range range_of(unsigned bytes, bool is_signed) {
 }  // namespace
 
 bool parse_real(const std::string& text, double& value) {
-    const char* first = text.c_str() + (text.starts_with('+') ? 1 : 0);
-    const auto [end, error] = std::from_chars(first, text.c_str() + text.size(), value);
-    return error == std::errc() && *end == '\0' && std::isfinite(value);
+    return parse_whole(std::string_view(text).substr(text.starts_with('+') ? 1 : 0), value) &&
+           std::isfinite(value);
 }
 
 std::vector<std::string> value_names(bool reading) {

@@ -10,6 +10,7 @@
 #include "cli/output.hpp"
 #include "text/diagnostic.hpp"
 #include "text/glyphs.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -45,10 +46,6 @@ Diagnostic worded(const eds::Message& message, std::uint32_t source) {
     return out;
 }
 
-std::string counted(std::size_t n, const char* what) {
-    return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s");
-}
-
 /// "motor.eds: not reliable (2 problems); Motor by Maker; 52 objects, 238 entries, 4 RPDOs, 4 TPDOs; 1 warning, 0 notes"
 std::string summary(const std::string& path, const eds::Reading& reading) {
     const eds::DeviceDescription& d = *reading.description;
@@ -70,8 +67,8 @@ std::string summary(const std::string& path, const eds::Reading& reading) {
                 (d.device.vendor_name.empty() ? "; " : " by " + d.device.vendor_name + "; ");
     }
     text += fmt::format("{}, {}, {}, {}", counted(d.objects.size(), "object"),
-                        fmt::format("{} {}", d.entries(), d.entries() == 1 ? "entry" : "entries"),
-                        counted(receive, "RPDO"), counted(send, "TPDO"));
+                        counted(d.entries(), "entry", "entries"), counted(receive, "RPDO"),
+                        counted(send, "TPDO"));
     if (!d.modules.empty()) {
         text += ", " + counted(d.modules.size(), "module");
     }
@@ -99,7 +96,7 @@ int check(const Options& options, const std::string& path) {
                 ? printable(summary(path, reading)) + "\n"
                 : fmt::format("{}: rejected, not a usable device description\n", printable(path));
     write_all(STDERR_FILENO, text);
-    return reading.description && reading.doubts().empty() ? 0 : 1;
+    return exit_code(reading.description && reading.doubts().empty());
 }
 
 }  // namespace

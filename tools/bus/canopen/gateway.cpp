@@ -3,7 +3,6 @@
 #include "bus/canopen/gateway.hpp"
 
 #include <arpa/inet.h>
-#include <charconv>
 #include <cstdlib>
 #include <fcntl.h>
 #include <fmt/core.h>
@@ -22,6 +21,7 @@
 #include "canopen/master/gateway/gateway.hpp"
 #include "canopen/protocol/lss.hpp"
 #include "cli/output.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::tools {
 
@@ -101,9 +101,7 @@ bool listen_on_port(const GatewayOptions& options, Listener& out) {
     std::uint16_t port = 0;
     sockaddr_in at{};
     at.sin_family = AF_INET;
-    const char* end = text.data() + text.size();
-    const bool good = colon != text.npos &&
-                      std::from_chars(text.data() + colon + 1, end, port).ptr == end &&
+    const bool good = colon != text.npos && parse_whole(text.substr(colon + 1), port) &&
                       ::inet_pton(AF_INET, text.substr(0, colon).c_str(), &at.sin_addr) == 1;
     if (!good) {
         fail(options, fmt::format("invalid --listen '{}'; write 127.0.0.1:6000", text));

@@ -180,7 +180,7 @@ public:
         listing_ = true;  // lines follow the response; the next response ends them
         const bool whole = ask("info version", answer);
         listing_ = false;
-        return whole ? 0 : 1;
+        return exit_code(whole);
     }
     Completion complete(std::string_view line, std::size_t cursor) override {
         Completion out;

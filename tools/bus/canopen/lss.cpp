@@ -2,14 +2,13 @@
 // `hal can lss`: configures node ID and bit rate of nodes by LSS (CiA 305).
 #include "bus/canopen/lss.hpp"
 
-#include <charconv>
 #include <fmt/core.h>
 
 #include "base/types.hpp"
 #include "bus/canopen/node_client.hpp"
-#include "bus/number_text.hpp"
 #include "cli/output.hpp"
 #include "text/diagnostic.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::tools {
 
@@ -60,7 +59,7 @@ struct Lss {
     }
     bool number(std::size_t n, const char* what, std::uint64_t most, std::uint32_t& value) const {
         const std::string& text = arguments[n];
-        const std::optional<std::uint64_t> read = parse_number(text);
+        const std::optional<std::uint64_t> read = parse_natural(text);
         if (read && *read <= most) {
             value = static_cast<std::uint32_t>(*read);
             return true;
@@ -150,11 +149,9 @@ int bit_rate(Lss& l) {
         scale = 1'000'000;
         text.pop_back();
     }
-    const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), rate);
-    const std::uint8_t index =
-        error == std::errc() && stop == text.data() + text.size() && rate <= 1'000'000 / scale
-            ? canopen::lss_bit_rate_index(rate * scale)
-            : std::uint8_t{255};
+    const std::uint8_t index = parse_whole(text, rate) && rate <= 1'000'000 / scale
+                                   ? canopen::lss_bit_rate_index(rate * scale)
+                                   : std::uint8_t{255};
     if (index == 255) {
         return fail(
             l.options,
@@ -188,14 +185,14 @@ int fastscan(Lss& l) {
     l.station.lss.scan(monotonic_ns());
     if (!l.wait()) return l.silent("a scan finds unconfigured slaves in the waiting state only");
     const Identity& found = l.station.lss.result().identity;
-    return print(text_of(found, ", now in the configuration state")) ? 0 : 1;
+    return exit_code(print(text_of(found, ", now in the configuration state")));
 }
 
 int identify(Lss& l) {
     if (l.arguments.empty()) {
         l.station.lss.identify_unconfigured(monotonic_ns());
         if (!l.wait()) return l.silent("no unconfigured slave that supports LSS");
-        return print("at least one unconfigured slave\n") ? 0 : 1;
+        return exit_code(print("at least one unconfigured slave\n"));
     }
     Identity low{};
     Identity high{};
@@ -222,7 +219,7 @@ int identify(Lss& l) {
     }
     l.station.lss.identify(low, high, monotonic_ns());
     if (!l.wait()) return l.silent("no slave of this identity that supports LSS");
-    return print("slave identified\n") ? 0 : 1;
+    return exit_code(print("slave identified\n"));
 }
 
 struct Command {

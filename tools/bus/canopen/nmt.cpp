@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "bus/can/bus.hpp"
-#include "bus/number_text.hpp"
 #include "canopen/protocol/numbers.hpp"
 #include "cli/output.hpp"
 #include "text/diagnostic.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::tools {
 
@@ -45,7 +45,7 @@ int run_can_nmt(const NmtOptions& options) {
                         hint.empty() ? "write start, stop, preop, reset or reset-comm" : hint));
     }
     const bool all = node_text == "all";
-    const std::uint64_t node = all ? 0 : parse_number(node_text).value_or(0);
+    const std::uint64_t node = all ? 0 : parse_natural(node_text).value_or(0);
     if (!all && (node < 1 || node > 127)) {
         return fail(options, fmt::format("invalid node '{}'; write 1..127, or all", node_text));
     }

@@ -3,9 +3,9 @@
 
 #include <fmt/core.h>
 
-#include "bus/number_text.hpp"
 #include "bus/transfer_progress.hpp"
 #include "cli/output.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::tools {
 
@@ -188,7 +188,7 @@ int NodeClient::fail_transfer(std::uint8_t node, const canopen::SdoRequest& requ
 }
 
 bool parse_node(const std::string& text, std::uint8_t& node) {
-    const std::optional<std::uint64_t> number = parse_number(text);
+    const std::optional<std::uint64_t> number = parse_natural(text);
     if (!number || *number < 1 || *number > 127) return false;
     node = static_cast<std::uint8_t>(*number);
     return true;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <fmt/core.h>
 
 #include "bus/json_text.hpp"
@@ -12,6 +11,8 @@
 #include "cli/output.hpp"
 #include "text/diagnostic.hpp"
 #include "text/glyphs.hpp"
+#include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -39,12 +40,8 @@ std::string plain(std::string_view name) {
 }
 
 bool hex_number(std::string_view text, unsigned max, unsigned& value) {
-    if (text.starts_with("0x") || text.starts_with("0X")) {
-        text.remove_prefix(2);
-    }
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
-    return !text.empty() && error == std::errc() && end == text.data() + text.size() &&
-           value <= max;
+    remove_hex_prefix(text);
+    return parse_whole(text, value, 16) && value <= max;
 }
 
 Type basic(std::uint16_t code) {
@@ -235,7 +232,7 @@ std::string type_word(Type type) {
 std::string hex_bytes(std::span<const std::uint8_t> bytes, const char* separator) {
     std::string text;
     for (const auto byte : bytes) {
-        text += fmt::format("{}{:02X}", text.empty() ? "" : separator, byte);
+        append_item(text, fmt::format("{:02X}", byte), separator);
     }
     return text;
 }
@@ -258,11 +255,9 @@ std::string value_text(std::span<const std::uint8_t> bytes, Type type) {
         return fmt::format("{} days {:02}:{:02}:{:02}.{:03} ({})", natural(bytes.subspan(4)),
                            ms / 3'600'000, ms / 60'000 % 60, ms / 1000 % 60, ms % 1000, raw);
     }
-    const auto count = [&] {
-        return fmt::format("{} byte{}", bytes.size(), bytes.size() == 1 ? "" : "s");
-    };
+    const std::string count = counted(bytes.size(), "byte");
     if (is_text(type) || (type == Type::none && bytes.size() > 8 && looks_like_text(bytes))) {
-        return fmt::format("\"{}\" ({})", hal::printable(text_in(bytes), 10'000), count());
+        return fmt::format("\"{}\" ({})", hal::printable(text_in(bytes), 10'000), count);
     }
     if (type == Type::none && bytes.size() <= 8) {
         const unsigned unused = 64 - 8 * static_cast<unsigned>(bytes.size());
@@ -277,7 +272,7 @@ std::string value_text(std::span<const std::uint8_t> bytes, Type type) {
             ? fmt::format("; {} has {}", type_word(type), canopen::bytes_of(type))
             : "";
     return fmt::format("{}{} ({}{})", hex_bytes(bytes.first(std::min(bytes.size(), max)), " "),
-                       bytes.size() > max ? " …" : "", count(), no_such);
+                       bytes.size() > max ? " …" : "", count, no_such);
 }
 
 std::string value_json(std::span<const std::uint8_t> bytes, Type type) {

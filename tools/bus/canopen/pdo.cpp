@@ -3,12 +3,12 @@
 #include "bus/canopen/pdo.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <fmt/core.h>
 
 #include "bus/canopen/pdo_settings.hpp"
 #include "bus/json_text.hpp"
 #include "cli/output.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::tools {
 
@@ -91,7 +91,7 @@ int run_can_pdo_show(const PdoShowOptions& options) {
     for (const PdoSettings& p : pdos) {
         text += options.json ? json_of(p) : lines_of(p);
     }
-    return print(text) ? 0 : 1;
+    return exit_code(print(text));
 }
 
 namespace {
@@ -152,10 +152,7 @@ bool parse_item(NodeClient& station, std::uint8_t node, const ObjectNames& names
     // A name may contain a slash; only digits after the last one are a length.
     const auto slash = word.rfind('/');
     unsigned bits = 0;
-    const bool sized =
-        slash != word.npos && slash + 1 < word.size() &&
-        std::from_chars(word.data() + slash + 1, word.data() + word.size(), bits).ptr ==
-            word.data() + word.size();
+    const bool sized = slash != word.npos && parse_whole(word.substr(slash + 1), bits);
     if (sized && (bits < 1 || bits > 64)) {
         problem = fmt::format("invalid length in '{}'; an object in a PDO has 1..64 bits", word);
 
@@ -309,7 +306,7 @@ int run_can_pdo_map(const PdoMapOptions& options) {
 
         return fail(options, "the node accepted every write but has other values now, as shown");
     }
-    return print(lines_of(now)) ? 0 : 1;
+    return exit_code(print(lines_of(now)));
 }
 
 namespace {
@@ -435,7 +432,7 @@ int run_can_pdo_watch(const PdoWatchOptions& options) {
         written = print(text);
         return written && (options.count == 0 || seen < options.count);
     });
-    return written ? 0 : 1;
+    return exit_code(written);
 }
 
 }  // namespace hal::tools

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "bus/canopen/pdo_settings.hpp"
 
-#include <charconv>
 #include <fmt/core.h>
 #include <functional>
 
 #include "cli/output.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::tools {
 
@@ -133,9 +133,8 @@ bool parse_pdo(const std::string& text, PdoSettings& p) {
     if (text.size() < 5 || !canopen::eds::same_word(text.substr(1, 3), "pdo")) return false;
     const char kind = text[0];
     p.received = kind == 'r' || kind == 'R';
-    const auto [end, error] = std::from_chars(text.data() + 4, text.data() + text.size(), p.number);
-    return (p.received || kind == 't' || kind == 'T') && error == std::errc() &&
-           end == text.data() + text.size() && p.number >= 1 && p.number <= 512;
+    return (p.received || kind == 't' || kind == 'T') && parse_whole(text.substr(4), p.number) &&
+           p.number >= 1 && p.number <= 512;
 }
 
 Abort read_pdo(NodeClient& station, std::uint8_t node, const ObjectNames& names, PdoSettings& p) {

@@ -2,7 +2,6 @@
 // `hal node KIND`: creates the device of each kind from the options.
 #include "bus/node/kinds.hpp"
 
-#include <charconv>
 #include <fmt/core.h>
 #include <stdexcept>
 
@@ -15,28 +14,23 @@
 #include "canopen/device/safety/safe_io.hpp"
 #include "canopen/device/sensor/jr3.hpp"
 #include "cli/output.hpp"
+#include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
 namespace {
 
-std::string counted(unsigned n, const char* what) {
-    return fmt::format("{} {}{}", n, what, n == 1 ? "" : "s");
-}
-
 /// Parses "2.1" to 0x00020001. Returns false for an invalid version.
 bool parse_version(const std::string& text, std::uint32_t& version) {
-    unsigned major = 0;
-    unsigned minor = 0;
-    const char* end = text.data() + text.size();
-    const auto first = std::from_chars(text.data(), end, major);
-    if (first.ec != std::errc() || first.ptr == end || *first.ptr != '.') return false;
-    const auto second = std::from_chars(first.ptr + 1, end, minor);
-    if (second.ec != std::errc() || second.ptr != end || major > 0xffff || minor > 0xffff) {
-        return false;
-    }
-    version = major << 16 | minor;
-    return true;
+    const std::string_view all = text;
+    const auto point = std::min(all.find('.'), all.size() - 1);
+    std::uint16_t major = 0;
+    std::uint16_t minor = 0;
+    const bool good =
+        parse_whole(all.substr(0, point), major) && parse_whole(all.substr(point + 1), minor);
+    version = std::uint32_t{major} << 16 | minor;
+    return good;
 }
 
 /// Records the sensor's line to a file for the time of --for.
@@ -83,9 +77,7 @@ int run_node_drive(const DriveNodeOptions& options) {
     constexpr std::uint16_t optional[] = {0x100c, 0x100d, 0x1016, 0x1029};
     for (const std::string& text : options.without) {
         std::uint16_t index = 0;
-        const auto [end, wrong] =
-            std::from_chars(text.data(), text.data() + text.size(), index, 16);
-        if (wrong != std::errc() || end != text.data() + text.size() ||
+        if (!parse_whole(text, index, 16) ||
             !(std::find(std::begin(optional), std::end(optional), index) != std::end(optional) ||
               index % 0x800 == 0x6007 % 0x800)) {
             return fail(options, fmt::format("--without '{}': not an optional object of this "
@@ -171,7 +163,7 @@ int run_node_bootloader(const BootloaderNodeOptions& options) {
         std::uint32_t wanted = 0;
         if (!version(options.image, wanted)) return 1;
         const auto image = canopen::program_image(settings.product, wanted, 20000);
-        return print({reinterpret_cast<const char*>(image.data()), image.size()}) ? 0 : 1;
+        return exit_code(print({reinterpret_cast<const char*>(image.data()), image.size()}));
     }
     if (options.version == "none") {
         settings.version = 0;

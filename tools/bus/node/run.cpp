@@ -2,7 +2,6 @@
 #include "bus/node/run.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <fmt/chrono.h>
 #include <fmt/core.h>
 #include <functional>
@@ -15,12 +14,12 @@
 #include "bus/node/background_writer.hpp"
 #include "bus/node/kinds.hpp"
 #include "bus/node/node_station.hpp"
-#include "bus/number_text.hpp"
 #include "canopen/device/eds_export.hpp"
 #include "canopen/device/node.hpp"
 #include "cli/output.hpp"
 #include "cli/signals.hpp"
 #include "hal/message_log.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::tools {
 
@@ -42,9 +41,7 @@ bool parse_setting(const std::string& text, Setting& setting, std::string& probl
     if (equals != text.npos && equals != 0 && (at == text.npos || at > equals) && ns && *ns >= 0) {
         const std::string digits =
             text.substr(equals + 1, at == text.npos ? text.npos : at - equals - 1);
-        const auto [end, wrong] =
-            std::from_chars(digits.data(), digits.data() + digits.size(), setting.value);
-        if (wrong == std::errc() && end == digits.data() + digits.size()) {
+        if (parse_whole(digits, setting.value)) {
             setting.name = text.substr(0, equals);
             setting.at_ns = *ns;
             return true;
@@ -91,7 +88,7 @@ bool parse_id(const NodeOptions& options, const NodeKind& kind, std::uint8_t& id
         id = canopen::unconfigured;
         return true;
     }
-    const std::optional<std::uint64_t> value = parse_number(text);
+    const std::optional<std::uint64_t> value = parse_natural(text);
     if (!value || *value < 1 || *value > 127) {
         problem = fmt::format(
             "invalid --id '{}'; write 1..127, 0x50, or none to wait for an LSS master", text);
@@ -314,7 +311,7 @@ private:
     int finish(Reporter& reporter) const {
         if (!problem_.empty()) return fail(options_, problem_);
         if (!is_read_) return 1;
-        return print(reporter.end(now_ns_)) ? 0 : 1;
+        return exit_code(print(reporter.end(now_ns_)));
     }
 
     StopRequest stop_;
@@ -396,7 +393,7 @@ int run_node_faults(const Options&) {
             row.time == 0 ? std::string()
                           : fmt::format("; time={:g}ms", static_cast<double>(row.time) / 1e6));
     }
-    return print(text) ? 0 : 1;
+    return exit_code(print(text));
 }
 
 }  // namespace hal::tools

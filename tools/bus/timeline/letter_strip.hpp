@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "text/quoting.hpp"
+
 namespace hal::tools {
 
 /// Returns the letter of a participant; the letters repeat after 52. [any]
@@ -20,7 +22,7 @@ inline std::string strip_key(const std::vector<std::string>& names, const std::v
     std::string key;
     for (std::size_t i = 0; i < names.size(); ++i) {
         if (!used[i]) continue;
-        key += (key.empty() ? "" : ", ") + std::string(1, strip_letter(i)) + " " + names[i];
+        append_item(key, std::string(1, strip_letter(i)) + " " + names[i]);
     }
     return key;
 }
