@@ -65,6 +65,10 @@ void OptionSet::words(const char* name, const std::string& what, bool required) 
     }
 }
 
+void OptionSet::word(const char* name, const std::string& what) {
+    app_->add_option(name, options_.words, what)->required()->expected(1)->allow_extra_args(false);
+}
+
 void OptionSet::flag(const char* names, bool& to, const char* what) {
     app_->add_flag(names, to, what);
 }

@@ -41,6 +41,8 @@ public:
 
     /// Declares the positional arguments, under the name that the help shows.
     void words(const char* name, const std::string& what, bool required = true);
+    /// Declares one required positional argument.
+    void word(const char* name, const std::string& what);
     void flag(const char* names, bool& to, const char* what);
     /// Declares a flag that calls `given` when it is typed.
     void flag(const char* names, const std::function<void()>& given, const char* what);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "bus/can/generate.hpp"
 
-#include <charconv>
 #include <fmt/core.h>
 #include <random>
 
 #include "bus/can/periodic.hpp"
 #include "cli/output.hpp"
+#include "text/numbers.hpp"
 
 namespace hal::tools {
 
@@ -15,25 +15,16 @@ namespace {
 /// Parses `181` or `100-1FF`, hexadecimal.
 bool parse_range(const std::string& text, std::uint32_t max, std::uint32_t& first,
                  std::uint32_t& last) {
-    const char* const end = text.data() + text.size();
-    const auto one = std::from_chars(text.data(), end, first, 16);
-    if (one.ec != std::errc()) return false;
-    last = first;
-    if (one.ptr != end) {
-        if (*one.ptr != '-') return false;
-        const auto two = std::from_chars(one.ptr + 1, end, last, 16);
-        if (two.ec != std::errc() || two.ptr != end) return false;
-    }
-    return first <= last && last <= max;
+    const std::string_view all = text;
+    const auto dash = all.find('-');
+    const std::string_view end = dash == all.npos ? all : all.substr(dash + 1);
+    return parse_whole(all.substr(0, dash), first, 16) && parse_whole(end, last, 16) &&
+           first <= last && last <= max;
 }
 
 }  // namespace
 
 int run_can_generate(const GenerateOptions& options) {
-    if (options.words.size() != 1) {
-        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help can generate",
-                                         options.words[1]));
-    }
     const std::uint32_t max = options.extended ? 0x1fffffff : 0x7ff;
     std::uint32_t first = 0;
     std::uint32_t last = max;
@@ -46,9 +37,6 @@ int run_can_generate(const GenerateOptions& options) {
         return fail(options,
                     "--seed has no effect with --counting and --length: nothing is random; delete "
                     "one of them");
-    }
-    if (options.length > 8) {
-        return fail(options, fmt::format("invalid --length {}; write 0..8", options.length));
     }
     Bus bus;
     if (!bus.open(options, options.words[0], false)) return 1;

@@ -17,7 +17,7 @@ struct GenerateOptions : PeriodicOptions {
     bool counting = false;
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS", bus_address());
+        set.word("ADDRESS", bus_address());
         set.duration("--every", every_ns, "interval between two frames (default 100ms)", 1);
         set.for_how_long(for_ns, "end after 2s, 500ms … (default: until Ctrl-C)");
         set.value("-n,--count", count, "N", "end after N frames");

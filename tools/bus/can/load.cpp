@@ -26,10 +26,6 @@ struct Share {
 }  // namespace
 
 int run_can_load(const BusLoadOptions& options) {
-    if (options.words.size() != 1) {
-        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help can load",
-                                         options.words[1]));
-    }
     Bus bus;
     if (!bus.open(options, options.words[0])) return 1;
     const can::Description& about = bus.link->description();
@@ -89,8 +85,8 @@ int run_can_load(const BusLoadOptions& options) {
         about.bit_rate ? fmt::format("peak load over 0.1 s: {:.1f} %",
                                      static_cast<double>(peak) * 100 / window_ns)
                        : "load unknown without a bit rate; add ?bitrate=500k to the address";
-    write_all(STDERR_FILENO,
-              fmt::format("{:.2f} s; {}; {} errors, {} lost\n", seconds, load_text, s.errors, s.lost));
+    write_all(STDERR_FILENO, fmt::format("{:.2f} s; {}; {} errors, {} lost\n", seconds, load_text,
+                                         s.errors, s.lost));
     return 0;
 }
 

@@ -11,7 +11,7 @@ struct BusLoadOptions : Options {
     std::int64_t for_ns = -1;  ///< -1: not given
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS", bus_address());
+        set.word("ADDRESS", bus_address());
         set.for_how_long(for_ns, "measure for 5s, 500ms … (default 2s)");
     }
 };

@@ -74,10 +74,6 @@ std::string table(const Rows& rows, std::int64_t now, bool coloured) {
 }  // namespace
 
 int run_can_sniff(const SniffOptions& options) {
-    if (options.words.size() != 1) {
-        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help can sniff",
-                                         options.words[1]));
-    }
     Bus bus;
     if (!bus.open(options, options.words[0], true, options.filters)) return 1;
     const bool live = ::isatty(STDOUT_FILENO) == 1 && !bus.is_capture() && !options.once;
@@ -105,7 +101,7 @@ int run_can_sniff(const SniffOptions& options) {
     });
     if (live) return written ? 0 : 1;
     if (rows.empty()) return fail(options, "no frames received");
-    return print(table(rows, 0, colours(STDOUT_FILENO))) ? 0 : 1;
+    return exit_code(print(table(rows, 0, colours(STDOUT_FILENO))));
 }
 
 }  // namespace hal::tools

@@ -16,7 +16,7 @@ struct SniffOptions : Options {
     bool once = false;
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS", bus_address());
+        set.word("ADDRESS", bus_address());
         declare_filter(set, filters, count);
         set.for_how_long(for_ns, "listen for 2s, 500ms … (default 2s; on a terminal until Ctrl-C)");
         set.flag("--once", once, "print one table at the end, also on a terminal");

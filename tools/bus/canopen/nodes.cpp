@@ -125,10 +125,6 @@ std::string json(const Nodes& nodes, std::int64_t now) {
 }  // namespace
 
 int run_can_nodes(const NodesOptions& options) {
-    if (options.words.size() != 1) {
-        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help can nodes",
-                                         options.words[1]));
-    }
     Bus bus;
     if (!bus.open(options, options.words[0], false)) return 1;
     const bool live =
@@ -166,7 +162,7 @@ int run_can_nodes(const NodesOptions& options) {
                                 "every node: hal can scan {}",
                                 seconds(std::max<std::int64_t>(for_ns, 0)), options.words[0]));
     }
-    return print(table(nodes, now())) ? 0 : 1;
+    return exit_code(print(table(nodes, now())));
 }
 
 }  // namespace hal::tools

@@ -13,7 +13,7 @@ struct NodesOptions : Options {
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS", bus_address());
+        set.word("ADDRESS", bus_address());
         set.for_how_long(for_ns, "listen for 2s, 500ms … (default 2s; on a terminal until Ctrl-C)");
         set.flag("--once", once, "print one table at the end, also on a terminal");
         set.flag("--json", json, "print JSON at the end");

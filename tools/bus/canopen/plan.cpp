@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <fmt/core.h>
-#include <sstream>
 #include <numeric>
+#include <sstream>
 #include <unistd.h>
 
 #include "base/types.hpp"
@@ -18,6 +18,7 @@
 #include "link/can.hpp"
 #include "link/capture.hpp"
 #include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -77,8 +78,8 @@ Table table_of(const can::Capture& capture, std::uint32_t bit_rate, std::string&
             "{} irregular: their period is the shortest distance between two frames\n", irregular);
     }
     if (once != 0) {
-        table.notes += fmt::format("{} identifier{} seen once: not counted\n", once,
-                                   once == 1 ? " was" : "s were");
+        table.notes += fmt::format("{} seen once: not counted\n",
+                                   counted(once, "identifier was", "identifiers were"));
     }
     if (table.rows.empty()) {
         problem = "no message is in it twice: record for longer";
@@ -320,9 +321,8 @@ std::string transmission_text(const config::Pdo& pdo) {
 }
 
 std::string network_text(const std::string& file, const config::MasterConfig& c) {
-    std::string text =
-        fmt::format("{}: {} at {} bit/s, master {}, {} node{}\n", file, c.link, c.bit_rate,
-                    c.node_id, c.nodes.size(), c.nodes.size() == 1 ? "" : "s");
+    std::string text = fmt::format("{}: {} at {} bit/s, master {}, {}\n", file, c.link, c.bit_rate,
+                                   c.node_id, counted(c.nodes.size(), "node"));
     for (const config::Node& n : c.nodes) {
         text += fmt::format("node {} {}, {}\n", n.setup.id, n.name,
                             n.setup.mandatory ? "mandatory" : "optional");
@@ -335,9 +335,9 @@ std::string network_text(const std::string& file, const config::MasterConfig& c)
                     p.safety->refresh / canopen::millisecond, p.safety->sct / canopen::millisecond,
                     p.safety->srvt / canopen::millisecond);
             } else {
-                text += fmt::format("  {}{} {:X}, {} byte{}, {}\n", p.to_node ? "rpdo" : "tpdo",
-                                    p.number, canopen::cob_id(p.cob), p.bytes(),
-                                    p.bytes() == 1 ? "" : "s", transmission_text(p));
+                text += fmt::format("  {}{} {:X}, {}, {}\n", p.to_node ? "rpdo" : "tpdo", p.number,
+                                    canopen::cob_id(p.cob), counted(p.bytes(), "byte"),
+                                    transmission_text(p));
             }
             for (const config::Object& o : p.objects) {
                 if (!o.filler) {
@@ -432,10 +432,6 @@ bool read_recording(const CanopenPlanOptions& options, const std::string& file, 
 }  // namespace
 
 int run_canopen_plan(const CanopenPlanOptions& options) {
-    if (options.words.size() != 1) {
-        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help canopen plan",
-                                         options.words[1]));
-    }
     const std::string& file = options.words[0];
     can_timing::Errors errors;
     if (!options.errors.empty()) {

@@ -13,17 +13,16 @@ struct CanopenPlanOptions : Options {
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.words("FILE",
-                  "configuration of the network, NAME.canopen, or a recording: candump's .log, "
-                  ".pcapng, .pcap");
+        set.word("FILE",
+                 "configuration of the network, NAME.canopen, or a recording: candump's .log, "
+                 ".pcapng, .pcap");
         set.value("--errors", errors, "COUNT/TIME",
                   "frames that are disturbed and sent again: COUNT at once, and one more in every "
                   "TIME: 1/10ms");
         set.value("--bitrate", bitrate, "RATE", "bit rate of the bus, for a recording: 500k");
         set.value("--cycle", cycle, "TIME",
                   "period of the master's thread, for a SYNC in every cycle (default 1ms)");
-        set.value("--svg", svg, "FILE",
-                  "draw the response times to this file; -: standard output");
+        set.value("--svg", svg, "FILE", "draw the response times to this file; -: standard output");
         set.flag("--json", json, "print JSON");
     }
 };

@@ -157,10 +157,6 @@ std::string json_of(const std::map<unsigned, Node>& nodes) {
 }  // namespace
 
 int run_can_scan(const ScanOptions& options) {
-    if (options.words.size() != 1) {
-        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help can scan",
-                                         options.words[1]));
-    }
     Bus bus;
     if (!bus.open(options, options.words[0], false)) return 1;
     NodeScan scan;
@@ -180,7 +176,7 @@ int run_can_scan(const ScanOptions& options) {
                                          scan.received()));
     }
     const std::string text = options.json ? json_of(scan.nodes()) : table_of(scan.nodes());
-    return print(text) ? 0 : 1;
+    return exit_code(print(text));
 }
 
 }  // namespace hal::tools

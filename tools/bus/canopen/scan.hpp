@@ -12,7 +12,7 @@ struct ScanOptions : Options {
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.words("ADDRESS", bus_address());
+        set.word("ADDRESS", bus_address());
         set.for_how_long(for_ns,
                          "listen for 2s, 500ms … (default 1s); at least the slowest heartbeat "
                          "period finds stopped nodes too");

@@ -16,6 +16,7 @@
 #include "hal/read_file.hpp"
 #include "link/timing.hpp"
 #include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -31,7 +32,7 @@ std::string ms(Time t) {
 std::string node_list(const Table& t) {
     std::string text;
     for (const Node& n : t.nodes) {
-        text += (text.empty() ? "" : ", ") + n.name;
+        append_item(text, n.name);
         if (n.role != Role::node) {
             text += fmt::format(" ({}{})", to_string(n.role),
                                 n.role == Role::backup ? fmt::format(" {}", n.backup) : "");
@@ -76,7 +77,7 @@ std::string identifiers(const Use& use) {
     if (use.kind == Kind::sync) return "0x000";
     std::string ids;
     for (const std::uint32_t id : use.ids) {
-        ids += (ids.empty() ? "" : " ") + scocan::id_text(id);
+        append_item(ids, scocan::id_text(id), " ");
     }
     if (ids.empty()) {
         ids = "any";
@@ -215,7 +216,7 @@ std::string json_text(const Table& t, const plan::Plan& p) {
         for (const Use& u : t.mode(p.mode)->slots[slot]) {
             std::string ids;
             for (const std::uint32_t id : u.ids) {
-                ids += fmt::format("{}{}", ids.empty() ? "" : ",", id);
+                append_item(ids, std::to_string(id), ",");
             }
             text += fmt::format(
                 R"({}{{"slot":{},"use":"{}","node":{},"ids":[{}],"every":{},"offset":{}}})",
@@ -249,10 +250,6 @@ std::optional<std::uint32_t> find_mode(const Table& t, const std::string& which)
 }  // namespace
 
 int run_scocan_plan(const ScocanPlanOptions& options) {
-    if (options.words.size() != 1) {
-        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help scocan plan",
-                                         options.words[1]));
-    }
     const std::string& file = options.words[0];
     std::string text;
     if (!read_regular_file(file, 1'000'000, text)) {
@@ -268,7 +265,7 @@ int run_scocan_plan(const ScocanPlanOptions& options) {
     if (!mode) {
         std::string all;
         for (const Mode& m : t.modes) {
-            all += fmt::format("{}{} ({})", all.empty() ? "" : ", ", m.number, m.name);
+            append_item(all, fmt::format("{} ({})", m.number, m.name));
         }
         return fail(options,
                     fmt::format("unknown mode '{}'; modes of {}: {}", options.mode, file, all));

@@ -13,7 +13,7 @@ struct ScocanPlanOptions : Options {
     std::string mode;  ///< number or name; empty: mode 0
 
     void declare(OptionSet& set) override {
-        set.words("FILE", "table of the bus, NAME.scocan");
+        set.word("FILE", "table of the bus, NAME.scocan");
         set.flag("--json", json, "print JSON");
         set.value("--svg", svg, "FILE",
                   "draw the slots and the latencies to this file; -: standard output");

@@ -11,6 +11,7 @@
 #include "bus/timeline/plan_output.hpp"
 #include "bus/timeline/text_table.hpp"
 #include "fieldbus/tdma/config/schedule_plan.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -41,9 +42,9 @@ std::string table_text(const config::Schedule& s, const plan::Plan& p) {
                      {"cycles", 0, true}});
     for (std::size_t i = 0; i < p.entries.size(); ++i) {
         const plan::Entry& e = p.entries[i];
-        const auto next = std::find_if(p.entries.begin() + static_cast<std::ptrdiff_t>(i) + 1,
-                                       p.entries.end(),
-                                       [&](const plan::Entry& other) { return meet(e, other); });
+        const auto next =
+            std::find_if(p.entries.begin() + static_cast<std::ptrdiff_t>(i) + 1, p.entries.end(),
+                         [&](const plan::Entry& other) { return meet(e, other); });
         const Time free_until = next == p.entries.end() ? s.cycle : next->at;
         const std::string every =
             e.period == 1 ? "all" : fmt::format("{} of {}", e.phasing + 1, e.period);
@@ -90,12 +91,12 @@ std::string trip_text(const config::Schedule& s, const plan::RoundTrip& t,
                       const std::string& by_way_of) {
     const auto& e = s.stations[t.station];
     return fmt::format(
-        "{}: worst-case latency from input to output {:.2f} us, {} cycle{} after the input is "
+        "{}: worst-case latency from input to output {:.2f} us, {} after the input is "
         "read\n"
         "  read {:.2f}, sent {:.2f} (slot {}), received {:.2f}; {}'s thread {:.2f}, sent {:.2f}, "
         "received {:.2f}; written {:.2f}\n"
         "  {:.2f} - {:.2f} + {:.2f} for an input that changed just after it was read = {:.2f} us\n",
-        e.name, us(t.worst), t.cycles, t.cycles == 1 ? "" : "s", us(t.read), us(t.up),
+        e.name, us(t.worst), counted(t.cycles, "cycle"), us(t.read), us(t.up),
         e.slots.front().setup.id, us(t.up_arrives), by_way_of, us(t.master), us(t.down),
         us(t.down_arrives), us(t.output), us(t.output), us(t.read), us(s.cycle), us(t.worst));
 }
@@ -105,9 +106,8 @@ std::string text_of(const config::Schedule& s, const plan::Plan& p) {
         std::count_if(p.entries.begin(), p.entries.end(),
                       [](const auto& e) { return e.what == plan::Entry::What::slot; }));
     std::string text =
-        fmt::format("cycle {:g} us at {} Mbit/s, guard {:g} us: {} station{}, {} slot{}\n\n",
-                    us(s.cycle), s.speed, us(s.guard), s.stations.size(),
-                    s.stations.size() == 1 ? "" : "s", slots, slots == 1 ? "" : "s");
+        fmt::format("cycle {:g} us at {} Mbit/s, guard {:g} us: {}, {}\n\n", us(s.cycle), s.speed,
+                    us(s.guard), counted(s.stations.size(), "station"), counted(slots, "slot"));
     text += table_text(s, p) + "\n" + timeline_text(s, p) + "\n";
     text += fmt::format(
         "load {:.1f} % with frames of full length; a frame of 60 bytes takes {:.2f} us on a line, "
@@ -122,8 +122,8 @@ std::string text_of(const config::Schedule& s, const plan::Plan& p) {
                 e.name, us(e.phase), us(e.backup_offset));
         }
     }
-    text += fmt::format("outputs are set to safe values {} cycle{} after the last sync: {:g} us\n",
-                        s.lost, s.lost == 1 ? "" : "s", us(s.cycle * s.lost));
+    text += fmt::format("outputs are set to safe values {} after the last sync: {:g} us\n",
+                        counted(s.lost, "cycle"), us(s.cycle * s.lost));
     for (const plan::RoundTrip& t : p.trips) {
         text += trip_text(s, t, s.stations[*p.by_way_of].name);
     }
@@ -154,10 +154,6 @@ std::string json_text(const config::Schedule& s, const plan::Plan& p) {
 }  // namespace
 
 int run_tdma_plan(const TdmaPlanOptions& options) {
-    if (options.words.size() != 1) {
-        return fail(options, fmt::format("nothing is expected at '{}'; see: hal help tdma plan",
-                                         options.words[1]));
-    }
     const std::string& file = options.words[0];
     std::string text;
     if (!config::read_from_disk(file, text)) {

@@ -12,7 +12,7 @@ struct TdmaPlanOptions : Options {
     std::string svg;  ///< a file for the picture; -: standard output; empty: not given
 
     void declare(OptionSet& set) override {
-        set.words("FILE", "schedule of the segment, NAME.tdma or RTnet's tdma.conf");
+        set.word("FILE", "schedule of the segment, NAME.tdma or RTnet's tdma.conf");
         set.flag("--json", json, "print JSON");
         set.value("--svg", svg, "FILE", "draw the slots to this file; -: standard output");
     }
