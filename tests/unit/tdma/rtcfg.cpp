@@ -257,6 +257,25 @@ TEST(Rtcfg_client, ignores_a_second_server_and_another_configuration_while_runni
     said.text();
 }
 
+TEST(Rtcfg_client, ignores_a_fragment_for_another_station) {
+    Cell cell;
+    Notice said;
+    cell.run(4000 * ms);
+    rtcfg::Client& client = cell.at_x.applicant.client();
+    ASSERT_TRUE(client.complete());
+    rtcfg::Message m;
+    m.id = rtcfg::Id::stage_2_fragment;
+    m.from = mac(1);
+    m.to = mac(9);
+    std::array<std::uint8_t, ethernet::largest_frame> frame{};
+    client.arrived(std::span(frame).first(rtcfg::encode(m, frame)), cell.now);
+    EXPECT_EQ(1U, client.foreign());
+    m.to = mac(2);
+    client.arrived(std::span(frame).first(rtcfg::encode(m, frame)), cell.now);
+    EXPECT_EQ(1U, client.foreign());
+    said.text();
+}
+
 TEST(Rtcfg_client, reports_an_invalid_configuration_once_and_accepts_the_next) {
     Cell cell;
     Notice said;
