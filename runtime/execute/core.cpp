@@ -10,6 +10,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include "execute/float_modes.hpp"
 #include "execute/violation.hpp"
 
 // The real-time guard: the sanitizer's runtime defines these when the program is built with it.
@@ -83,6 +84,8 @@ constexpr std::size_t checked_values = 256;
 }  // namespace
 
 Core* Core::current() noexcept { return current_core; }
+
+void Core::set_current(Core* core) noexcept { current_core = core; }
 
 Core::Core(std::uint32_t id, std::int64_t period_ns, ThreadPins pins, FaultBoard& board,
            Timeline& timeline, const std::atomic<bool>& running, bool measure, CycleMark* mark,
@@ -496,6 +499,7 @@ Core::Missing Core::missing() const noexcept {
 
 void Core::replay() noexcept {
     const CycleRecord record = inputs_->record();
+    const DefaultFloatModes modes;
     if (record.kind == CycleRecord::service) return service();
     if (record.missed > monitor.missed()) {
         skip(record.missed - monitor.missed());
@@ -852,6 +856,22 @@ void Core::step_clock(std::int64_t ns) noexcept {
     if (in_function()) {
         timeline_.step(grid_ns_, ns);
     }
+}
+
+void Core::pass(const plan::Gate& gate) noexcept {
+    if (!inputs_) return;
+    if (inputs_->replays()) {
+        inputs_->wait_for_turn(inputs_->note(0));
+    } else {
+        inputs_->note(gate.tickets->fetch_add(1, std::memory_order_acq_rel));
+    }
+    const std::uint64_t progress = note(__atomic_load_n(gate.progress, __ATOMIC_RELAXED));
+    __atomic_store_n(gate.seen_progress, progress, __ATOMIC_RELAXED);
+}
+
+void pass_gate(void* self, const hal_cycle*) {
+    const auto& gate = *static_cast<const plan::Gate*>(self);
+    static_cast<Core*>(gate.core)->pass(gate);
 }
 
 void check_finite(void* self, const hal_cycle* cycle) {

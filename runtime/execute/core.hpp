@@ -75,6 +75,8 @@ public:
     /// Does the same at the end of the thread; waits while the supervisor does it. Not in a cycle
     void make_safe_at_end() noexcept;
     void raise(FaultEvent event) noexcept;
+    /// Notes the order of functions that share state; in a re-execution, waits for it. [realtime]
+    void pass(const plan::Gate& gate) noexcept;
     /// Notes what the running function reads outside of the machine: a clock, a random number.
     /// Returns what it gets, which is from the journal in a re-execution. [realtime]
     std::uint64_t note_reading(std::uint64_t value) noexcept {
@@ -189,6 +191,8 @@ public:
     /// Returns the core whose functions run on the calling thread, or nullptr; for crash and
     /// terminate handlers.
     static Core* current() noexcept;
+    /// Continues a cycle that a re-execution has left in a gate.
+    static void set_current(Core* core) noexcept;
     std::uint32_t current_function() const noexcept;
     /// the same, seen from another thread
     std::uint32_t interrupted_function() const noexcept;
@@ -294,6 +298,10 @@ private:
     bool in_budget_ = true;
     ModeCheck modes_;
 };
+
+/// The step that the compiler inserts before and after a function that shares state with one of
+/// another thread; `self` is a plan::Gate. [realtime]
+void pass_gate(void* self, const hal_cycle* cycle);
 
 /// The step that the compiler inserts after a function with a declared-finite output; `self` is a
 /// plan::FiniteCheck whose sink is the Core. [realtime]

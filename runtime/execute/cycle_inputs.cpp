@@ -13,7 +13,8 @@ CycleInputs::CycleInputs(std::size_t ring_words)
       mask_(std::bit_ceil(std::max(ring_words, head_words)) - 1),
       ring_(std::make_unique<std::uint64_t[]>(mask_ + 1)) {}
 
-CycleInputs::CycleInputs() : notes_(std::make_unique<std::uint64_t[]>(max_notes)), mask_(0) {}
+CycleInputs::CycleInputs(FunctionOrder* order)
+    : notes_(std::make_unique<std::uint64_t[]>(max_notes)), order_(order), mask_(0) {}
 
 void CycleInputs::begin(CycleRecord::Kind kind, std::uint64_t number, std::int64_t grid_ns,
                         std::int64_t due_ns, std::int64_t woke_ns, std::uint64_t missed) noexcept {

@@ -34,6 +34,14 @@ struct CycleRecord {
     std::uint64_t notes = 0;  ///< how many words follow
 };
 
+/// The order in which functions that share state ran in a journaled machine.
+class FunctionOrder {
+public:
+    virtual ~FunctionOrder() = default;
+    /// Returns when all steps with smaller tickets have run. Other cycles are executed meanwhile.
+    virtual void wait_for(std::uint64_t ticket) = 0;
+};
+
 /// Records the inputs of the cycles of one thread, or gives them back. [realtime] for the thread,
 /// unless stated otherwise.
 ///
@@ -49,8 +57,8 @@ public:
 
     /// Records, in a ring of at least `ring_words`, which is touched here. [setup]
     explicit CycleInputs(std::size_t ring_words);
-    /// Gives back what load() is given. [setup]
-    CycleInputs();
+    /// Gives back what load() is given, in this order, which outlives it. [setup]
+    explicit CycleInputs(FunctionOrder* order = nullptr);
     CycleInputs(const CycleInputs&) = delete;
 
     bool replays() const noexcept { return ring_ == nullptr; }
@@ -72,6 +80,12 @@ public:
             notes_[at] = value;
         }
         return value;
+    }
+    /// Only in a re-execution.
+    void wait_for_turn(std::uint64_t ticket) {
+        if (order_) {
+            order_->wait_for(ticket);
+        }
     }
     void answered(std::uint64_t observation) noexcept { record_.observation = observation; }
     /// Ends the record; in a re-execution, compares it.
@@ -114,6 +128,7 @@ private:
     std::size_t count_ = 0;  // of notes
     std::unique_ptr<std::uint64_t[]> notes_;
     Match match_ = Match::same;
+    FunctionOrder* const order_ = nullptr;
     const std::size_t mask_;
     const std::unique_ptr<std::uint64_t[]> ring_;  // nullptr: replays
     std::size_t seen_tail_ = 0;

@@ -137,15 +137,16 @@ bool wait_for(Ready ready, std::int64_t timeout_ns) {
 }
 
 constexpr std::int64_t for_ever = std::numeric_limits<std::int64_t>::max() / 2;
+}  // namespace
 
 // Declared hung by the supervisor, or not supervised and in a cycle that an earlier call has
 // already waited for.
-bool hangs(const Core& core, std::int64_t timeout_ns) {
+bool Executor::hangs(const Core& core, std::int64_t timeout_ns) const {
     if (core.monitor.hung()) return true;
+    if (schedule_) return false;
     const std::int64_t since = core.monitor.busy_since_ns();
     return since != 0 && monotonic_ns() - since > timeout_ns + 2 * core.period_ns();
 }
-}  // namespace
 
 bool Executor::remove(Core& core, std::int64_t timeout_ns) {
     Runner& leaving = runner(core);
@@ -213,7 +214,7 @@ std::vector<Core*> Executor::hanging(std::int64_t timeout_ns) const {
             continue;
         }
         const std::int64_t since = core.monitor.busy_since_ns();
-        if (since == 0) continue;
+        if (since == 0 || schedule_) continue;
         if (!wait_for(
                 [&] { return core.monitor.busy_since_ns() != since || hangs(core, timeout_ns); },
                 for_ever) ||

@@ -31,6 +31,14 @@ public:
     /// Creates a thread, which serves its inbox at once. Returns its core, which lives until
     /// remove().
     Core& add(const CoreOptions& options, ThreadPins pins);
+    /// The cycles of all threads have a journal. Before the first thread and instance.
+    void begin_journal() { journaled_ = true; }
+    /// Returns the gate of functions that share state, without its core; nullptr: no journal.
+    const plan::Gate* gate() const { return journaled_ || schedule_ ? &gate_ : nullptr; }
+    /// Returns what components see of the supervisor.
+    const hal_supervision& seen_supervision() const {
+        return journaled_ || schedule_ ? seen_supervision_ : supervisor_.shared;
+    }
     /// Returns the number of the next thread that add() creates.
     std::uint32_t next_id() const { return next_id_; }
     /// Sets a thread's outputs to their safe values and ends it. Returns false when it hangs or
@@ -104,6 +112,7 @@ public:
 
 private:
     void call(Runner& runner);  // the virtual clock's is served at once
+    bool hangs(const Core& core, std::int64_t timeout_ns) const;
     template <class Ready>
     bool wait(Ready ready, std::int64_t timeout_ns);
     Runner& runner(const Core& core) const;
@@ -122,6 +131,11 @@ private:
     VirtualClock clock_{runners_, timeline_, background_, supervisor_};
     const std::int64_t epoch_ns_;  // all positions of the grid are epoch + k * period
     std::uint32_t next_id_ = 1;
+    bool journaled_ = false;
+    std::atomic<std::uint64_t> tickets_{0};  // written by all threads in gates
+    // written by threads in gates, so that a journal has what they read
+    hal_supervision seen_supervision_{sizeof(hal_supervision), 0, 0};
+    const plan::Gate gate_{&tickets_, &supervisor_.shared.progress, &seen_supervision_.progress};
 };
 
 }  // namespace hal

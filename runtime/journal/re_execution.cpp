@@ -51,6 +51,7 @@ std::string text_of(const std::vector<std::vector<std::string>>& commands) {
 ReExecution::ReExecution(JournalFile& file) : file_(file) {
     for (auto& [number, thread] : file.threads()) {
         Cursor& cursor = cursors_[number];
+        cursor.inputs = std::make_unique<CycleInputs>(static_cast<FunctionOrder*>(this));
         cursor.thread = &thread;
         load(cursor);
         if (const CycleRecord* const first = thread.record()) {
@@ -79,13 +80,22 @@ bool ReExecution::fail(State state, std::string reason) {
 
 // --- the schedule ---
 
-CycleInputs& ReExecution::inputs_of(std::uint32_t id) { return *cursors_[id].inputs; }
+CycleInputs& ReExecution::inputs_of(std::uint32_t id) {
+    std::unique_ptr<CycleInputs>& inputs = cursors_[id].inputs;
+    if (!inputs) {
+        inputs = std::make_unique<CycleInputs>(
+            static_cast<FunctionOrder*>(this));  // of a thread without a cycle
+    }
+    return *inputs;
+}
 
 void ReExecution::begin(Core& core) { cursors_[core.id()].core = &core; }
 
 void ReExecution::end(Core& core) {
     Cursor& cursor = cursors_[core.id()];
-    const auto remain = [&cursor] { return cursor.thread && cursor.thread->record(); };
+    const auto remain = [&cursor] {
+        return cursor.thread && (cursor.suspended || cursor.thread->record());
+    };
     while (remain() && step()) {
     }
     cursor.core = nullptr;
@@ -107,7 +117,9 @@ bool ReExecution::step() {
 ReExecution::Cursor* ReExecution::next(bool& needs_edit, bool in_edit) {
     std::vector<Cursor*> waiting;
     for (auto& [number, cursor] : cursors_) {
-        if (cursor.thread && cursor.thread->record() && !cursor.ended) {
+        if (cursor.suspended) {
+            if (cursor.ticket == next_ticket_) return &cursor;
+        } else if (cursor.thread && cursor.thread->record() && !cursor.ended) {
             waiting.push_back(&cursor);
         }
     }
@@ -131,11 +143,37 @@ void ReExecution::load(Cursor& cursor) {
     }
 }
 
-void ReExecution::execute(Cursor& cursor) {
-    const CycleRecord record = cursor.inputs->record();
-    now_ns_ = record.woke_ns;
-    newest_ = {cursor.thread->name, record.number, record.woke_ns - begin_ns_.value_or(0)};
-    cursor.core->replay();
+JournaledCycle ReExecution::cycle_of(const Cursor& cursor) const {
+    const CycleRecord& record = cursor.inputs->record();
+    return {cursor.thread->name, record.number, record.woke_ns - begin_ns_.value_or(0)};
+}
+
+/// Begins a cycle, or continues one that waits in a gate. Returns true when it has ended.
+bool ReExecution::execute(Cursor& cursor) {
+    Cursor* const outer = std::exchange(running_, &cursor);
+    bool ended = false;
+    if (cursor.suspended) {
+        Core::set_current(cursor.core);
+        ended = cursor.stack->resume();
+    } else {
+        if (!cursor.stack) {
+            cursor.stack = std::make_unique<CycleStack>();
+        }
+        cursor.entered.reset();
+        now_ns_ = cursor.inputs->record().woke_ns;
+        ended = cursor.stack->run([&cursor] { cursor.core->replay(); });
+    }
+    Core::set_current(nullptr);
+    running_ = outer;
+    cursor.suspended = !ended;
+    if (ended) {
+        finish_cycle(cursor);
+    }
+    return ended;
+}
+
+void ReExecution::finish_cycle(Cursor& cursor) {
+    newest_ = cycle_of(cursor);
     ++cycles_;
     match_ = cursor.inputs->match();
     if (match_ != CycleInputs::Match::same) {
@@ -145,12 +183,35 @@ void ReExecution::execute(Cursor& cursor) {
     load(cursor);
 }
 
+/// Called by a cycle before and after a function that shares state.
+void ReExecution::wait_for(std::uint64_t ticket) {
+    Cursor& cursor = *running_;
+    while (ticket > next_ticket_) {
+        cursor.ticket = ticket;
+        cursor.stack->leave();
+    }
+    next_ticket_ = ticket + 1;
+    note_overlap(cursor, ticket);
+}
+
+void ReExecution::note_overlap(Cursor& cursor, std::uint64_t ticket) {
+    if (!cursor.entered) {
+        cursor.entered = ticket;
+        return;
+    }
+    const bool overlapped = ticket != *cursor.entered + 1;
+    cursor.entered.reset();
+    if (overlapped && overlaps_++ == 0) {
+        first_overlap_ = cycle_of(cursor);
+    }
+}
+
 ReExecution::State ReExecution::advance() {
     while (state_ == State::goes_on) {
         bool needs_edit = false;
         if (Cursor* const cursor = next(needs_edit, false)) {
-            execute(*cursor);
-            return state_;
+            if (execute(*cursor)) return state_;
+            continue;
         }
         if (!needs_edit) return state_ = end_of_journal();
         if (!make_next_edit()) break;
@@ -161,6 +222,13 @@ ReExecution::State ReExecution::advance() {
 ReExecution::State ReExecution::end_of_journal() {
     for (const auto& [number, cursor] : cursors_) {
         if (!cursor.thread || !cursor.thread->record() || cursor.ended) continue;
+        if (cursor.suspended) {
+            reason_ = fmt::format(
+                "thread '{}': a function of its cycle {} waits for one of "
+                "another thread that is not in the journal",
+                cursor.thread->name, cursor.thread->record()->number);
+            return State::ends;
+        }
         reason_ = fmt::format(
             "thread '{}': its cycle {} reads a cycle of another thread that is "
             "not in the journal",

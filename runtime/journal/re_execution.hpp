@@ -13,6 +13,7 @@
 
 #include "execute/core.hpp"
 #include "execute/cycle_schedule.hpp"
+#include "journal/cycle_stack.hpp"
 #include "journal/journal_file.hpp"
 #include "netlist/netlist.hpp"
 #include "text/diagnostic.hpp"
@@ -30,7 +31,7 @@ struct JournaledCycle {
 };
 
 /// [setup] throughout. All cycles run on the calling thread, which holds the session's lock.
-class ReExecution final : public CycleSchedule {
+class ReExecution final : public CycleSchedule, private FunctionOrder {
 public:
     /// Elaborates a command of the journal in a transaction.
     using Apply = std::function<void(Transaction&, const Command&, Diagnostics&)>;
@@ -70,15 +71,28 @@ public:
     bool step() override;
     std::int64_t now_ns() const override { return now_ns_; }
 
+    /// Returns how often functions that share state ran at the same time, so that what one read of
+    /// the other is unknown, and the first such cycle.
+    std::uint64_t overlaps() const { return overlaps_; }
+    const JournaledCycle& first_overlap() const { return first_overlap_; }
+
 private:
     struct Cursor {
         JournaledThread* thread = nullptr;
-        std::unique_ptr<CycleInputs> inputs = std::make_unique<CycleInputs>();
+        std::unique_ptr<CycleInputs> inputs;
         Core* core = nullptr;  // nullptr: the thread does not exist yet, or no more
         bool ended = false;
+        std::unique_ptr<CycleStack> stack = {};  // of its cycle
+        bool suspended = false;  // within a cycle, in a gate
+        std::uint64_t ticket = 0;  // that it waits for
+        std::optional<std::uint64_t> entered = {};  // ticket with which its function began
     };
     Cursor* next(bool& needs_edit, bool in_edit);
-    void execute(Cursor& cursor);
+    bool execute(Cursor& cursor);
+    void finish_cycle(Cursor& cursor);
+    void wait_for(std::uint64_t ticket) override;
+    void note_overlap(Cursor& cursor, std::uint64_t ticket);
+    JournaledCycle cycle_of(const Cursor& cursor) const;
     void load(Cursor& cursor);
     State end_of_journal();
     bool make_next_edit();
@@ -95,6 +109,10 @@ private:
     Apply apply_;
     std::function<void(const std::vector<std::string>&)> sampled_;
     std::map<std::uint32_t, Cursor> cursors_;
+    Cursor* running_ = nullptr;
+    std::uint64_t next_ticket_ = 0;
+    std::uint64_t overlaps_ = 0;
+    JournaledCycle first_overlap_;
     std::size_t entry_ = 0;  // the next one
     State state_ = State::goes_on;
     bool finished_ = false;

@@ -245,6 +245,10 @@ private:
             }
         }
         plan.finite_checks = std::make_unique<plan::FiniteCheck[]>(checks);
+        if (input_.journaled()) {
+            plan.gate = std::make_unique<plan::Gate>(*input_.gate);
+            plan.gate->core = input_.core_of(thread);
+        }
         std::size_t check = 0;
         std::unordered_set<const Instance*> met;
         const auto fill = [&](const std::vector<LoadedFunction*>& row, std::vector<plan::Step>& to,
@@ -252,6 +256,10 @@ private:
             for (LoadedFunction* function : row) {
                 if (excluded(function)) continue;
                 const auto begin = static_cast<std::uint32_t>(to.size());
+                const bool gated = plan.gate && shares_state(*function);
+                if (gated) {
+                    to.push_back({input_.pass_gate, plan.gate.get()});
+                }
                 to.insert(to.end(), function->steps.begin(), function->steps.end());
                 for (const Instance* instance : function->instances) {
                     for (const Pin* pin : instance->finite) {
@@ -260,6 +268,9 @@ private:
                                                      input_.core_of(thread), false};
                         to.push_back({input_.check_finite, &plan.finite_checks[check++]});
                     }
+                }
+                if (gated) {
+                    to.push_back({input_.pass_gate, plan.gate.get()});
                 }
                 functions.push_back({begin, static_cast<std::uint32_t>(to.size()), function->id,
                                      function->times.get()});
@@ -275,6 +286,22 @@ private:
         fill(thread.functions, plan.steps, plan.functions);
         rows(thread, plan);
         note_working_set(thread, plan);
+    }
+
+    // One of its instances has functions in another thread, too, or pins in cells that other
+    // threads write, or reads what the supervisor writes.
+    bool shares_state(const LoadedFunction& of) const {
+        const auto elsewhere = [&](const LoadedFunction* other) {
+            return other->thread && other->thread != of.thread && !excluded(other);
+        };
+        const auto cell = [&](const auto& pin) {
+            return pin->signal && in_cell(out_.places[pin->signal->index], *pin);
+        };
+        return std::ranges::any_of(of.instances, [&](const Instance* instance) {
+            return instance->reads_supervision ||
+                   std::ranges::any_of(instance->functions, elsewhere) ||
+                   std::ranges::any_of(instance->pins, cell);
+        });
     }
 
     void rows(const Thread& thread, plan::Plan& plan) const {
@@ -471,7 +498,7 @@ private:
         } else if (!plan && (moves || &now != pin.memory)) {
             out_.session_rebinds.push_back({pin.memory, slot, now.slot, pin.type != HAL_TYPE_PORT});
         }
-        if (plan && input_.journaled) {
+        if (plan && input_.journaled()) {
             check(pin, slot, *plan);
         }
         if (pin.pointer) {

@@ -28,7 +28,11 @@ struct CompileInput {
     const std::unordered_map<const Pin*, hal_pin*>* old_memory = nullptr;
     std::function<void*(const Thread&)> core_of;  ///< the sink of finite checks
     hal_step check_finite = nullptr;
-    bool journaled = false;  ///< the threads have a journal, whose checksums cover their values
+    /// Not nullptr: the threads have a journal, whose checksums cover their values. The gate around
+    /// functions that share state, without its core, and the step that passes it.
+    const plan::Gate* gate = nullptr;
+    hal_step pass_gate = nullptr;
+    bool journaled() const { return gate != nullptr; }
 };
 
 /// Where things will be once all threads have taken their plans.

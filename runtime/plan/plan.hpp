@@ -129,6 +129,15 @@ struct Safe {
     hal_value value;
 };
 
+/// `self` of the steps before and after a function that shares state with a function of another
+/// thread: with a journal, the order in which they ran is noted.
+struct Gate {
+    std::atomic<std::uint64_t>* tickets = nullptr;  ///< of all gates of the machine
+    const std::uint64_t* progress = nullptr;  ///< of the supervisor
+    std::uint64_t* seen_progress = nullptr;  ///< what components see of it
+    void* core = nullptr;
+};
+
 /// A value that the checksum of a journaled cycle covers.
 struct Checked {
     const hal_value* value;
@@ -159,6 +168,7 @@ struct Plan {
     /// made safe by a call: instances of this thread with a hal::Emergency
     std::vector<Step> emergency;
     std::unique_ptr<FiniteCheck[]> finite_checks;
+    std::unique_ptr<Gate> gate;  ///< of all its gated functions; nullptr: it has no journal
     /// the slots of this thread's signals, in order of first use
     std::unique_ptr<hal_value[]> image;
     std::size_t image_size = 0;

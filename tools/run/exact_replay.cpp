@@ -273,6 +273,17 @@ private:
             counted(execution_.cycles(), "cycle"), counted(file_.threads().size(), "thread"),
             counted(execution_.edits(), "edit"), seconds(newest.time_ns), real, newest.number,
             newest.thread, seconds(newest.time_ns));
+        if (execution_.overlaps() > 0) {
+            const JournaledCycle& first = execution_.first_overlap();
+            note(options_,
+                 fmt::format("{} functions that share state with another thread ran at the same "
+                             "time as it, first in cycle {} of '{}' at {:.6f} s: what they read "
+                             "of each other there may differ",
+                             execution_.overlaps() == 1
+                                 ? "once,"
+                                 : fmt::format("{} times,", execution_.overlaps()),
+                             first.number, first.thread, seconds(first.time_ns)));
+        }
         const std::string difference = difference_text();
         const bool differs = !difference.empty();
         bool good = !differs;

@@ -27,6 +27,9 @@ std::unique_ptr<Executor> make_executor(const SessionOptions& options) {
 
 SessionState::SessionState(SessionOptions o)
     : options(std::move(o)), plugins(options.plugin_path), executor(make_executor(options)) {
+    if (options.sink) {
+        executor->begin_journal();
+    }
     if (!options.virtual_clock && !options.check_only) {
         refused = prepare_process();
     }

@@ -384,7 +384,8 @@ bool ThreadPlans::swap(Edit& edit, EarlierValues& before,
     input.old_memory = &edit.old_memory;
     input.core_of = [this](const Thread& thread) -> void* { return core(&thread); };
     input.check_finite = check_finite;
-    input.journaled = state_.options.sink || state_.executor->replays();
+    input.gate = state_.executor->gate();
+    input.pass_gate = pass_gate;
     Compiled compiled = compile(state_.model, input);
     state_.probes.enter(compiled);
     observe_unknowns(compiled);
