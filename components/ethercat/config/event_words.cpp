@@ -310,6 +310,10 @@ constexpr bus::EventRow<Event> event_rows[] = {
      "; it is tried again"},
     {Event::slave_settled, Effect::none,
      "{who} is in {state}, the state of its configuration, after {second} ms"},
+    {Event::data_stale, Effect::raises,
+     "{who} is in OP, but its process data is not exchanged[: {staleness}]",
+     "; its inputs keep their last values"},
+    {Event::data_fresh, Effect::ends, "{who} exchanges process data again"},
 };
 static_assert(bus::in_order(event_rows));
 
@@ -388,6 +392,21 @@ std::string lost_clock(const Source& s) {
            "synchronisation";
 }
 
+std::string staleness(const Source& s) {
+    switch (static_cast<master::Staleness>(s.first())) {
+    case master::Staleness::late:
+        return std::string("the frames return later than ") +
+               (s.setup.frame_timeout_ns != 0 ? "`frame-timeout`" : "the next cycle") +
+               "; find what delays them, or allow more time with a longer cycle" +
+               s.by_format("", " or `frame-timeout` in [bus]");
+    case master::Staleness::counter:
+        return "the working counter of its datagram is too small; it, or another slave of the same "
+               "datagram, does not take part: power-cycle them";
+    case master::Staleness::lost: break;
+    }
+    return "the frames with it do not return; check the cables and the network card";
+}
+
 struct Value {
     std::string_view name;
     std::string (*of)(const Source&);
@@ -426,10 +445,14 @@ constexpr Value values[] = {
     {"counter", [](const Source& s) { return std::to_string(s.first() & 0xffff); }},
     {"difference",
      [](const Source& s) {
+    if ((s.first() & 0xffff) == 0) {
+        return std::string("no slave takes part, or the frames are lost or late");
+    }
     return std::string((s.first() & 0xffff) < s.second()
                            ? "some slaves do not exchange process data"
                            : "a slave answers that is not started yet");
 }},
+    {"staleness", staleness},
     {"width", [](const Source& s) { return std::string(s.first() != 0 ? "" : " (32 bits)"); }},
     {"alias",
      [](const Source& s) {

@@ -77,6 +77,7 @@ void Bus::update_status() noexcept {
     State lowest = State::op;
     bool all = status.scanned;
     bool any = false;
+    bool fresh = true;
     for (std::size_t n = 0; n < device_of.size(); ++n) {
         const Device* d =
             device_of[n] >= 0 ? devices[static_cast<std::size_t>(device_of[n])].get() : nullptr;
@@ -87,9 +88,11 @@ void Bus::update_status() noexcept {
         any = true;
         lowest = std::min(lowest, d->slave.state);
         all &= d->settled;
+        fresh &= !d->stale;
     }
     status.state = any ? lowest : State::none;
-    status.operational = all && any;
+    settled = all && any;
+    status.operational = settled && fresh;
 }
 
 }  // namespace hal::ethercat::master

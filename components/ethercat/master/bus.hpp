@@ -40,6 +40,9 @@ struct Device {
     bool drifted = false;  ///< it was reported as not in step, while it is operational
     std::int64_t drifts_since_ns = 0;  ///< when its clock left the window; 0: it is there
     bool settled = false;  ///< a start-up brought it to the state that the setup names
+    bool in_op = false;  ///< settled in OP
+    bool stale = false;  ///< its process data is not exchanged
+    bool stale_reported = false;
     /// it is to be in BOOT, for its firmware; only a slave that the setup does not name
     bool to_boot = false;
     bool helping = false;  ///< the task on its channel works for that of the bus
@@ -75,6 +78,10 @@ struct Bus {
     unsigned known = 0;  ///< slaves on the bus after the newest scan
     bool outputs_valid = true;  ///< the slaves may go to OP
     bool exchange = false;  ///< process data frames are sent
+    /// every slave that is not optional is in the state that the setup names; its process data may
+    /// be stale
+    bool settled = false;
+    std::uint64_t late_seen = 0;  ///< BusStatus::late in the previous cycle
     bool suspicious = true;  ///< look at the slaves now
     /// the supervision waits; Master wakes it when `suspicious` is set
     bool resting = false;
@@ -127,7 +134,13 @@ struct Bus {
     /// Notes that a slave is no longer in its state, or is about to leave it.
     void unsettle(Device& d) noexcept {
         d.settled = false;
-        d.status.operational = false;
+        set_in_op(d, false);
+    }
+    /// Sets whether a start-up brought a slave to OP. It is operational while its process data is
+    /// exchanged, too.
+    void set_in_op(Device& d, bool is_in_op) noexcept {
+        d.in_op = is_in_op;
+        d.status.operational = d.in_op && !d.stale;
     }
     /// Lets shut_down() address the slave while it may be in OP.
     void note_in_op(const Device&, bool in_op) noexcept;
@@ -204,6 +217,8 @@ Task<void> supervise(Channel&, Bus&) noexcept;
 Task<void> watch(Channel&, Bus&) noexcept;
 Task<void> check(Channel&, Bus&, Device&) noexcept;
 void judge_counters(Bus&) noexcept;  ///< Reports changes of the working counters.
+/// Follows whether the process data of the slaves is exchanged, in each cycle.
+void judge_data(Bus&) noexcept;
 
 // redundancy.cpp
 /// Finds the break of a ring, by how far the primary port reaches.

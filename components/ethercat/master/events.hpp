@@ -73,6 +73,16 @@ enum class Event : std::uint8_t {
     start_up_failed,
     /// in the state below OP that the setup names for it [State, ms since its start-up began]
     slave_settled,
+    /// in OP, but its process data is not exchanged [Staleness, -]
+    data_stale,
+    data_fresh,  ///< its process data is exchanged again [position, -]
+};
+
+/// Why the process data of a slave is not exchanged.
+enum class Staleness : std::uint8_t {
+    lost,  ///< the frames do not return
+    late,  ///< the frames return after their timeout
+    counter,  ///< the frames return with a working counter that is too small
 };
 
 /// Set in the second number of an event if its low half is the code of a mailbox error and not of

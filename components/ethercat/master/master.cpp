@@ -39,6 +39,7 @@ void Master::receive(std::int64_t now_ns) noexcept {
     }
     take_clock(bus);
     judge_counters(bus);
+    judge_data(bus);
     if (bus.suspicious && bus.resting && bus.bus_channel.stage() == Channel::Stage::sleeping) {
         bus.bus_channel.wake();
     }
@@ -67,8 +68,8 @@ void Master::transmit(std::int64_t now_ns) noexcept {
     // backup port reaches: the clock they follow must not change when a ring breaks.
     const std::int64_t ahead =
         bus.setup.lead != ClockLead::thread && bus.skew_ns != 0 ? bus.skew_ns : bus.epoch_ns;
-    bus.engine.transmit(now_ns, bus.exchange, !bus.status.operational,
-                        bus.status.operational ? acyclic_frames_operating : acyclic_frames_starting,
+    bus.engine.transmit(now_ns, bus.exchange, !bus.settled,
+                        bus.settled ? acyclic_frames_operating : acyclic_frames_starting,
                         static_cast<std::uint64_t>(now_ns + ahead));
 }
 

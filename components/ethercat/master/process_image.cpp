@@ -12,6 +12,9 @@ namespace {
 
 constexpr std::uint16_t clock_bytes = 8;
 constexpr std::size_t datagram_overhead = datagram_header_bytes + wkc_bytes;
+// Longer than the master needs to notice that a slave does not answer.
+constexpr std::uint32_t stale_exchanges = 30;
+constexpr std::int64_t stale_after_ns = 30'000'000;
 
 constexpr bool overlap(std::uint32_t a, std::uint32_t a_bytes, std::uint32_t b,
                        std::uint32_t b_bytes) noexcept {
@@ -25,7 +28,8 @@ ProcessImage::ProcessImage(const Setup& setup, const std::array<std::uint8_t, 6>
       domains_(std::max<std::size_t>(setup.domains.size(), 1)),
       source_(source),
       most_(std::clamp<std::size_t>(setup.frame_bytes, 200, largest_frame_bytes)),
-      write_clock_(setup.lead == ClockLead::thread) {
+      write_clock_(setup.lead == ClockLead::thread),
+      cycle_ns_(std::max<std::int64_t>(setup.cycle_ns, 1)) {
     lay_out(setup);
     // Each block needs at most two datagrams and one per frame's worth of bytes; each of them could
     // need a frame of its own.
@@ -137,6 +141,7 @@ void ProcessImage::build() noexcept {
         build_frames(1);  // for the clock alone
     }
     recount();
+    mark_stale_slaves();
 }
 
 void ProcessImage::build_frames(unsigned every) noexcept {
@@ -205,6 +210,7 @@ void ProcessImage::add(FrameWriter& writer, Frame& frame, Command command, std::
     d.domain = b.domain;
     d.first_slave = b.first;
     d.last_slave = b.last;
+    d.every = b.every;
     if (command == Command::lwr) {
         d.out_to = d.length;
     } else if (command == Command::lrw) {
@@ -368,6 +374,40 @@ void ProcessImage::merge(const Frame& frame, std::uint8_t* first,
     }
 }
 
+/// Returns whether a datagram has process data of a slave.
+bool ProcessImage::carries(const Datagram& d, const SlaveImage& s) const noexcept {
+    return overlap(d.address, d.length, s.out_at, s.out_bytes) ||
+           overlap(d.address, d.length, s.in_at, s.in_bytes);
+}
+
+/// Follows whether the data of a datagram is exchanged.
+void ProcessImage::observe(Datagram& d, bool refreshed) noexcept {
+    d.returned = d.answered;
+    if (refreshed != d.stale) {
+        d.contradictions = 0;
+        return;
+    }
+    const auto limit =
+        std::max<std::int64_t>(stale_exchanges, stale_after_ns / (cycle_ns_ * d.every));
+    if (++d.contradictions < limit) return;
+    d.contradictions = 0;
+    d.stale = !d.stale;
+    mark_stale_slaves();
+}
+
+void ProcessImage::mark_stale_slaves() noexcept {
+    for (SlaveImage& s : slaves_) {
+        s.stale = std::any_of(datagrams().begin(), datagrams().end(),
+                              [&](const Datagram& d) { return d.stale && carries(d, s); });
+    }
+}
+
+bool ProcessImage::returns(std::size_t slave) const noexcept {
+    const SlaveImage& s = slaves_[slave];
+    return std::any_of(datagrams().begin(), datagrams().end(),
+                       [&](const Datagram& d) { return d.returned && carries(d, s); });
+}
+
 void ProcessImage::settle() noexcept {
     for (DomainStatus& d : domains_) {
         d.fresh = false;
@@ -395,6 +435,7 @@ void ProcessImage::settle() noexcept {
         s.wkc = static_cast<std::uint16_t>(s.wkc + wkc);
         s.expected = static_cast<std::uint16_t>(s.expected + d.expected);
         s.ok &= d.answered && wkc >= d.expected && wkc <= d.expected + d.tolerance;
+        observe(d, d.answered && wkc >= d.expected);
         d.sent = d.answered = false;
     }
     for (DomainStatus& s : domains_) {

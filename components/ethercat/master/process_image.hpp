@@ -44,6 +44,8 @@ public:
         /// its FMMUs are being set: it may count or not
         bool starting = false;
         bool no_lrw = false;
+        /// a datagram with its data is stale
+        bool stale = false;
         std::uint16_t domain = 0;
     };
     struct Datagram {
@@ -61,6 +63,11 @@ public:
         std::uint16_t last_slave = 0;  ///< in order of the layout
         bool sent = false;
         bool answered = false;  ///< since settle()
+        /// its data was not exchanged for 30 exchanges and 30 ms; ends after as many good ones
+        bool stale = false;
+        bool returned = false;  ///< it was answered in its newest exchange
+        unsigned every = 1;  ///< cycles between two exchanges
+        std::uint32_t contradictions = 0;  ///< exchanges in a row that contradict `stale`
     };
     struct Frame {
         std::array<std::uint8_t, largest_frame_bytes> bytes{};
@@ -128,6 +135,9 @@ public:
     /// Sums the counters of the datagrams sent since the last call, per domain; a datagram without
     /// answer counts 0. [realtime]
     void settle() noexcept;
+    /// Returns whether a datagram with data of a slave was answered in its newest exchange: its
+    /// working counter is wrong, then. [realtime]
+    bool returns(std::size_t slave) const noexcept;
 
 private:
     struct Block {
@@ -147,6 +157,9 @@ private:
              const Block&) noexcept;
     void copy_present(const Datagram&, const std::uint8_t* data) noexcept;
     std::size_t room() const noexcept;
+    bool carries(const Datagram&, const SlaveImage&) const noexcept;
+    void observe(Datagram&, bool refreshed) noexcept;
+    void mark_stale_slaves() noexcept;
 
     std::vector<SlaveImage> slaves_;
     std::vector<std::uint16_t> order_;
@@ -162,6 +175,7 @@ private:
     bool write_clock_ = false;
     std::uint16_t reference_ = 0;
     bool write_time_ = false;
+    std::int64_t cycle_ns_;
 };
 
 }  // namespace hal::ethercat::master

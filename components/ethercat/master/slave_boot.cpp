@@ -19,7 +19,7 @@ Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
     const auto done = [&](State reached) {
         if (reached != last) return false;
         d.settled = config != nullptr;
-        d.status.operational = d.settled && reached == State::op;
+        bus.set_in_op(d, d.settled && reached == State::op);
         return true;
     };
     bool ok = co_await request_state(c, bus, d, State::init, t.to_init);
@@ -152,7 +152,7 @@ Task<void> boot(Channel& c, Bus& bus, Device& d) noexcept {
     d.attempts = 0;
     if (!d.settled) co_return;
     const std::int64_t took_ms = (c.now_ns() - d.began_ns) / millisecond;
-    if (d.status.operational) {
+    if (d.in_op) {
         bus.report(Event::slave_operational, d, d.slave.position, took_ms);
     } else {
         bus.report(Event::slave_settled, d, code(d.slave.state), took_ms);

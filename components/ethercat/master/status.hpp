@@ -36,19 +36,20 @@ struct BusStatus {
     State state = State::none;
     bool link = false;                ///< the primary port has a carrier
     bool scanned = false;             ///< the slaves are identified
-    /// every slave that is not optional is in OP, or in its lower target
+    /// every slave that is not optional is in OP, or in its lower target, and the process data of
+    /// all is exchanged
     bool operational = false;
-    std::uint16_t responding = 0;     ///< slaves that answered the newest broadcast
-    std::uint16_t expected = 0;       ///< slaves of the setup that are not optional
+    std::uint16_t responding = 0;  ///< slaves that answered the newest broadcast
+    std::uint16_t expected = 0;  ///< slaves of the setup that are not optional
     std::uint16_t wkc = 0;
     std::uint16_t wkc_expected = 0;
     WkcState wkc_state = WkcState::none;
     std::uint64_t frames_sent = 0;
     std::uint64_t frames_received = 0;
-    std::uint64_t lost = 0;           ///< frames that did not return in time
-    std::uint64_t late = 0;           ///< frames that returned after their cycle
-    std::uint64_t duplicates = 0;     ///< frames that returned twice
-    std::uint64_t foreign = 0;        ///< EtherCAT frames of other programs, or damaged ones
+    std::uint64_t lost = 0;  ///< frames that did not return in time
+    std::uint64_t late = 0;  ///< frames that returned after their cycle
+    std::uint64_t duplicates = 0;  ///< frames that returned twice
+    std::uint64_t foreign = 0;  ///< EtherCAT frames of other programs, or damaged ones
     /// of these, those of another master: process data, settings, or from the far end of the line
     std::uint64_t foreign_control = 0;
     std::uint64_t send_failures = 0;  ///< frames that the port did not take
@@ -76,7 +77,7 @@ struct SlaveStatus {
     State state = State::none;
     std::uint16_t al_code = 0;
     bool online = false;  ///< answers datagrams
-    bool operational = false;  ///< in OP, with process data
+    bool operational = false;  ///< in OP, and its process data is exchanged
     bool al_error = false;
     /// magnitude of 092Ch; UINT32_MAX: no data
     std::uint32_t dc_deviation_ns = UINT32_MAX;

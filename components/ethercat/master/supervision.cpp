@@ -332,7 +332,7 @@ static Task<void> resynchronise(Channel& c, Bus& bus, Device& d) noexcept {
         co_return;
     }
     d.settled = true;
-    d.status.operational = true;
+    bus.set_in_op(d, true);
     bus.report(Event::slave_operational, d, d.slave.position,
                (c.now_ns() - d.began_ns) / millisecond);
 }
@@ -534,6 +534,37 @@ void judge_counters(Bus& bus) noexcept {
         bus.status.wkc_state = WkcState::complete;
     } else {
         bus.status.wkc_state = WkcState::none;
+    }
+}
+
+/// Reports a slave in OP whose process data is not exchanged, and the end of that.
+static void report_staleness(Bus& bus, Device& d, std::size_t slave, bool late) noexcept {
+    if (d.stale_reported && !d.stale) {
+        d.stale_reported = false;
+        bus.report(Event::data_fresh, d, d.slave.position);
+    } else if (!d.stale_reported && d.stale && d.in_op) {
+        d.stale_reported = true;
+        Staleness why = late ? Staleness::late : Staleness::lost;
+        if (bus.image.returns(slave)) {
+            why = Staleness::counter;
+        }
+        bus.report(Event::data_stale, d, static_cast<std::int64_t>(why));
+    }
+}
+
+void judge_data(Bus& bus) noexcept {
+    const bool late = bus.status.late != std::exchange(bus.late_seen, bus.status.late);
+    bool changed = false;
+    for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {
+        Device* const d = device_of(bus, n);
+        if (d == nullptr) continue;
+        changed |= d->stale != bus.image.slave(n).stale;
+        d->stale = bus.image.slave(n).stale;
+        bus.set_in_op(*d, d->in_op);
+        report_staleness(bus, *d, n, late);
+    }
+    if (changed) {
+        bus.update_status();
     }
 }
 

@@ -47,6 +47,10 @@ The netlist, with an emulated drive:
 others already exchange data; one that was lost is started again. Until a slave is `operational` its outputs are off and its inputs keep their last
 values.
 
+`operational` is also FALSE while the process data of a slave in OP is not exchanged for 30 cycles and 30 ms, although the slave answers: its frames
+return later than the next cycle (or `frame-timeout`), or with a working counter that is too small. A fault names the reason. Its inputs keep their
+last values, its outputs may still arrive. It is operational again after as many good cycles.
+
 With `dc` in the configuration the threads of this machine follow the reference clock, unless `clock = thread` is written there. `pll-err` is the remaining error.
 
 At the end, on `stop` and when a fault stops the thread, the slaves leave OP at once: their outputs are off, and `operational` is FALSE. When the thread

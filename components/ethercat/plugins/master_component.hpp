@@ -137,6 +137,7 @@ public:
         failed_.assign(bus_.setup.slaves.size(), Event::slave_operational);
         slave_faults_.resize(bus_.setup.slaves.size());
         clock_faults_.resize(bus_.setup.slaves.size());
+        data_faults_.resize(bus_.setup.slaves.size());
         filter_ = config::EventFilter(bus_.setup.slaves.size());
         begin_cycles();
         reporter_.start();
@@ -464,6 +465,12 @@ private:
         if (event == Event::dc_lost) {
             begin(clock_faults_[slave], event, slave, first);
         }
+        if (event == Event::data_stale) {
+            begin(data_faults_[slave], event, slave);
+        }
+        if (event == Event::data_fresh) {
+            end(data_faults_[slave]);
+        }
         if (event == Event::dc_recovered) {
             end(clock_faults_[slave]);
         }
@@ -591,7 +598,7 @@ private:
         return config::event_words(h, bus_.setup, bus_.link, bus_.backup,
                                    bus_.lcec ? config::Format::lcec : config::Format::ethercat);
     }, 256, [](const config::Happened& h, const std::string&) { return config::subject(h); }};
-    std::vector<hal::LastingFault> slave_faults_, clock_faults_;  // by slave
+    std::vector<hal::LastingFault> slave_faults_, clock_faults_, data_faults_;  // by slave
     hal::LastingFault period_fault_, unknown_fault_, nobody_fault_, link_fault_, other_fault_;
     std::int64_t now_ns_ = 0;
     std::int64_t other_seen_ns_ = 0;

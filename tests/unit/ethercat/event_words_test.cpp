@@ -90,6 +90,22 @@ TEST(EthercatEventWords, Bus_events_name_the_port_and_the_domain) {
     EXPECT_EQ(words(Event::wkc_incomplete, Events::bus, 3, 6),
               "domain 'default': working counter 3 instead of 6: some slaves do not exchange "
               "process data");
+    EXPECT_EQ(
+        words(Event::wkc_incomplete, Events::bus, 0, 6),
+        "domain 'default': working counter 0 instead of 6: no slave takes part, or the frames "
+        "are lost or late");
+    EXPECT_EQ(words(Event::data_stale, 1, static_cast<int>(master::Staleness::late)),
+              "slave 4 (x-axis) is in OP, but its process data is not exchanged: the frames return "
+              "later than the next cycle; find what delays them, or allow more time with a longer "
+              "cycle or `frame-timeout` in [bus]");
+    EXPECT_EQ(
+        words(Event::data_stale, 1, static_cast<int>(master::Staleness::lost)),
+        "slave 4 (x-axis) is in OP, but its process data is not exchanged: the frames with it "
+        "do not return; check the cables and the network card");
+    EXPECT_EQ(words(Event::data_stale, 1, static_cast<int>(master::Staleness::counter)),
+              "slave 4 (x-axis) is in OP, but its process data is not exchanged: the working "
+              "counter of its datagram is too small; it, or another slave of the same datagram, "
+              "does not take part: power-cycle them");
     EXPECT_EQ(words(Event::ring_broken, Events::bus, -1, 0),
               "eth:enp3s0 reaches no slave: the ring is broken there; all slaves still exchange "
               "data, repair the cable");

@@ -95,6 +95,35 @@ TEST_F(EthercatFaults, Lost_and_doubled_frames_are_counted_and_stop_nothing) {
     EXPECT_EQ(w.master->data(2, 1)[0], 4);
 }
 
+TEST_F(EthercatFaults, A_slave_in_OP_that_takes_no_part_in_the_process_data_is_not_operational) {
+    start(2);
+    const auto set_fmmus = [&](std::uint8_t active) {
+        for (const std::uint16_t fmmu : {0x60c, 0x61c}) {
+            std::array<std::uint8_t, largest_frame_bytes> bytes{};
+            FrameWriter frame(bytes, {2, 0, 0, 0, 0, 9});
+            put(frame.add(Command::fpwr, 0, at_station(0x1002, fmmu), 1), active);
+            std::vector<std::uint8_t> sent(frame.finish().size());
+            std::copy_n(bytes.begin(), sent.size(), sent.begin());
+            w.line.process(sent, esc::End::primary, w.now_ns);
+        }
+    };
+    set_fmmus(0);
+    w.run(25);
+    EXPECT_TRUE(w.master->status().operational) << "a few cycles are tolerated";
+    w.run(15);
+    EXPECT_FALSE(w.master->status().operational);
+    EXPECT_EQ(w.master->slave_status(1).state, State::op);
+    EXPECT_FALSE(w.master->slave_status(1).operational);
+    EXPECT_FALSE(w.master->slave_status(0).operational) << "the counter is that of both";
+    ASSERT_EQ(w.log.count(Event::data_stale), 2U) << w.log.text();
+    EXPECT_EQ(w.log.last(Event::data_stale)->first, static_cast<int>(Staleness::counter));
+    set_fmmus(1);
+    w.run(40);
+    EXPECT_TRUE(w.master->status().operational);
+    EXPECT_TRUE(w.master->slave_status(1).operational);
+    EXPECT_EQ(w.log.count(Event::data_fresh), 2U) << w.log.text();
+}
+
 TEST_F(EthercatFaults, Comes_up_although_every_fifth_frame_is_lost) {
     for (unsigned n = 0; n < 5; ++n) {
         w.add(0x100 + n);
