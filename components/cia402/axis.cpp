@@ -2,6 +2,7 @@
 #include "axis.hpp"
 
 #include <cmath>
+#include <utility>
 
 namespace hal::cia402 {
 
@@ -57,6 +58,7 @@ const AxisOrders& Axis::act(const AxisCommand& command, const AxisRules& rules, 
     active_ = enabled_ && mode_shown_ && home_ == Home::no;
     move(command, rules, now);
     if (failure_) {
+        stop_now(command, rules, now);
         enabled_ = active_ = false;
     }
     was_enable_ = command.enable;
@@ -64,6 +66,14 @@ const AxisOrders& Axis::act(const AxisCommand& command, const AxisRules& rules, 
     was_home_ = command.home;
     was_operational_ = in_.operational;
     return orders_;
+}
+
+/// Commands the drive to stop in the cycle that found a failure, after its state machine was stepped
+/// for an axis without one.
+void Axis::stop_now(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
+    if (!in_.operational || walk_.wanted() != State::operation_enabled) return;
+    want_state(state_of(in_.statusword), command.quick_stop);
+    orders_.controlword = walk_.step(in_.statusword, in_.error_code, now, rules.limits);
 }
 
 void Axis::set_missing(Cause half) noexcept {
@@ -80,7 +90,7 @@ void Axis::set_missing(Cause half) noexcept {
 }
 
 void Axis::interrupt() noexcept {
-    wanted_ = enabled_ = active_ = following_ = false;
+    wanted_ = enabled_ = active_ = following_ = holds_target_ = false;
     restart_ = Restart::pending;
     home_ = Home::no;
     set_points_.clear();
@@ -181,7 +191,10 @@ void Axis::walk(const AxisCommand& command, const AxisRules& rules, Time now) no
     want_state(state, command.quick_stop);
     orders_.controlword = walk_.step(in_.statusword, in_.error_code, now, rules.limits);
     take_failures(state);
-    enabled_ = wanted_ && walk_.reached();
+    const bool was_enabled = std::exchange(enabled_, wanted_ && walk_.reached());
+    if (enabled_ && !was_enabled) {
+        holds_target_ = false;
+    }
 }
 
 /// Fails when an enabled drive left operation enabled by itself.
@@ -305,7 +318,6 @@ void Axis::home(const AxisCommand& command, const AxisRules& rules, Time now) no
 /// enabling.
 void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     const double asked = command.position;
-    if (!rules.position.sound()) return fail(Cause::bad_factor, rules.position.ratio(), 0.0);
     if (!(std::fabs(asked * rules.position.ratio()) < farthest_count)) {
         return fail(Cause::bad_command, asked, 0.0);
     }
@@ -346,6 +358,18 @@ void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, T
     }
 }
 
+/// Lets the position sent to the drive follow the measured one while the drive does not follow it. A
+/// drive that still obeys its last target keeps it: the measured position would be a step back by
+/// the lag.
+void Axis::follow_target(bool by_cycle) noexcept {
+    const bool obeys = walk_.state() == State::operation_enabled &&
+                       by_position(in_.has_mode ? in_.mode : orders_.mode);
+    holds_target_ = (active_ && by_cycle) || (holds_target_ && obeys);
+    if (!holds_target_ && orders_.mode != Mode::profile_position) {
+        orders_.target_position = in_.position;
+    }
+}
+
 /// Follows the commanded position in the modes that take one in each cycle.
 void Axis::move_by_position(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     const bool by_cycle = by_position(orders_.mode);
@@ -359,9 +383,7 @@ void Axis::move_by_position(const AxisCommand& command, const AxisRules& rules, 
         active_ = false;
         following_ = false;
     }
-    if (!active_ && orders_.mode != Mode::profile_position) {
-        orders_.target_position = in_.position;
-    }
+    follow_target(by_cycle);
     if (!active_ || !by_cycle) {
         commanded_ = position_;
     }
@@ -467,11 +489,21 @@ void Axis::set_mode_bits(const AxisCommand& command) noexcept {
     }
 }
 
+/// Fails when the commands or the factors of an axis in motion are not valid numbers.
+void Axis::check_numbers(const AxisCommand& command, const AxisRules& rules) noexcept {
+    if (const Factor* const f = unsound_factor(rules)) {
+        fail(Cause::bad_factor, f->ratio(), 0.0);
+    } else if (!std::isfinite(command.velocity)) {
+        fail(Cause::bad_command, command.velocity, 0.0);
+    } else if (!std::isfinite(command.torque)) {
+        fail(Cause::bad_command, command.torque, 0.0);
+    }
+}
+
 /// Sets the targets and the upper bits of the controlword that belong to the mode.
 void Axis::move(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
-    const bool velocity_is_finite = std::isfinite(command.velocity);
-    if (active_ && !(velocity_is_finite && std::isfinite(command.torque))) {
-        fail(Cause::bad_command, velocity_is_finite ? command.torque : command.velocity, 0.0);
+    if (active_) {
+        check_numbers(command, rules);
     }
     move_by_position(command, rules, now);
     move_by_set_points(command, rules, now);

@@ -120,6 +120,9 @@ public:
     bool active() const noexcept { return active_; }
     /// Returns true while a commanded change of state is in progress.
     bool walking() const noexcept { return !walk_.reached(); }
+    /// Returns true while the drive has power although it was commanded off or to stop and the
+    /// timeout has expired: its power must be removed by other means.
+    bool keeps_power() const noexcept { return walk_.keeps_power(); }
     bool homed() const noexcept { return homed_; }
     bool homing() const noexcept { return home_ != Home::no; }
     bool fault() const noexcept {
@@ -160,10 +163,13 @@ private:
     void watch_enabled(State, const AxisRules&, Time now) noexcept;
     void want_state(State, bool quick_stop) noexcept;
     void take_failures(State) noexcept;
+    void stop_now(const AxisCommand&, const AxisRules&, Time now) noexcept;
     void select_mode(const AxisCommand&, const AxisRules&, Time now) noexcept;
     void home(const AxisCommand&, const AxisRules&, Time now) noexcept;
     void follow_position(const AxisCommand&, const AxisRules&, Time now) noexcept;
+    void check_numbers(const AxisCommand&, const AxisRules&) noexcept;
     void move(const AxisCommand&, const AxisRules&, Time now) noexcept;
+    void follow_target(bool by_cycle) noexcept;
     void move_by_position(const AxisCommand& command, const AxisRules& rules, Time now) noexcept;
     void move_by_set_points(const AxisCommand& command, const AxisRules& rules, Time now) noexcept;
     void queue_set_point(const AxisCommand& command, const AxisRules& rules) noexcept;
@@ -203,6 +209,7 @@ private:
     bool active_ = false;
     bool homed_ = false;
     bool following_ = false;
+    bool holds_target_ = false;  // the drive obeys the last commanded position
 
     bool mode_shown_ = false;
     bool was_enable_ = false;

@@ -92,6 +92,11 @@ std::string hint(const Failure& f) {
 
 }  // namespace
 
+bool has_power(State state) noexcept {
+    return state == State::operation_enabled || state == State::quick_stop_active ||
+           state == State::fault_reaction_active;
+}
+
 const char* to_string(Request request) noexcept {
     constexpr const char* words[] = {"enable", "run",  "disable", "quick stop",
                                      "reset",  "mode", "home",    "go"};
@@ -201,11 +206,19 @@ std::uint32_t key_of(const Failure& f) noexcept {
            a << 8 | b;
 }
 
+/// Returns what the axis does about a failure.
+const char* reaction(const Failure& f) {
+    const bool off = f.request == Request::disable || f.request == Request::quick_stop;
+    if (f.cause == Cause::lost) return "; it may not receive the command to stop";
+    if (f.cause == Cause::stays && off && has_power(f.state)) return "; it still has power";
+    return f.request == Request::run ? "; axis stopped" : "; axis off";
+}
+
 /// Returns the message with a placeholder for its number and with the reaction of the axis.
 std::string reason(const Failure& f) {
     const bool has_error_code = f.cause == Cause::drive_fault && f.error_code != 0;
     const char* const number = has_error_code ? " (error code {x})" : row_of(f.cause).placeholder;
-    return sentence(f) + number + (f.request == Request::run ? "; axis stopped" : "; axis off");
+    return sentence(f) + number + reaction(f);
 }
 
 }  // namespace

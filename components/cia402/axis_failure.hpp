@@ -10,6 +10,9 @@
 
 namespace hal::cia402 {
 
+/// Returns whether the motor may have power in a state of the drive. [any]
+bool has_power(State) noexcept;
+
 /// The command that failed.
 enum class Request : std::uint8_t { enable, run, disable, quick_stop, reset, mode, home, go };
 /// Returns the name of a request, as in "quick stop". [any]

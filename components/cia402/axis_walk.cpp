@@ -131,6 +131,7 @@ std::uint16_t Walk::step(std::uint16_t statusword, std::uint16_t error_code, Tim
 /// Takes the state of the drive. Returns whether it changed.
 bool Walk::observe(std::uint16_t statusword) noexcept {
     const State before = std::exchange(state_, state_of(statusword));
+    keeps_power_ = keeps_power_ && has_power(state_) && wanted_ != State::operation_enabled;
     const bool faulty = state_ == State::fault || state_ == State::fault_reaction_active;
     if (resetting_ && !faulty) {
         resetting_ = false;
@@ -175,9 +176,12 @@ Time Walk::timeout(const Limits& limits) const noexcept {
 /// The drive does not follow the command in time.
 void Walk::expire(std::uint16_t statusword, std::uint16_t error_code, Time waited) noexcept {
     // 605Ah may keep the drive there, and transition 16 is optional
-    const bool optional = state_ == State::quick_stop_active;
+    const bool optional = state_ == State::quick_stop_active && !forced_;
     if (!optional && !failure_) {
         fail(Cause::stays, statusword, error_code, waited);
+    }
+    if (!optional && has_power(state_) && wanted_ != State::operation_enabled) {
+        keeps_power_ = true;
     }
     if (resetting_) {
         resetting_ = false;

@@ -35,6 +35,9 @@ public:
     /// Returns true when the drive is in the commanded state. For switch on disabled, fault and not
     /// ready count, too: the motor has no power.
     bool reached() const noexcept { return reached_; }
+    /// Returns true while the drive has power although its time to switch off, or to stop, has
+    /// expired: it does not obey. Kept until it is seen without power, or is to be enabled again.
+    bool keeps_power() const noexcept { return keeps_power_; }
     /// Returns why it does not proceed. It has stopped trying, unless the commanded state is off.
     const Failure& failure() const noexcept { return failure_; }
 
@@ -64,6 +67,7 @@ private:
     bool resetting_ = false;
     bool edge_low_ = false;
     bool forced_ = false;  // braking took too long: the voltage is disabled
+    bool keeps_power_ = false;
 };
 
 }  // namespace hal::cia402

@@ -62,7 +62,7 @@ echo drive ended
 """
 SENTENCES = [  # of `show fault`, with # for what differs
     "canopen.0: node 2 (x): no heartbeat for # s (timeout 1 s) at cycle #; outputs set to safe values; see: show pin canopen.0",
-    "x: run: drive lost: node no longer operational at cycle #; axis stopped; see: show pin x",
+    "x: run: drive lost: node no longer operational at cycle #; it may not receive the command to stop; see: show pin x",
     "canopen.0: bus down: the interface is off or was removed at cycle #; the master retries; see: show pin canopen.0",
 ]
 EXPECTED = [

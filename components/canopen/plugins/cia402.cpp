@@ -124,6 +124,10 @@ struct Cia402 : hal::Component {
     hal::Out<std::uint32_t> fault_code{*this, "fault-code", "cause of the fault, see the table"};
     hal::Out<std::uint32_t> failed_step{*this, "failed-step",
                                         "state transition the drive did not make, see the table"};
+    hal::Out<bool> keeps_power{
+        *this, "keeps-power",
+        "TRUE: the drive has power although it was commanded off or to stop and the timeout has "
+        "expired; connect it to what removes the power by other means, such as a contactor"};
     hal::Out<std::uint32_t> state{*this, "state", "state of the drive, see the table"};
     hal::Out<double> position_fb{
         *this,
@@ -229,7 +233,7 @@ struct Cia402 : hal::Component {
         voltage = (in.statusword & status::voltage_enabled) != 0;
         limited = (in.statusword & status::internal_limit) != 0;
         const bool unwritten = writes_.is_missing(cycle.period_ns());
-        record_missing(unwritten_record_, unwritten, unwritten_text_);
+        record_lasting(unwritten_record_, unwritten, unwritten_text_);
         if (unwritten) {  // the drive must not keep the last orders
             axis_.set_missing(Cause::unwritten);
             act(cycle);
@@ -239,7 +243,7 @@ struct Cia402 : hal::Component {
     void write_all(hal::Cycle cycle) noexcept {
         writes_.ran(cycle.period_ns());
         const bool unread = reads_.is_missing(cycle.period_ns());
-        record_missing(unread_record_, unread, unread_text_);
+        record_lasting(unread_record_, unread, unread_text_);
         axis_.set_missing(unread ? Cause::unread : Cause::none);
         act(cycle);
     }
@@ -281,6 +285,8 @@ private:
             fault_record_.end(faults_, this);
         }
         reported_ = failure.cause;
+        record_lasting(power_record_, axis_.keeps_power(), power_text_);
+        keeps_power = axis_.keeps_power();
         fault_code = static_cast<std::uint32_t>(failure.cause);
         failed_step = static_cast<std::uint32_t>(failure.step);
         state = static_cast<std::uint32_t>(axis_.state());
@@ -293,10 +299,10 @@ private:
         probe_function = probe_1.write() | second << 8;
     }
 
-    void record_missing(hal::LastingFault& record, bool missing, const std::string& text) noexcept {
-        if (missing && !record.lasts()) {
+    void record_lasting(hal::LastingFault& record, bool lasts, const std::string& text) noexcept {
+        if (lasts && !record.lasts()) {
             record.begin(faults_, this, text.c_str());
-        } else if (!missing && record.lasts()) {
+        } else if (!lasts && record.lasts()) {
             record.end(faults_, this);
         }
     }
@@ -344,12 +350,14 @@ private:
     }
 
     const hal_faults* faults_ = nullptr;
-    hal::LastingFault fault_record_, unwritten_record_, unread_record_;
+    hal::LastingFault fault_record_, unwritten_record_, unread_record_, power_record_;
     const std::string name_ = hal::own_name("cia402.0");
     const std::string unwritten_text_ =
         hal::missing_function_text(name_ + ".read-all", name_ + ".write-all", "axis stopped");
     const std::string unread_text_ =
         hal::missing_function_text(name_ + ".write-all", name_ + ".read-all", "axis stopped");
+    const std::string power_text_ =
+        "the drive has power although it was commanded off; remove its power by other means";
     hal::FunctionMonitor reads_, writes_;
     const Sentences& made_ = sentences();
     Axis axis_;
@@ -369,13 +377,18 @@ the state machine of the drive and steps it towards the commanded state, one tra
 * `enable` steps the drive to *operation enabled*. If the drive does not make a transition within `step-timeout`, the axis is in fault and
   `show fault` names the transition: `x: enable: drive stays in "switched on" after "enable operation" for 2 s`. FALSE brakes on the drive's
   ramp and disables the axis; TRUE before that has finished enables it again.
-* While the axis is not enabled, the position sent to the drive is the measured one, so the axis does not jump when it is enabled. Let
+* While the axis is not enabled, the position sent to the drive is the measured one, so the axis does not jump when it is enabled. A drive that
+  is still in *operation enabled* keeps the last commanded position: the measured one would be a step back by the lag. Let
   `position-cmd` track `position-fb` while `active` is FALSE. If the two differ at enabling by more than `max-step`, enabling is rejected;
   with `max-step` 0, the difference is blended out over `blend-time`.
-* A fault (see the table) brakes with quick stop, disables the axis and stays until a rising edge of `reset`. After a fault, after
+* A fault (see the table) brakes with quick stop in the same cycle, disables the axis and stays until a rising edge of `reset`. After a fault, after
   `quick-stop` and after the node was lost, `enable` needs another rising edge. At start-up and after a stop, `enable` waits until the node is operational.
 * When `read-all` or `write-all` has not run for 100 cycles of the other one, the axis is in fault and brakes with quick stop, and `show
   fault` names the missing function. The fault of an axis that was off ends when both run again.
+* `keeps-power` is TRUE, and a fault is raised, when a drive does not obey: it is still in *operation enabled*, *quick stop active* or *fault
+  reaction active* after `stop-timeout` of a command to disable, or `step-timeout` of a quick stop. No further command is left then: connect the
+  pin to what removes the power by other means, such as a contactor. On CANopen, `restart` of the node is one more try: it resets the drive by NMT,
+  which does not depend on its PDOs. `keeps-power` stays TRUE until the drive is seen without power or is enabled again.
 * When the thread is stopped (`stop`, an exception, a hang, a suspended process), the axis is disabled without a fault. When the thread
   runs again, the axis stays off until `enable` has another rising edge.
 * `mode` may change at any time; the command is followed once the drive displays the new mode.
