@@ -1,5 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Plots for the machines whose pictures are computed from a simulation: axes, curves, floors, as SVG. Nothing here depends on time or machine."""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
 from xml.sax.saxutils import escape
 
 INK, GREY, GRID = "#24292f", "#6e7781", "#e4e8ec"
@@ -138,14 +146,44 @@ def floor(axes, path):
             axes.picture.circle(x, y, n[2] * scale, "#f59e0b" if beacon else "#c5cad0", INK, 1.2)
 
 
-def simulate(hal, netlist, lines, pins, samples, every_s, ini=None):
-    """Runs a netlist and `lines`, then samples the pins; returns a list of lists of texts. Ends the program when the simulation fails."""
-    import subprocess
-    import sys
-    import tempfile
-    from pathlib import Path
+def output_file(description, name):
+    """Returns the file to write, from the command line; default: `name` in the current folder. Ends the program when it cannot be written."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("file", nargs="?", metavar="FILE", help=f"the picture (default: {name})")
+    parser.add_argument("-o", "--output", metavar="FILE", help="the same")
+    given = parser.parse_args()
+    if given.file and given.output:
+        parser.error("write FILE or --output FILE, not both")
+    target = Path(given.output or given.file or name)
+    require_writable(target)
+    require_hal()
+    return target
 
-    script = [f"source {netlist}", *lines] + [
+
+def require_writable(*files):
+    """Ends the program when one of the files cannot be written: before a computation, not after it."""
+    for file in files:
+        if file.is_dir():
+            sys.exit(f"{file}: this is a folder; name a file: --output {file / 'picture.svg'}")
+        if not file.parent.is_dir():
+            sys.exit(
+                f"{file}: the folder {file.parent} is missing; create it: mkdir -p {file.parent}"
+            )
+        if not os.access(file if file.exists() else file.parent, os.W_OK):
+            sys.exit(f"{file}: not writable; choose another place with --output, such as /tmp")
+
+
+def require_hal():
+    """Returns the program: $HAL_BIN, or `hal` of the PATH. Ends this program when it is missing."""
+    hal = os.environ.get("HAL_BIN", "hal")
+    if not shutil.which(hal):
+        sys.exit(f"'{hal}' is missing or not executable; set HAL_BIN=/path/to/hal")
+    return hal
+
+
+def simulate(netlist, lines, pins, samples, every_s, ini=None):
+    """Runs a netlist and `lines`, then samples the pins; returns a list of lists of texts. Ends the program when the simulation fails."""
+    script = [*lines] + [
         f"advance {every_s:g}s",
         *(f"getp {pin}" for pin in pins),
     ] * samples
@@ -153,7 +191,7 @@ def simulate(hal, netlist, lines, pins, samples, every_s, ini=None):
         file = Path(folder, "run.hal")
         file.write_text("\n".join(script) + "\n", encoding="utf-8")
         done = subprocess.run(
-            [hal, "sim", *(["-i", ini] if ini else []), file],
+            [require_hal(), "sim", *(["-i", ini] if ini else []), netlist, file],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,

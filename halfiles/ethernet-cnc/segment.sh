@@ -9,7 +9,7 @@ if [ "$(id -u)" != 0 ]; then
     if [ -z "${HAL_BRING_UP:-}" ] && unshare --user --map-root-user --net --mount true 2>/dev/null; then
         report "not root: in a user namespace; without the right to real-time priorities the cycles are less exact"
         export HAL_BRING_UP=1
-        exec unshare --user --map-root-user --net --mount "$0" "$@"
+        exec unshare --user --map-root-user --net --mount bash "$(realpath "$0")" "$@"
     fi
     report "this makes network namespaces; run it as root (sudo $0), or where user namespaces are allowed" >&2
     exit 77
@@ -18,6 +18,7 @@ if [ -n "${HAL_BRING_UP:-}" ]; then mount -t tmpfs tmpfs /run; fi
 
 hal=${HAL:-hal}
 command -v "$hal" >/dev/null || { report "there is no '$hal'; set HAL=/path/to/hal" >&2; exit 1; }
+case $hal in */*) hal=$(realpath -s "$hal") ;; esac  # a machine runs in another folder
 switch=hal-$machine-switch
 pids=()
 carriers=()
@@ -72,6 +73,7 @@ make_segment() {
     fi
     folder=$(mktemp -d "${TMPDIR:-/tmp}/hal-$machine.XXXXXX" 2>/dev/null) ||
         { report "cannot create a folder for the output of the processes in '${TMPDIR:-/tmp}'; set TMPDIR=FOLDER" >&2; exit 1; }
+    folder=$(realpath "$folder")
     if [ -n "${HAL_BRING_UP:-}" ]; then export XDG_RUNTIME_DIR=$folder; fi  # the folder of the control sockets may be the real root's
     trap clean_up EXIT
     trap 'exit 130' INT TERM

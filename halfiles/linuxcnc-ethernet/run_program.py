@@ -1,6 +1,10 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
-"""A display without a window: switches the machine on, homes it, runs the program (default program.ngc), and draws the path that was driven."""
+"""A display without a window: switches the machine on, homes it, runs the program (default program.ngc), and draws the path that was driven.
+
+The path is written to the folder $PATH_FOLDER, by default `driven` in the folder where `hal linuxcnc` was typed.
+"""
+
 import os
 import signal
 import subprocess
@@ -11,7 +15,8 @@ from pathlib import Path
 import linuxcnc  # LinuxCNC's Python module
 
 HERE = Path(__file__).resolve().parent
-OUT = Path(os.environ.get("PATH_FOLDER", HERE / "driven"))
+# hal linuxcnc runs its programs in the folder of the INI file, and PWD remains that of the shell.
+OUT = Path(os.environ.get("PATH_FOLDER") or Path(os.environ.get("PWD", "."), "driven"))
 AXES = "xyzac"
 
 command, status, errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
@@ -55,7 +60,11 @@ def counts():
 def main():
     arguments = [word for word in sys.argv[1:] if word.endswith(".ngc")]
     program = Path(arguments[0] if arguments else HERE / "program.ngc").resolve()
-    OUT.mkdir(parents=True, exist_ok=True)
+    try:
+        OUT.mkdir(parents=True, exist_ok=True)
+        (OUT / "path.csv").open("a", encoding="utf-8").close()
+    except OSError as error:
+        sys.exit(f"run_program: {error.filename}: {error.strerror}; set PATH_FOLDER=FOLDER")
 
     # the nodes of the bus come first: a reset without them has no effect
     for _ in range(300):

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: MIT
 # packages: canopen dds tdma
 """Netlists for several machines: hal check, hal sim, and hal run --node with a process for each node on loopback; hal top."""
+
 import json
 import os
 import re
 import subprocess
 import unittest
 
-from harness import HAL, TIMEOUT, ROOT, Case, wait_until
+from harness import HAL, TIMEOUT, ROOT, Case, machines_elsewhere, wait_until
 from own_network import dds_domain
 
 # Fast DDS frees some of its memory by another size than it took; who is killed here leaks on purpose.
@@ -297,8 +298,9 @@ class Namespaces(Case):
     """halfiles/cell: a network namespace and a process for each node."""
 
     def bring_up(self, *words):
+        machines, read_only = machines_elsewhere(self.folder)
         done = subprocess.run(
-            [ROOT / "halfiles/cell/bring-up", *words],
+            [*read_only, machines / "cell/bring-up", *words],
             cwd=self.folder,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,

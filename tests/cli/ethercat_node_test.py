@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # packages: ethercat
 """hal node ethercat: a line of emulated slaves on a veth pair, with our master at the other end; each is killed in turn."""
+
 import json
 import os
 import re
@@ -9,7 +10,7 @@ import subprocess
 import unittest
 
 import ethercat_line
-from harness import HAL, ROOT, SANITIZED, Case, wait_until
+from harness import HAL, ROOT, SANITIZED, Case, machines_elsewhere, wait_until
 from own_network import VARIABLE, own_network
 
 MACHINE = ROOT / "halfiles/ethercat-servo"
@@ -320,8 +321,9 @@ class Line(Case):
 
 class BringUp(Case):
     def run_script(self, *words):
+        machines, read_only = machines_elsewhere(self.folder)
         done = subprocess.run(
-            [MACHINE / "bring-up", *words],
+            [*read_only, machines / "ethercat-servo/bring-up", *words],
             cwd=self.folder,
             env={**self.environment, "HAL": str(HAL), "TMPDIR": str(self.folder)},
             stdin=subprocess.DEVNULL,

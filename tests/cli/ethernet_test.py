@@ -3,13 +3,15 @@
 """The machines at the other end of a wire, as processes in network namespaces. Figures are printed, none is asserted: the machine may be
 busy. What is asserted is that it comes up, that all stations find the master's clock by clocks that differ, that the backup master takes
 over, what the way takes by the schedule, and that nothing is left behind."""
+
 import os
 import re
+import shutil
 import subprocess
 import sys
 import unittest
 
-from harness import HAL, ROOT, SANITIZED, Case
+from harness import HAL, ROOT, SANITIZED, Case, machines_elsewhere
 
 SECONDS = os.environ.get("HALCYON_ETHERNET_SECONDS", "12")
 
@@ -18,11 +20,11 @@ class Segment(Case):
     def bring_up(self, machine, *words):
         if SANITIZED:
             self.skipTest("eight processes under a sanitizer miss their cycles on any machine")
-        script = ROOT / "halfiles" / machine / "bring-up"
+        machines, read_only = machines_elsewhere(self.folder)
         done = subprocess.run(
-            [script, *words],
+            [*read_only, machines / machine / "bring-up", *words],
             cwd=self.folder,
-            env={**self.environment, "HAL": str(HAL), "TMPDIR": str(self.folder)},
+            env={**self.environment, "HAL": os.path.relpath(HAL, self.folder), "TMPDIR": "."},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
@@ -116,6 +118,57 @@ class Segment(Case):
                 ),
                 done.stdout,
             )
+
+    def test_linuxcnc_s_machine_checks_its_folders_and_programs_first(self):
+        machines, read_only = machines_elsewhere(self.folder)
+        programs = self.folder / "programs"
+        programs.mkdir()
+        (self.folder / "file").touch()
+
+        def refused(*words, cwd=self.folder):
+            done = subprocess.run(
+                [*read_only, machines / "linuxcnc-ethernet/bring-up", *words],
+                cwd=cwd,
+                env={
+                    **self.environment,
+                    "HAL": str(HAL),
+                    "PATH": f"{programs}:/usr/sbin:/usr/bin:/sbin:/bin",
+                },
+                text=True,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+            )
+            if done.returncode == 77:
+                self.skipTest("no network namespaces here")
+            self.assertEqual(1, done.returncode, done.stdout)
+            return done.stdout
+
+        if not shutil.which("linuxcncsvr"):
+            self.assertIn("type: sudo apt-get install linuxcnc-uspace\n", refused())
+        server = programs / "linuxcncsvr"
+        server.write_text("#!/bin/sh\n")
+        server.chmod(0o755)
+        usage = "write bring-up [PROGRAM.ngc] [--output FOLDER]\n"
+        self.assertIn(f"--output needs a folder; {usage}", refused("--output"))
+        self.assertIn(f"cannot read 'absent.ngc'; {usage}", refused("absent.ngc"))
+        self.assertIn(f"unknown option '--out'; {usage}", refused("--out", "x"))
+        elsewhere = "'; choose another one with --output FOLDER\n"
+        self.assertIn(f"cannot write to the folder 'file{elsewhere}", refused("--output", "file"))
+        if read_only:
+            here = machines / "linuxcnc-ethernet"
+            self.assertIn(f"cannot write to the folder 'driven{elsewhere}", refused(cwd=here))
+
+    def test_scripts_without_their_neighbours_name_what_is_missing(self):
+        for machine in ("cell", "ethercat-servo", "ethernet-furuta", "linuxcnc-ethernet"):
+            with self.subTest(machine):
+                alone = shutil.copytree(ROOT / "halfiles" / machine, self.folder / machine)
+                done = subprocess.run([alone / "bring-up"], capture_output=True, text=True)
+                self.assertEqual(1, done.returncode)
+                self.assertIn(
+                    "bring-up: copy the whole folder halfiles; this needs its ethernet-cnc\n",
+                    done.stderr,
+                )
 
     def test_a_station_prints_what_to_type(self):
         tdma = self.folder / "one.tdma"

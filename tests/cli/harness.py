@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What the tests of the program share: a sandbox, running machines, a terminal."""
+
 import fcntl
 import functools
 import json
@@ -80,6 +81,21 @@ setp adder.in0 2
 setp adder.in1 3
 net total adder.out
 """
+
+
+READ_ONLY = 'mount --bind "$1" "$1" && mount -o remount,bind,ro "$1" || exit 99; cd "$(pwd -P)"; shift; exec "$@"'
+
+
+def machines_elsewhere(folder):
+    """Copies halfiles, and returns the copy, and the words before a command that make the copy read-only for it: an installation
+    belongs to another user. Without root the words are missing, because network namespaces then need a namespace of their own.
+    """
+    copy = folder / "copied tree" / "halfiles"
+    ignored = shutil.ignore_patterns("__pycache__", "*.var*", "*.expanded")
+    shutil.copytree(ROOT / "halfiles", copy, ignore=ignored)
+    if os.geteuid() != 0:
+        return copy, []
+    return copy, ["unshare", "--mount", "sh", "-c", READ_ONLY, "sh", str(copy)]
 
 
 def undisturbed(error):

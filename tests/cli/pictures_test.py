@@ -1,33 +1,48 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 # packages: canopen estimation ethercat scocan tdma
-"""Pictures and tables that are computed from a simulation: made again, they are the same to the byte."""
+"""Pictures and tables that are computed from a simulation: made again, they are the same to the byte. The scripts run from a read-only copy
+of the machines, in another folder, as they do in an installation."""
+
 import os
 import re
+import shutil
 import subprocess
 import sys
 import unittest
 from pathlib import Path
 
-from harness import HAL, ROOT, SANITIZED, Case
+from harness import HAL, ROOT, SANITIZED, Case, machines_elsewhere
+
+SCRIPTS = {  # what each of them writes
+    "canopen-robot/picture": ("match.svg",),
+    "furuta/picture": ("swing-up.svg",),
+    "jitter/experiment": ("jitter.csv", "jitter-overshoot.svg", "jitter-responses.svg"),
+    "yair/picture": ("path.svg",),
+}
+# Started by `hal linuxcnc`, in LinuxCNC's Python, or by another script.
+NOT_ALONE = {f"linuxcnc-ethernet/{name}.py" for name in ("draw_path", "run_program", "tool_panel")}
 
 
 class Pictures(Case):
-    def make(self, *command):
-        environment = dict(
-            os.environ,
-            HAL_BIN=str(HAL),
-            XDG_RUNTIME_DIR=str(self.folder),
-            PYTHONDONTWRITEBYTECODE="1",
-        )
-        done = subprocess.run(
-            [sys.executable, *map(str, command)],
-            cwd=self.folder,
-            env=environment,
+    def setUp(self):
+        super().setUp()
+        self.machines, self.read_only = machines_elsewhere(self.folder)
+
+    def run_script(self, script, *words, hal=HAL, cwd=None):
+        """Runs a script of the read-only copy."""
+        return subprocess.run(
+            [*self.read_only, sys.executable, self.machines / script, *words],
+            cwd=cwd or self.folder,
+            env=dict(os.environ, HAL_BIN=str(hal), XDG_RUNTIME_DIR=str(self.folder)),
+            stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
         )
+
+    def make(self, script, *words):
+        done = self.run_script(script, *words)
         self.assertEqual(0, done.returncode, done.stderr)
         return done.stdout
 
@@ -40,7 +55,7 @@ class Pictures(Case):
 
     def test_path_of_the_robot_in_a_match(self):
         made = Path(self.folder, "match.svg")
-        said = self.make(ROOT / "halfiles/canopen-robot/picture", made)
+        said = self.make("canopen-robot/picture", "--output", made)
         self.assertRegex(
             said, r"^largest error of the filter: [1-4]?\d mm; of odometry alone: [2-9]\d\d mm\n$"
         )
@@ -48,29 +63,70 @@ class Pictures(Case):
 
     def test_swing_up_of_the_pendulum(self):
         made = Path(self.folder, "swing-up.svg")
-        self.assertRegex(
-            self.make(ROOT / "halfiles/furuta/picture", made), r"^upright after 2\.\d\d s\n$"
-        )
+        self.assertRegex(self.make("furuta/picture"), r"^upright after 2\.\d\d s\n$")
         self.same(ROOT / "docs/swing-up.svg", made)
 
-    def test_swing_up_is_not_computed_for_a_folder_that_is_missing(self):
-        done = subprocess.run(
-            [sys.executable, ROOT / "halfiles/furuta/picture", "absent/swing-up.svg"],
-            cwd=self.folder,
-            env=dict(os.environ, HAL_BIN="/bin/false"),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        self.assertEqual(1, done.returncode)
-        self.assertRegex(
-            done.stderr,
-            "^absent/swing-up.svg: the folder is missing or not writable; name another file: ",
-        )
+    def test_all_scripts_are_listed(self):
+        found = {
+            str(path.relative_to(self.machines))
+            for path in self.machines.rglob("*")
+            if path.is_file() and b"python" in path.read_bytes().split(b"\n")[0]
+        }
+        self.assertEqual(set(SCRIPTS) | NOT_ALONE, found)
+
+    def refuses(self, script, *words, cwd=None, hal="/bin/false"):
+        """Runs a script that must end before it computes: its `hal` is one with which it fails."""
+        done = self.run_script(script, *words, cwd=cwd, hal=hal)
+        self.assertEqual((1, ""), (done.returncode, done.stdout), done.stderr)
+        self.assertNotIn("Traceback", done.stderr)
+        self.assertNotIn("hal sim ended", done.stderr)
+        return done.stderr
+
+    def test_what_cannot_be_written_is_reported_before_the_computation(self):
+        (self.folder / "file").touch()
+        for script, files in SCRIPTS.items():
+            with self.subTest(script):
+                folder = len(files) > 1
+                missing = Path("absent") if folder else Path("absent", files[0])
+                self.assertEqual(
+                    f"{Path('absent', files[0])}: the folder absent is missing; create it: mkdir -p absent\n",
+                    self.refuses(script, "--output", missing),
+                )
+                place = Path("file") if folder else Path("file", files[0])
+                self.assertIn("the folder file is missing", self.refuses(script, place))
+                if not folder:
+                    self.assertIn(
+                        ": this is a folder; name a file: ", self.refuses(script, "--output", ".")
+                    )
+                if self.read_only:
+                    self.assertEqual(
+                        f"{files[0]}: not writable; choose another place with --output, such as /tmp\n",
+                        self.refuses(script, cwd=self.machines / script.split("/")[0]),
+                    )
+
+    def test_a_missing_program_or_a_part_of_the_tree_is_reported(self):
+        alone = self.folder / "alone"
+        alone.mkdir()
+        for script in SCRIPTS:
+            with self.subTest(script):
+                self.assertEqual(
+                    "'/no/hal' is missing or not executable; set HAL_BIN=/path/to/hal\n",
+                    self.refuses(script, hal="/no/hal"),
+                )
+                copy = shutil.copytree(
+                    self.machines / script.split("/")[0], alone / script.split("/")[0]
+                )
+                done = subprocess.run(
+                    [copy / script.split("/")[1]], capture_output=True, text=True, cwd=self.folder
+                )
+                self.assertEqual(
+                    (1, f"{alone}/drawing.py is missing; copy the whole folder halfiles\n"),
+                    (done.returncode, done.stderr),
+                )
 
     def test_path_of_yair(self):
         made = Path(self.folder, "path.svg")
-        self.assertEqual("round finished: yes\n", self.make(ROOT / "halfiles/yair/picture", made))
+        self.assertEqual("round finished: yes\n", self.make("yair/picture", made))
         self.same(ROOT / "halfiles/yair/path.svg", made)
 
     def test_slots_of_yair(self):
@@ -89,7 +145,7 @@ class Pictures(Case):
         SANITIZED, "36 simulations take minutes, and all they do is done in other tests"
     )
     def test_jitter_experiment(self):
-        said = self.make(ROOT / "halfiles/jitter/experiment", self.folder)
+        said = self.make("jitter/experiment")
         self.assertIn(
             said,
             (ROOT / "docs/tutorials/network-and-control.md").read_text(encoding="utf-8"),

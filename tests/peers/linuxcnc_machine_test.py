@@ -46,7 +46,7 @@ class Machine(Case):
         shown = (
             re.search(r"It prints:\n\n```text\n(.*?)```", page, re.S)[1]
             .replace("program.ngc", "short.ngc")
-            .replace("/home/you/halcyon/halfiles/linuxcnc-ethernet/driven", str(self.folder))
+            .replace("/home/you/halcyon/driven", str(self.folder))
         )
 
         def lines(text):
