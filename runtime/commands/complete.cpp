@@ -12,6 +12,7 @@
 #include "commands/table.hpp"
 #include "machine/processes/programs.hpp"
 #include "text/fault_pages.hpp"
+#include "text/natural_order.hpp"
 
 namespace hal {
 namespace {
@@ -387,7 +388,7 @@ Completion complete_line(Session& session, const ShellOptions& options, std::str
     }
     auto& found = completion.candidates;
     std::sort(found.begin(), found.end(),
-              [](const Candidate& a, const Candidate& b) { return a.text < b.text; });
+              [](const Candidate& a, const Candidate& b) { return natural_less(a.text, b.text); });
     found.erase(
         std::unique(found.begin(), found.end(),
                     [](const Candidate& a, const Candidate& b) { return a.text == b.text; }),

@@ -19,7 +19,7 @@ struct Candidate {
 
 struct Completion {
     std::size_t begin = 0;              ///< byte in the line where the word being typed starts
-    std::vector<Candidate> candidates;  ///< those that begin with what is typed, sorted by name
+    std::vector<Candidate> candidates;  ///< those that begin with what is typed, in natural order
 };
 
 /// Returns what could stand at `cursor` (a byte offset) of the line: only what the command would

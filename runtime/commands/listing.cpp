@@ -8,6 +8,7 @@
 #include <fnmatch.h>
 
 #include "machine/session.hpp"
+#include "text/natural_order.hpp"
 #include "text/sort_in_steps.hpp"
 
 namespace hal {
@@ -42,7 +43,7 @@ std::vector<const Pin*> pins_by_name(const Session& session, bool parameters,
         }
     }
     sort_in_steps(chosen, [](const Pin* a, const Pin* b) {
-        return shown_name(*a) < shown_name(*b);
+        return natural_less(shown_name(*a), shown_name(*b));
     }, [&] { return session.ending(); });
     return chosen;
 }
@@ -55,8 +56,9 @@ std::vector<const Signal*> signals_by_name(const Session& session, const Pattern
             chosen.push_back(signal.get());
         }
     }
-    sort_in_steps(chosen, [](const Signal* a, const Signal* b) { return a->name < b->name; },
-                  [&] { return session.ending(); });
+    sort_in_steps(chosen, [](const Signal* a, const Signal* b) {
+        return natural_less(a->name, b->name);
+    }, [&] { return session.ending(); });
     return chosen;
 }
 

@@ -14,6 +14,7 @@
 #include "commands/text_writer.hpp"
 #include "hal/replace_file.hpp"
 #include "machine/load/module_library.hpp"
+#include "text/natural_order.hpp"
 #include "text/numbers.hpp"
 
 namespace hal {
@@ -269,8 +270,9 @@ void save_linka(Context& context, Text& text) { save_links(context, text, true);
 
 std::vector<const Pin*> by_name(const Signal& signal) {
     std::vector<const Pin*> pins(signal.pins.begin(), signal.pins.end());
-    std::sort(pins.begin(), pins.end(),
-              [](const Pin* a, const Pin* b) { return shown_name(*a) < shown_name(*b); });
+    std::sort(pins.begin(), pins.end(), [](const Pin* a, const Pin* b) {
+        return natural_less(shown_name(*a), shown_name(*b));
+    });
     return pins;
 }
 

@@ -12,6 +12,7 @@
 #include "commands/table.hpp"
 #include "commands/text_writer.hpp"
 #include "machine/processes/programs.hpp"
+#include "text/natural_order.hpp"
 
 namespace hal {
 namespace {
@@ -106,8 +107,9 @@ void show_sig(Request& request) {
             request.add("{:<5}  {:>20}  {}\n", name(signal.type), value, signal.name);
         }
         pins.assign(signal.pins.begin(), signal.pins.end());
-        std::sort(pins.begin(), pins.end(),
-                  [](const Pin* a, const Pin* b) { return shown_name(*a) < shown_name(*b); });
+        std::sort(pins.begin(), pins.end(), [](const Pin* a, const Pin* b) {
+            return natural_less(shown_name(*a), shown_name(*b));
+        });
         for (const Pin* const pin : pins) {
             if (request.script()) {
                 request.add(" {} {}", arrow_of_signal(*pin), shown_name(*pin));

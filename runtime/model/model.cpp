@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <unordered_set>
 
+#include "text/natural_order.hpp"
+
 namespace hal {
 namespace {
 
@@ -15,7 +17,8 @@ T* find(const Index<T>& index, std::string_view name) {
 
 template <class T>
 std::vector<const T*> sorted(std::vector<const T*> all) {
-    std::sort(all.begin(), all.end(), [](const T* a, const T* b) { return a->name < b->name; });
+    std::sort(all.begin(), all.end(),
+              [](const T* a, const T* b) { return natural_less(a->name, b->name); });
     return all;
 }
 
