@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 # packages: canopen panel
 """The page of `hal panel` in headless Chromium, driven over the DevTools protocol: its views."""
+
 from harness import SERVO
 from panel_page import WAVE, Page, main
 
@@ -108,14 +109,126 @@ class Views(Page):
         self.assertLess(before, 0.5 + 1e-9)
         self.assertGreaterEqual(after, 0.5 - 1e-9)
         frequency = self.browser.wait(
-            "parseFloat(document.querySelector('[data-channel=sine]').children[6].textContent)"
+            "parseFloat(document.querySelector('[data-channel=sine]').children[10].textContent)"
         )
         self.assertAlmostEqual(5, frequency, delta=1)
 
+    def test_an_unknown_channel_is_rejected_and_the_record_goes_on(self):
+        self.begin(view="scope?ch=sine:0.5:0&base=0.1")
+        self.browser.wait("window.halcyonScope?.rows > 50")
+        self.browser.evaluate("window.store = halcyonScope.store")
+        add = "(name => { const i = document.querySelector('[aria-label=\"Add a channel\"]'); i.value = name; i.dispatchEvent(new Event('change')); })"
+        problem = "document.getElementById('scope-problem').textContent"
+        self.browser.evaluate(f"{add}('totl')")
+        self.browser.wait(f"{problem} === \"unknown name 'totl'; did you mean: total\"")
+        rows = self.browser.evaluate("store.rows")
+        self.browser.wait(f"store.rows > {rows} && store.place.has('sine')")
+        self.assertIn("ch=sine:0.5:0&base=0.1", self.browser.evaluate("location.hash"))
+        self.assertIn(
+            "every cycle",
+            self.browser.evaluate("document.getElementById('scope-status').textContent"),
+        )
+        self.browser.evaluate(f"{add}('sine')")
+        self.browser.wait(f"{problem} === \"'sine' is already shown\"")
+        self.browser.evaluate(f"{add}('totl')")
+        self.browser.wait("document.querySelector('#scope-problem button') !== null")
+        self.browser.evaluate("document.querySelector('#scope-problem button').click()")
+        self.browser.wait("store.place.has('total') && store.place.has('sine') && store.rows > 50")
+        self.assertEqual("", self.browser.evaluate(problem))
+
+    def test_an_unknown_channel_of_an_address_leaves_the_others(self):
+        self.begin(view="scope?ch=later,sine&base=0.1")
+        name = "document.querySelector('[data-channel=later]').textContent"
+        self.browser.wait("window.halcyonScope?.rows > 50 && halcyonScope.store.place.has('sine')")
+        self.assertIn("unknown name", self.browser.evaluate(name))
+        self.end(self.machine)
+        self.machine = self.start(
+            "run",
+            self.write("m.hal", WAVE + "net later adder.in2\n".replace("adder.in2", "wave.cosine")),
+        )
+        self.browser.wait("halcyonScope.store.place.has('later') && halcyonScope.rows > 50")
+        self.assertNotIn("unknown name", self.browser.evaluate(name))
+
+    def test_the_scope_saves_a_table_and_a_picture(self):
+        self.begin(view="scope?ch=sine:0.5:0,total:2:0&base=0.01")
+        self.browser.wait("window.halcyonScope?.rows > 200")
+        self.browser.evaluate("""window.saved = {};
+            URL.createObjectURL = blob => { blob.arrayBuffer().then(b => saved[blob.type] = b); return 'blob:none'; };
+            HTMLAnchorElement.prototype.click = function() { saved.name = this.download; };
+            window.press = label => [...document.querySelectorAll('button')].find(b => b.textContent === label).click();
+            press('Stop'); press('CSV');""")
+        table = self.browser.wait(
+            "saved['text/csv'] && new TextDecoder().decode(saved['text/csv'])"
+        )
+        self.assertEqual("scope.csv", self.browser.evaluate("saved.name"))
+        lines = table.splitlines()
+        self.assertEqual("time_s,sine,total", lines[0])
+        self.assertAlmostEqual(100, len(lines) - 1, delta=5)  # 0.1 s of a thread of 1 ms
+        rows = [line.split(",") for line in lines[1:]]
+        self.assertEqual({"5"}, {row[2] for row in rows})
+        self.assertGreater(len({row[1] for row in rows}), 50)
+        self.browser.evaluate("press('PNG')")
+        head = self.browser.wait(
+            "saved['image/png'] && [...new Uint8Array(saved['image/png'].slice(0, 4))]"
+        )
+        self.assertEqual([0x89, 0x50, 0x4E, 0x47], head)
+
+    def test_the_scope_measures_between_cursors(self):
+        self.begin(view="scope?ch=wave.square:1:0&base=0.1&cursors=1&step=1")
+        # One cursor in each half of a square wave of 5 Hz: a step of 2 without rise time or overshoot.
+        self.browser.wait("window.halcyonScope?.rows > 1200")
+        self.browser.evaluate(
+            "[...document.querySelectorAll('button')].find(b => b.textContent === 'Stop').click()"
+        )
+        cell = "document.querySelector('[data-channel=\"wave.square\"]').children[{}].textContent"
+        cells = lambda: [self.browser.evaluate(cell.format(i)) for i in range(5, 11)]
+        self.browser.wait(cell.format(8) + " !== '–'")
+        low, high, mean, rms, deviation = map(float, cells()[:5])
+        self.assertEqual((-1, 1, 1), (low, high, rms))
+        self.assertAlmostEqual(1, mean**2 + deviation**2, places=2)
+
+    def test_a_stopped_machine_looks_stopped(self):
+        self.begin(view="scope?ch=sine&base=0.1")
+        self.browser.wait("window.halcyonScope?.rows > 50")
+        self.assertEqual("", self.browser.evaluate("halcyonScope.notice"))
+        self.good("shell", "stop")
+        self.browser.wait("halcyonScope.notice === 'stopped: functions do not run'")
+        self.browser.wait("/is stopped/.test(document.getElementById('banner').textContent)")
+        self.browser.wait("halcyonScope.stops.length === 1 && halcyonScope.stops[0].to === null")
+        self.good("shell", "start")
+        self.browser.wait("document.getElementById('banner').hidden && halcyonScope.notice === ''")
+        begin, end = self.browser.wait(
+            "halcyonScope.stops[0].to && [halcyonScope.stops[0].from, halcyonScope.stops[0].to]"
+        )
+        self.assertLess(begin, end)
+        self.machine.send_signal(19)
+        try:
+            self.browser.wait("/^no samples for|not responding/.test(halcyonScope.notice)")
+        finally:
+            self.machine.send_signal(18)
+        self.browser.wait("halcyonScope.notice === ''")
+
+    def test_faults_are_marked_in_every_view_and_in_the_trace(self):
+        self.write(
+            "bus.canopen", "[bus]\nlink = sim:faulty\nbitrate = 1M\n[node 3 io]\ndevice = cia401\n"
+        )
+        self.begin(view="scope?ch=sine&base=0.5")
+        mark = "document.getElementById('faults')"
+        self.browser.wait("window.halcyonScope?.rows > 50")
+        self.good("shell", "loadrt", "canopen", "config=bus.canopen")
+        self.good("shell", "addf", "canopen.0.transmit", "servo")
+        self.browser.wait(f"!{mark}.hidden && /^[1-9]\\d* faults?$/.test({mark}.textContent)")
+        self.browser.wait("halcyonScope.faults.length > 0")
+        at, text = self.browser.evaluate("[halcyonScope.faults[0].at, halcyonScope.faults[0].text]")
+        self.assertIn("receive", text)
+        self.assertGreater(at, 0)
+        for view in ("watch", "graph", "log", "overview"):
+            self.browser.evaluate(f"location.hash = '#/{view}'")
+            self.assertFalse(self.browser.evaluate(f"{mark}.hidden"))
+
     def test_a_batch_of_a_probe_is_read_to_the_last_bit(self):
         self.begin()
-        result = self.browser.evaluate(
-            """(async () => {
+        result = self.browser.evaluate("""(async () => {
             const {Store, Trigger, measure} = await import('./scope_data.js'), store = new Store(), rows = 1000, view = new DataView(new ArrayBuffer(rows * 32));
             store.layout([{columns: [0, 1]}], ['x', 'n']);
             for (let i = 0; i < rows; i++) {
@@ -127,8 +240,7 @@ class Views(Page):
             store.samples({parts: [{group: 0, rows, lost: 3}], until_ns: 1000000000000 + rows * 100000}, view.buffer, {columns: [{type: 'float'}, {type: 's32'}]});
             const edges = new Trigger('x', 'rising', 0).scan(store), seen = measure(store, 'x', 0, 1);
             return {rows: store.rows, lost: store.lost, gaps: store.gaps, least: measure(store, 'n', 0, 1).min, edges: edges.map(t => Math.round(t * 1e6)), rms: seen.rms, frequency: seen.frequency};
-        })()"""
-        )
+        })()""")
         self.assertEqual(
             {
                 "rows": 1000,

@@ -26,11 +26,17 @@ function batch(rows) {
 
 test('a sine of 10 Hz is measured as one', () => {
     const store = recorded(1000, i => 2 + 3 * Math.sin(2 * Math.PI * 10 * i / 1000));
-    const {min, max, mean, rms, frequency} = measure(store, 'out', 0, 1);
+    const {min, max, mean, rms, deviation, frequency} = measure(store, 'out', 0, 1);
     assert.ok(Math.abs(min + 1) < 1e-2 && Math.abs(max - 5) < 1e-2);
     assert.ok(Math.abs(mean - 2) < 1e-2);
     assert.ok(Math.abs(rms - Math.sqrt(4 + 4.5)) < 1e-2);
+    assert.ok(Math.abs(deviation - 3 / Math.SQRT2) < 1e-3);
     assert.ok(Math.abs(frequency - 10) < 1e-6);
+});
+
+test('the deviation of a small signal on a large mean is exact', () => {
+    const {deviation} = measure(recorded(1000, i => 1e9 + i % 2), 'out', 0, 1);
+    assert.ok(Math.abs(deviation - .5) < 1e-6, String(deviation));
 });
 
 test('nothing is measured without samples, and no frequency of a constant', () => {

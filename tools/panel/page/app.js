@@ -61,6 +61,22 @@ function problemOf({server, reason, machine, responding, instance}) {
     return '';
 }
 
+/// What the banner says of a machine whose values are valid, but whose functions do not run.
+function pauseOf({server, machine, running, instance}) {
+    if (server !== 'up' || !machine || running) return '';
+    return `Machine '${
+        instance}' is stopped: its functions do not run. To start it: hal shell start`;
+}
+
+function drawFaults({machine, faults}) {
+    const mark = document.getElementById('faults'),
+          words = `${faults} ${faults === 1 ? 'fault' : 'faults'}`;
+    mark.hidden = !machine || faults === 0;
+    if (mark.textContent === words) return;
+    mark.textContent = words;
+    if (!mark.hidden) announce(`${words}, not acknowledged`);
+}
+
 /// What this page may do.
 function roleOf({write, held, token, holder}) {
     if (!write) return 'read-only';
@@ -72,10 +88,12 @@ function roleOf({write, held, token, holder}) {
 let lastBanner = '';
 function drawState() {
     document.getElementById('machine').textContent = state.instance || 'Halcyon';
-    const problem = problemOf(state);
+    const problem = problemOf(state), pause = problem === '' ? pauseOf(state) : '';
     const banner = document.getElementById('banner');
-    banner.hidden = problem === '';
-    banner.textContent = problem;
+    banner.hidden = problem === '' && pause === '';
+    banner.textContent = problem || pause;
+    banner.classList.toggle('stopped', pause !== '');
+    drawFaults(state);
     document.body.classList.toggle('stale', problem !== '');
     if (problem === '' && lastBanner !== '') announce(`Machine '${state.instance}' is running`);
     lastBanner = problem;

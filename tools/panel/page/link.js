@@ -17,6 +17,9 @@ export const state = {
     server: 'connecting',
     machine: false,
     responding: true,
+    running: true,  // false after `stop`: functions do not run
+    running_ns: 0,  // machine time of the last change of `running`, 0: unknown
+    faults: 0,      // not acknowledged
     instance: '',
     version: '',
     pid: 0,
@@ -117,8 +120,14 @@ function machine(event) {
     settle();
     state.machine = event.up;
     if (event.up)
-        Object.assign(
-            state, {version: event.hello.version, pid: event.hello.pid, responding: true});
+        Object.assign(state, {
+            version: event.hello.version,
+            pid: event.hello.pid,
+            responding: true,
+            running: true,
+            running_ns: 0,
+            faults: 0
+        });
     lastReply = performance.now();
     emit('state');
     note({
@@ -133,6 +142,7 @@ function machine(event) {
     for (const one of probes)
         startProbe(one);
     emit('machine');
+    readStatus(0);
 }
 
 function note(entry) {
@@ -186,7 +196,13 @@ function receive(text) {
             note(message);
             break;
         case 'journal':
-            note({kind: message.kind, text: message.text, unix_ms: Date.now()});
+            note({
+                kind: message.kind,
+                text: message.text,
+                unix_ms: Date.now(),
+                time_ns: message.time_ns
+            });
+            readStatus(message.time_ns);
             break;
         default:
             emit(message.event, message);
@@ -231,13 +247,26 @@ window.addEventListener('hashchange', () => {
     }
 });
 
-// A machine that is stopped (SIGSTOP, a debugger) keeps its connection and answers nothing.
-setInterval(async () => {
+/// Reads whether the functions run, and how many faults are not acknowledged. `time_ns`: the
+/// machine's time of the event after which it is read, or 0.
+async function readStatus(time_ns) {
+    if (replies.size >= 20) return;
+    const reply = await request({run: ['status']});
+    if (!reply.ok) return;
+    const {running, faults} = JSON.parse(reply.out);
+    if (running === state.running && faults === state.faults) return;
+    if (running !== state.running) state.running_ns = time_ns;
+    Object.assign(state, {running, faults});
+    emit('state');
+}
+
+// A suspended machine (SIGSTOP, a debugger) keeps its connection and answers nothing.
+setInterval(() => {
     if (!state.machine) return;
     const responding = performance.now() - lastReply < 3000;
     if (responding !== state.responding) {
         state.responding = responding;
         emit('state');
     }
-    if (replies.size < 20) request({list: 'thread'});
+    readStatus(0);
 }, 1000);

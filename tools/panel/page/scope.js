@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
 // The scope: up to 16 channels, time base, trigger, cursors, measurements. Samples come from a
 // probe, every cycle of their threads; from a machine without probes, by subscription.
-import {on, probe, subscribe} from './link.js';
-import {colour, dark, h, number, surface, text} from './dom.js';
+import {on, probe, state, subscribe} from './link.js';
+import {announce, colour, dark, h, number, surface, text} from './dom.js';
+import {compareNames, similar} from './names.js';
 import {objects} from './objects.js';
+import {timeLabels, valueLabels} from './scope_axes.js';
 import {Store, Trigger, measure, valueAt} from './scope_data.js';
+import {csv, download} from './scope_export.js';
 import {Picture} from './scope_picture.js';
+import {stepResponse} from './scope_step.js';
 import {remember} from './place.js';
 import {nice} from './widget_values.js';
 
@@ -13,8 +17,12 @@ const most = 16, divisions = 10, rows = 8, before = .2;
 const hues = [210, 30, 130, 350, 270, 175, 60, 310];
 const paint = i => `hsl(${hues[i % 8]} ${dark.matches ? '85% 68%' : '80% 36%'})`;
 const steps = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, .01, .02, .05, .1, .2, .5, 1, 2];
-const titles =
-    ['Channel', 'units/div', 'min', 'max', 'mean', 'rms', 'frequency', 'cursor 1', 'cursor 2', 'Δ'];
+const columns = [
+    ['Channel'], ['units/div'], ['rise time', 'n step'], ['overshoot', 'n step'],
+    ['settling time', 'n step'], ['min', 'n'], ['max', 'n'], ['mean', 'n'], ['rms', 'n'],
+    ['σ', 'n'], ['frequency', 'n'], ['cursor 1', 'n cursor'], ['cursor 2', 'n cursor'],
+    ['Δ', 'n cursor']
+];
 const modes = [['roll', 'Roll'], ['auto', 'Auto'], ['normal', 'Normal'], ['single', 'Single']];
 const edges = [['rising', 'rising'], ['falling', 'falling'], ['either', 'either edge']];
 
@@ -23,6 +31,8 @@ const edges = [['rising', 'rising'], ['falling', 'falling'], ['either', 'either 
  * @property {string} name
  * @property {number} scale units per division; 0: chosen from the first values
  * @property {number} position divisions above the middle
+ * @property {boolean} [unknown] the machine has no such name
+ * @property {string} [unit]
  * @property {HTMLInputElement} [input]
  * @property {HTMLElement[]} [cells]
  */
@@ -39,12 +49,6 @@ const channelsOf = words => words.split(',').filter(word => word).slice(0, most)
     const [name, scale, position] = word.split(':');
     return {name, scale: Number(scale) || 0, position: Number(position) || 0};
 });
-
-/// The class of a column of the table.
-function columnClass(i) {
-    if (i < 2) return '';
-    return i < 7 ? 'n' : 'n cursor';
-}
 
 /// A list to choose from; act(value) is called for a choice.
 function choose(label, values, value, act) {
@@ -73,6 +77,7 @@ export class View {
         this.edge = query.get('edge') ?? 'rising';
         this.level = Number(query.get('level')) || 0;
         this.useCursors = query.get('cursors') === '1';
+        this.useSteps = query.get('step') === '1';
         this.cursors = [.3, .7];
         this.selected = 0;
         this.dragging = null;  // 'move', or the number of a cursor
@@ -89,9 +94,14 @@ export class View {
         this.pending = null;  // s: a trigger whose record is not complete
         this.lastTrigger = 0;
         this.stopFollowing = () => {};
+        this.following = 0;  // counts calls of follow(): reading the names takes time
+        this.followed = '';  // the names whose samples are read
+        this.lastSamples = performance.now();
+        /** @type {{from: number, to: number}[]} */
+        this.stops = [];  // s: when the functions of the machine did not run
 
         this.picture = new Picture();
-        this.looks = {dark: null, back: '', grid: '', text: ''};
+        this.looks = {dark: null, back: '', grid: '', text: '', dim: '', bad: ''};
         this.frames = 0;  // since the last measurement
         this.drawn = 0;
         this.since = performance.now();
@@ -105,20 +115,21 @@ export class View {
                 'stops, left and right change the time base, up and down move the channel, ' +
                 'plus and minus scale it, a scales all.'
         });
-        this.whole = h(
-            'table', {class: 'channels'},
-            h('thead', {},
-              h('tr', {}, titles.map((title, i) => h('th', {class: columnClass(i)}, title)),
-                h('th', {}, h('span', {class: 'unseen'}, 'Remove')))),
-            this.table);
-        main.append(
-            h('div', {class: 'column'},
-              h('div', {class: 'bar'}, this.add, this.names, this.timeBase, this.modes,
-                this.triggerSource, this.edges, h('label', {class: 'tied'}, 'at', this.levelInput),
-                this.stop, h('button', {onclick: () => this.autoscale()}, 'Auto scale'),
-                this.cursorButton, this.status),
-              h('div', {class: 'fill high'}, this.canvas),
-              h('div', {class: 'scroll'}, this.whole)));
+        this.whole =
+            h('table', {class: 'channels'},
+              h('thead', {},
+                h('tr', {}, columns.map(([title, kind]) => h('th', {class: kind}, title)),
+                  h('th', {}, h('span', {class: 'unseen'}, 'Remove')))),
+              this.table);
+        main.append(h(
+            'div', {class: 'column'},
+            h('div', {class: 'bar'}, this.add, this.names, this.timeBase, this.modes,
+              this.triggerSource, this.edges, h('label', {class: 'tied'}, 'at', this.levelInput),
+              this.stop, h('button', {onclick: () => this.autoscale()}, 'Auto scale'),
+              this.cursorButton, this.stepButton,
+              h('button', {onclick: () => this.saveTable()}, 'CSV'),
+              h('button', {onclick: () => this.savePicture()}, 'PNG'), this.status, this.problem),
+            h('div', {class: 'fill high'}, this.canvas), h('div', {class: 'scroll'}, this.whole)));
         this.surface = surface(
             this.canvas,
             (context, width, height, ratio) => this.paint(context, width, height, ratio), true);
@@ -131,16 +142,22 @@ export class View {
         this.arm();
         this.follow();
         this.measuring = setInterval(() => this.measureAll(), 500);
-        this.unsubscribe = on('machine', () => {
-            this.shownAt = null;
-            this.suggest();
-        });
+        this.subscriptions = [
+            on('machine',
+               () => {
+                   this.shownAt = null;
+                   this.suggest();
+                   this.follow(true);
+               }),
+            on('state', () => this.noteState()), on('logged', () => this.surface.request())
+        ];
     }
 
     end() {
         clearInterval(this.measuring);
         dark.removeEventListener('change', this.redraw);
-        this.unsubscribe();
+        this.following++;
+        this.subscriptions.forEach(unsubscribe => unsubscribe());
         this.stopFollowing();
         this.surface.end();
     }
@@ -167,8 +184,7 @@ export class View {
         this.triggerSource = choose(
             'Trigger channel', [['', 'no trigger']], '',
             value => this.setTrigger({trigger: value}));
-        this.edges =
-            choose('Edge', edges, this.edge, value => this.setTrigger({edge: value}));
+        this.edges = choose('Edge', edges, this.edge, value => this.setTrigger({edge: value}));
         this.levelInput = h('input', {
             size: 7,
             inputmode: 'decimal',
@@ -178,11 +194,18 @@ export class View {
         });
         this.stop = h('button', {class: 'main', onclick: () => this.toggleRun()}, 'Stop');
         this.cursorButton =
-            h('button', {
-                'aria-pressed': String(this.useCursors),
-                onclick: () => this.toggleCursors()
-            },
+            h('button',
+              {'aria-pressed': String(this.useCursors), onclick: () => this.toggleCursors()},
               'Cursors');
+        this.stepButton =
+            h('button', {
+                'aria-pressed': String(this.useSteps),
+                title: 'Rise time (10 % to 90 %), overshoot and settling time (2 %) of a step ' +
+                    'from cursor 1 to cursor 2, or from the trigger on',
+                onclick: () => this.toggleSteps()
+            },
+              'Step');
+        this.problem = h('span', {class: 'bad', id: 'scope-problem', role: 'status'});
         this.status = h('span', {class: 'dim', id: 'scope-status'});
     }
 
@@ -205,11 +228,35 @@ export class View {
         this.save();
     }
 
-    showCursors() { this.whole.classList.toggle('no-cursors', !this.useCursors); }
+    toggleSteps() {
+        this.useSteps = !this.useSteps;
+        this.stepButton.setAttribute('aria-pressed', String(this.useSteps));
+        this.showCursors();
+        this.save();
+    }
+
+    showCursors() {
+        this.whole.classList.toggle('no-cursors', !this.useCursors);
+        this.whole.classList.toggle('no-step', !this.useSteps);
+    }
 
     async suggest() {
-        const all = [...(await objects()).values()].slice(0, 3000);
-        this.names.replaceChildren(...all.map(one => h('option', {value: one.name})));
+        const all = [...(await objects()).keys()].sort(compareNames).slice(0, 3000);
+        this.names.replaceChildren(...all.map(name => h('option', {value: name})));
+    }
+
+    // ---- files
+
+    saveTable() {
+        const [from, to] = this.range(), names = this.channels.map(one => one.name);
+        const table = csv(this.store, names, from, to);
+        download('scope.csv', new Blob([table], {type: 'text/csv'}));
+    }
+
+    savePicture() {
+        this.canvas.toBlob(blob => {
+            if (blob) download('scope.png', blob);
+        });
     }
 
     /// Keeps the settings in the URL.
@@ -221,20 +268,46 @@ export class View {
             trigger: this.trigger,
             edge: this.edge,
             level: this.level,
-            cursors: this.useCursors ? '1' : ''
+            cursors: this.useCursors ? '1' : '',
+            step: this.useSteps ? '1' : ''
         });
         this.draw();
     }
 
-    addChannel(name) {
-        const {channels} = this;
-        if (name === '' || channels.length >= most || channels.some(one => one.name === name))
-            return;
-        channels.push({name, scale: 0, position: 0});
+    /// Adds a channel, if the machine has that name. Otherwise nothing changes.
+    async addChannel(name) {
+        if (name === '') return this.report('');
+        const problem = await this.problemOf(name);
+        if (problem) return this.report(...problem);
+        this.report('');
+        this.channels.push({name, scale: 0, position: 0});
         this.add.value = '';
         this.save();
         this.drawChannels();
         this.follow();
+    }
+
+    /// Why a name cannot be a channel, and what was probably meant; null for a good name.
+    async problemOf(name) {
+        if (this.channels.some(one => one.name === name)) return [`'${name}' is already shown`];
+        if (this.channels.length >= most) return [`the scope has at most ${most} channels`];
+        let all = await objects();
+        if (!all.has(name)) all = await objects(true);  // it may be new
+        const type = all.get(name)?.type;
+        if (type === 'port') return [`'${name}' is a port, which has no number`];
+        if (type) return null;
+        if (!state.machine) return ['the machine is not running'];
+        return [`unknown name '${name}'`, similar(name, all.keys())];
+    }
+
+    report(problem, instead = []) {
+        const offers = instead.map(
+            name => h('button', {class: 'mono', onclick: () => this.addChannel(name)}, name));
+        this.problem.replaceChildren(
+            problem, offers.length > 0 ? '; did you mean: ' : '', ...offers);
+        if (problem)
+            announce(
+                instead.length > 0 ? `${problem}; did you mean ${instead.join(', ')}` : problem);
     }
 
     removeChannel(channel) {
@@ -252,32 +325,46 @@ export class View {
         this.pending = null;
     }
 
-    follow() {
+    /// Reads the samples of all channels that the machine has. `restarted`: the page follows the
+    /// same names again by itself.
+    async follow(restarted = false) {
+        const call = ++this.following, all = await objects();
+        if (call !== this.following) return;
+        for (const channel of this.channels) {
+            channel.unknown = all.size > 0 && !all.has(channel.name);
+            channel.unit = all.get(channel.name)?.unit ?? '';
+        }
+        this.drawChannels();
+        const list = this.channels.filter(one => !one.unknown).map(one => one.name);
+        if (restarted && list.join() === this.followed) return;
+        this.followed = list.join();
         this.stopFollowing();
         this.stopFollowing = () => {};
         this.store.clear();
-        const list = this.channels.map(channel => channel.name);
+        this.stops = [];
         if (list.length === 0) return;
         let known = 0;
-        this.stopFollowing =
-            probe(list, {batch_ms: 15}, (event, bytes, layout) => {
-                if (layout.layout !== known) {
-                    known = layout.layout;
-                    this.store.layout(layout.groups, list);
-                    this.arm();
-                }
-                this.source = 'every cycle';
-                this.store.samples(event, bytes, layout);
-                this.take();
-            }, () => this.followSlowly(list));
+        this.stopFollowing = probe(list, {batch_ms: 15}, (event, bytes, layout) => {
+            if (layout.layout !== known) {
+                known = layout.layout;
+                this.store.layout(layout.groups, list);
+                this.stops = [];
+                this.arm();
+            }
+            this.source = 'every cycle';
+            this.store.samples(event, bytes, layout);
+            this.take();
+        }, () => this.followSlowly(list));
     }
 
     /// Follows values of a machine without probes.
     followSlowly(list) {
         this.source = 'sampled every 10 ms';
-        this.store.layout([{columns: list.map((_, i) => i)}], list);
+        const every_ms = 10;
+        this.store.layout(
+            [{columns: list.map((_, i) => i), thread: 'values', period_ns: every_ms * 1e6}], list);
         this.arm();
-        this.stopFollowing = subscribe(list, 10, (values, event) => {
+        this.stopFollowing = subscribe(list, every_ms, (values, event) => {
             this.store.values(event);
             this.take();
         });
@@ -285,6 +372,8 @@ export class View {
 
     /// New samples are there: looks for triggers and decides which record is shown.
     take() {
+        this.lastSamples = performance.now();
+        if (this.stops.length === 0 && !state.running) this.noteState();
         if (!this.run) return;
         if (this.mode === 'roll' || !this.watcher) {
             this.shownAt = this.store.newest;
@@ -316,6 +405,35 @@ export class View {
         this.run = false;
         this.single = true;
         this.draw();
+    }
+
+    /// Remembers when the functions did not run.
+    noteState() {
+        const {store, stops} = this, open = stops.find(one => one.to === Infinity);
+        const exact = state.running_ns > 0 && store.origin !== null;
+        const now = exact ? store.seconds(state.running_ns) : store.newest;
+        if (!state.running && !open) stops.push({from: now, to: Infinity});
+        if (state.running && open) open.to = now;
+        if (stops.length > 100) stops.shift();
+        this.surface.request();
+    }
+
+    /// Why the newest samples are not those of a running machine; empty when they are.
+    notice() {
+        if (!state.machine) return 'machine not running';
+        if (!state.responding) return 'machine not responding';
+        if (!state.running) return 'stopped: functions do not run';
+        const silent = (performance.now() - this.lastSamples) / 1000;
+        return silent > 1 && this.followed !== '' ? `no samples for ${Math.floor(silent)} s` : '';
+    }
+
+    /// The faults during the shown time.
+    faults() {
+        const {store} = this, [from, to] = this.range();
+        if (store.origin === null) return [];
+        return state.log.filter(one => one.kind === 'fault' && one.time_ns > 0)
+            .map(one => ({at: store.seconds(one.time_ns), text: one.text}))
+            .filter(({at}) => at >= from && at <= to);
     }
 
     /// The shown time, from and to.
@@ -351,15 +469,19 @@ export class View {
                 dark: dark.matches,
                 back: colour('--card'),
                 grid: colour('--grid'),
-                text: colour('--text')
+                text: colour('--text'),
+                dim: colour('--dim'),
+                bad: colour('--bad')
             };
         picture.begin(width, height, thick, this.looks.back);
+        this.drawStops();
         for (let i = 1; i < divisions; i++)
             picture.vertical(width * i / divisions, this.looks.grid);
         for (let i = 1; i < rows; i++)
             picture.horizontal(height / rows * i, this.looks.grid);
         channels.forEach((channel, i) => {
             this.chooseScale(channel);
+            this.drawZero(channel, i, thick, ratio);
             if (i !== this.selected) this.drawChannel(channel, i, thick);
         });
         const top = channels[this.selected];
@@ -367,16 +489,85 @@ export class View {
         if (this.useCursors)
             for (const at of this.cursors)
                 picture.vertical(width * at, this.looks.text);
+        const faults = this.faults(), [from, to] = this.range();
+        for (const {at} of faults)
+            picture.vertical(width * (at - from) / (to - from), this.looks.bad);
         context.putImageData(picture.image, 0, 0);
+        context.font = '12px system-ui, sans-serif';
+        context.lineJoin = 'round';
+        context.lineWidth = 3;
+        context.strokeStyle = this.looks.back;
+        this.labelAxes(context, cssWidth, cssHeight);
         if (this.useCursors) this.labelCursors(context, cssWidth);
+        for (const {at, text} of faults)
+            this.write(
+                context, `fault: ${text}`, cssWidth * (at - from) / (to - from), 28, this.looks.bad,
+                cssWidth);
+        this.writeNotice(context, cssWidth, cssHeight);
+    }
+
+    /// Writes on the picture, with a margin in the colour behind it; kept within `width`.
+    write(context, words, x, y, paint, width) {
+        const wide = context.measureText(words).width;
+        const left = Math.max(2, Math.min(x + 4, width - wide - 4));
+        context.strokeText(words, left, y);
+        context.fillStyle = paint;
+        context.fillText(words, left, y);
+    }
+
+    writeNotice(context, width, height) {
+        const words = this.notice();
+        if (words === '') return;
+        context.save();
+        context.font = '600 18px system-ui, sans-serif';
+        const wide = context.measureText(words).width, x = (width - wide) / 2;
+        context.fillStyle = this.looks.back;
+        context.fillRect(x - 12, height / 2 - 22, wide + 24, 36);
+        this.write(context, words, x - 4, height / 2 + 2, this.looks.bad, width);
+        context.restore();
+    }
+
+    /// Shades the time in which the functions did not run.
+    drawStops() {
+        const {picture} = this, {width, height} = this.canvas, [from, to] = this.range();
+        const column = time => Math.round(width * (time - from) / (to - from));
+        for (const stop of this.stops) {
+            const begin = Math.max(0, column(Math.max(stop.from, from))),
+                  end = Math.min(width, column(Math.min(stop.to, to)));
+            picture.fill(begin, end - begin, 0, height, picture.colour(this.looks.grid));
+        }
+    }
+
+    /// The zero line: of the selected channel from side to side, of the others a mark at the left.
+    drawZero(channel, i, thick, ratio) {
+        const {picture, canvas} = this, row = canvas.height * (.5 - channel.position / rows);
+        if (!channel.scale || channel.unknown) return;
+        if (i === this.selected) picture.horizontal(row, this.looks.dim);
+        const from = Math.round(row) - thick;
+        picture.fill(0, Math.round(10 * ratio), from, from + 2 * thick, picture.colour(paint(i)));
+    }
+
+    /// The place of time 0, in divisions: the trigger, or the newest sample.
+    zeroTime() {
+        const triggered = this.mode !== 'roll' && this.watcher && this.lastTrigger > 0;
+        return triggered ? before * divisions : divisions;
+    }
+
+    labelAxes(context, width, height) {
+        const channel = this.channels[this.selected];
+        for (const {at, text} of timeLabels(this.base, divisions, this.zeroTime()))
+            this.write(context, text, width * at / divisions, height - 5, this.looks.dim, width);
+        if (!channel?.scale || channel.unknown) return;
+        const tone = paint(this.selected);
+        for (const {row, text} of valueLabels(channel, rows))
+            this.write(context, text, 10, height * row / rows - 4, tone, width);
+        const unit = channel.unit ? ` (${channel.unit})` : '';
+        this.write(context, channel.name + unit, 10, 14, tone, width);
     }
 
     labelCursors(context, width) {
-        context.fillStyle = this.looks.text;
-        context.font = '12px system-ui, sans-serif';
         this.cursors.forEach(
-            (at, i) =>
-                context.fillText(String(i + 1), Math.min(width * at + 4, width - 10), 12));
+            (at, i) => this.write(context, String(i + 1), width * at, 14, this.looks.text, width));
     }
 
     /// Chooses the scale of a new channel from its first values.
@@ -411,8 +602,7 @@ export class View {
         const {channels} = this,
               sources = [['', 'no trigger'], ...channels.map(c => [c.name, c.name])];
         this.triggerSource.replaceChildren(...sources.map(([v, t]) => h('option', {value: v}, t)));
-        this.triggerSource.value =
-            channels.some(c => c.name === this.trigger) ? this.trigger : '';
+        this.triggerSource.value = channels.some(c => c.name === this.trigger) ? this.trigger : '';
         this.whole.hidden = channels.length === 0;
         this.table.replaceChildren(...channels.map((channel, i) => this.channelRow(channel, i)));
     }
@@ -431,8 +621,8 @@ export class View {
                 this.save();
             }
         });
-        channel.cells = Array.from(
-            {length: 8}, (_, k) => h('td', {class: k < 5 ? 'n mono' : 'n mono cursor'}, '–'));
+        channel.cells =
+            Array.from(columns.slice(2), ([, kind]) => h('td', {class: `${kind} mono`}, '–'));
         const name =
             h('button', {
                 class: 'plain mono',
@@ -443,7 +633,8 @@ export class View {
                     this.draw();
                 }
             },
-              swatch, channel.name);
+              swatch, channel.name,
+              channel.unknown ? h('span', {class: 'bad'}, ' unknown name') : '');
         const remove =
             h('button', {
                 class: 'plain',
@@ -458,6 +649,7 @@ export class View {
 
     measureAll() {
         this.channels.forEach(channel => this.measureChannel(channel));
+        if (this.notice() !== '') this.surface.request();
         const now = performance.now(), fps = this.frames * 1000 / (now - this.since);
         this.drawn += this.frames;
         this.frames = 0;
@@ -474,7 +666,10 @@ export class View {
             lastTrigger,
             pre: this.base * divisions * before,
             store,
-            range: this.range()
+            range: this.range(),
+            notice: this.notice(),
+            faults: this.faults(),
+            stops: this.stops.map(({from, to}) => ({from, to: to === Infinity ? null : to}))
         };
         Object.assign(window, {halcyonScope: shownNow});  // for tests
     }
@@ -485,15 +680,40 @@ export class View {
         const times = this.cursors.map(at => from + (to - from) * at),
               [begin, end] = useCursors ? [...times].sort((a, b) => a - b) : [from, to];
         const seen = measure(store, channel.name, begin, end);
-        const at = useCursors ? times.map(time => valueAt(store, channel.name, time)) :
-                                [null, null];
+        const at =
+            useCursors ? times.map(time => valueAt(store, channel.name, time)) : [null, null];
         const known = seen && seen.frequency !== null,
               frequency = known ? `${shortened(seen.frequency)} Hz` : '?',
               difference = at.includes(null) ? null : at[1] - at[0];
-        [seen?.min, seen?.max, seen?.mean, seen?.rms, frequency, ...at, difference].forEach(
-            (value, k) => text(channel.cells[k], shortened(value)));
+        const figures = [
+            ...this.stepCells(channel), seen?.min, seen?.max, seen?.mean, seen?.rms,
+            seen?.deviation, frequency, ...at, difference
+        ];
+        figures.forEach((value, k) => text(channel.cells[k], shortened(value)));
         if (document.activeElement !== channel.input && channel.scale)
             channel.input.value = String(Number(channel.scale.toPrecision(3)));
+    }
+
+    /// The time of a step response: from cursor to cursor, or from the trigger to the end. Null:
+    /// neither is there.
+    stepRange() {
+        const [from, to] = this.range(), length = to - from;
+        if (this.useCursors) {
+            const [first, last] = [...this.cursors].sort((a, b) => a - b);
+            return [from + length * first, from + length * last];
+        }
+        return this.zeroTime() < divisions ? [from + length * before, to] : null;
+    }
+
+    stepCells(channel) {
+        const range = this.useSteps ? this.stepRange() : null;
+        const found = range && stepResponse(this.store, channel.name, ...range);
+        if (!found) return ['–', '–', '–'];
+        const {rise, overshoot, settling} = found;
+        return [
+            rise === null ? '–' : seconds(rise), `${shortened(overshoot)} %`,
+            settling === null ? 'not settled' : seconds(settling)
+        ];
     }
 
     statusText() {
@@ -503,6 +723,8 @@ export class View {
         const late = performance.now() - this.lastTrigger > 1000;
         if (this.mode !== 'roll' && this.trigger && this.run && late)
             parts.push('waiting for trigger');
+        if (this.useSteps && this.stepRange() === null)
+            parts.push('step: put cursor 1 at the step and cursor 2 where it has settled');
         if (this.useCursors) {
             const distance = Math.abs(this.cursors[1] - this.cursors[0]) * this.base * divisions;
             parts.push(`Δt ${seconds(distance)}`);

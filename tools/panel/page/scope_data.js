@@ -5,8 +5,10 @@ const capacity = 1 << 18;
 
 /// Rows that were sampled together: times in seconds, and the values of some channels.
 class Group {
-    constructor(columns) {
+    /// `hold`: seconds for which a value holds while no newer one comes.
+    constructor(columns, hold) {
         this.columns = columns;
+        this.hold = hold;
         this.times = new Float64Array(capacity);
         this.values = columns.map(() => new Float64Array(capacity));
         this.count = 0;  // rows ever added; row i is at i % capacity
@@ -72,6 +74,9 @@ class Columns {
     }
 }
 
+/// Values of a thread come in every cycle, and those without a thread when they change.
+function holdOf({thread, period_ns}) { return thread ? Math.max(.1, 5e-9 * period_ns) : Infinity; }
+
 export class Store {
     constructor() { this.clear(); }
     clear() {
@@ -94,7 +99,7 @@ export class Store {
     }
     layout(groups, names) {
         this.clear();
-        this.groups = groups.map(group => new Group(group.columns));
+        this.groups = groups.map(group => new Group(group.columns, holdOf(group)));
         this.cycles = groups.map(() => -1);
         groups.forEach(
             (group, g) => group.columns.forEach(
@@ -195,21 +200,22 @@ export class Trigger {
     }
 }
 
-/// Minimum, maximum, mean, rms and frequency between two times; null without samples. The frequency
-/// needs two rising crossings of the middle.
+/// Minimum, maximum, mean, rms, standard deviation and frequency between two times; null without
+/// samples. The frequency needs two rising crossings of the middle.
 export function measure(store, name, from, to) {
     const place = store.place.get(name);
     if (!place) return null;
     const [group, column] = place, begin = group.row(from), end = group.row(to);
-    let min = Infinity, max = -Infinity, sum = 0, squares = 0, count = 0;
+    let min = Infinity, max = -Infinity, mean = 0, squares = 0, deviations = 0, count = 0;
     for (let row = begin; row < end; row++) {
         const value = group.value(column, row);
         if (!Number.isFinite(value)) continue;
         min = Math.min(min, value);
         max = Math.max(max, value);
-        sum += value;
         squares += value * value;
-        count++;
+        const off = value - mean;  // Welford: exact beside a large mean
+        mean += off / ++count;
+        deviations += off * (value - mean);
     }
     if (count === 0) return null;
     const middle = (min + max) / 2, gap = (max - min) * .1, edges = [];
@@ -230,7 +236,8 @@ export function measure(store, name, from, to) {
     }
     const frequency =
         edges.length > 1 ? (edges.length - 1) / (edges[edges.length - 1] - edges[0]) : null;
-    return {min, max, mean: sum / count, rms: Math.sqrt(squares / count), frequency, count};
+    const rms = Math.sqrt(squares / count), deviation = Math.sqrt(deviations / count);
+    return {min, max, mean, rms, deviation, frequency, count};
 }
 
 /// The value of a channel at a time: that of the last row not after it.

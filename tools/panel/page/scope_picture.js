@@ -51,6 +51,12 @@ export class Picture {
             this.fill(x, dotted ? 2 : this.width, row, row + this.thick - 1, paint);
     }
 
+    /// Until when the value of a row is shown.
+    until(group, row, to) {
+        if (row + 1 < group.count) return group.time(row + 1);
+        return Math.min(to, group.time(row) + group.hold);
+    }
+
     /// A channel. With many samples per column of pixels, a column is a line from their minimum to
     /// their maximum; with few, the trace is stairs. `line`: {name, thick, dashed}. A value is at
     /// the row zero - value * perUnit.
@@ -65,8 +71,7 @@ export class Picture {
         if (end - begin < 2 * this.width) {
             for (let row = begin; row < end; row++) {
                 const at = Math.floor((group.time(row) - from) / each),
-                      next = row + 1 < end ? Math.floor((group.time(row + 1) - from) / each) :
-                                             this.width;
+                      next = Math.floor((this.until(group, row, to) - from) / each);
                 const here = pixelRow(row), before = row > begin ? pixelRow(row - 1) : here;
                 if (line.dashed) {
                     for (let x = Math.max(at, 0); x < Math.min(next, this.width); x++)

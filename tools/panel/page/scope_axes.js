@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+// The numbers of the scope's axes.
+
+/// Digits behind the decimal point with which steps of `size` differ.
+const digits = size => Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(size))));
+
+/// A number on an axis with steps of `size`, without the zeros that no label needs.
+export function label(value, size) {
+    if (Math.abs(value) < size * 1e-6) return '0';
+    if (Math.abs(value) >= 1e6 || size < 1e-6) return value.toExponential(2);
+    return String(Number(value.toFixed(digits(size))));
+}
+
+/**
+ * The numbers of a channel at the horizontal lines, from the top.
+ * @param {{scale: number, position: number}} channel
+ * @param {number} rows lines of the picture
+ * @returns {{row: number, text: string}[]}
+ */
+export function valueLabels({scale, position}, rows) {
+    return Array.from({length: rows - 1}, (_, i) => {
+        const value = (rows / 2 - (i + 1) - position) * scale;
+        return {row: i + 1, text: label(value, scale)};
+    });
+}
+
+const units = [{limit: 1e-3, factor: 1e6, unit: 'µs'}, {limit: 1, factor: 1e3, unit: 'ms'}];
+
+/**
+ * The times at the vertical lines. `zero` is the place of time 0, in divisions from the left.
+ * @param {number} base seconds per division
+ * @param {number} divisions
+ * @param {number} zero
+ * @returns {{at: number, text: string}[]} with the unit in the last one
+ */
+export function timeLabels(base, divisions, zero) {
+    const {factor, unit} =
+        units.find(({limit}) => base * divisions <= limit) ?? {factor: 1, unit: 's'};
+    return Array.from({length: divisions - 1}, (_, i) => {
+        const at = i + 1, text = label((at - zero) * base * factor, base * factor);
+        return {at, text: at === divisions - 1 ? `${text} ${unit}` : text};
+    });
+}
