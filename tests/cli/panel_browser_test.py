@@ -59,6 +59,73 @@ class Views(Page):
         self.browser.wait("document.querySelector('[data-value=total]').textContent === '43'")
         self.assertEqual("40", self.value("adder.in0"))
 
+    def test_watch_rejects_values_beyond_their_type_and_undoes_the_last_change(self):
+        netlist = WAVE + "newsig count s32\n"
+        self.begin("--write", netlist=netlist, view="watch?names=adder.in0,count,wave.frequency")
+        self.browser.wait("document.querySelectorAll('input.set:not(:disabled)').length === 3")
+        self.browser.evaluate("""window.put = (row, value) => {
+            const line = document.querySelectorAll('tbody tr')[row];
+            line.querySelector('input.set').value = value;
+            line.querySelector('button.set').click();
+        }""")
+        problem = "document.getElementById('watch-problem').textContent"
+        undo = "document.getElementById('undo')"
+        self.assertTrue(self.browser.evaluate(f"{undo}.hidden"))
+        self.browser.evaluate("put(1, '3000000000')")
+        self.assertEqual(
+            "count: 3000000000 is out of the range of s32: -2147483648 .. 2147483647",
+            self.browser.evaluate(problem),
+        )
+        self.browser.evaluate("put(0, '1,5')")
+        self.assertEqual(
+            "adder.in0: '1,5' is not a number; write 1.5", self.browser.evaluate(problem)
+        )
+        self.assertEqual(
+            ("2", "0"), (self.value("adder.in0"), self.good("shell", "gets", "count").strip())
+        )
+        self.browser.evaluate("put(0, '1.5')")
+        self.browser.wait(f"{undo}.textContent === 'Undo: adder.in0 back to 2'")
+        self.assertEqual(("1.5", ""), (self.value("adder.in0"), self.browser.evaluate(problem)))
+        self.browser.evaluate("put(1, '-7')")
+        self.browser.wait(f"{undo}.textContent === 'Undo: count back to 0'")
+        self.browser.evaluate(f"{undo}.click()")
+        self.browser.wait(f"{undo}.textContent === 'Undo: count back to -7'")
+        self.assertEqual(
+            ("1.5", "0"), (self.value("adder.in0"), self.good("shell", "gets", "count").strip())
+        )
+        self.browser.wait("document.querySelectorAll('.setter')[2].textContent.startsWith('Hz')")
+
+    def test_watch_lists_are_saved_by_name(self):
+        self.begin(view="watch?names=total,adder.in0", token=False)
+        button = "[...document.querySelectorAll('button')].find(b => b.textContent === '{}')"
+        self.browser.wait("document.querySelector('[data-value=total]')?.textContent === '5'")
+        self.assertTrue(self.browser.evaluate(button.format("Save list") + ".disabled"))
+        self.browser.evaluate(
+            "(() => { const t = document.querySelector('[aria-label=\"Name of the list\"]'); t.value = 'sums'; t.dispatchEvent(new Event('input')); })()"
+        )
+        self.browser.evaluate(button.format("Save list") + ".click()")
+        self.open("watch", token=False)
+        choice = "document.querySelector('[aria-label=\"Saved watch list\"]')"
+        self.browser.wait(
+            f"{choice}?.options.length === 2 && !document.querySelector('[data-value]')"
+        )
+        self.browser.evaluate(
+            f"{choice}.value = 'sums'; {choice}.dispatchEvent(new Event('change'))"
+        )
+        self.browser.wait("document.querySelector('[data-value=total]')?.textContent === '5'")
+        self.assertIn("names=total%2Cadder.in0", self.browser.evaluate("location.href"))
+        self.browser.evaluate(button.format("Delete list") + ".click()")
+        self.browser.wait(f"{choice}.disabled")
+
+    def test_names_are_in_natural_order(self):
+        netlist = SERVO + "loadrt siggen names=axis10,axis9,axis2\n"
+        self.begin(netlist=netlist, view="watch?filter=sine")
+        leaves = "[...document.querySelectorAll('.leaf')].map(leaf => leaf.textContent).filter(name => name.endsWith('.sine'))"
+        self.assertEqual(
+            ["axis2.sine", "axis9.sine", "axis10.sine"],
+            self.browser.wait(f"{leaves}.length === 3 && {leaves}"),
+        )
+
     def test_a_view_is_restored_from_its_address(self):
         self.begin(view="watch?names=total", token=False)
         self.browser.wait("document.querySelector('[data-value=total]')?.textContent === '5'")

@@ -2,8 +2,11 @@
 // A tree of all names, watch lists, set.
 import {on, request, state, subscribe} from './link.js';
 import {announce, colour, h, number, surface, text} from './dom.js';
+import {compareNames} from './names.js';
 import {objects, settable} from './objects.js';
 import {remember} from './place.js';
+import {rangeOf, typedValue} from './typed_value.js';
+import {keep, lists} from './watch_lists.js';
 
 const history = 150;  // values of a sparkline: 15 s
 
@@ -28,29 +31,9 @@ function sparkline(context, width, height, values) {
     context.stroke();
 }
 
-const bits = {
-    1: true,
-    true: true,
-    0: false,
-    false: false
-};
-
-/// The value that was typed, for the protocol; undefined when it is invalid.
-function typed(type, word) {
-    if (type === 'bit') return bits[word.toLowerCase()];
-    const value = Number(word);
-    if (word.trim() === '' || !Number.isFinite(value)) return undefined;
-    return type === 'float' || Number.isInteger(value) ? value : undefined;
-}
-
-async function set(name, value) {
-    const reply = await request({set: {[name]: value}});
-    const problem = reply.ok ?
-        '' :
-        reply.error.split('\n').filter(line => /error|read-only|lost|running/.test(line))[0] ??
-            reply.error;
-    announce(reply.ok ? `${name} set` : problem);
-    document.getElementById('watch-problem').textContent = problem;
+/// The line of an error that names its cause.
+function causeOf(error) {
+    return error.split('\n').find(line => /error|read-only|lost|running/.test(line)) ?? error;
 }
 
 /// Why a value cannot be set here.
@@ -59,7 +42,8 @@ function setElsewhere({kind, writer, signal}) {
     return signal ? `linked to ${signal}` : 'output';
 }
 
-function setter(name, object) {
+/// The elements that set a value: set(value) for a valid one, reject(problem) for any other text.
+function setter(name, object, set, reject) {
     if (!settable(object)) return h('span', {class: 'dim hide-narrow'}, setElsewhere(object));
     if (object.type === 'bit')
         return h(
@@ -69,25 +53,32 @@ function setter(name, object) {
                     h('button', {
                         class: 'set',
                         'aria-label': `set ${name} ${word}`,
-                        onclick: () => set(name, word === 'TRUE')
+                        onclick: () => set(word === 'TRUE')
                     },
                       word)));
-    const input =
-        h('input',
-          {class: 'set', size: 9, inputmode: 'decimal', 'aria-label': `new value of ${name}`});
+    const unit = object.unit ? ` in ${object.unit}` : '', range = rangeOf(object.type);
+    const input = h('input', {
+        class: 'set',
+        size: 9,
+        inputmode: 'decimal',
+        title: range ? `${object.type}: ${range}` : object.type,
+        'aria-label': `new value of ${name}${unit}`
+    });
     const send = () => {
-        const value = typed(object.type, input.value);
-        if (value === undefined)
+        const {value, problem} = typedValue(object.type, input.value);
+        input.toggleAttribute('aria-invalid', false);
+        if (problem) {
             input.setAttribute('aria-invalid', 'true');
-        else {
-            input.removeAttribute('aria-invalid');
-            set(name, value);
-        }
+            reject(`${name}: ${problem}`);
+        } else
+            set(value);
     };
     input.addEventListener('keydown', event => {
         if (event.key === 'Enter') send();
     });
-    return h('span', {class: 'setter'}, input, h('button', {class: 'set', onclick: send}, 'Set'));
+    return h(
+        'span', {class: 'setter'}, input, object.unit ? h('span', {class: 'dim'}, object.unit) : '',
+        h('button', {class: 'set', onclick: send}, 'Set'));
 }
 
 /// Groups names by the part behind `path`, up to the next dot.
@@ -161,6 +152,11 @@ export class View {
         this.tree = h('div', {class: 'card tree'});
         this.body = h('tbody');
         this.note = h('p', {class: 'dim'});
+        this.problem = h('p', {id: 'watch-problem', class: 'bad', role: 'status'});
+        /** @type {{name: string, value: any} | null} */
+        this.before = null;  // what undo sets
+        this.undoButton = h('button', {id: 'undo', hidden: true, onclick: () => this.undo()});
+        this.makeLists();
         const titles = [
             h('th', {}, 'Name'), h('th', {class: 'n'}, 'Value'), h('th', {}, 'Unit'),
             h('th', {class: 'hide-narrow'}, 'Last 15 s'), h('th', {}, 'Set'),
@@ -170,13 +166,13 @@ export class View {
         main.append(
             h('div', {class: 'split'},
               h('div', {class: 'column'}, h('div', {class: 'bar'}, this.filter), this.tree),
-              h('div', {class: 'card'}, h('h2', {}, 'Watch list'), this.note,
-                h('p', {id: 'watch-problem', class: 'bad', role: 'status'}),
-                h('div', {class: 'scroll'}, table))));
+              h('div', {class: 'card'}, h('h2', {}, 'Watch list'),
+                h('div', {class: 'bar'}, this.chosen, this.title, this.keepButton,
+                  this.removeButton, this.undoButton),
+                this.note, this.problem, h('div', {class: 'scroll'}, table))));
         this.load();
         this.follow();
-        this.subscriptions =
-            [on('machine', () => this.load()), on('state', () => this.enable())];
+        this.subscriptions = [on('machine', () => this.load()), on('state', () => this.enable())];
     }
 
     end() {
@@ -184,6 +180,79 @@ export class View {
         this.subscriptions.forEach(unsubscribe => unsubscribe());
         this.stopFollowing();
         this.rows.forEach(row => row.end());
+    }
+
+    // ---- lists by name
+
+    makeLists() {
+        this.chosen = h('select', {
+            'aria-label': 'Saved watch list',
+            onchange: () => {
+                this.title.value = this.chosen.value;
+                const names = lists(localStorage).get(this.chosen.value);
+                if (names) this.change(names);
+                this.drawLists();
+            }
+        });
+        this.title = h('input', {
+            size: 14,
+            placeholder: 'Name of the list',
+            'aria-label': 'Name of the list',
+            oninput: () => this.drawLists()
+        });
+        this.keepButton = h('button', {onclick: () => this.keepList(this.names)}, 'Save list');
+        this.removeButton = h('button', {onclick: () => this.keepList([])}, 'Delete list');
+        this.drawLists();
+    }
+
+    drawLists() {
+        const title = this.title.value.trim(), saved = [...lists(localStorage).keys()];
+        const none = saved.length === 0 ? 'no saved list' : 'choose a saved list';
+        this.chosen.replaceChildren(
+            h('option', {value: ''}, none), ...saved.map(name => h('option', {value: name}, name)));
+        this.chosen.value = saved.includes(title) ? title : '';
+        this.chosen.disabled = saved.length === 0;
+        this.keepButton.disabled = title === '' || this.names.length === 0;
+        this.removeButton.hidden = !saved.includes(title);
+    }
+
+    keepList(names) {
+        const stored = keep(localStorage, this.title.value.trim(), names);
+        this.reject(stored ? '' : 'the browser has no space for the list');
+        this.drawLists();
+    }
+
+    // ---- values
+
+    /// Shows why something was not done; an empty text removes that.
+    reject(problem) {
+        text(this.problem, problem);
+        if (problem) announce(problem);
+    }
+
+    /// Sets a value, and keeps the one before it for undo().
+    async set(name, value) {
+        const old = await request({read: [name]}), reply = await request({set: {[name]: value}});
+        if (!reply.ok) return this.reject(causeOf(reply.error));
+        this.reject('');
+        announce(`${name} set`);
+        const before = old.ok ? old.values[0] : null, type = this.all.get(name)?.type;
+        const exact = before !== null &&
+            (type === 'float' || typeof before !== 'number' || Number.isSafeInteger(before));
+        this.before = exact ? {name, value: before} : null;
+        this.drawUndo();
+    }
+
+    /// Sets the value from before the last change; once more sets the changed one again.
+    undo() {
+        if (this.before) this.set(this.before.name, this.before.value);
+    }
+
+    drawUndo() {
+        this.undoButton.hidden = this.before === null;
+        if (this.before)
+            text(this.undoButton, `Undo: ${this.before.name} back to ${number(this.before.value)}`);
+        this.enable();
     }
 
     async load() {
@@ -222,7 +291,8 @@ export class View {
     }
 
     drawTree() {
-        const word = this.filter.value.trim().toLowerCase(), sorted = [...this.all.keys()].sort();
+        const word = this.filter.value.trim().toLowerCase(),
+              sorted = [...this.all.keys()].sort(compareNames);
         if (word !== '') return this.drawFound(sorted, word);
         const part = (title, kind, open) => {
             const list = sorted.filter(name => this.all.get(name).kind === kind);
@@ -243,8 +313,7 @@ export class View {
         if (found.length > 400)
             this.tree.append(
                 h('p', {class: 'dim'}, `${found.length - 400} more; type more letters`));
-        if (found.length === 0)
-            this.tree.append(h('p', {class: 'dim'}, 'No name contains this.'));
+        if (found.length === 0) this.tree.append(h('p', {class: 'dim'}, 'No name contains this.'));
     }
 
     drawRows() {
@@ -256,6 +325,7 @@ export class View {
             this.names.length === 0 ?
                 'Choose names in the tree. The list is part of the address of this page.' :
                 '');
+        this.drawLists();
         this.enable();
     }
 
@@ -275,7 +345,10 @@ export class View {
             row.value, h('td', {class: 'dim'}, object?.unit ?? ''),
             h('td', {class: 'hide-narrow'}, row.canvas),
             h('td', {},
-              object ? setter(name, object) : h('span', {class: 'dim'}, 'unknown name')),
+              object ? setter(
+                           name, object, value => this.set(name, value),
+                           problem => this.reject(problem)) :
+                       h('span', {class: 'dim'}, 'unknown name')),
             h('td', {}, remove));
     }
 
@@ -283,6 +356,7 @@ export class View {
     enable() {
         for (const element of /** @type {NodeListOf<any>} */ (this.body.querySelectorAll('.set')))
             element.disabled = !state.held;
+        this.undoButton.disabled = !state.held;
     }
 
     follow() {
