@@ -395,6 +395,15 @@ shape pulse-train-2
 devices pulse-train-2 00000002
   EL2522          09DA3052
 
+shape frequency-output
+  sm 2 out write
+  pdo 1600 7000:01/16 7000:02/16s
+  sm 3 in write
+  pdo 1a00 6000:01/16 6000:02/16
+  frequency-output stp state=6000:01 count=6000:02 control=7000:01 target=7000:02
+devices frequency-output 00000002
+  EL2521          09D93052
+
 shape ssi-2
   2* param ch#DisFrameErr 8000+10:01/8
   2* param ch#EnPwrFailChk 8000+10:02/8
@@ -966,7 +975,7 @@ devices power-distribution 00000002
   EP9214          23FE4052
 
 unsupported AX5101 AX5103 AX5106 AX5112 AX5118 AX5203 AX5206 AX5805 EasyIO EL1918_LOGIC
-unsupported EL2521 EL2564 EL6090 EL9576 EpoCAT Ph3LM2RM StMDS5k
+unsupported EL2564 EL6090 EL9576 EpoCAT Ph3LM2RM StMDS5k
 )";
 // clang-format on
 

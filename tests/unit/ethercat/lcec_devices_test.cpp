@@ -2,9 +2,12 @@
 // The table of lcec's devices, and the channels that it names.
 #include "ethercat/config/lcec_devices.hpp"
 
+#include <map>
 #include <set>
 
+#include "ethercat/master/request_queue.hpp"
 #include "ethercat/plugins/channels/make_channel.hpp"
+#include "tests/unit/ethercat/mailbox_slave.hpp"
 #include "tests/unit/ethercat/pin_host.hpp"
 
 namespace hal::ethercat {
@@ -41,7 +44,9 @@ public:
     ImageField field(std::uint16_t index, std::uint8_t sub) const {
         return find(this, {index, sub, 0, 0});
     }
-    SlaveImage image(bool operational = true) const { return {areas_, operational, 1'000'000}; }
+    SlaveImage image(bool operational = true) const {
+        return {areas_, operational, 1'000'000, mailbox != nullptr, 0, mailbox};
+    }
     void set(std::uint16_t index, std::uint8_t sub, std::uint64_t value) {
         field(index, sub).write(image(), value);
     }
@@ -69,6 +74,7 @@ public:
     std::vector<std::string> problems;
     std::size_t unknown_objects = 0;
     PinHost host;
+    master::RequestPort* mailbox = nullptr;
 
 private:
     struct Owner : hal::Component {
@@ -331,6 +337,85 @@ TEST(LcecDevices, Drives_of_CiA_402_have_the_pins_of_their_modParams) {
     Bench two("CL57E-4A", {{"ch2enableCSV", "0"}});
     EXPECT_TRUE(two.field(0x60ff, 0).present());
     EXPECT_FALSE(two.field(0x68ff, 0).present());
+}
+
+/// A mailbox from which objects are uploaded.
+struct ObjectMailbox {
+    tests::MailboxSlave slave;
+    master::Mailboxes mailboxes{1};
+    master::RequestServer server{mailboxes, [this](std::uint16_t) { return &slave.bus; }, 2};
+    master::RequestPort& port = server.open();
+    struct Value {
+        std::size_t bytes;
+        std::uint32_t number;
+    };
+    std::map<std::uint32_t, Value> values;  ///< by index << 8 | sub-index
+
+    ObjectMailbox() {
+        slave.on_request = [this](const MailboxMessage& m) {
+            const auto sdo = coe::read_sdo(m.payload);
+            const Value value = values.at(sdo->index << 8 | sdo->sub);
+            tests::Bytes reply(coe::sdo_bytes);
+            coe::write_sdo(reply.data(), coe::Service::sdo_response,
+                           {coe::expedited_command(coe::command::upload_response, value.bytes),
+                            sdo->index, sdo->sub, value.number});
+            slave.reply(MailboxType::coe, reply);
+        };
+    }
+    ~ObjectMailbox() { server.stop(); }
+    void step() {
+        server.step(slave.now_ns);
+        slave.step(server.channel(0));
+    }
+};
+
+TEST(LcecDevices, Frequency_output_scales_by_the_frequency_of_the_terminal) {
+    ObjectMailbox objects;
+    objects.values = {{0x800102, {4, 50'000}},
+                      {0x800104, {2, 100}},
+                      {0x800105, {2, 200}},
+                      {0x800007, {1, 1}},
+                      {0x880002, {2, 0x4000}}};
+    Bench bench("EL2521");
+    bench.mailbox = &objects.port;
+    bench.pin<bool>("stp-enable") = true;
+    bench.pin<double>("stp-velo-cmd") = -12.5;
+    bench.pin<double>("stp-pos-scale") = 1000;
+    bench.pin<bool>("stp-ramp-disable") = true;
+    bench.set(0x6000, 2, 0xfffe);
+    bench.read();
+    bench.write();
+    EXPECT_EQ(bench.get(0x7000, 2), 0) << "the base frequency is unknown";
+    EXPECT_EQ(bench.get(0x7000, 1), 2);
+    for (int cycle = 0; cycle < 2000 && bench.pin<double>("stp-maxaccel-fall") == 0; ++cycle) {
+        objects.step();
+        bench.read();
+    }
+    bench.write();
+    EXPECT_DOUBLE_EQ(bench.pin<double>("stp-freq"), -12'500.0);
+    EXPECT_EQ(bench.get(0x7000, 2), -8191) << "a quarter of 32767";
+    EXPECT_NEAR(bench.pin<double>("stp-maxvel"), 25.0, 1e-3) << "half of 50 kHz";
+    EXPECT_DOUBLE_EQ(bench.pin<double>("stp-maxaccel-rise"), 100.0) << "100 steps of 1 kHz/s";
+    EXPECT_DOUBLE_EQ(bench.pin<double>("stp-maxaccel-fall"), 200.0);
+    bench.pin<double>("stp-velo-cmd") = 1e9;
+    bench.write();
+    EXPECT_EQ(bench.get(0x7000, 2), 32767);
+    bench.pin<bool>("stp-enable") = false;
+    bench.write();
+    EXPECT_EQ(bench.get(0x7000, 2), 0);
+    bench.set(0x6000, 1, 0x22);
+    bench.set(0x6000, 2, 3);
+    bench.read();
+    EXPECT_EQ(bench.pin<std::int32_t>("stp-counts"), 5) << "from 65534 to 3";
+    EXPECT_DOUBLE_EQ(bench.pin<double>("stp-pos-fb"), 0.005);
+    EXPECT_TRUE(bench.pin<bool>("stp-ramp-active") && bench.pin<bool>("stp-in-z"));
+    EXPECT_TRUE(bench.pin<bool>("stp-in-t-not") && !bench.pin<bool>("stp-in-t"));
+}
+
+TEST(LcecDevices, Power_distribution_has_its_current_limits_in_amperes) {
+    Bench bench("EP9214");
+    EXPECT_EQ(bench.host.declared().at("x.chan-4-current-limit-up"), "in float");
+    EXPECT_TRUE(bench.field(0xf707, 4).present() && bench.field(0x7010, 6).present());
 }
 
 TEST(LcecDevices, Servo_terminal_has_target_0_until_its_resolution_is_known) {

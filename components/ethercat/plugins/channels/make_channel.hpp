@@ -12,6 +12,7 @@
 #include "ethercat/plugins/channels/digital_output.hpp"
 #include "ethercat/plugins/channels/drive_modes.hpp"
 #include "ethercat/plugins/channels/flag.hpp"
+#include "ethercat/plugins/channels/frequency_output.hpp"
 #include "ethercat/plugins/channels/inverter.hpp"
 #include "ethercat/plugins/channels/motor_reset.hpp"
 #include "ethercat/plugins/channels/number.hpp"
@@ -58,6 +59,7 @@ inline std::unique_ptr<Channel> make_channel(const ChannelPlan& plan) {
         {"stepper", of(std::type_identity<StepperDrive>())},
         {"motor-reset", of(std::type_identity<MotorReset>())},
         {"pulse-train", of(std::type_identity<PulseTrain>())},
+        {"frequency-output", of(std::type_identity<FrequencyOutput>())},
     };
     for (const Kind& kind : kinds) {
         if (plan.channel.kind == kind.name) return kind.make(plan);
