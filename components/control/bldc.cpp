@@ -289,9 +289,9 @@ private:
     }
 
     void publish(double rotor) noexcept {
-        double lead = has.free() && !has.gray                    ? 0.0
-                      : has.index && !has.encoder() && !has.hall ? 0.0
-                                                                 : 0.25;
+        const bool is_open_loop = has.free() && !has.gray;
+        const bool has_index_only = has.index && !has.encoder() && !has.hall;
+        double lead = is_open_loop || has_index_only ? 0.0 : 0.25;
         if (has.encoder() && std::isfinite(lead_angle[0])) {
             lead = lead_angle[0] / 360.0;
         }

@@ -166,9 +166,8 @@ private:
             known_ = 0;
             return false;
         }
-        const double raw = velocity.linked() ? velocity.get()
-                           : known_ > 0      ? (position - position_) / dt
-                                             : 0.0;
+        const double difference = known_ > 0 ? (position - position_) / dt : 0.0;
+        const double raw = velocity.linked() ? velocity.get() : difference;
         const double share =
             !velocity.linked() && speed_filter > 0.0 ? dt / (speed_filter + dt) : 1.0;
         const double before = speed_;

@@ -388,6 +388,13 @@ struct Section {
     std::string_view name, also;
     void (*save)(Context&, Text&);
     bool in_all, in_allu;
+
+    /// Returns whether `save WANTED` prints it.
+    bool is_in(std::string_view wanted) const {
+        if (wanted == "all") return in_all;
+        if (wanted == "allu") return in_allu;
+        return wanted == name || (!also.empty() && wanted == also);
+    }
 };
 
 /// In the order of `save all`.
@@ -415,11 +422,7 @@ void command_save(Context& context) {
     Text text;
     bool known = false;
     for (const Section& section : sections) {
-        const bool chosen = wanted == "all"    ? section.in_all
-                            : wanted == "allu" ? section.in_allu
-                                               : wanted == section.name || (!section.also.empty() &&
-                                                                            wanted == section.also);
-        if (!chosen) continue;
+        if (!section.is_in(wanted)) continue;
         known = true;
         if (context.checking()) continue;
         section.save(context, text);

@@ -325,11 +325,10 @@ private:
         for (; at < text.size(); ++at) {
             const char c = text[at];
             if (c == ',') return at;
-            const std::size_t close = c == '{'                ? text.find('}', at + 1)
-                                      : c == '"' || c == '\'' ? text.find(c, at + 1)
-                                                              : at;
-            if (close == text.npos) return text.size();
-            at = close;
+            if (c == '{' || c == '"' || c == '\'') {
+                at = text.find(c == '{' ? '}' : c, at + 1);
+            }
+            if (at == text.npos) return text.size();
         }
         return text.size();
     }

@@ -119,6 +119,7 @@ bool check_arity(const Usage& usage, const Token& name, std::span<const Token> a
     if (given >= min && given <= max) return true;
     const bool few = given < min;
     const std::size_t bound = few ? min : max;
+    const char* const limit = few ? "at least " : "at most ";
     Span at = name.span;
     if (!few) {
         at = args[max].span;
@@ -128,10 +129,7 @@ bool check_arity(const Usage& usage, const Token& name, std::span<const Token> a
     }
     const std::string remedy = without_equals_sign(usage.name, args);
     diagnostics.error("wrong-arguments", at,
-                      std::string(usage.name) + " takes " +
-                          (min == max ? ""
-                           : few      ? "at least "
-                                      : "at most ") +
+                      std::string(usage.name) + " takes " + (min == max ? "" : limit) +
                           counted(bound, "argument") + ", not " + std::to_string(given),
                       "", remedy.empty() ? to_string(usage) : remedy);
     return false;

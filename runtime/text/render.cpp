@@ -162,9 +162,10 @@ private:
         gutter(std::string(gutter_, ' '));
         for (std::size_t at = 0; at < signs.size();) {
             const std::size_t stop = std::min(signs.find_first_not_of(signs[at], at), signs.size());
-            const char* color = signs[at] == '^'   ? style_.of(diagnostic_.severity)
-                                : signs[at] == '-' ? style_.gutter
-                                                   : "";
+            const char* color = signs[at] == '-' ? style_.gutter : "";
+            if (signs[at] == '^') {
+                color = style_.of(diagnostic_.severity);
+            }
             out_ += color + signs.substr(at, stop - at) + (*color != 0 ? style_.off : "");
             at = stop;
         }

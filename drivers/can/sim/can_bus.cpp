@@ -498,13 +498,15 @@ void Bus::occupy(std::int64_t start, std::int64_t end) noexcept {
     busy_ns_ += end - start;
 }
 
+/// Returns the error state of a node that is not off the bus, by its larger error counter.
+static State state_of(unsigned errors) noexcept {
+    if (errors >= 128) return State::passive;
+    return errors >= 96 ? State::warning : State::active;
+}
+
 void Bus::publish(Node& n) noexcept {
-    const auto worst = std::max(n.tec, n.rec);
-    const auto state = n.off          ? State::bus_off
-                       : worst >= 128 ? State::passive
-                       : worst >= 96  ? State::warning
-                                      : State::active;
-    n.state.store(state, std::memory_order_relaxed);
+    n.state.store(n.off ? State::bus_off : state_of(std::max(n.tec, n.rec)),
+                  std::memory_order_relaxed);
     n.counters.store(std::min(n.tec, 255U) << 16 | std::min(n.rec, 255U),
                      std::memory_order_relaxed);
 }

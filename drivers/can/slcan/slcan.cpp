@@ -240,9 +240,10 @@ private:
         if ((bits & 8) != 0) {
             Counting::add(counting_.lost);
         }
-        const auto state = (bits & 32) != 0  ? State::passive
-                           : (bits & 4) != 0 ? State::warning
-                                             : State::active;
+        State state = (bits & 4) != 0 ? State::warning : State::active;
+        if ((bits & 32) != 0) {
+            state = State::passive;
+        }
         counting_.state.store(state, std::memory_order_relaxed);
     }
     bool hung_up() const noexcept {

@@ -34,11 +34,15 @@ bool SpinBudget::is_needed() {
     return !(file >> runtime) || runtime >= 0;
 }
 
+/// Returns how long before the time of a frame the pacer spins.
+static std::int64_t spin_ns_of(const Options& options) {
+    if (options.policy == Policy::block) return 0;
+    return options.policy == Policy::spin ? INT64_MAX : options.spin_ns;
+}
+
 Pacer::Pacer(Sender& sender, const Options& options)
     : sender_(sender),
-      spin_ns_(options.policy == Policy::block  ? 0
-               : options.policy == Policy::spin ? INT64_MAX
-                                                : options.spin_ns),
+      spin_ns_(spin_ns_of(options)),
       places_(hal::Queue<std::uint32_t>(options.send_capacity).capacity()),
       unused_(options.send_capacity),
       outgoing_(options.send_capacity),

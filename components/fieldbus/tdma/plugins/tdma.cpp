@@ -309,9 +309,13 @@ private:
             had_carrier_ = port.up;
             on_event(port.up ? Event::carrier : Event::no_carrier, {}, 0);
         }
-        pins_.foreign = s.count.foreign + (service_     ? service_->server().foreign()
-                                           : applicant_ ? applicant_->foreign()
-                                                        : 0);
+        std::uint64_t foreign = s.count.foreign;
+        if (service_) {
+            foreign += service_->server().foreign();
+        } else if (applicant_) {
+            foreign += applicant_->foreign();
+        }
+        pins_.foreign = foreign;
         if (service_) {
             pins_.stations = service_->server().ready();
             pins_.stations_dead = service_->dead();
