@@ -144,10 +144,8 @@ int write_all_pages(const std::vector<Page>& pages, const Plugins& plugins, cons
         if (found == listed.end()) {
             found = listed.find(name);
         }
-        by_group[page.built_in           ? "runtime"
-                 : found == listed.end() ? "other"
-                                         : found->second.group]
-            .push_back(&page);
+        const std::string group = found == listed.end() ? "other" : found->second.group;
+        by_group[page.built_in ? "runtime" : group].push_back(&page);
     }
     std::vector<IndexGroup> groups;
     for (auto& [name, members] : by_group) {

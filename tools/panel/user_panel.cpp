@@ -50,6 +50,12 @@ bool convert(const PanelPin& pin, const Json& value, Json& to) {
     return true;
 }
 
+/// Returns what a widget shows before its pin has a value.
+Json first_value_of(const PanelPin& pin) {
+    if (pin.output && !pin.safe.is_null()) return pin.safe;
+    return pin.initial.is_null() ? zero_of(pin) : pin.initial;
+}
+
 }  // namespace
 
 UserPanel::UserPanel(lws_vhost* host, const std::string& instance, PanelLayout layout,
@@ -58,9 +64,7 @@ UserPanel::UserPanel(lws_vhost* host, const std::string& instance, PanelLayout l
     Json pins = Json::object();
     for (std::size_t i = 0; i < layout_.pins.size(); ++i) {
         const PanelPin& pin = layout_.pins[i];
-        shown_.push_back(text_of(pin.output && !pin.safe.is_null() ? pin.safe
-                                 : pin.initial.is_null()           ? zero_of(pin)
-                                                                   : pin.initial));
+        shown_.push_back(text_of(first_value_of(pin)));
         if (!pin.output) {
             inputs_.push_back(i);
         }

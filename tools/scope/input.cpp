@@ -53,11 +53,12 @@ bool Input::attach(const std::vector<std::string>& names, int every, std::string
     probe_ = ProbeClient::attach(*client_, once, how, problem);
     if (!probe_) return false;
     for (const ProbeColumn& column : probe_->columns()) {
+        Channel::Wide wide = column.type == HAL_TYPE_U64 ? Channel::Wide::u64 : Channel::Wide::no;
+        if (column.type == HAL_TYPE_S64) {
+            wide = Channel::Wide::s64;
+        }
         channels_.push_back({column.name, column.unit, column.type != HAL_TYPE_FLOAT,
-                             column.type == HAL_TYPE_BIT,
-                             column.type == HAL_TYPE_S64   ? Channel::Wide::s64
-                             : column.type == HAL_TYPE_U64 ? Channel::Wide::u64
-                                                           : Channel::Wide::no});
+                             column.type == HAL_TYPE_BIT, wide});
     }
     return true;
 }

@@ -236,10 +236,10 @@ std::string PerfettoWriter::events(const TraceThread& thread,
             return mark(out, to, one.begin_ns, frame_name(one), {{"bytes", one.bytes}});
         }
         const auto named = functions_.find(one.id);
-        const std::string name = one.kind == ThreadEvent::plan ? "take new plan"
-                                 : named != functions_.end()   ? named->second
-                                                               : fmt::format("function {}", one.id);
-        slice(out, to, one.begin_ns, name, {});
+        const std::string function =
+            named != functions_.end() ? named->second : fmt::format("function {}", one.id);
+        const bool is_plan = one.kind == ThreadEvent::plan;
+        slice(out, to, one.begin_ns, is_plan ? "take new plan" : function, {});
         end(out, to, one.end_ns);
     };
     for (const ThreadEvent& one : events) {
