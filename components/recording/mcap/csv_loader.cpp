@@ -49,7 +49,8 @@ bool whole_number(const std::string& text, std::uint64_t& word) {
         return true;
     }
     double real = 0;  // "1.0", "1e3": of another program
-    if (!parse_whole(text, real) || real != std::floor(real) || std::abs(real) > 0x1p53) return false;
+    if (!parse_whole(text, real) || real != std::floor(real) || std::abs(real) > 0x1p53)
+        return false;
     if (real < static_cast<double>(std::numeric_limits<Int>::min()) ||
         real > static_cast<double>(std::numeric_limits<Int>::max())) {
         return false;
