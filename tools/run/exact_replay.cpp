@@ -273,17 +273,7 @@ private:
             counted(execution_.cycles(), "cycle"), counted(file_.threads().size(), "thread"),
             counted(execution_.edits(), "edit"), seconds(newest.time_ns), real, newest.number,
             newest.thread, seconds(newest.time_ns));
-        if (execution_.overlaps() > 0) {
-            const JournaledCycle& first = execution_.first_overlap();
-            note(options_,
-                 fmt::format("{} functions that share state with another thread ran at the same "
-                             "time as it, first in cycle {} of '{}' at {:.6f} s: what they read "
-                             "of each other there may differ",
-                             execution_.overlaps() == 1
-                                 ? "once,"
-                                 : fmt::format("{} times,", execution_.overlaps()),
-                             first.number, first.thread, seconds(first.time_ns)));
-        }
+        note_overlaps();
         const std::string difference = difference_text();
         const bool differs = !difference.empty();
         bool good = !differs;
@@ -304,6 +294,18 @@ private:
         }
         if (!print(text)) return 1;
         return good ? 0 : 1;
+    }
+
+    void note_overlaps() const {
+        const std::uint64_t overlaps = execution_.overlaps();
+        if (overlaps == 0) return;
+        const JournaledCycle& first = execution_.first_overlap();
+        const std::string times = overlaps == 1 ? "once" : fmt::format("{} times", overlaps);
+        note(options_,
+             fmt::format("functions that share state in two threads ran at the same time {}, "
+                         "first in cycle {} of '{}' at {:.6f} s; what one read of the other there "
+                         "is unknown",
+                         times, first.number, first.thread, seconds(first.time_ns)));
     }
 
     bool has_gap() const {

@@ -138,9 +138,9 @@ Failure start_instance(Instance& instance, const Model& model, Executor& executo
             return &static_cast<Starting*>(h->data)->executor.clock();
         }
         if (std::strcmp(id, HAL_SUPERVISION) == 0) {
-            Starting& starting = *static_cast<Starting*>(h->data);
-            starting.instance.reads_supervision = true;
-            return &starting.executor.seen_supervision();
+            Starting& request = *static_cast<Starting*>(h->data);
+            request.instance.reads_supervision = true;
+            return &request.executor.seen_supervision();
         }
         if (std::strcmp(id, HAL_PATH_DELAY) == 0) return &path_delay_host;
         if (std::strcmp(id, HAL_SETUP_TIME) == 0) return &setup_time_host;

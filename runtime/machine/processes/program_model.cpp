@@ -70,7 +70,9 @@ void ProgramModel::add_component(Transaction&, const std::string& name, std::int
     for (const Token& token : command.args) {
         append_item(text, token.text, " ");
     }
-    state_.transaction.note({std::string(program_words::add), name, text});
+    if (state_.options.sink) {
+        state_.transaction.note({std::string(program_words::add), name, text});
+    }
     component.arguments.push_back(std::move(text));
 }
 
@@ -78,7 +80,9 @@ void ProgramModel::remove_component(Transaction&, std::string_view name) {
     Diagnostics none;
     if (LoadedComponent* const component = find_program(state_.model, name)) {
         state_.transaction.editing(none).remove_component(*component);
-        state_.transaction.note({std::string(program_words::remove), std::string(name)});
+        if (state_.options.sink) {
+            state_.transaction.note({std::string(program_words::remove), std::string(name)});
+        }
     }
 }
 
@@ -100,10 +104,12 @@ Pin* ProgramModel::add_pin(Transaction&, std::string_view component_name, const 
         row.push_back(make_pin(state_.model, *instance, wanted));
         Pin* const made = row.back().get();
         if (edit.add_pins(*instance, std::move(row), component->loaded)) {
-            state_.transaction.note({std::string(program_words::add_pin),
-                                     std::string(component_name), wanted.name,
-                                     std::to_string(wanted.type), std::to_string(wanted.dir),
-                                     std::to_string(wanted.initial.raw)});
+            if (state_.options.sink) {
+                state_.transaction.note({std::string(program_words::add_pin),
+                                         std::string(component_name), wanted.name,
+                                         std::to_string(wanted.type), std::to_string(wanted.dir),
+                                         std::to_string(wanted.initial.raw)});
+            }
             return made;
         }
     }
@@ -117,13 +123,17 @@ void ProgramModel::remove_pins(Transaction&, std::string_view component_name,
     if (!instance || pins.empty()) return;
     Diagnostics none;
     Edit& edit = state_.transaction.editing(none);
-    std::vector<std::string> words{std::string(program_words::remove_pins),
-                                   std::string(component_name)};
+    if (state_.options.sink) {
+        std::vector<std::string> words{std::string(program_words::remove_pins),
+                                       std::string(component_name)};
+        for (const Pin* const pin : pins) {
+            words.push_back(pin->name);
+        }
+        state_.transaction.note(std::move(words));
+    }
     for (Pin* const pin : pins) {
-        words.push_back(pin->name);
         edit.unlink(*pin);
     }
-    state_.transaction.note(std::move(words));
     edit.remove_pins(*instance, pins);
 }
 

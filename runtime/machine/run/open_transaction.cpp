@@ -114,8 +114,8 @@ bool OpenTransaction::commit(Diagnostics& diagnostics) {
         withdraw(&diagnostics);
     }
     open_ = false;
-    if (ExecutionSink* const sink = state_.options.sink; sink && good && edits) {
-        sink->edited(epoch, std::exchange(words_, {}), state_.model);
+    if (good && edits) {
+        journal(epoch);
     }
     const auto actions = std::exchange(actions_, {});
     if (good) {
@@ -124,6 +124,16 @@ bool OpenTransaction::commit(Diagnostics& diagnostics) {
         }
     }
     return good;
+}
+
+/// `epoch`: of the last plan before the edit.
+void OpenTransaction::journal(std::uint64_t epoch) noexcept {
+    if (!state_.options.sink) return;
+    try {
+        state_.options.sink->edited(epoch, std::exchange(words_, {}), state_.model);
+    } catch (const std::bad_alloc&) {
+        // The edit has taken effect. The re-execution ends where the first cycle needs it.
+    }
 }
 
 bool OpenTransaction::carry_out(Diagnostics& diagnostics) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -52,6 +53,7 @@ public:
     void out_of_memory(Diagnostics& diagnostics);
 
 private:
+    void journal(std::uint64_t epoch) noexcept;
     bool carry_out(Diagnostics& diagnostics);
     bool carry_out_checked(Diagnostics& diagnostics);
     bool start_added(Diagnostics& diagnostics);
