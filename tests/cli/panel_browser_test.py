@@ -241,8 +241,8 @@ class Views(Page):
         self.assertEqual([0x89, 0x50, 0x4E, 0x47], head)
 
     def test_the_scope_measures_between_cursors(self):
-        self.begin(view="scope?ch=wave.square:1:0&base=0.1&cursors=1&step=1")
-        # One cursor in each half of a square wave of 5 Hz: a step of 2 without rise time or overshoot.
+        self.begin(view="scope?ch=wave.square:1:0&base=0.1&cursors=1")
+        # Two periods of a square wave of 5 Hz lie between the cursors.
         self.browser.wait("window.halcyonScope?.rows > 1200")
         self.browser.evaluate(
             "[...document.querySelectorAll('button')].find(b => b.textContent === 'Stop').click()"

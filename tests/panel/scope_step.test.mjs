@@ -51,5 +51,7 @@ test('a constant, a missing channel and noise without a step are no step respons
     assert.equal(stepResponse(recorded(.1, () => 3), 'y', 0, .1), null);
     assert.equal(stepResponse(recorded(.1, () => NaN), 'y', 0, .1), null);
     assert.equal(stepResponse(recorded(.1, t => t), 'other', 0, .1), null);
+    assert.equal(stepResponse(recorded(.1, t => t), 'y', -.01, .1), null);
+    assert.equal(stepResponse(recorded(.1, t => .1 + Math.sin(1e4 * t)), 'y', 0, .1), null);
     assert.equal(stepResponse(recorded(.1, t => Math.sin(1e4 * t)), 'y', 0, .0998), null);
 });

@@ -247,13 +247,25 @@ window.addEventListener('hashchange', () => {
     }
 });
 
-/// Reads whether the functions run, and how many faults are not acknowledged. `time_ns`: the
-/// machine's time of the event after which it is read, or 0.
+let statusIsRead = false, statusAgain = null;  // time_ns of an entry that came meanwhile
+
+/// Reads whether the functions run, and how many faults are not acknowledged; one request at a
+/// time. `time_ns`: the machine's time of the journal's entry after which it is read, or 0.
 async function readStatus(time_ns) {
-    if (replies.size >= 20) return;
+    if (statusIsRead) {
+        statusAgain = time_ns || statusAgain;
+        return;
+    }
+    statusIsRead = true;
     const reply = await request({run: ['status']});
-    if (!reply.ok) return;
-    const {running, faults} = JSON.parse(reply.out);
+    statusIsRead = false;
+    const entry_ns = statusAgain || time_ns, again = statusAgain;
+    statusAgain = null;
+    if (reply.ok) noteStatus(JSON.parse(reply.out), entry_ns);
+    if (again) readStatus(again);
+}
+
+function noteStatus({running, faults}, time_ns) {
     if (running === state.running && faults === state.faults) return;
     if (running !== state.running) state.running_ns = time_ns;
     Object.assign(state, {running, faults});

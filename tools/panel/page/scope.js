@@ -8,6 +8,7 @@ import {objects} from './objects.js';
 import {timeLabels, valueLabels} from './scope_axes.js';
 import {Store, Trigger, measure, valueAt} from './scope_data.js';
 import {csv, download} from './scope_export.js';
+import {Labels, write} from './scope_labels.js';
 import {Picture} from './scope_picture.js';
 import {stepResponse} from './scope_step.js';
 import {remember} from './place.js';
@@ -93,6 +94,7 @@ export class View {
         /** @type {number} */
         this.pending = null;  // s: a trigger whose record is not complete
         this.lastTrigger = 0;
+        this.triggered = false;  // the shown record begins with a trigger
         this.stopFollowing = () => {};
         this.following = 0;  // counts calls of follow(): reading the names takes time
         this.followed = '';  // the names whose samples are read
@@ -101,6 +103,7 @@ export class View {
         this.stops = [];  // s: when the functions of the machine did not run
 
         this.picture = new Picture();
+        this.labels = new Labels();
         this.looks = {dark: null, back: '', grid: '', text: '', dim: '', bad: ''};
         this.frames = 0;  // since the last measurement
         this.drawn = 0;
@@ -377,6 +380,7 @@ export class View {
         if (!this.run) return;
         if (this.mode === 'roll' || !this.watcher) {
             this.shownAt = this.store.newest;
+            this.triggered = false;
             this.watcher?.scan(this.store);
         } else
             this.takeTriggered();
@@ -393,12 +397,15 @@ export class View {
             this.showRecord(this.pending + after);
         else if (
             this.mode === 'auto' &&
-            performance.now() - this.lastTrigger > Math.max(window * 1000, 300))
+            performance.now() - this.lastTrigger > Math.max(window * 1000, 300)) {
             this.shownAt = store.newest;
+            this.triggered = false;
+        }
     }
 
     showRecord(until) {
         this.shownAt = until;
+        this.triggered = true;
         this.lastTrigger = performance.now();
         this.pending = null;
         if (this.mode !== 'single') return;
@@ -492,39 +499,25 @@ export class View {
         const faults = this.faults(), [from, to] = this.range();
         for (const {at} of faults)
             picture.vertical(width * (at - from) / (to - from), this.looks.bad);
+        this.labels.put(picture, this.axisLabels(cssWidth, cssHeight), this.looks.back, ratio);
         context.putImageData(picture.image, 0, 0);
-        context.font = '12px system-ui, sans-serif';
-        context.lineJoin = 'round';
-        context.lineWidth = 3;
-        context.strokeStyle = this.looks.back;
-        this.labelAxes(context, cssWidth, cssHeight);
-        if (this.useCursors) this.labelCursors(context, cssWidth);
-        for (const {at, text} of faults)
-            this.write(
-                context, `fault: ${text}`, cssWidth * (at - from) / (to - from), 28, this.looks.bad,
-                cssWidth);
+        faults.forEach(({at, text}, i) => {
+            const x = cssWidth * (at - from) / (to - from) + 4, y = 28 + 14 * (i % 4);
+            const label = {words: `fault: ${text}`, x, y, paint: this.looks.bad};
+            write(context, label, this.looks.back, cssWidth);
+        });
         this.writeNotice(context, cssWidth, cssHeight);
     }
 
-    /// Writes on the picture, with a margin in the colour behind it; kept within `width`.
-    write(context, words, x, y, paint, width) {
-        const wide = context.measureText(words).width;
-        const left = Math.max(2, Math.min(x + 4, width - wide - 4));
-        context.strokeText(words, left, y);
-        context.fillStyle = paint;
-        context.fillText(words, left, y);
-    }
-
     writeNotice(context, width, height) {
-        const words = this.notice();
+        const words = this.notice(), {back, bad} = this.looks, y = height / 2;
         if (words === '') return;
-        context.save();
-        context.font = '600 18px system-ui, sans-serif';
+        const font = '600 18px system-ui, sans-serif';
+        context.font = font;
         const wide = context.measureText(words).width, x = (width - wide) / 2;
-        context.fillStyle = this.looks.back;
-        context.fillRect(x - 12, height / 2 - 22, wide + 24, 36);
-        this.write(context, words, x - 4, height / 2 + 2, this.looks.bad, width);
-        context.restore();
+        context.fillStyle = back;
+        context.fillRect(x - 12, y - 22, wide + 24, 36);
+        write(context, {words, x, y: y + 2, paint: bad, font}, back, width);
     }
 
     /// Shades the time in which the functions did not run.
@@ -548,26 +541,26 @@ export class View {
     }
 
     /// The place of time 0, in divisions: the trigger, or the newest sample.
-    zeroTime() {
-        const triggered = this.mode !== 'roll' && this.watcher && this.lastTrigger > 0;
-        return triggered ? before * divisions : divisions;
-    }
+    zeroTime() { return this.triggered ? before * divisions : divisions; }
 
-    labelAxes(context, width, height) {
-        const channel = this.channels[this.selected];
-        for (const {at, text} of timeLabels(this.base, divisions, this.zeroTime()))
-            this.write(context, text, width * at / divisions, height - 5, this.looks.dim, width);
-        if (!channel?.scale || channel.unknown) return;
-        const tone = paint(this.selected);
-        for (const {row, text} of valueLabels(channel, rows))
-            this.write(context, text, 10, height * row / rows - 4, tone, width);
-        const unit = channel.unit ? ` (${channel.unit})` : '';
-        this.write(context, channel.name + unit, 10, 14, tone, width);
-    }
-
-    labelCursors(context, width) {
-        this.cursors.forEach(
-            (at, i) => this.write(context, String(i + 1), width * at, 14, this.looks.text, width));
+    /// The numbers of the axes, the name of the selected channel, and those of the cursors.
+    axisLabels(width, height) {
+        const {dim, text: tone} = this.looks, channel = this.channels[this.selected];
+        const all =
+            timeLabels(this.base, divisions, this.zeroTime())
+                .map(
+                    ({at, text}) =>
+                        ({words: text, x: width * at / divisions + 4, y: height - 5, paint: dim}));
+        if (channel?.scale && !channel.unknown) {
+            const own = paint(this.selected), unit = channel.unit ? ` (${channel.unit})` : '';
+            for (const {row, text} of valueLabels(channel, rows))
+                all.push({words: text, x: 14, y: height * row / rows - 4, paint: own});
+            all.push({words: channel.name + unit, x: 14, y: 14, paint: own});
+        }
+        if (this.useCursors)
+            this.cursors.forEach(
+                (at, i) => all.push({words: String(i + 1), x: width * at + 4, y: 14, paint: tone}));
+        return all;
     }
 
     /// Chooses the scale of a new channel from its first values.

@@ -56,8 +56,8 @@ function statistics({group, column}, begin, end) {
  * null when it does not stay there during the last tenth of the time
  *
  * @returns {{initial: number, final: number, rise: number | null, overshoot: number,
- *     settling: number | null} | null} null without a step: no samples, or a step that is smaller
- *     than a tenth of the variation in the steady state
+ *     settling: number | null} | null} null without a step: no sample at `from`, or a step that is
+ *     smaller than the variation in the steady state
  */
 export function stepResponse(store, name, from, to) {
     const place = store.place.get(name);
@@ -65,10 +65,10 @@ export function stepResponse(store, name, from, to) {
     const [group, column] = place, channel = {group, column};
     const begin = group.row(from), end = group.row(to), steady = group.row(to - (to - from) / 10);
     const last = statistics(channel, steady, end), whole = statistics(channel, begin, end);
-    const initial = valueAt(store, name, from) ?? group.value(column, begin);
+    const initial = valueAt(store, name, from);
     if (last.count === 0 || !Number.isFinite(initial)) return null;
     const final = last.mean, step = final - initial, sign = Math.sign(step), size = Math.abs(step);
-    if (size === 0 || last.max - last.min > 10 * size) return null;
+    if (size === 0 || last.max - last.min > size) return null;
     const low = reached(channel, begin, end, initial + .1 * step, sign),
           high = reached(channel, begin, end, initial + .9 * step, sign);
     const peak = sign > 0 ? whole.max : whole.min,
