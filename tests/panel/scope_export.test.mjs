@@ -53,6 +53,7 @@ test('the axis of a channel has its values, and 0 at the zero line', () => {
     assert.deepEqual(
         valueLabels({scale: .05, position: -1}, 8).map(one => one.text),
         ['0.2', '0.15', '0.1', '0.05', '0', '-0.05', '-0.1']);
+    assert.equal(valueLabels({scale: 5, position: 3.75}, 8)[0].text, '-3.75');
     assert.equal(label(1234567, 1e5), '1.23e+6');
     assert.equal(label(-1e-12, .1), '0');
 });

@@ -2,7 +2,7 @@
 // The numbers of the scope's axes.
 
 /// Digits behind the decimal point with which steps of `size` differ.
-const digits = size => Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(size))));
+const digits = size => Math.min(9, Math.max(0, 2 - Math.floor(Math.log10(size))));
 
 /// A number on an axis with steps of `size`, without the zeros that no label needs.
 export function label(value, size) {
