@@ -250,8 +250,7 @@ private:
             end(own_id_fault_);
         }
         for (std::size_t n = 0; n < late_faults_.size(); ++n) {
-            if (late_faults_[n].lasts() &&
-                !runner_->device().pdos().rpdo(runner_->own().received[n].number).late) {
+            if (late_faults_[n].lasts() && !runner_->late(n)) {
                 end(late_faults_[n]);
             }
         }
@@ -350,9 +349,9 @@ private:
     void on_emergency(std::size_t place, const Emergency& e) noexcept override {
         reporter_->emergency(runner_->status(place), e);
     }
-    void on_late(std::size_t place) noexcept override {
-        begin(late_faults_[place], messages_->of(PdoFault::late, place),
-              runner_->own().received[place].pdo->limit);
+    void on_late(std::size_t place, Time silence) noexcept override {
+        nodes_[runner_->own().received[place].node].is_faulty = true;
+        begin(late_faults_[place], messages_->of(PdoFault::late, place), silence);
     }
     void on_short(std::size_t place, unsigned bytes) noexcept override {
         if (short_raised_[place]) return;

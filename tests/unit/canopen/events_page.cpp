@@ -77,7 +77,7 @@ TEST_F(CanopenFaults, of_a_boot_have_the_result) {
 TEST_F(CanopenFaults, of_a_PDO_and_of_the_bus_have_their_numbers) {
     const FaultMessages messages(config, received);
     EXPECT_EQ(messages.of(PdoFault::late, 0).text,
-              "node 2 (motor): tpdo1 (182) not received for {} s");
+              "node 2 (motor): tpdo1 (182) not received or too short for {} s");
     EXPECT_EQ(
         messages.of(PdoFault::too_short, 0).text,
         "node 2 (motor): tpdo1 (182) has {} bytes, its mapped objects need 0; pins keep their "

@@ -77,6 +77,9 @@ struct Safety {
     std::vector<std::uint32_t> inverted;  ///< the node's inverted objects, as mapping entries
 };
 
+/// Of Pdo::limit: derived from the transmission of the PDO.
+inline constexpr Time automatic_limit = -1;
+
 struct Pdo {
     bool to_node = false;  ///< an RPDO of the node: the master sends it
     unsigned number = 0;  ///< of the node, from 1
@@ -87,7 +90,7 @@ struct Pdo {
     std::uint8_t sync_start = 0;
     Multiplex multiplex = Multiplex::none;  ///< MPDO: one object per frame
     Time request = 0;  ///< TPDO: period of the remote requests; 0: none
-    Time limit = 0;  ///< TPDO: timeout; 0: none
+    Time limit = automatic_limit;  ///< TPDO: timeout; 0: none
     std::vector<Object> objects;
     Span at{};
     /// an SRDO: `number` is that of the SRDO, `cob` of its first frame; the PDO timing is unused

@@ -82,7 +82,7 @@ bool read_timeout(PdoTarget& to, const Line& line) {
                  "the node can supervise an rpdo: write event-timer");
         return true;
     }
-    return bus::time(of_pdo(&Pdo::limit), 0, 65535 * millisecond).parse(to, line);
+    return bus::time(of_pdo(&Pdo::limit), 0, 65535 * millisecond).or_none().parse(to, line);
 }
 
 /// Reads an identifier, or one relative to the node ID: $NODEID+0x180.
@@ -133,8 +133,13 @@ const bus::KeyTable<PdoTarget>& option_keys() {
          "event timer: maximum interval between two transmissions. The timeout of an rpdo in the "
          "node is three times its event timer"},
         {"timeout",
-         bus::own("a time of 0..65535ms, as in 10ms or 0.5s", "0..65535ms", &read_timeout), "none",
-         "of a tpdo: reception timeout in the master; its expiry is a fault"},
+         bus::own("a time of 0..65535ms, as in 10ms or 0.5s, or none", "0..65535ms, none",
+                  &read_timeout),
+         "10 of its SYNC periods, 3 of its `event-timer` or `request`, at least 20 ms; none if it "
+         "is "
+         "sent on change or event only",
+         "of a tpdo: reception timeout in the master. Its expiry is a fault, and the node is not "
+         "`operational` until the next one"},
         {"request",
          bus::own("a time of 1ms..3600s, as in 10ms or 0.5s", "1ms..3600s", &read_request), "none",
          "of a tpdo: period at which the master requests the PDO with a remote frame; "

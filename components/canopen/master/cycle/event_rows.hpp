@@ -153,7 +153,7 @@ static_assert(bus::in_order(boot_fault_rows));
 /// Faults of a TPDO of a node.
 enum class PdoFault : std::uint8_t { late, too_short };
 inline constexpr bus::EventRow<PdoFault> pdo_fault_rows[] = {
-    {PdoFault::late, bus::Effect::raises, "{pdo} not received for {s}"},
+    {PdoFault::late, bus::Effect::raises, "{pdo} not received or too short for {s}"},
     {PdoFault::too_short, bus::Effect::raises,
      "{pdo} has {value} bytes, its mapped objects need {bytes}; pins keep their values; to see the "
      "mapping of the node: hal can pdo show"},

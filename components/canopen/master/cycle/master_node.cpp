@@ -99,7 +99,8 @@ private:
         PdoDescription p;
         p.cob = pdo.cob;
         p.transmission = 255;  // what came is seen in the cycle it came in, not after the next SYNC
-        p.event_ms = static_cast<std::uint16_t>(std::min<Time>(pdo.limit / millisecond, 65535));
+        p.event_ms =
+            static_cast<std::uint16_t>(std::clamp<Time>(pdo.limit / millisecond, 0, 65535));
         p.multiplex = pdo.multiplex;
         if (pdo.multiplexed()) {
             for (const config::Object& object : pdo.objects) {

@@ -2,9 +2,12 @@
 // Objects as pins. Declared in the component's constructor; the cycle moves numbers only.
 #pragma once
 
+#include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "hal/any_pin.hpp"
@@ -27,14 +30,15 @@ public:
                              {.unit = o.unit.c_str()});
             } else {
                 outs_.declare(component, &shows_, type, prefix + name, about, bound,
-                              {.unit = o.unit.c_str()});
+                              {.unit = o.unit.c_str(), .safe = safe_value(type, o, bound)});
             }
         };
-        if (!to_node && is_real(o.type) && !invalid_) {
+        const bool may_be_invalid = to_node ? o.as == config::PinType::real : is_real(o.type);
+        if (may_be_invalid && !invalid_) {
             invalid_ = std::make_unique<Out<std::uint32_t>>(
                 component, shows_, "invalid",
-                "real values of nodes that are not finite, counted in each cycle: their pins keep "
-                "the last finite value");
+                "real values that are not finite, of nodes and of input pins, counted in each "
+                "cycle: the pin or the object keeps the last finite value");
         }
         for (const config::BitPin& b : o.bit_pins) {
             add(HAL_TYPE_BIT, b.name, o.about + ", bit " + std::to_string(b.bit),
@@ -57,20 +61,27 @@ public:
         show(runner.slots(), [](const Slot& s) noexcept { return s.has_safe; });
     }
 
-    /// [realtime]
-    void take(Runner& runner) noexcept {
-        ins_.each([slots = runner.slots()]<class T>(const In<T>& pin, const Bound& b) noexcept {
+    /// Returns whether an input pin is not finite. [realtime]
+    bool take(Runner& runner) noexcept {
+        std::uint32_t invalid = 0;
+        ins_.each(
+            [slots = runner.slots(), &invalid]<class T>(const In<T>& pin, const Bound& b) noexcept {
             std::uint64_t& wish = slots[b.slot].wish;
             if constexpr (std::is_same_v<T, bool>) {
                 wish = (wish & ~b.mask) | (pin ? b.high : 0);
             } else if constexpr (std::is_same_v<T, double>) {
                 const double value = pin * b.scale + b.offset;
-                if (!std::isfinite(value)) return;  // the last one stays
+                if (!std::isfinite(value)) {
+                    ++invalid;
+                    return;  // the last one stays
+                }
                 wish = b.codec.encode(value);
             } else {
                 wish = b.codec.encode(pin.get());
             }
         });
+        taken_invalid_.fetch_add(invalid, std::memory_order_relaxed);
+        return invalid != 0;
     }
 
 private:
@@ -91,23 +102,43 @@ private:
         std::uint32_t invalid = 0;
         outs_.each([slots, is_safe, &invalid]<class T>(Out<T>& pin, const Bound& b) noexcept {
             const Slot& s = slots[b.slot];
-            const std::uint64_t raw = is_safe(s) ? s.safe : number_in(*s.entry);
-            if constexpr (std::is_same_v<T, bool>) {
-                pin = (raw & b.mask) != 0;
-            } else if constexpr (std::is_same_v<T, double>) {
-                const double value = b.codec.decode<T>(raw);
+            const T value = value_of<T>(is_safe(s) ? s.safe : number_in(*s.entry), b);
+            if constexpr (std::is_same_v<T, double>) {
                 if (!std::isfinite(value)) {
                     ++invalid;
                     return;
                 }
-                pin = (value - b.offset) / b.scale;
-            } else {
-                pin = b.codec.decode<T>(raw);
             }
+            pin = value;
         });
+        invalid += taken_invalid_.exchange(0, std::memory_order_relaxed);
         if (invalid_ && invalid != 0) {
             *invalid_ = *invalid_ + invalid;
         }
+    }
+
+    /// Returns the value of a pin from that of its object. [realtime]
+    template <class T>
+    static T value_of(std::uint64_t raw, const Bound& b) noexcept {
+        if constexpr (std::is_same_v<T, bool>) {
+            return (raw & b.mask) != 0;
+        } else if constexpr (std::is_same_v<T, double>) {
+            return (b.codec.decode<T>(raw) - b.offset) / b.scale;
+        } else {
+            return b.codec.decode<T>(raw);
+        }
+    }
+    /// Returns the value that a pin gets when its thread stops; none if the object has no safe
+    /// value. [setup]
+    static std::optional<hal_value> safe_value(hal_type type, const config::Object& o,
+                                               const Bound& b) {
+        std::optional<hal_value> safe;
+        if (o.safe) {
+            visit_type(type, [&]<class T>(std::type_identity<T>) {
+                safe = to_value<T>(value_of<T>(*o.safe, b));
+            });
+        }
+        return safe;
     }
 
     static PinCodec codec_of(const config::Object& o) noexcept {
@@ -133,7 +164,9 @@ private:
     const Function& takes_;
     AnyIns<Bound> ins_;
     AnyOuts<Bound> outs_;
-    std::unique_ptr<Out<std::uint32_t>> invalid_;  // if nodes send real values
+    std::unique_ptr<Out<std::uint32_t>> invalid_;  // if there are real values
+    // counted by take(), added to the pin by show()
+    std::atomic<std::uint32_t> taken_invalid_{0};
 };
 
 /// What is known of a node.
@@ -148,8 +181,8 @@ struct NodePins {
 
     NodePins(Component& c, const Function& f, const std::string& n)
         : online(c, f, (n + ".online").c_str(), "it is heard", {.safe = false}),
-          operational(c, f, (n + ".operational").c_str(), "it exchanges process data",
-                      {.safe = false}),
+          operational(c, f, (n + ".operational").c_str(),
+                      "it exchanges process data, and none of its TPDOs is late", {.safe = false}),
           fault(c, f, (n + ".fault").c_str(),
                 "it was lost or could not be booted, and is not operational again yet"),
           state(
@@ -169,16 +202,17 @@ struct NodePins {
           boot_result(
               c, f, (n + ".boot-result").c_str(),
               "0 not finished, 1 booted, else the character of CiA 302's letter, 65 (A) to 79 (O)"),
-          age(c, f, (n + ".heartbeat-age-ms").c_str(), "since its last sign of life; -1: none yet",
-              {.unit = "ms"}),
+          age(c, f, (n + ".heartbeat-age-ms").c_str(),
+              "since its last sign of life; -1: none yet; infinite while the thread is stopped",
+              {.unit = "ms", .safe = std::numeric_limits<double>::infinity()}),
           restart(c, (n + ".restart").c_str(), "rising edge: resets it and boots it anew") {}
 
     /// [realtime]
     void show(Runner& runner, std::size_t place, Time now) noexcept {
         const NodeStatus& s = runner.status(place);
         online = s.online;
-        operational = s.operational;
-        if (s.operational) {
+        operational = runner.operational(place);
+        if (operational) {
             is_faulty = false;
         }
         fault = is_faulty;
@@ -276,7 +310,7 @@ struct BusPins {
     void show(Runner& runner, Time now) noexcept {
         const NetworkStatus& n = runner.network();
         const can::Statistics& s = runner.link_statistics();
-        operational = n.state == NetworkState::operational;
+        operational = n.state == NetworkState::operational && !runner.any_late();
         state = static_cast<std::uint32_t>(n.state);
         nodes_operational = n.operational;
         bus_off = s.state == can::State::bus_off || s.state == can::State::down;

@@ -55,6 +55,10 @@ Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
             device_.srdos().derive_inverted(s.number);
         }
     }
+    for (const Received& r : own_.received) {
+        watches_.emplace_back(*r.pdo);
+    }
+    late_pdos_.assign(statuses_.size(), 0);
     open_.assign(statuses_.size(), 0);
     was_operational_.assign(statuses_.size(), 0);
     ever_operational_.assign(statuses_.size(), 0);
@@ -231,6 +235,7 @@ void Runner::receive(Time now) noexcept {
         master_.poll(now);
     }
     open_and_close();
+    watch_pdos(now);
     watch_srdos(now);
     // what a SYNC asked for does not wait for transmit()
     if (config_.sync == config::SyncMode::follow) {
@@ -388,6 +393,30 @@ void Runner::ask(Time now) noexcept {
             continue;
         }
         a.next = std::max(a.next + a.every, now + a.every / 2);
+    }
+}
+
+bool Runner::any_late() const noexcept {
+    for (std::size_t n = 0; n < late_pdos_.size(); ++n) {
+        if (late_pdos_[n] != 0 && statuses_[n]->mandatory) return true;
+    }
+    return false;
+}
+
+/// Expects the TPDOs of operational nodes within their timeouts.
+void Runner::watch_pdos(Time now) noexcept {
+    std::fill(late_pdos_.begin(), late_pdos_.end(), std::uint8_t{0});
+    for (std::size_t n = 0; n < watches_.size(); ++n) {
+        const Received& r = own_.received[n];
+        const bool expired =
+            watches_[n].step(statuses_[r.node]->operational, device_.pdos().rpdo(r.number).count,
+                             syncs_ + syncs_heard_, now);
+        if (expired) {
+            events_.on_late(n, watches_[n].silence(now));
+        }
+        if (watches_[n].late()) {
+            late_pdos_[r.node] = 1;
+        }
     }
 }
 

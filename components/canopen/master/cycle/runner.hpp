@@ -22,6 +22,7 @@
 #include "foreign_senders.hpp"
 #include "link/can.hpp"
 #include "master_node.hpp"
+#include "pdo_watch.hpp"
 
 namespace hal::canopen {
 
@@ -52,8 +53,9 @@ public:
     virtual void on_step(std::size_t node, const NodeStatus&) noexcept { (void)node; }
     virtual void on_network(const NetworkStatus&) noexcept {}
     virtual void on_emergency(std::size_t node, const Emergency&) noexcept { (void)node; }
-    /// A PDO of a node did not come for its time-out. `place` is that in OwnNode::received.
-    virtual void on_late(std::size_t place) noexcept { (void)place; }
+    /// A PDO of a node did not come for `silence`, its timeout, in ns. `place` is that in
+    /// OwnNode::received.
+    virtual void on_late(std::size_t place, Time silence) noexcept { (void)place, (void)silence; }
     /// It came with fewer bytes than its objects have; they keep their values. `place` is that in
     /// OwnNode::received.
     virtual void on_short(std::size_t place, unsigned bytes) noexcept { (void)place, (void)bytes; }
@@ -93,7 +95,14 @@ public:
     void make_safe() noexcept;
 
     std::span<Slot> slots() noexcept { return slots_; }
-    bool operational(std::size_t node) const noexcept { return statuses_[node]->operational; }
+    /// The node is operational, and none of its TPDOs is late.
+    bool operational(std::size_t node) const noexcept {
+        return statuses_[node]->operational && late_pdos_[node] == 0;
+    }
+    /// A TPDO is late. `place` is that in OwnNode::received. [realtime]
+    bool late(std::size_t place) const noexcept { return watches_[place].late(); }
+    /// A TPDO of a mandatory node is late. [realtime]
+    bool any_late() const noexcept;
     const NodeStatus& status(std::size_t node) const noexcept { return *statuses_[node]; }
     const NetworkStatus& network() const noexcept { return master_.status(); }
     const can::Statistics& link_statistics() const noexcept { return statistics_; }
@@ -180,12 +189,12 @@ private:
     void ask(Time now) noexcept;
     void tell_again() noexcept;
     bool make_safe_alone(const Output&) noexcept;
+    void watch_pdos(Time now) noexcept;
     void watch_srdos(Time now) noexcept;
 
     void on_step(const NodeStatus&) noexcept override;
     void on_network(const NetworkStatus&) noexcept override;
     void on_emergency(std::uint8_t node, const Emergency&) noexcept override;
-    void on_rpdo_late(unsigned number, Time) noexcept override { events_.on_late(number - 1); }
     void on_rpdo_short(unsigned number, unsigned bytes, Time) noexcept override {
         events_.on_short(number - 1, bytes);
     }
@@ -210,6 +219,8 @@ private:
     bool sync_open_ = false;
     ForeignSenders foreign_;
     unsigned vain_waits_ = 0;  // of serve_boot(), in a row
+    std::vector<PdoWatch> watches_;  // in the order of OwnNode::received
+    std::vector<std::uint8_t> late_pdos_;  // by node
     // by node; ever: since the network was booted
     std::vector<std::uint8_t> was_operational_, ever_operational_;
     std::vector<Output> outputs_;
