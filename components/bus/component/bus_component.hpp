@@ -98,6 +98,16 @@ protected:
     }
     /// [realtime]
     void end(hal::LastingFault& fault) noexcept { fault.end(faults_, this); }
+    /// Raises the fault of input pins that are not finite, and ends it: the bus carries their last
+    /// valid values. Called in each cycle. [realtime]
+    void record_invalid_inputs(bool invalid) noexcept {
+        if (invalid && !invalid_fault_.lasts()) {
+            begin(invalid_fault_,
+                  "an input pin is NaN or infinite; the bus carries its last valid value");
+        } else if (!invalid && invalid_fault_.lasts()) {
+            end(invalid_fault_);
+        }
+    }
 
     const std::string name_;
     hal::FunctionPair functions_;
@@ -106,6 +116,7 @@ protected:
     const hal_faults* faults_ = nullptr;
 
 private:
+    hal::LastingFault invalid_fault_;
     bool offline_ = false;
     std::atomic<bool> interrupted_{false};  // written by any thread
 };

@@ -147,7 +147,7 @@ public:
             }
             return;
         }
-        objects_->take(*runner_);
+        record_invalid_inputs(objects_->take(*runner_));
         runner_->transmit(
             cycle.start_ns(), cycle.period_ns(),
             link_ && link_->leads(config_.node_id, cycle.start_ns(), cycle.period_ns()));

@@ -3,6 +3,7 @@
 // numbers only.
 #pragma once
 
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -36,11 +37,11 @@ public:
             }
             return;
         }
-        if (is_real(e) && !output && !invalid_) {
+        if ((is_real(e) || (output && e.scaled)) && !invalid_) {
             invalid_ = std::make_unique<Out<std::uint32_t>>(
                 component_, shows_, "invalid",
-                "real values of slaves that are not finite, counted in each cycle: their pins keep "
-                "the last finite value");
+                "real values that are not finite, of slaves and of input pins, counted in each "
+                "cycle: the pin or the entry keeps the last finite value");
         }
         Place place{area, at, codec_of(e)};
         hal_type type = place.codec.pin_type();
@@ -68,20 +69,28 @@ public:
                 pin = value;
             }
         });
+        invalid += taken_invalid_.exchange(0, std::memory_order_relaxed);
         if (invalid_ && invalid != 0) {
             *invalid_ = *invalid_ + invalid;
         }
     }
     /// Copies pins to outputs of the slaves, limited to the range of the entry. [realtime]
-    void take(std::span<const std::span<std::uint8_t>> areas) noexcept {
-        ins_.each([areas]<class T>(const In<T>& pin, const Place& p) noexcept {
+    /// Returns whether an input pin is not finite: its entry keeps the last value.
+    bool take(std::span<const std::span<std::uint8_t>> areas) noexcept {
+        std::uint32_t invalid = 0;
+        ins_.each([areas, &invalid]<class T>(const In<T>& pin, const Place& p) noexcept {
             T value = pin.get();
             if constexpr (std::is_same_v<T, double>) {
                 value = (value - p.offset) / p.scale;
-                if (!std::isfinite(value)) return;  // the last one stays
+                if (!std::isfinite(value)) {
+                    ++invalid;
+                    return;  // the last one stays
+                }
             }
             write_bits(areas[p.area], p.at, p.codec.bits(), p.codec.encode(value));
         });
+        taken_invalid_.fetch_add(invalid, std::memory_order_relaxed);
+        return invalid != 0;
     }
 
 private:
@@ -124,7 +133,9 @@ private:
     const Function &shows_, &takes_;
     AnyIns<Place> ins_;
     AnyOuts<Place> outs_;
-    std::unique_ptr<Out<std::uint32_t>> invalid_;  // if slaves send real values
+    std::unique_ptr<Out<std::uint32_t>> invalid_;  // if there are real values
+    // counted by take(), added to the pin by show()
+    std::atomic<std::uint32_t> taken_invalid_{0};
 };
 
 }  // namespace hal::ethercat

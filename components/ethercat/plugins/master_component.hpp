@@ -208,7 +208,7 @@ public:
         }
         // The thread was declared hung, but its cycle goes on.
         if (interrupted()) return;
-        entries_.take(areas_);
+        record_invalid_inputs(entries_.take(areas_));
         each_channel(cycle, [](Channel& channel, const SlaveImage& image) noexcept {
             channel.write(image);
         });

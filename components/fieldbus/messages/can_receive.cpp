@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <limits>
 #include <memory>
 #include <stdexcept>
 
@@ -39,11 +40,16 @@ struct CanReceive : hal::Component {
         "timeout",
         "time without a message after which valid becomes FALSE; 0: no timeout",
         {.unit = "s"}};
-    hal::Out<bool> fresh{*this, "new", "TRUE for the cycle in which a message arrived"};
+    hal::Out<bool> fresh{
+        *this, "new", "TRUE for the cycle in which a message arrived", {.safe = false}};
     hal::Out<bool> valid{*this, "valid", "TRUE: a message arrived within timeout", {.safe = false}};
     hal::Out<std::uint32_t> id_offset{*this, "id-offset",
                                       "identifier of the newest message, less id"};
-    hal::Out<double> age{*this, "age", "time since the end of the newest message", {.unit = "s"}};
+    hal::Out<double> age{
+        *this,
+        "age",
+        "time since the end of the newest message; infinite while the thread is stopped",
+        {.unit = "s", .safe = std::numeric_limits<double>::infinity()}};
     hal::Out<std::uint64_t> received{*this, "received", "messages received"};
     hal::Out<std::uint64_t> overwritten{*this, "overwritten",
                                         "messages that a later one of the same cycle replaced"};
