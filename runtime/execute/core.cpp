@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <ctime>
 #include <functional>
 
@@ -289,9 +290,11 @@ void Core::take_over() noexcept {
     take_probes();
 }
 
-/// Empties the inbox; in a re-execution in the cycle that did so.
+/// Empties the inbox once the plan may be taken; in a re-execution in the cycle that did so.
 plan::Plan* Core::offered_plan() noexcept {
     if (inputs_ && inputs_->replays() && inputs_->record().epoch == 0) return nullptr;
+    const plan::Plan* const offered = inbox_.load(std::memory_order_acquire);
+    if (!offered || !is_due(*offered)) return nullptr;
     return inbox_.exchange(nullptr, std::memory_order_acq_rel);
 }
 
@@ -307,6 +310,13 @@ void Core::sample_probes() noexcept {
     for (const plan::Probe& probe : probes_->probes) {
         probe.ring->sample(info_.number, info_.start_ns, probe.from.data());
     }
+}
+
+/// Returns whether all other threads have taken what must precede this plan.
+bool Core::is_due(const plan::Plan& plan) noexcept {
+    return std::all_of(plan.after.begin(), plan.after.end(), [](const plan::Precedence& one) {
+        return one.taken->load(std::memory_order_acquire) >= one.epoch;
+    });
 }
 
 void Core::take(plan::Plan* plan) noexcept {
@@ -326,6 +336,12 @@ void Core::take(plan::Plan* plan) noexcept {
     }
     for (std::size_t i = 0; i < plan->carries.size(); ++i) {
         plan->carries[i].to->raw = plan->scratch[i];
+    }
+    for (const plan::Handover& state : plan->handovers) {
+        std::memcpy(state.to, state.from, state.bytes);
+    }
+    for (const plan::Handed& handed : plan->handed) {
+        *handed.to = handed.value;
     }
     board_.end_all(&info_, &info_ + 1);  // the checks of the new plan begin anew
     modes_.begin_plan();
@@ -484,6 +500,7 @@ Core::Missing Core::missing() const noexcept {
     if (record.epoch != 0) {
         plan = inbox_.load(std::memory_order_acquire);
         if (!plan || plan->epoch != record.epoch) return Missing::edit;
+        if (!is_due(*plan)) return Missing::cycle;
     }
     if (record.writes_after > pushed_) return Missing::edit;
     if (record.observation != 0) {

@@ -121,6 +121,8 @@ public:
         return inbox_.compare_exchange_strong(plan, nullptr, std::memory_order_acq_rel);
     }
     std::uint64_t taken() const { return taken_.load(std::memory_order_acquire); }
+    /// For a plan of another thread that must be taken after the plan `epoch` of this one.
+    plan::Precedence precedence(std::uint64_t epoch) const { return {&taken_, epoch}; }
     /// The same for probes, which change while the plan stays. A later plan brings its own.
     void offer(plan::ProbeSet* probes) { probe_inbox_.store(probes, std::memory_order_release); }
     bool withdraw(plan::ProbeSet* probes) {
@@ -209,6 +211,7 @@ public:
 
 private:
     void take_over() noexcept;
+    static bool is_due(const plan::Plan& plan) noexcept;
     void take(plan::Plan* plan) noexcept;
     plan::Plan* offered_plan() noexcept;
     void drain_writes(std::uint64_t until = UINT64_MAX) noexcept;

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <unordered_map>
 
+#include "model/state_handover.hpp"
 #include "text/quoting.hpp"
 
 namespace hal {
@@ -31,8 +32,8 @@ void swap_declarations(LoadedFunction& a, LoadedFunction& b) {
 
 void swap_contents(Instance& a, Instance& b) {
     swap_members(a, b, &Instance::memory, &Instance::storage, &Instance::blocks, &Instance::further,
-                 &Instance::functions, &Instance::emergency, &Instance::streams, &Instance::finite,
-                 &Instance::constructed, &Instance::started);
+                 &Instance::variables, &Instance::functions, &Instance::emergency,
+                 &Instance::streams, &Instance::finite, &Instance::constructed, &Instance::started);
 }
 void swap_contents(LoadedComponent& a, LoadedComponent& b) {
     swap_members(a, b, &LoadedComponent::plugin, &LoadedComponent::library, &LoadedComponent::path,
@@ -242,6 +243,18 @@ void ComponentReplacement::vanish(Pin& pin, const std::string& why, const EditLo
     }
 }
 
+/// Reports state of the old version that has no counterpart in the new one.
+void ComponentReplacement::compare_variables(const InstancePair& pair, const EditLog& edit,
+                                             Span at) {
+    for (const Instance::Variable* const lost : lost_variables(*pair.kept, *pair.fresh)) {
+        edit.diagnostics->warning(
+            "reload-dropped", at,
+            "variable " + hal::quoted(lost->name) + " of " + hal::quoted(pair.kept->name) +
+                " is missing or has another type in the new version: its value is lost",
+            "", "stop the machine before such a reload");
+    }
+}
+
 void ComponentReplacement::compare_pins(const InstancePair& pair, const EditLog& edit, Span at) {
     std::vector<const Pin*> fresh_of(pair.kept->pins.size(), nullptr);
     std::vector<bool> is_new(pair.fresh->pins.size(), true);
@@ -309,6 +322,7 @@ void ComponentReplacement::compare_functions(const EditLog& edit, Span at) {
 void ComponentReplacement::compare(const EditLog& edit, Span at) {
     for (const InstancePair& pair : instances_) {
         compare_pins(pair, edit, at);
+        compare_variables(pair, edit, at);
     }
     compare_functions(edit, at);
 }

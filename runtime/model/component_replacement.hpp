@@ -64,6 +64,7 @@ private:
                   std::string help) const;
     void vanish(Pin& pin, const std::string& why, const EditLog& edit, Span at);
     void compare_pins(const InstancePair& pair, const EditLog& edit, Span at);
+    static void compare_variables(const InstancePair& pair, const EditLog& edit, Span at);
     void compare_functions(const EditLog& edit, Span at);
 
     Model& model_;

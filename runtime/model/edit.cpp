@@ -383,7 +383,11 @@ bool Edit::replace(LoadedComponent& component, std::unique_ptr<LoadedComponent>&
             replacement->back();
         }
     });
-    replaced_.push_back({&component, std::move(owned), false});
+    Replaced& replaced = replaced_.emplace_back(Replaced{&component, std::move(owned)});
+    for (std::size_t i = 0; i < component.instances.size(); ++i) {
+        replaced.pairs.push_back(
+            {component.instances[i].get(), replaced.other->instances[i].get()});
+    }
     *done = true;
     replacement->run();
     structural_ = true;

@@ -8,6 +8,9 @@ void EditLog::undo() {
         undo_.back()();
         undo_.pop_back();
     }
+    for (Replaced& one : replaced_) {
+        one.undone = true;
+    }
     pin_values.clear();
     signal_values.clear();
     inherited.clear();

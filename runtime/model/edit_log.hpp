@@ -57,6 +57,14 @@ public:
         LoadedComponent* component;
         std::unique_ptr<LoadedComponent> other;
         bool stopped = false;  ///< the old instances have been stopped for the new ones
+        /// An instance of the model and the one that is not. The state of the machine is in the
+        /// memory of the old version, or (`handed`) in that of the new one.
+        struct Pair {
+            Instance *kept, *other;
+            bool handed = false;
+        };
+        std::vector<Pair> pairs = {};
+        bool undone = false;  ///< the old version is in the model again
     };
     std::deque<Replaced>& replaced() { return replaced_; }
     /// Functions that this edit took from a thread; it may have put them into another one since.

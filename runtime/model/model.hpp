@@ -126,6 +126,14 @@ struct Instance {
     };
     std::vector<Block> blocks;  ///< what its constructor has allocated
     std::vector<plan::Memory> further;  ///< memory of others that its functions use
+    /// State that a reload copies to the instance that replaces this one.
+    struct Variable {
+        std::string name;
+        std::uint64_t type;
+        void* memory;
+        std::size_t bytes;
+    };
+    std::vector<Variable> variables;
     std::vector<std::unique_ptr<Pin>> pins;
     std::vector<LoadedFunction*> functions;
     std::vector<plan::Step> emergency;

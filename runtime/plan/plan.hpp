@@ -144,6 +144,26 @@ struct Checked {
     std::uint64_t mask;  ///< the bits that its type has
 };
 
+/// State that an instance takes over from the one it replaces. Done once, when the plan is taken.
+struct Handover {
+    void* to;
+    const void* from;
+    std::size_t bytes;
+};
+
+/// Records for the session that the state of an instance was handed over. Written by the thread
+/// when it takes the plan; read by the session after that.
+struct Handed {
+    bool* to;
+    bool value;
+};
+
+/// A plan of another thread that must be taken before this one.
+struct Precedence {
+    const std::atomic<std::uint64_t>* taken;
+    std::uint64_t epoch;
+};
+
 /// Bytes in a row that the cycle works on.
 struct Memory {
     const void* begin;
@@ -164,6 +184,10 @@ struct Plan {
     std::vector<Carry> carries;
     std::vector<Rebind> rebinds;
     std::vector<Pointer> pointers;
+    std::vector<Handover> handovers;
+    std::vector<Handed> handed;
+    /// until all of these are taken, the thread continues with its old plan
+    std::vector<Precedence> after;
     std::vector<Safe> safe;
     /// made safe by a call: instances of this thread with a hal::Emergency
     std::vector<Step> emergency;

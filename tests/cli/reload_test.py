@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """hal shell reload: a new version of a plugin in a running machine. The versions are compiled here."""
+
 import os
 import re
 import shutil
@@ -69,6 +70,36 @@ struct Part : hal::Component {
         other += 1;
         cycles = cycles + 1;
     }
+};
+HAL_COMPONENT(Part, "part", "Remembers")
+"""
+
+# Members that it names: counts of two functions, which may be in two threads, and what changes its type or is gone.
+RETAINED = """#include <vector>
+#include "hal/retained.hpp"
+struct Part : hal::Component {
+    using Component::Component;
+    hal::Function quick{*this, "quick", &Part::count_quick, "one step"};
+    hal::Function calm{*this, "calm", &Part::count_calm, "one step"};
+    hal::Out<std::int64_t> quick_cycles{*this, quick, "quick-cycles", "so far"};
+    hal::Out<std::int64_t> quick_sum{*this, quick, "quick-sum", "of all steps"};
+    hal::Out<std::int64_t> calm_cycles{*this, calm, "calm-cycles", "so far"};
+    hal::Out<std::int64_t> calm_sum{*this, calm, "calm-sum", "of all steps"};
+    hal::Out<double> total{*this, quick, "total", "of what changes its type"};
+    void count_quick(hal::Cycle) noexcept {
+        quick_cycles = quick_cycles + 1;
+        rows_[1] += STEP;
+        quick_sum = rows_[1];
+        total = static_cast<double>(other_ += 1);
+    }
+    void count_calm(hal::Cycle) noexcept {
+        calm_cycles = calm_cycles + 1;
+        calm_sum = calm_ += STEP;
+    }
+    OTHER other_ = 0;
+    std::vector<std::int64_t> rows_ = std::vector<std::int64_t>(3);
+    std::int64_t calm_ = 0;
+    hal::Retained retained_{*this, {{"other", other_}, GONE {"rows", rows_}, {"calm", calm_}}};
 };
 HAL_COMPONENT(Part, "part", "Remembers")
 """
@@ -161,6 +192,12 @@ class Reload(Case):
             "state2": STATE.replace("STEP", "1000")
             .replace("OTHER", "std::int32_t")
             .replace("ZERO", "7"),
+            "retained1": RETAINED.replace("STEP", "1")
+            .replace("OTHER", "double")
+            .replace("GONE", '{"gone", rows_},'),
+            "retained2": RETAINED.replace("STEP", "1000")
+            .replace("OTHER", "float")
+            .replace("GONE", ""),
             "owner1": OWNER.replace("VERSION", "1").replace("FAILS", "false"),
             "owner2": OWNER.replace("VERSION", "2").replace("FAILS", "false"),
             "failing": OWNER.replace("VERSION", "3").replace("FAILS", "true"),
@@ -363,6 +400,41 @@ class Reload(Case):
             wait_until(lambda: int(self.value("p.cycles")) > before + 2, "it runs on")
         self.say("stop")
         self.assertEqual(self.value("p.cycles"), self.value("p.sum"))
+
+    def test_named_members_are_carried_over_where_name_and_type_match(self):
+        self.install("retained1")
+        path = self.write(
+            "m.hal",
+            "loadrt threads name1=servo period1=1000000\nloadrt part names=p\naddf p.quick servo\nstart\nadvance 10 cycles\n"
+            f"getp p.quick-sum\ngetp p.total\nloadusr -w cp {self.versions['retained2']} {self.plugins}/part.so\n"
+            "reload part\nadvance 3 cycles\ngetp p.quick-sum\ngetp p.total\ngetp p.quick-cycles\n",
+        )
+        done = self.run_program("sim", path)
+        self.assertEqual("10\n10\n3010\n3\n13\n", done.stdout)
+        for name in ("other", "gone"):
+            self.assertIn(
+                f"warning: variable '{name}' of 'p' is missing or has another type in the new version: its value is lost",
+                done.stderr,
+            )
+
+    def test_no_cycle_of_named_members_is_lost_in_two_threads(self):
+        self.install("retained1")
+        self.start(
+            "run",
+            self.write(
+                "m.hal",
+                "newthread base 500000\nnewthread servo 2000000\nloadrt part names=p\n"
+                "addf p.quick base\naddf p.calm servo\nstart\n",
+            ),
+        )
+        for _ in range(20):
+            before = int(self.value("p.calm-cycles"))
+            self.install("retained1")
+            self.say("reload", "part")
+            wait_until(lambda: int(self.value("p.calm-cycles")) > before + 2, "it runs on")
+        self.say("stop")
+        self.assertEqual(self.value("p.quick-cycles"), self.value("p.quick-sum"))
+        self.assertEqual(self.value("p.calm-cycles"), self.value("p.calm-sum"))
 
     def test_a_machine_that_reloads_itself_under_the_virtual_clock(self):
         self.install("first")

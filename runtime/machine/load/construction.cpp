@@ -179,6 +179,20 @@ constexpr hal_pin_names pin_names_extension{
     sizeof pin_names_extension,
     [](const hal_host* host, bool whole) { construction_of(host).whole_pin_names = whole; }};
 
+bool declare_variable(const hal_host* host, const hal_variable* variable) {
+    Construction& c = construction_of(host);
+    return guarded(c, false, [&] {
+        if (variable->size < sizeof *variable) {
+            return refuse(c, "unsupported hal_variable of " + std::to_string(variable->size) +
+                                 " bytes; rebuild the component");
+        }
+        c.instance.variables.push_back(
+            {variable->name, variable->type, variable->memory, variable->bytes});
+        return true;
+    });
+}
+constexpr hal_retained retained_extension{sizeof retained_extension, 0, declare_variable};
+
 constexpr hal_assumed assumed_extension{sizeof assumed_extension,
                                         [](const hal_host* host, const char* name) {
     const Construction& c = construction_of(host);
@@ -190,6 +204,7 @@ const void* extension_of(const hal_host* host, const char* id) {
     if (std::strcmp(id, HAL_NAMING) == 0) return &naming_extension;
     if (std::strcmp(id, HAL_PIN_NAMES) == 0) return &pin_names_extension;
     if (std::strcmp(id, HAL_ASSUMED) == 0) return &assumed_extension;
+    if (std::strcmp(id, HAL_RETAINED) == 0) return &retained_extension;
     if (std::strcmp(id, HAL_MODULES) == 0) return &modules_extension;
     if (std::strcmp(id, HAL_MODULE_CALLS) == 0) return &module_calls_extension;
     return std::strcmp(id, HAL_TEXTS) == 0 ? &texts_extension : nullptr;

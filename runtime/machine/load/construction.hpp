@@ -19,6 +19,7 @@
 #include "hal/modules.h"
 #include "hal/naming.h"
 #include "hal/pin_names.h"
+#include "hal/retained.h"
 #include "hal/texts.h"
 #include "machine/load/construct.hpp"
 

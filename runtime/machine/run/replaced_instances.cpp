@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "machine/run/replaced_instances.hpp"
 
+#include <algorithm>
+
 #include "machine/load/construct.hpp"
 #include "machine/run/state.hpp"
 
@@ -67,7 +69,7 @@ bool ReplacedInstances::start(Diagnostics& diagnostics) {
         }
     }
     if (without.empty()) return true;
-    without.merge(moving(state_.model));
+    without.merge(ThreadPlans::deferred(edit_, state_.model));
     ThreadPlans& threads = state_.threads;
     if (!threads.make(diagnostics)) return false;
     if (!threads.end(edit_.removed().threads, diagnostics)) return false;
@@ -76,6 +78,8 @@ bool ReplacedInstances::start(Diagnostics& diagnostics) {
         one.stopped = true;
         stop(one);
     }
+    // no thread runs what has not been handed over yet
+    std::ranges::for_each(state_handovers(edit_), hand_over);
     for (const Edit::Replaced& one : edit_.replaced()) {
         if (!start_new(*one.component, diagnostics)) return false;
     }
@@ -84,9 +88,12 @@ bool ReplacedInstances::start(Diagnostics& diagnostics) {
 
 void ReplacedInstances::restart(Diagnostics& diagnostics) {
     Functions without;
-    for (const Edit::Replaced& one : edit_.replaced()) {
-        if (one.stopped) {
-            insert(without, *one.component);
+    for (Edit::Replaced& one : edit_.replaced()) {
+        if (!one.stopped) continue;
+        insert(without, *one.component);
+        // the old ones have their state as they were stopped with it
+        for (Edit::Replaced::Pair& pair : one.pairs) {
+            pair.handed = false;
         }
     }
     if (without.empty()) return;

@@ -365,15 +365,49 @@ void ThreadPlans::report_hung(const Thread& thread, const Core& core,
 // --- plans ---
 
 bool ThreadPlans::synchronise(Edit& edit, EarlierValues& before, Diagnostics& diagnostics) {
-    // A function must never be in two threads at once: first everything runs without the movers,
-    // then with them.
-    const auto movers = moving(state_.model);
-    if (!movers.empty() && !swap(edit, before, movers, diagnostics)) return false;
+    const Functions later = deferred(edit, state_.model);
+    if (!later.empty() && !swap(edit, before, later, diagnostics)) return false;
     return swap(edit, before, {}, diagnostics);
 }
 
-bool ThreadPlans::swap(Edit& edit, EarlierValues& before,
-                       const std::unordered_set<const LoadedFunction*>& without,
+ThreadPlans::Functions ThreadPlans::deferred(Edit& edit, const Model& model) {
+    Functions all = moving(model);
+    all.merge(late_functions(state_handovers(edit)));
+    return all;
+}
+
+/// Adds the handovers of instances that one thread runs to its plan. Returns the others: no thread
+/// runs the instance.
+std::vector<StateHandover> ThreadPlans::hand_over_in_threads(Edit& edit, const Functions& without,
+                                                             Compiled& compiled) const {
+    std::vector<StateHandover> by_session;
+    for (StateHandover& one : state_handovers(edit)) {
+        const Thread* runs = nullptr;
+        for (const LoadedFunction* const function : one.instance->functions) {
+            if (function->thread && !function->halted && !without.contains(function)) {
+                runs = function->thread;
+            }
+        }
+        const auto found = std::ranges::find_if(
+            compiled.plans, [&](const auto& entry) { return entry.first == runs; });
+        if (found == compiled.plans.end() || !core(runs)) {
+            by_session.push_back(std::move(one));
+            continue;
+        }
+        plan::Plan& plan = *found->second;
+        plan.handovers.insert(plan.handovers.end(), one.copies.begin(), one.copies.end());
+        plan.handed.push_back(one.handed);
+        for (const LoadedFunction* const function : one.instance->functions) {
+            const Core* const other = function->thread == runs ? nullptr : core(function->thread);
+            if (other) {
+                plan.after.push_back(other->precedence(plan.epoch));
+            }
+        }
+    }
+    return by_session;
+}
+
+bool ThreadPlans::swap(Edit& edit, EarlierValues& before, const Functions& without,
                        Diagnostics& diagnostics) {
     CompileInput input;
     input.epoch = ++epoch_;
@@ -389,6 +423,7 @@ bool ThreadPlans::swap(Edit& edit, EarlierValues& before,
     Compiled compiled = compile(state_.model, input);
     state_.probes.enter(compiled);
     observe_unknowns(compiled);
+    const std::vector<StateHandover> handovers = hand_over_in_threads(edit, without, compiled);
     before.note(edit);
 
     std::vector<std::shared_ptr<void>> cells;
@@ -402,12 +437,23 @@ bool ThreadPlans::swap(Edit& edit, EarlierValues& before,
         offers.emplace_back(core(thread), plan.get());
         plans_.try_emplace(thread);
     }
+    std::ranges::stable_partition(offers,
+                                  [](const auto& offer) { return offer.second->after.empty(); });
+    std::unordered_set<const Core*> dependent;  // they wait for others
+    for (const auto& [core, plan] : offers) {
+        if (!plan->after.empty()) {
+            dependent.insert(core);
+        }
+    }
     std::vector<Core*> silent;
     const std::function<bool(const Thread*)> hangs = [&](const Thread* thread) {
         return thread && std::ranges::find(silent, core(thread)) != silent.end();
     };
     // from here until the plans are kept nothing is allocated
     silent = state_.executor->swap(offers, answer_timeout_ns);
+    if (silent.empty() && without.empty()) {
+        std::ranges::for_each(handovers, hand_over);
+    }
     PlanAdoption(edit, compiled, hangs, silent.empty()).adopt();
     for (auto& [thread, plan] : compiled.plans) {
         std::unique_ptr<plan::Plan>& running = plans_.at(thread);
@@ -425,7 +471,9 @@ bool ThreadPlans::swap(Edit& edit, EarlierValues& before,
     }
     keep_cells(cells, silent.empty());
     for (const Core* const one : silent) {
-        report_silent(one, diagnostics);
+        if (silent.size() == 1 || !dependent.contains(one)) {
+            report_silent(one, diagnostics);
+        }
     }
     return silent.empty();
 }

@@ -13,6 +13,7 @@
 #include "machine/report/machine_view.hpp"
 #include "model/compile.hpp"
 #include "model/edit.hpp"
+#include "model/state_handover.hpp"
 #include "text/diagnostic.hpp"
 
 namespace hal {
@@ -36,6 +37,7 @@ struct EarlierValues {
 /// Makes and ends threads, and gives them plans and values. [setup]
 class ThreadPlans {
 public:
+    using Functions = std::unordered_set<const LoadedFunction*>;
     using Plans = std::unordered_map<const Thread*, std::unique_ptr<plan::Plan>>;
 
     explicit ThreadPlans(SessionState& state) : state_(state) {}
@@ -63,8 +65,11 @@ public:
     /// threads. False after reporting.
     bool synchronise(Edit& edit, EarlierValues& before, Diagnostics& diagnostics);
     /// The same in one step and without the functions `without`.
-    bool swap(Edit& edit, EarlierValues& before,
-              const std::unordered_set<const LoadedFunction*>& without, Diagnostics& diagnostics);
+    bool swap(Edit& edit, EarlierValues& before, const Functions& without,
+              Diagnostics& diagnostics);
+    /// Returns the functions that a first step leaves out: no function may be in two threads at
+    /// once, nor run in one while another copies its state.
+    static Functions deferred(Edit& edit, const Model& model);
     /// An edit has taken effect in all threads: frees the plans of earlier ones that did not.
     void free_stuck() { stuck_.clear(); }
     /// Puts new values of what threads own into their queues. False after reporting.
@@ -87,6 +92,8 @@ private:
     bool report_hung_writers(const std::vector<std::pair<Core*, std::vector<Write>>>& rows,
                              Diagnostics& diagnostics) const;
     void observe_unknowns(Compiled& compiled);
+    std::vector<StateHandover> hand_over_in_threads(Edit& edit, const Functions& without,
+                                                    Compiled& compiled) const;
     void describe_functions();
     void keep_cells(const std::vector<std::shared_ptr<void>>& cells, bool all_answered);
 
