@@ -9,7 +9,8 @@ struct Gearchange : hal::Component {
     using Component::Component;
     hal::In<bool> sel{*this, "sel", "TRUE: gear 2, FALSE: gear 1"};
     hal::In<double> speed_in{*this, "speed-in", "commanded spindle speed"};
-    hal::Out<double> speed_out{*this, "speed-out", "speed for the drive, scaled for gear 1"};
+    hal::Out<double> speed_out{
+        *this, "speed-out", "speed for the drive, scaled for gear 1", {.safe = 0.0}};
     hal::In<bool> dir_in{*this, "dir-in", "commanded direction"};
     hal::Out<bool> dir_out{*this, "dir-out", "direction for the drive"};
     hal::LimitParam min1{*this, "min1", "lowest speed in gear 1"};

@@ -25,7 +25,8 @@ struct Spindle : hal::Component {
     hal::Out<double> rpm{*this, "spindle-rpm", "speed, measured or simulated", {.unit = "rpm"}};
     hal::Out<double> rpm_abs{
         *this, "spindle-rpm-abs", "magnitude of spindle-rpm, for a display", {.unit = "rpm"}};
-    hal::Out<double> output{*this, "output", "command for the drive: (speed + offset) * scale"};
+    hal::Out<double> output{
+        *this, "output", "command for the drive: (speed + offset) * scale", {.safe = 0.0}};
     hal::Out<std::uint32_t> current_gear{*this, "current-gear", "number of the gear in use"};
     hal::Out<bool> at_speed{*this, "at-speed",
                             "TRUE while the speed is within speed-tolerance of commanded-speed"};
@@ -170,6 +171,7 @@ r += (speed - r) * spindle-lpf * period while at speed.
 **Differences from LinuxCNC:** `brake` is set as documented (LinuxCNC: always FALSE). `reverse` remains TRUE while a spindle that turns backwards
 decelerates to a stop, like `forward` (LinuxCNC: it becomes FALSE at once, and the spindle coasts). A `select-gear` beyond the last gear is the
 last one (LinuxCNC reads pins that do not exist). A NaN or infinite speed counts as 0 (LinuxCNC: the outputs remain NaN).
+While the machine is stopped, `output` is 0, and `forward` and `reverse` are FALSE (LinuxCNC: they keep their values).
 
     loadrt spindle names=router
     addf router servo

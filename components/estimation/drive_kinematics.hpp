@@ -2,6 +2,7 @@
 #pragma once
 
 #include "estimation/kinematics.hpp"
+#include "hal/retained.hpp"
 
 namespace hal::estimation {
 
@@ -17,7 +18,7 @@ public:
                       "odometry: x y (m), heading (rad), forward speed (m/s), turning speed "
                       "(rad/s), distance driven (m)",
                       "speed of wheel # that reaches the target: m/s",
-                      "while TRUE, the odometry is reset to 0"}) {}
+                      "while TRUE, the odometry is reset to 0", 0.0}) {}
 
     void update(Cycle cycle) noexcept {
         if (!read_inputs()) return;
@@ -53,6 +54,8 @@ private:
 
 private:
     double distance_ = 0.0;
+    Retained retained_{*this,
+                       {{"x", x_}, {"y", y_}, {"heading", heading_}, {"distance", distance_}}};
 
 public:
     Param<double> track{

@@ -4,6 +4,7 @@
 
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -57,8 +58,10 @@ struct ForceControl : hal::Component {
                                   "position-out",
                                   "command for the position loop; admittance",
                                   {.unit = "m", .finite = true}};
-    hal::Out<double> velocity_out{
-        *this, "velocity-out", "derivative of position-out", {.unit = "m/s", .finite = true}};
+    hal::Out<double> velocity_out{*this,
+                                  "velocity-out",
+                                  "derivative of position-out",
+                                  {.unit = "m/s", .safe = 0.0, .finite = true}};
     hal::Out<double> error{*this, "error", "force-command - force", {.unit = "N"}};
     hal::Out<bool> saturated{*this, "saturated", "TRUE: effort or offset is at its limit"};
     hal::Out<std::uint32_t> bad_inputs{
@@ -212,6 +215,14 @@ private:
     double error_ = 0.0;
     std::uint32_t mode_ = 0;
     bool started_ = false;
+    hal::Retained retained_{*this,
+                            {{"integral", integral_},
+                             {"offset", offset_},
+                             {"speed", speed_},
+                             {"path", path_},
+                             {"error", error_},
+                             {"mode", mode_},
+                             {"started", started_}}};
 };
 
 }  // namespace

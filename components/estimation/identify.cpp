@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -17,7 +18,8 @@ enum class Failure : std::uint32_t {
     no_answer,
     noisy,
     too_long,
-    no_oscillation
+    no_oscillation,
+    interrupted
 };
 
 struct Identify : hal::Component {
@@ -52,13 +54,14 @@ struct Identify : hal::Component {
         "target time constant of the closed loop for the proposed gains; 0: the dead time",
         {.unit = "s"}};
 
-    hal::Out<double> output{*this, "output", "input of the plant", {.finite = true}};
+    hal::Out<double> output{*this, "output", "input of the plant", {.safe = 0.0, .finite = true}};
     hal::Out<std::uint32_t> phase{*this, "phase",
                                   "0 idle, 1 settling, 2 step, 3 relay, 4 done, 5 failed"};
     hal::Out<std::uint32_t> failure{
         *this, "failure",
         "reason of a failure: 1 value is NaN or infinite, 2 no response, 3 response below the "
-        "noise, 4 not settled, 5 no oscillation"};
+        "noise, 4 not settled, 5 no oscillation, 6 interrupted by a stop"};
+    hal::Out<bool> active{*this, "active", "TRUE during an experiment", {.safe = false}};
     hal::Out<double> gain{*this, "gain", "K of K e^(-L s) / (T s + 1)"};
     hal::Out<double> time_constant{
         *this, "time-constant", "T of K e^(-L s) / (T s + 1)", {.unit = "s"}};
@@ -82,6 +85,9 @@ struct Identify : hal::Component {
         const bool relay_asked = relay && !relay_was_;
         step_was_ = step;
         relay_was_ = relay;
+        if (running() && !active) {  // the outputs had their safe values meanwhile
+            fail(Failure::interrupted);
+        }
         if (cancel) {
             enter(Phase::idle);
         } else if (step_asked) {
@@ -95,8 +101,7 @@ struct Identify : hal::Component {
 
             top_ = bottom_ = y;
         }
-        const bool active = now_ == Phase::settling || now_ == Phase::step || now_ == Phase::relay;
-        if (active && !std::isfinite(y)) {
+        if (running() && !std::isfinite(y)) {
             fail(Failure::not_a_number);
         }
         time_ += dt;
@@ -109,9 +114,13 @@ struct Identify : hal::Component {
         const double given = bias + excitation();
         output = std::isfinite(given) ? given : 0.0;
         phase = static_cast<std::uint32_t>(now_);
+        active = running();
     }
 
 private:
+    bool running() const noexcept {
+        return now_ == Phase::settling || now_ == Phase::step || now_ == Phase::relay;
+    }
     double excitation() const noexcept {
         if (now_ == Phase::step) return amplitude;
         if (now_ != Phase::relay) return 0.0;
@@ -348,6 +357,31 @@ private:
     double shortest_ = 0.0;
     double longest_ = 0.0;  // of them
     std::array<double, periods> ups_{}, downs_{};  // when the output was switched
+    hal::Retained retained_{*this,
+                            {{"now", now_},
+                             {"time", time_},
+                             {"first", first_},
+                             {"start", start_},
+                             {"noise", noise_},
+                             {"quiet-sum", quiet_sum_},
+                             {"quiet-square", quiet_square_},
+                             {"quiet-count", quiet_count_},
+                             {"kept", kept_},
+                             {"count", count_},
+                             {"thin", thin_},
+                             {"skip", skip_},
+                             {"step-was", step_was_},
+                             {"relay-was", relay_was_},
+                             {"high", high_},
+                             {"last-switch", last_switch_},
+                             {"top", top_},
+                             {"bottom", bottom_},
+                             {"swings", swings_},
+                             {"even", even_},
+                             {"shortest", shortest_},
+                             {"longest", longest_},
+                             {"ups", ups_},
+                             {"downs", downs_}}};
 };
 
 }  // namespace
@@ -366,6 +400,8 @@ which are insensitive to noise; `fit` is the quality of the model. The proposed 
 give `ultimate-gain` and `ultimate-period`, and the Tyreus-Luyben rule the proposed gains. The first harmonics of output and response are compared, not their
 amplitudes, so the error of the gain is below 3 %, or 6 % for a plant with dominant dead time (4 d / (pi a) has an error of 18 % for K = 2, T = 0.5 s,
 L = 0.1 s). The experiment fails if there is no oscillation within `step-time`.
+
+An experiment does not survive a stop of the machine: `output` is 0 then, and with the next start the experiment has failed.
 
 The component changes only `output`: connect it to the plant by a mux2, and set the gains of the controller yourself. `failure` is the reason of a failure.
 

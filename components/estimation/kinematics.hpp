@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <optional>
 
 #include "estimation/matrix.hpp"
 #include "hal/component.hpp"
@@ -15,6 +16,7 @@ namespace hal::estimation {
 /// Documentation of the pins whose meaning depends on the machine.
 struct KinematicsDocs {
     const char *joint, *target, *pose, *command, *follow;
+    std::optional<double> safe = {};  ///< of the commands: 0 for speeds, none for positions
 };
 
 /// Base of the kinematics components. A derived class declares the function `update` and calls
@@ -28,7 +30,7 @@ protected:
           joint(*this, "joint-#", joints, docs.joint),
           target(*this, "target-#", 6, docs.target),
           pose(*this, "pose-#", 6, docs.pose, {.finite = true}),
-          command(*this, "command-#", joints, docs.command, {.finite = true}),
+          command(*this, "command-#", joints, docs.command, {.safe = docs.safe, .finite = true}),
           follow(*this, "follow", docs.follow) {
         measured_ = Vector::Zero(static_cast<Eigen::Index>(joints));
     }

@@ -13,8 +13,8 @@ struct Modmath : hal::Component {
     hal::Io<std::int32_t> max{*this, "max-num", "highest position", {.initial = 15}};
     hal::Io<bool> wrap{
         *this, "wrap", "TRUE: the lowest position follows the highest one", {.initial = true}};
-    hal::Out<bool> up{*this, "up", "TRUE: move up"};
-    hal::Out<bool> down{*this, "down", "TRUE: move down"};
+    hal::Out<bool> up{*this, "up", "TRUE: move up", {.safe = false}};
+    hal::Out<bool> down{*this, "down", "TRUE: move down", {.safe = false}};
     hal::Out<bool> on_target{*this, "on-target", "TRUE: actual equals desired", {.initial = true}};
     hal::Function run{*this, "", hal::step<&Modmath::update>, "selects the direction"};
 

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 #include "profile.hpp"
 
 namespace {
@@ -21,8 +22,11 @@ struct SetPoint {
 /// A ring of queued set-points, allocated once.
 class Queue {
 public:
-    explicit Queue(std::int64_t depth)
-        : depth_(static_cast<std::size_t>(depth)), ring_(std::make_unique<SetPoint[]>(depth_)) {}
+    Queue(hal::Component& component, std::int64_t depth)
+        : depth_(static_cast<std::size_t>(depth)),
+          ring_(std::make_unique<SetPoint[]>(depth_)),
+          retained_(component,
+                    {{"first", first_}, {"size", size_}, {"ring", ring_.get(), depth_}}) {}
     std::size_t size() const noexcept { return size_; }
     bool full() const noexcept { return size_ == depth_; }
     const SetPoint& operator[](std::size_t i) const noexcept {
@@ -44,6 +48,7 @@ public:
 private:
     std::size_t depth_, first_ = 0, size_ = 0;
     std::unique_ptr<SetPoint[]> ring_;
+    hal::Retained retained_;
 };
 
 struct MotionProfile : hal::Component {
@@ -104,7 +109,7 @@ struct MotionProfile : hal::Component {
 
     hal::Out<double> position{*this, "position", "position of the profile", {.finite = true}};
     hal::Out<double> velocity{
-        *this, "velocity", "velocity of the profile", {.unit = "1/s", .finite = true}};
+        *this, "velocity", "velocity of the profile", {.unit = "1/s", .safe = 0.0, .finite = true}};
     hal::Out<double> acceleration{
         *this, "acceleration", "acceleration of the profile", {.unit = "1/s^2", .finite = true}};
     hal::Out<double> jerk{*this,
@@ -357,7 +362,7 @@ private:
 
     motion::Generator generator_;
     motion::Limits limits_;
-    Queue queue_{depth};
+    Queue queue_{*this, depth};
     SetPoint goal_;
     double side_ = 1.0;
     double speed_ = 0.0;
@@ -373,6 +378,23 @@ private:
     bool in_table_ = false;
     bool start_table_ = false;
     bool was_run_ = false;
+    hal::Retained retained_{*this,
+                            {{"generator", generator_},
+                             {"limits", limits_},
+                             {"goal", goal_},
+                             {"side", side_},
+                             {"speed", speed_},
+                             {"rested", rested_},
+                             {"row", row_},
+                             {"last-mode", last_mode_},
+                             {"has-goal", has_goal_},
+                             {"waiting", waiting_},
+                             {"was-new", was_new_},
+                             {"acknowledge", acknowledge_},
+                             {"counted", counted_},
+                             {"in-table", in_table_},
+                             {"start-table", start_table_},
+                             {"was-run", was_run_}}};
 };
 
 }  // namespace

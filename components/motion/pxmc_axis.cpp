@@ -5,6 +5,7 @@
 
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 #include "profile.hpp"
 
 namespace {
@@ -80,6 +81,7 @@ struct PxmcAxis : hal::Component {
         *this, "actual-speed", "measured speed", {.unit = "1/s", .finite = true}};
     hal::Out<double> error_out{
         *this, "following-error", "commanded - actual position", {.finite = true}};
+    hal::Out<bool> active{*this, "active", "TRUE while the axis is controlled", {.safe = false}};
     hal::Out<bool> busy{*this, "busy", "TRUE while moving"};
     hal::Out<bool> error{*this, "error", "TRUE: a fault has disabled the axis; see error-code"};
     hal::Out<std::uint32_t> error_code{*this, "error-code", "cause of the fault; see the table"};
@@ -116,14 +118,19 @@ struct PxmcAxis : hal::Component {
         if (cleared && found == none) {
             code_ = none;
         }
-        const bool on = enable && code_ == none;
+        if (!enable) {
+            interrupted_ = false;
+        } else if (was_on_ && !active) {
+            interrupted_ = true;  // the outputs had their safe values meanwhile
+        }
+        const bool on = enable && code_ == none && !interrupted_;
         if (on && found == none && was_on_) {
             found = watch(limits);
         }
         if (on && found != none) {
             code_ = found;
         }
-        was_on_ = enable && code_ == none;
+        was_on_ = on && code_ == none;
         if (!was_on_) return rest();
 
         if (closing_) {
@@ -237,6 +244,7 @@ private:
         position = generator_.state().position;
         speed = generator_.state().velocity;
         error_out = generator_.state().position - measured_;
+        active = was_on_;
         error = code_ != none;
         error_code = code_;
     }
@@ -247,13 +255,29 @@ private:
     double integral_ = 0.0;
     double target_ = 0.0;
     std::uint32_t code_ = none;
-    bool was_go_ = false;
-    bool was_reset_ = false;
+    // TRUE from the first cycle on: not a rising edge
+    bool was_go_ = true;
+    bool was_reset_ = true;
     bool was_on_ = false;
+    bool interrupted_ = false;  // until enable is FALSE
     bool closing_ = true;
     bool moves_ = false;
 
     bool has_measured_ = false;
+    hal::Retained retained_{*this,
+                            {{"generator", generator_},
+                             {"measured", measured_},
+                             {"speed", speed_},
+                             {"integral", integral_},
+                             {"target", target_},
+                             {"code", code_},
+                             {"was-go", was_go_},
+                             {"was-reset", was_reset_},
+                             {"was-on", was_on_},
+                             {"interrupted", interrupted_},
+                             {"closing", closing_},
+                             {"moves", moves_},
+                             {"has-measured", has_measured_}}};
 };
 
 }  // namespace
@@ -270,7 +294,8 @@ monitors it.
 (G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of Dynamic Systems*, 4.3; the trajectory: T. Kroeger, *On-Line Trajectory
 Generation in Robotic Systems*, Springer 2010.) Units are those of `actual-position`; all limits and gains may change at any time.
 
-* `enable` closes the loop at the current position, at standstill. A rising edge of `go` starts a move, also during a move.
+* `enable` closes the loop at the current position, at standstill; then `active` is TRUE. After a `stop` of the machine, or when the
+  function was in no thread, the axis stays off until `enable` has a rising edge. A rising edge of `go` starts a move, also during a move.
 * `speed-mode` moves at `requested-speed`, and stops at `min-position` and `max-position`. Positions beyond them are limited
   (`request-limited`).
 * `stop` brakes with `max-acceleration`. `busy` is TRUE while the trajectory runs (and until the axis is within `position-window`).
