@@ -2,6 +2,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -92,6 +93,7 @@ private:
     }
 
     bool was_enabled_ = false;
+    hal::Retained retained_{*this, {{"was-enabled", was_enabled_}}};
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include "bldc_angles.hpp"
 #include "hal/component.hpp"
 #include "hal/corrected.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -361,6 +362,22 @@ private:
     double amplitude_ = 0.0;
     double free_angle_ = 0.0;
     double elapsed_ = 0.0;
+    hal::Retained retained_{*this,
+                            {{"state", state_},
+                             {"started", started_},
+                             {"was-init", was_init_},
+                             {"trapezoid", trapezoid_},
+                             {"error", error_},
+                             {"source", source_},
+                             {"hall-state", hall_state_},
+                             {"used-pattern", used_pattern_},
+                             {"counts", counts_},
+                             {"offset", offset_},
+                             {"last-raw", last_raw_},
+                             {"moved", moved_},
+                             {"amplitude", amplitude_},
+                             {"free-angle", free_angle_},
+                             {"elapsed", elapsed_}}};
 };
 
 Bldc::Bldc(const hal_host* host) : Component(host) {

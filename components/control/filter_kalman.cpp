@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -49,6 +50,7 @@ private:
 
     double x_ = 0.0;
     double p_ = 1.0;
+    hal::Retained retained_{*this, {{"x", x_}, {"p", p_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -107,6 +108,14 @@ private:
     std::size_t source_ = 0;
     bool started_ = false;
     bool was_held_ = false;
+    hal::Retained retained_{*this,
+                            {{"out", out_},
+                             {"offset", offset_},
+                             {"first", first_},
+                             {"gone", gone_},
+                             {"source", source_},
+                             {"started", started_},
+                             {"was-held", was_held_}}};
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -321,6 +322,28 @@ private:
     double time_sum_ = 0.0;
     double ultimate_gain_ = 0.0;
     double ultimate_period_ = 0.0;
+    hal::Retained retained_{*this,
+                            {{"integral", integral_},
+                             {"pushing", pushing_},
+                             {"last-command", last_command_},
+                             {"last-feedback", last_feedback_},
+                             {"slope", slope_},
+                             {"error-d", error_d_},
+                             {"feedback-d", feedback_d_},
+                             {"command-d", command_d_},
+                             {"command-dd", command_dd_},
+                             {"command-ddd", command_ddd_},
+                             {"has-previous", has_previous_},
+                             {"was-index-enable", was_index_enable_},
+                             {"tuning", tuning_},
+                             {"half-cycles", half_cycles_},
+                             {"direction", direction_},
+                             {"peak", peak_},
+                             {"elapsed", elapsed_},
+                             {"amplitude-sum", amplitude_sum_},
+                             {"time-sum", time_sum_},
+                             {"ultimate-gain", ultimate_gain_},
+                             {"ultimate-period", ultimate_period_}}};
 };
 
 }  // namespace

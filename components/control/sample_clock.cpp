@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -109,6 +110,13 @@ private:
     std::int64_t last_ = -1;
     std::uint32_t newest_ = 0;
     bool started_ = false;
+    hal::Retained retained_{*this,
+                            {{"taken", taken_},
+                             {"square", square_},
+                             {"begin-ns", begin_ns_},
+                             {"last", last_},
+                             {"newest", newest_},
+                             {"started", started_}}};
 };
 
 }  // namespace

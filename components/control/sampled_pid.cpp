@@ -5,6 +5,7 @@
 
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -118,6 +119,15 @@ private:
     double before_ = 0.0;
     double next_ = 0.0;
     bool started_ = false;
+    hal::Retained retained_{*this,
+                            {{"queue", queue_},
+                             {"first", first_},
+                             {"waiting", waiting_},
+                             {"integral", integral_},
+                             {"derivative", derivative_},
+                             {"before", before_},
+                             {"next", next_},
+                             {"started", started_}}};
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include "hal/component.hpp"
 #include "hal/corrected.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -62,6 +63,7 @@ private:
 
     static constexpr double max_step = 0.5;  // periods per cycle: the Nyquist frequency
     double phase_ = 0.0;  // 0 to below 1; 0 is the positive peak of cosine
+    hal::Retained retained_{*this, {{"phase", phase_}}};
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -14,7 +15,8 @@ struct Series {
           deviation(c, (std::string(name) + "-sd").c_str(),
                     (std::string(doc) + ", standard deviation").c_str(), {.unit = unit}),
           most(c, (std::string(name) + "-max").c_str(), (std::string(doc) + ", worst step").c_str(),
-               {.unit = unit}) {}
+               {.unit = unit}),
+          retained_(c, {{"square", square_}}) {}
 
     void add(double value, std::uint32_t count) noexcept {
         if (count == 1) {
@@ -32,6 +34,7 @@ struct Series {
 
 private:
     double square_ = 0.0;
+    hal::Retained retained_;
 };
 
 struct StepSeries : hal::Component {
@@ -98,6 +101,15 @@ private:
     std::uint32_t count_ = 0;
     std::uint32_t number_ = 0;
     bool started_ = false;
+    hal::Retained retained_{*this,
+                            {{"from", from_},
+                             {"since", since_},
+                             {"peak", peak_},
+                             {"settled", settled_},
+                             {"sum", sum_},
+                             {"count", count_},
+                             {"number", number_},
+                             {"started", started_}}};
 };
 
 }  // namespace

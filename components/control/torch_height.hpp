@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 /// The pins that thc and thcud share, and the correction of Z.
 struct TorchHeight : hal::Component {
@@ -70,4 +71,5 @@ private:
 
 private:
     double last_z_ = 0.0;
+    hal::Retained retained_{*this, {{"offset", offset_}, {"last-z", last_z_}}};
 };

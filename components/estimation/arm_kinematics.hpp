@@ -8,6 +8,7 @@
 
 #include "estimation/kinematics.hpp"
 #include "estimation/matrices.hpp"
+#include "hal/retained.hpp"
 
 namespace hal::estimation {
 
@@ -129,6 +130,7 @@ private:
                "while TRUE, each solution starts at the measured joints"}),
           arm_(std::move(arm)) {
         solved_ = measured_;
+        Retained(*this, {{"solved", solved_}});
     }
 
     /// Reads the argument `dh`. [setup]

@@ -9,6 +9,7 @@
 
 #include "estimation/past.hpp"
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace hal::estimation {
 
@@ -42,6 +43,9 @@ public:
                 std::make_unique<Row>(component, name("z"), name("age"), name("new"), what));
         }
         reported_ = Vector::Zero(count);
+        hal::Retained(
+            component,
+            {{"reported", reported_}, {"silent-s", silent_s_}, {"used", used_}, {"ever", ever_}});
     }
 
     /// Gives `past` what there is in this cycle. [realtime]

@@ -6,6 +6,7 @@
 #include "estimation/model.hpp"
 #include "estimation/past.hpp"
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 #include "hal/texts.hpp"
 
 namespace {
@@ -156,6 +157,8 @@ public:
                                 hal::PinOptions<double>{.finite = true});
         }
         input_ = Vector::Zero(count(plant_.model().inputs));
+        hal::Retained(*this, {{"input", input_}});
+        past_.retain(*this);
     }
 
     void update(hal::Cycle cycle) noexcept {

@@ -5,6 +5,7 @@
 
 #include "estimation/sections.hpp"
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -38,6 +39,12 @@ struct FilterBiquad : hal::Component {
         sections_.resize(
             static_cast<std::size_t>(passes ? order / 2 : static_cast<std::int64_t>(order)));
         coefficients_.resize(sections_.size());
+        hal::Retained(*this, {{"sections", sections_},
+                              {"coefficients", coefficients_},
+                              {"f", f_},
+                              {"q", q_},
+                              {"g", g_},
+                              {"running", running_}});
     }
 
     hal::TextArgument type;

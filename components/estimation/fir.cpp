@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -19,6 +20,8 @@ struct Fir : hal::Component {
                  "without taps: corner (gain 0.5) as a fraction of the thread's rate, below 0.5") {
         design();
         past_.assign(weights_.size(), 0.0);
+        hal::Retained(
+            *this, {{"past", past_}, {"newest", newest_}, {"last", last_}, {"started", started_}});
     }
 
     hal::TextArgument taps;

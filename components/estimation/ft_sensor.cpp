@@ -5,6 +5,7 @@
 
 #include "estimation/matrices.hpp"
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -232,6 +233,7 @@ public:
                                        "cycles with a NaN or infinite channel; the wrench is held"};
     hal::Function run{*this, "update", &FtSensor::update,
                       "computes the wrench from the six channels"};
+    hal::Retained retained_{*this, {{"sum", sum_}, {"count", count_}, {"asked", asked_}}};
 };
 
 }  // namespace

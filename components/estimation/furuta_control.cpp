@@ -7,6 +7,7 @@
 #include "hal/component.hpp"
 #include "hal/lasting_fault.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -392,6 +393,12 @@ private:
 
     hal::estimation::FurutaParameters rig_;
     hal::estimation::FurutaIdentification identification_;
+    hal::Retained retained_{*this,
+                            {{"now", now_},
+                             {"upright-s", upright_s_},
+                             {"enabled", enabled_},
+                             {"rig", rig_},
+                             {"identification", identification_}}};
 };
 
 }  // namespace

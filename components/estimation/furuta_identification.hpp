@@ -61,6 +61,7 @@ private:
 /// far beyond the noise is linear, not quadratic.
 class RecursiveLeastSquares {
 public:
+    static constexpr bool retainable = true;
     using Vector = Eigen::Vector3d;
     void restart(const Vector& estimate, const Vector& deviation, double noise) noexcept {
         estimate_ = estimate;
@@ -92,6 +93,7 @@ private:
 
 class FurutaIdentification {
 public:
+    static constexpr bool retainable = true;
     /// Begins anew with what the user gave. [realtime]
     void restart(const FurutaParameters& nominal, double dt) noexcept {
         nominal_ = nominal;

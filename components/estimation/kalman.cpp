@@ -9,6 +9,7 @@
 #include "estimation/matrices.hpp"
 #include "estimation/past.hpp"
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -65,10 +66,15 @@ public:
             }
         }
         input_ = Vector::Zero(model_.b.cols());
+        hal::Retained(*this, {{"input", input_}});
+        past_.retain(*this);
     }
 
     void update(hal::Cycle cycle) noexcept {
         if (cycle.period_ns() != period_ns_) {
+            if (continuous_ && period_ns_ != 0) {
+                past_.restart();
+            }
             sample(cycle);
         }
         if (reset) {
@@ -203,7 +209,6 @@ private:
         model_.q = q_;
         hold_.sample(model_.a, model_.b, cycle.seconds());
         hold_.sample_noise(a_, model_.q, cycle.seconds());
-        past_.restart();
     }
     void show(const Moment& now) noexcept {
         Matrix gain;

@@ -12,6 +12,7 @@
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
 #include "hal/queue.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -132,6 +133,7 @@ public:
         order_.r = problem_.r.diagonal();
         order_.period_ns = std::llround(problem_.period * 1e9);
         state_ = Vector::Zero(problem_.a.rows());
+        hal::Retained(*this, {{"gain", gain_}, {"state", state_}, {"blind", blind_}});
         for (Eigen::Index i = 0; i < gain_.rows(); ++i) {
             for (Eigen::Index j = 0; j < gain_.cols(); ++j) {
                 gains_.emplace_back(*this, (name("gain", i) + "-" + std::to_string(j)).c_str(),

@@ -5,6 +5,7 @@
 #include "estimation/design/plant.hpp"
 #include "estimation/matrices.hpp"
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -21,6 +22,7 @@ public:
           innovation(*this, "innovation-#", model_.c.rows(),
                      "measurement # minus its expected value") {
         state_ = start_;
+        hal::Retained(*this, {{"state", state_}});
     }
 
     void update(hal::Cycle) noexcept {

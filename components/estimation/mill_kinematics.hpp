@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 
 #include "estimation/kinematics.hpp"
+#include "hal/retained.hpp"
 
 namespace hal::estimation {
 
@@ -19,6 +20,7 @@ public:
                       "position of axis # of X Y Z A C that reaches the target: m, rad",
                       "without effect"}) {
         solved_ = measured_;
+        Retained(*this, {{"solved", solved_}});
     }
 
     void update(Cycle) noexcept {

@@ -4,6 +4,7 @@
 
 #include "estimation/sections.hpp"
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -16,6 +17,13 @@ struct Notch : hal::Component {
                     {.min = 1, .max = 16}) {
         sections_.resize(static_cast<std::size_t>(harmonics));
         coefficients_.resize(sections_.size());
+        hal::Retained(*this, {{"sections", sections_},
+                              {"coefficients", coefficients_},
+                              {"f", f_},
+                              {"w", w_},
+                              {"d", d_},
+                              {"used", used_},
+                              {"running", running_}});
     }
 
     hal::Argument harmonics;

@@ -6,15 +6,18 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "estimation/matrix.hpp"
+#include "hal/retained.hpp"
 
 namespace hal::estimation {
 
 /// The estimate at one time, and the inputs and measurements of that time.
 struct Moment {
+    static constexpr bool retainable = true;
     Vector x;                 ///< after the measurements of this moment
     Matrix p;                 ///< covariance of x
     Vector u;                 ///< the input that acted since the moment before
@@ -162,6 +165,19 @@ public:
     void restart() noexcept {
         number_ = 0;
         known_ = 0;
+    }
+    /// Lets a reload carry the whole history over. [setup]
+    void retain(Component& component) {
+        // none of it is of use to a model of another size
+        const auto size = [](const Vector& v) { return "-" + std::to_string(v.size()); };
+        const std::string shape = size(start_.x) + size(start_.u) + size(start_.z);
+        Retained(component, {{("moments" + shape).c_str(), moments_},
+                             {("number" + shape).c_str(), number_},
+                             {("first" + shape).c_str(), first_},
+                             {("known" + shape).c_str(), known_},
+                             {"used", used},
+                             {"outliers", outliers},
+                             {"renewals", renewals}});
     }
     /// counted; a measurement that is done again counts once
     std::uint32_t used = 0;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -24,6 +25,8 @@ struct SavgolDiff : hal::Component {
         }
         design();
         past_.assign(size(), 0.0);
+        hal::Retained(
+            *this, {{"past", past_}, {"newest", newest_}, {"last", last_}, {"started", started_}});
     }
 
     hal::Argument window, order;

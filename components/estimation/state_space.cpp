@@ -5,6 +5,7 @@
 #include "estimation/hold.hpp"
 #include "estimation/matrices.hpp"
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -22,6 +23,7 @@ struct StateSpace : hal::Component {
         for (std::size_t i = 0; i < x.size(); ++i) {
             x[i] = state_(static_cast<Eigen::Index>(i));
         }
+        hal::Retained(*this, {{"state", state_}, {"input", input_}});
     }
 
     hal::TextArgument plant;

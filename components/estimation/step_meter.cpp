@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -77,6 +78,13 @@ private:
 private:
     double mean_ = 0.0;
     bool started_ = false;
+    hal::Retained retained_{*this,
+                            {{"from", from_},
+                             {"step", step_},
+                             {"target", target_},
+                             {"tenth", tenth_},
+                             {"mean", mean_},
+                             {"started", started_}}};
 };
 
 }  // namespace

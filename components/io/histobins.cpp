@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 #include "run_time.hpp"
 
 namespace {
@@ -120,6 +121,16 @@ private:
     std::uint32_t counted_bins_ = 0;  // settings of the bins at the last value; 0: none yet
     double counted_size_ = 0.0;
     double counted_minimum_ = 0.0;
+    hal::Retained retained_{*this,
+                            {{"statistics", statistics_},
+                             {"bins", bins_},
+                             {"above", above_},
+                             {"below", below_},
+                             {"smallest", smallest_},
+                             {"largest", largest_},
+                             {"counted-bins", counted_bins_},
+                             {"counted-size", counted_size_},
+                             {"counted-minimum", counted_minimum_}}};
 };
 
 }  // namespace

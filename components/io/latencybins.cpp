@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 #include "run_time.hpp"
 
 namespace {
@@ -93,6 +94,16 @@ private:
     std::int32_t now_ = 0;
     std::int32_t latest_ = 0;
     std::int32_t earliest_ = 0;
+    hal::Retained retained_{*this,
+                            {{"time", time_},
+                             {"statistics", statistics_},
+                             {"above", above_},
+                             {"below", below_},
+                             {"later", later_},
+                             {"earlier", earlier_},
+                             {"now", now_},
+                             {"latest", latest_},
+                             {"earliest", earliest_}}};
 };
 
 }  // namespace

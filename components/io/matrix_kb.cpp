@@ -7,6 +7,7 @@
 #include <string>
 
 #include "hal/naming.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -139,6 +140,7 @@ private:
     std::array<Row, 32> seen_{};
     std::uint32_t down_ = 0;
     long driven_ = 0;
+    hal::Retained retained_{*this, {{"seen", seen_}, {"down", down_}, {"driven", driven_}}};
 };
 
 }  // namespace

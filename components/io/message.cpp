@@ -7,6 +7,7 @@
 
 #include "hal/component.hpp"
 #include "hal/message_log.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -71,6 +72,7 @@ private:
     std::optional<std::thread> printer_;
     bool was_trigger_ = false;
     bool was_forced_ = false;
+    hal::Retained retained_{*this, {{"was-trigger", was_trigger_}, {"was-forced", was_forced_}}};
 };
 
 }  // namespace

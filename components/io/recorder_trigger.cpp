@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -237,6 +238,23 @@ private:
     bool was_below_ = false;
     bool was_above_ = false;
     bool have_ = false;
+    hal::Retained retained_{*this,
+                            {{"newest", newest_},
+                             {"back", back_},
+                             {"filled", filled_},
+                             {"values", values_.get(), size_* static_cast<std::size_t>(channels)},
+                             {"bits", bits_.get(), size_* static_cast<std::size_t>(bit_channels)},
+                             {"at", at_},
+                             {"after", after_},
+                             {"waited", waited_},
+                             {"state", state_},
+                             {"was-arm", was_arm_},
+                             {"was-force", was_force_},
+                             {"was-bit", was_bit_},
+                             {"was-known", was_known_},
+                             {"was-below", was_below_},
+                             {"was-above", was_above_},
+                             {"have", have_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 #include "stream_columns.hpp"
 
 namespace {
@@ -78,6 +79,7 @@ private:
     }
 
     bool was_clock_ = false;
+    hal::Retained retained_{*this, {{"was-clock", was_clock_}}};
 };
 
 }  // namespace

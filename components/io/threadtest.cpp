@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -20,6 +21,7 @@ struct Threadtest : hal::Component {
 
 private:
     std::atomic<bool> cleared_{false};  // reset sets it, increment clears it
+    hal::Retained retained_{*this, {{"cleared", cleared_}}};
 };
 
 }  // namespace

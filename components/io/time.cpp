@@ -2,6 +2,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -34,6 +35,7 @@ struct Time : hal::Component {
 private:
     std::int64_t elapsed_ns_ = 0;
     bool was_running_ = false;
+    hal::Retained retained_{*this, {{"elapsed-ns", elapsed_ns_}, {"was-running", was_running_}}};
 };
 
 }  // namespace

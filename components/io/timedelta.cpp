@@ -2,6 +2,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 #include "run_time.hpp"
 
 namespace {
@@ -55,6 +56,13 @@ private:
     std::int64_t worst_ = 0;
     std::int64_t shortest_ = 0;
     std::int64_t longest_ = 0;
+    hal::Retained retained_{*this,
+                            {{"time", time_},
+                             {"runs", runs_},
+                             {"sum", sum_},
+                             {"worst", worst_},
+                             {"shortest", shortest_},
+                             {"longest", longest_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -27,6 +28,7 @@ struct Dbounce : hal::Component {
 private:
     // cycles in which in was TRUE, minus those in which it was not: 0 to delay
     std::uint32_t count_ = 0;
+    hal::Retained retained_{*this, {{"count", count_}}};
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
 #include "hal/corrected.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -44,6 +45,7 @@ struct Debounce : hal::Component {
 
 private:
     std::int32_t* counts_;  // one per filter, from 0 to delay
+    hal::Retained retained_{*this, {{"counts", counts_, in.size()}}};
 };
 
 }  // namespace

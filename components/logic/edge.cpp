@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -41,6 +42,9 @@ private:
     bool started_ = false;
     bool was_in_ = false;
     bool pulse_ = false;
+    hal::Retained retained_{
+        *this,
+        {{"left-ns", left_ns_}, {"started", started_}, {"was-in", was_in_}, {"pulse", pulse_}}};
 };
 
 }  // namespace

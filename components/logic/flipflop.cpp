@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -31,6 +32,7 @@ struct Flipflop : hal::Component {
 
 private:
     bool was_clk_ = false;
+    hal::Retained retained_{*this, {{"was-clk", was_clk_}}};
 };
 
 }  // namespace

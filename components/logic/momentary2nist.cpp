@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -50,6 +51,7 @@ private:
     std::uint32_t held_ = 0;  // cycles for which in has differed from stable_
     std::uint32_t pulse_ = 0;  // cycles for which on or off has been TRUE
     bool stable_ = false;
+    hal::Retained retained_{*this, {{"held", held_}, {"pulse", pulse_}, {"stable", stable_}}};
 };
 
 }  // namespace

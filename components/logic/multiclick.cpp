@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -41,8 +42,8 @@ struct Multiclick : hal::Component {
         for (std::size_t i = 0; i < std::size(pulses_); ++i) {
             Pulse& pulse = pulses_[i];
             pulse.age_ns += pulse.age_ns < forever ? period : 0;
-            if (*pulse.out && pulse.age_ns >= pulse.hold_ns) {
-                *pulse.out = false;
+            if (*outs_[i] && pulse.age_ns >= pulse.hold_ns) {
+                *outs_[i] = false;
             }
         }
         in_state_ns_ += in_state_ns_ < forever ? period : 0;
@@ -57,7 +58,6 @@ private:
     static constexpr std::int32_t waiting = 9;
 
     struct Pulse {
-        hal::Out<bool>* out;
         std::int64_t age_ns = 0;
         std::int64_t hold_ns = 0;
     };
@@ -69,7 +69,7 @@ private:
             }
         } else if (state_ % 2 == 1) {
             if (!pressed) {
-                start(pulses_[state_ - 1]);
+                start(state_ - 1);
                 enter(state_ + 1);
             } else if (in_state_ns_ > limit_ns_) {
                 enter(waiting);
@@ -77,7 +77,7 @@ private:
         } else if (pressed) {
             enter(state_ == last_release ? waiting : state_ + 1);  // a fifth click is ignored
         } else if (state_ != idle && in_state_ns_ > limit_ns_) {
-            start(pulses_[state_ - 1]);
+            start(state_ - 1);
             enter(idle);
         }
     }
@@ -86,18 +86,23 @@ private:
         in_state_ns_ = 0;
         limit_ns_ = next % 2 == 1 ? max_hold : max_space;
     }
-    void start(Pulse& pulse) {
-        *pulse.out = true;
-        pulse.age_ns = 0;
-        pulse.hold_ns = output_hold;
+    void start(std::int32_t i) {
+        *outs_[i] = true;
+        pulses_[i] = {0, output_hold};
     }
 
     // In the order of the states that start them.
-    Pulse pulses_[8] = {{&single}, {&single_only}, {&twice},     {&twice_only},
-                        {&triple}, {&triple_only}, {&quadruple}, {&quadruple_only}};
+    hal::Out<bool>* const outs_[8] = {&single, &single_only, &twice,     &twice_only,
+                                      &triple, &triple_only, &quadruple, &quadruple_only};
+    Pulse pulses_[8] = {};
     std::int64_t in_state_ns_ = 0;
     std::int64_t limit_ns_ = 0;  // of this state: max-hold-ns or max-space-ns when it began
     std::int32_t state_ = idle;
+    hal::Retained retained_{*this,
+                            {{"pulses", pulses_},
+                             {"in-state-ns", in_state_ns_},
+                             {"limit-ns", limit_ns_},
+                             {"state", state_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -57,6 +58,7 @@ private:
 
 private:
     bool was_down_ = false;
+    hal::Retained retained_{*this, {{"was-up", was_up_}, {"was-down", was_down_}}};
 };
 
 }  // namespace

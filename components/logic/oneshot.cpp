@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -47,6 +48,7 @@ struct Oneshot : hal::Component {
 private:
     double left_s_ = 0.0;
     bool was_in_ = false;
+    hal::Retained retained_{*this, {{"left-s", left_s_}, {"was-in", was_in_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -28,6 +29,7 @@ struct Radiobutton : hal::Component {
 
 private:
     std::uint32_t was_ = 0;
+    hal::Retained retained_{*this, {{"was", was_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -35,6 +36,7 @@ struct Reset : hal::Component {
 
 private:
     bool was_ = false;
+    hal::Retained retained_{*this, {{"was", was_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -37,6 +38,7 @@ struct Timedelay : hal::Component {
 
 private:
     double waited_s_ = 0.0;  // time for which in has differed from out
+    hal::Retained retained_{*this, {{"waited-s", waited_s_}}};
 };
 
 }  // namespace

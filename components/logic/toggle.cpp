@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
 #include "hal/corrected.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -40,6 +41,7 @@ private:
     bool pressed_ = false;     // debounced state of the button
     // cycles in which in was TRUE, minus those in which it was not: 0 to debounce
     std::uint32_t count_ = 0;
+    hal::Retained retained_{*this, {{"pressed", pressed_}, {"count", count_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -55,6 +56,7 @@ private:
     bool state_ = false;      // debounced state of the switch
     std::uint32_t held_ = 0;  // cycles for which the switch has differed from state_
     std::uint64_t age_ = 0;   // cycles since the last request
+    hal::Retained retained_{*this, {{"state", state_}, {"held", held_}, {"age", age_}}};
 };
 
 }  // namespace

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "hal/retained.hpp"
 #include "iec_time.hpp"
 
 namespace {
@@ -27,6 +28,7 @@ struct Tp : hal::Component {
 
 private:
     bool was_in_ = false;
+    hal::Retained retained_{*this, {{"was-in", was_in_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -48,6 +49,9 @@ private:
     bool started_ = false;
     bool was_up_ = false;
     bool was_down_ = false;
+    hal::Retained retained_{
+        *this,
+        {{"count", count_}, {"started", started_}, {"was-up", was_up_}, {"was-down", was_down_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -17,6 +18,7 @@ struct Ddt : hal::Component {
 
 private:
     double before_ = 0.0;
+    hal::Retained retained_{*this, {{"before", before_}}};
 };
 
 }  // namespace

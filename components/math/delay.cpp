@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -69,6 +70,8 @@ private:
     std::size_t newest_ = 0;
     std::size_t filled_ = 0;
     std::unique_ptr<Sample[]> line_ = std::make_unique<Sample[]>(size_);
+    hal::Retained retained_{
+        *this, {{"newest", newest_}, {"filled", filled_}, {"line", line_.get(), size_}}};
 };
 
 }  // namespace

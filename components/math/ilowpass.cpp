@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "conv.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -24,6 +25,7 @@ struct Ilowpass : hal::Component {
 
 private:
     double state_ = 0.0;
+    hal::Retained retained_{*this, {{"state", state_}}};
 };
 
 }  // namespace

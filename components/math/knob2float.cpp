@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -35,6 +36,7 @@ struct Knob2float : hal::Component {
 private:
     double value_ = 0.0;
     std::int32_t last_ = 0;
+    hal::Retained retained_{*this, {{"value", value_}, {"last", last_}}};
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -38,6 +39,7 @@ private:
         return std::min(value, high);
     }
     double state_ = 0.0;
+    hal::Retained retained_{*this, {{"state", state_}}};
 };
 
 }  // namespace

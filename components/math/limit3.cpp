@@ -14,6 +14,7 @@
 // relative to it: `out` meets it at w.
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -230,6 +231,16 @@ private:
     double low_now_ = 0.0;  // max; the lower of min and max
     bool arrived_ = true;  // out is on its goal
     bool carried_ = false;  // by load, in the last cycle
+    hal::Retained retained_{*this,
+                            {{"position", position_},
+                             {"rest", rest_},
+                             {"speed", speed_},
+                             {"input", input_},
+                             {"speed-in", speed_in_},
+                             {"high", high_},
+                             {"low-now", low_now_},
+                             {"arrived", arrived_},
+                             {"carried", carried_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -53,6 +54,7 @@ private:
     }
 
     std::size_t current_ = 0;
+    hal::Retained retained_{*this, {{"current", current_}}};
 };
 
 }  // namespace

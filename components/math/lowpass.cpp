@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -21,6 +22,7 @@ struct Lowpass : hal::Component {
 
 private:
     double state_ = 0.0;
+    hal::Retained retained_{*this, {{"state", state_}}};
 };
 
 }  // namespace

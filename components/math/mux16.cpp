@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "conv.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -46,6 +47,7 @@ struct Mux16 : hal::Component {
 private:
     unsigned debounced_ = 0;  // the selection in use while debounce-time is set
     double waited_s_ = 0.0;   // for which another one was selected
+    hal::Retained retained_{*this, {{"debounced", debounced_}, {"waited-s", waited_s_}}};
 };
 
 }  // namespace

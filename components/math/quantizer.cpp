@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -80,6 +81,7 @@ private:
     double in_ = 0.0;
     double level_ = 0.0;
     bool known_ = false;
+    hal::Retained retained_{*this, {{"in", in_}, {"level", level_}, {"known", known_}}};
 };
 
 }  // namespace

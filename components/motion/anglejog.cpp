@@ -6,6 +6,7 @@
 
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -145,6 +146,18 @@ private:
     std::int32_t factor_ = 10000;
     std::int64_t last_counts_ = 0;
     std::int64_t commanded_counts_ = 0;
+    hal::Retained retained_{*this,
+                            {{"started", started_},
+                             {"was-enabled", was_enabled_},
+                             {"waiting", waiting_},
+                             {"angle", angle_},
+                             {"scale", scale_},
+                             {"unit", unit_},
+                             {"magnitude", magnitude_},
+                             {"velocity", velocity_},
+                             {"factor", factor_},
+                             {"last-counts", last_counts_},
+                             {"commanded-counts", commanded_counts_}}};
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace axis_test {
 
@@ -94,6 +95,7 @@ private:
 
     bool pausing_ = false;   // at an end
     double paused_s_ = 0.0;  // since the axis reached the end
+    hal::Retained retained_{*this, {{"pausing", pausing_}, {"paused-s", paused_s_}}};
 };
 
 }  // namespace axis_test

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -410,6 +411,24 @@ private:
     std::int64_t zero_ = 0;
     double left_ = 0.0;
     double last_pocket_ = 0.0;
+    hal::Retained retained_{*this,
+                            {{"state", state_},
+                             {"was-enabled", was_enabled_},
+                             {"was-jog-fwd", was_jog_fwd_},
+                             {"was-jog-rev", was_jog_rev_},
+                             {"was-pulse", was_pulse_},
+                             {"marker", marker_},
+                             {"moved", moved_},
+                             {"requested-index", requested_index_},
+                             {"direction", direction_},
+                             {"stable", stable_},
+                             {"reading", reading_},
+                             {"position", position_},
+                             {"target", target_},
+                             {"from", from_},
+                             {"zero", zero_},
+                             {"left", left_},
+                             {"last-pocket", last_pocket_}}};
 };
 
 }  // namespace

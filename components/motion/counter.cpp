@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "edge_count.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -63,6 +64,8 @@ private:
     bool started_ = false;
     bool a_ = false;
     bool z_ = false;  // update-counters
+    hal::Retained retained_{*this,
+                            {{"count", count_}, {"started", started_}, {"a", a_}, {"z", z_}}};
 };
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -201,6 +202,16 @@ private:
     double v_ = 0.0;
     double w_ = 0.0;
     bool started_ = false;
+    hal::Retained retained_{*this,
+                            {{"x", x_},
+                             {"y", y_},
+                             {"heading", heading_},
+                             {"distance", distance_},
+                             {"last-left", last_left_},
+                             {"last-right", last_right_},
+                             {"v", v_},
+                             {"w", w_},
+                             {"started", started_}}};
 };
 
 }  // namespace

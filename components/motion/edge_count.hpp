@@ -107,6 +107,8 @@ public:
         return std::clamp(position, cell, cell + 1.0) - static_cast<double>(zero_);
     }
 
+    static constexpr bool retainable = true;
+
 private:
     Sample sample_;  // fast thread
     hal::Mailbox<Sample> handed_;  // written by the fast thread, read by the servo thread

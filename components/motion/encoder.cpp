@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "edge_count.hpp"
 #include "hal/corrected.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -171,6 +172,18 @@ private:
     std::int64_t tooth_pitch_ns_ = 0;
     // capture-position
     std::uint32_t latches_ = 0;
+    hal::Retained retained_{*this,
+                            {{"count", count_},
+                             {"started", started_},
+                             {"a", a_},
+                             {"b", b_},
+                             {"z", z_},
+                             {"latch", latch_},
+                             {"seen-tooth", seen_tooth_},
+                             {"now-ns", now_ns_},
+                             {"tooth-ns", tooth_ns_},
+                             {"tooth-pitch-ns", tooth_pitch_ns_},
+                             {"latches", latches_}}};
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include "hal/component.hpp"
 #include "hal/queue.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -94,6 +95,11 @@ private:
     Edges master_edges_, slave_edges_;
     Counted counted_;
     hal::Mailbox<Counted> handed_;  // sample writes, update reads
+    hal::Retained retained_{*this,
+                            {{"master-edges", master_edges_},
+                             {"slave-edges", slave_edges_},
+                             {"counted", counted_},
+                             {"handed", handed_}}};
 };
 
 }  // namespace

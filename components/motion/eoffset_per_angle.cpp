@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -130,6 +131,7 @@ private:
     }
     State state_ = State::off;
     bool failed_ = false;  // the shape was impossible
+    hal::Retained retained_{*this, {{"state", state_}, {"failed", failed_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -74,6 +75,10 @@ private:
     double last_command_ = 0.0;
     bool started_ = false;
     std::size_t feedback_joint_ = 0;
+    hal::Retained retained_{*this,
+                            {{"last-command", last_command_},
+                             {"started", started_},
+                             {"feedback-joint", feedback_joint_}}};
 };
 
 }  // namespace

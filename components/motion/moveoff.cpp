@@ -6,6 +6,7 @@
 #include "axis_planner.hpp"
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -210,6 +211,19 @@ private:
     double near_ = 0.0005;
     double step_ = 0.02;
     double every_ = 0.02;
+    hal::Retained retained_{*this,
+                            {{"axes", axes_},
+                             {"applied", applied_},
+                             {"last", last_},
+                             {"waypoints", waypoints_},
+                             {"used", used_},
+                             {"state", state_},
+                             {"paused", paused_},
+                             {"was-applying", was_applying_},
+                             {"since", since_},
+                             {"near", near_},
+                             {"step", step_},
+                             {"every", every_}}};
 };
 
 }  // namespace

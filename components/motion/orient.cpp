@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -52,6 +53,8 @@ private:
     static constexpr int required_cycles = 101;
     bool was_enabled_ = false;
     int settled_cycles_ = 0;  // since the rising edge of enable, within the tolerance
+    hal::Retained retained_{*this,
+                            {{"was-enabled", was_enabled_}, {"settled-cycles", settled_cycles_}}};
 };
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "hal/lasting_fault.hpp"
 #include "hal/limit.hpp"
 #include "hal/queue.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -77,8 +78,6 @@ struct Pwmgen : hal::Component {
             dir.emplace(*this, make, "dir", "direction: low forward, high in reverse", off);
         }
     }
-
-    void start() { faults_ = hal::extension<hal_faults>("hal.faults/1"); }
 
     void make_pulses(hal::Cycle cycle) noexcept {
         tick_ns_.store(cycle.period_ns(), std::memory_order_relaxed);
@@ -194,7 +193,7 @@ private:
         }
     }
 
-    const hal_faults* faults_ = nullptr;
+    const hal_faults* faults_ = hal::extension<hal_faults>("hal.faults/1");
     hal::FunctionMonitor updates_;  // make-pulses monitors update
     hal::LastingFault abandoned_;  // make-pulses only
     const std::string abandoned_text_ =
@@ -209,6 +208,17 @@ private:
     double high_rest_ = 0.0;
     double density_ = 0.0;
     bool reverse_ = false;
+    hal::Retained retained_{*this,
+                            {{"updates", updates_},
+                             {"orders", orders_},
+                             {"tick-ns", tick_ns_},
+                             {"tick", tick_},
+                             {"length", length_},
+                             {"high", high_},
+                             {"length-rest", length_rest_},
+                             {"high-rest", high_rest_},
+                             {"density", density_},
+                             {"reverse", reverse_}}};
 };
 
 }  // namespace

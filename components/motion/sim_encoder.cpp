@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -70,6 +71,11 @@ private:
     // make-pulses only
     std::int64_t count_ = 0;
     std::int64_t fraction_ = 0;  // of a count, 0 to below 2^31
+    hal::Retained retained_{*this,
+                            {{"counts-per-second", counts_per_second_},
+                             {"per-turn", per_turn_},
+                             {"count", count_},
+                             {"fraction", fraction_}}};
 };
 
 }  // namespace

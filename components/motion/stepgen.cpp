@@ -13,6 +13,7 @@
 #include "hal/lasting_fault.hpp"
 #include "hal/limit.hpp"
 #include "hal/queue.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -174,8 +175,6 @@ struct Stepgen : hal::Component {
                                  "commanded speed in length units per second");
         }
     }
-
-    void start() { faults_ = hal::extension<hal_faults>("hal.faults/1"); }
 
     void make_pulses(hal::Cycle cycle) noexcept {
         const std::int64_t tick_ns = cycle.period_ns();
@@ -420,7 +419,7 @@ private:
     Sequence sequence_{0, 1, {}};
     std::array<std::optional<hal::Out<bool>>, 5> phase_;
 
-    const hal_faults* faults_ = nullptr;
+    const hal_faults* faults_ = hal::extension<hal_faults>("hal.faults/1");
     hal::FunctionMonitor updates_;  // make-pulses monitors update-freq
     hal::LastingFault abandoned_;  // make-pulses only
     std::atomic<bool> was_abandoned_{false};  // make-pulses sets it, update-freq takes it
@@ -444,6 +443,24 @@ private:
     std::int64_t setup_ns_ = 0;
     // update-freq only
     double last_command_ = 0.0;
+    hal::Retained retained_{*this,
+                            {{"updates", updates_},
+                             {"was-abandoned", was_abandoned_},
+                             {"orders", orders_},
+                             {"tick-ns", tick_ns_},
+                             {"made-out", made_out_},
+                             {"position-out", position_out_},
+                             {"scale", scale_},
+                             {"position", position_},
+                             {"made", made_},
+                             {"rate", rate_},
+                             {"direction", direction_},
+                             {"high", high_},
+                             {"pulse-ns", pulse_ns_},
+                             {"space-ns", space_ns_},
+                             {"hold-ns", hold_ns_},
+                             {"setup-ns", setup_ns_},
+                             {"last-command", last_command_}}};
 };
 
 }  // namespace

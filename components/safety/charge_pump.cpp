@@ -2,6 +2,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -27,6 +28,7 @@ struct ChargePump : hal::Component {
 
 private:
     std::uint32_t phase_ = 0;
+    hal::Retained retained_{*this, {{"phase", phase_}}};
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -190,6 +191,13 @@ private:
     std::uint32_t fault_ = agree;
     bool was_reset_ = false;
     bool was_ok_ = false;
+    hal::Retained retained_{*this,
+                            {{"for", for_},
+                             {"good", good_},
+                             {"largest", largest_},
+                             {"fault", fault_},
+                             {"was-reset", was_reset_},
+                             {"was-ok", was_ok_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -33,6 +34,7 @@ struct EstopLatch : hal::Component {
 
 private:
     bool was_reset_ = false;
+    hal::Retained retained_{*this, {{"was-reset", was_reset_}}};
 };
 
 }  // namespace
@@ -41,7 +43,8 @@ HAL_COMPONENT(EstopLatch, "estop_latch", "Emergency stop latch: holds a fault un
               R"(
 The latch has two states: "faulted" (initial) and "OK". A rising edge of `reset` with `ok-in` TRUE and `fault-in` FALSE enters OK.
 `ok-in` FALSE or `fault-in` TRUE enters faulted in the same cycle. In the OK state `watchdog` toggles every cycle, for a `watchdog`
-or a charge pump that trips when this function stops running. Chain latches by linking `ok-out` to the next `ok-in`.
+or a charge pump that trips when this function stops running. As in LinuxCNC, a `reset` that is TRUE in the first cycle counts as a rising
+edge; the other safety components need a FALSE first. Chain latches by linking `ok-out` to the next `ok-in`.
 
     loadrt estop_latch
     addf estop-latch.0 servo-thread

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 #include "hal/supervision.h"
 
 namespace {
@@ -69,6 +70,8 @@ private:
     std::uint64_t seen_ = 0;
     std::uint64_t acknowledged_ = no_count;  // count at the last edge of reset
     bool was_reset_ = false;
+    hal::Retained retained_{
+        *this, {{"seen", seen_}, {"acknowledged", acknowledged_}, {"was-reset", was_reset_}}};
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -210,6 +211,18 @@ private:
     bool first_ = true;
 
     bool was_ok_ = false;
+    hal::Retained retained_{*this,
+                            {{"age-ns", age_ns_},
+                             {"interval-ns", interval_ns_},
+                             {"last-counter", last_counter_},
+                             {"good", good_},
+                             {"bad", bad_},
+                             {"fault", fault_},
+                             {"last-toggle", last_toggle_},
+                             {"was-watched", was_watched_},
+                             {"was-reset", was_reset_},
+                             {"first", first_},
+                             {"was-ok", was_ok_}}};
 };
 
 }  // namespace

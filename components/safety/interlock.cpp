@@ -5,6 +5,7 @@
 
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -170,6 +171,19 @@ private:
     bool waits_ = false;
 
     bool has_run_ = false;
+    hal::Retained retained_{*this,
+                            {{"bad-for", bad_for_},
+                             {"since", since_},
+                             {"bypass-for", bypass_for_},
+                             {"tripped", tripped_},
+                             {"unheard", unheard_},
+                             {"first", first_},
+                             {"phase-ns", phase_ns_},
+                             {"was-reset", was_reset_},
+                             {"was-acknowledged", was_acknowledged_},
+                             {"was-ok", was_ok_},
+                             {"waits", waits_},
+                             {"has-run", has_run_}}};
 };
 
 }  // namespace

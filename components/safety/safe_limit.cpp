@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -329,6 +330,22 @@ private:
     bool was_reset_ = false;
     bool has_run_ = false;
     bool may_return_ = false;
+    hal::Retained retained_{*this,
+                            {{"position", position_},
+                             {"speed", speed_},
+                             {"slew", slew_},
+                             {"given", given_},
+                             {"lasted", lasted_},
+                             {"stood-for", stood_for_},
+                             {"stood-at", stood_at_},
+                             {"since", since_},
+                             {"state", state_},
+                             {"reason", reason_},
+                             {"returning", returning_},
+                             {"known", known_},
+                             {"was-reset", was_reset_},
+                             {"has-run", has_run_},
+                             {"may-return", may_return_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -51,6 +52,8 @@ private:
     std::int64_t count_ = 0;
     bool latched_ = false;
     bool was_reset_ = false;
+    hal::Retained retained_{*this,
+                            {{"count", count_}, {"latched", latched_}, {"was-reset", was_reset_}}};
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -335,6 +336,16 @@ private:
     bool was_down_ = false;
     bool counts_ = false;
     bool stuck_ = false;
+    hal::Retained retained_{*this,
+                            {{"test", test_},
+                             {"a", a_},
+                             {"b", b_},
+                             {"state", state_},
+                             {"disagree-ns", disagree_ns_},
+                             {"pressed-ns", pressed_ns_},
+                             {"was-down", was_down_},
+                             {"counts", counts_},
+                             {"stuck", stuck_}}};
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -111,6 +112,7 @@ private:
     }
 
     struct Watched {
+        static constexpr bool retainable = true;
         std::atomic<std::int64_t> limit_ns{0};  // set-timeouts writes, process reads
         std::int64_t silent_ns = 0;
         bool level = false;
@@ -122,6 +124,11 @@ private:
     bool was_enabled_ = false;
     // enabled, and ok-out waits for an input that tripped the watchdog
     bool starting_ = false;
+    hal::Retained retained_{*this,
+                            {{"watched", watched_.get(), static_cast<std::size_t>(inputs)},
+                             {"limits-known", limits_known_},
+                             {"was-enabled", was_enabled_},
+                             {"starting", starting_}}};
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 #include "motor.hpp"
 #include "quadrature.hpp"
 
@@ -132,6 +133,8 @@ private:
     double speed_ = 0.0;
     double current_ = 0.0;
     double torque_ = 0.0;
+    hal::Retained retained_{
+        *this, {{"angle", angle_}, {"speed", speed_}, {"current", current_}, {"torque", torque_}}};
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 #include "linear.hpp"
 
 namespace {
@@ -89,6 +90,7 @@ private:
     double x_ = 0.0;
     double v_ = 0.0;
     double push_ = 0.0;
+    hal::Retained retained_{*this, {{"x", x_}, {"v", v_}, {"push", push_}}};
 };
 
 }  // namespace

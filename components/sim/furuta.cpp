@@ -4,6 +4,7 @@
 #include "furuta_rig.hpp"
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -272,6 +273,7 @@ private:
 
     sim::FurutaRig rig_;
     bool was_reset_ = false;
+    hal::Retained retained_{*this, {{"rig", rig_}, {"was-reset", was_reset_}}};
 };
 
 }  // namespace

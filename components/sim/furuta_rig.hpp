@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <memory>
 
 #include "furuta_dynamics.hpp"
 #include "motor.hpp"
@@ -70,14 +69,14 @@ public:
     std::int64_t pass(std::int64_t count, std::int64_t now_ns, std::int64_t delay_ns) noexcept {
         if (count != last_in_) {
             // full: the oldest comes early
-            if (in_ - out_ == edges_->size()) {
-                last_out_ = (*edges_)[out_++ % edges_->size()].count;
+            if (in_ - out_ == edges_.size()) {
+                last_out_ = edges_[out_++ % edges_.size()].count;
             }
-            (*edges_)[in_++ % edges_->size()] = {count, now_ns};
+            edges_[in_++ % edges_.size()] = {count, now_ns};
             last_in_ = count;
         }
-        while (out_ != in_ && now_ns - (*edges_)[out_ % edges_->size()].at_ns >= delay_ns) {
-            last_out_ = (*edges_)[out_++ % edges_->size()].count;
+        while (out_ != in_ && now_ns - edges_[out_ % edges_.size()].at_ns >= delay_ns) {
+            last_out_ = edges_[out_++ % edges_.size()].count;
         }
         return last_out_;
     }
@@ -90,14 +89,14 @@ private:
     struct Edge {
         std::int64_t count, at_ns;
     };
-    std::unique_ptr<std::array<Edge, 4096>> edges_ = std::make_unique<std::array<Edge, 4096>>();
+    std::array<Edge, 4096> edges_{};
     std::size_t in_ = 0;
     std::size_t out_ = 0;
     std::int64_t last_in_ = 0;
     std::int64_t last_out_ = 0;
 };
 
-/// The state and what moves it on. All functions are [realtime]; memory is taken when it is made.
+/// The state and what moves it on. All functions are [realtime].
 class FurutaRig {
 public:
     /// At rest with these angles.

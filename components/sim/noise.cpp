@@ -7,6 +7,7 @@
 
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -141,6 +142,17 @@ private:
     bool started_ = false;
     bool spare_known_ = false;
     bool was_restart_ = false;
+    hal::Retained retained_{*this,
+                            {{"bits", bits_},
+                             {"rows", rows_},
+                             {"value", value_},
+                             {"spare", spare_},
+                             {"count", count_},
+                             {"seed", seed_},
+                             {"age", age_},
+                             {"started", started_},
+                             {"spare-known", spare_known_},
+                             {"was-restart", was_restart_}}};
 };
 
 }  // namespace

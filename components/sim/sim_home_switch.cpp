@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -56,6 +57,7 @@ private:
 
     double left_ms_ = 0.0;  // until index-enable is cleared; 0: not waiting
     bool was_enabled_ = false;
+    hal::Retained retained_{*this, {{"left-ms", left_ms_}, {"was-enabled", was_enabled_}}};
 };
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -47,6 +48,7 @@ struct SimMatrixKb : hal::Component {
 
 private:
     std::uint64_t reported_ = 0;
+    hal::Retained retained_{*this, {{"reported", reported_}}};
 };
 
 }  // namespace

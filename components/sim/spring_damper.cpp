@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 #include "linear.hpp"
 
 namespace {
@@ -99,6 +100,7 @@ private:
     Plant heavy_;
     double foot_ = 0.0;
     bool started_ = false;
+    hal::Retained retained_{*this, {{"heavy", heavy_}, {"foot", foot_}, {"started", started_}}};
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 #include "linear.hpp"
 
 namespace {
@@ -95,6 +96,7 @@ struct TwoMass : hal::Component {
 private:
     using Plant = sim::Linear<4, 2>;
     Plant plant_;
+    hal::Retained retained_{*this, {{"plant", plant_}}};
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 #include "mobile/triangulation.hpp"
 
 namespace {
@@ -297,6 +298,14 @@ private:
     std::size_t number_ = 0;
     std::int64_t shortest_ns_ = 0;
     bool clock_known_ = false;
+    hal::Retained retained_{*this,
+                            {{"past", past_},
+                             {"last", last_},
+                             {"map", map_},
+                             {"accepted-ns", accepted_ns_},
+                             {"number", number_},
+                             {"shortest-ns", shortest_ns_},
+                             {"clock-known", clock_known_}}};
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 #include "mobile/to_target.hpp"
 
 namespace {
@@ -217,6 +218,12 @@ private:
     std::size_t count_ = 0;
     double last_ = 0.0;
     std::uint32_t echoes_ = 0;
+    hal::Retained retained_{*this,
+                            {{"points", points_},
+                             {"seen", seen_},
+                             {"count", count_},
+                             {"last", last_},
+                             {"echoes", echoes_}}};
 };
 
 }  // namespace

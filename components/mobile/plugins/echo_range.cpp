@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -100,6 +101,14 @@ private:
     std::uint32_t count_ = 0;
     bool begun_ = false;
     bool announced_ = false;
+    hal::Retained retained_{*this,
+                            {{"got", got_},
+                             {"found", found_},
+                             {"newest-ns", newest_ns_},
+                             {"step", step_},
+                             {"count", count_},
+                             {"begun", begun_},
+                             {"announced", announced_}}};
 };
 
 }  // namespace

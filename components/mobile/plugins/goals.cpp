@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 #include "hal/texts.hpp"
 #include "mobile/texts/goal_list.hpp"
 
@@ -66,6 +67,7 @@ private:
     }
     std::uint32_t at_ = 0;
     bool was_ = false;
+    hal::Retained retained_{*this, {{"at", at_}, {"was", was_}}};
 };
 
 }  // namespace

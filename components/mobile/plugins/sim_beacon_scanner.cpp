@@ -6,6 +6,7 @@
 
 #include "floor_argument.hpp"
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -95,6 +96,7 @@ private:
 
     double head_ = 0.0;
     std::uint64_t state_ = 0x9E3779B97F4A7C15u;
+    hal::Retained retained_{*this, {{"head", head_}, {"state", state_}}};
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include "floor_argument.hpp"
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -120,6 +121,13 @@ private:
     double last_left_ = 0.0;
     double last_right_ = 0.0;
     bool begun_ = false;
+    hal::Retained retained_{*this,
+                            {{"x", x_},
+                             {"y", y_},
+                             {"heading", heading_},
+                             {"last-left", last_left_},
+                             {"last-right", last_right_},
+                             {"begun", begun_}}};
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -187,6 +188,18 @@ private:
     std::int64_t next_ns_ = 0;
     std::uint32_t mode_ = 0;
     bool begun_ = false;
+    hal::Retained retained_{*this,
+                            {{"angle", angle_},
+                             {"speed", speed_},
+                             {"setpoint", setpoint_},
+                             {"profile", profile_},
+                             {"error", error_},
+                             {"command", command_},
+                             {"last", last_},
+                             {"rest-s", rest_s_},
+                             {"next-ns", next_ns_},
+                             {"mode", mode_},
+                             {"begun", begun_}}};
 };
 
 }  // namespace

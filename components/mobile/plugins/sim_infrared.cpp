@@ -6,6 +6,7 @@
 
 #include "floor_argument.hpp"
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -93,6 +94,7 @@ private:
     std::int64_t next_ns_ = 0;
     std::size_t at_ = 0;
     bool begun_ = false;
+    hal::Retained retained_{*this, {{"next-ns", next_ns_}, {"at", at_}, {"begun", begun_}}};
 };
 
 }  // namespace

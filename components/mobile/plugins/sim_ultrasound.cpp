@@ -6,6 +6,7 @@
 
 #include "floor_argument.hpp"
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -95,6 +96,13 @@ private:
     std::uint32_t position_ = 0;
     std::uint32_t sent_ = samples / per_message;
     bool begun_ = false;
+    hal::Retained retained_{*this,
+                            {{"record", record_},
+                             {"echo", echo_},
+                             {"pinged-ns", pinged_ns_},
+                             {"position", position_},
+                             {"sent", sent_},
+                             {"begun", begun_}}};
 };
 
 }  // namespace

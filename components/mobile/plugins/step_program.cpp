@@ -2,6 +2,7 @@
 #include <deque>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 #include "hal/texts.hpp"
 #include "mobile/texts/step_text.hpp"
 
@@ -42,7 +43,7 @@ public:
             enter(0, cycle);
             started_ = false;
             fired_ = 0;
-        } else if (!begun_) {
+        } else if (!begun_ || at_ >= program_.steps.size()) {  // a reload read another program
             enter(0, cycle);
         } else {
             advance(cycle);
@@ -120,6 +121,13 @@ public:
     hal::Out<double> step_time{*this, "step-time", "time since the step began", {.unit = "s"}};
     hal::Function run{*this, "update", &StepProgram::update,
                       "takes at most one transition and sets the outputs"};
+    hal::Retained retained_{*this,
+                            {{"entered-ns", entered_ns_},
+                             {"left-ns", left_ns_},
+                             {"fired", fired_},
+                             {"at", at_},
+                             {"begun", begun_},
+                             {"started", started_}}};
 };
 
 }  // namespace

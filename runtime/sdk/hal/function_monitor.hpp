@@ -60,6 +60,8 @@ public:
         silent_ns_ = 0;
     }
 
+    static constexpr bool retainable = true;  ///< by hal::Retained
+
 private:
     /// written by the monitored function
     std::atomic<std::uint64_t> runs_{0};

@@ -10,6 +10,7 @@
 
 #include "hal/component.hpp"
 #include "hal/corrected.hpp"
+#include "hal/retained.hpp"
 
 namespace hal {
 
@@ -28,14 +29,16 @@ public:
           valid_(first_limit(options.initial)),
           applies_(is_limit(options.initial) ? Applies::initial_value : Applies::nothing),
           self_(&component),
-          faults_(fault_record()) {}
+          faults_(fault_record()),
+          retained_(component, {{name, valid_}, {name, applies_}, {name, reported_}}) {}
     LimitPin(Component& component, const Function& function, const char* name, const char* doc,
              PinOptions<double> options = {})
         : P(component, function, name, doc, options),
           valid_(first_limit(options.initial)),
           applies_(is_limit(options.initial) ? Applies::initial_value : Applies::nothing),
           self_(&component),
-          faults_(fault_record()) {}
+          faults_(fault_record()),
+          retained_(component, {{name, valid_}, {name, applies_}, {name, reported_}}) {}
     LimitPin& operator=(double value) noexcept
         requires std::derived_from<P, Io<double>>
     {
@@ -94,6 +97,7 @@ private:
     mutable bool reported_ = false;
     const Component* self_;
     const hal_faults* faults_;
+    [[no_unique_address]] Retained retained_;
 };
 
 using Limit = LimitPin<In<double>>;
