@@ -189,7 +189,7 @@ private:
     double good_ = 0.0;
     double largest_ = 0.0;
     std::uint32_t fault_ = agree;
-    bool was_reset_ = false;
+    bool was_reset_ = true;  // TRUE from the first cycle on: not a rising edge
     bool was_ok_ = false;
     hal::Retained retained_{*this,
                             {{"for", for_},

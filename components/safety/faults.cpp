@@ -69,7 +69,7 @@ private:
     const hal_supervision* supervision_ = nullptr;
     std::uint64_t seen_ = 0;
     std::uint64_t acknowledged_ = no_count;  // count at the last edge of reset
-    bool was_reset_ = false;
+    bool was_reset_ = true;  // TRUE from the first cycle on: not a rising edge
     hal::Retained retained_{
         *this, {{"seen", seen_}, {"acknowledged", acknowledged_}, {"was-reset", was_reset_}}};
 };

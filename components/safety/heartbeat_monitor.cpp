@@ -207,7 +207,7 @@ private:
     std::uint32_t fault_ = alive;
     bool last_toggle_ = false;
     bool was_watched_ = false;
-    bool was_reset_ = false;
+    bool was_reset_ = true;  // TRUE from the first cycle on: not a rising edge
     bool first_ = true;
 
     bool was_ok_ = false;

@@ -165,7 +165,7 @@ private:
     std::uint64_t unheard_ = 0;
     std::uint64_t first_ = 0;
     std::int64_t phase_ns_ = 0;
-    bool was_reset_ = false;
+    bool was_reset_ = true;  // TRUE from the first cycle on: not a rising edge
     bool was_acknowledged_ = false;
     bool was_ok_ = false;
     bool waits_ = false;

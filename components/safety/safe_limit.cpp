@@ -327,7 +327,7 @@ private:
     std::uint32_t reason_ = not_reset;
     std::uint32_t returning_ = none;
     int known_ = 0;  // measurements so far: speed needs two, slew three
-    bool was_reset_ = false;
+    bool was_reset_ = true;  // TRUE from the first cycle on: not a rising edge
     bool has_run_ = false;
     bool may_return_ = false;
     hal::Retained retained_{*this,

@@ -51,7 +51,7 @@ struct SafetyLatch : hal::Component {
 private:
     std::int64_t count_ = 0;
     bool latched_ = false;
-    bool was_reset_ = false;
+    bool was_reset_ = true;  // TRUE from the first cycle on: not a rising edge
     hal::Retained retained_{*this,
                             {{"count", count_}, {"latched", latched_}, {"was-reset", was_reset_}}};
 };

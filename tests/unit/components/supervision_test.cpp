@@ -16,6 +16,7 @@ using hal::test::Instance;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 void press(Instance& instance) {
+    instance.run(1);
     instance.set("reset", true);
     instance.run(1);
     instance.set("reset", false);
