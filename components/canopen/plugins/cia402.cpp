@@ -10,6 +10,7 @@
 #include "hal/lasting_fault.hpp"
 #include "hal/limit.hpp"
 #include "hal/naming.hpp"
+#include "hal/retained.hpp"
 
 namespace {
 
@@ -365,6 +366,7 @@ private:
     Cause reported_ = Cause::none;
     // set by interrupt() in any thread, taken by act()
     std::atomic<bool> interrupted_{false};
+    hal::Retained retained_{*this, {{"axis", axis_}, {"interrupted", interrupted_}}};
 };
 
 }  // namespace
@@ -390,7 +392,7 @@ the state machine of the drive and steps it towards the commanded state, one tra
   pin to what removes the power by other means, such as a contactor. On CANopen, `restart` of the node is one more try: it resets the drive by NMT,
   which does not depend on its PDOs. `keeps-power` stays TRUE until the drive is seen without power or is enabled again.
 * When the thread is stopped (`stop`, an exception, a hang, a suspended process), the axis is disabled without a fault. When the thread
-  runs again, the axis stays off until `enable` has another rising edge.
+  runs again, the axis stays off until `enable` has another rising edge. `reload cia402` acts like such a stop and keeps a fault.
 * `mode` may change at any time; the command is followed once the drive displays the new mode.
 * `halt` brakes on the drive's ramp in modes 1 to 7. In the cyclic modes the target freezes, or drops to 0, at once: bring the command to
   rest first.
