@@ -52,11 +52,29 @@ bool is_pdo(std::uint16_t index) {
 
 }  // namespace
 
+/// Gives an integer of a drive the sign that CiA 402 has for its object: descriptions declare
+/// target positions as UDINT.
+void SlavePdos::correct_sign(std::uint16_t index, std::uint8_t sub, unsigned bits,
+                             master::Type& type) const {
+    Known profile = profile_object(index, sub, in_.info.cia402_axes);
+    // descriptions name sub-indices that a variable does not have
+    if (profile.bits == 0) profile = profile_object(index, 0, in_.info.cia402_axes);
+    if (profile.bits == bits && !is_real(type)) type = profile.type;
+}
+
 Known SlavePdos::known(std::uint16_t index, std::uint8_t sub) const {
     if (device_ == nullptr) return profile_object(index, sub, std::max(in_.info.cia402_axes, 1U));
-    if (const Known found = dictionary_object(*device_, index, sub); found.bits != 0) return found;
+    const auto corrected = [&](Known found) {
+        correct_sign(index, sub, found.bits, found.type);
+        return found;
+    };
+    if (const Known found = dictionary_object(*device_, index, sub); found.bits != 0) {
+        return corrected(found);
+    }
     for (const auto* pdos : {&device_->rx, &device_->tx}) {
-        if (const Known found = mapped_object(*pdos, index, sub); found.bits != 0) return found;
+        if (const Known found = mapped_object(*pdos, index, sub); found.bits != 0) {
+            return corrected(found);
+        }
     }
     // a description with a dictionary has all objects
     if (!device_->objects.empty()) return {};
@@ -262,6 +280,7 @@ void SlavePdos::assign(const esi::Pdo& from, master::SyncManager& to) {
         entry.bits = e.bits;
         if (e.index != 0) {
             entry.type = described_type(e.type, e.bits);
+            correct_sign(e.index, e.sub, e.bits, entry.type);
             entry.is_signed = is_signed(entry.type);
             entry.name = dashed(e.name);
             if (entry.name.empty()) {

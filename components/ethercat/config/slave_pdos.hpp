@@ -35,6 +35,7 @@ public:
     std::optional<ObjectAddress> find(std::string_view name) const;
 
 private:
+    void correct_sign(std::uint16_t index, std::uint8_t sub, unsigned bits, master::Type&) const;
     std::uint8_t manager_number(bool output);
     master::SyncManager manager(bool output);
     master::SyncManager further_manager(const master::SyncManager& first, unsigned number) const;

@@ -85,6 +85,41 @@ TEST(EthercatConfig, Drives_of_a_type_have_its_PDOs_clocks_and_writes) {
     EXPECT_EQ(io.sync_managers[0].pdos[0].entries[0].type, master::Type::bit);
 }
 
+TEST(EthercatConfig, Objects_of_a_drive_have_the_sign_of_CiA_402) {
+    const auto description = [](const std::string& profile) {
+        const auto entry = [](const std::string& index, const std::string& type) {
+            return "<Entry><Index>#x" + index +
+                   "</Index><SubIndex>4</SubIndex><BitLen>32</BitLen><Name>" + index +
+                   "</Name><DataType>" + type + "</DataType></Entry>";
+        };
+        return [=](const std::string&, std::string& bytes) {
+            bytes =
+                "<EtherCATInfo><Vendor><Id>1</Id></Vendor><Descriptions><Devices><Device>"
+                "<Type ProductCode='1'>D</Type>" +
+                profile +
+                "<Sm StartAddress='#x1100' ControlByte='#x24'>Outputs</Sm><RxPdo Sm='0' "
+                "Fixed='1'><Index>#x1600</Index>" +
+                entry("607A", "UDINT") + entry("60FE", "UDINT") + entry("60FF", "REAL") +
+                "</RxPdo></Device></Devices></Descriptions></EtherCATInfo>";
+            return true;
+        };
+    };
+    const auto types = [&](const std::string& profile) {
+        const Reading r =
+            read("[bus]\n[slave 0 d]\nesi = d.xml\n", "d.ethercat", description(profile));
+        std::vector<master::Type> all;
+        for (const master::Entry& e :
+             r.buses.at(0).setup.slaves.at(0).sync_managers.at(0).pdos.at(0).entries) {
+            all.push_back(e.type);
+        }
+        return all;
+    };
+    using master::Type;
+    EXPECT_EQ(types("<Profile><ProfileNo>402</ProfileNo></Profile>"),
+              (std::vector{Type::s32, Type::u32, Type::real32}));
+    EXPECT_EQ(types(""), (std::vector{Type::u32, Type::u32, Type::real32})) << "not a drive";
+}
+
 TEST(EthercatConfig, Drive_without_a_description_has_the_objects_of_its_profile) {
     const Bus bus = good(
         "[bus]\n[slave 0 a]\ndevice = cia402\naxes = 2\nproduct = 0x10\nvendor = 1\nrevision = "
