@@ -65,7 +65,7 @@ class CoeHeader(ctypes.Structure):
 
 
 def prepared(message, own=SDOMessage.__post_init__):
-    """Two headers of the package are structures of bit fields of different types, which only a compiler of Microsoft puts into one word; without these
+    """Two headers of the package are structures of bit fields of different types, which only a compiler of Microsoft places as meant; without these
     it sends zeros here."""
     own(message)
     message.ethercat_header, message.coe_header = EthernetHeader(), CoeHeader()
