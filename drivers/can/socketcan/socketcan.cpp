@@ -18,6 +18,7 @@
 #include "hal/queue.hpp"
 #include "kernel_frames.hpp"
 #include "link/counting.hpp"
+#include "link/drop_counter.hpp"
 #include "link/system.hpp"
 
 namespace hal::can::socketcan {
@@ -73,7 +74,6 @@ link::Descriptor make_socket(int index, const Options& o, const std::vector<can_
     }
     if (o.stamps) {
         set(fd.get(), SOL_SOCKET, SO_TIMESTAMPNS, yes);
-        set(fd.get(), SOL_SOCKET, SO_RXQ_OVFL, yes);
     }
     set(fd.get(), SOL_SOCKET, SO_RCVTIMEO, receive_timeout);
     // the kernel's cost of a frame
@@ -289,6 +289,9 @@ private:
         const int got = ::recvmmsg(socket_.get(), in_, static_cast<unsigned>(max), flags, nullptr);
         const int error = errno;
         last_batch_short_ = got < static_cast<int>(max);
+        Counting::add(counting_.lost,
+                      drops_.update(socket_.get(), got > 0 ? static_cast<std::size_t>(got) : 0,
+                                    last_batch_short_));
         if (got < 0 && (error == ENETDOWN || error == ENODEV || error == ENXIO)) {
             lose_interface();
         }
@@ -367,11 +370,6 @@ private:
                 timespec t{};
                 std::memcpy(&t, CMSG_DATA(c), sizeof t);
                 time_ns = t.tv_sec * 1'000'000'000LL + t.tv_nsec + offset;
-            } else if (c->cmsg_type == SO_RXQ_OVFL) {
-                std::uint32_t lost = 0;
-                std::memcpy(&lost, CMSG_DATA(c), sizeof lost);
-                Counting::add(counting_.lost, lost - lost_before_);
-                lost_before_ = lost;
             }
         }
         return time_ns;
@@ -439,8 +437,7 @@ private:
     mmsghdr in_[batch]{};
     iovec parts_[batch]{};
     canfd_frame raw_[batch]{};
-    alignas(cmsghdr) char control_[batch][CMSG_SPACE(sizeof(timespec)) +
-                                          CMSG_SPACE(sizeof(std::uint32_t))]{};
+    alignas(cmsghdr) char control_[batch][CMSG_SPACE(sizeof(timespec))]{};
     Frame buffer_[batch];
     std::size_t next_ = 0;
     std::size_t filled_ = 0;
@@ -451,7 +448,7 @@ private:
     bool waited_ = false;
     bool several_ = false;
     unsigned waits_ = 0;
-    std::uint32_t lost_before_ = 0;
+    link::DropCounter drops_;
 
     ControllerMonitor monitor_;  // last: its thread uses all of the above, and ends first
 };

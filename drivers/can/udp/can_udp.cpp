@@ -13,6 +13,7 @@
 
 #include "datagram.hpp"
 #include "hal/queue.hpp"
+#include "link/drop_counter.hpp"
 #include "link/filtering.hpp"
 #include "link/system.hpp"
 
@@ -96,7 +97,6 @@ link::Descriptor receiver(const Place& p, const Options& o, std::string& problem
     set(fd.get(), SOL_SOCKET, SO_REUSEADDR, yes);
     set(fd.get(), SOL_SOCKET, SO_REUSEPORT, yes);
     set(fd.get(), SOL_SOCKET, SO_TIMESTAMPNS, yes);
-    set(fd.get(), SOL_SOCKET, SO_RXQ_OVFL, yes);
     // the kernel's cost of a datagram
     const int buffer_bytes =
         static_cast<int>((o.receive_capacity < 65536 ? o.receive_capacity : 65536) * 1024);
@@ -236,8 +236,7 @@ private:
         mmsghdr messages[batch]{};
         iovec parts[batch]{};
         sockaddr_storage from[batch];
-        alignas(cmsghdr) char
-            control[batch][CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t))];
+        alignas(cmsghdr) char control[batch][CMSG_SPACE(sizeof(timespec))];
         for (std::size_t i = 0; i < batch; ++i) {
             parts[i] = {in_buffers_[i].data(), in_buffers_[i].size()};
             messages[i].msg_hdr.msg_iov = &parts[i];
@@ -251,6 +250,9 @@ private:
         next_ = filled_ = 0;
         requested_at_ = now_ns;
         was_short_ = got < static_cast<int>(batch);
+        Counting::add(
+            counting_.lost,
+            drops_.update(in_.get(), got > 0 ? static_cast<std::size_t>(got) : 0, was_short_));
         counting_.tick(now_ns != unclocked ? now_ns : link::monotonic_ns());
         const auto offset = got > 0 ? link::real_to_monotonic_ns() : 0;
         for (int i = 0; i < got; ++i) {
@@ -263,11 +265,6 @@ private:
                     timespec t{};
                     std::memcpy(&t, CMSG_DATA(c), sizeof t);
                     time = t.tv_sec * 1'000'000'000LL + t.tv_nsec + offset;
-                } else if (c->cmsg_type == SO_RXQ_OVFL) {
-                    std::uint32_t lost = 0;
-                    std::memcpy(&lost, CMSG_DATA(c), sizeof lost);
-                    Counting::add(counting_.lost, lost - lost_before_);
-                    lost_before_ = lost;
                 }
             }
             if ((header.msg_flags & MSG_TRUNC) != 0 ||
@@ -314,7 +311,7 @@ private:
     std::size_t filled_ = 0;
     std::int64_t requested_at_ = unclocked;
     bool was_short_ = false;
-    std::uint32_t lost_before_ = 0;
+    link::DropCounter drops_;
 };
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <atomic>
 #include <cstring>
 
+#include "link/drop_counter.hpp"
 #include "link/system.hpp"
 #include "link/trace_frame.hpp"
 #include "text/numbers.hpp"
@@ -157,6 +158,8 @@ public:
                 set_up(false);
                 continue;
             }
+            lost_.fetch_add(drops_.update(socket_.get(), got < 0 ? 0 : 1, got < 0),
+                            std::memory_order_relaxed);
             if (got < 0) return std::nullopt;
             const auto now = link::monotonic_ns();
             set_up(true);
@@ -213,6 +216,7 @@ public:
         s.sent_bytes = read(sent_bytes_);
         s.received = read(received_);
         s.received_bytes = read(received_bytes_);
+        s.lost = read(lost_);
         s.dropped = read(dropped_);
         s.late = read(late_);
         s.errors = read(errors_);
@@ -343,6 +347,8 @@ private:
     Count sent_bytes_{0};
     Count received_{0};
     Count received_bytes_{0};
+    link::DropCounter drops_;  // used by the receiving thread
+    Count lost_{0};
     Count dropped_{0};
     Count late_{0};
 
