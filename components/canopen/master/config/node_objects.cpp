@@ -200,8 +200,8 @@ const bus::KeyTable<ObjectTarget>& option_keys() {
          "name of the pin"},
         {"safe", bus::own("a value of the pin, or hold", "a value, hold", &read_safe), "see below",
          "safe value. The master sends it for an output while the node is not operational and when "
-         "the machine stops; the pin of an input shows it while the node is not operational. "
-         "`hold`: the last value"},
+         "the machine stops; the pin of an input shows it while the node is not operational and "
+         "while the thread of the master is stopped. `hold`: the last value"},
     }};
     return table;
 }
