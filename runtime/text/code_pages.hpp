@@ -545,7 +545,10 @@ inline constexpr CodePage code_pages[] = {
      "A parameter or an input whose value had been set is missing in the new version of the "
      "component, or has a different type. The "
      "reload took effect, and the value is lost.\n\n"
-     "A `setp` of this name in the netlist will fail the next time the netlist is loaded."},
+     "A `setp` of this name in the netlist will fail the next time the netlist is loaded.\n\n"
+     "The same is reported of a variable with state that is missing in the new version or has a "
+     "different type: the new instance begins without it, as after `loadrt`. Stop the machine "
+     "before such a reload where that matters."},
     {"scocan-line",
      "A line of a SCoCAN table is invalid at its position: an unknown or duplicate key, an "
      "incomplete line, or a slot outside of a mode.\n\n"
