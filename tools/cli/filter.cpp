@@ -17,6 +17,7 @@ namespace hal::tools {
 
 std::string run_filter(const std::vector<const char*>& arguments, std::string_view input,
                        std::string& output, const char* package) {
+    output.clear();
     int in[2], out[2];
     if (::pipe2(in, O_CLOEXEC) != 0) return std::strerror(errno);
     if (::pipe2(out, O_CLOEXEC) != 0) {
