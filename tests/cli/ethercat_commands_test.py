@@ -675,9 +675,12 @@ class Interface(Ethercat):
         if os.environ.get(VARIABLE) != "1":
             self.skipTest("no network namespaces here")
         subprocess.run(
-            "ip link add left type veth peer name right && ip link set left up",
+            "ip link add left type veth peer name right && ip link set left up;"
+            # the kernel notices a missing carrier a little later
+            " until ip -oneline link show left | grep -q LOWERLAYERDOWN; do sleep 0.01; done",
             shell=True,
             check=True,
+            timeout=20,
         )
         self.assertEqual(
             "hal ethercat scan: eth:left has no link; check the cable and the supply of the first slave\n",
