@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 # packages: linuxcnc
 """hal linuxcnc: TWOPASS, includes, and netlists in Tcl."""
+
 import shutil
 import subprocess
 import unittest
@@ -61,7 +62,10 @@ class LinuxcncNetlists(LinuxcncCase):
         if done.returncode == 77:
             self.skipTest(done.stderr.strip())
         self.assertEqual(
-            (1, "bring-up: cannot read 'nothing.ngc'; write bring-up [PROGRAM.ngc]\n"),
+            (
+                1,
+                "bring-up: cannot read 'nothing.ngc'; write bring-up [PROGRAM.ngc] [--output FOLDER]\n",
+            ),
             (done.returncode, done.stderr),
         )
 
