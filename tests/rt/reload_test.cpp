@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // A reload of an unchanged component is invisible: two machines with the same inputs at random, one
 // of which reloads, have the same values in every cycle.
+#include <filesystem>
 #include <set>
+#include <string>
 
 #include "rt/any_component.hpp"
 #include "unit/machine.hpp"
@@ -35,6 +37,10 @@ const std::map<std::string, const char*> exceptions{
     {"scocan_bridge", "a network, which is started again"},
     {"scocan_monitor", "a network, which is started again"},
     {"scocan_sync", "a network, which is started again"},
+    {"vision_blob", "a camera, which is opened again"},
+    {"vision_line", "a camera, which is opened again"},
+    {"vision_marker", "a camera, which is opened again"},
+    {"vision_pendulum", "a camera, which is opened again"},
     {"lcd", "the display, which is cleared and written again"},
 };
 
@@ -118,10 +124,22 @@ TEST_P(Reload, with_unchanged_source_is_invisible_in_two_threads) { compare(true
 INSTANTIATE_TEST_SUITE_P(Of, Reload, testing::ValuesIn(all_components()),
                          [](const auto& component) { return component.param; });
 
+/// Returns the names of the source files of all components, also of those that this build leaves
+/// out.
+std::set<std::string> sources_of_components() {
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator("components")) {
+        if (entry.path().extension() == ".cpp") {
+            names.insert(entry.path().stem().string());
+        }
+    }
+    return names;
+}
+
 TEST(Reload_exceptions, are_components) {
-    const std::vector<std::string> all = all_components();
+    const std::set<std::string> sources = sources_of_components();
     for (const auto& [name, reason] : exceptions) {
-        EXPECT_TRUE(std::ranges::binary_search(all, name)) << name << ": " << reason;
+        EXPECT_TRUE(sources.contains(name)) << name << ": " << reason;
     }
 }
 

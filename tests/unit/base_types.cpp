@@ -165,9 +165,12 @@ TEST(Float_value, does_not_depend_on_the_locale) {
 }
 
 TEST(Float_value, is_refused_when_it_is_none_or_too_large) {
-    for (const char* text : {"", "-", "1,5", " 1", "1 ", "1e", "abc", "0x", "1.5mm"}) {
+    for (const char* text :
+         {"", "-", "1,500", "1,5,5", ",5", "1,", " 1", "1 ", "1e", "abc", "0x", "1.5mm"}) {
         EXPECT_EQ(problem(HAL_TYPE_FLOAT, text), "'" + std::string(text) + "' is not a number");
     }
+    EXPECT_EQ(problem(HAL_TYPE_FLOAT, "1,5"), "'1,5' is not a number; write 1.5");
+    EXPECT_EQ(problem(HAL_TYPE_FLOAT, "-0,25"), "'-0,25' is not a number; write -0.25");
     EXPECT_EQ(problem(HAL_TYPE_FLOAT, std::string_view("1\0", 2)),
               std::string("'1\0' is not a number", 20));
     EXPECT_EQ(problem(HAL_TYPE_FLOAT, "1e999"),
