@@ -19,8 +19,8 @@ public:
     /// The thread exists from now on, or is about to end: then its remaining cycles are executed.
     virtual void begin(Core& core) = 0;
     virtual void end(Core& core) = 0;
-    /// Executes the next cycle whose inputs exist. Returns false when there is none: the session
-    /// has to do something, or the journal ends.
+    /// Executes the next cycle whose inputs exist. Returns false if the session
+    /// must act before any cycle can run, or if the journal ends.
     virtual bool step() = 0;
     /// Returns when the newest cycle woke, on the clock of the journaled machine.
     virtual std::int64_t now_ns() const = 0;

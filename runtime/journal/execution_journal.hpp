@@ -67,7 +67,7 @@ public:
     /// Returns why nothing, or nothing more, is written: a reason without the name of the file; ""
     /// when nothing failed. [any]
     std::string problem() const;
-    /// After close(): the file that has what was written; "" when there is none.
+    /// Returns the path of the written file, valid after close(); empty if nothing was written.
     std::string where() const { return writer_.where(); }
     const std::string& kept() const { return writer_.kept(); }
     std::uint64_t cycles() const { return cycles_; }  ///< after close()

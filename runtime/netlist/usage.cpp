@@ -92,7 +92,7 @@ const std::vector<std::vector<UsageWord>>& usage_forms(std::string_view argument
 
 namespace {
 
-/// Returns what to type for `NAME VALUE` with an equals sign between them; empty: there is none.
+/// Returns what to type in place of `NAME = VALUE`; empty for any other arguments.
 std::string without_equals_sign(std::string_view command, std::span<const Token> args) {
     if (args.size() != 3 || args[1].text != "=") return {};
     return "write it without '=': " + std::string(command) + " " + args[0].text + " " +

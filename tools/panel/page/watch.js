@@ -232,11 +232,13 @@ export class View {
 
     /// Sets a value, and keeps the one before it for undo().
     async set(name, value) {
-        const old = await request({read: [name]}), reply = await request({set: {[name]: value}});
+        const old = await request({read: [name]});
+        const reply = await request({set: {[name]: value}});
         if (!reply.ok) return this.reject(causeOf(reply.error));
         this.reject('');
         announce(`${name} set`);
-        const before = old.ok ? old.values[0] : null, type = this.all.get(name)?.type;
+        const before = old.ok ? old.values[0] : null;
+        const type = this.all.get(name)?.type;
         const exact = before !== null &&
             (type === 'float' || typeof before !== 'number' || Number.isSafeInteger(before));
         this.before = exact ? {name, value: before} : null;
