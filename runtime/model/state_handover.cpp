@@ -34,6 +34,8 @@ std::vector<plan::Handover> copies(const Instance& from, const Instance& to) {
     std::vector<plan::Handover> all;
     const auto targets = by_key(to);
     for (const auto& [key, source] : by_key(from)) {
+        // an array without elements has no memory, and memcpy() takes no null pointer
+        if (source->bytes == 0) continue;
         if (const Variable* const target = counterpart(targets, key, *source)) {
             all.push_back({target->memory, source->memory, source->bytes});
         }
