@@ -13,7 +13,7 @@ class Views(Page):
         self.browser.wait(
             "Number(document.querySelector('[data-thread=servo] .figures dd:nth-of-type(2)')?.textContent) > 10"
         )
-        self.assertIn("No faults", self.browser.evaluate("document.body.innerText"))
+        self.browser.wait("/No faults/.test(document.body.innerText)")
         self.end(self.machine, 9)
         self.browser.wait(
             "document.body.classList.contains('stale') && /not running/.test(document.getElementById('banner').textContent)"

@@ -147,7 +147,12 @@ class Tdma(Case):
         online = re.compile(
             r"(?m)^x +online +\S+ s +\d+ +\d+ +[-+]\d+\.\d ppm  0: 300 us, 2: 500 us in 1 of 2 cycles$"
         )
-        wait_until(lambda: online.search(self.good("tdma", "status")), "x is heard")
+
+        def is_heard():  # a station without values to send is heard only when it answers
+            self.answered("x", 1)
+            return online.search(self.good("tdma", "status"))
+
+        wait_until(is_heard, "x is heard")
 
         # It is heard no more: its thread does nothing.
         for function in ("receive", "transmit"):
