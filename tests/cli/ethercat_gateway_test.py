@@ -6,15 +6,9 @@ import socket
 import struct
 import unittest
 
-from harness import ROOT, Case, wait_until
+from harness import ROOT, Case, free_port, wait_until
 
 MACHINE = ROOT / "halfiles/ethercat-servo"
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def upload(station, index, sub):
@@ -37,7 +31,7 @@ class Gateway(Case):
 
     def setUp(self):
         super().setUp()
-        self.port = free_port()
+        self.port = free_port(socket.SOCK_STREAM)
         self.address = f"gateway:127.0.0.1:{self.port}"
 
     def test_objects_of_a_running_machine(self):

@@ -6,20 +6,13 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 import unittest
 
-from harness import HAL, ROOT, SANITIZED, Case, wait_until
+from harness import HAL, ROOT, SANITIZED, Case, free_port, wait_until
 
 MACHINE = ROOT / "halfiles/ethercat-servo"
 UNPRIVILEGED = ("setpriv", "--bounding-set=-all", "--inh-caps=-all")
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class Udp(Case):

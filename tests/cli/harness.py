@@ -10,6 +10,7 @@ import re
 import select
 import shutil
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -105,6 +106,13 @@ def undisturbed(error):
         return None
     error = re.sub(r"(?m)^fault: .* \[overrun\].*\n", "", error)
     return re.sub(r"(?m)^==\d+==WARNING: ASan doesn't fully support makecontext.*\n", "", error)
+
+
+def free_port(kind=socket.SOCK_DGRAM):
+    """A port of this machine that nobody uses now."""
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
 
 
 def wait_until(predicate, what):

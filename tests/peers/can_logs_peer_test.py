@@ -10,19 +10,14 @@ import sys
 import tempfile
 from pathlib import Path
 
+from checks import check, checked
+
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from peers import package  # noqa: E402
 
 (can,) = package("can")
 
 HAL = sys.argv[1]
-failed = 0
-
-
-def check(what, good, seen=""):
-    global failed
-    failed += not good
-    print(f"{'ok    ' if good else 'FAILED'} {what}" + (f": {seen}" if not good else ""))
 
 
 def messages(flexible=True):
@@ -172,4 +167,4 @@ with tempfile.TemporaryDirectory() as temporary:
             for frame in wanted
         ]
         check("candump's terminal format of log2long", frames == without_flags, (frames, error))
-sys.exit(failed != 0)
+sys.exit(checked())

@@ -6,37 +6,19 @@ and our NMT master, all on the `udp:` bus. 77: the package or multicast is missi
 import subprocess
 import sys
 import threading
-import time
 
 import peers
+from checks import check, checked, wait_for
 
 can, canopen = peers.packages()
 
 GROUP, PORT = "239.74.163.78", 43178
 ADDRESS = f"udp:{GROUP}:{PORT}"
 SIZES = [1, 4, 5, 7, 8, 14, 21, 889, 890, 1000, 10000]
-checks = []
-
-
-def check(name, holds, *seen):
-    checks.append(bool(holds))
-    print(
-        f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}",
-        flush=True,
-    )
 
 
 def pattern(size, seed):
     return bytes((n * 7 + seed + (n >> 8)) & 0xFF for n in range(size))
-
-
-def wait_for(condition, seconds=5.0):
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.005)
-    return False
 
 
 def dictionary():
@@ -261,8 +243,7 @@ def main():
     for part in (our_device, our_client, our_master):
         part(sys.argv[1], network)
     network.disconnect()
-    print(f"{sum(checks)} of {len(checks)} checks hold")
-    return 0 if checks and all(checks) else 1
+    return checked()
 
 
 if __name__ == "__main__":

@@ -9,10 +9,10 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
 import zlib
 
 import peers
+from checks import check, checked, wait_for
 
 can, canopen = peers.packages()
 
@@ -20,24 +20,6 @@ GROUP, PORT = "239.74.163.79", 43179
 HAL = sys.argv[1]
 TEMPORARY = tempfile.TemporaryDirectory(prefix="hal-devices-")  # gone at the end of the program
 FOLDER = TEMPORARY.name
-checks = []
-
-
-def check(name, holds, *seen):
-    checks.append(bool(holds))
-    print(
-        f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}",
-        flush=True,
-    )
-
-
-def wait_for(condition, seconds=20.0):
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.005)
-    return False
 
 
 class Device:
@@ -252,8 +234,7 @@ def main():
     for part in (io, drive, jr3, bootloader):
         part(network)
     network.disconnect()
-    print(f"{sum(checks)} of {len(checks)} checks hold")
-    return 0 if checks and all(checks) else 1
+    return checked()
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@
 import asyncio
 import ctypes
 import logging
+import os
 import re
 import socket
 import subprocess
@@ -15,6 +16,7 @@ import time
 from pathlib import Path
 
 import peers
+from checks import check, checked
 
 peers.package("pyetg1510")
 from pyetg1510 import ETG1510Profile, EtherCATMasterConnection, MasterODSpecification  # noqa: E402
@@ -39,15 +41,6 @@ HAL = sys.argv[1]
 LIMIT_S = 60
 HEADER = (("Length", 11), ("Reserved", 1), ("DataType", 4))
 COE_HEADER = (("Number", 9), ("Reserved", 3), ("Service", 4))
-checks = []
-
-
-def check(name, holds, *seen):
-    checks.append(bool(holds))
-    print(
-        f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}",
-        flush=True,
-    )
 
 
 def free_port():
@@ -117,6 +110,7 @@ def machine(folder, port):
         program = subprocess.Popen(
             [Path(HAL).resolve(), "run", "two.hal"],
             cwd=folder,
+            env={**os.environ, "XDG_RUNTIME_DIR": str(folder)},
             stdin=subprocess.DEVNULL,
             stdout=out,
             stderr=out,
@@ -144,5 +138,4 @@ with tempfile.TemporaryDirectory(prefix="hal-gateway-") as name:
     finally:
         program.terminate()
         program.wait(LIMIT_S)
-print(f"{sum(checks)} of {len(checks)} checks hold")
-sys.exit(0 if checks and all(checks) else 1)
+sys.exit(checked())

@@ -10,19 +10,11 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "cli"))
 import ethercat_line  # noqa: E402
 import peers  # noqa: E402
+from checks import check, checked  # noqa: E402
 from ethercat_line import wait_for  # noqa: E402
 
 (kickcat,) = peers.package("kickcat")
 HAL = sys.argv[1]
-checks = []
-
-
-def check(name, holds, *seen):
-    checks.append(bool(holds))
-    print(
-        f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}",
-        flush=True,
-    )
 
 
 def initialise(bus, attempts=5):
@@ -113,5 +105,4 @@ def run(log):
 ethercat_line.network()
 with ethercat_line.line(HAL, "servo\ndigital_out bits=8\ndigital_in bits=8\n") as node:
     run(node.log)
-print(f"{sum(checks)} of {len(checks)} checks hold")
-sys.exit(0 if checks and all(checks) else 1)
+sys.exit(checked())

@@ -11,19 +11,11 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "cli"))
 import ethercat_line  # noqa: E402
 import peers  # noqa: E402
+from checks import check, checked  # noqa: E402
 from ethercat_line import wait_for  # noqa: E402
 
 (pysoem,) = peers.package("pysoem")
 HAL = sys.argv[1]
-checks = []
-
-
-def check(name, holds, *seen):
-    checks.append(bool(holds))
-    print(
-        f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}",
-        flush=True,
-    )
 
 
 def abort_code(transfer):
@@ -189,5 +181,4 @@ with ethercat_line.line(
         run(node.log)
     finally:
         master.close()
-print(f"{sum(checks)} of {len(checks)} checks hold")
-sys.exit(0 if checks and all(checks) else 1)
+sys.exit(checked())

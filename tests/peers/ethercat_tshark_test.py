@@ -14,6 +14,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from checks import skip
+
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests/cli"))
 import ethercat_line  # noqa: E402
@@ -64,11 +66,6 @@ FMMUS = [  # of each drive: register, logical start, length, physical start, rea
     ],
 ]
 wrong, compared = [], 0
-
-
-def skip(reason):
-    print(reason)
-    sys.exit(77)
 
 
 def wait_for(condition, what, seconds=60.0):

@@ -9,6 +9,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from checks import skip
+
 HERE = Path(__file__).resolve().parent
 os.environ["HAL_BIN"] = sys.argv[1]
 sys.path.insert(0, str(HERE.parent / "cli"))
@@ -30,11 +32,6 @@ start
 """
 )
 CHECKS = 14
-
-
-def skip(why):
-    print(why)
-    sys.exit(77)
 
 
 def install():

@@ -8,6 +8,8 @@ import os
 import sys
 from pathlib import Path
 
+from checks import skip
+
 HERE = Path(__file__).resolve().parent
 os.environ["HAL_BIN"] = sys.argv[1]
 sys.path.insert(0, str(HERE.parent / "cli"))
@@ -24,11 +26,6 @@ COUNT = """(() => {
     const count = node => node.widget === 'tablerow' ? 0 : 1 + (node.children ?? []).reduce((sum, child) => sum + count(child), 0);
     return [count(halcyon.panel.root), document.querySelectorAll('.w-root, .w-root [data-widget]').length];
 })()"""
-
-
-def skip(why):
-    print(why)
-    sys.exit(77)
 
 
 def panels():

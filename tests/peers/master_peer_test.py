@@ -8,10 +8,10 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import peers
+from checks import SKIPPED, check, checked, wait_for
 
 can, canopen = peers.packages()
 types = canopen.objectdictionary.datatypes
@@ -25,8 +25,6 @@ ENVIRONMENT = {
     "LC_ALL": "C.UTF-8",
     "TERM": "dumb",
 }
-checks = []
-
 CONFIGURATION = """[bus]
 link = {link}
 sync = 50ms
@@ -50,14 +48,6 @@ addf canopen.0.receive  servo
 addf canopen.0.transmit servo
 start
 """
-
-
-def check(name, holds, *seen):
-    checks.append(bool(holds))
-    print(
-        f"{'ok  ' if holds else 'FAIL'} {name} {' '.join(map(str, seen)) if not holds else ''}",
-        flush=True,
-    )
 
 
 def shell(*words):
@@ -145,16 +135,6 @@ class Device:
             for entry in mapping
         )
         self.network.send_message(cob & 0x7FF, data)
-
-
-def wait_for(condition, seconds=120.0):
-    """Waits for an event: the time only ends a test that would wait for ever, on a busy host too."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.02)
-    return False
 
 
 def run(what, network, link):
@@ -271,10 +251,7 @@ def main():
     udp()
     slcan()
     shutil.rmtree(FOLDER)
-    print(f"{sum(checks)} of {len(checks)} checks hold")
-    if not checks:
-        return 77
-    return 0 if all(checks) else 1
+    return checked(if_none=SKIPPED)
 
 
 if __name__ == "__main__":

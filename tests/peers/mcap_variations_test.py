@@ -10,6 +10,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from checks import check, checked
+
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from peers import package  # noqa: E402
 
@@ -24,13 +26,6 @@ HAL = sys.argv[1]
 BEGIN = 1_700_000_000_000_000_000
 PERIOD = 1_000_000
 ROWS = 60
-failed = 0
-
-
-def check(what, good, seen=""):
-    global failed
-    failed += not good
-    print(f"{'ok    ' if good else 'FAILED'} {what}" + (f": {seen}" if not good else ""))
 
 
 def hal(folder, *words):
@@ -481,4 +476,4 @@ with tempfile.TemporaryDirectory() as temporary:
     messages_with_texts(place)
     profile(place)
     live(place)
-sys.exit(failed != 0)
+sys.exit(checked())

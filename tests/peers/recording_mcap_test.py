@@ -8,6 +8,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from checks import check, checked
+
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from peers import package  # noqa: E402
 
@@ -31,14 +33,6 @@ newsig no-thread s32
 sets no-thread -7
 start
 """
-
-failed = 0
-
-
-def check(what, good, seen=""):
-    global failed
-    failed += not good
-    print(f"{'ok    ' if good else 'FAILED'} {what}" + (f": {seen}" if not good else ""))
 
 
 class Counted:
@@ -227,4 +221,4 @@ with tempfile.TemporaryDirectory() as folder:
         text=True,
     ).stdout
     check("replay does not mention the second copy", "not read" not in said, said)
-sys.exit(failed != 0)
+sys.exit(checked())

@@ -10,6 +10,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from checks import check, checked
+
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from peers import package  # noqa: E402
 
@@ -39,13 +41,6 @@ device = cia401
 """
 CLEARED, NEEDED = 1, 2  # TracePacket.SequenceFlags
 MONOTONIC = 3
-failed = 0
-
-
-def check(what, good, seen=""):
-    global failed
-    failed += not good
-    print(f"{'ok    ' if good else 'FAILED'} {what}" + (f": {seen}" if not good else ""))
 
 
 def unknown(message):
@@ -228,5 +223,4 @@ check(
     "counters of latency and execution",
     {"fast wake-up latency", "fast execution time"} <= {one[0] for one in replay.counters},
 )
-print(f"{failed} failed")
-sys.exit(1 if failed else 0)
+sys.exit(checked())
