@@ -178,10 +178,11 @@ void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
 }
 
 void Axis::walk(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
-    if (!in_.operational) {  // nothing reaches the drive; when it returns, it is commanded off
+    if (!in_.operational) {
+        // Its feedback is lost; it may still receive. A quick stop brakes, and enables nothing.
         walk_.want(State::switch_on_disabled, Request::disable);
         enabled_ = false;
-        orders_.controlword = command::disable_voltage;
+        orders_.controlword = command::quick_stop;
         disable_sent_ = true;
         disable_sent_at_ = now;
         return;

@@ -176,7 +176,8 @@ struct Cia402 : hal::Component {
     hal::In<std::uint32_t> probe_status{*this, "touch-probe-status", "60B9h; optional"};
     hal::In<std::uint32_t> error_code{*this, "error-code",
                                       "603Fh, or the emcy pin of the node; optional"};
-    hal::Out<std::uint32_t> controlword{*this, "controlword", "6040h", {.safe = 0U}};
+    hal::Out<std::uint32_t> controlword{
+        *this, "controlword", "6040h", {.safe = std::uint32_t{hal::cia402::command::quick_stop}}};
     hal::Out<std::int32_t> mode_out{*this, "modes-of-operation", "6060h"};
     hal::Out<std::int32_t> target_position{*this, "target-position", "607Ah"};
     hal::Out<std::int32_t> target_velocity{*this, "target-velocity", "60FFh", {.safe = 0}};
@@ -383,6 +384,7 @@ the state machine of the drive and steps it towards the commanded state, one tra
   is still in *operation enabled* keeps the last commanded position: the measured one would be a step back by the lag. Let
   `position-cmd` track `position-fb` while `active` is FALSE. If the two differ at enabling by more than `max-step`, enabling is rejected;
   with `max-step` 0, the difference is blended out over `blend-time`.
+* While `operational` is FALSE the controlword is quick stop: the feedback of the drive is lost, but it may still receive.
 * A fault (see the table) brakes with quick stop in the same cycle, disables the axis and stays until a rising edge of `reset`. After a fault, after
   `quick-stop` and after the node was lost, `enable` needs another rising edge. At start-up and after a stop, `enable` waits until the node is operational.
 * When `read-all` or `write-all` has not run for 100 cycles of the other one, the axis is in fault and brakes with quick stop, and `show

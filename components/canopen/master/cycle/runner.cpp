@@ -344,12 +344,12 @@ void Runner::send_all_to(std::size_t node) noexcept {
 
 void Runner::take_wishes() noexcept {
     for (std::size_t n = 0; n < statuses_.size(); ++n) {
-        const bool operational = statuses_[n]->operational;
-        if (operational && was_operational_[n] == 0) {
+        const bool exchanges = operational(n);
+        if (exchanges && was_operational_[n] == 0) {
             send_all_to(n);
         }
-        was_operational_[n] = operational ? 1 : 0;
-        if (operational) {
+        was_operational_[n] = exchanges ? 1 : 0;
+        if (exchanges) {
             ever_operational_[n] = 1;
         }
     }
@@ -358,7 +358,7 @@ void Runner::take_wishes() noexcept {
         // One that is kept alive may be operational before we know: it gets what it is to have, not
         // what we would have it held at.
         const bool kept = config_.nodes[s.node].setup.keep_alive && ever_operational_[s.node] == 0;
-        if (statuses_[s.node]->operational || kept) {
+        if (operational(s.node) || kept) {
             set_value(*s.entry, s.wish);
         } else if (s.has_safe) {
             set_value(*s.entry, s.safe);
