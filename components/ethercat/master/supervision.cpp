@@ -270,7 +270,7 @@ static Task<Look> look_at_line(Channel& c, Bus& bus) noexcept {
 static bool all_fine(const Bus& bus, const Look& look) noexcept {
     return look.at_rest && look.count == bus.known && look.present == look.count &&
            look.states == static_cast<std::uint16_t>(State::op) &&
-           bus.status.wkc_state != WkcState::part;
+           (bus.status.wkc_expected == 0 || bus.status.wkc_state == WkcState::complete);
 }
 
 /// Starts a look at each slave that may need one.
@@ -528,9 +528,9 @@ void judge_counters(Bus& bus) noexcept {
             seen = complete ? WkcState::complete : WkcState::part;
         }
     }
-    if (part) {
+    if (part && bus.status.wkc != 0) {
         bus.status.wkc_state = WkcState::part;
-    } else if (any) {
+    } else if (any && !part) {
         bus.status.wkc_state = WkcState::complete;
     } else {
         bus.status.wkc_state = WkcState::none;
