@@ -48,7 +48,8 @@ struct Histobins : hal::Component {
         const double value = chosen();
         const bool bins = nbins >= 1 && nbins <= max && binsize > 0.0 && std::isfinite(binsize) &&
                           std::isfinite(minvalue);
-        input_error = !bins || !(std::fabs(value) <= 1e150);
+        constexpr double limit = 1e150;  // the square of a larger one is infinite
+        input_error = !bins || !(std::fabs(value) <= limit);
         if (input_error) return;
 
         const bool changed = has_changed();
@@ -142,7 +143,8 @@ first of `nsamples`, but not counted in a bin, and neither is a value at the upp
 divisor `nsamples` - 1.
 
 **Differences from LinuxCNC:** `mean` and `variance` include the first value (LinuxCNC divides by its number and leaves it out). A `binsize` that is
-not above 0 and a value that is NaN or infinite set `input-error` (LinuxCNC: writes outside of its memory).
+not above 0 and a value that is NaN or infinite set `input-error` (LinuxCNC: writes outside of its memory). So does a value beyond ±1e150, whose
+square no number can hold (LinuxCNC counts it, and `variance` is infinite or NaN until a reset).
 
     loadrt histobins names=errors
     addf errors servo

@@ -311,6 +311,17 @@ behaviour(
     lasts=True,
     witness=("histobins", {"histobins.0.binsize": [-1.0], "histobins.0.input": [2.0]}, {}),
 )
+behaviour(
+    "histobins",
+    ".*",
+    lambda v: v["pintype"] not in (1, 2, 3) and v.beyond(1e150, "input"),
+    "`input` is beyond ±1e150",
+    "`input-error`, and the outputs are held",
+    "the value is counted, and `variance` is infinite or NaN until a reset",
+    "its square is beyond the range of float",
+    lasts=True,
+    witness=("histobins", {"histobins.0.input": [1.0, 1e200, 2.0]}, {}),
+)
 
 
 def beyond_last_of_200_bins(v):
