@@ -339,6 +339,23 @@ puts [getp a.in0]
         )
 
     @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
+    def test_a_number_beyond_the_range_is_an_error_in_tcl_too(self):
+        for value in ("1e400", "-1e400"):
+            done = self.halrun(self.write("a.tcl", f"loadrt sum2 names=a\nsetp a.in0 {value}\n"))
+            self.assertEqual((1, ""), (done.returncode, done.stdout))
+            self.assertIn(
+                f"<a.tcl>:1:12: error: {value} is out of range for float (up to 1.797693e+308) [bad-value]",
+                done.stderr,
+            )
+        done = self.halrun(
+            self.write(
+                "b.tcl", "loadrt sum2 names=a\nsetp a.in0 -inf\nset x 4\nsetp a.in1 {$x*2}\n"
+                "puts [getp a.in0]\nputs [getp a.in1]\n"
+            )
+        )
+        self.assertEqual((0, "-inf\n8\n", ""), (done.returncode, done.stdout, done.stderr))
+
+    @unittest.skipUnless(shutil.which("tclsh"), "tclsh is not installed")
     def test_lines_of_tcl_after_a_file(self):
         done = self.halrun(
             "-T",

@@ -45,9 +45,15 @@ foreach halcyon::name $halcyon::commands {
 }
 
 # As in LinuxCNC's haltcl, a value is an expression, and a table is printed; `hal setp` and `hal show` take the words as they are, and return.
+# Tcl makes Inf of a number beyond the range of double: such a number is passed as it is, and rejected.
+proc halcyon::value {text} {
+    set value [uplevel 2 [::list expr $text]]
+    if {$value in {Inf -Inf} && [string match {*[0-9]*} $text] && [string is double -strict $text]} {return $text}
+    return $value
+}
 foreach halcyon::name {setp sets} {
     interp alias {} $halcyon::name {}
-    proc $halcyon::name {name value} "hal $halcyon::name \$name \[uplevel 1 \[::list expr \$value\]\]"
+    proc $halcyon::name {name value} "hal $halcyon::name \$name \[halcyon::value \$value\]"
 }
 interp alias {} show {}
 proc show {args} {puts [hal show {*}$args]}
