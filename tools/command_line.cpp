@@ -350,24 +350,55 @@ int run_command_line(int argc, char** argv) {
     return row->run(*options);
 }
 
+namespace {
+
+/// The entry of a command, which is that of its group where it has one.
+CompletionEntry& entry_of(const Subcommand& row, std::vector<CompletionEntry>& all) {
+    const std::string_view name = row.name;
+    const std::string_view first = name.substr(0, name.find(' '));
+    if (all.empty() || all.back().name != first) {
+        const Group* const group = find_group(first);
+        all.push_back({std::string(first), group ? group->purpose : row.summary, {}, {}});
+    }
+    return all.back();
+}
+
+/// Adds the second word of a command of a group: of those with a third word only once.
+void add_word(const Subcommand& row, std::vector<CompletionWord>& to) {
+    const std::string_view name = row.name;
+    const auto space = name.find(' ');
+    if (space == name.npos) return;
+    const std::string_view rest = name.substr(space + 1);
+    const std::string word(rest.substr(0, rest.find(' ')));
+    if (!to.empty() && to.back().name == word) return;
+    to.push_back({word, row.summary});
+}
+
+void add_option(const OptionSet::Row& row, const std::string& name,
+                std::vector<CompletionOption>& to) {
+    const bool known = std::any_of(to.begin(), to.end(), [&](const CompletionOption& other) {
+        return other.name == name;
+    });
+    if (!known) {
+        to.push_back({{name, row.text}, row.takes_value});
+    }
+}
+
+}  // namespace
+
 std::vector<CompletionEntry> completions() {
     std::vector<CompletionEntry> all;
     for (const Subcommand& row : subcommands()) {
         if (row.missing_package()) continue;
+        CompletionEntry& entry = entry_of(row, all);
+        add_word(row, entry.words);
         const auto options = row.make_options();
-        const std::string name = row.name;
-        const auto space = name.find(' ');
-        if (all.empty() || all.back().name != name.substr(0, space)) {
-            all.push_back({name.substr(0, space), {}, {}});
-        }
-        if (space != name.npos) {
-            all.back().words.push_back(
-                name.substr(space + 1, name.find(' ', space + 1) - space - 1));
-        }
-        for (std::string& option : OptionSet(*options, row.name, row.summary).names()) {
-            if (auto& known = all.back().options;
-                std::find(known.begin(), known.end(), option) == known.end()) {
-                known.push_back(std::move(option));
+        for (const OptionSet::Row& option : OptionSet(*options, row.name, row.summary).rows()) {
+            for (const std::string& name : option.long_names) {
+                add_option(option, "--" + name, entry.options);
+            }
+            for (const std::string& name : option.short_names) {
+                add_option(option, "-" + name, entry.options);
             }
         }
     }

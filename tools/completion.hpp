@@ -6,7 +6,7 @@
 namespace hal::tools {
 
 struct CompletionOptions : Options {
-    void declare(OptionSet& set) override { set.words("SHELL", "bash"); }
+    void declare(OptionSet& set) override { set.words("SHELL", "bash, zsh or fish"); }
 };
 
 /// Runs `hal completion`: prints a script derived from the table of subcommands. Returns the exit

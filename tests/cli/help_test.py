@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import unittest
 
-from harness import HAL, Case, needs_package, packages_left_out
+from harness import HAL, SERVO, Case, needs_package, packages_left_out
 
 
 class Help(Case):
@@ -203,7 +203,112 @@ class CompletionScript(Case):
         self.assertIn("and2", self.complete("hal doc an"))
 
     def test_rejects_other_shells(self):
-        self.assertIn("hal completion bash", self.bad("completion", "fish"))
+        self.assertEqual(
+            "hal completion: unsupported shell; type: hal completion SHELL with one of bash, zsh, fish\n",
+            self.bad("completion", "tcsh"),
+        )
+
+    def test_values_of_a_running_machine(self):
+        self.start("run", self.write("m.hal", SERVO))
+        self.assertEqual(["adder.in0", "adder.in1"], sorted(self.complete("hal watch adder.in")))
+        self.assertEqual(["total"], self.complete("hal scope tot"))
+        self.assertEqual(["total"], self.complete("hal record new.mcap tot"))
+
+    @unittest.skipUnless(shutil.which("fish"), "fish is not installed")
+    def test_fish(self):
+        self.write("hal.fish", self.good("completion", "fish"))
+        for line, wanted in (
+            ("hal rec", "record\trecord any values of a running instance to MCAP or CSV"),
+            ("hal run --no-", "--no-picture\tno live picture in the terminal"),
+            ("hal can sd", "sdo\t"),
+            ("hal explain two-w", "two-writers"),
+            ("hal completion z", "zsh"),
+        ):
+            done = self.run_shell("fish", "-c", f"source hal.fish; complete -C '{line}'")
+            self.assertIn(wanted, done)
+        self.start("run", self.write("m.hal", SERVO))
+        done = self.run_shell("fish", "-c", "source hal.fish; complete -C 'hal watch adder.in'")
+        self.assertEqual(["adder.in0", "adder.in1"], sorted(done.split()))
+
+    @unittest.skipUnless(shutil.which("zsh"), "zsh is not installed")
+    def test_zsh(self):
+        """The functions of zsh's completion that offer words print them here."""
+        self.write("_hal", self.good("completion", "zsh"))
+        offers = (
+            "compdef() { :; }; _files() { print files; }\n"
+            "_describe() { print -rl -- ${(P)@[-1]}; }\n"
+            "compadd() { if [[ $1 == -a ]]; then print -rl -- ${(P)2}; else print -rl -- $@; fi; }\n"
+            "source ./_hal\n"
+        )
+
+        def offered(line):
+            words = line.split(" ")
+            code = (
+                f"{offers}service=hal; words=({line}); CURRENT={len(words)}; PREFIX='{words[-1]}'\n_hal"
+            )
+            return self.run_shell("zsh", "-f", "-c", code).splitlines()
+
+        self.assertIn("fmt:format netlists", offered("hal f"))
+        self.assertIn("--no-picture:no live picture in the terminal", offered("hal run --no-"))
+        self.assertIn("nmt:send an NMT command to CANopen nodes", offered("hal can n"))
+        self.assertEqual(["bash", "zsh", "fish"], offered("hal completion z"))
+        self.assertIn("two-writers", offered("hal explain t"))
+        self.assertEqual(["files"], offered("hal record x"))
+        self.start("run", self.write("m.hal", SERVO))
+        self.assertEqual(
+            ["adder.in0", "adder.in1"], sorted(filter(None, offered("hal watch adder.in")))
+        )
+
+    def run_shell(self, *words):
+        done = subprocess.run(
+            words,
+            env={**self.environment, "PATH": f"{HAL.parent}:{self.environment['PATH']}"},
+            cwd=self.folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+        )
+        self.assertEqual((0, ""), (done.returncode, done.stderr), done.stdout)
+        return done.stdout
+
+
+class ManualPages(Case):
+    def test_of_all_commands(self):
+        self.good("doc", "--commands", "--man", "--output", "man1")
+        pages = {path.name: path.read_text() for path in (self.folder / "man1").iterdir()}
+        for name in ("hal.1", "halcmd.1", "hal-run.1", "hal-can.1", "hal-can-sdo-read.1"):
+            self.assertIn(name, pages)
+        self.assertIn("\\fB\\-\\-for TIME\\fR\n", pages["hal-run.1"])
+        self.assertIn("loadrt", pages["halcmd.1"])
+        for name, text in pages.items():
+            self.assertRegex(text, r'^\.TH "[A-Z0-9\\-]+" 1 "" "Halcyon [\d.]+', name)
+            self.assertRegex(text, r"\n\.SH NAME\n\S+ \\- \S", name)
+
+    @unittest.skipUnless(shutil.which("man"), "man is not installed")
+    def test_man_has_nothing_to_complain_of(self):
+        self.good("doc", "--commands", "--man", "--output", "man1")
+        for path in sorted((self.folder / "man1").iterdir()):
+            done = subprocess.run(
+                ["man", "--warnings", "-E", "UTF-8", "-Tutf8", "-l", str(path)],
+                env={**os.environ, "LC_ALL": "C.UTF-8", "MANWIDTH": "100"},
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                timeout=60,
+            )
+            self.assertEqual((0, ""), (done.returncode, done.stderr), path)
+            self.assertIn("Halcyon commands", done.stdout)
+
+    def test_wrong_words(self):
+        self.assertEqual(
+            "hal doc: unknown page 'hal-rn'; did you mean 'hal-run'?\n",
+            self.bad("doc", "--commands", "--man", "hal-rn"),
+        )
+        self.assertEqual(
+            "hal doc: the pages of commands are troff; type: hal doc --commands --man\n",
+            self.bad("doc", "--commands"),
+        )
 
 
 class Doctor(Case):

@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "base/types.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 namespace {
@@ -152,38 +153,73 @@ OptionSet::Reading OptionSet::read(std::vector<std::string> arguments) {
     return reading;
 }
 
-std::string OptionSet::help() const {
-    std::string text;
-    for (const CLI::Option* option : std::as_const(*app_).get_options()) {
+namespace {
+
+OptionSet::Row positional_row(const CLI::Option& option) {
+    OptionSet::Row row;
+    row.positional = true;
+    row.names = option.get_name(true);
+    row.text = option.get_description();
+    return row;
+}
+
+OptionSet::Row option_row(const CLI::Option& option) {
+    OptionSet::Row row;
+    row.text = option.get_description();
+    row.long_names = option.get_lnames();
+    row.short_names = option.get_snames();
+    row.takes_value = option.get_expected_min() > 0 && !option.get_type_name().empty();
+    for (const std::string& name : row.short_names) {
+        append_item(row.names, "-" + name);
+    }
+    for (const std::string& name : row.long_names) {
+        append_item(row.names, "--" + name);
+    }
+    if (row.takes_value) {
+        row.names += " " + option.get_type_name();
+    }
+    return row;
+}
+
+}  // namespace
+
+std::vector<OptionSet::Row> OptionSet::rows() const {
+    const auto options = std::as_const(*app_).get_options();
+    std::vector<Row> rows;
+    for (const CLI::Option* option : options) {
         if (option->get_positional()) {
-            text += fmt::format("\n  {:24} {}", option->get_name(true), option->get_description());
+            rows.push_back(positional_row(*option));
         }
     }
-    text += "\n";
-    for (const CLI::Option* option : std::as_const(*app_).get_options(
-             [](const CLI::Option* o) { return o->nonpositional(); })) {
-        const std::string value = option->get_expected_min() > 0 && !option->get_type_name().empty()
-                                      ? " " + option->get_type_name()
-                                      : "";
-        std::string names;
-        for (const std::string& name : option->get_snames()) {
-            names += (names.empty() ? "-" : ", -") + name;
+    for (const CLI::Option* option : options) {
+        if (option->nonpositional()) {
+            rows.push_back(option_row(*option));
         }
-        for (const std::string& name : option->get_lnames()) {
-            names += (names.empty() ? "--" : ", --") + name;
+    }
+    return rows;
+}
+
+std::string OptionSet::help() const {
+    std::string text;
+    bool in_options = false;
+    for (const Row& row : rows()) {
+        if (!row.positional && !in_options) {
+            text += "\n";
+            in_options = true;
         }
-        text += fmt::format("  {:24} {}\n", names + value, option->get_description());
+        text += row.positional ? fmt::format("\n  {:24} {}", row.names, row.text)
+                               : fmt::format("  {:24} {}\n", row.names, row.text);
     }
     return text;
 }
 
 std::vector<std::string> OptionSet::names() const {
     std::vector<std::string> names;
-    for (const CLI::Option* option : std::as_const(*app_).get_options()) {
-        for (const std::string& name : option->get_lnames()) {
+    for (const Row& row : rows()) {
+        for (const std::string& name : row.long_names) {
             names.push_back("--" + name);
         }
-        for (const std::string& name : option->get_snames()) {
+        for (const std::string& name : row.short_names) {
             names.push_back("-" + name);
         }
     }

@@ -70,7 +70,17 @@ public:
     };
     /// Fills the members of the options.
     Reading read(std::vector<std::string> arguments);
-    /// Returns the help: a line for each positional argument and each option.
+    /// A line of the help.
+    struct Row {
+        bool positional = false;
+        std::string names;  ///< as it is typed: `-N, --name NAME`
+        std::string text;
+        std::vector<std::string> long_names, short_names;  ///< without dashes
+        bool takes_value = false;
+    };
+    /// Returns the positional arguments, then the options.
+    std::vector<Row> rows() const;
+    /// Returns the help: a line for each of rows().
     std::string help() const;
     /// Returns the options as they are typed: --name, -n.
     std::vector<std::string> names() const;

@@ -8,6 +8,7 @@
 #include "doc/markdown.hpp"
 #include "doc/page.hpp"
 #include "doc/page_walk.hpp"
+#include "doc/troff.hpp"
 
 namespace hal::tools {
 
@@ -91,20 +92,6 @@ struct MarkdownWriter : PageWriter {
         text += doc + (doc.ends_with('\n') ? "" : "\n");
     }
 };
-
-std::string troff(const std::string& line) {
-    std::string text = line.starts_with('.') || line.starts_with('\'') ? "\\&" : "";
-    for (const char c : line) {
-        if (c == '\\') {
-            text += std::string("\\e");
-        } else if (c == '-') {
-            text += std::string("\\-");
-        } else {
-            text += std::string(1, c);
-        }
-    }
-    return text;
-}
 
 struct ManWriter : PageWriter {
     explicit ManWriter(std::string head) { text = std::move(head); }
