@@ -143,8 +143,8 @@ first of `nsamples`, but not counted in a bin, and neither is a value at the upp
 divisor `nsamples` - 1.
 
 **Differences from LinuxCNC:** `mean` and `variance` include the first value (LinuxCNC divides by its number and leaves it out). A `binsize` that is
-not above 0 and a value that is NaN or infinite set `input-error` (LinuxCNC: writes outside of its memory). So does a value beyond ±1e150, whose
-square no number can hold (LinuxCNC counts it, and `variance` is infinite or NaN until a reset).
+not above 0 and a value that is NaN or infinite set `input-error` (LinuxCNC: writes outside of its memory). So does a value beyond ±1e150, because
+its square is infinite (LinuxCNC counts it, and `variance` is infinite or NaN until a reset).
 
     loadrt histobins names=errors
     addf errors servo
