@@ -40,6 +40,7 @@
 #include "inspect/tdma_status.hpp"
 #include "inspect/top.hpp"
 #include "linuxcnc/linuxcnc.hpp"
+#include "manual.hpp"
 #include "panel/panel.hpp"
 #include "record/plot.hpp"
 #include "run/check.hpp"
@@ -350,6 +351,9 @@ constexpr Subcommand table[] = {
         "check whether this machine, or a network interface, is fit for real time"),
     command<CompletionOptions, IN_CORE(run_completion)>(
         "completion", "SHELL", "print a completion script: source <(hal completion bash)"),
+    command<ManualOptions, IN_TOOLS(run_manual)>(
+        "manual", "[PAGE…] [--output DIR]",
+        "print manual pages of the commands: hal manual hal-run | man -l -"),
 };
 
 constexpr Group groups[] = {

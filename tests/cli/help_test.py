@@ -275,7 +275,7 @@ class CompletionScript(Case):
 
 class ManualPages(Case):
     def test_of_all_commands(self):
-        self.good("doc", "--commands", "--man", "--output", "man1")
+        self.good("manual", "--output", "man1")
         pages = {path.name: path.read_text() for path in (self.folder / "man1").iterdir()}
         for name in ("hal.1", "halcmd.1", "hal-run.1", "hal-can.1", "hal-can-sdo-read.1"):
             self.assertIn(name, pages)
@@ -287,7 +287,7 @@ class ManualPages(Case):
 
     @unittest.skipUnless(shutil.which("man"), "man is not installed")
     def test_man_has_nothing_to_complain_of(self):
-        self.good("doc", "--commands", "--man", "--output", "man1")
+        self.good("manual", "--output", "man1")
         for path in sorted((self.folder / "man1").iterdir()):
             done = subprocess.run(
                 ["man", "--warnings", "-E", "UTF-8", "-Tutf8", "-l", str(path)],
@@ -302,12 +302,16 @@ class ManualPages(Case):
 
     def test_wrong_words(self):
         self.assertEqual(
-            "hal doc: unknown page 'hal-rn'; did you mean 'hal-run'?\n",
-            self.bad("doc", "--commands", "--man", "hal-rn"),
+            "hal manual: unknown page 'hal-rn'; did you mean 'hal-run'?\n",
+            self.bad("manual", "hal-rn"),
         )
         self.assertEqual(
-            "hal doc: the pages of commands are troff; type: hal doc --commands --man\n",
-            self.bad("doc", "--commands"),
+            "hal manual: unknown page 'xyzzy'; type the command with hyphens: hal-can-dump\n",
+            self.bad("manual", "xyzzy"),
+        )
+        self.assertEqual(
+            "hal manual: cannot create '/dev/null/man1': Not a directory\n",
+            self.bad("manual", "--output", "/dev/null/man1"),
         )
 
 

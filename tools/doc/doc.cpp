@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // `hal doc [COMPONENT]`: the manual page of a component, derived from its declarations; without a name, all components.
 // `hal doc --all --output DIR`: the pages of all of them, with an index.
-// `hal doc --commands --man`: the manual pages of the commands.
 #include "doc/doc.hpp"
 
 #include <algorithm>
@@ -11,11 +10,9 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/output.hpp"
-#include "doc/command_pages.hpp"
 #include "doc/page.hpp"
 #include "machine/load/plugins.hpp"
 #include "machine/load/source_tree.hpp"
-#include "text/suggest.hpp"
 
 namespace hal::tools {
 
@@ -122,19 +119,15 @@ bool write_page(const fs::path& path, const std::string& text, const DocOptions&
     return why.empty() || (fail(options, why), false);
 }
 
-/// Returns false after printing the error.
-bool make_output_folder(const DocOptions& options) {
-    std::error_code problem;
-    fs::create_directories(options.output, problem);
-    if (!problem) return true;
-    fail(options, fmt::format("cannot create '{}': {}", options.output, problem.message()));
-    return false;
-}
-
 int write_all_pages(const std::vector<Page>& pages, const Plugins& plugins, const Form& form,
                     const DocOptions& options) {
-    if (!make_output_folder(options)) return 1;
     const fs::path folder(options.output);
+    std::error_code problem;
+    fs::create_directories(folder, problem);
+    if (problem) {
+        return fail(options,
+                    fmt::format("cannot create '{}': {}", folder.string(), problem.message()));
+    }
     for (const Page& page : pages) {
         if (!write_page(folder / (form.before + page.name + form.after),
                         form.write(page, !options.all), options)) {
@@ -161,52 +154,10 @@ int write_all_pages(const std::vector<Page>& pages, const Plugins& plugins, cons
     return exit_code(write_page(folder / "index.html", as_html_index(groups), options));
 }
 
-/// Returns the pages of the commands that were typed, or all. Empty after printing an error.
-std::vector<CommandPage> chosen_command_pages(const DocOptions& options) {
-    const std::vector<CommandPage> all = command_pages();
-    if (options.words.empty()) return all;
-    std::vector<CommandPage> chosen;
-    std::vector<std::string> names;
-    for (const CommandPage& page : all) {
-        names.push_back(page.name);
-    }
-    for (const std::string& name : options.words) {
-        const auto found = std::find(names.begin(), names.end(), name);
-        if (found == names.end()) {
-            const std::string hint = did_you_mean(name, names);
-            fail(options, fmt::format("unknown page '{}'; {}", name,
-                                      hint.empty() ? "type the command with hyphens: hal-can-dump"
-                                                   : hint));
-            return {};
-        }
-        chosen.push_back(all[static_cast<std::size_t>(found - names.begin())]);
-    }
-    return chosen;
-}
-
-int write_command_pages(const DocOptions& options) {
-    if (!options.man || options.markdown || options.json || options.html || options.all) {
-        return fail(options, "the pages of commands are troff; type: hal doc --commands --man");
-    }
-    const std::vector<CommandPage> pages = chosen_command_pages(options);
-    if (pages.empty()) return 1;
-    if (options.output.empty()) {
-        return exit_code(std::all_of(pages.begin(), pages.end(), [](const CommandPage& page) {
-            return print(page.troff);
-        }));
-    }
-    if (!make_output_folder(options)) return 1;
-    const fs::path folder(options.output);
-    return exit_code(std::all_of(pages.begin(), pages.end(), [&](const CommandPage& page) {
-        return write_page(folder / (page.name + ".1"), page.troff, options);
-    }));
-}
-
 }  // namespace
 
 int run_doc(const DocOptions& given) {
     DocOptions options = given;
-    if (options.commands) return write_command_pages(options);
     if (options.markdown + options.json + options.man + options.html > 1) {
         return fail(options, "--markdown, --json, --man and --html exclude each other; give one");
     }

@@ -13,7 +13,6 @@ struct DocOptions : Options {
     bool man = false;
     bool html = false;
     bool all = false;
-    bool commands = false;
     std::string output;  ///< a folder
 
     void declare(OptionSet& set) override {
@@ -26,8 +25,6 @@ struct DocOptions : Options {
         set.flag("--all", all,
                  "all components, into the folder of --output: web pages with an index, or the "
                  "format chosen above");
-        set.flag("--commands", commands,
-                 "with --man: the pages of the commands, as hal-run, in place of components");
         set.value("-o,--output", output, "DIR", "a folder; each component gets a file");
     }
 };

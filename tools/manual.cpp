@@ -1,20 +1,31 @@
 // SPDX-License-Identifier: MIT
-#include "doc/command_pages.hpp"
+// `hal manual [PAGE…]`: the manual pages: hal, one for each command and each group of commands, and
+// halcmd for the commands of netlists and of the shell.
+#include "manual.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <fmt/format.h>
 #include <string_view>
+#include <vector>
 
+#include "cli/output.hpp"
 #include "commands/help.hpp"
 #include "commands/table.hpp"
 #include "doc/markdown.hpp"
 #include "doc/troff.hpp"
 #include "paths.hpp"
 #include "subcommand.hpp"
+#include "text/suggest.hpp"
 
 namespace hal::tools {
 
 namespace {
+
+struct CommandPage {
+    std::string name;  ///< of the page: hal-can-dump
+    std::string troff;
+};
 
 std::string page_name(std::string_view command) {
     std::string name = fmt::format("hal {}", command);
@@ -121,8 +132,7 @@ std::string page_of_halcmd() {
     return text + see_also("hal");
 }
 
-}  // namespace
-
+/// Returns the pages of all commands that this build has, hal and halcmd first.
 std::vector<CommandPage> command_pages() {
     std::vector<CommandPage> pages{{"hal", page_of_hal()}, {"halcmd", page_of_halcmd()}};
     for (const Group& group : subcommand_groups()) {
@@ -139,6 +149,54 @@ std::vector<CommandPage> command_pages() {
         pages.push_back({page_name(row.name), page_of(row, parent)});
     }
     return pages;
+}
+
+/// Returns the pages that were typed, or all. Empty after printing an error.
+std::vector<CommandPage> chosen_pages(const ManualOptions& options) {
+    const std::vector<CommandPage> all = command_pages();
+    if (options.words.empty()) return all;
+    std::vector<std::string> names;
+    for (const CommandPage& page : all) {
+        names.push_back(page.name);
+    }
+    std::vector<CommandPage> chosen;
+    for (const std::string& name : options.words) {
+        const auto found = std::find(names.begin(), names.end(), name);
+        if (found == names.end()) {
+            const std::string hint = did_you_mean(name, names);
+            fail(options, fmt::format("unknown page '{}'; {}", name,
+                                      hint.empty() ? "type the command with hyphens: hal-can-dump"
+                                                   : hint));
+            return {};
+        }
+        chosen.push_back(all[static_cast<std::size_t>(found - names.begin())]);
+    }
+    return chosen;
+}
+
+/// Writes each page to a file. Returns what failed; empty: nothing.
+std::string write_pages(const std::vector<CommandPage>& pages, const std::string& folder) {
+    std::error_code problem;
+    std::filesystem::create_directories(folder, problem);
+    if (problem) return fmt::format("cannot create '{}': {}", folder, problem.message());
+    for (const CommandPage& page : pages) {
+        std::string why = write_file(fmt::format("{}/{}.1", folder, page.name), page.troff);
+        if (!why.empty()) return why;
+    }
+    return "";
+}
+
+}  // namespace
+
+int run_manual(const ManualOptions& options) {
+    const std::vector<CommandPage> pages = chosen_pages(options);
+    if (pages.empty()) return 1;
+    if (!options.output.empty()) {
+        const std::string why = write_pages(pages, options.output);
+        return why.empty() ? 0 : fail(options, why);
+    }
+    return exit_code(std::all_of(pages.begin(), pages.end(),
+                                 [](const CommandPage& page) { return print(page.troff); }));
 }
 
 }  // namespace hal::tools
