@@ -61,6 +61,7 @@ Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
     late_pdos_.assign(statuses_.size(), 0);
     open_.assign(statuses_.size(), 0);
     was_operational_.assign(statuses_.size(), 0);
+    was_started_.assign(statuses_.size(), 0);
     ever_operational_.assign(statuses_.size(), 0);
     produces_ = config.sync == config::SyncMode::cycle || config.sync == config::SyncMode::timed;
     sync_frame_ = make_frame(config.sync_cob, config.sync_counter != 0 ? 1 : 0);
@@ -342,6 +343,16 @@ void Runner::send_all_to(std::size_t node) noexcept {
     }
 }
 
+/// What a lost node sent says nothing about the node that returns: until its first TPDO the inputs
+/// have their safe values.
+void Runner::forget_inputs_of(std::size_t node) noexcept {
+    for (const Slot& s : slots_) {
+        if (s.node == node && !s.to_node && s.has_safe) {
+            set_value(*s.entry, s.safe);
+        }
+    }
+}
+
 void Runner::take_wishes() noexcept {
     for (std::size_t n = 0; n < statuses_.size(); ++n) {
         const bool exchanges = operational(n);
@@ -351,6 +362,10 @@ void Runner::take_wishes() noexcept {
         was_operational_[n] = exchanges ? 1 : 0;
         if (exchanges) {
             ever_operational_[n] = 1;
+        }
+        const std::uint8_t started = statuses_[n]->operational ? 1 : 0;
+        if (std::exchange(was_started_[n], started) > started) {
+            forget_inputs_of(n);
         }
     }
     for (Slot& s : slots_) {

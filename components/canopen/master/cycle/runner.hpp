@@ -184,6 +184,7 @@ private:
     void produce_sync(Time now, Time period) noexcept;
     void produce_time(Time now) noexcept;
     void send_all_to(std::size_t node) noexcept;
+    void forget_inputs_of(std::size_t node) noexcept;
     void take_wishes() noexcept;
     void tell_alone(Time now) noexcept;
     void ask(Time now) noexcept;
@@ -221,8 +222,8 @@ private:
     unsigned vain_waits_ = 0;  // of serve_boot(), in a row
     std::vector<PdoWatch> watches_;  // in the order of OwnNode::received
     std::vector<std::uint8_t> late_pdos_;  // by node
-    // by node; ever: since the network was booted
-    std::vector<std::uint8_t> was_operational_, ever_operational_;
+    // by node; started: without regard to late TPDOs; ever: since the network was booted
+    std::vector<std::uint8_t> was_operational_, was_started_, ever_operational_;
     std::vector<Output> outputs_;
     /// A PDO of a node that is asked for.
     struct Asked {
