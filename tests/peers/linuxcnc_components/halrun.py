@@ -62,13 +62,27 @@ class HalrunRunner:
                 os.killpg(done.pid, signal.SIGKILL)
                 done.communicate()
                 subprocess.run(["/usr/bin/halrun", "-U"], timeout=timeout, check=False, **settings)
+                self.remove_shared_memory()
                 raise RunError(f"LinuxCNC's halrun hangs: {error}") from error
+            if done.returncode != 0:
+                self.remove_shared_memory()
             left = {
                 path.name: path.read_text(errors="replace")
                 for path in folder.iterdir()
                 if path.is_file()
             }
             return output, errors, done.returncode, left
+
+    def remove_shared_memory(self):
+        """Removes what an rtapi_app that crashed left: a segment of another size makes the next run fail."""
+        if not self.user:
+            return
+        rows = Path("/proc/sysvipc/shm").read_text().splitlines()
+        columns = rows[0].split()
+        for row in rows[1:]:
+            segment = dict(zip(columns, row.split()))
+            if int(segment["uid"]) == self.user.pw_uid and segment["nattch"] == "0":
+                subprocess.run(["ipcrm", "-m", segment["shmid"]], check=False)
 
     def inventory(self, variant):
         text, errors, status, _ = self.halrun(
