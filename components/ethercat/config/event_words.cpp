@@ -230,6 +230,7 @@ constexpr bus::EventRow<Event> event_rows[] = {
      "{who} is not on the bus[; check its supply and cable, or {optional}]"},
     {Event::unknown_slave, Effect::raises,
      "{who} is not in the configuration[ (vendor {first8}, product {second8}); add {unknown}]"},
+    {Event::unknown_gone, Effect::ends, "every slave on {link} is in the configuration"},
     {Event::wrong_vendor, Effect::raises, "{who} {identity}"},
     {Event::wrong_product, Effect::raises, "{who} {identity}"},
     {Event::wrong_revision, Effect::raises, "{who} {identity}"},

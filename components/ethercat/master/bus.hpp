@@ -92,6 +92,7 @@ struct Bus {
     std::int64_t skew_ns = 0;
     /// of the slave last reported as unknown, so that it is reported once
     std::uint32_t unknown_product = 0;
+    bool unknown_reported = false;  ///< a slave that is not in the setup, until it is gone
     /// positions of slaves whose EEPROM was reported as unreadable, so that it is reported once
     std::bitset<1024> unreadable;
     bool reported_empty = false;

@@ -16,6 +16,7 @@ enum class Event : std::uint8_t {
     too_many_slaves,               ///< [found, capacity]
     slave_missing,                 ///< not on the bus at start [position, -]
     unknown_slave,                 ///< not in the setup [vendor, product]
+    unknown_gone,                  ///< no slave is unknown any more [-, -]
     wrong_vendor,
     wrong_product,
     wrong_revision,

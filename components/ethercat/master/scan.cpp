@@ -368,6 +368,7 @@ void assign(Bus& bus) noexcept {
         Device& d = *bus.devices[number];
         const bool is_unknown = d.slave.present && d.identified && d.slave.configured < 0;
         if (is_unknown && !d.refused) {
+            bus.unknown_reported = true;
             bus.report(Event::unknown_slave, d, d.slave.vendor, d.slave.product);
         }
     }

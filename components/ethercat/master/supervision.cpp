@@ -97,9 +97,24 @@ void report_unknown(Bus& bus, const BusSlave& found) noexcept {
         }
     }
     if (std::exchange(bus.unknown_product, found.product) != found.product) {
+        bus.unknown_reported = true;
         bus.events.report(Event::unknown_slave, Events::of_position + found.position, found.vendor,
                           found.product);
     }
+}
+
+/// Returns whether a slave without known address is a configured one that lost its power for so
+/// short a time that it is still held to be there: none answers at the address which that one had.
+Task<bool> lost_its_address(Channel& c, Bus& bus, const BusSlave& found) noexcept {
+    for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {
+        const Device* const device = device_of(bus, n);
+        if (device == nullptr || !device->slave.present) continue;
+        const Slave& want = bus.setup.slaves[n];
+        if (!is_at_its_place(want, found) || !matches(bus, want, found, nullptr)) continue;
+        const Answer a = co_await read(c, device->slave, registers::al_status, 2);
+        if (a.wkc != 1) co_return true;
+    }
+    co_return false;
 }
 
 /// Identifies a slave without known address at a position, and makes it one of those that are
@@ -118,8 +133,11 @@ Task<int> take_in(Channel& c, Bus& bus, std::uint16_t position) noexcept {
     if (!identified) co_return -1;
     const Seat seat = seat_of(bus, found);
     if (seat.device == nullptr) {
-        report_unknown(bus, found);
-        co_return -1;
+        const bool is_known = co_await lost_its_address(c, bus, found);
+        if (!is_known) {
+            report_unknown(bus, found);
+        }
+        co_return -1;  // one that is known is taken in when its loss was noticed
     }
     Device& d = *seat.device;
     const Slave& want = bus.setup.slaves[seat.configured];
@@ -266,6 +284,17 @@ static Task<Look> look_at_line(Channel& c, Bus& bus) noexcept {
     co_return look;
 }
 
+/// Ends the report of an unknown slave when every slave that answers is a configured one.
+static void look_for_unknown(Bus& bus, const Look& look) noexcept {
+    if (!bus.unknown_reported || look.count != look.present) return;
+    for (const auto& device : bus.devices) {
+        if (device->slave.present && device->slave.configured < 0) return;
+    }
+    bus.unknown_reported = false;
+    bus.unknown_product = 0;
+    bus.report(Event::unknown_gone, 0, 0);
+}
+
 /// Returns whether nothing is to be done: all slaves answer, are known and in OP.
 static bool all_fine(const Bus& bus, const Look& look) noexcept {
     return look.at_rest && look.count == bus.known && look.present == look.count &&
@@ -300,6 +329,7 @@ Task<void> supervise(Channel& c, Bus& bus) noexcept {
         bus.resting = false;
         bus.suspicious = false;
         const Look look = co_await look_at_line(c, bus);
+        look_for_unknown(bus, look);
         if (all_fine(bus, look)) continue;
         check_slaves(bus, look);
         const bool somebody_waits =

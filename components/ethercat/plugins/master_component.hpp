@@ -495,6 +495,10 @@ private:
         if (event == Event::scanned) {
             unknown_raised_ = false;
         }
+        if (event == Event::unknown_gone) {
+            unknown_raised_ = false;
+            end(unknown_fault_);
+        }
         if (event == Event::no_slaves) {
             begin(nobody_fault_, event);
         }
