@@ -343,7 +343,7 @@ void Runner::send_all_to(std::size_t node) noexcept {
     }
 }
 
-/// What a lost node sent says nothing about the node that returns: until its first TPDO the inputs
+/// What a lost node sent does not describe the node that returns: until its first TPDO the inputs
 /// have their safe values.
 void Runner::forget_inputs_of(std::size_t node) noexcept {
     for (const Slot& s : slots_) {
