@@ -20,6 +20,16 @@ class Sim(Case):
         self.assertEqual("", report.stdout)
         self.assertRegex(report.stderr, r"(?m)^servo +1 ms +2000 +0 ")
 
+    def test_keep_going_runs_what_could_be_loaded(self):
+        path = self.write("a.hal", "setp nowhere 1\n" + SERVO)
+        done = self.run_program(
+            "sim", "-k", path, "--for", "1s", "--record", "a.csv", "-e", "gets total"
+        )
+        self.assertEqual((1, "5\n"), (done.returncode, done.stdout), done.stderr)
+        self.assertIn("a.hal:1:6: error: unknown pin 'nowhere' [no-such-pin]", done.stderr)
+        self.assertGreater(len((self.folder / "a.csv").read_text().splitlines()), 1000)
+        self.bad("sim", path, "--for", "1s")
+
     def test_a_summary_ends_a_run_that_printed_nothing(self):
         path = self.write("a.hal", SERVO)
         done = self.run_program("sim", path, "--for", "2s")

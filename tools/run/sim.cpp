@@ -175,15 +175,17 @@ int simulate(const SimOptions& options, const SimRecorder* recorder) {
     TrackedOutput output;
     const auto begun = std::chrono::steady_clock::now();
     int status = machine.load(&output);
-    const bool loaded = status == 0;
-    if (loaded && is_advanced(options)) {
-        status = advance(options, recorder, machine);
+    // with -k what could be loaded runs, and the status tells of the rest
+    const bool loaded = status == 0 || (options.keep_going && !machine.stop.requested());
+    const auto goes_on = [&] { return status == 0 || (loaded && options.keep_going); };
+    if (goes_on() && is_advanced(options)) {
+        status = std::max(status, advance(options, recorder, machine));
     }
     const auto wall = std::chrono::steady_clock::now() - begun;
-    if (status == 0) {
-        status = execute_and_show(options, machine, output);
+    if (goes_on()) {
+        status = std::max(status, execute_and_show(options, machine, output));
     }
-    if (loaded && status == 0) {
+    if (goes_on()) {
         machine.shell.warn_when_nothing_ran(output);
     }
     if (machine.faulted() || machine.stop.requested()) {
