@@ -69,7 +69,7 @@ const bus::KeyTable<MasterConfig>& bus_keys() {
     static const bus::KeyTable<MasterConfig> table{{
         {"link", bus::text_value(&C::link, "ADDRESS"), "`sim:canopen`",
          "`can:can0`, `sim:NAME`, `udp:…`, `slcan:…`, `replay:…`; see `drivers/README.md`"},
-        {"bitrate", bus::bit_rate(&C::bit_rate, 5e3, 20e6), "`1M`",
+        {"bitrate", bus::bit_rate(&C::bit_rate, 5e3, 1e6), "`1M`",
          "bit rate; set on a `sim:` bus, checked on all others"},
         {"datarate", bus::bit_rate(&C::data_rate, 5e3, 20e6), "none",
          "data bit rate of the CAN FD frames in `[messages]`, for the plan"},
