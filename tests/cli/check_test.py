@@ -290,5 +290,39 @@ class SpecialFiles(Case):
         return HAL
 
 
+class Parts(Case):
+    """A netlist that another one reads has one cause for many errors: it is not complete."""
+
+    def test_a_part_names_what_reads_it(self):
+        self.write("machine.hal", "loadrt threads name1=t period1=1000000\nsource part.hal\n")
+        self.write("other.hal", SERVO + "source 'part.hal'\n")
+        self.write("part.hal", "loadrt siggen\n" + "addf siggen.0.update t\n" * 5)
+        self.assertEqual(
+            "hal check: 'part.hal' is a part of 'machine.hal', 'other.hal', and has 5 errors by itself; type: hal check machine.hal\n",
+            self.bad("check", "part.hal"),
+        )
+
+    def test_few_errors_are_printed(self):
+        self.write("machine.hal", "source part.hal\n")
+        self.write("part.hal", "addf siggen.0.update t\n")
+        error = self.bad("check", "part.hal")
+        self.assertIn("part.hal:1:6: error: unknown function 'siggen.0.update'", error)
+        self.assertTrue(error.endswith("\n2 errors\n"), error)
+
+    def test_an_ini_file_reads_parts_too(self):
+        self.write("machine.ini", "[HAL]\nHALFILE = first.hal\nHALFILE = part.hal\n")
+        self.write("part.hal", "addf siggen.0.update t\n" * 5)
+        self.assertEqual(
+            "hal check: 'part.hal' is a part of 'machine.ini', and has 10 errors by itself; type: hal check machine.ini\n",
+            self.bad("check", "part.hal"),
+        )
+
+    def test_a_part_that_is_complete_is_good(self):
+        self.write("machine.hal", "source part.hal\n")
+        self.write("part.hal", SERVO)
+        done = self.run_program("check", "part.hal")
+        self.assertEqual((0, "part.hal: no errors\n"), (done.returncode, done.stderr))
+
+
 if __name__ == "__main__":
     unittest.main()
