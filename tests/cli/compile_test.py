@@ -51,6 +51,16 @@ class Compile(harness.Case):
         )
         self.assertIn("First-order lag", self.run_program("doc", "lag").stdout)
 
+    def test_a_pin_of_another_type_is_one_sentence(self):
+        self.write("lag.cpp", LAG.replace("BODY", "out = 1;").replace("Out<double>  ", "Out<float>   "))
+        done = self.compile("lag.cpp")
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(
+            done.stderr,
+            r"^lag\.cpp:\d+:\d+: error: a pin has one of the types bool, double, std::int32_t, std::uint32_t, std::int64_t, std::uint64_t and hal::Port; "
+            r"write double in place of float\nhal compile: 'lag\.cpp' does not compile; it was not installed\n$",
+        )
+
     def test_a_compiler_error_names_the_users_line_and_column(self):
         self.write(
             "lag.cpp",

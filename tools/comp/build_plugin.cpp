@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "cli/output.hpp"
+#include "comp/compiler_messages.hpp"
 #include "comp/toolchain.hpp"
 #include "comp/try_plugin.hpp"
 #include "machine/load/plugins.hpp"
@@ -324,7 +325,8 @@ private:
             return fail(fmt::format("{} cannot be run: {}", words.front(), std::strerror(errno)));
         }
         if (source_.language == Language::cpp && status != 0) {
-            built_.messages = without_false_hint(built_.messages, source_);
+            built_.messages =
+                with_assertions_in_one_line(without_false_hint(built_.messages, source_));
         }
         if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return true;
         if (built_.messages.empty()) {

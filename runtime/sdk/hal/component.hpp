@@ -289,6 +289,17 @@ private:
 };
 
 namespace detail {
+/// The type of a pin. Another one gives one message, and counts as double behind it.
+template <class T>
+struct PinOf {
+    static_assert(is_pin_type<T>,
+                  "a pin has one of the types bool, double, std::int32_t, std::uint32_t, "
+                  "std::int64_t, std::uint64_t and hal::Port; write double in place of float");
+    using type = std::conditional_t<is_pin_type<T>, T, double>;
+};
+template <class T>
+using pin_of = typename PinOf<T>::type;
+
 template <PinType T, hal_dir Dir>
 class Pin {
 public:
@@ -316,28 +327,28 @@ private:
 
 /// An input: reads the signal it is linked to, or its own value (`setp`). Assigning to it does not
 /// compile.
-template <PinType T>
-class In : public detail::Pin<T, HAL_DIR_IN> {
+template <class T>
+class In : public detail::Pin<detail::pin_of<T>, HAL_DIR_IN> {
 public:
-    using detail::Pin<T, HAL_DIR_IN>::Pin;
+    using detail::Pin<detail::pin_of<T>, HAL_DIR_IN>::Pin;
     In& operator=(const In&) = delete;
     In& operator=(T) = delete;  // an input is only read; hal::Out and hal::Io can be written
 };
 
 /// A parameter: read by the component, set by `setp`, never linked.
-template <PinType T>
-class Param : public detail::Pin<T, HAL_DIR_PARAM> {
+template <class T>
+class Param : public detail::Pin<detail::pin_of<T>, HAL_DIR_PARAM> {
 public:
-    using detail::Pin<T, HAL_DIR_PARAM>::Pin;
+    using detail::Pin<detail::pin_of<T>, HAL_DIR_PARAM>::Pin;
     Param& operator=(const Param&) = delete;
     Param& operator=(T) = delete;  // a parameter is only read; setp sets it
 };
 
 /// An output. Reading it gives what was last written.
-template <PinType T>
-class Out : public detail::Pin<T, HAL_DIR_OUT> {
+template <class T>
+class Out : public detail::Pin<detail::pin_of<T>, HAL_DIR_OUT> {
 public:
-    using detail::Pin<T, HAL_DIR_OUT>::Pin;
+    using detail::Pin<detail::pin_of<T>, HAL_DIR_OUT>::Pin;
     Out& operator=(T value) noexcept {
         this->put(value);
         return *this;
@@ -349,10 +360,10 @@ public:
 };
 
 /// Read and written by the component and by others (`index-enable`).
-template <PinType T>
-class Io : public detail::Pin<T, HAL_DIR_IO> {
+template <class T>
+class Io : public detail::Pin<detail::pin_of<T>, HAL_DIR_IO> {
 public:
-    using detail::Pin<T, HAL_DIR_IO>::Pin;
+    using detail::Pin<detail::pin_of<T>, HAL_DIR_IO>::Pin;
     Io& operator=(T value) noexcept {
         this->put(value);
         return *this;
@@ -428,10 +439,10 @@ private:
     P* pins_ = nullptr;
     std::size_t size_ = 0;
 };
-template <PinType T> using Ins = Pins<In<T>, T>;
-template <PinType T> using Outs = Pins<Out<T>, T>;
-template <PinType T> using Ios = Pins<Io<T>, T>;
-template <PinType T> using Params = Pins<Param<T>, T>;
+template <class T> using Ins = Pins<In<T>, detail::pin_of<T>>;
+template <class T> using Outs = Pins<Out<T>, detail::pin_of<T>>;
+template <class T> using Ios = Pins<Io<T>, detail::pin_of<T>>;
+template <class T> using Params = Pins<Param<T>, detail::pin_of<T>>;
 
 /// Returns an extension of the host interface, or nullptr. In constructor and start() only. [setup]
 template <class Extension>

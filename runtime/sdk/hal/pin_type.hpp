@@ -14,10 +14,13 @@
 namespace hal {
 
 template <class T>
-concept PinType =
-    std::same_as<T, bool> || std::same_as<T, double> || std::same_as<T, std::int32_t> ||
-    std::same_as<T, std::uint32_t> || std::same_as<T, std::int64_t> ||
-    std::same_as<T, std::uint64_t> || std::same_as<T, Port>;
+inline constexpr bool is_pin_type =
+    std::is_same_v<T, bool> || std::is_same_v<T, double> || std::is_same_v<T, std::int32_t> ||
+    std::is_same_v<T, std::uint32_t> || std::is_same_v<T, std::int64_t> ||
+    std::is_same_v<T, std::uint64_t> || std::is_same_v<T, Port>;
+
+template <class T>
+concept PinType = is_pin_type<T>;
 
 namespace detail {
 template <class T>
