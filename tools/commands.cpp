@@ -113,8 +113,8 @@ constexpr Subcommand table[] = {
     command<DocOptions, IN_TOOLS(run_doc)>("doc", "[COMPONENT…] [--all --output DIR]",
                                            "print the manual page of a component"),
     command<NewOptions, IN_TOOLS(run_new)>(
-        "new", "component NAME [--folder DIR]",
-        "create a component to start from: source, CMakeLists.txt, test"),
+        "new", "component|machine NAME [--folder DIR] [--axes N] [--bus BUS]",
+        "create a component or a machine to start from, with a test"),
     command<CompileOptions, IN_TOOLS(run_compile)>(
         "compile", "FILE… [--output DIR] [--check-rt [-- ARGUMENT=VALUE…]]",
         "build a plugin from one source file and install it"),

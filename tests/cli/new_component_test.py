@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""hal new component: what it makes compiles and passes its test at once, from the build tree and from an installation."""
+"""hal new: a component compiles and passes its test at once, from the build tree and from an installation; a machine runs and passes its test."""
 import os
 import shutil
 import subprocess
 import unittest
 
-from harness import HAL, TIMEOUT, Case
+from harness import HAL, TIMEOUT, Case, wait_until
 
 BUILD = HAL.parent.parent  # the build tree, or an installation
 PACKAGE = BUILD / "lib" / "cmake" / "Halcyon"
@@ -97,7 +97,7 @@ class NewComponent(Case):
             with self.subTest(words):
                 self.assertIn(why, self.bad("new", "component", *words))
         self.assertEqual(
-            "hal new: missing kind: only components can be created; type: hal new component thing\n",
+            "hal new: missing kind; type: hal new component thing, or hal new machine thing\n",
             self.bad("new", "thing"),
         )
         self.assertEqual({"there"}, set(os.listdir(self.folder)) - {".ccache"})
@@ -111,6 +111,61 @@ class NewComponent(Case):
         self.assertEqual(
             {"part.cpp", "CMakeLists.txt", "test.hal", "expected"},
             set(os.listdir(self.folder / "a b" / "c")),
+        )
+
+
+class NewMachine(Case):
+    def create(self, name, *options):
+        printed = self.good("new", "machine", name, *options)
+        return printed.splitlines()
+
+    def test_each_bus_runs_and_passes_its_test(self):
+        for bus, axes in (("none", 1), ("none", 9), ("canopen", 3), ("canopen", 4), ("ethercat", 9)):
+            with self.subTest(bus=bus, axes=axes):
+                name = f"{bus}-{axes}"
+                lines = self.create(name, "--bus", bus, "--axes", axes)
+                self.assertEqual(f"  cd {name}", lines[1])
+                self.assertEqual(f"  hal run --ini {name}.ini {name}.hal", lines[2])
+                folder = self.folder / name
+                files = {f"{name}.hal", f"{name}.ini", "test.hal", "expected", "README.md"}
+                if bus != "none":
+                    files.add(f"{name}.{bus}")
+                self.assertEqual(files, set(os.listdir(folder)))
+                test = lines[3].removeprefix("Its test: ")
+                self.assertIn(test.split(" 2>")[0], (folder / "README.md").read_text())
+                done = subprocess.run(
+                    ["bash", "-c", f"set -o pipefail; {test}"],
+                    cwd=folder,
+                    env={**self.environment, "PATH": f"{HAL.parent}:{self.environment['PATH']}"},
+                    stdout=subprocess.PIPE,
+                    text=True,
+                    timeout=2 * TIMEOUT,
+                )
+                self.assertEqual((0, ""), (done.returncode, done.stdout))
+                for file in (f"{name}.hal", "test.hal"):
+                    self.assertEqual("", self.good("fmt", "--check", folder / file))
+
+    def test_it_runs_as_printed(self):
+        self.create("mill", "--bus", "canopen")
+        self.start("run", "--ini", "mill/mill.ini", "mill/mill.hal")
+        wait_until(lambda: self.shell("gets", "bus-ok").stdout == "TRUE\n", "the drives are there")
+        for name, value in (("chain-closed", "TRUE"), ("reset", "TRUE"), ("x-target", "1")):
+            self.assertEqual(0, self.shell("sets", name, value).returncode)
+        wait_until(lambda: self.value("x-there.out") == "TRUE", "x is there")
+
+    def test_wrong_words(self):
+        for words, message in (
+            (("mill", "--bus", "profinet"), "unknown bus 'profinet'; type one of none, canopen, ethercat"),
+            (("4mill",), "invalid machine name '4mill': use a letter, then letters, digits, - and _; try: hal new machine mill"),
+            ((), "missing name; type: hal new machine NAME"),
+        ):
+            self.assertEqual(f"hal new: {message}\n", self.bad("new", "machine", *words))
+        self.assertIn("--axes", self.bad("new", "machine", "mill", "--axes", "0"))
+        self.assertIn("--axes", self.bad("new", "machine", "mill", "--axes", "10"))
+        self.create("mill")
+        self.assertEqual(
+            "hal new: 'mill' exists already; give the new machine another folder: hal new machine mill --folder DIR\n",
+            self.bad("new", "machine", "mill"),
         )
 
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // `hal new component NAME`: a component that compiles and has a test, in a folder of its own outside of the tree.
+// `hal new machine NAME`: a machine that runs and has a test.
 #include "comp/new.hpp"
 
 #include <algorithm>
@@ -13,11 +14,13 @@
 #include <sstream>
 
 #include "cli/output.hpp"
+#include "comp/new_machine.hpp"
 #include "machine/load/plugins.hpp"
 #include "netlist/netlist.hpp"
 #include "text/characters.hpp"
 #include "text/diagnostic.hpp"
 #include "text/folder_entries.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -133,20 +136,25 @@ std::string repaired(const std::string& name) {
     return good.empty() ? "my-part" : good;
 }
 
-std::string problem_of(const std::string& name) {
+/// What is wrong with the spelling of a name; empty: nothing.
+std::string problem_of_spelling(const std::string& kind, const std::string& name) {
     const bool plain = std::all_of(name.begin(), name.end(),
                                    [](char c) { return is_name_character(c) && c != '.'; });
     constexpr std::size_t longest = 40;
     if (!plain || name.empty() || !is_letter(name.front()) || name.back() == '-' ||
         name.back() == '_') {
         return fmt::format(
-            "invalid component name '{}': use a letter, then letters, digits, - and _; try: hal "
-            "new component {}",
-            name, repaired(name));
+            "invalid {0} name '{1}': use a letter, then letters, digits, - and _; try: hal new {0} {2}",
+            kind, name, repaired(name));
     }
     if (name.size() > longest) {
         return fmt::format("the name has {} characters; the limit is {}", name.size(), longest);
     }
+    return {};
+}
+
+std::string problem_of_component(const std::string& name) {
+    if (std::string why = problem_of_spelling("component", name); !why.empty()) return why;
     std::string underlined = name;
     std::replace(underlined.begin(), underlined.end(), '-', '_');
     if (std::find(std::begin(keywords), std::end(keywords), underlined) != std::end(keywords)) {
@@ -238,67 +246,107 @@ std::string shell_word(const std::string& word) {
     return quoted + "'";
 }
 
+/// Creates the folder and the files. Returns what failed; empty: nothing.
+std::string create(const NewOptions& options, const fs::path& folder,
+                   const std::vector<NewFile>& files) {
+    std::error_code problem;
+    const bool there = fs::exists(fs::symlink_status(folder, problem));
+    if (there && !(fs::is_directory(folder, problem) && fs::is_empty(folder, problem))) {
+        return fmt::format("'{0}' exists already; give the new {1} another folder: hal new {1} {2} "
+                           "--folder DIR",
+                           folder.string(), options.words[0], options.words[1]);
+    }
+    fs::create_directories(folder, problem);
+    if (problem) return fmt::format("cannot create '{}': {}", folder.string(), problem.message());
+    for (const NewFile& file : files) {
+        const bool is_netlist = file.name.ends_with(".hal");
+        std::string why = write_file((folder / file.name).string(),
+                                     is_netlist ? formatted(file.text) : file.text);
+        if (!why.empty()) return why;
+    }
+    return {};
+}
+
+int new_component(const NewOptions& options, const fs::path& folder) {
+    const std::string& name = options.words[1];
+    if (const std::string why = problem_of_component(name); !why.empty()) return fail(options, why);
+    const std::string package = package_hint();
+    const std::string hint = package.empty() ? "" : fmt::format(" HINTS \"{}\"", package);
+    const std::vector<NewFile> files{{name + ".cpp", filled(source_text, name, hint)},
+                                     {"CMakeLists.txt", filled(project, name, hint)},
+                                     {"test.hal", filled(netlist, name, hint)},
+                                     {"expected", filled(expected, name, hint)}};
+    if (const std::string why = create(options, folder, files); !why.empty()) {
+        return fail(options, why);
+    }
+    return exit_code(
+        print(fmt::format("{0}: {1}.cpp, CMakeLists.txt, test.hal and its expected output\n"
+                          "  cd {0}\n"
+                          "  cmake -B build && cmake --build build && ctest --test-dir build\n"
+                          "To load it: HALCYON_PLUGIN_PATH=build hal doc {1}; to install it: "
+                          "hal compile {1}.cpp\n",
+                          shell_word(folder.string()), name)));
+}
+
+int new_machine(const NewOptions& options, const fs::path& folder) {
+    const std::string& name = options.words[1];
+    if (const std::string why = problem_of_spelling("machine", name); !why.empty()) {
+        return fail(options, why);
+    }
+    const auto buses = machine_buses();
+    if (std::find(buses.begin(), buses.end(), options.bus) == buses.end()) {
+        std::string names;
+        for (const std::string_view bus : buses) {
+            append_item(names, bus);
+        }
+        return fail(options, fmt::format("unknown bus '{}'; type one of {}", options.bus, names));
+    }
+    const std::vector<NewFile> files = machine_files({name, options.axes, options.bus});
+    if (const std::string why = create(options, folder, files); !why.empty()) {
+        return fail(options, why);
+    }
+    std::string names;
+    for (const NewFile& file : files) {
+        append_item(names, file.name);
+    }
+    return exit_code(print(fmt::format(
+        "{0}: {2}\n  cd {0}\n  hal run --ini {1}.ini {1}.hal\nIts test: hal sim --quiet --ini "
+        "{1}.ini test.hal 2>/dev/null | diff expected -\n",
+        shell_word(folder.string()), name, names)));
+}
+
+struct Kind {
+    const char* name;
+    int (*create)(const NewOptions& options, const fs::path& folder);
+};
+
+constexpr Kind kinds[] = {{"component", new_component}, {"machine", new_machine}};
+
 }  // namespace
 
 int run_new(const NewOptions& options) {
     const auto& words = options.words;
-    if (words.empty() || words[0] != "component") {
-        const std::string hint = words.size() == 1 && problem_of(words[0]).empty()
-                                     ? "hal new component " + words[0]
-                                     : "hal new component NAME";
-        return fail(options,
-                    fmt::format("missing kind: only components can be created; type: {}", hint));
+    const auto* const kind =
+        std::find_if(std::begin(kinds), std::end(kinds),
+                     [&](const Kind& one) { return !words.empty() && words[0] == one.name; });
+    if (kind == std::end(kinds)) {
+        const bool may_be_name =
+            words.size() == 1 && problem_of_spelling("component", words[0]).empty();
+        const std::string name = may_be_name ? words[0] : "NAME";
+        return fail(options, fmt::format("missing kind; type: hal new component {0}, or hal new "
+                                         "machine {0}",
+                                         name));
     }
-    if (words.size() != 2) {
-        return fail(
-            options,
-            words.size() < 2
-                ? "missing name; type: hal new component NAME"
-                : fmt::format(
-                      "expected one name, not {}; a name contains no blanks: hal new component {}",
-                      words.size() - 1, repaired(words[1] + "-" + words[2])));
+    if (words.size() < 2) {
+        return fail(options, fmt::format("missing name; type: hal new {} NAME", kind->name));
     }
-    const std::string& name = words[1];
-    if (const std::string why = problem_of(name); !why.empty()) return fail(options, why);
-
-    std::error_code problem;
-    const fs::path folder = options.folder.empty() ? fs::path(name) : fs::path(options.folder);
-    const bool there = fs::exists(fs::symlink_status(folder, problem));
-    if (there && !(fs::is_directory(folder, problem) && fs::is_empty(folder, problem))) {
-        return fail(options, fmt::format("'{}' exists already; give the new component another "
-                                         "folder: hal new component {} --folder DIR",
-                                         folder.string(), name));
+    if (words.size() > 2) {
+        return fail(options, fmt::format("expected one name, not {}; a name contains no blanks: "
+                                         "hal new {} {}",
+                                         words.size() - 1, kind->name,
+                                         repaired(words[1] + "-" + words[2])));
     }
-    fs::create_directories(folder, problem);
-    if (problem) {
-        return fail(options,
-                    fmt::format("cannot create '{}': {}", folder.string(), problem.message()));
-    }
-
-    const std::string package = package_hint();
-    const std::array<std::pair<std::string, std::string_view>, 4> files{
-        {{name + ".cpp", source_text},
-         {"CMakeLists.txt", project},
-         {"test.hal", netlist},
-         {"expected", expected}}};
-    for (const auto& [file, text] : files) {
-        const std::string content =
-            filled(text, name, package.empty() ? "" : fmt::format(" HINTS \"{}\"", package));
-        if (const std::string why = write_file((folder / file).string(),
-                                               file == "test.hal" ? formatted(content) : content);
-            !why.empty()) {
-            return fail(options, why);
-        }
-    }
-    const std::string path = shell_word(folder.string());
-    return print(fmt::format("{0}: {1}.cpp, CMakeLists.txt, test.hal and its expected output\n"
-                             "  cd {0}\n"
-                             "  cmake -B build && cmake --build build && ctest --test-dir build\n"
-                             "To load it: HALCYON_PLUGIN_PATH=build hal doc {1}; to install it: "
-                             "hal compile {1}.cpp\n",
-                             path, name))
-               ? 0
-               : 1;
+    return kind->create(options, options.folder.empty() ? words[1] : options.folder);
 }
 
 }  // namespace hal::tools

@@ -8,12 +8,17 @@
 namespace hal::tools {
 
 struct NewOptions : Options {
-    std::string folder;  ///< of the new component; empty: its name
+    std::string folder;  ///< of the new component or machine; empty: its name
+    int axes = 3;
+    std::string bus = "none";
 
     void declare(OptionSet& set) override {
-        set.words("component NAME", "name for loadrt: letters, digits, - and _");
+        set.words("component|machine NAME", "its name: letters, digits, - and _");
         set.value("--folder", folder, "DIR",
                   "folder to create (default: NAME in the current folder)");
+        set.value("--axes", axes, "N", "of a machine: the number of axes (default 3)").in(1, 9);
+        set.value("--bus", bus, "BUS",
+                  "of a machine: canopen, ethercat, or none (default): motors without a bus");
     }
 };
 
