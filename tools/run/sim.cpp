@@ -175,7 +175,7 @@ int simulate(const SimOptions& options, const SimRecorder* recorder) {
     TrackedOutput output;
     const auto begun = std::chrono::steady_clock::now();
     int status = machine.load(&output);
-    // with -k what could be loaded runs, and the status tells of the rest
+    // with -k what could be loaded runs, and the status has the rest
     const bool loaded = status == 0 || (options.keep_going && !machine.stop.requested());
     const auto goes_on = [&] { return status == 0 || (loaded && options.keep_going); };
     if (goes_on() && is_advanced(options)) {
