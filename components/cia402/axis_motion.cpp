@@ -12,8 +12,8 @@ bool SetPoints::push(const SetPoint& p) noexcept {
     if (p.immediate) {
         count_ = 0;
     }
-    if (count_ == room) return false;
-    queue_[(first_ + count_++) % room] = p;
+    if (count_ == capacity) return false;
+    queue_[(first_ + count_++) % capacity] = p;
     done_ = false;
     return true;
 }
@@ -45,7 +45,7 @@ std::uint16_t SetPoints::step(std::uint16_t statusword, Time now, Time limit,
             done_ = reached && !acknowledged;
         } else if (!acknowledged) {
             now_ = queue_[first_];
-            first_ = (first_ + 1) % room;
+            first_ = (first_ + 1) % capacity;
             --count_;
             enter(Phase::shown, now);
         } else if (reached) {

@@ -20,7 +20,7 @@ struct SetPoint {
 /// Profile position: passes set-points to the drive one by one, as fast as it takes them.
 class SetPoints {
 public:
-    static constexpr std::size_t room = 16;
+    static constexpr std::size_t capacity = 16;
 
     /// Queues a set-point; an immediate one replaces all queued ones. Returns false when the queue
     /// is full. [realtime]
@@ -50,7 +50,7 @@ private:
     }
     void check(std::uint16_t statusword, Time now, Time limit) noexcept;
 
-    std::array<SetPoint, room> queue_{};
+    std::array<SetPoint, capacity> queue_{};
     std::size_t first_ = 0;
     std::size_t count_ = 0;
     SetPoint now_;

@@ -14,7 +14,7 @@ using Time = std::int64_t;
 inline constexpr Time one_second = 1'000'000'000;
 
 /// Axes of one node. The objects of axis n, counted from 0, are at +0x800·n, its PDOs at +64·n.
-inline constexpr unsigned most_axes = 8;
+inline constexpr unsigned max_axes = 8;
 /// Returns the object of an axis that corresponds to `index` of the first one. [any]
 constexpr std::uint16_t of_axis(std::uint16_t index, unsigned axis) noexcept {
     return static_cast<std::uint16_t>(index + 0x800 * axis);

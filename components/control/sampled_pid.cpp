@@ -94,8 +94,8 @@ private:
             td / (td + n * h) * derivative_ - gain * td * n / (td + n * h) * (feedback - before_);
         before_ = feedback;
         const double wanted = gain * (weight * command - feedback) + integral_ + derivative_;
-        const double most = std::fabs(limit);
-        next_ = most > 0.0 ? std::clamp(wanted, -most, most) : wanted;
+        const double max = std::fabs(limit);
+        next_ = max > 0.0 ? std::clamp(wanted, -max, max) : wanted;
         const double error = command - feedback;
         // While the output is limited the integral changes only towards the range (conditional
         // integration).

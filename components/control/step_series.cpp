@@ -14,7 +14,7 @@ struct Series {
                (std::string(doc) + ", mean of the steps").c_str(), {.unit = unit}),
           deviation(c, (std::string(name) + "-sd").c_str(),
                     (std::string(doc) + ", standard deviation").c_str(), {.unit = unit}),
-          most(c, (std::string(name) + "-max").c_str(), (std::string(doc) + ", worst step").c_str(),
+          max(c, (std::string(name) + "-max").c_str(), (std::string(doc) + ", worst step").c_str(),
                {.unit = unit}),
           retained_(c, {{"square", square_}}) {}
 
@@ -22,15 +22,15 @@ struct Series {
         if (count == 1) {
             mean = 0.0;
             square_ = 0.0;
-            most = value;
+            max = value;
         }
         const double off = value - mean;
         mean = mean + off / count;
         square_ += off * (value - mean);
         deviation = std::sqrt(std::fmax(square_, 0.0) / count);
-        most = std::fmax(most, value);
+        max = std::fmax(max, value);
     }
-    hal::Out<double> mean, deviation, most;
+    hal::Out<double> mean, deviation, max;
 
 private:
     double square_ = 0.0;

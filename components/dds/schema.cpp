@@ -19,7 +19,7 @@ static_assert(std::endian::native == std::endian::little, "values are stored in 
 
 constexpr std::size_t header = 4;
 constexpr std::size_t max_fields = 1024;
-constexpr std::size_t most_bytes = 60'000;
+constexpr std::size_t max_bytes = 60'000;
 
 struct TypeName {
     std::string_view name;
@@ -206,7 +206,7 @@ public:
         // PLAIN_CDR2_LE
         good_ = bytes[1] <= 1 || bytes[1] == 6 || bytes[1] == 7;
         swapped_ = (bytes[1] & 1) == 0;
-        most_ = bytes[1] >= 6 ? 4 : 8;
+        max_ = bytes[1] >= 6 ? 4 : 8;
     }
     template <class T>
     T get() noexcept {
@@ -244,7 +244,7 @@ public:
 
 private:
     void align(std::size_t size) noexcept {
-        const std::size_t to = std::min(size, most_);
+        const std::size_t to = std::min(size, max_);
         const std::size_t over = (at_ - header) % to;
         if (over != 0) {
             skip(to - over);
@@ -252,7 +252,7 @@ private:
     }
     std::span<const std::uint8_t> bytes_;
     std::size_t at_ = header;
-    std::size_t most_ = 8;
+    std::size_t max_ = 8;
     bool good_ = false;
     bool swapped_ = false;
 };
@@ -401,9 +401,9 @@ Schema Schema::of_ros(std::string_view ros, const std::vector<std::string>& name
                           "WrenchStamped, sensor_msgs/JointState Image; other types that consist "
                           "of plain numbers: fields= and type=");
     }
-    if (schema.sample.size() > most_bytes) {
+    if (schema.sample.size() > max_bytes) {
         reject("ros", "ros=" + std::string(ros) + ": the message exceeds " +
-                          std::to_string(most_bytes) +
+                          std::to_string(max_bytes) +
                           " bytes; shorten joints=, frame= or encoding=");
     }
     const auto slash = ros.find('/');

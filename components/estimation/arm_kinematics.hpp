@@ -42,7 +42,7 @@ struct Arm {
     /// Returns the pose of the end effector and sets its Jacobian (six rows, a column per joint).
     Transform forward(const Vector& q, Matrix& jacobian) const noexcept {
         Transform t = Transform::Identity();
-        Eigen::Vector3d axes[most], origins[most];
+        Eigen::Vector3d axes[max], origins[max];
         for (std::size_t i = 0; i < links.size(); ++i) {
             axes[i] = t.block<3, 1>(0, 2);
             origins[i] = t.block<3, 1>(0, 3);

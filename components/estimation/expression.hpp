@@ -44,9 +44,9 @@ public:
         to.steps_.clear();
         parser.sum();
         parser.skip();
-        if (!parser.problem && parser.place < text.size()) {
-            parser.fail(parser.place, parser.place + 1,
-                        "'" + std::string(1, text[parser.place]) + "' is not an operator",
+        if (!parser.problem && parser.offset < text.size()) {
+            parser.fail(parser.offset, parser.offset + 1,
+                        "'" + std::string(1, text[parser.offset]) + "' is not an operator",
                         "write one of + - * / ^ between two values");
         }
         if (!parser.problem && parser.deep > deepest) {
@@ -144,7 +144,7 @@ private:
         std::uint32_t at;
         const Lookup& lookup;
         Expression& to;
-        std::size_t place;
+        std::size_t offset;
         std::optional<Problem> problem;
         std::size_t deep, now = 0, nested = 0;
 
@@ -156,15 +156,15 @@ private:
             }
         }
         void skip() {
-            while (place < text.size() &&
-                   (text[place] == ' ' || text[place] == '\t' || text[place] == '\r')) {
-                ++place;
+            while (offset < text.size() &&
+                   (text[offset] == ' ' || text[offset] == '\t' || text[offset] == '\r')) {
+                ++offset;
             }
         }
         bool take(char c) {
             skip();
-            if (problem || place >= text.size() || text[place] != c) return false;
-            ++place;
+            if (problem || offset >= text.size() || text[offset] != c) return false;
+            ++offset;
             return true;
         }
         void push(Step s) {
@@ -206,7 +206,7 @@ private:
         }
         void sign() {
             if (++nested > 200) {
-                return fail(place, place + 1, "the formula is nested too deeply",
+                return fail(offset, offset + 1, "the formula is nested too deeply",
                             "use fewer brackets");
             }
             if (take('-')) {
@@ -229,11 +229,11 @@ private:
         void value() {
             skip();
             if (problem) return;
-            if (place >= text.size()) {
+            if (offset >= text.size()) {
                 return fail(text.empty() ? 0 : text.size() - 1, text.size(),
                             "missing value at the end of the formula", a_value);
             }
-            const std::size_t begin = place;
+            const std::size_t begin = offset;
             if (take('(')) {
                 sum();
                 if (!problem && !take(')')) {
@@ -241,29 +241,29 @@ private:
                 }
                 return;
             }
-            const unsigned char c = static_cast<unsigned char>(text[place]);
+            const unsigned char c = static_cast<unsigned char>(text[offset]);
             if (std::isdigit(c) || c == '.') return number();
             if (std::isalpha(c) || c == '_') return word();
             fail(begin, begin + 1, "'" + std::string(1, text[begin]) + "' is not a value", a_value);
         }
         void number() {
-            const std::string rest(text.substr(place));
+            const std::string rest(text.substr(offset));
             char* end = nullptr;
             const double v = std::strtod(rest.c_str(), &end);
             if (end == rest.c_str()) {
-                return fail(place, place + 1, "'.' is not a number",
+                return fail(offset, offset + 1, "'.' is not a number",
                             "write numbers as in 9.81 or 2e-3");
             }
-            place += static_cast<std::size_t>(end - rest.c_str());
+            offset += static_cast<std::size_t>(end - rest.c_str());
             push({Kind::number, 0, v});
         }
         void word() {
-            const std::size_t begin = place;
-            while (place < text.size() &&
-                   (std::isalnum(static_cast<unsigned char>(text[place])) || text[place] == '_')) {
-                ++place;
+            const std::size_t begin = offset;
+            while (offset < text.size() &&
+                   (std::isalnum(static_cast<unsigned char>(text[offset])) || text[offset] == '_')) {
+                ++offset;
             }
-            const std::string name(text.substr(begin, place - begin));
+            const std::string name(text.substr(begin, offset - begin));
             if (take('(')) {
                 const auto find = [&](const auto& table, std::size_t from) -> int {
                     for (std::size_t i = from; i < std::size(table); ++i) {

@@ -31,11 +31,11 @@ struct FurutaParameters {
 /// the length in series.
 class TriangularFilter {
 public:
-    static constexpr std::size_t most = 64;
+    static constexpr std::size_t max = 64;
     /// [realtime]
     void restart(std::size_t length) noexcept {
         *this = {};
-        length_ = std::clamp<std::size_t>(length, 1, most);
+        length_ = std::clamp<std::size_t>(length, 1, max);
     }
     double pass(double value) noexcept {
         for (auto& stage : stages_) {
@@ -49,7 +49,7 @@ public:
 
 private:
     struct Stage {
-        std::array<double, most> last{};
+        std::array<double, max> last{};
         double sum = 0;
     };
     std::array<Stage, 2> stages_{};
@@ -99,7 +99,7 @@ public:
         nominal_ = nominal;
         dt_ = dt;
         half_ = std::clamp<std::size_t>(static_cast<std::size_t>(std::lround(0.03 / dt)), 2,
-                                        TriangularFilter::most);
+                                        TriangularFilter::max);
         const double K = nominal.pendulum_inertia;
         const double ratio = nominal.coupling / K;
 

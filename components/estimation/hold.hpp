@@ -75,7 +75,7 @@ private:
     }
 
     using Wide =
-        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 2 * most, 2 * most>;
+        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, 2 * max, 2 * max>;
     Wide step_, power_, sum_, next_;
 };
 

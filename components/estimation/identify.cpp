@@ -270,9 +270,9 @@ private:
         if (!first && ++swings_ > 3) {
             shortest_ = even_ == 0 ? period : std::fmin(shortest_, period);
 
-            longest_ = even_ == 0 ? period : std::fmax(longest_, period);
+            max_ = even_ == 0 ? period : std::fmax(max_, period);
             if (++even_ == periods) {
-                if (longest_ <= 1.1 * shortest_) return conclude(dt * static_cast<double>(thin_));
+                if (max_ <= 1.1 * shortest_) return conclude(dt * static_cast<double>(thin_));
                 even_ = 0;
             }
         }
@@ -355,7 +355,7 @@ private:
     int swings_ = 0;
     std::size_t even_ = 0;  // periods so far that are compared
     double shortest_ = 0.0;
-    double longest_ = 0.0;  // of them
+    double max_ = 0.0;  // of them
     std::array<double, periods> ups_{}, downs_{};  // when the output was switched
     hal::Retained retained_{*this,
                             {{"now", now_},
@@ -379,7 +379,7 @@ private:
                              {"swings", swings_},
                              {"even", even_},
                              {"shortest", shortest_},
-                             {"longest", longest_},
+                             {"longest", max_},
                              {"ups", ups_},
                              {"downs", downs_}}};
 };

@@ -187,11 +187,11 @@ private:
                     current_.value(index(diagonal_ ? j : i), index(j)) = rows_[i][j];
                 }
             }
-            if (current_.value.rows() > most || current_.value.cols() > most) {
+            if (current_.value.rows() > max || current_.value.cols() > max) {
                 report_at(current_.begin, current_.end,
                           current_.name + " is " + std::to_string(current_.value.rows()) + " x " +
                               std::to_string(current_.value.cols()),
-                          "matrices have at most " + std::to_string(most) + " rows and columns");
+                          "matrices have at most " + std::to_string(max) + " rows and columns");
             }
         }
         rows_.clear();

@@ -6,10 +6,10 @@
 
 namespace hal::estimation {
 
-inline constexpr int most = 12;  ///< rows and columns at most
+inline constexpr int max = 12;  ///< rows and columns at most
 
-using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, most, most>;
-using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, most, 1>;
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, max, max>;
+using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, max, 1>;
 
 /// to = a * b, without temporaries. `to` is neither of them; all three are matrices, not
 /// expressions. [realtime]

@@ -59,7 +59,7 @@ struct Histobins : hal::Component {
             count(value);
         }
         smallest_ = std::min(smallest_, value);
-        largest_ = std::max(largest_, value);
+        max_ = std::max(max_, value);
         statistics_.add(value);
         show();
     }
@@ -87,7 +87,7 @@ private:
         above_ = 0.0;
         below_ = 0.0;
         smallest_ = 1e99;
-        largest_ = -1e99;
+        max_ = -1e99;
         statistics_ = {};
     }
     void count(double value) noexcept {
@@ -108,7 +108,7 @@ private:
         pextra = above_;
         nextra = below_;
         input_min = smallest_;
-        input_max = largest_;
+        input_max = max_;
         nsamples = static_cast<std::uint32_t>(statistics_.count());
         mean = statistics_.mean();
         variance = statistics_.variance();
@@ -118,7 +118,7 @@ private:
     double above_ = 0.0;
     double below_ = 0.0;
     double smallest_ = 0.0;
-    double largest_ = 0.0;
+    double max_ = 0.0;
     std::uint32_t counted_bins_ = 0;  // settings of the bins at the last value; 0: none yet
     double counted_size_ = 0.0;
     double counted_minimum_ = 0.0;
@@ -128,7 +128,7 @@ private:
                              {"above", above_},
                              {"below", below_},
                              {"smallest", smallest_},
-                             {"largest", largest_},
+                             {"largest", max_},
                              {"counted-bins", counted_bins_},
                              {"counted-size", counted_size_},
                              {"counted-minimum", counted_minimum_}}};

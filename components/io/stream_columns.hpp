@@ -77,8 +77,8 @@ public:
             throw hal::ArgumentError("cfg",
                                      "cfg= is empty; give one letter per pin, of b f s u l k");
         }
-        constexpr std::size_t most_values = std::size_t{1} << 26;  // half a gigabyte
-        if (static_cast<std::size_t>(depth) > most_values / (cfg.size() + 1)) {
+        constexpr std::size_t max_values = std::size_t{1} << 26;  // half a gigabyte
+        if (static_cast<std::size_t>(depth) > max_values / (cfg.size() + 1)) {
             throw hal::ArgumentError("depth", "depth=" + std::to_string(depth) +
                                                   " records of this cfg need more than 512 MB");
         }

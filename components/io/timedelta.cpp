@@ -31,20 +31,20 @@ struct Timedelta : hal::Component {
         if (reset || runs_ == 0) {
             runs_ = 0;
             sum_ = worst_ = 0;
-            shortest_ = longest_ = since;
+            shortest_ = max_ = since;
         }
         ++runs_;
         sum_ += error;
         worst_ = std::max(worst_, error < 0 ? -error : error);
         shortest_ = std::min(shortest_, since);
-        longest_ = std::max(longest_, since);
+        max_ = std::max(max_, since);
 
         out = measure::to_s32(since);
         current_error = measure::to_s32(error);
         current_jitter = measure::to_s32(error < 0 ? -error : error);
         jitter = measure::to_s32(worst_);
         min = measure::to_s32(shortest_);
-        max = measure::to_s32(longest_);
+        max = measure::to_s32(max_);
         err = measure::to_s32(sum_);
         average = static_cast<double>(sum_) / static_cast<double>(runs_);
     }
@@ -55,14 +55,14 @@ private:
     std::int64_t sum_ = 0;
     std::int64_t worst_ = 0;
     std::int64_t shortest_ = 0;
-    std::int64_t longest_ = 0;
+    std::int64_t max_ = 0;
     hal::Retained retained_{*this,
                             {{"time", time_},
                              {"runs", runs_},
                              {"sum", sum_},
                              {"worst", worst_},
                              {"shortest", shortest_},
-                             {"longest", longest_}}};
+                             {"longest", max_}}};
 };
 
 }  // namespace

@@ -26,12 +26,12 @@ struct Delay : hal::Component {
     hal::Function run{*this, "", hal::step<&Delay::update>, "stores in and updates out"};
 
     void update(hal::Cycle cycle) noexcept {
-        const double most = static_cast<double>(size_ - 1);
+        const double max = static_cast<double>(size_ - 1);
         const double wanted = static_cast<double>(cycles) + seconds / cycle.seconds();
-        const bool possible = wanted >= -1e-9 && wanted <= most + 1e-9;
+        const bool possible = wanted >= -1e-9 && wanted <= max + 1e-9;
         double back = 0.0;  // also for NaN
         if (wanted > 0.0) {
-            back = std::min(wanted, most);
+            back = std::min(wanted, max);
         }
         // Seconds that are a multiple of the period must not round down to one period less.
         const double whole = std::round(back);

@@ -18,10 +18,10 @@
 
 namespace {
 
-constexpr double largest = 1e150;  // what is larger counts as this: its square is finite
+constexpr double max_magnitude = 1e150;  // what is larger counts as this: its square is finite
 constexpr double rounding = 16e-16;  // of a few additions, relative
 
-double bounded(double value) { return std::clamp(value, -largest, largest); }
+double bounded(double value) { return std::clamp(value, -max_magnitude, max_magnitude); }
 
 // q(m), the distance over which braking fades out.
 double fading_way(double m) { return (m + 1.0) * (m + 2.0) / 6.0; }
@@ -72,25 +72,25 @@ bool lands(double way, double speed, double a, int moves) {
 
 // The speed after `before`, to go `way` by at most `most` in a cycle; speeds and way are relative
 // to the goal, which may be moving.
-double next_speed(double way, double before, double most, double a, double m, bool moving = false) {
+double next_speed(double way, double before, double max_speed, double a, double m, bool moving = false) {
     const double side = std::copysign(1.0, way);
     const double limit = side * stopping_speed(way, a, m);
 
-    const double on_line = std::min(limit, most);
+    const double on_line = std::min(limit, max_speed);
     const double faster = side * before + a;
     const double slower = side * before - a;
 
-    const double fastest = std::min(faster, most);
+    const double fastest = std::min(faster, max_speed);
     const double last_moves = a * (fading_way(m) + m + 4.0);  // q(m+2)
     if (side * way - std::clamp(on_line, slower, faster) <= last_moves) {
         // With a whole `a` in each cycle, when such moves end there as soon, or meet a moving goal
         // at most two cycles later.
         const int moves_on_line =
             static_cast<int>(std::min(8.0, std::ceil(on_line / a - rounding)));
-        if (m == 1.0 && limit < most && on_line > slower && on_line < faster && side * way > a) {
+        if (m == 1.0 && limit < max_speed && on_line > slower && on_line < faster && side * way > a) {
             for (int moves = 0; moves <= moves_on_line + (moving ? 0 : -2); ++moves) {
                 for (const double speed : {slower, faster}) {
-                    if (speed <= most && lands(side * way, speed, a, moves)) return side * speed;
+                    if (speed <= max_speed && lands(side * way, speed, a, moves)) return side * speed;
                 }
             }
         }
@@ -122,12 +122,12 @@ struct Limit3 : hal::Component {
 
     void update(hal::Cycle cycle) noexcept {
         const double period = cycle.seconds();
-        const double a = std::min(maxa * period * period, largest),
-                     v = maxv > 0.0 ? std::min(maxv * period, largest) : 0.0;
+        const double a = std::min(maxa * period * period, max_magnitude),
+                     v = maxv > 0.0 ? std::min(maxv * period, max_magnitude) : 0.0;
         const double w = look_at_input(v);
         if (load) {
             carry();
-        } else if (a > 1.0 / largest) {
+        } else if (a > 1.0 / max_magnitude) {
             approach(a, v, w);
         } else {
             stand();

@@ -18,8 +18,8 @@ struct Quantizer : hal::Component {
     hal::In<double> hysteresis{
         *this, "hysteresis",
         "distance, in steps, by which in must pass the border of a level to leave it"};
-    hal::Limit min{*this, "min-level", "lowest level", {.initial = -most}};
-    hal::Limit max{*this, "max-level", "highest level", {.initial = most}};
+    hal::Limit min{*this, "min-level", "lowest level", {.initial = -max_exact}};
+    hal::Limit max{*this, "max-level", "highest level", {.initial = max_exact}};
     hal::Out<double> out{*this, "out", "level * step + offset", {.finite = true}};
     hal::Out<double> error{*this, "error", "in - out", {.finite = true}};
     hal::Out<std::int64_t> level{*this, "level", "number of the level"};
@@ -35,13 +35,13 @@ struct Quantizer : hal::Component {
         const double height = std::fabs(step);
         const double exact = (in_ - origin) / height;
         // finer than any level
-        if (!(height > 0.0) || !std::isfinite(height) || !(std::fabs(exact) <= most)) {
+        if (!(height > 0.0) || !std::isfinite(height) || !(std::fabs(exact) <= max_exact)) {
             show(in_, 0.0, false);
             return;
         }
         double wanted = rounded(exact);
         // Between two adjacent levels, change only once in is beyond the border by the hysteresis.
-        if (hysteresis > 0.0 && known_ && std::fabs(level_) <= most) {
+        if (hysteresis > 0.0 && known_ && std::fabs(level_) <= max_exact) {
             const double band = std::min(hysteresis.get(), 1e6);
             const double low = rounded(exact - band);
 
@@ -54,15 +54,15 @@ struct Quantizer : hal::Component {
                 wanted = level_;
             }
         }
-        const double low = std::isfinite(min) ? std::clamp(std::ceil(min), -most, most) : -most;
-        const double high = std::isfinite(max) ? std::clamp(std::floor(max), -most, most) : most;
+        const double low = std::isfinite(min) ? std::clamp(std::ceil(min), -max_exact, max_exact) : -max_exact;
+        const double high = std::isfinite(max) ? std::clamp(std::floor(max), -max_exact, max_exact) : max_exact;
         level_ = std::min(std::max(wanted, low), high);
         known_ = true;
         show(level_ * height + origin, level_, level_ != wanted);
     }
 
 private:
-    static constexpr double most = 9007199254740992.0;  // 2^53: whole numbers are exact up to here
+    static constexpr double max_exact = 9007199254740992.0;  // 2^53: whole numbers are exact up to here
     double rounded(double exact) const noexcept {
         switch (mode) {
         case down: return std::floor(exact);

@@ -94,7 +94,7 @@ struct DiffDrive : hal::Component {
         const double right = right_angle;
         const double base = width();
         // FALSE for NaN, too
-        const bool good = std::fabs(left) <= most && std::fabs(right) <= most;
+        const bool good = std::fabs(left) <= max && std::fabs(right) <= max;
         double way = 0.0;
         double turn = 0.0;
         if (good && started_) {
@@ -110,13 +110,13 @@ struct DiffDrive : hal::Component {
             started_ = true;
         }
         if (load) {
-            if (std::fabs(load_x) <= most) {
+            if (std::fabs(load_x) <= max) {
                 x_ = load_x;
             }
-            if (std::fabs(load_y) <= most) {
+            if (std::fabs(load_y) <= max) {
                 y_ = load_y;
             }
-            if (std::fabs(load_heading) <= most) {
+            if (std::fabs(load_heading) <= max) {
                 heading_ = load_heading;
             }
             distance_ = 0.0;
@@ -148,9 +148,9 @@ struct DiffDrive : hal::Component {
     }
 
     void command(hal::Cycle cycle) noexcept {
-        const double wanted_v = std::isfinite(linear) ? std::clamp(linear.get(), -most, most) : 0.0;
+        const double wanted_v = std::isfinite(linear) ? std::clamp(linear.get(), -max, max) : 0.0;
         const double wanted_w =
-            std::isfinite(angular) ? std::clamp(angular.get(), -most, most) : 0.0;
+            std::isfinite(angular) ? std::clamp(angular.get(), -max, max) : 0.0;
         // All limits scale (v, w) as a vector, so that the robot stays on its curve.
         double share = 1.0;
         const auto within = [&](double value, double limit) {
@@ -187,7 +187,7 @@ struct DiffDrive : hal::Component {
     }
 
 private:
-    static constexpr double most = 1e15;
+    static constexpr double max = 1e15;
     static double radius(double given) noexcept {
         return given > 1e-9 ? std::min(given, 1e9) : 1e-9;
     }

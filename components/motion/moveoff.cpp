@@ -141,8 +141,8 @@ private:
     }
 
     void follow(double dt) noexcept {
-        const std::size_t most = limit_test ? 10 : max_waypoints;
-        const bool full = used_ >= most;
+        const std::size_t capacity = limit_test ? 10 : max_waypoints;
+        const bool full = used_ >= capacity;
         for (std::size_t i = 0; i < pos.size(); ++i) {
             const double target =
                 std::min(std::max(offset_in[i].get(), min[i].get()), max[i].get());
@@ -190,11 +190,11 @@ private:
         offset_applied = any;
         warning = any && !apply_offsets && (warning || was_applying_);
         was_applying_ = apply_offsets;
-        const std::size_t most = limit_test ? 10 : max_waypoints;
-        waypoint_limit = state_ == follows && used_ >= most;
+        const std::size_t capacity = limit_test ? 10 : max_waypoints;
+        waypoint_limit = state_ == follows && used_ >= capacity;
         waypoint_count = static_cast<std::int32_t>(used_);
         waypoint_percent =
-            static_cast<std::int32_t>(std::min<std::size_t>(100 * used_ / most, 100));
+            static_cast<std::int32_t>(std::min<std::size_t>(100 * used_ / capacity, 100));
         state = paused_ ? std::int32_t{off} : state_;
     }
 

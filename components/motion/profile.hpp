@@ -88,22 +88,22 @@ public:
     }
     /// Changes the speed to `v`, with an acceleration of 0 there, with accelerations within
     /// ±`most`; an initial acceleration beyond it returns to it immediately.
-    void reach(double v, double most) noexcept {
+    void reach(double v, double max) noexcept {
         if (!(jerk_ < unlimited)) {
-            end_.acceleration = std::copysign(most, v - end_.velocity);
-            append(std::fabs(v - end_.velocity) / most, 0.0);
+            end_.acceleration = std::copysign(max, v - end_.velocity);
+            append(std::fabs(v - end_.velocity) / max, 0.0);
         } else {
             const double up = v < settled() ? -1.0 : 1.0;
             const double a = up * end_.acceleration;
             const double dv = up * (v - end_.velocity);
             const double peak = std::sqrt(std::max(0.0, jerk_ * dv + a * a / 2));
-            if (peak <= most) {
+            if (peak <= max) {
                 ramp(up * std::max(peak, a));
             } else {
                 const double way_up =
-                    (a <= most ? most * most - a * a : a * a - most * most) / (2 * jerk_);
-                ramp(up * most);
-                append(std::max(0.0, dv - way_up - most * most / (2 * jerk_)) / most, 0.0);
+                    (a <= max ? max * max - a * a : a * a - max * max) / (2 * jerk_);
+                ramp(up * max);
+                append(std::max(0.0, dv - way_up - max * max / (2 * jerk_)) / max, 0.0);
             }
             ramp(0.0);
         }
@@ -281,9 +281,9 @@ inline Path forward(const State& start, double target, const Limits& limits,
     }
     // From a start that is too fast S has a local maximum, but it starts at the stop point, before
     // the target, and ends behind it.
-    const double least = miss(slowest);
-    if (least >= 0.0) return stop(start, limits);
-    return by_way_of(root(slowest, top, least, beyond, miss));
+    const double min = miss(slowest);
+    if (min >= 0.0) return stop(start, limits);
+    return by_way_of(root(slowest, top, min, beyond, miss));
 }
 
 inline bool same(double a, double b, double scale) noexcept {

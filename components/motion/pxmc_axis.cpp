@@ -208,7 +208,7 @@ private:
     void control(double dt) noexcept {
         const motion::State& now = generator_.state();
         const double e = now.position - measured_;
-        const double most = std::fabs(max_output);
+        const double max = std::fabs(max_output);
         double integral = integral_ + e * dt;
         const auto effort = [&](double sum) {
             return p_gain * e + i_gain * sum + d_gain * (now.velocity - speed_) +
@@ -216,7 +216,7 @@ private:
         };
         double wanted = effort(integral);
         // Anti-windup: do not integrate further into saturation.
-        if (most > 0.0 && std::fabs(wanted) > most && i_gain * e * wanted > 0.0) {
+        if (max > 0.0 && std::fabs(wanted) > max && i_gain * e * wanted > 0.0) {
             wanted = effort(integral = integral_);
         }
         if (!std::isfinite(wanted)) {
@@ -225,7 +225,7 @@ private:
             return rest();
         }
         integral_ = integral;
-        output = most > 0.0 ? std::clamp(wanted, -most, most) : wanted;
+        output = max > 0.0 ? std::clamp(wanted, -max, max) : wanted;
         busy = (!generator_.arrived() || generator_.moving() ||
                 (moves_ && window > 0.0 && std::fabs(e) > window));
         show();

@@ -63,7 +63,7 @@ struct DualChannel : hal::Component {
     hal::Out<double> out{*this, "out", "checked value", {.finite = true}};
     hal::Out<bool> bit_out{*this, "bit-out", "TRUE: both bits are TRUE, and ok", {.safe = false}};
     hal::Out<double> difference{*this, "difference", "a - b", {.finite = true}};
-    hal::Out<double> largest{
+    hal::Out<double> max{
         *this, "largest-difference", "largest difference since the last reset", {.finite = true}};
     hal::Out<double> since{*this,
                            "differs-for",
@@ -82,7 +82,7 @@ struct DualChannel : hal::Component {
         const Comparison now = compare();
         count_time(now, cycle.seconds());
         update_fault(now, reset_edge, cycle.seconds());
-        update_largest(now, reset_edge);
+        update_max(now, reset_edge);
         publish(now);
     }
 
@@ -142,12 +142,12 @@ private:
         }
     }
 
-    void update_largest(const Comparison& now, bool reset_edge) noexcept {
+    void update_max(const Comparison& now, bool reset_edge) noexcept {
         if (reset_edge) {
-            largest_ = 0.0;
+            max_ = 0.0;
         }
         if (now.finite) {
-            largest_ = std::max(largest_, std::fabs(now.difference));
+            max_ = std::max(max_, std::fabs(now.difference));
         }
     }
 
@@ -171,7 +171,7 @@ private:
         out = substituted ? substitute.get() : good_;
         bit_out = healthy && now.bits;
         difference = now.finite ? now.difference : 0.0;
-        largest = largest_;
+        max = max_;
         since = for_;
     }
 
@@ -187,14 +187,14 @@ private:
 
     double for_ = 0.0;
     double good_ = 0.0;
-    double largest_ = 0.0;
+    double max_ = 0.0;
     std::uint32_t fault_ = agree;
     bool was_reset_ = true;  // TRUE from the first cycle on: not a rising edge
     bool was_ok_ = false;
     hal::Retained retained_{*this,
                             {{"for", for_},
                              {"good", good_},
-                             {"largest", largest_},
+                             {"largest", max_},
                              {"fault", fault_},
                              {"was-reset", was_reset_},
                              {"was-ok", was_ok_}}};

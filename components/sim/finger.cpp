@@ -53,9 +53,9 @@ struct Finger : hal::Component {
 
         const double k = sim::sane(wall_stiffness, 0.0);
         const double d = sim::sane(wall_damping, 0.0);
-        const double most = sim::sane(max_effort, 0.0);
+        const double max = sim::sane(max_effort, 0.0);
 
-        const double wanted = std::clamp(sim::force(effort), -most, most);
+        const double wanted = std::clamp(sim::force(effort), -max, max);
         const double edge = sim::force(wall);
         const double lag = sim::sane(actuator_lag, 0.0);
         const std::int64_t steps =

@@ -209,8 +209,8 @@ private:
 
 /// A parameter of a plant in a range that keeps the equations finite; what is not a number counts
 /// as `least`. [any]
-inline double sane(double value, double least) noexcept {
-    if (!(value > least)) return least;
+inline double sane(double value, double min) noexcept {
+    if (!(value > min)) return min;
     return value < 1e15 ? value : 1e15;
 }
 

@@ -98,11 +98,11 @@ private:
         of.markers = static_cast<int>(markers_);
         return of;
     }
-    static double within(const char* name, double value, double least, double most) {
-        if (value >= least && value <= most) return value;
+    static double within(const char* name, double value, double min, double max) {
+        if (value >= min && value <= max) return value;
         throw hal::ArgumentError(name, std::string(name) + "=" + short_text(value) +
-                                           " is outside " + short_text(least) + " to " +
-                                           short_text(most));
+                                           " is outside " + short_text(min) + " to " +
+                                           short_text(max));
     }
     static std::string short_text(double value) {
         std::string text = std::to_string(value);
@@ -172,7 +172,7 @@ private:
     Settings settings_;
 
     std::deque<hal::In<double>> poses_;
-    std::array<double, most_values> values_{};
+    std::array<double, max_values> values_{};
     std::shared_ptr<Stage> stage_;
     bool opened_ = false;
 

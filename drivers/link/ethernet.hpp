@@ -36,7 +36,7 @@ inline constexpr Address broadcast{0xff, 0xff, 0xff, 0xff, 0xff, 0xff};
 inline constexpr std::size_t header_bytes = 14;  ///< destination, source, type
 /// without the check sequence; shorter ones are padded with zeros
 inline constexpr std::size_t smallest_frame = 60;
-inline constexpr std::size_t largest_frame = 1514;
+inline constexpr std::size_t max_frame = 1514;
 
 /// Returns the bytes of line time that a frame of `length` bytes (without check sequence) takes,
 /// including preamble, check sequence and gap, at least 84 (IEEE 802.3 clause 4.2.3.2, 4.4.2).

@@ -13,13 +13,13 @@
 namespace hal {
 namespace {
 
-constexpr std::size_t most_bytes = std::size_t{1} << 30;  // places in a text are 32-bit numbers
+constexpr std::size_t max_bytes = std::size_t{1} << 30;  // places in a text are 32-bit numbers
 
 }  // namespace
 
 bool read_text_file(const std::string& path, std::string& text, std::string& problem,
                     bool descriptors) {
-    if (read_regular_file(path, most_bytes, text, descriptors)) return true;
+    if (read_regular_file(path, max_bytes, text, descriptors)) return true;
     problem = std::move(text);
     text.clear();
     return false;

@@ -242,11 +242,11 @@ void LinuxcncCheck::model(const Model& model, Diagnostics& diagnostics) {
     for (const auto& component : model.components) {
         name(component->name, "component", component->loaded, diagnostics);
         for (const auto& instance : component->instances) {
-            const auto longest = std::max_element(
+            const auto max = std::max_element(
                 instance->pins.begin(), instance->pins.end(),
                 [](const auto& a, const auto& b) { return a->name.size() < b->name.size(); });
-            if (longest != instance->pins.end()) {
-                name((*longest)->name, "pin", instance->loaded, diagnostics);
+            if (max != instance->pins.end()) {
+                name((*max)->name, "pin", instance->loaded, diagnostics);
             }
         }
         for (const auto& function : component->functions) {

@@ -177,14 +177,14 @@ public:
             while ((got = read(pipes_[i][0], text.data(), text.size())) > 0) {
                 const std::string_view part(text.data(), static_cast<std::size_t>(got));
                 // read and discarded, so that the program does not block
-                if (total_ > most) continue;
+                if (total_ > max) continue;
                 total_ += part.size();
                 if (i == 0) {
                     output.out(part);
                 } else {
                     output.err(part);
                 }
-                if (total_ > most) {
+                if (total_ > max) {
                     output.err("\n(output truncated after 1 MiB)\n");
                 }
             }
@@ -196,7 +196,7 @@ public:
     }
 
 private:
-    static constexpr std::size_t most = std::size_t{1} << 20;
+    static constexpr std::size_t max = std::size_t{1} << 20;
     static void close_one(int& file) {
         if (file >= 0) {
             close(file);

@@ -161,13 +161,13 @@ void show_thread(Request& request) {
     for (std::size_t i = 0; i < threads.size(); ++i) {
         const Thread* const thread = threads[i];
         const std::int32_t last = values[2 * i].s32;
-        const std::int32_t longest = values[2 * i + 1].s32;
+        const std::int32_t max = values[2 * i + 1].s32;
         if (request.script()) {
             request.add("{} YES {} {:>8} {}", thread->options.period_ns, thread->name, last,
-                        longest);
+                        max);
         } else {
             request.add("{:>11}  YES  {:>20} ( {:>8}, {:>8} )\n", thread->options.period_ns,
-                        thread->name, last, longest);
+                        thread->name, last, max);
         }
         int number = 1;
         for (const LoadedFunction* const function : thread->functions) {

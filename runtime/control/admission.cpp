@@ -112,7 +112,7 @@ int Admission::accept_one() {
 
 /// Returns the client that has been idle longest, for at least this time, and on which nothing
 /// depends; nullptr without such a client.
-ServedClient* Admission::longest_idle(std::int64_t idle_ns) const {
+ServedClient* Admission::max_idle(std::int64_t idle_ns) const {
     const std::int64_t now = monotonic_ns();
     ServedClient* max = nullptr;
     for (const auto& client : clients_.all()) {
@@ -129,7 +129,7 @@ ServedClient* Admission::longest_idle(std::int64_t idle_ns) const {
 /// Closes the client that has been idle longest, for at least this time. Returns false without such
 /// a client.
 bool Admission::close_one_idle(std::int64_t idle_ns) {
-    ServedClient* const idle = longest_idle(idle_ns);
+    ServedClient* const idle = max_idle(idle_ns);
     if (!idle) return false;
     close_idle(*idle);
     return true;

@@ -62,7 +62,7 @@ private:
     void add_client(int fd);
     void watch_process(ServedClient& client);
     bool give_up_watch();
-    ServedClient* longest_idle(std::int64_t idle_ns) const;
+    ServedClient* max_idle(std::int64_t idle_ns) const;
     bool close_one_idle(std::int64_t idle_ns);
     bool make_way();
     bool may_reclaim(const ServedClient& client, bool is_full, std::int64_t idle_ns,

@@ -63,7 +63,7 @@ ProbeFeeds::~ProbeFeeds() {
 std::string ProbeFeeds::add(const ProbeRequest& request, std::int64_t batch_ns,
                             std::string& reply) {
     const std::scoped_lock own(mutex_);
-    if (all_.size() >= most) return "a client has at most " + number(most) + " probes";
+    if (all_.size() >= max) return "a client has at most " + number(max) + " probes";
     const auto lock = session_.lock();
     std::string problem;
     const auto probe = session_.probes().attach(request, problem);
@@ -152,7 +152,7 @@ void ProbeFeeds::publish(Feed& feed, std::int64_t now_ns, std::string& events) {
         results = session_.probes().take(*feed.probe);
     }
     // more is waiting
-    if (!results.empty() && results.back().bytes.size() >= Probes::most_at_once) {
+    if (!results.empty() && results.back().bytes.size() >= Probes::max_at_once) {
         feed.due_ns = now_ns;
     }
     const std::string probe = "\"probe\":" + number(feed.id);

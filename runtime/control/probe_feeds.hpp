@@ -18,7 +18,7 @@ namespace hal {
 /// lock must not call anything here. [any]
 class ProbeFeeds {
 public:
-    static constexpr std::size_t most = 64;  ///< of one client
+    static constexpr std::size_t max = 64;  ///< of one client
 
     explicit ProbeFeeds(Session& session) : session_(session) {}
     ~ProbeFeeds();  ///< detaches all

@@ -31,12 +31,12 @@ inline const std::string& text_of(const nlohmann::json& value, const char* what)
 }
 
 inline std::vector<std::string> names_in(const nlohmann::json& value, const char* what) {
-    constexpr std::size_t most = 100'000;
+    constexpr std::size_t max = 100'000;
     if (!value.is_array()) {
         throw RequestError{std::string(what) + " must be an array of names"};
     }
-    if (value.size() > most) {
-        throw RequestError{std::string(what) + " has more than " + std::to_string(most) + " names"};
+    if (value.size() > max) {
+        throw RequestError{std::string(what) + " has more than " + std::to_string(max) + " names"};
     }
     std::vector<std::string> names;
     for (const nlohmann::json& name : value) {
@@ -45,11 +45,11 @@ inline std::vector<std::string> names_in(const nlohmann::json& value, const char
     return names;
 }
 
-inline std::int64_t whole(const nlohmann::json& value, const char* what, std::int64_t least,
-                          std::int64_t most) {
-    if (!value.is_number_integer() || value < least || value > most) {
+inline std::int64_t whole(const nlohmann::json& value, const char* what, std::int64_t min,
+                          std::int64_t max) {
+    if (!value.is_number_integer() || value < min || value > max) {
         throw RequestError{std::string(what) + " must be a whole number from " +
-                           std::to_string(least) + " to " + std::to_string(most)};
+                           std::to_string(min) + " to " + std::to_string(max)};
     }
     return value.get<std::int64_t>();
 }

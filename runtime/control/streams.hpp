@@ -15,7 +15,7 @@ namespace hal {
 void describe_stream(const hal_stream& stream, std::string& to);
 /// Takes at most so many records out and appends `,"numbers":[…],"records":[[…],…]`. False: `why`
 /// it cannot be read.
-bool pop_records(hal_stream& stream, std::uint64_t most, std::string& to, std::string& why);
+bool pop_records(hal_stream& stream, std::uint64_t max, std::string& to, std::string& why);
 /// Appends as many records as there is space for, and `,"taken":N` to the reply. On an error
 /// returns false, appends none and sets `why`.
 bool feed_records(hal_stream& stream, const std::vector<std::vector<std::string>>& records,

@@ -34,7 +34,7 @@ bool same(const std::vector<std::optional<Reading>>& a,
 std::uint64_t Subscriptions::add(std::vector<std::string> names, std::int64_t every_ns,
                                  bool changes_only) {
     const std::scoped_lock lock(mutex_);
-    if (all_.size() >= most) return 0;
+    if (all_.size() >= max) return 0;
     all_.push_back({next_++, std::move(names), every_ns, monotonic_ns(), changes_only});
     return all_.back().id;
 }

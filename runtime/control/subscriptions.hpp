@@ -18,7 +18,7 @@ namespace hal {
 /// [any]
 class Subscriptions {
 public:
-    static constexpr std::size_t most = 64;  ///< of one client
+    static constexpr std::size_t max = 64;  ///< of one client
 
     /// Adds a subscription to the values of `names` and returns its number; 0 when there are
     /// `most`.

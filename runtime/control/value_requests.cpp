@@ -81,7 +81,7 @@ void ValueRequests::subscribe(const Json& body, std::string& reply) {
     const std::uint64_t number = subscriptions.add(std::move(names), every_ms * 1'000'000,
                                                    changes.is_boolean() && changes.get<bool>());
     if (number == 0) {
-        throw RequestError{"a client has at most " + std::to_string(Subscriptions::most) +
+        throw RequestError{"a client has at most " + std::to_string(Subscriptions::max) +
                            " subscriptions"};
     }
     reply += ",\"subscription\":" + std::to_string(number);

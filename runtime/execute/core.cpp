@@ -736,7 +736,7 @@ std::int64_t Core::account(std::int64_t woke_ns, bool ran) noexcept {
         store(*pins_.tmax_increased, more);
     }
     const std::int64_t budget = budget_ns.load(std::memory_order_relaxed);
-    const bool too_long = busy_ns >= longest_overrun * period_ns_;
+    const bool too_long = busy_ns >= max_overrun * period_ns_;
     const bool in_budget = (budget == 0 || busy_ns <= budget) && !too_long;
     if (!in_budget) {
         overruns.store(overruns.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);

@@ -136,11 +136,11 @@ public:
         pushed_ += count;
         return true;
     }
-    static constexpr std::size_t most_writes = 4096;  ///< largest batch
+    static constexpr std::size_t max_writes = 4096;  ///< largest batch
     /// Returns how many writes were queued since the thread exists.
     std::uint64_t queued_writes() const { return pushed_; }
     /// Returns the remaining capacity in writes; the thread only increases it.
-    std::size_t room() const { return writes_.capacity() - writes_.size(); }
+    std::size_t capacity() const { return writes_.capacity() - writes_.size(); }
     /// Returns true when all queued writes have been applied.
     bool settled() const { return applied_.load(std::memory_order_acquire) == pushed_; }
     void observe(Observation* observation) {
@@ -184,7 +184,7 @@ public:
     CycleMonitor monitor;  ///< of its cycles
     std::atomic<std::int64_t> budget_ns{0};
     /// A cycle that takes this many periods is a fault, whatever the budget.
-    static constexpr std::int64_t longest_overrun = 10;
+    static constexpr std::int64_t max_overrun = 10;
     std::atomic<bool> profile_every{false};
     Histogram wakeup, busy;  ///< written by the thread
     std::atomic<std::uint64_t> overruns{0};  ///< written by the thread
@@ -282,7 +282,7 @@ private:
     enum Turn : int { nobody, thread, supervisor };
     std::atomic<int> turn_{nobody};
     std::atomic<plan::Plan*> shown_{nullptr};  // plan_, for the supervisor
-    Queue<Write> writes_{most_writes};  // session to thread
+    Queue<Write> writes_{max_writes};  // session to thread
     std::uint64_t pushed_ = 0;  // the session's own
     std::atomic<std::uint64_t> applied_{0};  // written by the thread
     Queue<FaultEvent> faults_{256};  // thread to session

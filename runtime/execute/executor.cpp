@@ -156,15 +156,15 @@ bool Executor::remove(Core& core, std::int64_t timeout_ns) {
     if (virtual_) {
         core.make_safe_at_end();
     } else if (leaving.started()) {
-        const std::int64_t longest_ns = timeout_ns + leaving.options.period_ns;
+        const std::int64_t max_ns = timeout_ns + leaving.options.period_ns;
         leaving.ask_to_end();
-        if (!wait_for([&] { return leaving.ended() || core.monitor.hung(); }, longest_ns) ||
+        if (!wait_for([&] { return leaving.ended() || core.monitor.hung(); }, max_ns) ||
             !leaving.ended()) {
             leaving.ask_to_go_on();
             return false;
         }
         supervisor_.remove(core);  // before its pthread_t is gone
-        if (!leaving.join(longest_ns)) {
+        if (!leaving.join(max_ns)) {
             leaving.ask_to_go_on();
             return false;
         }
@@ -275,21 +275,21 @@ std::vector<Core*> Executor::swap(const std::vector<std::pair<Core*, plan::Probe
     return silent;
 }
 
-bool Executor::observe(const std::vector<std::pair<Core*, Observation*>>& wishes,
+bool Executor::observe(const std::vector<std::pair<Core*, Observation*>>& observations,
                        std::int64_t timeout_ns) {
-    for (const auto& [core, wish] : wishes) {
-        core->observe(wish);
+    for (const auto& [core, observation] : observations) {
+        core->observe(observation);
     }
-    for (const auto& [core, wish] : wishes) {
+    for (const auto& [core, observation] : observations) {
         call(runner(*core));
     }
     bool all = true;
-    for (const auto& [core, wish] : wishes) {
-        const auto done = [wish = wish] { return wish->done.load(std::memory_order_acquire); };
+    for (const auto& [core, observation] : observations) {
+        const auto done = [observation = observation] { return observation->done.load(std::memory_order_acquire); };
         wait([&, core = core] { return done() || hangs(*core, timeout_ns); },
              timeout_ns + 2 * core->period_ns());
         if (done()) continue;
-        if (core->withdraw(wish)) {
+        if (core->withdraw(observation)) {
             all = false;
         } else {
             wait_for(done, for_ever);  // it is being answered: never free it under the thread
@@ -304,7 +304,7 @@ bool Executor::write(const std::vector<std::pair<Core*, std::vector<Write>>>& ro
         if (hangs(*core, timeout_ns)) return false;
     }
     for (const auto& [core, row] : rows) {
-        const auto fits = [&, core = core, needed = row.size()] { return core->room() >= needed; };
+        const auto fits = [&, core = core, needed = row.size()] { return core->capacity() >= needed; };
         if (fits()) continue;
         wait([&, core = core] {
             call(runner(*core));

@@ -72,9 +72,9 @@ public:
                             std::int64_t timeout_ns);
     /// Waits for all observations. Returns false when a thread did not answer; its observation is
     /// withdrawn.
-    bool observe(const std::vector<std::pair<Core*, Observation*>>& wishes,
+    bool observe(const std::vector<std::pair<Core*, Observation*>>& observations,
                  std::int64_t timeout_ns);
-    /// Queues a batch of at most Core::most_writes writes per thread; each batch takes effect in
+    /// Queues a batch of at most Core::max_writes writes per thread; each batch takes effect in
     /// one cycle. Waits while a queue is full. Returns false and queues nothing when it stays full
     /// for the timeout.
     bool write(const std::vector<std::pair<Core*, std::vector<Write>>>& rows,

@@ -54,12 +54,12 @@ void limit_helper_stacks() {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // whose frames are larger
     // Less than a real-time thread asks for: glibc gives the stack of an ended thread to a new one
     // that asks for as much or less, and release_unused_stack() may have unlocked it.
-    constexpr std::size_t most = (1 << 20) - (1 << 16);
+    constexpr std::size_t max = (1 << 20) - (1 << 16);
     pthread_attr_t attributes;
     if (pthread_getattr_default_np(&attributes) != 0) return;
     std::size_t size = 0;
-    if (pthread_attr_getstacksize(&attributes, &size) == 0 && size > most &&
-        pthread_attr_setstacksize(&attributes, most) == 0) {
+    if (pthread_attr_getstacksize(&attributes, &size) == 0 && size > max &&
+        pthread_attr_setstacksize(&attributes, max) == 0) {
         pthread_setattr_default_np(&attributes);
     }
     pthread_attr_destroy(&attributes);

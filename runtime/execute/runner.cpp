@@ -33,9 +33,9 @@ constexpr std::int64_t look_ns = 1'000;
 constexpr std::size_t signal_stack_bytes = 1 << 16;
 
 void prefault_stack() noexcept {
-    volatile char room[1 << 19];
-    for (std::size_t i = 0; i < sizeof room; i += 4096) {
-        room[i] = 0;
+    volatile char buffer[1 << 19];
+    for (std::size_t i = 0; i < sizeof buffer; i += 4096) {
+        buffer[i] = 0;
     }
 }
 
@@ -194,9 +194,9 @@ void Runner::place(std::int64_t now_ns) noexcept {
 // window that is longer than that sees the steps anyway.
 std::int64_t Runner::safe_until(std::int64_t due) const noexcept {
     if (!timeline_.led()) return due;
-    constexpr std::int64_t least_ns = 50'000;
+    constexpr std::int64_t min_ns = 50'000;
     const std::int64_t margin = (due - monotonic_ns()) / 10;
-    return margin <= std::max(wait_.spin_ns, least_ns) ? due : due - margin + wait_.spin_ns;
+    return margin <= std::max(wait_.spin_ns, min_ns) ? due : due - margin + wait_.spin_ns;
 }
 
 // Sleeps up to the spin window before the next deadline. False: called between two cycles.
@@ -256,9 +256,9 @@ void Runner::loop() noexcept {
 std::uint64_t Runner::page_faults() const {
     const std::uint64_t before = faults_before_.load(std::memory_order_acquire);
     if (before == 0) return 0;
-    constexpr std::size_t most = 4096;
+    constexpr std::size_t max = 4096;
     std::string text;
-    if (!read_regular_file("/proc/self/task/" + std::to_string(tid.load()) + "/stat", most, text)) {
+    if (!read_regular_file("/proc/self/task/" + std::to_string(tid.load()) + "/stat", max, text)) {
         return 0;
     }
     const auto name_end = text.rfind(')');

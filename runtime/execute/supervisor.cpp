@@ -21,7 +21,7 @@ namespace hal {
 namespace {
 
 constexpr std::int64_t shortest_interval_ns = 2'000'000;
-constexpr std::int64_t longest_interval_ns = 50'000'000;
+constexpr std::int64_t max_interval_ns = 50'000'000;
 constexpr std::int64_t feed_every_ns = 100'000'000;
 constexpr std::int64_t usage_interval_ns = 1'000'000'000;
 
@@ -186,14 +186,14 @@ std::int64_t Supervisor::process_gap_ns(std::int64_t until_ns, std::int64_t sile
 // limit is looked at eight times.
 void Supervisor::settle_down() {
     const Hold hold(mutex_);
-    std::int64_t interval = longest_interval_ns;
+    std::int64_t interval = max_interval_ns;
     cpu_set_t left;
     if (sched_getaffinity(getpid(), sizeof left, &left) != 0) {
         CPU_ZERO(&left);
     }
     cpu_set_t all = left;
     for (const Watched& one : watched_) {
-        interval = std::min(interval, Core::longest_overrun * one.core->period_ns() / 2);
+        interval = std::min(interval, Core::max_overrun * one.core->period_ns() / 2);
         if (const std::int64_t limit = one.core->monitor.supervise_ns; limit > 0) {
             interval = std::min(interval, limit / 8);
         }
@@ -228,7 +228,7 @@ void Supervisor::work() {
         const std::int64_t gap = now - looked_ns_ - interval;
 
         const std::int64_t slept = asleep();
-        if (gap > longest_interval_ns / 2) {
+        if (gap > max_interval_ns / 2) {
             gap_ns_ = gap;
             gap_end_ns_ = now;
         }
@@ -479,7 +479,7 @@ void Supervisor::name_starved(Watched& hog, Stall& stall, std::int64_t now_ns) {
             2 * other.core->period_ns() + shortest_interval_ns) {
             continue;
         }
-        if (stall.starved_count < Stall::most_starved) {
+        if (stall.starved_count < Stall::max_starved) {
             stall.starved[stall.starved_count++] = other.core->id();
         }
         other.core->monitor.excuse(now_ns);

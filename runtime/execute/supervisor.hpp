@@ -30,7 +30,7 @@ struct Stall {
         suspended,  ///< the host was suspended
         ended,  ///< a function ended the thread
     };
-    static constexpr std::size_t most_starved = 8;
+    static constexpr std::size_t max_starved = 8;
     Cause cause = Cause::busy;
     bool demoted = false;  ///< lost its real-time priority
     std::uint32_t thread = 0;  ///< Core::id
@@ -44,7 +44,7 @@ struct Stall {
     std::int64_t time_ns = 0;
     std::int64_t silent_ns = 0;
     std::int64_t limit_ns = 0;
-    std::uint32_t starved[most_starved]{};  ///< Core::id of further threads that got no CPU time
+    std::uint32_t starved[max_starved]{};  ///< Core::id of further threads that got no CPU time
     std::uint32_t starved_count = 0;
 };
 

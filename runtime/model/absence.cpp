@@ -124,9 +124,9 @@ bool Absences::explains(std::string_view name, Kind kind, const Model& model) {
             return true;
         }
     }
-    const Scope least = kind == Kind::signal ? Scope::file : Scope::component;
+    const Scope min = kind == Kind::signal ? Scope::file : Scope::component;
     const auto may_have = [&](const Entry& entry) {
-        return entry.scope >= least && !entry.what.empty();
+        return entry.scope >= min && !entry.what.empty();
     };
     const auto first = std::find_if(causes_.begin(), causes_.end(), may_have);
     if (first == causes_.end() || !foreign(name, kind, model)) return false;

@@ -205,10 +205,10 @@ struct ThreadOptions {
 
     /// The limit that takes effect: 10 periods or 100 ms, whichever is longer, when none was given.
     std::int64_t supervision_limit_ns() const {
-        constexpr std::int64_t least = 100'000'000;
+        constexpr std::int64_t min = 100'000'000;
         if (supervise_ns >= 0) return supervise_ns;
-        if (period_ns * 10 > least) return period_ns * 10;
-        return least;
+        if (period_ns * 10 > min) return period_ns * 10;
+        return min;
     }
     bool profile_every = false;  ///< time every function in every cycle
 };

@@ -10,8 +10,8 @@ namespace hal {
 
 namespace {
 
-constexpr std::size_t most_names = 1'000'000;                  // that one command stands for
-constexpr std::size_t most_bytes = std::size_t{256} << 20;  // of text that one command becomes
+constexpr std::size_t max_names = 1'000'000;                  // that one command stands for
+constexpr std::size_t max_bytes = std::size_t{256} << 20;  // of text that one command becomes
 constexpr std::size_t max_parts = 1000;  // ranges and literals of one word
 constexpr std::size_t word_overhead = sizeof(Token);
 
@@ -44,7 +44,7 @@ struct Part {
 struct Pattern {
     std::vector<Part> parts;
     std::uint64_t count = 1;
-    std::size_t longest = 0;  ///< bytes of its longest name, at most
+    std::size_t max = 0;  ///< bytes of its longest name, at most
 
     std::string name(std::uint64_t index) const {
         std::string text;
@@ -108,7 +108,7 @@ private:
 
     void add_literal(Pattern& pattern, std::size_t begin, std::size_t end) const {
         if (begin == end) return;
-        pattern.longest += end - begin;
+        pattern.max += end - begin;
         pattern.parts.push_back({.literal = text_.substr(begin, end - begin), .elements = {}});
     }
 
@@ -116,16 +116,16 @@ private:
         if (pattern.parts.size() > max_parts) {
             return fail(begin, end, "too many ranges in one word");
         }
-        if (part.count > most_names || pattern.count * part.count > most_names) {
+        if (part.count > max_names || pattern.count * part.count > max_names) {
             return fail(begin, end,
-                        "this word expands to more than " + std::to_string(most_names) + " names");
+                        "this word expands to more than " + std::to_string(max_names) + " names");
         }
         pattern.count *= part.count;
-        std::size_t longest = std::max<std::size_t>(part.width, 20);
+        std::size_t max = std::max<std::size_t>(part.width, 20);
         for (const std::string_view element : part.elements) {
-            longest = std::max(longest, element.size());
+            max = std::max(max, element.size());
         }
-        pattern.longest += longest;
+        pattern.max += max;
         pattern.parts.push_back(std::move(part));
         return true;
     }
@@ -194,7 +194,7 @@ struct Word {
     std::vector<Pattern> patterns;
     bool ranged = false;
     std::uint64_t count = 1;
-    std::size_t longest = 0;
+    std::size_t max = 0;
 
     std::string name(std::uint64_t index) const {
         for (const Pattern& pattern : patterns) {
@@ -242,9 +242,9 @@ public:
         std::size_t bytes = 0;
         for (const Word& word : words_) {
             if (word.ranged && word.count != leader.count) return mismatch(leader, word);
-            bytes += word.longest + word_overhead;
+            bytes += word.max + word_overhead;
         }
-        if (bytes > most_bytes / leader.count) return too_long();
+        if (bytes > max_bytes / leader.count) return too_long();
         std::vector<Command> commands(static_cast<std::size_t>(leader.count));
         for (std::size_t i = 0; i < commands.size(); ++i) {
             Command& made = commands[i];
@@ -273,7 +273,7 @@ private:
 
     bool add(const Token& token) {
         Word word{.token = &token, .head = {}, .patterns = {}};
-        word.longest = token.text.size();
+        word.max = token.text.size();
         if (has_range(token.text) && !parse(token, word)) return false;
         words_.push_back(std::move(word));
         return true;
@@ -286,7 +286,7 @@ private:
             key != text.npos && key > 0 && text[key] == '=' && &token != &command_.name;
         word.head = list ? text.substr(0, key + 1) : std::string_view{};
         PatternParser parser(text);
-        std::size_t longest = word.head.size();
+        std::size_t max = word.head.size();
         word.count = 0;
         for (std::size_t at = word.head.size(); at <= text.size();) {
             const std::size_t stop = list ? element_end(text, at) : text.size();
@@ -300,14 +300,14 @@ private:
             word.ranged = word.ranged || std::any_of(pattern.parts.begin(), pattern.parts.end(),
                                                      [](const Part& p) { return p.names(); });
             word.count += pattern.count;
-            longest = std::max(longest, word.head.size() + pattern.longest);
-            list_bytes_ += pattern.count * (pattern.longest + 1);
+            max = std::max(max, word.head.size() + pattern.max);
+            list_bytes_ += pattern.count * (pattern.max + 1);
             word.patterns.push_back(std::move(pattern));
             at = stop + 1;
-            if (word.count > most_names) {
+            if (word.count > max_names) {
                 diagnostics_.error(
                     "bad-range", token.span,
-                    "this word expands to more than " + std::to_string(most_names) + " names");
+                    "this word expands to more than " + std::to_string(max_names) + " names");
                 return false;
             }
         }
@@ -316,7 +316,7 @@ private:
             word.patterns.clear();
             return true;
         }
-        word.longest = longest;
+        word.max = max;
         return true;
     }
 
@@ -341,7 +341,7 @@ private:
     }
 
     std::vector<Command> in_place() {
-        if (list_bytes_ > most_bytes) return too_long();
+        if (list_bytes_ > max_bytes) return too_long();
         std::uint64_t names = 0;
         for (const Word& word : words_) {
             names += word.ranged ? word.count : 0;
@@ -349,7 +349,7 @@ private:
         if (names == 0) {
             return {command_};
         }
-        if (names > most_names) return too_long();
+        if (names > max_names) return too_long();
         Command made{command_.name, {}, command_.span};
         for (std::size_t i = 0; i < command_.args.size(); ++i) {
             const Word& word = words_[i + 1];
@@ -383,7 +383,7 @@ private:
     std::vector<Command> too_long() {
         diagnostics_.error("bad-range", command_.span,
                            "the ranges of this command expand to too many names", "",
-                           "at most " + std::to_string(most_names) + " names, and 256 MB of text");
+                           "at most " + std::to_string(max_names) + " names, and 256 MB of text");
         return {};
     }
 

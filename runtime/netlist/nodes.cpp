@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t longest_name = 32;
 constexpr std::size_t max_nodes = 100;
 constexpr std::int64_t shortest_ns = 100'000;
-constexpr std::int64_t longest_ns = 60'000'000'000;
+constexpr std::int64_t max_ns = 60'000'000'000;
 
 bool good_name(std::string_view name) {
     const auto good = [](char c) { return is_name_character(c) && c != '.'; };
@@ -38,7 +38,7 @@ bool read_option(const Token& token, std::size_t equals, ParsedLine& line,
         return false;
     }
     const auto ns = parse_duration_ns(value);
-    if (!ns || *ns < shortest_ns || *ns > longest_ns) {
+    if (!ns || *ns < shortest_ns || *ns > max_ns) {
         diagnostics.error("bad-argument", token.span, "'" + value + "' is not a valid interval", "",
                           "the range is 100us..60s; for example 5ms or 0.1s");
         return false;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t window_columns = 100;  // of a source line that is longer
 constexpr std::size_t columns_before = 40;   // shown in front of the place
-constexpr std::size_t most_bytes = 8 * window_columns;  // of a window; characters may have no width
+constexpr std::size_t max_bytes = 8 * window_columns;  // of a window; characters may have no width
 constexpr std::size_t tab_stop = 8;
 constexpr std::string_view ellipsis = "…";
 
@@ -185,7 +185,7 @@ private:
     /// The piece of `line` around `first` as it is printed; notes the columns of all marks that lie
     /// in it.
     std::string lay_out(std::string_view line, const Mark& first) {
-        const bool fits = line.size() <= most_bytes && width_of(line) <= window_columns;
+        const bool fits = line.size() <= max_bytes && width_of(line) <= window_columns;
         const std::size_t start = fits ? 0 : window_start(line, first.begin);
         std::string text(start > 0 ? ellipsis : "");
         std::size_t column = start > 0 ? 1 : 0;
@@ -208,7 +208,7 @@ private:
                 }
             }
         };
-        while (at < line.size() && at < start + most_bytes && column < window_columns) {
+        while (at < line.size() && at < start + max_bytes && column < window_columns) {
             const Glyph glyph = glyph_in(line, at, column);
             note(at, at + glyph.bytes, glyph.columns);
             if (line[at] == '\t') {
@@ -252,7 +252,7 @@ private:
     static std::size_t window_start(std::string_view line, std::size_t place) {
         std::size_t at = place;
         std::size_t before = 0;
-        while (at > 0 && place - at < most_bytes / 2) {
+        while (at > 0 && place - at < max_bytes / 2) {
             std::size_t previous = at - 1;
             while (previous > 0 && at - previous < 4 && (line[previous] & 0xC0) == 0x80) {
                 --previous;

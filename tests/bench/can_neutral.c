@@ -17,9 +17,9 @@
 #include <time.h>
 #include <unistd.h>
 
-enum { node = 5, most = 8 << 20, blocks = 127 };
+enum { node = 5, max = 8 << 20, blocks = 127 };
 static int fd;
-static uint8_t domain[most + 8];
+static uint8_t domain[max + 8];
 static uint32_t domain_size, value;
 
 static int64_t now_ns(clockid_t clock) {
@@ -95,7 +95,7 @@ static void slave(void) {
             if (mode == block_down && d[0] != 0x80 &&
                 !(d[0] >> 5 == 6 && sequence == 0 && at >= domain_size)) {
                 if ((d[0] & 0x7f) == sequence + 1) {
-                    if (at + 7 <= most) {
+                    if (at + 7 <= max) {
                         memcpy(domain + at, d + 1, 7);
                     }
                     at += 7;
@@ -126,7 +126,7 @@ static void slave(void) {
                 memcpy(a + 4, &domain_size, 4);
             } else if (mode == down && d[0] >> 5 == 0) {
                 const uint32_t n = 7 - (d[0] >> 1 & 7);
-                if (at + 7 <= most) {
+                if (at + 7 <= max) {
                     memcpy(domain + at, d + 1, n);
                 }
                 at += n;
@@ -293,7 +293,7 @@ static void upload(uint32_t size, int block, uint8_t* to) {
     }
 }
 static void transfers(const char* name, uint32_t size, int block) {
-    static uint8_t back[most + 8];
+    static uint8_t back[max + 8];
     for (uint32_t n = 0; n < size; ++n) {
         domain[n] = (uint8_t)(n * 7 + n / 251);
     }
@@ -340,7 +340,7 @@ int main(int argc, char** argv) {
     }
     struct sockaddr_can at = {.can_family = AF_CAN, .can_ifindex = (int)if_nametoindex(argv[1])};
     const struct timeval timeout = {2, 0};
-    const int room = 4 << 20;
+    const int capacity = 4 << 20;
     const int master = strcmp(argv[2], "master") == 0;
 
     const int answered = master || strcmp(argv[2], "receive") == 0;
@@ -355,7 +355,7 @@ int main(int argc, char** argv) {
     }
     setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, answered ? answers : heard,
                answered ? sizeof answers : sizeof heard);
-    setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &room, sizeof room);
+    setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &capacity, sizeof capacity);
     setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout);
     if (bind(fd, (struct sockaddr*)&at, sizeof at) < 0) {
         perror("can_neutral");

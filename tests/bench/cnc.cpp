@@ -27,7 +27,7 @@ namespace hal::bench {
 namespace {
 
 constexpr int slot_holds = 12;   ///< nodes; the frame of each is one of the smallest
-constexpr int most_axes = 120;   ///< node-ids end at 127
+constexpr int max_axes = 120;   ///< node-ids end at 127
 constexpr double boot_s = 8;
 constexpr double boot_s_per_axis = 0.15;
 
@@ -279,11 +279,11 @@ double bare_loop(const Options& options, int frames_in, std::size_t bytes) {
     const auto bound = [](const char* interface) {
         // 0x9023 on the wire
         link::Descriptor socket(::socket(AF_PACKET, SOCK_RAW | SOCK_NONBLOCK, 0x2390));
-        sockaddr_ll place{};
-        place.sll_family = AF_PACKET;
-        place.sll_protocol = 0x2390;
-        place.sll_ifindex = static_cast<int>(if_nametoindex(interface));
-        if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&place), sizeof place) != 0) {
+        sockaddr_ll address{};
+        address.sll_family = AF_PACKET;
+        address.sll_protocol = 0x2390;
+        address.sll_ifindex = static_cast<int>(if_nametoindex(interface));
+        if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
             throw std::runtime_error("no raw socket");
         }
         return socket;
@@ -313,12 +313,12 @@ double bare_loop(const Options& options, int frames_in, std::size_t bytes) {
     });
     run_real_time(options.cpu, [&] {
         const auto f = frame_of(bytes);
-        std::array<std::uint8_t, 2048> room;
+        std::array<std::uint8_t, 2048> buffer;
         auto due = begin;
         for (int cycle = 0; cycle < (options.quick ? 500 : 2000); ++cycle, due += 1'000'000) {
             wait_until(due, 50'000);
             const auto from = link::monotonic_ns();
-            while (::recv(here.get(), room.data(), room.size(), 0) > 0) {
+            while (::recv(here.get(), buffer.data(), buffer.size(), 0) > 0) {
             }
             (void)!::send(here.get(), f.data(), f.size(), 0);
             us.push_back(static_cast<double>(link::monotonic_ns() - from) / 1000);
@@ -367,24 +367,24 @@ void measure(const Options& options, Report& report) {
 
     // The search is bounded: steps, and the time for them.
     const Stopwatch watch;
-    const double most_ms = options.quick ? 30'000 : 90'000;
+    const double max_ms = options.quick ? 30'000 : 90'000;
     int axes = five.holds() ? 5 : 0;
     int cycle = five.holds() ? 1000 : 0;
     for (const int tried : {500, 250, 200, 150, 100}) {
-        if (cycle == 0 || watch.ms() > most_ms / 3) break;
+        if (cycle == 0 || watch.ms() > max_ms / 3) break;
         if (!machine(options, folder, 5, tried).holds()) break;
         cycle = tried;
     }
-    int too_many = most_axes + 1;
+    int too_many = max_axes + 1;
     for (int tried = 20;
-         axes != 0 && tried <= most_axes && too_many - axes > 5 && watch.ms() < most_ms;) {
+         axes != 0 && tried <= max_axes && too_many - axes > 5 && watch.ms() < max_ms;) {
         if (machine(options, folder, tried, 1000).holds()) {
             axes = tried;
         } else {
             too_many = tried;
         }
-        tried = too_many > most_axes ? std::min(axes * 2, most_axes) : (axes + too_many) / 2;
-        if (axes == most_axes) break;
+        tried = too_many > max_axes ? std::min(axes * 2, max_axes) : (axes + too_many) / 2;
+        if (axes == max_axes) break;
     }
     if (cycle != 0) {
         report.row({.what = "shortest cycle tried that 5 axes and 64 I/O hold",
@@ -402,7 +402,7 @@ void measure(const Options& options, Report& report) {
         fmt::format("control and nodes are a process each, on a CPU each; held: all nodes' frames "
                     "in 99 % of the cycles, 1 % of them missed at most; "
                     "tried for {:.0f} s of {:.0f}",
-                    watch.ms() / 1000, most_ms / 1000));
+                    watch.ms() / 1000, max_ms / 1000));
 }
 
 }  // namespace

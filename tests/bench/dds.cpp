@@ -53,7 +53,7 @@ struct Times {
     double lost = 0;
     double p50 = 0;
     double p99 = 0;
-    double most = 0;
+    double max = 0;
 };
 
 /// One exchange of `count` samples at 1 kHz.
@@ -82,7 +82,7 @@ Times exchange(const Options& options, bool ours, long count, int domain) {
     Times t;
     if (!line ||
         std::sscanf(line->c_str(), "%lf %lf %lf %lf %lf", &t.samples, &t.lost, &t.p50, &t.p99,
-                    &t.most) != 5 ||
+                    &t.max) != 5 ||
         t.samples < 1) {
         throw std::runtime_error("no samples came");
     }
@@ -110,14 +110,14 @@ void dds(const Options& options, Report& report) {
     const int rounds = options.quick ? 2 : 5;
     const long count = options.quick ? 1000 : 3000;
     std::vector<double> p50[2], p99[2];
-    double lost[2] = {}, most[2] = {};
+    double lost[2] = {}, max[2] = {};
     for (int round = 0; round < rounds; ++round) {
         for (const int ours : {1, 0}) {
             const Times t = exchange(options, ours == 1, count, 200 + round);
             p50[ours].push_back(t.p50);
             p99[ours].push_back(t.p99);
             lost[ours] += t.lost + static_cast<double>(count) - t.samples;
-            most[ours] = std::max(most[ours], t.most);
+            max[ours] = std::max(max[ours], t.max);
         }
     }
     const char* peer = "bare Fast DDS";
@@ -135,9 +135,9 @@ void dds(const Options& options, Report& report) {
                 .goal = at_most(1.3)});
     report.row({.what = "the same, greatest",
                 .unit = "us",
-                .ours = most[1],
+                .ours = max[1],
                 .peer = peer,
-                .theirs = most[0]});
+                .theirs = max[0]});
     report.row({.what = fmt::format("lost of {}, reliable", rounds * count),
                 .unit = "",
                 .ours = lost[1],

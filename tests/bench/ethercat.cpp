@@ -175,7 +175,7 @@ void cycles(const Options& options, Report& report, const std::string& here,
             RawSocket raw(here);
             const std::vector<std::uint8_t> frame = slaves.cyclic_frame();
             frame_bytes = frame.size();
-            std::array<std::uint8_t, largest_frame_bytes> answer;
+            std::array<std::uint8_t, max_frame_bytes> answer;
             const auto plain = [&] {
                 raw.send(frame);
                 return raw.receive(answer) != 0;

@@ -88,7 +88,7 @@ void Slaves::stop() {
 }
 
 void Slaves::emulate() noexcept {
-    std::array<std::uint8_t, largest_frame_bytes> buffer;
+    std::array<std::uint8_t, max_frame_bytes> buffer;
     std::int64_t tick = 0;
     while (!stop_.load(std::memory_order_relaxed)) {
         port_->wait(tick);
@@ -110,7 +110,7 @@ void Slaves::emulate() noexcept {
 }
 
 void Slaves::return_frames() noexcept {
-    std::array<std::uint8_t, largest_frame_bytes> buffer;
+    std::array<std::uint8_t, max_frame_bytes> buffer;
     while (!stop_.load(std::memory_order_relaxed)) {
         if (const std::size_t length = socket_->receive(buffer); length != 0) {
             const std::span frame(buffer.data(), length);

@@ -50,10 +50,10 @@ class Plain {
 public:
     Plain(const std::string& interface, Wait wait, bool stamps)
         : wait_(wait), stamps_(stamps), socket_(::socket(AF_PACKET, SOCK_RAW, htons(type))) {
-        sockaddr_ll place{};
-        place.sll_family = AF_PACKET;
-        place.sll_protocol = htons(type);
-        place.sll_ifindex = static_cast<int>(if_nametoindex(interface.c_str()));
+        sockaddr_ll address{};
+        address.sll_family = AF_PACKET;
+        address.sll_protocol = htons(type);
+        address.sll_ifindex = static_cast<int>(if_nametoindex(interface.c_str()));
         const int one = 1;
         const timeval second{1, 0};
         setsockopt(socket_.get(), SOL_PACKET, PACKET_QDISC_BYPASS, &one, sizeof one);
@@ -61,7 +61,7 @@ public:
         if (stamps) {
             setsockopt(socket_.get(), SOL_SOCKET, SO_TIMESTAMPNS, &one, sizeof one);
         }
-        if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&place), sizeof place) != 0) {
+        if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
             throw std::runtime_error("no raw socket");
         }
     }

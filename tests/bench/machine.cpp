@@ -112,8 +112,8 @@ void stay_off(int cpu) {
     }
 }
 
-void wait_for_quiet(double most_s) {
-    const std::int64_t end = monotonic_ns() + static_cast<std::int64_t>(most_s * 1e9);
+void wait_for_quiet(double max_s) {
+    const std::int64_t end = monotonic_ns() + static_cast<std::int64_t>(max_s * 1e9);
     CpuTimes before = cpu_times();
     for (int calm = 0; calm < 2 && monotonic_ns() < end;) {
         std::this_thread::sleep_for(std::chrono::milliseconds(200));

@@ -22,8 +22,8 @@ std::vector<std::string> machine_facts(int cpu);
 int real_time_cpu();
 /// Keeps this thread, and what it starts, off that CPU (if there is another).
 void stay_off(int cpu);
-/// Waits until other programs leave the processors alone: at most `most_s`.
-void wait_for_quiet(double most_s);
+/// Waits until other programs leave the processors alone: at most `max_s`.
+void wait_for_quiet(double max_s);
 /// Cycles of the time-stamp counter per ns; 0 where there is none.
 double tsc_per_ns();
 /// Time the hypervisor took from all CPUs since the machine started, ms. 0 on a real machine.

@@ -90,7 +90,7 @@ std::string find_program(const std::string& name) {
     return "";
 }
 
-Finished run(const Start& start, double most_ms) {
+Finished run(const Start& start, double max_ms) {
     const Ends out = make_pipe();
     Finished finished;
     const Stopwatch watch;
@@ -104,7 +104,7 @@ Finished run(const Start& start, double most_ms) {
     std::array<char, 65536> buffer;
     while (open) {
         pollfd wait{out[0], POLLIN, 0};
-        const double left = most_ms - watch.ms();
+        const double left = max_ms - watch.ms();
         if (left <= 0 || poll(&wait, 1, static_cast<int>(left) + 1) == 0) break;
         const ssize_t n = read(out[0], buffer.data(), buffer.size());
         if (n > 0) {
@@ -153,7 +153,7 @@ void Child::write(const std::string& text) {
     }
 }
 
-std::optional<std::string> Child::line(int most_ms) {
+std::optional<std::string> Child::line(int max_ms) {
     for (;;) {
         if (const auto end = read_.find('\n'); end != std::string::npos) {
             std::string line = read_.substr(0, end);
@@ -162,7 +162,7 @@ std::optional<std::string> Child::line(int most_ms) {
         }
         pollfd wait{out_, POLLIN, 0};
         std::array<char, 4096> buffer;
-        if (poll(&wait, 1, most_ms) <= 0) return std::nullopt;
+        if (poll(&wait, 1, max_ms) <= 0) return std::nullopt;
         const ssize_t n = read(out_, buffer.data(), buffer.size());
         if (n <= 0) return std::nullopt;
         read_.append(buffer.data(), static_cast<std::size_t>(n));

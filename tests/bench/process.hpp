@@ -22,14 +22,14 @@ struct Start {
 };
 
 struct Finished {
-    /// exit status; 128 + signal; -1: it could not be started or was stopped after `most_ms`
+    /// exit status; 128 + signal; -1: it could not be started or was stopped after `max_ms`
     int status = -1;
     double ms = 0;  ///< wall time
     std::string out;  ///< its standard output
 };
 
 /// Runs a program to its end. Its standard error is thrown away.
-Finished run(const Start& start, double most_ms = 60'000);
+Finished run(const Start& start, double max_ms = 60'000);
 
 /// A program that runs beside us; ended with its owner.
 class Child {
@@ -41,8 +41,8 @@ public:
     bool alive();
     pid_t pid() const { return pid_; }
     void write(const std::string& text);
-    /// The next line of its output without its end, or nothing after `most_ms`.
-    std::optional<std::string> line(int most_ms = 2000);
+    /// The next line of its output without its end, or nothing after `max_ms`.
+    std::optional<std::string> line(int max_ms = 2000);
     /// SIGTERM, and SIGKILL two seconds later.
     void end();
 

@@ -112,9 +112,9 @@ private:
 
     Finished start(std::vector<std::string> words) const {
         words.insert(words.begin(), tree_ + "/hal");
-        const double most_ms = 24 * 3'600'000.0;
+        const double max_ms = 24 * 3'600'000.0;
         return run({.arguments = words, .environment = {"CCACHE_DISABLE=1"}, .everywhere = true},
-                   most_ms);
+                   max_ms);
     }
 
     /// Of the pendulum that hangs, two seconds after it has begun to answer.

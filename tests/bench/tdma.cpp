@@ -121,8 +121,8 @@ std::unique_ptr<ethernet::Port> observer(const std::string& interface, std::uint
 }
 
 template <class Condition>
-bool within(double most_s, Condition condition) {
-    const auto end = link::monotonic_ns() + static_cast<std::int64_t>(most_s * 1e9);
+bool within(double max_s, Condition condition) {
+    const auto end = link::monotonic_ns() + static_cast<std::int64_t>(max_s * 1e9);
     while (!condition()) {
         if (link::monotonic_ns() > end) return false;
         sleep_until(link::monotonic_ns() + 10'000'000);
@@ -132,12 +132,12 @@ bool within(double most_s, Condition condition) {
 
 /// How far arrivals are from a grid of that period, us.
 std::vector<double> phases(ethernet::Port& port, std::int64_t cycle, std::size_t count,
-                           double most_s) {
+                           double max_s) {
     std::vector<double> us;
     while (port.receive(0)) {
     }
     std::int64_t first = 0;
-    within(most_s, [&] {
+    within(max_s, [&] {
         while (auto arrival = port.receive(0)) {
             if (first == 0) {
                 first = arrival->time_ns - cycle / 2;
@@ -330,11 +330,11 @@ void axis_meanwhile(const Options& options, Report& report) {
         return report.note("the axis beside it was not simulated: hal sim ended with " +
                            std::to_string(done.status));
     }
-    const double most = std::max(std::abs(std::atof(words[words.size() - 2].c_str())),
+    const double max = std::max(std::abs(std::atof(words[words.size() - 2].c_str())),
                                  std::abs(std::atof(words.back().c_str())));
     report.row({.what = "  largest following error of an axis meanwhile (virtual clock)",
                 .unit = "mm",
-                .ours = most,
+                .ours = max,
                 .goal = limit(1)});
 }
 

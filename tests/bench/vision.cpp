@@ -23,7 +23,7 @@ constexpr double pi = 3.14159265358979323846;
 
 struct Measured {
     double mean_mm = 0;
-    double most_mm = 0;
+    double max_mm = 0;
     double median_ms = 0;
     int missed = 0;
 };
@@ -38,8 +38,8 @@ Measured markers(double noise, int poses) {
     camera.cy = 239.5;
     MarkerDetector detector("4x4_50", camera);
     std::mt19937 random(1);
-    const auto between = [&](double least, double most) {
-        return least + (most - least) * static_cast<double>(random()) / 4294967295.0;
+    const auto between = [&](double min, double max) {
+        return min + (max - min) * static_cast<double>(random()) / 4294967295.0;
     };
     scene::Settings of;
     of.kind = scene::Kind::markers;
@@ -82,7 +82,7 @@ Measured markers(double noise, int poses) {
         const Pose& p = found[0].pose;
         const double error = std::hypot(x * 1000 - p.x_mm, y * 1000 - p.y_mm, z * 1000 - p.z_mm);
         m.mean_mm += error;
-        m.most_mm = std::max(m.most_mm, error);
+        m.max_mm = std::max(m.max_mm, error);
     }
     m.mean_mm /= std::max(1, poses - m.missed);
     std::nth_element(times.begin(), times.begin() + poses / 2, times.end());
@@ -102,7 +102,7 @@ void vision(const Options& options, Report& report) {
                     .unit = "mm",
                     .ours = m.mean_mm,
                     .goal = noise == 3.0 ? limit(1.5) : Goal{}});
-        report.row({.what = "  the largest", .unit = "mm", .ours = m.most_mm});
+        report.row({.what = "  the largest", .unit = "mm", .ours = m.max_mm});
         report.row({.what = fmt::format("  time for a frame, median; {} of {} were not found",
                                         m.missed, poses),
                     .unit = "ms",

@@ -12,7 +12,7 @@ namespace {
 
 /// A packed Ethernet frame from one station to all.
 Bytes packed(std::initializer_list<Frame> messages, Stamp stamp = {}) {
-    Bytes whole(ethernet::largest_frame);
+    Bytes whole(ethernet::max_frame);
     std::fill_n(whole.begin(), 6, std::uint8_t{0xff});
     whole[6] = 2;
     whole[11] = 9;
@@ -28,15 +28,15 @@ Bytes packed(std::initializer_list<Frame> messages, Stamp stamp = {}) {
 }
 
 TEST(CaneSingle, is_what_the_source_system_sends) {
-    std::array<std::uint8_t, 64> room{};
-    ASSERT_EQ(put_single(message(0x181, {1, 2, 3}), Order::big, room), 8U);
-    EXPECT_EQ(Bytes(room.begin(), room.begin() + 8), (Bytes{0, 0, 1, 0x81, 3, 1, 2, 3}));
-    ASSERT_EQ(put_single(message(0x181, {1, 2, 3}), Order::little, room), 8U);
-    EXPECT_EQ(Bytes(room.begin(), room.begin() + 8), (Bytes{0x81, 1, 0, 0, 3, 1, 2, 3}));
-    ASSERT_EQ(put_single(Frame::request(0x1abcdef0, 4), Order::big, room), 5U);
-    EXPECT_EQ(Bytes(room.begin(), room.begin() + 5), (Bytes{0xda, 0xbc, 0xde, 0xf0, 4}));
+    std::array<std::uint8_t, 64> buffer{};
+    ASSERT_EQ(put_single(message(0x181, {1, 2, 3}), Order::big, buffer), 8U);
+    EXPECT_EQ(Bytes(buffer.begin(), buffer.begin() + 8), (Bytes{0, 0, 1, 0x81, 3, 1, 2, 3}));
+    ASSERT_EQ(put_single(message(0x181, {1, 2, 3}), Order::little, buffer), 8U);
+    EXPECT_EQ(Bytes(buffer.begin(), buffer.begin() + 8), (Bytes{0x81, 1, 0, 0, 3, 1, 2, 3}));
+    ASSERT_EQ(put_single(Frame::request(0x1abcdef0, 4), Order::big, buffer), 5U);
+    EXPECT_EQ(Bytes(buffer.begin(), buffer.begin() + 5), (Bytes{0xda, 0xbc, 0xde, 0xf0, 4}));
     Frame back;
-    EXPECT_EQ(get_single(std::span(room).first(46), Order::big, back), Wrong::none);
+    EXPECT_EQ(get_single(std::span(buffer).first(46), Order::big, back), Wrong::none);
     EXPECT_TRUE(back.same(Frame::request(0x1abcdef0, 4)));
 }
 

@@ -159,7 +159,7 @@ TEST(CaneLink, what_a_tag_costs) {
     constexpr int turns = 200'000;
     const Key key{1, 2};
     for (const int messages : {1, 5, 20}) {
-        Bytes whole(ethernet::largest_frame);
+        Bytes whole(ethernet::max_frame);
         std::size_t plain = 14 + packed_header;
         std::size_t tagged = plain + counter_bytes;
         for (int n = 0; n < messages; ++n) {

@@ -211,11 +211,11 @@ TEST(CaneLink, is_down_without_a_cable_and_comes_back) {
 /// A TDMA with one slot.
 struct Slots final : ethernet::Discipline {
     std::vector<std::pair<Bytes, unsigned>> queue;
-    std::size_t most = 2;
+    std::size_t max = 2;
     bool is_ready = true;
     ethernet::Sent send(std::span<const std::uint8_t> frame, unsigned, unsigned priority,
                         ethernet::Finisher* finisher) noexcept override {
-        if (queue.size() == most) return ethernet::Sent::full;
+        if (queue.size() == max) return ethernet::Sent::full;
         queue.emplace_back(Bytes(frame.begin(), frame.end()), priority);
         if (finisher != nullptr) {
             finisher->leaves(queue.back().first);
@@ -248,7 +248,7 @@ TEST(CaneLink, in_a_slot_keeps_what_does_not_fit_for_the_next_cycle) {
     EXPECT_EQ(u.stamp().sequence, 0);
     EXPECT_EQ(x->statistics().queued, 11U);
     slots.queue.clear();
-    slots.most = 10;
+    slots.max = 10;
     x->flush(1'000'000);
     ASSERT_EQ(slots.queue.size(), 3U);
     ASSERT_EQ(u.open(slots.queue[0].first), Wrong::none);
@@ -284,7 +284,7 @@ TEST(CaneLink, that_missed_a_turn_sends_the_newest_in_the_next) {
     ASSERT_TRUE(ethernet::offer_discipline(*line.port, &slots));
     for (const char* format : {"packed", "single"}) {
         auto x = opened(std::string("cane:sim:slots/late?slot=2&format=") + format);
-        slots.most = 0;  // the last cycle's frames wait in the slot
+        slots.max = 0;  // the last cycle's frames wait in the slot
         for (std::uint8_t cycle = 1; cycle <= 5; ++cycle) {
             x->send(message(0x080, {}), 0);
             x->send(message(0x000, {1, cycle}), 0);  // each NMT command counts
@@ -295,7 +295,7 @@ TEST(CaneLink, that_missed_a_turn_sends_the_newest_in_the_next) {
             }
             x->flush(0);
         }
-        slots.most = 100;
+        slots.max = 100;
         x->flush(0);
         Bytes sent;  // the cycle that each message is of; SYNC has none
         const auto note = [&sent](const Frame& f) {

@@ -74,7 +74,7 @@ TEST_F(UdpEnds, Payload_passes_in_both_directions_with_the_type_in_front) {
     const auto master = other();
     ASSERT_TRUE(line && master);
     settle();
-    for (const std::size_t length : {smallest_frame, std::size_t{200}, largest_frame}) {
+    for (const std::size_t length : {smallest_frame, std::size_t{200}, max_frame}) {
         const auto sent = frame(length);
         const auto before = link::monotonic_ns();
         ASSERT_EQ(master->send(sent, {}, unclocked), Sent::queued);

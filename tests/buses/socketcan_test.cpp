@@ -140,10 +140,10 @@ TEST_F(Socketcan, waiting_takes_what_comes_one_by_one_and_in_bursts_and_keeps_th
     std::uint32_t sent = 0;
     std::uint32_t got = 0;
     const auto take = [&](std::int64_t now_ns) {
-        Frame room[7];
-        for (std::size_t count; (count = b->receive(room, now_ns)) > 0;) {
+        Frame buffer[7];
+        for (std::size_t count; (count = b->receive(buffer, now_ns)) > 0;) {
             for (std::size_t n = 0; n < count; ++n, ++got) {
-                ASSERT_EQ(room[n].id, got & 0x7ffU);
+                ASSERT_EQ(buffer[n].id, got & 0x7ffU);
             }
         }
     };

@@ -141,10 +141,10 @@ TEST(Frame_bits, of_fd_frames_stay_below_the_worst_case) {
         for (auto& b : f.data) {
             b = static_cast<std::uint8_t>(kind == 0 ? 0 : kind == 1 ? 0xff : random());
         }
-        const auto most = worst_case_bits(f.length, f.extended, true, f.bit_rate_switch);
+        const auto max = worst_case_bits(f.length, f.extended, true, f.bit_rate_switch);
         const auto bits = frame_bits(f);
-        ASSERT_LE(bits.nominal, most.nominal) << i;
-        ASSERT_LE(bits.total(), most.total()) << i;
+        ASSERT_LE(bits.nominal, max.nominal) << i;
+        ASSERT_LE(bits.total(), max.total()) << i;
     }
 }
 

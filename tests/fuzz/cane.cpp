@@ -51,11 +51,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     Nodes nodes;
     Streams streams;
     unpack(bytes, nodes, streams);
-    if (size < hal::ethernet::header_bytes + packed_header || size > hal::ethernet::largest_frame) {
+    if (size < hal::ethernet::header_bytes + packed_header || size > hal::ethernet::max_frame) {
         return 0;
     }
-    std::array<std::uint8_t, hal::ethernet::largest_frame> room{};
-    const auto whole = std::span(room).first(size);
+    std::array<std::uint8_t, hal::ethernet::max_frame> buffer{};
+    const auto whole = std::span(buffer).first(size);
     std::copy(bytes.begin(), bytes.end(), whole.begin());
     const auto messages = whole[hal::ethernet::header_bytes + 2];
     close_packed(whole, messages,

@@ -58,12 +58,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     LssMaster lss(out);
     auto& node = network.add(5);
     node.expect_heartbeat(50 * millisecond);
-    std::uint8_t room[64] = {};
+    std::uint8_t buffer[64] = {};
     static std::uint8_t bytes[1200] = {1, 2, 3};
     SdoRequest requests[] = {
         {.index = 0x2006, .data = bytes},
-        {.index = 0x2006, .upload = true, .mode = SdoMode::block, .buffer = room},
-        {.index = 0x2006, .upload = true, .mode = SdoMode::segmented, .buffer = room},
+        {.index = 0x2006, .upload = true, .mode = SdoMode::block, .buffer = buffer},
+        {.index = 0x2006, .upload = true, .mode = SdoMode::segmented, .buffer = buffer},
         {.index = 0x2000, .data = {bytes, 4}}};
     Time now = 0;
     device.start(now);

@@ -29,8 +29,8 @@ void matrices(const std::string& text) {
     places(read.problems, text.size());
     if (!read.problems.empty()) return;
     for (const Given& given : read.found) {
-        require(given.value.rows() >= 1 && given.value.rows() <= most && given.value.cols() >= 1 &&
-                    given.value.cols() <= most,
+        require(given.value.rows() >= 1 && given.value.rows() <= max && given.value.cols() >= 1 &&
+                    given.value.cols() <= max,
                 "a matrix that is taken has a size that one may have");
         require(given.value.allFinite(), "and consists of numbers");
     }

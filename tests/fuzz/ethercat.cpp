@@ -61,7 +61,7 @@ struct Line {
         line.advance(now_ns + 100'000);
     }
     void write(std::uint16_t address, const Bytes& data) {
-        std::array<std::uint8_t, largest_frame_bytes> buffer{};
+        std::array<std::uint8_t, max_frame_bytes> buffer{};
         FrameWriter frame(buffer, {});
         if (std::uint8_t* to = frame.add(Command::apwr, 0, at_position(0, address),
                                          static_cast<std::uint16_t>(data.size()))) {
@@ -121,7 +121,7 @@ void mailbox(std::span<const std::uint8_t> in) {
                              in[0] >> 4 & 7);
         std::copy_n(in.begin() + 3, length, message.begin() + mailbox_header_bytes);
         line.write(areas.receive.start, message);
-        std::array<std::uint8_t, largest_frame_bytes> buffer{};
+        std::array<std::uint8_t, max_frame_bytes> buffer{};
         FrameWriter frame(buffer, {});
         frame.add(Command::aprd, 0, at_position(0, areas.send.start), areas.send.size);
         const auto bytes = frame.finish();
@@ -260,8 +260,8 @@ void to_master(std::span<const std::uint8_t> in) {
     const std::array<master::GatewaySlave, 2> slaves{
         {{0x1001, 0, 2, 0x1234, 0x10000, 7}, {0x1002, 1, 2, 0x1234, 0x10000, 8}}};
     Bytes message(in.begin(), in.end());
-    const std::size_t length = std::min<std::size_t>(in.size(), largest_mailbox);
-    message.resize(largest_mailbox);
+    const std::size_t length = std::min<std::size_t>(in.size(), max_mailbox);
+    message.resize(max_mailbox);
     require(master::answer_for_master(slaves, message, length) <= message.size(),
             "an answer lies in its buffer");
 }
@@ -339,7 +339,7 @@ void bus(std::span<const std::uint8_t> in) {
         "m.ethercat");
     require(reading.good(), "the configuration is valid");
     master::Setup& setup = reading.buses[0].setup;
-    setup.most_slaves = 4;
+    setup.max_slaves = 4;
     Nobody events(setup);
     master::Mailboxes mailboxes{4};
     master::CoeClient client(mailboxes);

@@ -89,7 +89,7 @@ int client(const char* address, std::uint8_t id) {
     FrameQueue out(1024);
     Network network(out, events, {.timeout = 1 * second});
     auto& node = network.add(id);
-    std::vector<std::uint8_t> data, room(1 << 20);
+    std::vector<std::uint8_t> data, buffer(1 << 20);
     for (std::string line; std::getline(std::cin, line);) {
         std::istringstream words(line);
         std::string what, index, sub, mode, bytes;
@@ -110,7 +110,7 @@ int client(const char* address, std::uint8_t id) {
                          .upload = what == "read",
                          .mode = mode == "block" ? SdoMode::block : SdoMode::segmented,
                          .data = data,
-                         .buffer = room};
+                         .buffer = buffer};
             node.sdo().submit(r);
             while (!r.done()) {
                 network.poll(clock_now());
@@ -121,7 +121,7 @@ int client(const char* address, std::uint8_t id) {
             } else {
                 std::printf("ok ");
                 for (std::size_t n = 0; r.upload && n < r.size; ++n) {
-                    std::printf("%02x", room[n]);
+                    std::printf("%02x", buffer[n]);
                 }
                 std::puts("");
             }

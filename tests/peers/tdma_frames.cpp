@@ -101,7 +101,7 @@ void rtcfg_frame(Capture& out, rtcfg::Message m, const std::string& fields) {
                      m.id == Id::dead_station
                  ? master
                  : station;
-    std::array<std::uint8_t, ethernet::largest_frame> frame{};
+    std::array<std::uint8_t, ethernet::max_frame> frame{};
     const std::size_t length = rtcfg::encode(m, frame);
     out.add(std::span(frame).first(length),
             "rtcfg.vers=0 rtcfg.id=" + n(static_cast<unsigned>(m.id)) + " " + fields);

@@ -220,7 +220,7 @@ TEST(A_function_that_hangs, rejects_edits_with_its_name_and_leaves_the_other_thr
     ASSERT_TRUE(eventually([&] { return watch.runs > runs + 2; }));
     machine.must("loadrt test-counter names=e\naddf e good\nnet s e.step");
     machine.must("delthread bad");
-    EXPECT_EQ(watch.most_inside, 1);
+    EXPECT_EQ(watch.max_inside, 1);
 }
 
 TEST(A_function_that_hangs, leaves_safe_values_to_other_threads_and_is_one_fault) {

@@ -89,7 +89,7 @@ TEST_F(Live, A_function_moved_between_running_threads_is_never_in_both) {
         const auto runs = watch.runs.load();
         ASSERT_TRUE(eventually([&] { return watch.runs > runs; }));
     }
-    EXPECT_EQ(watch.most_inside, 1);
+    EXPECT_EQ(watch.max_inside, 1);
     machine.must("unloadrt x");
 }
 

@@ -46,7 +46,7 @@ TEST_F(Reload, of_a_component_that_starts_stops_the_old_one_first) {
     EXPECT_GE(watch.emergencies, 1);
     const auto runs = watch.runs.load();
     ASSERT_TRUE(eventually([&] { return watch.runs > runs + 3; }));
-    EXPECT_EQ(watch.most_inside, 1);
+    EXPECT_EQ(watch.max_inside, 1);
     EXPECT_EQ(machine.get("l"), "7");
     EXPECT_EQ(machine.get("x.in"), "TRUE");
     machine.must("unload test-life");

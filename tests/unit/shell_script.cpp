@@ -229,12 +229,12 @@ TEST(Script,
         EXPECT_TRUE(has(manual, "\n    " + usage + "\n")) << name;
         const auto forms = usage_forms(row.arguments);
         const auto& words = forms.front();
-        const auto least = static_cast<std::size_t>(std::count_if(
+        const auto min = static_cast<std::size_t>(std::count_if(
             words.begin(), words.end(), [](const UsageWord& word) { return !word.optional; }));
         const bool open = std::any_of(words.begin(), words.end(),
                                       [](const UsageWord& word) { return word.repeats; });
         std::vector<std::string> lines;
-        if (least > 0) {
+        if (min > 0) {
             lines.push_back(name);
         }
         if (!open) {

@@ -16,18 +16,18 @@ TEST(Texts, texts_of_reverted_edits_are_freed) {
     machine.must("loadrt and2 names=a\nnewthread t 1000000\n");
     const Sources& sources = machine.session.sources;
     const std::string large(2000, '#');
-    std::size_t most = 0;
-    std::size_t most_bytes = 0;
+    std::size_t max = 0;
+    std::size_t max_bytes = 0;
     for (int i = 0; i < 20'000; ++i) {
         const std::string name = "x" + std::to_string(i);
         EXPECT_EQ(machine.line("net " + name + " a.out " + (i % 10 == 0 ? large : "")), 0);
         EXPECT_EQ(machine.line("delsig " + name), 0);
         EXPECT_EQ(machine.line("net " + name + " nothing.out"), 1);
-        most = std::max(most, sources.count());
-        most_bytes = std::max(most_bytes, sources.bytes());
+        max = std::max(max, sources.count());
+        max_bytes = std::max(max_bytes, sources.bytes());
     }
-    EXPECT_LT(most, 2000U);
-    EXPECT_LT(most_bytes, 2U << 20);
+    EXPECT_LT(max, 2000U);
+    EXPECT_LT(max_bytes, 2U << 20);
 }
 
 TEST(Texts, texts_that_something_points_into_are_kept) {

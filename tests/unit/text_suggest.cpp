@@ -21,9 +21,9 @@ TEST(NameIndex, finds_what_the_plain_search_finds) {
     const auto number = [&](int below) {
         return static_cast<int>(random() % static_cast<unsigned>(below));
     };
-    const auto word = [&](int longest) {
+    const auto word = [&](int max) {
         std::string text;
-        for (int i = number(longest + 1); i > 0; --i) {
+        for (int i = number(max + 1); i > 0; --i) {
             text += "abcAB.-_01"[number(10)];
         }
         return text;

@@ -51,15 +51,15 @@ TEST(LineReader, gives_lines_as_they_come_and_a_last_one_without_end) {
 
 TEST(LineReader, keeps_a_line_longer_than_its_buffer) {
     Pipe pipe;
-    const std::string longest(300'000, 'x');
+    const std::string max(300'000, 'x');
     auto writer = std::async(std::launch::async, [&] {
-        pipe.write(longest + "\nend\n");
+        pipe.write(max + "\nend\n");
         pipe.finish();
     });
     LineReader reader(pipe.ends[0]);
     std::string line;
     EXPECT_TRUE(reader.read(line));
-    EXPECT_EQ(line, longest);
+    EXPECT_EQ(line, max);
     EXPECT_TRUE(reader.read(line));
     EXPECT_EQ(line, "end");
     writer.get();

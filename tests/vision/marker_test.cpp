@@ -93,12 +93,12 @@ TEST(Marker, has_a_pose_in_millimetres_and_degrees) {
 TEST(Marker, is_placed_to_1_5_mm_in_the_mean_with_noise) {
     MarkerDetector detector("4x4_50", camera());
     std::mt19937 random(5);
-    const auto between = [&](double least, double most) {
-        return least + (most - least) * static_cast<double>(random()) / 4294967295.0;
+    const auto between = [&](double min, double max) {
+        return min + (max - min) * static_cast<double>(random()) / 4294967295.0;
     };
     constexpr int poses = 60;
     double sum = 0;
-    double most = 0;
+    double max = 0;
     for (int i = 0; i < poses; ++i) {
         Shot shot;
         shot.id = i % 50;
@@ -114,11 +114,11 @@ TEST(Marker, is_placed_to_1_5_mm_in_the_mean_with_noise) {
         EXPECT_EQ(found[0].id, shot.id);
         const double error = distance(shot, found[0].pose);
         sum += error;
-        most = std::max(most, error);
+        max = std::max(max, error);
     }
     RecordProperty("mean_mm", std::to_string(sum / poses));
     std::printf("position error over %d poses: mean %.2f mm, most %.2f mm\n", poses, sum / poses,
-                most);
+                max);
     EXPECT_LE(sum / poses, 1.5);
 }
 

@@ -168,7 +168,7 @@ TEST(Stage, states_lie_between_their_neighbours) {
     scene::State seen;
     EXPECT_FALSE(stage.newest(seen));
     EXPECT_FALSE(stage.when(0, seen));
-    std::array<double, scene::most_values> values{};
+    std::array<double, scene::max_values> values{};
     for (int i = 0; i < 2000; ++i) {
         values[scene::at::arm] = i;
         values[scene::at::light] = i;

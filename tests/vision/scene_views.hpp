@@ -36,9 +36,9 @@ inline Frame frame_of(const scene::Settings& settings, const scene::State& from,
 
 /// A number between `least` and `most` that is spread evenly over n = 0, 1, 2 … `step`: a prime for
 /// each quantity. (R. Richtmyer, 1951)
-inline double spread(int n, double step, double least, double most) {
+inline double spread(int n, double step, double min, double max) {
     const double part = n * std::sqrt(step);
-    return least + (most - least) * (part - std::floor(part));
+    return min + (max - min) * (part - std::floor(part));
 }
 
 }  // namespace hal::vision::test

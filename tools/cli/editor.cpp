@@ -75,10 +75,10 @@ std::string common_prefix(const std::vector<Candidate>& candidates) {
 }
 
 std::string candidate_table(const std::vector<Candidate>& candidates, std::size_t columns) {
-    constexpr std::size_t most = 200;
+    constexpr std::size_t max = 200;
     std::size_t name_width = 0;
     std::size_t hint_width = 0;
-    const std::size_t shown = std::min(candidates.size(), most);
+    const std::size_t shown = std::min(candidates.size(), max);
     for (std::size_t i = 0; i < shown; ++i) {
         name_width = std::max(name_width, candidates[i].text.size());
         hint_width = std::max(hint_width, candidates[i].hint.size());
@@ -187,7 +187,7 @@ struct Editor::State {
         if (!line) return;
         history = history_init();
         HistEvent event{};
-        ::history(history, &event, H_SETSIZE, static_cast<int>(HistoryFile::most));
+        ::history(history, &event, H_SETSIZE, static_cast<int>(HistoryFile::max));
         ::history(history, &event, H_SETUNIQUE, 1);
         for (const std::string& old : file.load()) {
             ::history(history, &event, H_ENTER, old.c_str());

@@ -20,7 +20,7 @@ namespace hal::tools {
 /// that several shells share it.
 class HistoryFile {
 public:
-    static constexpr std::size_t most = 2000;
+    static constexpr std::size_t max = 2000;
 
     std::vector<std::string> load() {
         namespace fs = std::filesystem;
@@ -42,8 +42,8 @@ public:
         for (std::string line; std::getline(file, line);) {
             lines.push_back(line);
         }
-        if (lines.size() > 2 * most) {
-            lines.erase(lines.begin(), lines.end() - static_cast<std::ptrdiff_t>(most));
+        if (lines.size() > 2 * max) {
+            lines.erase(lines.begin(), lines.end() - static_cast<std::ptrdiff_t>(max));
             std::string all;
             for (const auto& line : lines) {
                 all += line + "\n";

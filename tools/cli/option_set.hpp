@@ -22,9 +22,9 @@ namespace hal::tools {
 class DeclaredOption {
 public:
     explicit DeclaredOption(CLI::Option* option) : option_(option) {}
-    void in(int least, int most);  ///< the help shows the range
-    void in(double least, double most);
-    void quietly_in(int least, int most);  ///< the help does not show it
+    void in(int min, int max);  ///< the help shows the range
+    void in(double min, double max);
+    void quietly_in(int min, int max);  ///< the help does not show it
     void not_negative();
     void finite();
 

@@ -140,15 +140,15 @@ std::string repaired(const std::string& name) {
 std::string problem_of_spelling(const std::string& kind, const std::string& name) {
     const bool plain = std::all_of(name.begin(), name.end(),
                                    [](char c) { return is_name_character(c) && c != '.'; });
-    constexpr std::size_t longest = 40;
+    constexpr std::size_t max = 40;
     if (!plain || name.empty() || !is_letter(name.front()) || name.back() == '-' ||
         name.back() == '_') {
         return fmt::format(
             "invalid {0} name '{1}': use a letter, then letters, digits, - and _; try: hal new {0} {2}",
             kind, name, repaired(name));
     }
-    if (name.size() > longest) {
-        return fmt::format("the name has {} characters; the limit is {}", name.size(), longest);
+    if (name.size() > max) {
+        return fmt::format("the name has {} characters; the limit is {}", name.size(), max);
     }
     return {};
 }

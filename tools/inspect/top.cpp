@@ -30,7 +30,7 @@ constexpr auto status_period = std::chrono::milliseconds(500);
 constexpr double silent_after_s = 2;
 constexpr double gone_after_s = 30;
 // a publisher that floods the topic does not fill the memory
-constexpr std::size_t most_instances = 1000;
+constexpr std::size_t max_instances = 1000;
 
 std::vector<std::string_view> words_of(std::string_view text) {
     std::vector<std::string_view> words;
@@ -127,7 +127,7 @@ private:
                                         [&](const Seen& one) { return one.what.same(seen); });
         if (known != self.seen_.end()) {
             *known = {std::move(seen), Clock::now()};
-        } else if (self.seen_.size() < most_instances) {
+        } else if (self.seen_.size() < max_instances) {
             self.seen_.push_back({std::move(seen), Clock::now()});
         }
     }

@@ -17,7 +17,7 @@ using Json = nlohmann::json;
 
 namespace {
 
-constexpr std::size_t most_channels = 5000;
+constexpr std::size_t max_channels = 5000;
 constexpr std::size_t max_subscriptions = 1000;
 
 std::string text_of(const Json& json) {
@@ -120,7 +120,7 @@ void FoxgloveClient::machine_line(std::string_view line, std::string_view) {
 void FoxgloveClient::advertise(const Json& objects, bool signals) {
     Json added = Json::array();
     for (const Json& object : objects) {
-        if (channels_.size() >= most_channels) break;
+        if (channels_.size() >= max_channels) break;
         const std::string type = object.value("type", "");
         const std::string direction = object.value("dir", "");
         if (type == "port" || (!signals && (object.contains("signal") || direction == "IN"))) {

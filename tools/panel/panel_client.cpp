@@ -19,7 +19,7 @@ namespace {
 constexpr std::int64_t retry_ms = 500;
 constexpr std::int64_t hello_ms = 10'000;
 constexpr std::size_t pause_above = 256 << 10;
-constexpr std::size_t most_writes = 100;  // requests under way
+constexpr std::size_t max_writes = 100;  // requests under way
 
 std::string text_of(const Json& json) {
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -194,7 +194,7 @@ void PanelClient::write(Json request) {
     if (!values.is_object() || values.size() > 100 || !request.contains("id")) {
         return reject(request, "set needs an id and an object of at most 100 values");
     }
-    if (writes_.size() >= most_writes) return reject(request, "too many requests are waiting");
+    if (writes_.size() >= max_writes) return reject(request, "too many requests are waiting");
     Write write{request["id"].get<std::uint64_t>(), {}, {}, {}};
     for (const auto& [name, value] : values.items()) {
         write.names.push_back(name);

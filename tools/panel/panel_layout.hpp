@@ -18,9 +18,9 @@ struct PanelPin {
     /// value of an output without a page, and before the first one; null: keeps its value
     nlohmann::json safe;
     /// what a page may set
-    double least = -std::numeric_limits<double>::infinity();
+    double min = -std::numeric_limits<double>::infinity();
 
-    double most = std::numeric_limits<double>::infinity();
+    double max = std::numeric_limits<double>::infinity();
     std::string unit, doc;
 };
 

@@ -280,10 +280,10 @@ void Reader::set_value(const Kind& kind, const Given& given, const char* key, co
     const Word& word = at->second;
     const auto value = value_of(kind, word);
     if (!value) return;
-    const double number = value->is_number() ? value->get<double>() : pin.least;
-    if (number < pin.least || number > pin.most) {
+    const double number = value->is_number() ? value->get<double>() : pin.min;
+    if (number < pin.min || number > pin.max) {
         error(word.at, fmt::format("{}={} is outside {:g}..{:g}", key, word.text.substr(0, 60),
-                                   pin.least, pin.most));
+                                   pin.min, pin.max));
     }
     to = *value;
 }
@@ -299,14 +299,14 @@ void Reader::pin(const Kind& kind, const std::vector<Word>& words, const Given& 
         pin.safe = false;
     }
     if (kind.output) {
-        pin.least = options.value("min", pin.least);
-        pin.most = options.value("max", pin.most);
+        pin.min = options.value("min", pin.min);
+        pin.max = options.value("max", pin.max);
     }
     set_value(kind, given, "initial", pin, pin.initial);
     set_value(kind, given, "safe", pin, pin.safe);
-    const bool zero_is_outside = pin.least > 0 || pin.most < 0;
+    const bool zero_is_outside = pin.min > 0 || pin.max < 0;
     if (kind.output && zero_is_outside && pin.initial.is_null() && pin.safe.is_null()) {
-        pin.initial = pin.least > 0 ? pin.least : pin.most;
+        pin.initial = pin.min > 0 ? pin.min : pin.max;
     }
     if (given.contains("unit")) {
         pin.unit = given.at("unit").text;

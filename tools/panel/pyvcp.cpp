@@ -273,12 +273,12 @@ private:
 
     /// Reads an image of the file for the page: its name and data URI.
     void picture(pugi::xml_node element) {
-        constexpr std::size_t largest = 200'000;
+        constexpr std::size_t max = 200'000;
         const std::string file = element.attribute("file").as_string();
 
         const std::string name = element.attribute("name").as_string();
         std::string bytes;
-        if (!read_bytes((std::filesystem::path(name_).parent_path() / file).string(), largest,
+        if (!read_bytes((std::filesystem::path(name_).parent_path() / file).string(), max,
                         bytes) ||
             images_.size() >= 100) {
             return error(

@@ -309,7 +309,7 @@ void PanelServer::release(PanelClient& client) {
 }
 
 bool PanelServer::admit(WebClient& client) {
-    if (clients_.size() <= most_clients) return true;
+    if (clients_.size() <= max_clients) return true;
     if (!client.by_token()) return false;
     const auto viewer = std::find_if(clients_.begin(), clients_.end(),
                                      [](const auto& one) { return !one->by_token(); });

@@ -64,7 +64,7 @@ public:
     std::uint64_t next_number() { return ++numbers_; }
     void tick();
 
-    static constexpr std::size_t most_clients = 32;
+    static constexpr std::size_t max_clients = 32;
     static constexpr std::size_t max_connections = 48;
 
 private:

@@ -100,8 +100,8 @@ std::string UserPanel::write(std::string_view name, const Json& value) {
         return fmt::format("the value of '{}' is not a {}", name, at->type);
     }
     if (converted.is_number() &&
-        !(converted.get<double>() >= at->least && converted.get<double>() <= at->most)) {
-        return fmt::format("the value of '{}' is outside {:g}..{:g}", name, at->least, at->most);
+        !(converted.get<double>() >= at->min && converted.get<double>() <= at->max)) {
+        return fmt::format("the value of '{}' is outside {:g}..{:g}", name, at->min, at->max);
     }
     const auto i = static_cast<std::size_t>(at - layout_.pins.begin());
     shown_[i] = text_of(converted);

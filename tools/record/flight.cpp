@@ -40,7 +40,7 @@ void FlightMemory::note_last(const Held& held) {
 
 void FlightMemory::prune(std::int64_t now_ns, std::int64_t but_from_ns) {
     const std::int64_t from = std::min(now_ns - last_ns_, but_from_ns);
-    while (!batches_.empty() && (batches_.front().batch.until_ns < from || bytes_ > most_bytes)) {
+    while (!batches_.empty() && (batches_.front().batch.until_ns < from || bytes_ > max_bytes)) {
         note_last(batches_.front());
         bytes_ -= batches_.front().batch.bytes.size();
         forgotten_until_ns_ = batches_.front().batch.until_ns;

@@ -16,7 +16,7 @@ namespace hal::tools {
 /// The samples, layouts and journal entries of the last time, bounded in bytes too.
 class FlightMemory {
 public:
-    static constexpr std::size_t most_bytes = std::size_t{512} << 20;
+    static constexpr std::size_t max_bytes = std::size_t{512} << 20;
 
     FlightMemory(std::vector<ProbeGroup> groups, std::int64_t last_ns) : last_ns_(last_ns) {
         layout(std::move(groups));

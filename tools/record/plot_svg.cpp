@@ -255,14 +255,14 @@ struct Range {
     double low = std::numeric_limits<double>::infinity();
 
     double high = -std::numeric_limits<double>::infinity();
-    double least = 0;  // the smallest size of what was added; 0: only zeros
+    double min = 0;  // the smallest size of what was added; 0: only zeros
 
     bool empty() const { return !(low <= high); }
     double half() const { return high / 2 - low / 2; }
     double size() const { return empty() ? 0 : std::max(std::abs(low), std::abs(high)); }
     void add(const Range& other) {
         if (const double size = other.size(); size != 0) {
-            least = least == 0 ? size : std::min(least, size);
+            min = min == 0 ? size : std::min(min, size);
         }
         low = std::min(low, other.low);
         high = std::max(high, other.high);
@@ -305,7 +305,7 @@ bool alike(const Range& strip, const Range& range) {
     constexpr double max = 20;
     const double size = range.size();
     return size == 0 || strip.size() == 0 ||
-           (size / max <= strip.least && strip.size() / max <= size);
+           (size / max <= strip.min && strip.size() / max <= size);
 }
 
 }  // namespace

@@ -335,9 +335,9 @@ std::vector<std::string> names_of(Client& client, const Recording& what, std::st
         add_new(names, group_names(client, group, problem));
         if (!problem.empty()) return names;
     }
-    if (names.size() > Probes::most_names) {
+    if (names.size() > Probes::max_names) {
         problem = fmt::format("{} values are more than {}; name fewer, or type --group NAME",
-                              names.size(), Probes::most_names);
+                              names.size(), Probes::max_names);
     }
     return names;
 }

@@ -26,24 +26,24 @@ constexpr const char* colours[] = {"#1f6fb4", "#c2410c", "#15803d", "#7c3aed",
                                    "#0e7490", "#be185d", "#a16207", "#4d7c0f"};
 
 struct Axis {
-    double least = 0;
-    double most = 1;
+    double min = 0;
+    double max = 1;
     double step = 1;
 };
 
 /// Whole steps of 1, 2 or 5 around the range.
-Axis axis_of(double least, double most, int about) {
-    if (!(most > least)) {
-        const double around = std::max(std::abs(least) * 0.1, 0.5);
-        least -= around;
-        most += around;
+Axis axis_of(double min, double max, int about) {
+    if (!(max > min)) {
+        const double around = std::max(std::abs(min) * 0.1, 0.5);
+        min -= around;
+        max += around;
     }
-    const double fine = (most - least) / about;
+    const double fine = (max - min) / about;
     double step = std::pow(10.0, std::floor(std::log10(fine)));
     while (step < fine * (1 - 1e-9)) {
         step = next_step(step, true);
     }
-    return {std::floor(least / step + 1e-9) * step, std::ceil(most / step - 1e-9) * step, step};
+    return {std::floor(min / step + 1e-9) * step, std::ceil(max / step - 1e-9) * step, step};
 }
 
 struct TimeUnit {
@@ -134,22 +134,22 @@ private:
             left, y_ - 6, colour, xml_escape(channel.name),
             channel.unit.empty() ? "" : " [" + xml_escape(channel.unit) + "]", left + plot_width,
             y_ - 6, xml_escape(summary(channel, found)));
-        double least = std::numeric_limits<double>::infinity();
-        double most = -least;
+        double min = std::numeric_limits<double>::infinity();
+        double max = -min;
         for (const Sample& sample : record_.samples[i]) {
             if (std::isfinite(sample.value)) {
-                least = std::min(least, sample.value);
-                most = std::max(most, sample.value);
+                min = std::min(min, sample.value);
+                max = std::max(max, sample.value);
             }
         }
         const Axis axis = channel.bit    ? Axis{0, 1, 1}
-                          : least > most ? Axis{}
-                                         : axis_of(least, most, 4);
+                          : min > max ? Axis{}
+                                         : axis_of(min, max, 4);
         const auto y_of = [&](double value) {
-            return y_ + height - (value - axis.least) / (axis.most - axis.least) * height;
+            return y_ + height - (value - axis.min) / (axis.max - axis.min) * height;
         };
-        for (int k = 0; axis.least + k * axis.step <= axis.most + axis.step * 0.5; ++k) {
-            const double value = axis.least + k * axis.step;
+        for (int k = 0; axis.min + k * axis.step <= axis.max + axis.step * 0.5; ++k) {
+            const double value = axis.min + k * axis.step;
             text_ += fmt::format(
                 "<path d=\"M{} {:.1f}H{}\" stroke=\"#e4e4e4\"/><text x=\"{}\" y=\"{:.1f}\" "
                 "text-anchor=\"end\" fill=\"#555\">{}</text>\n",

@@ -43,11 +43,11 @@ struct Periods {
     std::vector<std::size_t> at;
 };
 
-Periods periods_of(View samples, double least, double most) {
+Periods periods_of(View samples, double min, double max) {
     Periods periods;
-    const double mid = (least + most) / 2;
-    const double margin = crossing_hysteresis * (most - least);
-    if (!(most > least)) return periods;
+    const double mid = (min + max) / 2;
+    const double margin = crossing_hysteresis * (max - min);
+    if (!(max > min)) return periods;
     bool low = false;
     // the newest crossing of the mid level upwards, which counts once the hysteresis is passed
     std::size_t up = 0;
@@ -94,11 +94,11 @@ void measure_step(View samples, std::int64_t step_ns, double range, Measurements
     }
     to.settling_s =
         outside == 0 ? 0 : static_cast<double>(after[outside - 1].time_ns - step_ns) * 1e-9;
-    double most = 0;
+    double max = 0;
     for (const Sample& sample : after) {
-        most = std::max(most, (sample.value - last) / step);
+        max = std::max(max, (sample.value - last) / step);
     }
-    to.overshoot_percent = 100 * most;
+    to.overshoot_percent = 100 * max;
     double low_ns = NAN;
     double high_ns = NAN;
     std::size_t low_at = 0;

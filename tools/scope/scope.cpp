@@ -142,10 +142,10 @@ std::string no_record(const ScopeOptions& options, Source& source) {
             duration);
     }
     const std::string range =
-        search.least() > search.most() ? fmt::format("'{}' had no value", name)
-        : search.least() == search.most()
-            ? fmt::format("{} was {:g}", name, search.least())
-            : fmt::format("{} was between {:g} and {:g}", name, search.least(), search.most());
+        search.min() > search.max() ? fmt::format("'{}' had no value", name)
+        : search.min() == search.max()
+            ? fmt::format("{} was {:g}", name, search.min())
+            : fmt::format("{} was between {:g} and {:g}", name, search.min(), search.max());
     return fmt::format("no trigger '{}' in {}: {}; type another level, or a longer --timeout",
                        format_trigger(trigger, acquisition.channels()), duration, range);
 }

@@ -111,10 +111,10 @@ std::string format_trigger(const Trigger& trigger, const std::vector<Channel>& c
 
 /// Returns the hysteresis of an edge: a share of the range of the values so far.
 double TriggerSearch::margin_with(double value) {
-    const bool is_first = least_ > most_;
-    least_ = is_first ? value : std::min(least_, value);
-    most_ = is_first ? value : std::max(most_, value);
-    const double range = most_ - least_;
+    const bool is_first = min_ > max_;
+    min_ = is_first ? value : std::min(min_, value);
+    max_ = is_first ? value : std::max(max_, value);
+    const double range = max_ - min_;
     return bit_ || !std::isfinite(range) ? 0 : hysteresis * range;
 }
 

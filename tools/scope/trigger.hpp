@@ -47,8 +47,8 @@ public:
     std::optional<std::int64_t> feed(Sample sample);
     /// Forgets edges in progress; the range seen so far stays.
     void rearm();
-    double least() const { return least_; }  ///< of all samples; above most() before the first one
-    double most() const { return most_; }
+    double min() const { return min_; }  ///< of all samples; above most() before the first one
+    double max() const { return max_; }
 
 private:
     double margin_with(double value);
@@ -60,8 +60,8 @@ private:
     bool below_ = false;
     bool above_ = false;  ///< armed for a rising, a falling edge
     std::optional<Sample> last_;
-    double least_ = 1;
-    double most_ = -1;
+    double min_ = 1;
+    double max_ = -1;
 };
 
 }  // namespace hal::tools

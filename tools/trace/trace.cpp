@@ -74,7 +74,7 @@ struct Summary {
     std::uint64_t calls = 0;
     std::uint64_t lost = 0;
     std::uint64_t overruns = 0;
-    std::int64_t longest_ns = -1;  ///< from the due time of a cycle to its end
+    std::int64_t max_ns = -1;  ///< from the due time of a cycle to its end
     std::string thread, function;
     std::uint64_t cycle = 0;
     std::int64_t latency_ns = 0;
@@ -96,8 +96,8 @@ struct Summary {
         const std::int64_t took_ns = event.end_ns - event.begin_ns;
         const std::int64_t late_ns = took_ns + event.id;
         overruns += late_ns > from.period_ns;
-        if (late_ns > longest_ns) {
-            longest_ns = late_ns;
+        if (late_ns > max_ns) {
+            max_ns = late_ns;
             thread = from.name;
             cycle = event.cycle_number;
             latency_ns = event.id;
@@ -365,10 +365,10 @@ int Tracer::finish() {
     print(fmt::format("wrote {}: {}, {}, {}, {} lost; open it in https://ui.perfetto.dev\n", path,
                       counted(summary_.cycles, "cycle"), counted(summary_.calls, "function call"),
                       counted(summary_.overruns, "overrun"), counted(summary_.lost, "event")));
-    if (summary_.longest_ns < 0) return status;
+    if (summary_.max_ns < 0) return status;
     std::string line = fmt::format(
         "latest end: cycle {} of '{}', {} after it was due: wake-up latency {}, execution {}",
-        summary_.cycle, summary_.thread, format_duration(static_cast<double>(summary_.longest_ns)),
+        summary_.cycle, summary_.thread, format_duration(static_cast<double>(summary_.max_ns)),
         format_duration(static_cast<double>(summary_.latency_ns)),
         format_duration(static_cast<double>(summary_.execution_ns)));
     if (!summary_.function.empty()) {

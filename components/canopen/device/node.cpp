@@ -7,7 +7,7 @@ namespace hal::canopen {
 
 namespace {
 // of 64 frames: a flooded bus must not delay a cycle without limit
-constexpr unsigned most_batches = 16;
+constexpr unsigned max_batches = 16;
 }  // namespace
 
 void add_storage(Description& d) {
@@ -69,7 +69,7 @@ void Node::turn(Time now, std::int64_t link_now) noexcept {
         bus_.clear();
     }
     std::size_t count = heard_.size();
-    for (unsigned batch = 0; batch < most_batches && count == heard_.size(); ++batch) {
+    for (unsigned batch = 0; batch < max_batches && count == heard_.size(); ++batch) {
         count = link_->receive(heard_, link_now);
         if (!runs_) continue;
         for (std::size_t n = 0; n < count; ++n) {

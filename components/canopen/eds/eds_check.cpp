@@ -10,7 +10,7 @@ namespace {
 
 bool has_parameter_value(const Entry& entry) { return !entry.parameter_value.empty(); }
 
-constexpr unsigned most_pdo_bits = 64 * 8;  // CAN FD; a classic frame has 64
+constexpr unsigned max_pdo_bits = 64 * 8;  // CAN FD; a classic frame has 64
 
 class Checks {
 public:
@@ -96,7 +96,7 @@ private:
             if (!bits || *bits == 0) continue;
             sum += one(object, *entry, static_cast<std::uint32_t>(*bits), receive);
         }
-        if (sum > most_pdo_bits) {
+        if (sum > max_pdo_bits) {
             report(Severity::warning, Topic::object, object.at,
                    label(object.index) + " maps " + std::to_string(sum) + " bits",
                    "that exceeds every frame");

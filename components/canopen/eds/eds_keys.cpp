@@ -122,7 +122,7 @@ std::string Keys::bare(IniSection& section, std::string_view key) {
     return found->value;
 }
 
-std::optional<std::uint64_t> Keys::parse(IniSection& section, IniKey& key, std::uint64_t most) {
+std::optional<std::uint64_t> Keys::parse(IniSection& section, IniKey& key, std::uint64_t max) {
     key.used = true;
     cut_comment(key);
     const std::string in = "'" + key.name + "' of [" + section.name + "]";
@@ -147,17 +147,17 @@ std::optional<std::uint64_t> Keys::parse(IniSection& section, IniKey& key, std::
                    std::to_string(number->magnitude),
                "remove the 0");
     }
-    if ((number->negative && number->magnitude != 0) || number->magnitude > most) {
+    if ((number->negative && number->magnitude != 0) || number->magnitude > max) {
         report(Severity::warning, Topic::number, key.value_at,
                in + " is out of range: '" + key.value + "'",
-               "the range is 0.." + std::to_string(most));
+               "the range is 0.." + std::to_string(max));
         return {};
     }
     return number->magnitude;
 }
 
 std::optional<std::uint64_t> Keys::number(IniSection& section, std::string_view key,
-                                          std::uint64_t most) {
+                                          std::uint64_t max) {
     IniKey* found = section.find(key);
     if (found == nullptr) {
         return {};
@@ -166,7 +166,7 @@ std::optional<std::uint64_t> Keys::number(IniSection& section, std::string_view 
     if (found->value.empty()) {
         return {};
     }
-    return parse(section, *found, most);
+    return parse(section, *found, max);
 }
 
 bool Keys::flag(IniSection& section, std::string_view key, bool otherwise) {

@@ -44,12 +44,12 @@ public:
     /// Returns nothing if the key is missing, empty or not a number in 0..`most`; reports an
     /// invalid number.
     std::optional<std::uint64_t> number(IniSection& section, std::string_view key,
-                                        std::uint64_t most);
+                                        std::uint64_t max);
     bool flag(IniSection& section, std::string_view key, bool otherwise = false);
     /// Returns the keys 1=, 2=, … of a list whose length is in `count_key`; without one the length
     /// is not checked.
     std::map<unsigned, IniKey*> list(IniSection& section, const char* count_key);
-    std::optional<std::uint64_t> parse(IniSection& section, IniKey& key, std::uint64_t most);
+    std::optional<std::uint64_t> parse(IniSection& section, IniKey& key, std::uint64_t max);
     /// Returns what was not read: comment lines and unknown keys. Warns of a key that is close to
     /// one of `known`.
     Extras rest(IniSection& section, std::initializer_list<std::string_view> known = {});

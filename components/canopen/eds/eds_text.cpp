@@ -8,8 +8,8 @@ namespace hal::canopen::eds {
 
 namespace {
 
-constexpr std::size_t most_bytes = 32u << 20;
-constexpr std::size_t most_line = 65536;
+constexpr std::size_t max_bytes = 32u << 20;
+constexpr std::size_t max_line = 65536;
 
 void append_utf8(std::string& out, std::uint32_t c) {
     const auto add = [&](std::uint32_t byte) { out += static_cast<char>(byte); };
@@ -136,7 +136,7 @@ bool decode(std::string_view bytes, std::string& text, std::vector<Message>& mes
         return false;
     };
     text.clear();
-    if (bytes.size() > most_bytes) {
+    if (bytes.size() > max_bytes) {
         return refuse("the file is larger than 32 MiB", "is it the right file?");
     }
     std::string plain;
@@ -267,7 +267,7 @@ private:
 
     void line(std::string_view line) {
         if (line.empty()) return;
-        if (line.size() > most_line) {
+        if (line.size() > max_line) {
             return report(Severity::warning, line.substr(0, 1),
                           "line of " + std::to_string(line.size()) + " bytes ignored",
                           "the limit is 255 characters");

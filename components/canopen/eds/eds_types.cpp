@@ -54,8 +54,8 @@ constexpr DataType table[] = {
 };
 
 std::string quoted(std::string_view text) {
-    constexpr std::size_t most = 60;
-    return "'" + std::string(text.substr(0, most)) + (text.size() > most ? "…'" : "'");
+    constexpr std::size_t max = 60;
+    return "'" + std::string(text.substr(0, max)) + (text.size() > max ? "…'" : "'");
 }
 
 struct Term {

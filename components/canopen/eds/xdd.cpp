@@ -91,7 +91,7 @@ private:
         messages_.push_back({severity, topic, place(node), std::move(sentence), std::move(help)});
     }
 
-    std::optional<std::uint64_t> number(const Node& node, const char* name, std::uint64_t most,
+    std::optional<std::uint64_t> number(const Node& node, const char* name, std::uint64_t max,
                                         bool hexadecimal = false) {
         const std::string text = attribute(node, name);
         if (text.empty()) {
@@ -100,9 +100,9 @@ private:
         const auto value = parse_number(
             hexadecimal && text.find_first_of("xX") == std::string::npos ? "0x" + text : text);
         const bool negative = value && value->negative && value->magnitude != 0;
-        if (!value || value->node_id || negative || value->magnitude > most) {
+        if (!value || value->node_id || negative || value->magnitude > max) {
             report(Severity::warning, Topic::number, node,
-                   "'" + std::string(name) + "' is not a number of 0.." + std::to_string(most) +
+                   "'" + std::string(name) + "' is not a number of 0.." + std::to_string(max) +
                        ": '" + text.substr(0, 60) + "'");
             return {};
         }

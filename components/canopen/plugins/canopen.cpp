@@ -185,20 +185,20 @@ private:
     void report_path_delays() {
         const std::vector<hal::can::DeliveryTime> delays = link_->delivery_times();
         if (delays.empty()) return;
-        hal::can::DeliveryTime longest = delays.front();
+        hal::can::DeliveryTime max = delays.front();
         for (const hal::can::DeliveryTime& d : delays) {
-            longest.there_ns = std::max(longest.there_ns, d.there_ns);
+            max.there_ns = std::max(max.there_ns, d.there_ns);
 
-            longest.back_ns = std::max(longest.back_ns, d.back_ns);
-            longest.there_cycles = std::max(longest.there_cycles, d.there_cycles);
-            longest.back_cycles = std::max(longest.back_cycles, d.back_cycles);
-            longest.round_trip = std::max(longest.round_trip, d.round_trip);
+            max.back_ns = std::max(max.back_ns, d.back_ns);
+            max.there_cycles = std::max(max.there_cycles, d.there_cycles);
+            max.back_cycles = std::max(max.back_cycles, d.back_cycles);
+            max.round_trip = std::max(max.round_trip, d.round_trip);
         }
         for (const Slot& s : runner_->slots()) {
             const config::Node& node = config_.nodes[s.node];
             const auto own = std::find_if(delays.begin(), delays.end(),
                                           [&](const auto& d) { return d.station == node.name; });
-            const auto& delay = own == delays.end() ? longest : *own;
+            const auto& delay = own == delays.end() ? max : *own;
             const std::string far =
                 "node " + std::to_string(node.setup.id) + " (" + node.name + ")";
             const auto report = [&](const std::string& pin) {
@@ -262,50 +262,50 @@ private:
     }
 
     // Events of the runner. [realtime]
-    void on_step(std::size_t place, const NodeStatus& s) noexcept override {
-        NodePins& pins = nodes_[place];
+    void on_step(std::size_t position, const NodeStatus& s) noexcept override {
+        NodePins& pins = nodes_[position];
         const bool is_lost = s.losses != pins.losses;
         pins.losses = s.losses;
-        if (is_lost) return on_lost(place, s);
+        if (is_lost) return on_lost(position, s);
         switch (s.step) {
         case Step::waiting:
-        case Step::failed: return on_boot_failed(place, s);
-        case Step::running: return on_running(place, s);
+        case Step::failed: return on_boot_failed(position, s);
+        case Step::running: return on_running(position, s);
         default: return;
         }
     }
-    void on_lost(std::size_t place, const NodeStatus& s) noexcept {
-        nodes_[place].is_faulty = true;
+    void on_lost(std::size_t position, const NodeStatus& s) noexcept {
+        nodes_[position].is_faulty = true;
         // A fault of a node lasts until it runs again.
-        begin(node_faults_[place], messages_->lost(place, s), silence(s));
+        begin(node_faults_[position], messages_->lost(position, s), silence(s));
         reporter_->node(s);
     }
     /// Raises a fault for a node that did not boot or start, once until it runs.
-    void on_boot_failed(std::size_t place, const NodeStatus& s) noexcept {
+    void on_boot_failed(std::size_t position, const NodeStatus& s) noexcept {
         const bool not_started = s.cause == Cause::not_started;
         const bool not_booted = s.result != BootResult::none && !booted(s.result);
-        if (nodes_[place].is_faulty || !(not_started || not_booted)) return;
-        if (!not_started && may_be_powering_up(place, s)) return;
-        nodes_[place].is_faulty = true;
-        begin(node_faults_[place], messages_->not_booted(place, s));
+        if (nodes_[position].is_faulty || !(not_started || not_booted)) return;
+        if (!not_started && may_be_powering_up(position, s)) return;
+        nodes_[position].is_faulty = true;
+        begin(node_faults_[position], messages_->not_booted(position, s));
         reporter_->node(s);
     }
     /// Returns true for an absent node that need not be there yet.
-    bool may_be_powering_up(std::size_t place, const NodeStatus& s) const noexcept {
-        const NodeSetup& setup = config_.nodes[place].setup;
+    bool may_be_powering_up(std::size_t position, const NodeStatus& s) const noexcept {
+        const NodeSetup& setup = config_.nodes[position].setup;
         const bool is_absent = s.result == BootResult::no_answer &&
                                (s.cause == Cause::no_response || s.cause == Cause::not_sent);
         return is_absent &&
                (!setup.mandatory || now_ - runner_->network().begun < setup.boot_limit);
     }
-    void on_running(std::size_t place, const NodeStatus& s) noexcept {
-        if (nodes_[place].is_faulty) {
+    void on_running(std::size_t position, const NodeStatus& s) noexcept {
+        if (nodes_[position].is_faulty) {
             reporter_->node(s);
         }
-        end(node_faults_[place]);
-        tell_notes(place, s);
+        end(node_faults_[position]);
+        tell_notes(position, s);
         for (std::size_t n = 0; n < short_faults_.size(); ++n) {
-            if (runner_->own().received[n].node != place) continue;
+            if (runner_->own().received[n].node != position) continue;
             short_raised_[n] = false;
             end(short_faults_[n]);
         }
@@ -323,17 +323,17 @@ private:
         begin(lasting, fault.text, fault.detail(value));
     }
     /// Reports each note about a node once, a suspected duplicate node ID after each boot.
-    void tell_notes(std::size_t place, const NodeStatus& s) noexcept {
-        const unsigned fresh = s.notes & ~unsigned{reported_notes_[place]};
-        reported_notes_[place] =
-            static_cast<std::uint8_t>((reported_notes_[place] & ~note_duplicate_id) | s.notes);
+    void tell_notes(std::size_t position, const NodeStatus& s) noexcept {
+        const unsigned fresh = s.notes & ~unsigned{reported_notes_[position]};
+        reported_notes_[position] =
+            static_cast<std::uint8_t>((reported_notes_[position] & ~note_duplicate_id) | s.notes);
         for (unsigned bit = 1; bit <= note_updated; bit <<= 1) {
             if ((fresh & bit) != 0) {
                 reporter_->note(s, static_cast<Note>(bit));
             }
         }
         if ((fresh & note_duplicate_id) != 0) {
-            raise(messages_->of(NodeFault::suspected_id, place).text.c_str());
+            raise(messages_->of(NodeFault::suspected_id, position).text.c_str());
         }
     }
     void on_network(const NetworkStatus& n) noexcept override {
@@ -346,17 +346,17 @@ private:
         }
         reporter_->network(n, *about);
     }
-    void on_emergency(std::size_t place, const Emergency& e) noexcept override {
-        reporter_->emergency(runner_->status(place), e);
+    void on_emergency(std::size_t position, const Emergency& e) noexcept override {
+        reporter_->emergency(runner_->status(position), e);
     }
-    void on_late(std::size_t place, Time silence) noexcept override {
-        nodes_[runner_->own().received[place].node].is_faulty = true;
-        begin(late_faults_[place], messages_->of(PdoFault::late, place), silence);
+    void on_late(std::size_t position, Time silence) noexcept override {
+        nodes_[runner_->own().received[position].node].is_faulty = true;
+        begin(late_faults_[position], messages_->of(PdoFault::late, position), silence);
     }
-    void on_short(std::size_t place, unsigned bytes) noexcept override {
-        if (short_raised_[place]) return;
-        short_raised_[place] = true;
-        begin(short_faults_[place], messages_->of(PdoFault::too_short, place), bytes);
+    void on_short(std::size_t position, unsigned bytes) noexcept override {
+        if (short_raised_[position]) return;
+        short_raised_[position] = true;
+        begin(short_faults_[position], messages_->of(PdoFault::too_short, position), bytes);
     }
     void on_foreign(const Foreign& f) noexcept override {
         if (f.sync || f.rpdo) {
@@ -374,8 +374,8 @@ private:
         own_id_seen_ = now_;
         begin(own_id_fault_, messages_->of(BusEvent::own_id));
     }
-    void on_srdo_fault(std::size_t place, SrdoFault fault) noexcept override {
-        begin(srdo_faults_[place], safety_->words(place, fault));
+    void on_srdo_fault(std::size_t position, SrdoFault fault) noexcept override {
+        begin(srdo_faults_[position], safety_->words(position, fault));
     }
     void on_bus_state(hal::can::State state) noexcept override {
         const BusEvent event = bus_event(state, runner_->had_bus());

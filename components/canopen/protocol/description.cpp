@@ -126,9 +126,9 @@ void add_pdo(Description& d, std::uint16_t communication, std::uint32_t predefin
           pdo.multiplex != Multiplex::none ? static_cast<std::uint64_t>(pdo.multiplex)
                                            : pdo.mapping.size(),
           "Number of mapped objects");
-    const auto room =
+    const auto capacity =
         std::min(std::max<std::size_t>(pdo.max_mapped, pdo.mapping.size()), std::size_t{64});
-    for (std::size_t n = 0; n < room; ++n) {
+    for (std::size_t n = 0; n < capacity; ++n) {
         d.add(mapping, static_cast<std::uint8_t>(n + 1), u32, rw,
               n < pdo.mapping.size() ? pdo.mapping[n] : 0, "Mapped object");
     }

@@ -146,7 +146,7 @@ Dictionary::Dictionary(const Description& description, std::uint8_t node_id) : n
         }
         const Entry e = make_entry(*from);
         if (e.type != Type::domain) {
-            longest_ = std::max<std::size_t>(longest_, e.capacity);
+            max_ = std::max<std::size_t>(max_, e.capacity);
         }
         keys_.push_back(key(from));
         accepted.push_back(from);

@@ -168,7 +168,7 @@ public:
     /// the description (1011h). [realtime]
     void keep(std::uint16_t first, std::uint16_t last, bool to_defaults) noexcept;
     /// Returns the length of the longest value other than domains, in bytes. [any]
-    std::size_t longest() const noexcept { return longest_; }
+    std::size_t max() const noexcept { return max_; }
     /// Returns a sentence for each entry of the description that was left out or changed. [setup]
     const std::vector<std::string>& problems() const noexcept { return problems_; }
 
@@ -187,7 +187,7 @@ private:
     std::vector<Image> images_;  // position of each value in the three memories below
     std::vector<std::uint8_t> memory_, power_on_, defaults_;
     std::vector<std::string> problems_;
-    std::size_t longest_ = 8;
+    std::size_t max_ = 8;
     std::uint8_t node_id_;
 };
 

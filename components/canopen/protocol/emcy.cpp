@@ -55,14 +55,14 @@ void Emcy::raise(std::uint16_t code, std::uint8_t register_bits, const Bytes& ma
     update_register();
     if (history_.size() > 1) {  // the newest is at sub-index 1
         std::uint8_t& used = *history_[0].data;
-        const auto room = history_.size() - 1;
-        for (std::size_t n = std::min<std::size_t>(used, room - 1); n > 0; --n) {
+        const auto capacity = history_.size() - 1;
+        for (std::size_t n = std::min<std::size_t>(used, capacity - 1); n > 0; --n) {
             std::memcpy(history_[n + 1].data, history_[n].data, 4);
         }
         const std::uint32_t field =
             code | std::uint32_t{manufacturer[0]} << 16 | std::uint32_t{manufacturer[1]} << 24;
         store(history_[1].data, field);
-        if (used < room) {
+        if (used < capacity) {
             ++used;
         }
     }

@@ -8,7 +8,7 @@ namespace hal::canopen {
 
 ObjectTransfer::ObjectTransfer(Dictionary& dictionary)
     : dictionary_(dictionary),
-      scratch_size_(dictionary.longest()),
+      scratch_size_(dictionary.max()),
       scratch_(std::make_unique<std::uint8_t[]>(scratch_size_)) {}
 
 void ObjectTransfer::close(bool complete) noexcept {

@@ -10,7 +10,7 @@ namespace hal::canopen {
 namespace {
 using namespace cia301::shorthand;
 
-constexpr std::size_t most_mapped = 16;
+constexpr std::size_t max_mapped = 16;
 
 template <class T>
 std::uint16_t with(std::uint16_t crc, T value) noexcept {
@@ -57,7 +57,7 @@ void add_srdos(Description& d, std::span<const SrdoDescription> srdos) {
         d.add(index, 5, u32, rw, s.cob, "COB-ID 1");
         d.add(index, 6, u32, rw, s.cob == 0 ? 0 : s.cob + 1, "COB-ID 2");
         d.add(mapping, 0, u8, rw, s.mapping.size(), "Number of mapped objects");
-        for (std::size_t k = 0; k < std::max(most_mapped, s.mapping.size()); ++k) {
+        for (std::size_t k = 0; k < std::max(max_mapped, s.mapping.size()); ++k) {
             d.add(mapping, static_cast<std::uint8_t>(k + 1), u32, rw,
                   k < s.mapping.size() ? s.mapping[k] : 0, "Mapped object");
         }

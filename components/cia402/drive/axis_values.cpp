@@ -7,8 +7,8 @@ namespace hal::cia402 {
 
 AxisSettings possible(AxisSettings settings) {
     auto& m = settings.motor;
-    const auto at_least = [](double& value, double least) {
-        value = value >= least && value < 1e12 ? value : least;
+    const auto at_least = [](double& value, double min) {
+        value = value >= min && value < 1e12 ? value : min;
     };
     at_least(m.inertia, 1e-9);
     at_least(m.rated_torque, 1e-6);

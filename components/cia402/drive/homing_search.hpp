@@ -50,7 +50,7 @@ private:
     static Range range(const Plant&, Switch) noexcept;
     Region before_edge() const noexcept;  // where the last passage starts
     void track(const Plant&, double speed, double slow) noexcept;
-    void pass(double place, Region to, bool wanted, double speed, double slow,
+    void pass(double position, Region to, bool wanted, double speed, double slow,
               int direction) noexcept;
     Order order(const Plant&) noexcept;
     Order search_index(const Plant&) const noexcept;

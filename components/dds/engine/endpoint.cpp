@@ -157,7 +157,7 @@ void WriterImpl::unmake() noexcept {
 ReaderImpl::ReaderImpl(std::shared_ptr<ParticipantImpl> owner, const TopicType& t, const Quality& q,
                        Listener* l)
     : Endpoint(std::move(owner), t, q, l) {
-    sample_.in.reserve(t.largest);
+    sample_.in.reserve(t.max);
     owner_->join(*this, false);
 }
 

@@ -32,16 +32,16 @@ namespace rtps = eprosima::fastrtps::rtps;
 /// A type with a name and no fields.
 class BytesType : public fd::TopicDataType {
 public:
-    BytesType(const std::string& name, std::size_t largest) {
+    BytesType(const std::string& name, std::size_t max) {
         setName(name.c_str());
-        m_typeSize = static_cast<std::uint32_t>(largest);
+        m_typeSize = static_cast<std::uint32_t>(max);
         m_isGetKeyDefined = false;
         // Cyclone DDS rejects endpoints that announce these parameters as 2.9 does
         auto_fill_type_object(false);
         auto_fill_type_information(false);
     }
-    void grow(std::size_t largest) {
-        m_typeSize = std::max(m_typeSize, static_cast<std::uint32_t>(largest));
+    void grow(std::size_t max) {
+        m_typeSize = std::max(m_typeSize, static_cast<std::uint32_t>(max));
     }
 
     bool serialize(void* data, rtps::SerializedPayload_t* to) override {
@@ -222,9 +222,9 @@ private:
     fd::Topic* acquire(const TopicType& t) {
         auto& type = types_[t.type];
         if (type.empty()) {
-            type.reset(new BytesType(t.type, t.largest));
+            type.reset(new BytesType(t.type, t.max));
         }
-        static_cast<BytesType*>(type.get())->grow(t.largest);
+        static_cast<BytesType*>(type.get())->grow(t.max);
         if (const auto known = topics_.find(t.name);
             known != topics_.end() && known->second.type != t.type) {
             throw std::runtime_error("topic '" + t.name +

@@ -62,7 +62,7 @@ private:
         failed_ = true;
         report_(true, esi::span_of(at, text_).line, std::move(sentence), std::move(help));
     }
-    std::optional<std::int64_t> number(const Xml& command, const char* name, std::int64_t most,
+    std::optional<std::int64_t> number(const Xml& command, const char* name, std::int64_t max,
                                        std::int64_t otherwise) {
         const Xml child = command.child(name);
         if (!child) {
@@ -72,11 +72,11 @@ private:
             return {};
         }
         const auto value = esi::number(trimmed(child.child_value()));
-        if (value && *value >= 0 && *value <= most) return value;
+        if (value && *value >= 0 && *value <= max) return value;
         error(
             child,
             "invalid " + std::string(name) + " '" + std::string(trimmed(child.child_value())) + "'",
-            "write a number of 0.." + std::to_string(most) + " in decimal, or as #x6040");
+            "write a number of 0.." + std::to_string(max) + " in decimal, or as #x6040");
         return {};
     }
     static bool yes(std::string_view text) { return same_word(text, "true") || text == "1"; }

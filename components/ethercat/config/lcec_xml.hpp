@@ -53,8 +53,8 @@ public:
         }
     }
 
-    std::optional<std::int64_t> number(const Xml& node, const char* name, std::int64_t least,
-                                       std::int64_t most, bool hexadecimal = false,
+    std::optional<std::int64_t> number(const Xml& node, const char* name, std::int64_t min,
+                                       std::int64_t max, bool hexadecimal = false,
                                        bool required = false) {
         const std::string_view value = trimmed(node.attribute(name).value());
         if (!node.attribute(name)) {
@@ -67,9 +67,9 @@ public:
         }
         const bool prefixed = value.starts_with("0x") || value.starts_with("0X") || !hexadecimal;
         const auto n = esi::number(prefixed ? std::string(value) : "0x" + std::string(value));
-        if (n && *n >= least && *n <= most) return n;
+        if (n && *n >= min && *n <= max) return n;
         if (const auto lenient = hexadecimal ? leading_digits(value) : std::nullopt;
-            lenient && *lenient >= least && *lenient <= most) {
+            lenient && *lenient >= min && *lenient <= max) {
             char digits[20];
             std::snprintf(digits, sizeof digits, "%llX", static_cast<long long>(*lenient));
             report_.warning(Topic::value, esi::span_of(node, text_),
@@ -81,7 +81,7 @@ public:
         char range[96];
         std::snprintf(range, sizeof range,
                       hexadecimal ? "a hexadecimal number of %llX..%llX" : "a number of %lld..%lld",
-                      static_cast<long long>(least), static_cast<long long>(most));
+                      static_cast<long long>(min), static_cast<long long>(max));
         error(Topic::value, node,
               "invalid " + std::string(name) + " '" + std::string(value) + "' of <" + node.name() +
                   ">",

@@ -112,7 +112,7 @@ bool PdoPlacement::choose(const Line& line, std::vector<std::uint16_t>& free) {
 
 /// Returns how many entries a PDO takes; 0: any number.
 std::uint64_t PdoPlacement::limit_of(std::uint16_t pdo) const {
-    const std::uint64_t described = device_ != nullptr ? most_entries(*device_, pdo) : 0;
+    const std::uint64_t described = device_ != nullptr ? max_entries(*device_, pdo) : 0;
     if (described == 0) return max_entries_;
     return max_entries_ == 0 ? described : std::min(max_entries_, described);
 }

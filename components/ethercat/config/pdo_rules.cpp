@@ -64,12 +64,12 @@ std::string too_long(const PdoContext& context, const master::SyncManager& sm) {
         }
     }
     const unsigned bytes = (bits + 7) / 8;
-    const unsigned most = device.sync_managers[sm.number].max_size;
-    if (bytes <= most) {
+    const unsigned max = device.sync_managers[sm.number].max_size;
+    if (bytes <= max) {
         return {};
     }
     return "the objects have " + std::to_string(bytes) + " bytes; sync manager " +
-           std::to_string(sm.number) + " of '" + context.type + "' takes " + std::to_string(most);
+           std::to_string(sm.number) + " of '" + context.type + "' takes " + std::to_string(max);
 }
 
 }  // namespace
@@ -80,7 +80,7 @@ bool exclude_each_other(const esi::Pdo& a, const esi::Pdo& b) {
     return names(a, b.index) || names(b, a.index);
 }
 
-unsigned most_entries(const esi::Device& device, std::uint16_t pdo) {
+unsigned max_entries(const esi::Device& device, std::uint16_t pdo) {
     const esi::Object* object = device.find(pdo);
     if (object == nullptr) return 0;
     unsigned highest = 0;

@@ -18,7 +18,7 @@ bool exclude_each_other(const esi::Pdo&, const esi::Pdo&);
 
 /// Returns how many objects the mapping of a PDO takes: the sub-indices of its object in the
 /// dictionary; 0: unknown.
-unsigned most_entries(const esi::Device&, std::uint16_t pdo);
+unsigned max_entries(const esi::Device&, std::uint16_t pdo);
 
 /// Returns the PDOs of a direction that can be mapped anew, together: mandatory ones first, then
 /// those that are assigned by default.

@@ -18,7 +18,7 @@ using master::ProcessImage;
 constexpr std::int64_t ns_per_byte = 80;         // 100 Mbit/s
 constexpr std::size_t wire_overhead_bytes = 24;  // preamble 8, check sequence 4, gap 12
 constexpr std::size_t clock_bytes = 8;
-constexpr unsigned longest_period = 1000;
+constexpr unsigned max_period = 1000;
 
 std::string micro(std::int64_t ns) {
     char out[32];
@@ -84,7 +84,7 @@ std::vector<PlannedFrame> frames_of(const master::Setup& setup) {
 
 void add_slots(Plan& plan, std::int64_t acyclic_ns) {
     for (const PlannedFrame& f : plan.cyclic) {
-        plan.period = std::min(std::lcm(plan.period, f.every), longest_period);
+        plan.period = std::min(std::lcm(plan.period, f.every), max_period);
     }
     for (unsigned cycle = 0; cycle < plan.period; ++cycle) {
         PlannedSlot slot{{cycle}, {}, acyclic_ns};
@@ -106,12 +106,12 @@ void add_slots(Plan& plan, std::int64_t acyclic_ns) {
 
 /// Returns how many cycles an answer waits at most for a cycle in which its domain is sent. It is
 /// computed in the cycle after the inputs were sent, which is one of every `from`.
-unsigned longest_wait(unsigned from, unsigned to) {
-    unsigned most = 0;
+unsigned max_wait(unsigned from, unsigned to) {
+    unsigned max = 0;
     for (unsigned sent = 0; sent < std::lcm(from, to); sent += from) {
-        most = std::max(most, (to - (sent + 1) % to) % to);
+        max = std::max(max, (to - (sent + 1) % to) % to);
     }
-    return most;
+    return max;
 }
 
 /// An input that changes just after it was taken is sent `from` cycles later, arrives in the next
@@ -138,7 +138,7 @@ void add_trips(Plan& plan, const master::Setup& setup, const PlanOptions& option
             PlannedTrip trip{setup.domains[from].name, setup.domains[to].name, 0,
                              sides[from].synchronised || sides[to].synchronised, 0};
             const unsigned every = std::max(setup.domains[from].every, 1U);
-            trip.cycles = every + 1 + longest_wait(every, std::max(setup.domains[to].every, 1U)) +
+            trip.cycles = every + 1 + max_wait(every, std::max(setup.domains[to].every, 1U)) +
                           (trip.synchronised ? 1 : 0);
             trip.worst_ns = trip.cycles * setup.cycle_ns + options.drive_ns +
                             (trip.synchronised ? 0 : plan.shortest_cycle_ns);
@@ -243,14 +243,14 @@ Plan plan(const Bus& bus, const PlanOptions& options) {
     out.cyclic = frames_of(setup);
     out.cycle_ns = setup.cycle_ns;
     add_slots(out, wire_time(options.acyclic_frame_bytes, 1));
-    const auto longest =
+    const auto max =
         std::max_element(out.slots.begin(), out.slots.end(),
                          [](const auto& a, const auto& b) { return a.wire_ns < b.wire_ns; });
-    out.frames = longest->frames.size() + 1;
+    out.frames = max->frames.size() + 1;
     out.frame_bytes = options.acyclic_frame_bytes;
 
-    out.wire_ns = longest->wire_ns;
-    for (const std::size_t f : longest->frames) {
+    out.wire_ns = max->wire_ns;
+    for (const std::size_t f : max->frames) {
         out.frame_bytes += out.cyclic[f].bytes;
     }
     out.propagation_ns = static_cast<std::int64_t>(setup.slaves.size()) * options.slave_delay_ns;

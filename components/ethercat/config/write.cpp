@@ -153,7 +153,7 @@ std::string modes(const Found& s, unsigned axes) {
 
 /// Returns how many entries each of several assigned PDOs with consecutive numbers has; 0: they
 /// differ, or there is at most one.
-std::size_t entries_each(const std::vector<sii::Pdo>& pdos, std::size_t& most) {
+std::size_t entries_each(const std::vector<sii::Pdo>& pdos, std::size_t& max) {
     std::vector<const sii::Pdo*> assigned;
     for (const sii::Pdo& p : pdos) {
         if (p.sync_manager != 0xff) {
@@ -162,7 +162,7 @@ std::size_t entries_each(const std::vector<sii::Pdo>& pdos, std::size_t& most) {
     }
     bool equal = assigned.size() > 1;
     for (std::size_t i = 0; i < assigned.size(); ++i) {
-        most = std::max(most, assigned[i]->entries.size());
+        max = std::max(max, assigned[i]->entries.size());
         equal = equal && assigned[i]->entries.size() == assigned[0]->entries.size() &&
                 assigned[i]->index == assigned[0]->index + i;
     }
@@ -225,9 +225,9 @@ std::string write(const std::string& link, std::int64_t cycle_ns,
 
             const std::string inputs = objects("inputs", s.tx, axes, options);
             out += outputs + inputs + options + modes(s, axes);
-            std::size_t most = 0;  // a slave with a fixed assignment keeps it
-            const std::size_t each = std::max(entries_each(s.rx, most), entries_each(s.tx, most));
-            if (each != 0 && most == each) {
+            std::size_t max = 0;  // a slave with a fixed assignment keeps it
+            const std::size_t each = std::max(entries_each(s.rx, max), entries_each(s.tx, max));
+            if (each != 0 && max == each) {
                 out += "entries-per-pdo = " + std::to_string(each) + "\n";
             }
         }

@@ -31,12 +31,12 @@ void AoeServer::take(const MailboxMessage& message, State state, Outbox& out) no
     };
     switch (h->command) {
     case aoe::Command::read:
-        return sdo([&](std::uint16_t index, std::uint8_t sub, bool complete, std::uint32_t most) {
+        return sdo([&](std::uint16_t index, std::uint8_t sub, bool complete, std::uint32_t max) {
             std::size_t n = 0;
             const std::size_t space =
                 out.mailbox() - mailbox_header_bytes - aoe::header_bytes - aoe::read_response_bytes;
             const std::span<std::uint8_t> space_for(to + aoe::read_response_bytes,
-                                                    std::min<std::size_t>(space, most));
+                                                    std::min<std::size_t>(space, max));
             const auto code = dictionary_->read(index, sub, complete, state, space_for, n);
             put(to, cia301::code_of(code));
             put(to + 4, static_cast<std::uint32_t>(n));

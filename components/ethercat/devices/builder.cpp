@@ -63,16 +63,16 @@ void DesignBuilder::mailbox(std::size_t bytes, bool boot) {
 }
 
 void DesignBuilder::pdo(bool output, std::uint16_t index, std::string name,
-                        const std::vector<PdoEntry>& entries, bool assigned, unsigned most) {
+                        const std::vector<PdoEntry>& entries, bool assigned, unsigned max) {
     namespace access = coe::access;
     auto& pdos = output ? design_.sii.rx : design_.sii.tx;
     sii::Pdo& pdo = pdos.emplace_back();
     pdo.index = index;
     pdo.name = name;
-    pdo.flags = most == 0 ? sii::pdo_fixed : std::uint16_t{0};
+    pdo.flags = max == 0 ? sii::pdo_fixed : std::uint16_t{0};
     // the number follows in finish()
     pdo.sync_manager = assigned ? std::uint8_t{0} : std::uint8_t{0xff};
-    const std::uint16_t rights = most == 0 ? access::read : access::read | access::write_preop;
+    const std::uint16_t rights = max == 0 ? access::read : access::read | access::write_preop;
     auto& d = dictionary();
     const auto count = static_cast<std::uint8_t>(entries.size());
     std::vector<std::uint32_t> raw;
@@ -99,11 +99,11 @@ void DesignBuilder::pdo(bool output, std::uint16_t index, std::string name,
     }
     d.record(index, std::move(name), count, coe::ObjectCode::record, rights,
              coe::type::pdo_mapping);
-    for (unsigned n = 1; n <= std::max<unsigned>(most, count); ++n) {
+    for (unsigned n = 1; n <= std::max<unsigned>(max, count); ++n) {
         d.sub(static_cast<std::uint8_t>(n), "Mapping " + std::to_string(n), coe::type::u32, rights,
               n <= raw.size() ? raw[n - 1] : 0);
     }
-    if (most != 0) {
+    if (max != 0) {
         design_.sii.general.coe_details |= sii::coe_pdo_assign | sii::coe_pdo_config;
     }
 }

@@ -34,10 +34,10 @@ public:
     /// Adds a PDO whose entries are in the dictionary already. Fixed PDOs cannot be mapped anew;
     /// others hold up to `most` entries.
     void pdo(bool output, std::uint16_t index, std::string name,
-             const std::vector<PdoEntry>& entries, bool assigned = true, unsigned most = 0);
+             const std::vector<PdoEntry>& entries, bool assigned = true, unsigned max = 0);
     /// Offers SYNC0, and SYNC1 with `sync1`.
     void dc(bool required, bool sync1 = true);
-    /// Completes sync managers, assignment, SII; `most_*` are the largest process data, 0: as
+    /// Completes sync managers, assignment, SII; `max_*` are the largest process data, 0: as
     /// assigned.
     Design finish(std::uint16_t alias, std::uint32_t serial, std::size_t max_output_bytes = 0,
                   std::size_t max_input_bytes = 0);

@@ -27,7 +27,7 @@ private:
 
     eoe::Joiner joiner_;
     eoe::Splitter splitter_;
-    std::array<std::uint8_t, eoe::largest_frame> frame_{};
+    std::array<std::uint8_t, eoe::max_frame> frame_{};
     eoe::Ip ip_;
     unsigned number_ = 0;
 };

@@ -294,7 +294,7 @@ void write_dictionary(const Plan& plan, Dictionary& d) {
 /// Adds the mappings of PDOs, and returns which are there; a number that occurs twice counts once.
 void add_pdos(const std::vector<esi::Pdo>& pdos, bool configurable, Dictionary& d,
               std::set<std::uint16_t>& done) {
-    constexpr std::size_t most = 32;  // entries of a PDO that can be mapped anew
+    constexpr std::size_t max = 32;  // entries of a PDO that can be mapped anew
     for (const esi::Pdo& pdo : pdos) {
         if (!done.insert(pdo.index).second) continue;
         const bool writable = configurable && !pdo.fixed;
@@ -310,7 +310,7 @@ void add_pdos(const std::vector<esi::Pdo>& pdos, bool configurable, Dictionary& 
         }
         d.record(pdo.index, pdo.name, static_cast<std::uint8_t>(mapped.size()),
                  coe::ObjectCode::record, rights, coe::type::pdo_mapping);
-        for (std::size_t n = 0; n < std::max(writable ? most : 0, mapped.size()); ++n) {
+        for (std::size_t n = 0; n < std::max(writable ? max : 0, mapped.size()); ++n) {
             d.sub(static_cast<std::uint8_t>(n + 1), "Mapping " + std::to_string(n + 1),
                   coe::type::u32, rights, n < mapped.size() ? mapped[n] : 0);
         }
@@ -532,7 +532,7 @@ Parts make_esi_device(const DeviceOptions& o) {
         s.serial = o.serial;
     }
     for (sii::Area* area : {&s.mailboxes.receive, &s.mailboxes.send}) {
-        area->size = static_cast<std::uint16_t>(std::min<std::size_t>(area->size, largest_mailbox));
+        area->size = static_cast<std::uint16_t>(std::min<std::size_t>(area->size, max_mailbox));
     }
     if (s.general.ports == std::array<std::uint8_t, 4>{}) {
         s.general.ports = {1, 1, 0, 0};
@@ -583,11 +583,11 @@ Parts make_esi_device(const DeviceOptions& o) {
         const std::size_t bytes = add_assignment(output ? device.rx : device.tx, n, assignable, d);
         s.sync_managers[n].length = static_cast<std::uint16_t>(bytes);
         const std::size_t sampled = max_sampled_bytes(output ? device.rx : device.tx, n);
-        const std::size_t most =
+        const std::size_t max =
             std::max({bytes, sampled, std::size_t{device.sync_managers[n].max_size}});
         std::size_t& max_bytes = output ? design.max_output_bytes : design.max_input_bytes;
         const bool changes = configurable || assignable;
-        max_bytes = std::max({max_bytes, most, changes ? usual_max_bytes : std::size_t{0}});
+        max_bytes = std::max({max_bytes, max, changes ? usual_max_bytes : std::size_t{0}});
     }
     if (design.coe) {
         add_empty_assignments(s, d);

@@ -7,7 +7,7 @@
 namespace hal::ethercat::devices {
 
 FirmwareMailbox::FirmwareMailbox(const FirmwareFaults& faults)
-    : faults_(faults), received_(largest_mailbox) {}
+    : faults_(faults), received_(max_mailbox) {}
 
 void FirmwareMailbox::Mail::store(std::span<const std::uint8_t> from) noexcept {
     length = from.size();
@@ -61,7 +61,7 @@ void FirmwareMailbox::receive(esc::Pdi& pdi, State state, std::int64_t now_ns) n
     if (!outbox_.empty()) return;
     const std::size_t n = pdi.read_sync_manager(0, received_);
     if (n == 0) return;
-    outbox_.clear(std::min<std::size_t>(pdi.sync_manager(1).length, largest_mailbox));
+    outbox_.clear(std::min<std::size_t>(pdi.sync_manager(1).length, max_mailbox));
     if (faults_.mailbox_dead.load(std::memory_order_relaxed)) return;
     answer({received_.data(), n}, state, now_ns);
 }

@@ -32,7 +32,7 @@ public:
 private:
     /// A message with its header.
     struct Mail {
-        Mail() : data(largest_mailbox) {}
+        Mail() : data(max_mailbox) {}
         void store(std::span<const std::uint8_t> from) noexcept;
         std::span<const std::uint8_t> bytes() const noexcept { return {data.data(), length}; }
         bool empty() const noexcept { return length == 0; }

@@ -17,7 +17,7 @@ void FoeServer::add(std::string name, std::vector<std::uint8_t> content, std::ui
 void FoeServer::accept_new() {
     new_ = files_.size();
     add({}, {});
-    files_.back().name.reserve(largest_mailbox);
+    files_.back().name.reserve(max_mailbox);
 }
 
 FoeServer::File* FoeServer::find(std::string_view name) noexcept {

@@ -13,7 +13,7 @@
 
 namespace hal::ethercat::devices {
 
-inline constexpr unsigned most_channels = 64;
+inline constexpr unsigned max_channels = 64;
 
 /// Terminal values of an I/O device. Inputs are written from any thread and outputs read from any
 /// thread.
@@ -25,17 +25,17 @@ public:
     void step(Step&) noexcept override;
     void power_on() noexcept override;
     void set_input(unsigned channel, std::int32_t value) noexcept {
-        values_[channel % most_channels].store(value, std::memory_order_relaxed);
+        values_[channel % max_channels].store(value, std::memory_order_relaxed);
     }
     std::int32_t output(unsigned channel) const noexcept {
-        return values_[channel % most_channels].load(std::memory_order_relaxed);
+        return values_[channel % max_channels].load(std::memory_order_relaxed);
     }
     unsigned channels() const noexcept { return channels_; }
 
 private:
     std::shared_ptr<Dictionary> dictionary_;
-    std::array<std::uint8_t*, most_channels> data_{};
-    std::array<std::atomic<std::int32_t>, most_channels> values_{};
+    std::array<std::uint8_t*, max_channels> data_{};
+    std::array<std::atomic<std::int32_t>, max_channels> values_{};
     unsigned channels_;
     bool output_, digital_;
 };

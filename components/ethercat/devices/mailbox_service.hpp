@@ -15,7 +15,7 @@ namespace hal::ethercat::devices {
 /// Messages that wait for an empty send mailbox. Its size is fixed in setup.
 class Outbox {
 public:
-    explicit Outbox(std::size_t messages = 4, std::size_t bytes = largest_mailbox)
+    explicit Outbox(std::size_t messages = 4, std::size_t bytes = max_mailbox)
         : slots_(messages), memory_(messages * bytes), bytes_(bytes) {}
     /// Forgets all messages; messages are up to `mailbox` bytes long from now on. [realtime]
     void clear(std::size_t mailbox) noexcept {

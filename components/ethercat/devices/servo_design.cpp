@@ -111,7 +111,7 @@ namespace {
 /// Adds the PDOs of an axis: one of each direction is assigned, the master can map and assign the
 /// others.
 void add_pdos(DesignBuilder& b, unsigned n, const std::string& axis) {
-    constexpr unsigned most = 12;  // entries
+    constexpr unsigned max = 12;  // entries
     const auto at = [&](std::uint16_t index) { return cia402::of_axis(index, n); };
     const auto rx = static_cast<std::uint16_t>(coe::rx_pdo + 0x10 * n);
     const auto tx = static_cast<std::uint16_t>(coe::tx_pdo + 0x10 * n);
@@ -125,18 +125,18 @@ void add_pdos(DesignBuilder& b, unsigned n, const std::string& axis) {
     const auto other = [](std::uint16_t first, unsigned number) {
         return static_cast<std::uint16_t>(first + number);
     };
-    b.pdo(true, rx, "Outputs" + axis, {control, mode, position, velocity, torque}, true, most);
-    b.pdo(true, other(rx, 1), "Position" + axis, {control, position}, false, most);
-    b.pdo(true, other(rx, 2), "Velocity" + axis, {control, velocity}, false, most);
-    b.pdo(true, other(rx, 3), "Torque" + axis, {control, torque}, false, most);
+    b.pdo(true, rx, "Outputs" + axis, {control, mode, position, velocity, torque}, true, max);
+    b.pdo(true, other(rx, 1), "Position" + axis, {control, position}, false, max);
+    b.pdo(true, other(rx, 2), "Velocity" + axis, {control, velocity}, false, max);
+    b.pdo(true, other(rx, 3), "Torque" + axis, {control, torque}, false, max);
     b.pdo(false, tx, "Inputs" + axis,
           {status,
            {at(o402::modes_of_operation_display), 0, "Modes of operation display"},
            actual,
            {at(o402::velocity_actual), 0, "Velocity actual value"},
            {at(o402::torque_actual), 0, "Torque actual value"}},
-          true, most);
-    b.pdo(false, other(tx, 1), "Position" + axis, {status, actual}, false, most);
+          true, max);
+    b.pdo(false, other(tx, 1), "Position" + axis, {status, actual}, false, max);
 }
 
 }  // namespace

@@ -77,9 +77,9 @@ void SoeServer::read(const soe::Header& h, Outbox& out) noexcept {
         std::memcpy(buffer_.data() + n, from, length);
         n += length;
     };
-    const auto list = [&](const void* from, std::size_t length, std::size_t most) {
+    const auto list = [&](const void* from, std::size_t length, std::size_t max) {
         const std::uint16_t lengths[2] = {static_cast<std::uint16_t>(length),
-                                          static_cast<std::uint16_t>(most)};
+                                          static_cast<std::uint16_t>(max)};
         bytes(lengths, 4);
         bytes(from, length);
     };
@@ -157,11 +157,11 @@ void SoeServer::write(const soe::Header& h, std::span<const std::uint8_t> data, 
     if (idn->attribute.write_protected(phase_of(state)))
         return refuse(h, soe::error::protected_now, out);
     const std::size_t head = idn->attribute.list() ? 4 : 0;
-    const std::size_t most =
+    const std::size_t max =
         idn->attribute.list() ? head + idn->value.size() : idn->attribute.bytes();
-    const std::size_t least = idn->attribute.list() ? head : idn->attribute.bytes();
-    if (length > most) return refuse(h, soe::error::too_long, out);
-    if (length < least || (head != 0 && get<std::uint16_t>(buffer_.data()) > length - head)) {
+    const std::size_t min = idn->attribute.list() ? head : idn->attribute.bytes();
+    if (length > max) return refuse(h, soe::error::too_long, out);
+    if (length < min || (head != 0 && get<std::uint16_t>(buffer_.data()) > length - head)) {
         return refuse(h, soe::error::too_short, out);
     }
     const std::size_t bytes = head != 0 ? get<std::uint16_t>(buffer_.data()) : length;

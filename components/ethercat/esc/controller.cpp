@@ -15,7 +15,7 @@ constexpr std::size_t memory_bytes = 0x10000;
 constexpr std::uint16_t first_memory = 0x0f00;  ///< from here on sync managers rule
 constexpr std::int64_t idle_ns = 1'000'000;    ///< the application runs at least this often
 /// without frames; SYNC pulses and idle work of more are skipped
-constexpr std::int64_t longest_pause_ns = 2'000'000'000;
+constexpr std::int64_t max_pause_ns = 2'000'000'000;
 /// and at frames that did not concern it, if it did not run for this long
 constexpr std::int64_t bystander_ns = 200'000;
 constexpr std::uint32_t watchdog_event = 0x40;
@@ -79,8 +79,8 @@ Controller::Controller(const Settings& settings, std::vector<std::uint8_t> sii,
       memory_(std::make_unique<std::uint8_t[]>(controller_facts::memory_bytes)),
       application_(application),
       unit_(*this, fmmus_) {
-    settings_.fmmus = std::min(settings_.fmmus, Fmmus::most);
-    settings_.sync_managers = std::min(settings_.sync_managers, SyncManagers::most);
+    settings_.fmmus = std::min(settings_.fmmus, Fmmus::max);
+    settings_.sync_managers = std::min(settings_.sync_managers, SyncManagers::max);
     settings_.ram_kb = std::clamp(settings_.ram_kb, 1U, 60U);
     ram_end_ = registers::process_data_memory + settings_.ram_kb * 1024;
     eeprom_.connect(memory_.get(), std::move(sii), settings_.eeprom_read_ns,
@@ -161,7 +161,7 @@ void Controller::commit(std::int64_t now_ns) noexcept {
 
 void Controller::work_until(std::int64_t now_ns) noexcept {
     if (!powered_) return;
-    if (now_ns - due_ns_ > controller_facts::longest_pause_ns) {
+    if (now_ns - due_ns_ > controller_facts::max_pause_ns) {
         dc_.clock_changed(now_ns);
         last_run_ns_ = std::max(last_run_ns_, now_ns - controller_facts::idle_ns);
         find_due();

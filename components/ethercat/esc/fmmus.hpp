@@ -12,7 +12,7 @@ namespace hal::ethercat::esc {
 /// [realtime]
 class Fmmus {
 public:
-    static constexpr unsigned most = 16;
+    static constexpr unsigned max = 16;
 
     struct Unit {
         std::uint64_t first_bit = 0;
@@ -49,7 +49,7 @@ private:
     const std::uint8_t* memory_ = nullptr;
     unsigned count_ = 0;
     unsigned used_ = 0;
-    std::array<Unit, most> units_;  ///< active ones
+    std::array<Unit, max> units_;  ///< active ones
     std::uint64_t first_ = ~std::uint64_t{0};
     std::uint64_t end_ = 0;
     bool overlap_ = false;

@@ -289,8 +289,8 @@ int Line::exit_of(Walk& w, std::size_t slave, unsigned port) noexcept {
 
 bool Line::post(const LineCommand& command) noexcept {
     const std::size_t next = posted_.load(std::memory_order_relaxed);
-    if (next - taken_.load(std::memory_order_acquire) == most_commands) return false;
-    commands_[next % most_commands] = command;
+    if (next - taken_.load(std::memory_order_acquire) == max_commands) return false;
+    commands_[next % max_commands] = command;
     posted_.store(next + 1, std::memory_order_release);
     return true;
 }
@@ -300,7 +300,7 @@ void Line::take_commands(std::int64_t now_ns) noexcept {
     const std::size_t end = posted_.load(std::memory_order_acquire);
     if (next == end) return;
     for (; next != end; ++next) {
-        execute(commands_[next % most_commands], now_ns);
+        execute(commands_[next % max_commands], now_ns);
     }
     taken_.store(end, std::memory_order_release);
 }

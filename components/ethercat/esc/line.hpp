@@ -83,7 +83,7 @@ struct LineCommand {
 
 class Line {
 public:
-    static constexpr std::size_t most_disturbances = 32;
+    static constexpr std::size_t max_disturbances = 32;
 
     Line();
     Line(const Line&) = delete;
@@ -176,13 +176,13 @@ private:
         std::uint64_t seen = 0;
         std::uint64_t hits = 0;
     };
-    std::array<Disturbed, most_disturbances> disturbances_;
+    std::array<Disturbed, max_disturbances> disturbances_;
     std::size_t disturbance_count_ = 0;
     std::array<DatagramView, 128> datagrams_;
 
     void take_commands(std::int64_t now_ns) noexcept;
-    static constexpr std::size_t most_commands = 64;
-    std::array<LineCommand, most_commands> commands_;
+    static constexpr std::size_t max_commands = 64;
+    std::array<LineCommand, max_commands> commands_;
     std::atomic<std::size_t> posted_{0};  ///< written by the poster
     std::atomic<std::size_t> taken_{0};  ///< written by the thread of process()
 };

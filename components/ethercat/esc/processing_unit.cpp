@@ -128,7 +128,7 @@ void ProcessingUnit::physical(const DatagramView& d, bool reads, bool writes,
     std::uint16_t wkc = d.wkc();
     if (d.length == 0) return;
     if (reads && (writes || broadcast)) {
-        std::array<std::uint8_t, largest_frame_bytes> mine;
+        std::array<std::uint8_t, max_frame_bytes> mine;
         const std::span<std::uint8_t> old{mine.data(), data.size()};
         const bool accepted = memory_.read(address, old);
         if (writes && memory_.write(address, data, nullptr)) {
@@ -158,7 +158,7 @@ void ProcessingUnit::physical(const DatagramView& d, bool reads, bool writes,
 
 void ProcessingUnit::logical(const DatagramView& d, bool reads, bool writes) noexcept {
     if (!fmmus_.hit(d.address, d.length)) return;
-    std::array<std::uint8_t, largest_frame_bytes> copy;
+    std::array<std::uint8_t, max_frame_bytes> copy;
     const std::uint8_t* sent = d.data;
     if (reads && writes && fmmus_.overlap()) {
         std::memcpy(copy.data(), d.data, d.length);
@@ -194,7 +194,7 @@ bool ProcessingUnit::read_logical(const Fmmus::Unit& unit, const DatagramView& d
     if (unit.bytes) {
         return memory_.read(part.address(), {d.data + part.in_frame / 8, part.bytes()});
     }
-    std::array<std::uint8_t, largest_frame_bytes> bytes;
+    std::array<std::uint8_t, max_frame_bytes> bytes;
     if (!memory_.read(part.address(), {bytes.data(), part.bytes()})) return false;
     const std::uint64_t shift = part.in_memory % 8;
     for (std::uint64_t i = 0; i < part.bits; ++i) {
@@ -210,7 +210,7 @@ bool ProcessingUnit::write_logical(const Fmmus::Unit& unit, const DatagramView& 
     if (unit.bytes) {
         return memory_.write(part.address(), {data + part.in_frame / 8, part.bytes()}, nullptr);
     }
-    std::array<std::uint8_t, largest_frame_bytes> bytes, mask;
+    std::array<std::uint8_t, max_frame_bytes> bytes, mask;
     std::fill_n(bytes.begin(), part.bytes(), std::uint8_t{0});
     std::fill_n(mask.begin(), part.bytes(), std::uint8_t{0});
     const std::uint64_t shift = part.in_memory % 8;

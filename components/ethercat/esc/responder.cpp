@@ -48,7 +48,7 @@ constexpr std::size_t frames_at_once = 32;
 void serve(Line& line, ethernet::Port& primary, ethernet::Port* secondary,
            const std::atomic<bool>& stop, ServeControl* control) noexcept {
     const std::array<ethernet::Port*, 2> both{&primary, secondary};
-    std::array<std::uint8_t, ethernet::largest_frame> frame;
+    std::array<std::uint8_t, ethernet::max_frame> frame;
     std::array<bool, 2> up{true, true};
     std::int64_t tick = 0;
     while (!stop.load(std::memory_order_relaxed)) {

@@ -15,7 +15,7 @@ namespace hal::ethercat::esc {
 /// [realtime]
 class SyncManagers {
 public:
-    static constexpr unsigned most = 16;
+    static constexpr unsigned max = 16;
 
     void connect(std::uint8_t* memory, unsigned count) noexcept {
         memory_ = memory;
@@ -85,7 +85,7 @@ private:
     unsigned count_ = 0;
     unsigned enabled_ = 0;  ///< enabled_: a bit for each
     bool pending_ = false;
-    std::array<Unit, most> units_;
+    std::array<Unit, max> units_;
 };
 
 }  // namespace hal::ethercat::esc

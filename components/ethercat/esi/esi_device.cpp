@@ -19,11 +19,11 @@ unsigned Pdo::bits() const {
 }
 
 unsigned OpMode::samples() const noexcept {
-    unsigned most = 0;
+    unsigned max = 0;
     for (const Assigned& one : assigned) {
-        most = std::max(most, one.samples);
+        max = std::max(max, one.samples);
     }
-    return most;
+    return max;
 }
 
 const Value* Object::find(std::uint8_t sub) const {

@@ -9,7 +9,7 @@ namespace hal::ethercat::esi {
 
 namespace {
 
-constexpr std::size_t most_values = 300'000;
+constexpr std::size_t max_values = 300'000;
 
 struct Flags {
     bool given = false;
@@ -57,9 +57,9 @@ public:
             data_type(type);
         }
         for (const Xml object : dictionary.child("Objects").children("Object")) {
-            if (values_ > most_values) {
+            if (values_ > max_values) {
                 context_.warn(object, "the dictionary has more than " +
-                                          std::to_string(most_values) +
+                                          std::to_string(max_values) +
                                           " values; the rest is ignored");
                 break;
             }

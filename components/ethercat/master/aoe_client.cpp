@@ -46,9 +46,9 @@ Task<MailboxResult> AoeClient::read(Channel& channel, BusSlave& slave, const Aoe
     if (body.size() < aoe::header_bytes + aoe::address_bytes || slave.area().in_size < overhead) {
         co_return refused();
     }
-    const std::size_t most = std::min<std::size_t>(to.size(), slave.area().in_size - overhead);
+    const std::size_t max = std::min<std::size_t>(to.size(), slave.area().in_size - overhead);
     write_request(body.data(), address, aoe::Command::read, aoe::address_bytes, ++invoke_, group,
-                  offset, static_cast<std::uint32_t>(most));
+                  offset, static_cast<std::uint32_t>(max));
     const Expected expected{accepts_aoe, invoke_, static_cast<std::uint32_t>(aoe::Command::read)};
     const MailboxResult result = co_await mailbox->exchange(
         channel, slave, MailboxType::aoe, aoe::header_bytes + aoe::address_bytes, expected);

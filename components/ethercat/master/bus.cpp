@@ -17,7 +17,7 @@ Bus::Bus(Setup setup_, const std::array<std::uint8_t, 6>& source, Events& events
       wkc_seen(image.domain_count(), WkcState::none) {
     constexpr std::size_t spare = 64;
     const std::size_t capacity =
-        setup.most_slaves != 0 ? setup.most_slaves : setup.slaves.size() + spare;
+        setup.max_slaves != 0 ? setup.max_slaves : setup.slaves.size() + spare;
     for (std::size_t n = 0; n < capacity; ++n) {
         devices.push_back(std::make_unique<Device>());
         devices[n]->slave.number = static_cast<std::uint16_t>(n);

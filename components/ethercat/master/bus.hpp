@@ -217,12 +217,12 @@ void take_clock(Bus&) noexcept;
 Task<void> supervise(Channel&, Bus&) noexcept;
 Task<void> watch(Channel&, Bus&) noexcept;
 Task<void> check(Channel&, Bus&, Device&) noexcept;
-void judge_counters(Bus&) noexcept;  ///< Reports changes of the working counters.
+void update_working_counters(Bus&) noexcept;  ///< Reports changes of the working counters.
 /// Follows whether the process data of the slaves is exchanged, in each cycle.
-void judge_data(Bus&) noexcept;
+void check_process_data(Bus&) noexcept;
 
 // redundancy.cpp
 /// Finds the break of a ring, by how far the primary port reaches.
-void judge_ring(Bus&, unsigned responding) noexcept;
+void check_ring(Bus&, unsigned responding) noexcept;
 
 }  // namespace hal::ethercat::master

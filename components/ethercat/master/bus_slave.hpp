@@ -32,7 +32,7 @@ struct SiiSyncManager {
 /// See the top of this file.
 struct BusSlave {
     static constexpr std::uint16_t nowhere = 0xffff;
-    static constexpr unsigned most_sync_managers = 8;
+    static constexpr unsigned max_sync_managers = 8;
 
     std::uint16_t number = 0;              ///< in the list of the master
     std::uint16_t station = 0;             ///< station address (0010h)
@@ -58,7 +58,7 @@ struct BusSlave {
     std::uint8_t coe_details = 0;          ///< byte 5 of the general category
     std::uint8_t sii_flags = 0;            ///< byte Bh of the general category
     unsigned sii_sync_managers = 0;
-    std::array<SiiSyncManager, most_sync_managers> sii{};
+    std::array<SiiSyncManager, max_sync_managers> sii{};
 
     State state = State::none;             ///< as last read
     bool al_failed = false;                ///< bit 4 of AL status

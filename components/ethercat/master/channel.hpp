@@ -30,7 +30,7 @@ struct Answer {
 ///     }
 class Channel : public TaskChannel {
 public:
-    static constexpr std::size_t largest = 1486;  ///< data bytes of a datagram
+    static constexpr std::size_t max = 1486;  ///< data bytes of a datagram
 
     explicit Channel(std::size_t task_bytes = 16 * 1024) : TaskChannel(task_bytes) {}
 
@@ -128,7 +128,7 @@ private:
         resume();
     }
 
-    std::array<std::uint8_t, largest> data_{};
+    std::array<std::uint8_t, max> data_{};
     std::uint32_t address_ = 0;
     std::uint32_t generation_ = 0;
     std::int64_t now_ns_ = 0;

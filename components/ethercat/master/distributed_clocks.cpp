@@ -66,8 +66,8 @@ Task<void> wait_for_helpers(Channel& c, Bus& bus) noexcept {
 /// clocks between the reference and it.
 bool has_valid_delay(const Bus& bus, const Device& d, std::size_t slaves) noexcept {
     // more: the ports are others than those that were read
-    constexpr std::uint32_t longest_ns = 100'000;
-    constexpr std::uint32_t longest_per_slave_ns = 20'000;
+    constexpr std::uint32_t max_ns = 100'000;
+    constexpr std::uint32_t max_per_slave_ns = 20'000;
     if (bus.engine.redundant()) return d.times_read;
     std::size_t steps = 0;
     for (int parent = d.slave.parent; parent >= 0 && steps < slaves;
@@ -75,7 +75,7 @@ bool has_valid_delay(const Bus& bus, const Device& d, std::size_t slaves) noexce
         const Device& before = *bus.devices[static_cast<std::size_t>(parent)];
         if (before.slave.has_dc() && before.slave.present && !before.times_read) return false;
     }
-    return d.times_read && d.slave.delay_ns <= longest_ns + longest_per_slave_ns * slaves;
+    return d.times_read && d.slave.delay_ns <= max_ns + max_per_slave_ns * slaves;
 }
 
 int choose_reference(const Bus& bus) noexcept {

@@ -162,7 +162,7 @@ Task<MailboxResult> EoeClient::set_ip(Channel& channel, BusSlave& slave,
     if (mailbox == nullptr) co_return refused();
     const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
     const auto body = mailbox->body(slave);
-    if (body.size() < eoe::header_bytes + eoe::largest_ip) co_return refused();
+    if (body.size() < eoe::header_bytes + eoe::max_ip) co_return refused();
     eoe::Ip all = ip;
     all.flags |= eoe::ip_flag::mac | eoe::ip_flag::address | eoe::ip_flag::mask |
                  eoe::ip_flag::gateway | eoe::ip_flag::dns;

@@ -19,7 +19,7 @@ namespace hal::ethercat::master {
 /// An Ethernet frame from the destination address on, without check sequence.
 struct EthernetFrame {
     std::uint16_t length = 0;
-    std::array<std::uint8_t, eoe::largest_frame> bytes{};
+    std::array<std::uint8_t, eoe::max_frame> bytes{};
 };
 
 struct EoeCounters {

@@ -16,8 +16,8 @@
 namespace hal::ethercat::master {
 namespace {
 
-constexpr std::size_t largest_message = ecat_header_bytes + largest_mailbox;
-constexpr std::size_t most_pending = 16;
+constexpr std::size_t max_message = ecat_header_bytes + max_mailbox;
+constexpr std::size_t max_pending = 16;
 
 int open_socket(int type, const std::string& address, std::uint16_t port, std::string& problem) {
     sockaddr_in at{};
@@ -58,12 +58,12 @@ struct Gateway::Client {
     std::uint32_t id = 0;
     bool input_ended = false;  ///< it sends no more requests, but may still read replies
     std::size_t used = 0;
-    std::array<std::uint8_t, largest_message> bytes{};
+    std::array<std::uint8_t, max_message> bytes{};
 };
 struct Gateway::Pending {
     MailboxRequest request;
     Sender sender;
-    std::array<std::uint8_t, largest_mailbox> bytes{};
+    std::array<std::uint8_t, max_mailbox> bytes{};
 };
 
 std::vector<GatewaySlave> GatewaySlaves::all() const {
@@ -148,7 +148,7 @@ void Gateway::run() {
         std::erase_if(clients_, [](const auto& client) { return client->fd < 0; });
         if (polled[1].revents != 0) {
             const int fd = accept4(tcp_, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
-            if (fd >= 0 && clients_.size() < setup_.most_clients) {
+            if (fd >= 0 && clients_.size() < setup_.max_clients) {
                 clients_.push_back(std::make_unique<Client>());
                 clients_.back()->fd = fd;
                 clients_.back()->id = next_client_++;
@@ -161,9 +161,9 @@ void Gateway::run() {
 }
 
 void Gateway::read_udp() {
-    std::array<std::uint8_t, largest_message + 1> bytes;
+    std::array<std::uint8_t, max_message + 1> bytes;
     Sender sender;
-    for (unsigned most = 64; most != 0; --most) {
+    for (unsigned max = 64; max != 0; --max) {
         socklen_t size = sizeof sender.address;
         const auto got = recvfrom(udp_, bytes.data(), bytes.size(), 0,
                                   reinterpret_cast<sockaddr*>(&sender.address), &size);
@@ -207,10 +207,10 @@ void Gateway::take(std::span<const std::uint8_t> bytes, const Sender& sender) {
         bytes.size() < ecat_header_bytes ? 0 : get<std::uint16_t>(bytes.data());
     const std::size_t length = header & 0x7ffU;
     const bool fits = header >> 12 == static_cast<unsigned>(Protocol::mailbox_gateway) &&
-                      ecat_header_bytes + length <= bytes.size() && length <= largest_mailbox;
+                      ecat_header_bytes + length <= bytes.size() && length <= max_mailbox;
     const auto message =
         fits ? read_mailbox(bytes.subspan(ecat_header_bytes, length)) : std::nullopt;
-    if (!message || pending_.size() >= most_pending) {
+    if (!message || pending_.size() >= max_pending) {
         ++dropped_;
         return;
     }
@@ -257,7 +257,7 @@ void Gateway::collect() {
 }
 
 void Gateway::answer(const Sender& sender, std::span<const std::uint8_t> message) {
-    std::array<std::uint8_t, largest_message> bytes;
+    std::array<std::uint8_t, max_message> bytes;
     put(bytes.data(), static_cast<std::uint16_t>(
                           message.size() | static_cast<unsigned>(Protocol::mailbox_gateway) << 12));
     std::copy(message.begin(), message.end(), bytes.begin() + ecat_header_bytes);

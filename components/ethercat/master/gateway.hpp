@@ -31,7 +31,7 @@ struct GatewaySlave {
 /// The slaves as the cycle knows them, for the thread of the gateway.
 class GatewaySlaves {
 public:
-    explicit GatewaySlaves(std::size_t most) : rows_(most) {}  ///< [setup]
+    explicit GatewaySlaves(std::size_t max) : rows_(max) {}  ///< [setup]
     /// Sets the slaves in the order of their positions: `slave(n)` returns the BusSlave at position
     /// n. [realtime] one thread
     template <class Slave>
@@ -72,7 +72,7 @@ struct GatewaySetup {
     std::string address = "127.0.0.1";
     std::uint16_t port = 34980;  ///< 0: any free one
     bool tcp = true;
-    std::size_t most_clients = 16;  ///< of TCP
+    std::size_t max_clients = 16;  ///< of TCP
     /// Returns the slaves; called in the gateway's thread.
     std::function<std::vector<GatewaySlave>()> slaves;
 };

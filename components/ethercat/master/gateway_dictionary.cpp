@@ -10,7 +10,7 @@
 namespace hal::ethercat::master {
 namespace {
 
-constexpr std::size_t most_slaves = 0x1000;
+constexpr std::size_t max_slaves = 0x1000;
 constexpr std::size_t addresses_per_object = 255;
 constexpr std::uint16_t first_description = 0x8000;
 constexpr std::uint16_t first_addresses = 0xf020;
@@ -55,7 +55,7 @@ MasterEntry modular_device(std::uint8_t sub) noexcept {
     switch (sub) {
     case 0: return last_sub(2);
     case 1: return {"Index distance", coe::type::u16, 1};  // of the objects of two slaves
-    case 2: return {"Maximum number of modules", coe::type::u16, most_slaves};
+    case 2: return {"Maximum number of modules", coe::type::u16, max_slaves};
     default: return {};
     }
 }
@@ -106,7 +106,7 @@ bool is_addresses(std::uint16_t index) noexcept {
 }
 bool is_description(Slaves slaves, std::uint16_t index) noexcept {
     return index >= first_description &&
-           index - first_description < static_cast<int>(std::min(slaves.size(), most_slaves));
+           index - first_description < static_cast<int>(std::min(slaves.size(), max_slaves));
 }
 
 MasterEntry entry_of(Slaves slaves, std::uint16_t index, std::uint8_t sub) noexcept {
@@ -268,7 +268,7 @@ private:
             put_word(index);
         }
     }
-    std::size_t described() const noexcept { return std::min(slaves_.size(), most_slaves); }
+    std::size_t described() const noexcept { return std::min(slaves_.size(), max_slaves); }
 
     std::size_t describe_object(std::uint16_t index) noexcept {
         const MasterObject object = object_of(slaves_, index);

@@ -12,7 +12,7 @@ namespace {
 constexpr std::uint8_t sm_full = 0x08;
 constexpr std::uint8_t sm_repeat = 0x02;
 // answers with WKC 0 in a row after which a slave counts as not on the bus
-constexpr unsigned most_absent = 4;
+constexpr unsigned max_absent = 4;
 constexpr std::uint16_t status_of(unsigned n) {
     return static_cast<std::uint16_t>(registers::sync_manager_at(n) + 5);
 }
@@ -82,7 +82,7 @@ Task<MailboxResult> SlaveMailbox::send(Channel& channel, BusSlave& slave, Mailbo
             break;  // it is the message whose datagram was lost
         }
         absent = full == Full::absent ? absent + 1 : 0;
-        if (absent >= most_absent) co_return failed(MailboxResult::Outcome::lost);
+        if (absent >= max_absent) co_return failed(MailboxResult::Outcome::lost);
         if (channel.now_ns() >= until) co_return too_late(full == Full::lost);
         // see receive()
         if (!answer && (counters_.resent & 1) == 0) {
@@ -124,7 +124,7 @@ Task<MailboxResult> SlaveMailbox::receive(Channel& channel, BusSlave& slave,
             if (got) co_return succeeded(reply_.payload.size());
         }
         absent = full == Full::absent ? absent + 1 : 0;
-        if (absent >= most_absent) co_return failed(MailboxResult::Outcome::lost);
+        if (absent >= max_absent) co_return failed(MailboxResult::Outcome::lost);
         if (channel.now_ns() >= until_ns) co_return too_late(full == Full::lost);
     }
 }
@@ -176,7 +176,7 @@ Task<MailboxResult> SlaveMailbox::poll(Channel& channel, BusSlave& slave) noexce
 }
 
 Task<bool> SlaveMailbox::read(Channel& channel, BusSlave& slave, std::int64_t until_ns) noexcept {
-    const std::size_t size = std::min<std::size_t>(slave.area().in_size, largest_mailbox);
+    const std::size_t size = std::min<std::size_t>(slave.area().in_size, max_mailbox);
     const Answer answer =
         co_await channel.exchange(Command::fprd, at_station(slave.station, slave.area().in_start),
                                   static_cast<std::uint16_t>(size), 0);

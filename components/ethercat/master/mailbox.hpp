@@ -140,7 +140,7 @@ private:
     friend class Hold;
     enum class Full : std::uint8_t { no, yes, absent, lost };
     static std::size_t size_of_out(const BusSlave& slave) noexcept {
-        return slave.area().out_size <= largest_mailbox ? slave.area().out_size : largest_mailbox;
+        return slave.area().out_size <= max_mailbox ? slave.area().out_size : max_mailbox;
     }
     Task<Full> is_full(Channel&, BusSlave&, unsigned sync_manager, unsigned repeats = 2) noexcept;
     // returns whether a message is in reply_
@@ -151,7 +151,7 @@ private:
     bool accept(const BusSlave&, std::size_t size) noexcept;
     bool is_duplicate(const MailboxMessage&) noexcept;
 
-    std::array<std::uint8_t, largest_mailbox> request_{}, reply_bytes_{};
+    std::array<std::uint8_t, max_mailbox> request_{}, reply_bytes_{};
     MailboxMessage reply_;
     std::array<MailboxSink*, types> sinks_{};
     MailboxSink* router_ = nullptr;

@@ -38,8 +38,8 @@ void Master::receive(std::int64_t now_ns) noexcept {
         rescan();
     }
     take_clock(bus);
-    judge_counters(bus);
-    judge_data(bus);
+    update_working_counters(bus);
+    check_process_data(bus);
     if (bus.suspicious && bus.resting && bus.bus_channel.stage() == Channel::Stage::sleeping) {
         bus.bus_channel.wake();
     }
@@ -91,7 +91,7 @@ std::span<std::uint8_t> Master::data(std::size_t slave, std::size_t n) noexcept 
 
 void Master::shut_down() noexcept {
     if (primary_ == nullptr) return;
-    std::array<std::uint8_t, largest_frame_bytes> buffer;
+    std::array<std::uint8_t, max_frame_bytes> buffer;
     std::optional<FrameWriter> frame;
     const auto send = [&] {
         if (frame) {
@@ -159,7 +159,7 @@ std::uint64_t Master::cycles_incomplete() const noexcept {
 void Master::reset_domain(std::size_t n) noexcept {
     DomainStatus& d = bus_->image.domain(n);
     d.was_complete = false;
-    d.least = 0;
+    d.min = 0;
     d.changes = 0;
 }
 const SlaveStatus& Master::slave_status(std::size_t slave) const noexcept {

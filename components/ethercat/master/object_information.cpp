@@ -117,7 +117,7 @@ Task<MailboxResult> ObjectInformation::object(Channel& channel, BusSlave& slave,
         co_await fetch(channel, slave, coe::Information::object_request, index, 2, head, to);
     if (result) {
         description.type = get<std::uint16_t>(head.data() + 2);
-        description.largest_sub = head[4];
+        description.max_sub = head[4];
         description.code = static_cast<coe::ObjectCode>(head[5]);
 
         description.name_length = result.length;

@@ -14,7 +14,7 @@ namespace hal::ethercat::master {
 /// An object as SDO information describes it.
 struct ObjectDescription {
     std::uint16_t type = 0;
-    std::uint8_t largest_sub = 0;
+    std::uint8_t max_sub = 0;
     coe::ObjectCode code{};
     std::size_t name_length = 0;  ///< bytes of the name in the buffer of the call
 };

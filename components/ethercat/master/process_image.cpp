@@ -27,25 +27,25 @@ ProcessImage::ProcessImage(const Setup& setup, const std::array<std::uint8_t, 6>
     : slaves_(setup.slaves.size()),
       domains_(std::max<std::size_t>(setup.domains.size(), 1)),
       source_(source),
-      most_(std::clamp<std::size_t>(setup.frame_bytes, 200, largest_frame_bytes)),
+      max_(std::clamp<std::size_t>(setup.frame_bytes, 200, max_frame_bytes)),
       write_clock_(setup.lead == ClockLead::thread),
       cycle_ns_(std::max<std::int64_t>(setup.cycle_ns, 1)) {
     lay_out(setup);
     // Each block needs at most two datagrams and one per frame's worth of bytes; each of them could
     // need a frame of its own.
-    std::size_t most = 1;
+    std::size_t max = 1;
     for (const Block& b : blocks_) {
-        most += 2 + 2 * (b.out_bytes / room() + b.in_bytes / room() + 2);
+        max += 2 + 2 * (b.out_bytes / capacity() + b.in_bytes / capacity() + 2);
     }
-    datagrams_.resize(most);
-    frames_.resize(most);
+    datagrams_.resize(max);
+    frames_.resize(max);
     build();
 }
 
 /// Data bytes of one process datagram in a frame that also carries the clock, if two of them (LWR
 /// and LRD) share the frame.
-std::size_t ProcessImage::room() const noexcept {
-    const std::size_t payload = most_ - ethernet_header_bytes - ecat_header_bytes;
+std::size_t ProcessImage::capacity() const noexcept {
+    const std::size_t payload = max_ - ethernet_header_bytes - ecat_header_bytes;
     return payload - (write_clock_ ? 2 : 1) * (clock_bytes + datagram_overhead) -
            2 * datagram_overhead;
 }
@@ -84,7 +84,7 @@ void ProcessImage::lay_out(const Setup& setup) {
                     image.out_bytes + image.in_bytes == 0) {
                     continue;
                 }
-                if (block.out_bytes + block.in_bytes + image.out_bytes + image.in_bytes > room()) {
+                if (block.out_bytes + block.in_bytes + image.out_bytes + image.in_bytes > capacity()) {
                     close(block, at);
                 }
                 block.out_bytes += image.out_bytes;
@@ -158,7 +158,7 @@ void ProcessImage::build_frames(unsigned every) noexcept {
         frame->every = every;
         frame->first = static_cast<unsigned>(datagrams_used_);
         frame->clock_write = frame->clock_read = 0;
-        writer.emplace(frame->bytes, source_, most_);
+        writer.emplace(frame->bytes, source_, max_);
         const auto clock = [&] {
             return static_cast<std::uint16_t>(writer->add(Command::nop, 0,
                                                           at_station(0, registers::dc_system_time),
@@ -173,14 +173,14 @@ void ProcessImage::build_frames(unsigned every) noexcept {
     open(true);
     for (const Block& b : blocks_) {
         if (b.every != every) continue;
-        bool lrw = b.out_bytes + b.in_bytes <= room() && b.out_bytes != 0 && b.in_bytes != 0;
+        bool lrw = b.out_bytes + b.in_bytes <= capacity() && b.out_bytes != 0 && b.in_bytes != 0;
         for (std::uint16_t i = b.first; i < b.last; ++i) {
             lrw &= !slaves_[order_[i]].no_lrw;
         }
         const auto piece = [&](Command command, std::uint32_t at, std::uint32_t length) {
             while (length != 0) {
                 const auto part =
-                    std::min<std::uint32_t>(length, static_cast<std::uint32_t>(room()));
+                    std::min<std::uint32_t>(length, static_cast<std::uint32_t>(capacity()));
                 if (writer->space() < part) {
                     open(false);
                 }
@@ -448,7 +448,7 @@ void ProcessImage::settle() noexcept {
         if (state == WkcState::complete) {
             if (!s.was_complete) {
                 s.was_complete = true;
-                s.least = s.wkc;
+                s.min = s.wkc;
                 s.changes = 0;
             }
             s.bad_cycles = 0;
@@ -459,7 +459,7 @@ void ProcessImage::settle() noexcept {
             ++s.bad_cycles;
         }
         if (s.was_complete) {
-            s.least = std::min(s.least, s.wkc);
+            s.min = std::min(s.min, s.wkc);
             if (state != s.state) {
                 ++s.changes;
             }

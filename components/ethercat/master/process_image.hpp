@@ -70,7 +70,7 @@ public:
         std::uint32_t contradictions = 0;  ///< exchanges in a row that contradict `stale`
     };
     struct Frame {
-        std::array<std::uint8_t, largest_frame_bytes> bytes{};
+        std::array<std::uint8_t, max_frame_bytes> bytes{};
         std::uint16_t size = 0;
         unsigned every = 1;
         /// datagrams [first, last)
@@ -156,7 +156,7 @@ private:
     void add(FrameWriter&, Frame&, Command, std::uint32_t at, std::uint32_t length,
              const Block&) noexcept;
     void copy_present(const Datagram&, const std::uint8_t* data) noexcept;
-    std::size_t room() const noexcept;
+    std::size_t capacity() const noexcept;
     bool carries(const Datagram&, const SlaveImage&) const noexcept;
     void observe(Datagram&, bool refreshed) noexcept;
     void mark_stale_slaves() noexcept;
@@ -171,7 +171,7 @@ private:
     std::size_t datagrams_used_ = 0;
     std::size_t frames_used_ = 0;
     std::array<std::uint8_t, 6> source_;
-    std::size_t most_;  ///< bytes of the longest frame
+    std::size_t max_;  ///< bytes of the longest frame
     bool write_clock_ = false;
     std::uint16_t reference_ = 0;
     bool write_time_ = false;

@@ -7,7 +7,7 @@
 
 namespace hal::ethercat::master {
 
-void judge_ring(Bus& bus, unsigned responding) noexcept {
+void check_ring(Bus& bus, unsigned responding) noexcept {
     const int at_primary = bus.engine.primary_wkc();
     if (responding == 0) return;
     const bool broken = at_primary != 0;

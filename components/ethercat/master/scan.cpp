@@ -107,7 +107,7 @@ Task<bool> read_mailboxes(Channel& c, BusSlave& s) noexcept {
     s.protocols = words[8];
     for (MailboxArea* area : {&s.mailbox, &s.bootstrap}) {
         // longer than a datagram, or an erased EEPROM
-        if (area->out_size > Channel::largest || area->in_size > Channel::largest) {
+        if (area->out_size > Channel::max || area->in_size > Channel::max) {
             *area = {};
         }
     }
@@ -127,7 +127,7 @@ Task<bool> read_general(Channel& c, BusSlave& s, std::uint32_t at) noexcept {
 Task<bool> read_sync_managers(Channel& c, BusSlave& s, std::uint32_t at,
                               std::uint16_t length) noexcept {
     for (std::uint32_t word = 0; word + 4 <= length; word += 4) {
-        if (s.sii_sync_managers >= BusSlave::most_sync_managers) break;
+        if (s.sii_sync_managers >= BusSlave::max_sync_managers) break;
         const SiiData sii = co_await sii_read(c, s.station, at + 2 + word);
         if (!sii.ok) co_return false;
         const auto* bytes = reinterpret_cast<const std::uint8_t*>(sii.words.data());

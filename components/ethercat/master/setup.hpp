@@ -189,7 +189,7 @@ struct Setup {
     bool accept_other_slaves = false;
     /// longest frame, from the destination address on, without check sequence
     std::size_t frame_bytes = 1514;
-    std::uint16_t most_slaves = 0;  ///< capacity of the bus; 0: the slaves named here and 64 more
+    std::uint16_t max_slaves = 0;  ///< capacity of the bus; 0: the slaves named here and 64 more
     DcLoss dc_loss = DcLoss::report;
     std::int64_t dc_loss_ns = 500'000'000;
     /// clock deviation below which a slave counts as synchronised

@@ -185,7 +185,7 @@ Task<bool> startup_writes(Channel& c, Bus& bus, Device& d, State before) noexcep
         if (w.before != before) continue;
         const std::int64_t object = w.index << 8 | w.sub;
         if (w.protocol == StartupWrite::Protocol::reg) {
-            if (w.data.size() > Channel::largest) continue;
+            if (w.data.size() > Channel::max) continue;
             std::memcpy(c.data(), w.data.data(), w.data.size());
             const Answer a =
                 co_await c.exchange(Command::fpwr, at_station(d.slave.station, w.index),

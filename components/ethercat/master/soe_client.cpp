@@ -25,11 +25,11 @@ bool accepts_soe(const Expected& expected, std::span<const std::uint8_t> payload
 
 std::optional<std::uint16_t> parse_idn(std::string_view text) noexcept {
     const auto number = [](std::string_view digits, unsigned base,
-                           unsigned most) -> std::optional<unsigned> {
+                           unsigned max) -> std::optional<unsigned> {
         unsigned value = 0;
         const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(),
                                                   value, static_cast<int>(base));
-        if (error != std::errc{} || end != digits.data() + digits.size() || value > most) {
+        if (error != std::errc{} || end != digits.data() + digits.size() || value > max) {
             return std::nullopt;
         }
         return value;

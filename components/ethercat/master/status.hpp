@@ -20,7 +20,7 @@ struct DomainStatus {
     WkcState state = WkcState::none;
     std::uint16_t wkc = 0;
     std::uint16_t expected = 0;  ///< of all datagrams, newest exchange
-    std::uint16_t least = 0;              ///< smallest counter since the first complete exchange
+    std::uint16_t min = 0;              ///< smallest counter since the first complete exchange
     std::uint32_t changes = 0;            ///< of the state, since the first complete exchange
     std::uint32_t bad_cycles = 0;         ///< exchanges in a row that were not complete
     std::uint64_t exchanges = 0;

@@ -267,7 +267,7 @@ static Task<Look> look_at_line(Channel& c, Bus& bus) noexcept {
     look.states = get<std::uint16_t>(c.data());
     bus.status.responding = static_cast<std::uint16_t>(look.count);
     if (bus.engine.redundant()) {
-        judge_ring(bus, look.count);
+        check_ring(bus, look.count);
     }
     // On a broken ring the delays are others; they are frozen until it is closed.
     if (bus.clocks_missing() && !bus.status.ring_broken) {
@@ -369,7 +369,7 @@ static Task<void> resynchronise(Channel& c, Bus& bus, Device& d) noexcept {
 
 /// Reports a slave that is not in step for some time although it is in OP, and stops it where the
 /// setup requires it; reports it when it is again.
-static void judge_clock(Bus& bus, Device& d, std::int64_t now_ns) noexcept {
+static void check_clock(Bus& bus, Device& d, std::int64_t now_ns) noexcept {
     const Slave* config = bus.config(d);
     const std::int64_t window = std::max(bus.setup.sync_window_ns, tolerable_deviation_ns);
 
@@ -401,7 +401,7 @@ static void judge_clock(Bus& bus, Device& d, std::int64_t now_ns) noexcept {
 
 /// Reads the deviation of every clock that is set.
 static Task<void> look_at_clocks(Channel& c, Bus& bus) noexcept {
-    std::uint32_t largest = 0;
+    std::uint32_t max = 0;
     bool any = false;
     bool all = true;
     for (const auto& device : bus.devices) {
@@ -413,16 +413,16 @@ static Task<void> look_at_clocks(Channel& c, Bus& bus) noexcept {
         const Answer a = co_await read(c, d.slave, registers::dc_system_time_difference, 4);
         if (a.wkc != 1) continue;
         d.status.dc_deviation_ns = get<std::uint32_t>(c.data()) & 0x7fff'ffff;
-        judge_clock(bus, d, c.now_ns());
+        check_clock(bus, d, c.now_ns());
         if (d.slave.number != bus.reference) {
-            largest = std::max(largest, d.status.dc_deviation_ns);
+            max = std::max(max, d.status.dc_deviation_ns);
         }
         any = true;
     }
-    bus.status.dc_deviation_ns = any ? largest : UINT32_MAX;
-    const bool synchronised = any && all && largest <= bus.setup.sync_window_ns;
+    bus.status.dc_deviation_ns = any ? max : UINT32_MAX;
+    const bool synchronised = any && all && max <= bus.setup.sync_window_ns;
     if (synchronised && !bus.status.dc_synchronised) {
-        bus.report(Event::dc_synchronised, largest);
+        bus.report(Event::dc_synchronised, max);
     }
     bus.status.dc_synchronised = synchronised;
 }
@@ -534,7 +534,7 @@ Task<void> watch(Channel& c, Bus& bus) noexcept {
     }
 }
 
-void judge_counters(Bus& bus) noexcept {
+void update_working_counters(Bus& bus) noexcept {
     bus.status.wkc = bus.status.wkc_expected = 0;
     bool part = false;
     bool any = false;
@@ -582,7 +582,7 @@ static void report_staleness(Bus& bus, Device& d, std::size_t slave, bool late) 
     }
 }
 
-void judge_data(Bus& bus) noexcept {
+void check_process_data(Bus& bus) noexcept {
     const bool late = bus.status.late != std::exchange(bus.late_seen, bus.status.late);
     bool changed = false;
     for (std::size_t n = 0; n < bus.setup.slaves.size(); ++n) {

@@ -12,12 +12,12 @@ constexpr std::array<unsigned, 4> port_order{0, 3, 1, 2};
 /// Returns the port in use after `port` in the order of the frame, counted round; `port` itself if
 /// it is the only one.
 unsigned next_port(std::uint16_t dl_status, unsigned port) noexcept {
-    unsigned place = 0;
-    while (port_order[place] != port) {
-        ++place;
+    unsigned position = 0;
+    while (port_order[position] != port) {
+        ++position;
     }
     for (unsigned n = 1; n <= 4; ++n) {
-        if (const unsigned candidate = port_order[(place + n) % 4];
+        if (const unsigned candidate = port_order[(position + n) % 4];
             port_in_use(dl_status, candidate)) {
             return candidate;
         }

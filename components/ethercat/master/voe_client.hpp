@@ -18,7 +18,7 @@ struct VoeMessage {
     std::uint16_t slave = 0;  ///< BusSlave::number
     std::uint16_t length = 0;
     VoeHeader header;
-    std::array<std::uint8_t, largest_mailbox> data{};
+    std::array<std::uint8_t, max_mailbox> data{};
 };
 
 /// See the top of this file. Received messages go from the cycle to one other thread.

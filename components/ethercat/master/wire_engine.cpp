@@ -95,7 +95,7 @@ void WireEngine::ready() {
     for (std::size_t n = 0; n < channels_.size(); ++n) {
         channels_[n]->set_active_flag(&active_[n]);
     }
-    acyclic_.resize(4 * most_acyclic);
+    acyclic_.resize(4 * max_acyclic);
 }
 
 int WireEngine::take_index() noexcept {
@@ -208,7 +208,7 @@ void WireEngine::send_acyclic(unsigned frames, std::size_t bytes) noexcept {
 /// Fills a frame of at most `most` bytes on the wire with waiting datagrams, in turn; the `first`
 /// one of a cycle may be longer. Those that count positions do not share a frame with others, as
 /// they leave on one port.
-bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std::size_t most,
+bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std::size_t max,
                       bool first) noexcept {
     FrameWriter writer(frame.bytes, primary_->address());
     frame.count = 0;
@@ -216,7 +216,7 @@ bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std
     const std::size_t channels = channels_.size();
     std::size_t at = next_channel_ < channels ? next_channel_ : 0;
     std::size_t next = at;
-    for (std::size_t seen = 0; seen < channels && frame.count < most_items;
+    for (std::size_t seen = 0; seen < channels && frame.count < max_items;
          ++seen, at = at + 1 == channels ? 0 : at + 1) {
         if (active_[at] == 0) continue;
         Channel& c = *channels_[at];
@@ -224,7 +224,7 @@ bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std
         const bool both = use_backup_ && backup_ != nullptr && !counts_positions(c.command());
         if (frame.count != 0 && both != backup) continue;
         const std::size_t needed = c.length() + datagram_overhead;
-        if (bytes + needed > most && !(first && frame.count == 0)) continue;
+        if (bytes + needed > max && !(first && frame.count == 0)) continue;
         if (bytes + needed > setup_.frame_bytes + frame_overhead && frame.count != 0) continue;
         if (c.length() > writer.space() || (c.length() == 0 && writer.space() == 0)) continue;
         std::uint8_t* data = writer.add(c.command(), index, c.address(), c.length());

@@ -79,12 +79,12 @@ private:
         std::uint16_t offset = 0;
         std::uint16_t length = 0;
     };
-    static constexpr std::size_t most_items = 64;
-    static constexpr std::size_t most_acyclic = 8;
+    static constexpr std::size_t max_items = 64;
+    static constexpr std::size_t max_acyclic = 8;
     static constexpr std::size_t indexes = 256;
     struct AcyclicFrame {
-        std::array<std::uint8_t, largest_frame_bytes> bytes{}, answer{};
-        std::array<Item, most_items> items{};
+        std::array<std::uint8_t, max_frame_bytes> bytes{}, answer{};
+        std::array<Item, max_items> items{};
         std::size_t count = 0;
         std::uint16_t size = 0;
         bool free = true;
@@ -119,7 +119,7 @@ private:
     void expire(Flight&) noexcept;
     void wake() noexcept;
     void send_acyclic(unsigned frames, std::size_t bytes) noexcept;
-    bool pack(AcyclicFrame&, std::uint8_t index, bool& backup, std::size_t most,
+    bool pack(AcyclicFrame&, std::uint8_t index, bool& backup, std::size_t max,
               bool first) noexcept;
     std::uint8_t send(std::span<const std::uint8_t> frame, bool backup) noexcept;
     int take_index() noexcept;
@@ -133,7 +133,7 @@ private:
     std::vector<std::uint8_t> active_;  ///< of each channel
     std::vector<AcyclicFrame> acyclic_;
     /// first copies of the cyclic frames, with a backup port only
-    std::vector<std::array<std::uint8_t, largest_frame_bytes>> halves_;
+    std::vector<std::array<std::uint8_t, max_frame_bytes>> halves_;
     std::array<Flight, indexes> flights_{};
     ClockSample clock_;
     std::int64_t now_ns_ = 0;

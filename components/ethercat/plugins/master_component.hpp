@@ -434,7 +434,7 @@ private:
 
     /// Takes all slaves to INIT, where outputs are off. [setup]
     void release_slaves() noexcept {
-        std::array<std::uint8_t, largest_frame_bytes> buffer{};
+        std::array<std::uint8_t, max_frame_bytes> buffer{};
         FrameWriter frame(buffer, primary_->address());
         if (std::uint8_t* data =
                 frame.add(Command::bwr, 0, at_position(0, registers::al_control), 2)) {

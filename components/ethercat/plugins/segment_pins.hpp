@@ -91,13 +91,13 @@ struct EmulatedSlavePins {
         }
         was_expired = expire_watchdog;
         const double wanted =
-            std::isfinite(drift.get()) ? std::clamp(drift.get(), -most_drift, most_drift) : 0.0;
+            std::isfinite(drift.get()) ? std::clamp(drift.get(), -max_drift, max_drift) : 0.0;
         if (wanted != was_drift &&
             line.post({.kind = Kind::drift, .slave = slave, .value = wanted})) {
             was_drift = wanted;
         }
         const double jump = std::isfinite(clock_jump.get())
-                                ? std::clamp(clock_jump.get(), -most_jump, most_jump)
+                                ? std::clamp(clock_jump.get(), -max_jump, max_jump)
                                 : 0.0;
         if (jump != was_jump &&
             (jump == 0 || line.post({.kind = Kind::jump, .slave = slave, .value = jump * 1e9}))) {
@@ -140,8 +140,8 @@ struct EmulatedSlavePins {
         return posted;
     }
 
-    static constexpr double most_drift = 100'000;  ///< ppm
-    static constexpr double most_jump = 10;        ///< s
+    static constexpr double max_drift = 100'000;  ///< ppm
+    static constexpr double max_jump = 10;        ///< s
 
     hal::In<bool> power, cable;
     hal::In<double> drift, clock_jump;

@@ -74,9 +74,9 @@ RecordedAnswers::RecordedAnswers(const std::vector<hal::ethernet::Captured>& fra
 }
 
 std::size_t RecordedAnswers::keep(const DatagramView& d) {
-    const std::size_t place = bytes_.size();
+    const std::size_t index = bytes_.size();
     bytes_.insert(bytes_.end(), d.data, d.data + d.length);
-    return place;
+    return index;
 }
 
 void RecordedAnswers::add(const DatagramView& sent, const DatagramView& returned) {

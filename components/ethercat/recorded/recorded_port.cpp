@@ -25,7 +25,7 @@ RecordedPort::RecordedPort(const std::string& address,
 
 Sent RecordedPort::send(std::span<const std::uint8_t> frame, const hal::ethernet::Launch& launch,
                         std::int64_t now_ns) noexcept {
-    const bool fits = launch.fits(frame.size()) && frame.size() <= largest_frame_bytes;
+    const bool fits = launch.fits(frame.size()) && frame.size() <= max_frame_bytes;
     if (!fits || waiting_ == capacity) {
         add(dropped_);
         return fits ? Sent::full : Sent::rejected;

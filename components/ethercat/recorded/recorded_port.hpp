@@ -33,7 +33,7 @@ private:
     using Count = std::atomic<std::uint64_t>;
     static constexpr std::size_t capacity = 64;  // frames
     struct Frame {
-        std::array<std::uint8_t, largest_frame_bytes> bytes;
+        std::array<std::uint8_t, max_frame_bytes> bytes;
         std::size_t size = 0;
         std::int64_t time_ns = 0;
     };

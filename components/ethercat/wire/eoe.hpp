@@ -15,7 +15,7 @@
 namespace hal::ethercat::eoe {
 
 inline constexpr std::size_t header_bytes = 4;
-inline constexpr std::size_t largest_frame = 1522;  ///< with two VLAN tags, without check sequence
+inline constexpr std::size_t max_frame = 1522;  ///< with two VLAN tags, without check sequence
 enum class Type : std::uint8_t {
     fragment = 0,
     timestamp = 1,
@@ -173,7 +173,7 @@ public:
     std::uint32_t dropped() const noexcept { return dropped_; }
 
 private:
-    std::array<std::uint8_t, largest_frame> bytes_{};
+    std::array<std::uint8_t, max_frame> bytes_{};
     std::size_t used_ = 0;
     std::uint32_t dropped_ = 0;
     unsigned expected_ = 0;
@@ -200,7 +200,7 @@ inline constexpr std::uint32_t gateway = 8;
 inline constexpr std::uint32_t dns = 16;
 inline constexpr std::uint32_t name = 32;
 }  // namespace ip_flag
-inline constexpr std::size_t largest_ip = 4 + 6 + 16 + 32;  ///< bytes after the header
+inline constexpr std::size_t max_ip = 4 + 6 + 16 + 32;  ///< bytes after the header
 /// Writes the fields that are set, in order and packed, up to the last one; returns their length
 /// with the flags. [realtime]
 inline std::size_t write_ip(std::uint8_t* to, const Ip& ip) noexcept {
@@ -234,7 +234,7 @@ inline std::optional<Ip> read_ip(std::span<const std::uint8_t> data) noexcept {
     Ip ip;
     ip.flags = get<std::uint32_t>(data.data()) & 0x3f;
     // some masters send all fields, whatever the flags
-    const bool fixed = data.size() >= largest_ip;
+    const bool fixed = data.size() >= max_ip;
     std::size_t at = 4;
     bool ok = true;
     const auto field = [&](std::uint32_t flag, void* to, std::size_t bytes) {

@@ -69,9 +69,9 @@ std::optional<DatagramView> FrameReader::next() noexcept {
     return d;
 }
 
-FrameWriter::FrameWriter(std::span<std::uint8_t, largest_frame_bytes> buffer,
-                         const std::array<std::uint8_t, 6>& source, std::size_t most) noexcept
-    : buffer_(buffer), most_(std::min(most, largest_frame_bytes)) {
+FrameWriter::FrameWriter(std::span<std::uint8_t, max_frame_bytes> buffer,
+                         const std::array<std::uint8_t, 6>& source, std::size_t max) noexcept
+    : buffer_(buffer), max_(std::min(max, max_frame_bytes)) {
     std::fill_n(buffer_.begin(), 6, std::uint8_t{0xff});
     std::copy(source.begin(), source.end(), buffer_.begin() + 6);
     buffer_[12] = ethertype >> 8;
@@ -80,7 +80,7 @@ FrameWriter::FrameWriter(std::span<std::uint8_t, largest_frame_bytes> buffer,
 
 std::size_t FrameWriter::space() const noexcept {
     constexpr std::size_t overhead = datagram_header_bytes + wkc_bytes;
-    return most_ > used_ + overhead ? most_ - used_ - overhead : 0;
+    return max_ > used_ + overhead ? max_ - used_ - overhead : 0;
 }
 
 std::uint8_t* FrameWriter::add(Command command, std::uint8_t index, std::uint32_t address,

@@ -25,9 +25,9 @@ inline constexpr std::size_t ecat_header_bytes = 2;
 
 inline constexpr std::size_t datagram_header_bytes = 10;
 inline constexpr std::size_t wkc_bytes = 2;
-inline constexpr std::size_t largest_frame_bytes = 1514;  ///< without check sequence
+inline constexpr std::size_t max_frame_bytes = 1514;  ///< without check sequence
 /// Data bytes of the only datagram of a frame: 1500 - 2 - 12.
-inline constexpr std::size_t largest_datagram_data = 1486;
+inline constexpr std::size_t max_datagram_data = 1486;
 
 /// Types of the EtherCAT header, bits 12-15.
 enum class Protocol : std::uint8_t { datagrams = 1, network_variables = 4, mailbox_gateway = 5 };
@@ -98,13 +98,13 @@ private:
     bool more_ = true;
 };
 
-/// Writes a frame of datagrams into a buffer of largest_frame_bytes. [realtime]
+/// Writes a frame of datagrams into a buffer of max_frame_bytes. [realtime]
 class FrameWriter {
 public:
     /// `most`: bytes of the longest frame.
-    FrameWriter(std::span<std::uint8_t, largest_frame_bytes> buffer,
+    FrameWriter(std::span<std::uint8_t, max_frame_bytes> buffer,
                 const std::array<std::uint8_t, 6>& source,
-                std::size_t most = largest_frame_bytes) noexcept;
+                std::size_t max = max_frame_bytes) noexcept;
     /// Adds a datagram with zeroed data and WKC 0. Returns its data, or nullptr if the frame has no
     /// space left.
     std::uint8_t* add(Command command, std::uint8_t index, std::uint32_t address,
@@ -116,8 +116,8 @@ public:
     std::span<const std::uint8_t> finish() noexcept;
 
 private:
-    std::span<std::uint8_t, largest_frame_bytes> buffer_;
-    std::size_t most_;
+    std::span<std::uint8_t, max_frame_bytes> buffer_;
+    std::size_t max_;
     std::size_t used_ = ethernet_header_bytes + ecat_header_bytes;
     std::uint8_t* last_ = nullptr;  ///< header of the last datagram
 };

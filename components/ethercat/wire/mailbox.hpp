@@ -16,7 +16,7 @@ namespace hal::ethercat {
 
 inline constexpr std::size_t mailbox_header_bytes = 6;
 inline constexpr std::size_t smallest_mailbox = 16;   ///< bytes: a header and an SDO of 10 bytes
-inline constexpr std::size_t largest_mailbox = 1486;  ///< bytes of one datagram
+inline constexpr std::size_t max_mailbox = 1486;  ///< bytes of one datagram
 
 enum class MailboxType : std::uint8_t {
     error = 0,

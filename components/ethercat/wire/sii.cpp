@@ -11,7 +11,7 @@ namespace hal::ethercat::sii {
 
 namespace {
 
-constexpr std::size_t most_bytes = 128 * 1024;
+constexpr std::size_t max_bytes = 128 * 1024;
 constexpr std::size_t header_bytes = 4;
 
 constexpr std::size_t categories_at = 2 * word_categories;
@@ -278,18 +278,18 @@ std::uint8_t checksum(std::span<const std::uint8_t> image) noexcept {
 
 std::size_t bytes_needed(std::span<const std::uint8_t> read) noexcept {
     std::size_t at = categories_at;
-    while (at + 2 <= read.size() && at < most_bytes) {
+    while (at + 2 <= read.size() && at < max_bytes) {
         if (get<std::uint16_t>(read.data() + at) == static_cast<std::uint16_t>(Category::end)) {
             return at + 2;
         }
         if (at + header_bytes > read.size()) return at + header_bytes;
         at += header_bytes + 2 * std::size_t{get<std::uint16_t>(read.data() + at + 2)};
     }
-    return std::min(at + header_bytes, most_bytes);
+    return std::min(at + header_bytes, max_bytes);
 }
 
 Contents parse(std::span<const std::uint8_t> image) {
-    return Parser(image.first(std::min(image.size(), most_bytes))).parse();
+    return Parser(image.first(std::min(image.size(), max_bytes))).parse();
 }
 
 std::uint8_t type_number(std::string_view name) noexcept {

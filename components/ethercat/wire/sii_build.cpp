@@ -10,8 +10,8 @@ namespace hal::ethercat::sii {
 
 namespace {
 
-constexpr std::size_t longest_string = 255;
-constexpr std::size_t most_strings = 255;
+constexpr std::size_t max_string = 255;
+constexpr std::size_t max_strings = 255;
 
 class Builder {
 public:
@@ -69,8 +69,8 @@ private:
         if (text.empty()) return 0;
         const auto known = numbers_.find(text);
         if (known != numbers_.end()) return known->second;
-        if (strings_.size() == most_strings) return 0;
-        strings_.push_back(text.substr(0, longest_string));
+        if (strings_.size() == max_strings) return 0;
+        strings_.push_back(text.substr(0, max_string));
         return numbers_[text] = static_cast<std::uint8_t>(strings_.size());
     }
     std::uint8_t name(const std::string& text) {

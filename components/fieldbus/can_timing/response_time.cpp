@@ -101,7 +101,7 @@ double use_of(std::span<const Item> items) {
     return use;
 }
 
-std::int64_t longest_of(std::span<const Item> items) {
+std::int64_t max_of(std::span<const Item> items) {
     std::int64_t max = 0;
     for (const Item& k : items) {
         max = std::max(max, k.c);
@@ -111,7 +111,7 @@ std::int64_t longest_of(std::span<const Item> items) {
 
 /// The exact analysis. `busy`: those of higher priority, and behind them m itself.
 Worst worst_of(const Item& m, std::int64_t blocking, std::span<const Item> busy, const Bus& bus) {
-    const ErrorTime errors(bus, longest_of(busy));
+    const ErrorTime errors(bus, max_of(busy));
     if (use_of(busy) + errors.load() >= 1.0) {
         return {};
     }
@@ -169,9 +169,9 @@ public:
             if (const std::uint32_t number = items_[rank].fifo; number != 0) {
                 Queue& q = queues_[number];
                 q.last = rank;
-                q.most = std::max(q.most, items_[rank].c);
+                q.max = std::max(q.max, items_[rank].c);
                 q.sum += items_[rank].c;
-                q.least = q.least == 0 ? items_[rank].c : std::min(q.least, items_[rank].c);
+                q.min = q.min == 0 ? items_[rank].c : std::min(q.min, items_[rank].c);
             }
         }
     }
@@ -198,35 +198,35 @@ public:
     }
     std::int64_t others(std::size_t rank) const {
         const auto q = queues_.find(items_[rank].fifo);
-        return q == queues_.end() ? 0 : q->second.sum - q->second.least;
+        return q == queues_.end() ? 0 : q->second.sum - q->second.min;
     }
 
 private:
     struct Queue {
         std::size_t last = 0;
-        std::int64_t most = 0;
-        std::int64_t least = 0;
+        std::int64_t max = 0;
+        std::int64_t min = 0;
         std::int64_t sum = 0;
         std::int64_t time = 0;
     };
 
     std::int64_t time_in(std::uint32_t number, const Queue& q) const {
         const auto above = std::span<const Item>(items_).first(q.last + 1);
-        const ErrorTime errors(bus_, longest_of(above));
+        const ErrorTime errors(bus_, max_of(above));
         if (use_of(above) + errors.load() >= 1.0) return -1;
-        const std::int64_t constant = std::max(blocking_[q.last], q.most) + q.sum - q.least;
-        return settle(constant, constant, bit_time(bus_), q.most, errors, above,
+        const std::int64_t constant = std::max(blocking_[q.last], q.max) + q.sum - q.min;
+        return settle(constant, constant, bit_time(bus_), q.max, errors, above,
                       [&](const Item& k) { return k.fifo != number; });
     }
     Worst answer(std::size_t rank) const {
         const Item& m = items_[rank];
         const auto busy = std::span<const Item>(items_).first(rank + 1);
-        const ErrorTime errors(bus_, longest_of(busy));
+        const ErrorTime errors(bus_, max_of(busy));
         Worst worst;
         if (m.fifo != 0) {
             const Queue& q = queues_.at(m.fifo);
             if (q.time >= 0) {
-                worst = {m.j + q.time + q.least, q.time, 0, errors(q.time + q.most)};
+                worst = {m.j + q.time + q.min, q.time, 0, errors(q.time + q.max)};
             }
         } else if (use_of(busy) + errors.load() < 1.0) {
             const std::int64_t constant = std::max(blocking_[rank], m.c);

@@ -85,13 +85,13 @@ struct CanReceive : hal::Component {
     void update(hal::Cycle cycle) noexcept {
         const std::int64_t now = cycle.start_ns();
         bool any = false;
-        const std::size_t most = one_by_one ? 1 : buffer_.size();
+        const std::size_t max = one_by_one ? 1 : buffer_.size();
         for (int batch = 0; batch < 8; ++batch) {  // a babbling bus costs a bounded time
-            const std::size_t count = link_->receive(std::span(buffer_.data(), most), now);
+            const std::size_t count = link_->receive(std::span(buffer_.data(), max), now);
             for (std::size_t i = 0; i < count; ++i) {
                 any = take(buffer_[i], any) || any;
             }
-            if (count < most || (one_by_one && any)) break;
+            if (count < max || (one_by_one && any)) break;
         }
         link_->flush(now);
         fresh = any;

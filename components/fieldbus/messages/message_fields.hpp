@@ -48,7 +48,7 @@ public:
     std::uint8_t bytes() const noexcept { return bytes_; }  ///< of data in the message
 
 private:
-    static constexpr std::size_t most = 8;
+    static constexpr std::size_t max = 8;
 
     void add(const std::string& one) {
         const auto colon = one.find(':');
@@ -94,7 +94,7 @@ private:
         throw hal::ArgumentError("fields", "fields: " + why);
     }
 
-    std::array<Field, most> fields_;
+    std::array<Field, max> fields_;
     std::size_t count_ = 0;
     std::uint8_t bytes_ = 0;
 };

@@ -16,7 +16,7 @@
 
 namespace hal::faults {
 
-inline constexpr std::size_t most = 32;
+inline constexpr std::size_t max = 32;
 
 template <class Fault>
 struct Named {
@@ -44,11 +44,11 @@ inline std::int64_t time(std::string_view part, std::string_view text) {
     return *value;
 }
 inline std::uint64_t count(std::string_view part, std::string_view text,
-                           std::uint64_t largest = std::numeric_limits<std::uint64_t>::max()) {
+                           std::uint64_t max = std::numeric_limits<std::uint64_t>::max()) {
     const auto value = hal::parse_natural(text);
-    if (!value || *value > largest) {
+    if (!value || *value > max) {
         reject(part, "'" + std::string(text) + "' is not a number" +
-                         (value ? " up to " + std::to_string(largest) : ""));
+                         (value ? " up to " + std::to_string(max) : ""));
     }
     return *value;
 }
@@ -107,9 +107,9 @@ auto parse_list(std::string_view text, ParseOne parse_one) {
     while (!text.empty()) {
         all.push_back(parse_one(cut(text, ',')));
     }
-    if (all.size() > most) {
+    if (all.size() > max) {
         throw hal::ArgumentError(
-            "faults", std::to_string(all.size()) + " faults (limit " + std::to_string(most) + ")");
+            "faults", std::to_string(all.size()) + " faults (limit " + std::to_string(max) + ")");
     }
     return all;
 }

@@ -61,7 +61,7 @@ struct SegmentRecord final : hal::Component {
         for (int n = 0; n < max; ++n) {
             const auto arrival = port_->receive(cycle.start_ns());
             if (!arrival) break;
-            if (pause || arrival->bytes.size() > largest_frame) continue;
+            if (pause || arrival->bytes.size() > max_frame) continue;
             taken_.time_ns = arrival->time_ns;
             taken_.length = arrival->bytes.size();
             std::copy(arrival->bytes.begin(), arrival->bytes.end(), taken_.bytes.begin());
@@ -78,7 +78,7 @@ private:
     struct Taken {
         std::int64_t time_ns = 0;
         std::size_t length = 0;
-        std::array<std::uint8_t, largest_frame> bytes{};
+        std::array<std::uint8_t, max_frame> bytes{};
     };
     static std::int64_t clock_ns(clockid_t clock) noexcept {
         timespec t;

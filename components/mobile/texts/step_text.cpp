@@ -100,7 +100,7 @@ private:
                 reject(words[i], "duplicate name '" + name + "'", "choose another name");
             } else if (taken(own)) {
                 reject(words[i], "reserved name '" + name + "'", "choose another name");
-            } else if (to.size() == StepText::most_bits) {
+            } else if (to.size() == StepText::max_bits) {
                 reject(words[i], "more than 64 names", "split the program");
             } else {
                 to.push_back(name);

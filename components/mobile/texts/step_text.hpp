@@ -35,7 +35,7 @@ struct Step {
 };
 
 struct StepText {
-    static constexpr std::size_t most_bits = 64;
+    static constexpr std::size_t max_bits = 64;
     static constexpr std::size_t max_steps = 128;
     static constexpr std::size_t max_transitions = 32;
 

@@ -192,7 +192,7 @@ private:
         // on 32 bit less than the limit
         constexpr std::uint64_t addressable = std::numeric_limits<std::size_t>::max() / 2;
         const std::uint64_t size = source->size();
-        const bool fits = size <= std::min(4 * options_.most_bytes, addressable);
+        const bool fits = size <= std::min(4 * options_.max_bytes, addressable);
         if (fits && source->read(0, static_cast<std::size_t>(size), text)) return true;
         return fail("'" + path_ + "' is too large, or cannot be read");
     }
@@ -261,8 +261,8 @@ private:
         first_filled_.push_back(first_filled);
         table_.times_ns.push_back(time_ns);
         table_.words.insert(table_.words.end(), held_.begin(), held_.end());
-        if (table_.words.size() * 8 <= options_.most_bytes) return true;
-        return fail("'" + path_ + "' has more than " + std::to_string(options_.most_bytes >> 20) +
+        if (table_.words.size() * 8 <= options_.max_bytes) return true;
+        return fail("'" + path_ + "' has more than " + std::to_string(options_.max_bytes >> 20) +
                     " MiB of values; choose a part of it");
     }
 

@@ -205,7 +205,7 @@ bool Reader::add_chunk_index(Fields fields) {
 // Adds a schema, a channel or an index: from the summary, or found by a scan. Ignores other
 // records.
 bool Reader::add_entry(std::uint8_t opcode, std::string_view content) {
-    if (schemas_.size() + channels_.size() + chunks_.size() + metadata_.size() > most_entries) {
+    if (schemas_.size() + channels_.size() + chunks_.size() + metadata_.size() > max_entries) {
         return fail("the file has too many parts");
     }
     Fields fields(content);
@@ -297,7 +297,7 @@ bool Reader::read_content(const RecordHead& record, std::string& content) {
 
 bool Reader::add_message(const RecordHead& record) {
     if (record.length < message_head || record.length > max_chunk) return false;
-    if (chunks_.size() >= most_entries) return false;
+    if (chunks_.size() >= max_entries) return false;
     add_loose(record.offset, record.whole(), record.log_time);
     return true;
 }
@@ -306,7 +306,7 @@ bool Reader::add_chunk(const RecordHead& record, bool listed) {
     ChunkIndex index;
     index.offset = record.offset;
     index.length = record.whole();
-    if (chunks_.size() >= most_entries || !scan_chunk(index)) return false;
+    if (chunks_.size() >= max_entries || !scan_chunk(index)) return false;
     if (!listed) {
         chunks_.push_back(std::move(index));
     }

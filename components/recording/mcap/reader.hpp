@@ -37,7 +37,7 @@ public:
     /// bytes of a chunk, expanded
     static constexpr std::uint64_t max_chunk = std::uint64_t{256} << 20;
     /// chunks, or other records of the summary
-    static constexpr std::size_t most_entries = 1'000'000;
+    static constexpr std::size_t max_entries = 1'000'000;
 
     /// Reads what the file contains: its summary, and the heads of its records. Where the summary
     /// is missing, or omits chunks, schemas or channels, it reads these chunks too. Messages that

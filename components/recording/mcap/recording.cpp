@@ -245,7 +245,7 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem,
         problem = "'" + path + "': " + reader.problem();
         return false;
     }
-    McapLoader loader(reader, to, options.most_bytes);
+    McapLoader loader(reader, to, options.max_bytes);
     loader.add_channels();
     const auto begin = static_cast<std::uint64_t>(std::max<std::int64_t>(options.begin_ns, 0));
     const auto end =
@@ -263,7 +263,7 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem,
     }
     loader.finish();
     if (loader.too_large()) {
-        problem = "'" + path + "' has more than " + std::to_string(options.most_bytes >> 20) +
+        problem = "'" + path + "' has more than " + std::to_string(options.max_bytes >> 20) +
                   " MiB of values; choose a part of it";
         return false;
     }

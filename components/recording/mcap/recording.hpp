@@ -59,7 +59,7 @@ struct Recording {
 
 /// Options of load().
 struct LoadOptions {
-    std::uint64_t most_bytes = std::uint64_t{1} << 30;
+    std::uint64_t max_bytes = std::uint64_t{1} << 30;
     /// of Unix time; of the table's time for .csv
     std::int64_t begin_ns = INT64_MIN;
     std::int64_t end_ns = INT64_MAX;

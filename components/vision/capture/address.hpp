@@ -23,9 +23,9 @@ public:
     bool has(const char* name) const;  ///< the option is present
     /// Returns the option's number, or `fallback` without it. Throws if it is not a number or out
     /// of range. [setup]
-    double number(const char* name, double fallback, double least, double most);
+    double number(const char* name, double fallback, double min, double max);
     /// Returns an integer option, like number().
-    int whole(const char* name, int fallback, int least, int most);
+    int whole(const char* name, int fallback, int min, int max);
     /// `?loop` and `?loop=1` are true, `?loop=0` is not.
     bool flag(const char* name);
     /// Returns the option's text, or `fallback` without it.

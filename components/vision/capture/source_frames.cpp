@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr std::size_t max_files = 100'000;
 // of a file: what the largest frame has in 16 bits
-constexpr std::size_t most_bytes = std::size_t{3} * 2 * max_pixels + 4096;
+constexpr std::size_t max_bytes = std::size_t{3} * 2 * max_pixels + 4096;
 
 class Frames final : public Source {
 public:
@@ -115,7 +115,7 @@ private:
         std::error_code error;
         const auto size = fs::file_size(path, error);
         if (error) return bad(error.message().c_str());
-        if (size > most_bytes) {
+        if (size > max_bytes) {
             return fail(FrameError::too_large, shown_ + "/" + name + " has " +
                                                    std::to_string(size) +
                                                    " bytes, more than the limit for a frame");

@@ -138,7 +138,7 @@ void Ground::fit(GroundText& text, const std::optional<Camera>& camera) {
         return refuse("some of these points are above the horizon",
                       "check whether two of them are exchanged");
     }
-    least_w_ = 1e-3 * min;
+    min_w_ = 1e-3 * min;
     for (std::size_t i = 0; i < seen.size(); ++i) {
         double x = 0;
         double y = 0;
@@ -151,7 +151,7 @@ void Ground::fit(GroundText& text, const std::optional<Camera>& camera) {
 bool Ground::map(double u, double v, double& x, double& y) const noexcept {
     undistort(u, v);
     const double w = h_[6] * u + h_[7] * v + h_[8];
-    if (!(w > least_w_)) return false;
+    if (!(w > min_w_)) return false;
     const double px = (h_[0] * u + h_[1] * v + h_[2]) / w;
     const double py = (h_[3] * u + h_[4] * v + h_[5]) / w;
     if (!std::isfinite(px) || !std::isfinite(py)) return false;

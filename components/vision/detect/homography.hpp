@@ -55,7 +55,7 @@ private:
     bool distorted_ = false;
     // w of pixels closer to the horizon than that is taken for 0
     double error_ = 0;
-    double least_w_ = 0;
+    double min_w_ = 0;
 };
 
 }  // namespace hal::vision

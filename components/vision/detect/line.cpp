@@ -10,7 +10,7 @@ namespace hal::vision {
 
 namespace {
 
-constexpr std::size_t most_in_band = 3;
+constexpr std::size_t max_in_band = 3;
 
 struct Parabola {
     double a = 0.0;
@@ -69,8 +69,8 @@ void look(const std::vector<float>& row, double v, int band, const Ground& groun
     std::sort(found.begin(), found.end(), [](const LinePoint& a, const LinePoint& b) {
         return std::fabs(a.y) < std::fabs(b.y);
     });
-    if (found.size() > most_in_band) {
-        found.resize(most_in_band);
+    if (found.size() > max_in_band) {
+        found.resize(max_in_band);
     }
     to.insert(to.end(), found.begin(), found.end());
 }

@@ -158,7 +158,7 @@ struct MarkerDetector::Inside {
 
     void refine(const cv::Mat& picture, std::vector<cv::Point2f>& corners) const;
     Candidates candidates(const View& view) const;
-    Candidate judged(const View& view, const cv::Mat& r, const cv::Mat& t) const;
+    Candidate scored(const View& view, const cv::Mat& r, const cv::Mat& t) const;
     Candidate refined(const View& view, const Candidates& both, std::size_t chosen) const;
     void position(Marker& marker, double size, bool alone);
 };
@@ -250,13 +250,13 @@ Candidates MarkerDetector::Inside::candidates(const View& view) const {
     }
     Candidates both;
     for (std::size_t i = 0; i < 2; ++i) {
-        both[i] = judged(view, rotations[std::min(i, rotations.size() - 1)],
+        both[i] = scored(view, rotations[std::min(i, rotations.size() - 1)],
                          places[std::min(i, places.size() - 1)]);
     }
     return both;
 }
 
-Candidate MarkerDetector::Inside::judged(const View& view, const cv::Mat& r,
+Candidate MarkerDetector::Inside::scored(const View& view, const cv::Mat& r,
                                          const cv::Mat& t) const {
     std::vector<cv::Point2d> back;
     cv::projectPoints(view.square, r, t, k, d, back);
@@ -279,7 +279,7 @@ Candidate MarkerDetector::Inside::refined(const View& view, const Candidates& bo
     cv::Mat r, t(from.position, true);
     cv::Rodrigues(from.rotation, r);
     cv::solvePnPRefineLM(view.square, view.seen, k, d, r, t);
-    const Candidate to = judged(view, r, t);
+    const Candidate to = scored(view, r, t);
     const bool slid = angle_between(to.rotation, both[1 - chosen].rotation) <
                       angle_between(to.rotation, from.rotation);
     return slid ? from : to;

@@ -39,6 +39,6 @@ void weigh(const Frame& frame, Hue hue, std::vector<std::uint8_t>& weights);
 /// Returns at most `most` connected spots of at least `min_area` px above `threshold`, the
 /// heaviest first. [any] allocates memory
 std::vector<Spot> find_spots(const std::vector<std::uint8_t>& weights, int width, int height,
-                             int threshold, int min_area, std::size_t most);
+                             int threshold, int min_area, std::size_t max);
 
 }  // namespace hal::vision

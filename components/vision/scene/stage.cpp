@@ -14,7 +14,7 @@ void Stage::put(std::int64_t stamp_ns, std::span<const double> values) noexcept 
     slot.number.store(2 * n + 1, std::memory_order_relaxed);
     // who sees this or a value sees the odd number too
     slot.stamp.store(stamp_ns, std::memory_order_release);
-    for (std::size_t i = 0; i < std::min(values.size(), most_values); ++i) {
+    for (std::size_t i = 0; i < std::min(values.size(), max_values); ++i) {
         slot.values[i].store(values[i], std::memory_order_release);
     }
     slot.number.store(2 * n + 2, std::memory_order_release);
@@ -25,7 +25,7 @@ bool Stage::read(std::uint64_t n, State& to) const noexcept {
     const Slot& slot = (*slots_)[n % kept];
     if (slot.number.load(std::memory_order_acquire) != 2 * n + 2) return false;
     to.stamp_ns = slot.stamp.load(std::memory_order_acquire);
-    for (std::size_t i = 0; i < most_values; ++i) {
+    for (std::size_t i = 0; i < max_values; ++i) {
         to.values[i] = slot.values[i].load(std::memory_order_acquire);
     }
     return slot.number.load(std::memory_order_relaxed) == 2 * n + 2;

@@ -64,14 +64,14 @@ constexpr std::size_t markers = poses + smooth;
 constexpr std::size_t of_marker = 8;
 }  // namespace at
 
-constexpr std::size_t most_values = 72;
+constexpr std::size_t max_values = 72;
 constexpr std::size_t max_objects = 16;
 constexpr std::size_t max_markers = 8;
 
 /// The state of the scene at a moment of the runtime's clock.
 struct State {
     std::int64_t stamp_ns = 0;
-    std::array<double, most_values> values{};
+    std::array<double, max_values> values{};
 
     double operator[](std::size_t i) const noexcept { return values[i]; }
 };
@@ -101,7 +101,7 @@ private:
     struct Slot {
         std::atomic<std::uint64_t> number{0};
         std::atomic<std::int64_t> stamp{0};
-        std::array<std::atomic<double>, most_values> values{};
+        std::array<std::atomic<double>, max_values> values{};
     };
     bool read(std::uint64_t n, State& to) const noexcept;
 

@@ -21,7 +21,7 @@ namespace hal::can::cane {
 namespace {
 
 constexpr unsigned max_messages = 255;  // per packed frame: the count is one byte
-constexpr std::size_t max_payload = ethernet::largest_frame - ethernet::header_bytes;
+constexpr std::size_t max_payload = ethernet::max_frame - ethernet::header_bytes;
 
 /// Share of the line used by the frames of this link in both directions. Both threads add to it;
 /// the receiving one closes the windows.
@@ -468,7 +468,7 @@ private:
     // at the front of process_data_: left by the last flush()
     std::size_t held_ = 0;
     std::shared_ptr<Seal> seal_;
-    std::array<std::uint8_t, ethernet::largest_frame> frame_{};
+    std::array<std::uint8_t, ethernet::max_frame> frame_{};
 
     Streams streams_;  // from here on: used by the receiving thread
     Guard guard_;

@@ -68,7 +68,7 @@ public:
 
 private:
     /// sessions, one or two per sender; the least recently used is replaced
-    static constexpr unsigned most = 128;
+    static constexpr unsigned max = 128;
     /// consecutive stale frames after which the sequence restarts
     static constexpr unsigned max_stale = 8;
     struct Sender {
@@ -80,7 +80,7 @@ private:
             bool begun = false;
         } stream[2];
     };
-    std::array<Sender, most> senders_;
+    std::array<Sender, max> senders_;
 };
 
 /// Counts the frames to each destination. Several threads send frames.

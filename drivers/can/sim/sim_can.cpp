@@ -12,7 +12,7 @@ namespace hal::can::simbus {
 
 namespace {
 
-constexpr std::size_t most_disturbances = 64;
+constexpr std::size_t max_disturbances = 64;
 constexpr std::size_t max_filters = 1024;
 
 class SimulatedLink final : public Link, public Simulation {
@@ -130,7 +130,7 @@ public:
     }
     int disturb(const Disturbance& what) override {
         return bus_->exclusively([&] {
-            if (bus_->disturbances.size() >= most_disturbances) return -1;
+            if (bus_->disturbances.size() >= max_disturbances) return -1;
             bus_->disturbances.push_back({what, 0, 0});
             return static_cast<int>(bus_->disturbances.size()) - 1;
         });

@@ -101,7 +101,7 @@ public:
     /// A bus at 10 kbit/s needs seconds for what is queued, the safe values at its end among it.
     std::int64_t closing_ns() const noexcept override {
         constexpr std::int64_t min_bits = 47;
-        constexpr std::int64_t most_ns = 50'000'000'000;  // frame without data
+        constexpr std::int64_t max_ns = 50'000'000'000;  // frame without data
         constexpr std::int64_t shortest_line = 6;  // "t1230\r"
         if (state() == State::down) return 0;
         const auto lines =
@@ -110,7 +110,7 @@ public:
         if (lines == 0) return 0;
         const std::int64_t rate =
             counting_.bit_rate != 0 ? static_cast<std::int64_t>(counting_.bit_rate) : min_rate;
-        return std::min(most_ns, 1'000'000'000 + lines * 4 * min_bits * 1'000'000'000 / rate);
+        return std::min(max_ns, 1'000'000'000 + lines * 4 * min_bits * 1'000'000'000 / rate);
     }
 
     Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {

@@ -32,7 +32,7 @@ public:
 
 private:
     struct Place {
-        std::array<std::uint8_t, largest_frame> bytes;
+        std::array<std::uint8_t, max_frame> bytes;
         std::size_t length = 0;
         Launch launch;
     };

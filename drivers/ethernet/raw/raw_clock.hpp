@@ -71,8 +71,8 @@ public:
         if (!bounded_) return true;
         credit_ns_ += (to_ns - last_ns_) / 20 * 17 - (to_ns - from_ns);
         last_ns_ = to_ns;
-        if (credit_ns_ > most_ns) {
-            credit_ns_ = most_ns;
+        if (credit_ns_ > max_ns) {
+            credit_ns_ = max_ns;
         }
         return credit_ns_ > 0;
     }
@@ -81,9 +81,9 @@ public:
     static bool is_needed();
 
 private:
-    static constexpr std::int64_t most_ns = 100'000'000;
+    static constexpr std::int64_t max_ns = 100'000'000;
     const bool bounded_;
-    std::int64_t credit_ns_ = most_ns;
+    std::int64_t credit_ns_ = max_ns;
     std::int64_t last_ns_ = link::monotonic_ns();
 };
 

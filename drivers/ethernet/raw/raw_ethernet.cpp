@@ -62,7 +62,7 @@ public:
         const auto now = link::monotonic_ns();
         if (now >= launch.at_ns) return sender_.leave(frame, launch);
         if (pacer_) {
-            return frame.size() <= largest_frame ? pacer_->send(frame, launch, now)
+            return frame.size() <= max_frame ? pacer_->send(frame, launch, now)
                                                  : sender_.drop(Sent::rejected);
         }
         if (launch.at_ns - now > options_.spin_ns) return sender_.drop(Sent::full);

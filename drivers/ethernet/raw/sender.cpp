@@ -90,7 +90,7 @@ public:
 private:
     std::span<const std::uint8_t> bytes_;
     std::size_t length_ = 0;
-    std::array<std::uint8_t, largest_frame> buffer_;
+    std::array<std::uint8_t, max_frame> buffer_;
 };
 
 bool is_gone(int error) noexcept { return error == ENETDOWN || error == ENXIO || error == ENODEV; }

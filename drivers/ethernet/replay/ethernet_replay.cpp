@@ -41,7 +41,7 @@ public:
     const Address& address() const noexcept override { return address_; }
     Sent send(std::span<const std::uint8_t> frame, const Launch& launch,
               std::int64_t now_ns) noexcept override {
-        if (!launch.fits(frame.size()) || frame.size() > largest_frame) {
+        if (!launch.fits(frame.size()) || frame.size() > max_frame) {
             add(dropped_);
             add(errors_);
             return Sent::rejected;
@@ -139,7 +139,7 @@ Capture parse_capture(std::string_view bytes) {
     capture.problem = hal::replay::each_packet(bytes, [&](const hal::replay::Packet& packet) {
         if (packet.link != hal::replay::link_ethernet) return;
         if (packet.bytes.size() < packet.length || packet.bytes.size() < header_bytes ||
-            packet.bytes.size() > largest_frame) {
+            packet.bytes.size() > max_frame) {
             ++capture.left_out;
             return;
         }

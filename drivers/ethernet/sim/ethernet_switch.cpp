@@ -12,7 +12,7 @@ namespace hal::ethernet::simbus {
 namespace {
 
 constexpr std::size_t max_events = 8192;
-constexpr std::size_t most_disturbances = 64;
+constexpr std::size_t max_disturbances = 64;
 constexpr std::size_t max_stations = 256;
 // memory of a small switch per line; frames beyond it are lost
 constexpr std::size_t egress_bytes = 65536;
@@ -49,7 +49,7 @@ Switch::Switch(std::string its_name, const Options& o)
       speed(o.speed != 0 ? o.speed : 100),
       forward_ns(o.forward_ns >= 0 ? o.forward_ns : 2000) {
     events_.reserve(max_events);
-    disturbances.reserve(most_disturbances);
+    disturbances.reserve(max_disturbances);
     stations.reserve(max_stations);
 }
 

@@ -26,7 +26,7 @@
 
 namespace hal::ethernet::simbus {
 
-using Bytes = std::array<std::uint8_t, largest_frame>;
+using Bytes = std::array<std::uint8_t, max_frame>;
 
 /// A frame of a user, from send() until the last line has sent it.
 struct Outgoing {

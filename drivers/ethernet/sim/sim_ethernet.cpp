@@ -11,7 +11,7 @@ namespace hal::ethernet::simbus {
 
 namespace {
 
-constexpr std::size_t most_disturbances = 64;
+constexpr std::size_t max_disturbances = 64;
 constexpr std::size_t babble_capacity = 256;
 
 class SimulatedPort final : public Port, public Segment {
@@ -32,7 +32,7 @@ public:
               std::int64_t now_ns) noexcept override {
         switch_->pump(now_ns);
         const auto now = switch_->time(now_ns);
-        if (!launch.fits(frame.size()) || frame.size() > largest_frame) {
+        if (!launch.fits(frame.size()) || frame.size() > max_frame) {
             count(user_.rejected);
             return Sent::rejected;
         }
@@ -113,7 +113,7 @@ public:
     }
     int disturb(const Disturbance& what) override {
         return switch_->exclusively([&] {
-            if (switch_->disturbances.size() >= most_disturbances) return -1;
+            if (switch_->disturbances.size() >= max_disturbances) return -1;
             switch_->disturbances.push_back({what, 0, 0});
             return static_cast<int>(switch_->disturbances.size()) - 1;
         });
@@ -154,7 +154,7 @@ public:
                 s->babbler->station = s;
             }
             s->babble.fill(0);
-            const auto length = std::min(frame.size(), largest_frame);
+            const auto length = std::min(frame.size(), max_frame);
             if (length != 0) {
                 std::memcpy(s->babble.data(), frame.data(), length);
             }

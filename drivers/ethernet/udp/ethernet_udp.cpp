@@ -20,7 +20,7 @@ namespace hal::ethernet {
 namespace {
 
 constexpr std::uint32_t ip_and_udp_bytes = 28;
-constexpr std::uint32_t max_payload = largest_frame - header_bytes;
+constexpr std::uint32_t max_payload = max_frame - header_bytes;
 constexpr std::size_t max_peers = 8;
 constexpr std::int64_t peer_timeout_ns = 2'000'000'000;
 constexpr std::int64_t announce_every_ns = 500'000'000;
@@ -98,7 +98,7 @@ public:
 
     Sent send(std::span<const std::uint8_t> frame, const Launch& launch,
               std::int64_t) noexcept override {
-        if (!launch.fits(frame.size()) || frame.size() > largest_frame) {
+        if (!launch.fits(frame.size()) || frame.size() > max_frame) {
             add(dropped_);
             add(errors_);
             return Sent::rejected;
@@ -115,7 +115,7 @@ public:
             add(late_);
             return Sent::late;
         }
-        std::array<std::uint8_t, largest_frame> own;
+        std::array<std::uint8_t, max_frame> own;
         if (launch.stamp_at != 0 || launch.finisher != nullptr) {
             std::memcpy(own.data(), frame.data(), frame.size());
             auto stamp = static_cast<std::uint64_t>(now + launch.stamp_add_ns);
@@ -357,7 +357,7 @@ private:
     std::atomic<bool> up_{true};
     std::atomic<std::int64_t> last_sent_ns_{0};
     std::array<Peer, max_peers> peers_;
-    std::array<std::uint8_t, largest_frame> frame_{};  ///< used by the receiving thread
+    std::array<std::uint8_t, max_frame> frame_{};  ///< used by the receiving thread
 };
 
 }  // namespace

@@ -80,13 +80,13 @@ bool apply_arguments(const hal_host* host, void* library,
             return false;
         }
         void* const variable = *static_cast<void**>(pointer);
-        const bool array = parameter.most > 0;
+        const bool array = parameter.max > 0;
         const std::vector<std::string> values =
             array ? split(given) : std::vector<std::string>{given};
         for (std::size_t i = 0; i < values.size(); ++i) {
-            if (array && i >= static_cast<std::size_t>(parameter.most)) {
+            if (array && i >= static_cast<std::size_t>(parameter.max)) {
                 return reject(host, parameter.name, given,
-                              "has more than " + std::to_string(parameter.most) + " values");
+                              "has more than " + std::to_string(parameter.max) + " values");
             }
             if (!set_element(variable, i, parameter.type, values[i], texts)) {
                 return reject(host, parameter.name, values[i], "is not a whole number");

@@ -38,8 +38,8 @@ std::vector<Chunk> chunks;
 bool memory_kept = false;
 std::map<std::uintptr_t, std::size_t> blocks;  // what hal_malloc() gave: address and size
 
-bool add_chunk(std::size_t least) {
-    const std::size_t bytes = (least + chunk_bytes - 1) / chunk_bytes * chunk_bytes;
+bool add_chunk(std::size_t min) {
+    const std::size_t bytes = (min + chunk_bytes - 1) / chunk_bytes * chunk_bytes;
     chunks.reserve(chunks.size() + 1);
     void* const memory =
         mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);

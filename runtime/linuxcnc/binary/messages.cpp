@@ -72,7 +72,7 @@ void report_withheld() noexcept {
     const int length =
         std::snprintf(text, sizeof text,
                       "hal: %llu messages of LinuxCNC modules not printed (limit %u per second)\n",
-                      static_cast<unsigned long long>(rate.withheld), most_per_second);
+                      static_cast<unsigned long long>(rate.withheld), max_per_second);
     write_text(RTAPI_MSG_ERR, text, static_cast<std::size_t>(length));
     rate.withheld = 0;
 }
@@ -87,7 +87,7 @@ void print_lines() noexcept {
     for (;; ++printed_line) {
         Line& line = lines[printed_line % lines_in_flight];
         if (line.turn.load(std::memory_order_acquire) != printed_line + 1) break;
-        if (rate.printed < most_per_second) {
+        if (rate.printed < max_per_second) {
             ++rate.printed;
             write_text(line.level, line.text, std::strlen(line.text));
         } else {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What modules print. While a module is loaded or unloaded it is collected; in a cycle it goes
-// through a bounded queue to a thread that prints it, at most `most_per_second` lines; otherwise it
+// through a bounded queue to a thread that prints it, at most `max_per_second` lines; otherwise it
 // is printed at once.
 #pragma once
 
@@ -8,7 +8,7 @@
 
 namespace hal::modules {
 
-constexpr unsigned most_per_second = 100;
+constexpr unsigned max_per_second = 100;
 
 /// Collects what the calling thread's module prints from now on. [setup]
 void begin_capture() noexcept;

@@ -15,7 +15,7 @@ extern "C" {
 struct halcyon_module_parameter {
     const char *name, *doc;
     char type;          ///< 'i' int, 'l' long, 's' text
-    std::int32_t most;  ///< number of elements of an array; 0: a single value
+    std::int32_t max;  ///< number of elements of an array; 0: a single value
 };
 
 /// A module that was opened: a description of its file. Its code is mapped by component.create and

@@ -188,7 +188,7 @@ int rtapi_spawnp_as_root(pid_t* process, const char* file, const void* actions,
 int rtapi_open_as_root(const char* path, int flags);
 char** rtapi_argv_split(int flags, const char* text, int* count);
 void rtapi_argv_free(char** words);
-char* rtapi_kstrndup(const char* text, std::size_t most, int flags);
+char* rtapi_kstrndup(const char* text, std::size_t max, int flags);
 void rtapi_outb(unsigned char byte, unsigned port);  // [any]
 unsigned char rtapi_inb(unsigned port);  // [any]
 long simple_strtol(const char* text, char** end, unsigned base);

@@ -11,8 +11,8 @@
 namespace {
 
 constexpr std::uint32_t magic = 0x4649464f;
-constexpr std::size_t most_pins = 21;
-constexpr int most_depth = 1 << 24;
+constexpr std::size_t max_pins = 21;
+constexpr int max_depth = 1 << 24;
 
 struct Header {
     std::uint32_t magic;
@@ -21,7 +21,7 @@ struct Header {
     std::int32_t depth, pins;
     std::atomic<std::uint32_t> overruns, underruns;
     char unused[8];
-    std::int32_t types[most_pins];
+    std::int32_t types[max_pins];
 };
 constexpr std::size_t data_offset = 128;
 static_assert(offsetof(Header, depth) == 16 && offsetof(Header, overruns) == 24 &&
@@ -66,7 +66,7 @@ extern "C" {
 
 int hal_stream_create(halcyon_stream* stream, int comp, int key, int depth, const char* types) {
     const std::size_t pins = types ? std::strlen(types) : 0;
-    if (!stream || pins == 0 || pins > most_pins || depth < 1 || depth > most_depth) return -EINVAL;
+    if (!stream || pins == 0 || pins > max_pins || depth < 1 || depth > max_depth) return -EINVAL;
     for (std::size_t i = 0; i < pins; ++i) {
         if (type_of(types[i]) == 0) return -EINVAL;
     }

@@ -26,7 +26,7 @@ using namespace hal::modules;
 
 namespace {
 
-constexpr long longest_delay_ns = 10'000;
+constexpr long max_delay_ns = 10'000;
 
 struct Firmware {
     halcyon_firmware shown;  // first
@@ -49,9 +49,9 @@ long long rtapi_get_clocks() {
     return rtapi_get_time();
 #endif
 }
-long rtapi_delay_max() { return longest_delay_ns; }
+long rtapi_delay_max() { return max_delay_ns; }
 void rtapi_delay(long ns) {
-    const long long end = rtapi_get_time() + std::min(ns, longest_delay_ns);
+    const long long end = rtapi_get_time() + std::min(ns, max_delay_ns);
     while (rtapi_get_time() < end) {
     }
 }
@@ -82,10 +82,10 @@ char** rtapi_argv_split(int, const char* text, int* count) {
     }
     if (!text) return nullptr;
     const std::size_t length = std::strlen(text);
-    const std::size_t most = length / 2 + 2;
-    char** const words = static_cast<char**>(std::malloc(most * sizeof *words + length + 1));
+    const std::size_t max = length / 2 + 2;
+    char** const words = static_cast<char**>(std::malloc(max * sizeof *words + length + 1));
     if (!words) return nullptr;
-    char* const copy = reinterpret_cast<char*>(words + most);
+    char* const copy = reinterpret_cast<char*>(words + max);
     std::memcpy(copy, text, length + 1);
     int found = 0;
     char* rest = nullptr;
@@ -100,8 +100,8 @@ char** rtapi_argv_split(int, const char* text, int* count) {
     return words;
 }
 void rtapi_argv_free(char** words) { std::free(words); }
-char* rtapi_kstrndup(const char* text, std::size_t most, int) {
-    return text ? strndup(text, most) : nullptr;
+char* rtapi_kstrndup(const char* text, std::size_t max, int) {
+    return text ? strndup(text, max) : nullptr;
 }
 
 // LinuxCNC's needs neither before other calls; what an id holds is given back with it.

@@ -29,7 +29,7 @@ namespace {
 
 constexpr int highest_priority = 98;
 constexpr int lowest_priority = 1;
-constexpr std::size_t least_stack = 1 << 20;
+constexpr std::size_t min_stack = 1 << 20;
 constexpr std::size_t signal_stack_bytes = 1 << 16;
 constexpr std::int64_t second_ns = 1'000'000'000;
 
@@ -101,9 +101,9 @@ void set_up(Task& task) noexcept {
     prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL);
     const stack_t other{.ss_sp = task.signal_stack, .ss_flags = 0, .ss_size = signal_stack_bytes};
     sigaltstack(&other, nullptr);
-    volatile char room[1 << 18];
-    for (std::size_t i = 0; i < sizeof room; i += 4096) {
-        room[i] = 0;  // no page fault later
+    volatile char buffer[1 << 18];
+    for (std::size_t i = 0; i < sizeof buffer; i += 4096) {
+        buffer[i] = 0;  // no page fault later
     }
 }
 
@@ -177,8 +177,8 @@ void release_tasks(Module& module) noexcept {
 bool correct_task(long ns) noexcept {
     if (!current) return false;
     // as for the machine's threads
-    const auto most = static_cast<long>(current->period_ns.load(std::memory_order_relaxed) / 10);
-    current->correction_ns = std::clamp(ns, -most, most);
+    const auto max = static_cast<long>(current->period_ns.load(std::memory_order_relaxed) / 10);
+    current->correction_ns = std::clamp(ns, -max, max);
     return true;
 }
 
@@ -247,7 +247,7 @@ int rtapi_task_new(void (*code)(void*), void* argument, int priority, int owner,
     task->code = code;
     task->argument = argument;
     task->priority = priority;
-    task->stack = std::max<std::size_t>(stack_bytes, least_stack);
+    task->stack = std::max<std::size_t>(stack_bytes, min_stack);
     task->state.store(State::made, std::memory_order_release);
     return number_of(*task);
 }

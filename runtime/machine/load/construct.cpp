@@ -27,7 +27,7 @@ void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noe
     }
     // What lies together is fetched into the caches together: blocks of growing size, aligned by
     // hand.
-    constexpr std::size_t most = 64 * 1024;
+    constexpr std::size_t max = 64 * 1024;
     const auto take = [&](Instance::Block& block) -> void* {
         const auto begin = reinterpret_cast<std::uintptr_t>(block.memory.get());
         const std::uintptr_t at = (begin + block.used + align - 1) / align * align;
@@ -39,7 +39,7 @@ void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noe
         std::size_t next = 0;
         if (!instance.blocks.empty()) {
             if (void* const memory = take(instance.blocks.back())) return memory;
-            next = std::min(most, std::max<std::size_t>(256, 2 * instance.blocks.back().bytes));
+            next = std::min(max, std::max<std::size_t>(256, 2 * instance.blocks.back().bytes));
         }
         const std::size_t size = std::max(next, bytes + align);
         instance.blocks.push_back({std::make_unique<char[]>(size), size, 0});
@@ -428,7 +428,7 @@ private:
     /// may.
     bool fits_lists(const Construction& first, std::size_t total) {
         if (first.list_length <= total) return true;
-        const auto list = request_.arguments.find(first.longest_list);
+        const auto list = request_.arguments.find(first.max_list);
         if (list == request_.arguments.end()) return true;
         diagnostics_.error("bad-argument", list->second.at,
                            "argument '" + list->first + "' lists " +

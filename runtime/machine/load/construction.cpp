@@ -107,7 +107,7 @@ bool take_function(const hal_host* host, const hal_function_decl* decl) {
 void note_list(Construction& c, const char* argument, std::size_t length) {
     if (length <= c.list_length) return;
     c.list_length = length;
-    c.longest_list = argument;
+    c.max_list = argument;
 }
 
 const char* find_argument(const hal_host* host, const hal_argument_decl* decl) {

@@ -47,7 +47,7 @@ struct Construction {
     std::vector<DeclaredFunction> functions = {};
     std::set<std::string> asked = {};    // arguments it asked for
     std::size_t list_length = 0;         // of the longest list among them
-    std::string longest_list = {};       // its argument
+    std::string max_list = {};       // its argument
     std::map<std::string, LoadArgument::Use> uses = {};  // of those that are not common
     std::size_t declared_count = 0;  ///< instances by hal_naming::count; precedes the lists
     std::vector<std::string> texts = {};  // keeps what argument() gave

@@ -59,12 +59,12 @@ void report_in_text(const hal_host* host, const hal_text_message* message) {
         const std::uint32_t begin = std::min(message->begin, size);
         const std::uint32_t end = std::clamp(message->end, begin, size);
         const Span at = c.text_source == 0 ? c.request.at : Span{c.text_source, begin, end};
-        constexpr std::size_t most = 99;  // with the sentence behind them as many as are rendered
-        if (++c.said > most) {
-            if (c.said == most + 1) {
+        constexpr std::size_t max = 99;  // with the sentence behind them as many as are rendered
+        if (++c.said > max) {
+            if (c.said == max + 1) {
                 c.diagnostics->error("construct-failed", at,
                                      "there are more errors in '" + c.text_name + "' than the " +
-                                         std::to_string(most) + " shown; fix these first");
+                                         std::to_string(max) + " shown; fix these first");
             }
             c.said_why = true;
             return true;

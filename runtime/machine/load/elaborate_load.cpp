@@ -15,7 +15,7 @@ namespace {
 using edits::Args;
 
 // of one loadrt; a slip of the finger must not take all memory
-constexpr std::uint64_t most_instances = 200'000;
+constexpr std::uint64_t max_instances = 200'000;
 
 std::vector<std::string> split_list(const std::string& text) {
     std::vector<std::string> parts;
@@ -78,18 +78,18 @@ bool read_count(Elaboration& on, const Token& token, const std::string& key,
     if (value.empty()) return true;
     request.count_at = token.span;
     const Parsed number = parse_value(HAL_TYPE_U64, value);
-    if (number.problem.empty() && number.value.u64 >= 1 && number.value.u64 <= most_instances) {
+    if (number.problem.empty() && number.value.u64 >= 1 && number.value.u64 <= max_instances) {
         request.count = static_cast<std::int64_t>(number.value.u64);
         return true;
     }
-    const std::string range = "1.." + std::to_string(most_instances);
+    const std::string range = "1.." + std::to_string(max_instances);
     const bool digits_only = value.find_first_not_of("0123456789") == value.npos;
     const bool too_many =
-        number.problem.empty() ? number.value.u64 > most_instances : digits_only && value[0] != '0';
+        number.problem.empty() ? number.value.u64 > max_instances : digits_only && value[0] != '0';
     if (too_many) {
         on.diagnostics.error("bad-argument", token.span,
                              key + "=" + value + " exceeds the limit of " +
-                                 std::to_string(most_instances) + " instances per loadrt",
+                                 std::to_string(max_instances) + " instances per loadrt",
                              range);
     } else {
         on.diagnostics.error("bad-argument", token.span,

@@ -47,9 +47,9 @@ public:
 
     /// Notes that the present call may take `ns`, a minute at most. [setup]
     static void expect(std::int64_t ns, const char* why) noexcept {
-        constexpr std::int64_t most_ns = 60'000'000'000;
+        constexpr std::int64_t max_ns = 60'000'000'000;
         now.why = why;
-        now.expected_ns = std::clamp<std::int64_t>(ns, 0, most_ns);
+        now.expected_ns = std::clamp<std::int64_t>(ns, 0, max_ns);
     }
 
     inline static SetupCallNow now;  ///< [any]

@@ -12,7 +12,7 @@ namespace hal {
 namespace {
 
 constexpr std::int64_t shortest_period_ns = 1000;
-constexpr std::int64_t longest_period_ns = 1'000'000'000'000;
+constexpr std::int64_t max_period_ns = 1'000'000'000'000;
 
 /// A period of 0 or below in `loadrt threads`, as LinuxCNC reads it.
 bool is_no_period(std::string_view text) {
@@ -23,7 +23,7 @@ bool is_no_period(std::string_view text) {
 bool set_period(NewThread& thread, std::string_view text, Span at, Diagnostics& diagnostics) {
     thread.period_at = at;
     const auto ns = parse_duration_ns(text, 1.0);
-    if (ns && *ns >= shortest_period_ns && *ns <= longest_period_ns) {
+    if (ns && *ns >= shortest_period_ns && *ns <= max_period_ns) {
         thread.options.period_ns = *ns;
         return true;
     }

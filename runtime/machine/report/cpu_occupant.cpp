@@ -33,9 +33,9 @@ struct TaskStat {
 };
 
 bool read_stat(const fs::path& path, TaskStat& stat) {
-    constexpr std::size_t most = 4096;
+    constexpr std::size_t max = 4096;
     std::string text;
-    if (!read_regular_file(path.string(), most, text)) return false;
+    if (!read_regular_file(path.string(), max, text)) return false;
     const auto begin = text.find('(');
     const auto end = text.rfind(')');
     if (begin == std::string::npos || end == std::string::npos) return false;

@@ -326,8 +326,8 @@ void watch_for_crashes(const MachineView& machine) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
         // for the program's own thread, which runs the cycles of a virtual clock; the executor's
         // threads have one each
-        alignas(16) static char room[1 << 15];
-        const stack_t other{.ss_sp = room, .ss_flags = 0, .ss_size = sizeof room};
+        alignas(16) static char buffer[1 << 15];
+        const stack_t other{.ss_sp = buffer, .ss_flags = 0, .ss_size = sizeof buffer};
         sigaltstack(&other, nullptr);
         for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP}) {
             install_crash_handler(signal);

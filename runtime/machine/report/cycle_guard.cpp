@@ -33,7 +33,7 @@ CycleTimeLimit::Action CycleTimeLimit::check(const CycleNow& now, std::int64_t n
     }
     if (reported_ns_ != 0) {
         if (now_ns - reported_ns_ < pause_ns_) return Action::none;
-        pause_ns_ = std::min(2 * pause_ns_, longest_pause_ns);
+        pause_ns_ = std::min(2 * pause_ns_, max_pause_ns);
     }
     reported_ns_ = now_ns;
     return Action::report;

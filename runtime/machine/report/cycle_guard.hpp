@@ -20,7 +20,7 @@ public:
     static constexpr std::int64_t first_report_ns = 10'000'000'000;
 
 public:
-    static constexpr std::int64_t longest_pause_ns = 600'000'000'000;
+    static constexpr std::int64_t max_pause_ns = 600'000'000'000;
     enum class Action : std::uint8_t { none, report, end };
 
     /// What the cycle does that runs now, if any, in real time. [any]

@@ -42,7 +42,7 @@ void Traces::start(Core& core) {
     core.trace(&ring->ring);
 }
 
-TraceBatch Traces::take(std::size_t most) {
+TraceBatch Traces::take(std::size_t max) {
     TraceBatch batch;
     if (!on_) return batch;
     for (const auto& owned : machine_.model.threads) {
@@ -53,7 +53,7 @@ TraceBatch Traces::take(std::size_t most) {
         }
         Ring& ring = *of_.at(core);
         TraceBatch::Part part;
-        for (TraceEvent event; part.events.size() < most && ring.ring.take(event);) {
+        for (TraceEvent event; part.events.size() < max && ring.ring.take(event);) {
             part.events.push_back(event);
             if (event.kind != TraceEvent::function || !named_.insert(event.id).second) continue;
             if (const LoadedFunction* const function = function_with_id(machine_.model, event.id)) {

@@ -47,7 +47,7 @@ public:
     void end();
     /// Takes the events that have come, at most so many of each thread. Threads that were added
     /// meanwhile are recorded from now on.
-    TraceBatch take(std::size_t most = 1 << 14);
+    TraceBatch take(std::size_t max = 1 << 14);
 
 private:
     struct Ring {

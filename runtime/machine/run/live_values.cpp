@@ -175,7 +175,7 @@ void LiveValues::write(const std::vector<std::pair<Pin*, hal_value>>& values) {
             continue;
         }
         row[signal] = value;
-        if (row.size() >= Core::most_writes / 2) {
+        if (row.size() >= Core::max_writes / 2) {
             flush();
         }
     }

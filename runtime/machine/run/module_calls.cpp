@@ -37,8 +37,8 @@ constexpr Row module_commands[] = {{"newsig", config, edits::newsig},
                                    {"stop", run, nullptr},
                                    {"lock", 0, nullptr}};
 
-void put_text(const std::string& text, char* to, std::size_t room) {
-    const std::size_t length = std::min(text.size(), room - 1);
+void put_text(const std::string& text, char* to, std::size_t capacity) {
+    const std::size_t length = std::min(text.size(), capacity - 1);
     std::memcpy(to, text.data(), length);
     to[length] = '\0';
 }
@@ -68,16 +68,16 @@ bool take_later(Construction& c, std::string_view name, const char* number) {
 }
 
 int carry_out(const hal_host* host, const char* const* words, std::size_t count, char* why,
-              std::size_t room) {
+              std::size_t capacity) {
     Construction& c = construction_of(host);
     return guarded(c, -ENOMEM, [&] {
-        put_text("unknown command", why, room);
+        put_text("unknown command", why, capacity);
         const Row* const row =
             std::find_if(std::begin(module_commands), std::end(module_commands),
                          [&](const Row& one) { return count > 0 && one.name == words[0]; });
         if (!c.request.on || row == std::end(module_commands)) return -EINVAL;
         if (locks_of(c) & row->lock) {
-            put_text("it is locked (lock, hal_set_lock)", why, room);
+            put_text("it is locked (lock, hal_set_lock)", why, capacity);
             return -EPERM;
         }
         if (!row->elaborate) {
@@ -86,7 +86,7 @@ int carry_out(const hal_host* host, const char* const* words, std::size_t count,
         }
         if (!enter_declared(c)) {
             c.said_why = true;
-            put_text("what the module has declared is rejected", why, room);
+            put_text("what the module has declared is rejected", why, capacity);
             return -EINVAL;
         }
         std::vector<Token> arguments;
@@ -114,7 +114,7 @@ int carry_out(const hal_host* host, const char* const* words, std::size_t count,
         const auto error =
             std::find_if(found.all().begin(), found.all().end(),
                          [](const Diagnostic& one) { return one.severity == Severity::error; });
-        put_text(error->message, why, room);
+        put_text(error->message, why, capacity);
         return -EINVAL;
     });
 }

@@ -138,7 +138,7 @@ void OpenTransaction::journal(std::uint64_t epoch) noexcept {
 
 bool OpenTransaction::carry_out(Diagnostics& diagnostics) {
     const std::size_t values = edit_->pin_values.size() + edit_->signal_values.size();
-    if (!edit_->structural() && values <= Core::most_writes / 2) {
+    if (!edit_->structural() && values <= Core::max_writes / 2) {
         if (!state_.threads.write(edit_->pin_values, edit_->signal_values, diagnostics)) {
             return false;
         }

@@ -215,8 +215,8 @@ std::shared_ptr<LiveProbe> Probes::attach(const ProbeRequest& request, std::stri
         return nullptr;
     };
     if (request.names.empty()) return reject("a probe needs at least one name");
-    if (request.names.size() > most_names) {
-        return reject("a probe has at most " + std::to_string(most_names) + " names");
+    if (request.names.size() > max_names) {
+        return reject("a probe has at most " + std::to_string(max_names) + " names");
     }
     auto probe = std::make_shared<LiveProbe>();
     probe->request = request;
@@ -251,9 +251,9 @@ std::shared_ptr<LiveProbe> Probes::attach(const ProbeRequest& request, std::stri
                      8;  // rounded up to a power of two
         }
     }
-    if (bytes > most_bytes) {
+    if (bytes > max_bytes) {
         return reject("the probe needs up to " + std::to_string(bytes >> 20) +
-                      " MiB of memory, more than " + std::to_string(most_bytes >> 20) +
+                      " MiB of memory, more than " + std::to_string(max_bytes >> 20) +
                       "; sample fewer values, a shorter buffer_ms, or a larger every");
     }
     adopt(*probe, found);
@@ -331,11 +331,11 @@ namespace {
 
 // Appends the rows before `until_ns`, as many as fit.
 std::size_t move_rows(const LiveProbe& probe, RingGroup& group, std::int64_t until_ns,
-                      std::size_t most, std::string& bytes) {
+                      std::size_t max, std::string& bytes) {
     plan::ProbeRing& ring = *group.ring;
     const std::size_t size = ring.size();
     std::size_t rows = 0;
-    for (; rows < size && bytes.size() < most; ++rows) {
+    for (; rows < size && bytes.size() < max; ++rows) {
         const std::uint64_t* const row = ring.row(rows);
         if (static_cast<std::int64_t>(row[1]) >= until_ns) break;
         append(bytes, row[0]);
@@ -350,7 +350,7 @@ std::size_t move_rows(const LiveProbe& probe, RingGroup& group, std::int64_t unt
 
 }  // namespace
 
-std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t most) {
+std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t max) {
     std::vector<ProbeRows> results;
     const std::int64_t now_ns = state_.executor->now_ns();
     // Returns the time before which no row remains.
@@ -361,7 +361,7 @@ std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t most) {
             if (!group.ring) continue;
             // before the rows: a loss is named with or before the row after it
             const std::uint64_t lost = group.ring->lost();
-            const std::size_t rows = move_rows(probe, group, until_ns, most, to.bytes);
+            const std::size_t rows = move_rows(probe, group, until_ns, max, to.bytes);
             if (rows > 0 || lost > group.reported) {
                 to.parts.push_back({i, rows, lost - std::exchange(group.reported, lost)});
             }

@@ -62,8 +62,8 @@ struct ProbeRows {
 /// Part of a Session. [setup]
 class Probes {
 public:
-    static constexpr std::size_t most_names = 4096;
-    static constexpr std::size_t most_bytes = std::size_t{64} << 20;  ///< of the rings of one probe
+    static constexpr std::size_t max_names = 4096;
+    static constexpr std::size_t max_bytes = std::size_t{64} << 20;  ///< of the rings of one probe
     explicit Probes(SessionState& state);
     ~Probes();
 
@@ -78,8 +78,8 @@ public:
     static std::uint64_t lost(const LiveProbe& probe);
     /// Takes the rows that have come, at most so many bytes in each result. There is one result per
     /// layout in force since the last call.
-    std::vector<ProbeRows> take(LiveProbe& probe, std::size_t most_bytes = most_at_once);
-    static constexpr std::size_t most_at_once = std::size_t{1} << 18;
+    std::vector<ProbeRows> take(LiveProbe& probe, std::size_t max_bytes = max_at_once);
+    static constexpr std::size_t max_at_once = std::size_t{1} << 18;
 
     /// For the compiler's result that threads are going to take: gives each plan its probes.
     void enter(Compiled& compiled);

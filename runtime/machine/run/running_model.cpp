@@ -70,13 +70,13 @@ void end_conditions(Executor& executor, const Instance& instance) {
 namespace {
 
 /// hal_status::text; its data is the RunningModel.
-std::size_t status_for_plugins(const hal_status* self, char* to, std::size_t room) {
+std::size_t status_for_plugins(const hal_status* self, char* to, std::size_t capacity) {
     RunningModel& machine = *static_cast<RunningModel*>(self->data);
     const SessionLock lock = machine.try_lock();
     if (!lock) return 0;
     try {
         const std::string text = machine.reports().status_text();
-        const std::size_t length = std::min(room, text.size());
+        const std::size_t length = std::min(capacity, text.size());
         std::memcpy(to, text.data(), length);
         return length;
     } catch (const std::bad_alloc&) {

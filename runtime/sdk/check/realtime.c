@@ -22,7 +22,7 @@
 
 #include "hal/abi.h"
 
-enum { cycles = 1000, most = 4096 };
+enum { cycles = 1000, max = 4096 };
 static const int64_t period_ns = 1000000;
 
 static __thread bool in_cycle;
@@ -184,12 +184,12 @@ static struct {
     hal_pin* memory;
     hal_type type;
     hal_dir dir;
-} pins[most];
+} pins[max];
 static struct {
     char name[160];
     hal_step step;
     void* self;
-} functions[most];
+} functions[max];
 static int pin_count, function_count, argument_count;
 static char** arguments_given;
 static const hal_component* component;
@@ -202,7 +202,7 @@ static bool accept_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* 
     if (decl->size >= sizeof *decl && decl->pointer) {
         *decl->pointer = memory->slot;
     }
-    if (pin_count < most) {
+    if (pin_count < max) {
         pins[pin_count].memory = memory;
         pins[pin_count].type = decl->type;
 
@@ -212,7 +212,7 @@ static bool accept_pin(const hal_host* host, const hal_pin_decl* decl, hal_pin* 
 }
 static bool accept_function(const hal_host* host, const hal_function_decl* decl) {
     (void)host;
-    if ((decl->flags & HAL_FUNCTION_EMERGENCY) || function_count == most) return true;
+    if ((decl->flags & HAL_FUNCTION_EMERGENCY) || function_count == max) return true;
     const bool whole = component->flags & HAL_COMPONENT_WHOLE_NAMES;
     char* const name = functions[function_count].name;
     if (whole) {

@@ -15,13 +15,13 @@ enum {
     peek_user = 3,
     get_register_set = 0x4204,
     set_register_set = 0x4205,
-    largest = 16384,
+    max = 16384,
     places = 1024
 };
 
 static struct {
     const void* of;
-    unsigned char state[largest];
+    unsigned char state[max];
 } kept[places];
 
 static unsigned char* kept_state(const void* of) {
@@ -42,7 +42,7 @@ static long raw(long request, long process, long address, void* data) {
 static long get_state(long process, struct iovec* to) {
     unsigned char* const state = kept_state(to->iov_base);
     if (!state) return -1;
-    struct iovec whole = {state, largest};
+    struct iovec whole = {state, max};
     const long result = raw(get_register_set, process, NT_X86_XSTATE, &whole);
     if (result < 0) return result;
     if (to->iov_len > whole.iov_len) {
@@ -53,8 +53,8 @@ static long get_state(long process, struct iovec* to) {
 }
 
 static long set_state(long process, const struct iovec* from) {
-    static unsigned char now[largest];
-    struct iovec whole = {now, largest};
+    static unsigned char now[max];
+    struct iovec whole = {now, max};
     if (raw(get_register_set, process, NT_X86_XSTATE, &whole) < 0) return -1;
     unsigned char* const state = kept_state(from->iov_base);
     if (state) {

@@ -3,7 +3,7 @@
 #include "declared.h"
 #include <signal.h>
 
-enum { most = 4000 };
+enum { max = 4000 };
 static volatile int *from, *to;
 static sig_atomic_t stop;
 
@@ -65,16 +65,16 @@ int main(void) {
            hal_port_write(12345, bytes, 1));
     unsigned received = 0;
     unsigned transmitted = 0;
-    for (unsigned turn = 0; !stop && (received < most || transmitted < most); ++turn) {
+    for (unsigned turn = 0; !stop && (received < max || transmitted < max); ++turn) {
         const unsigned count = 1 + turn % 64;
-        if (received < most) {
+        if (received < max) {
             hal_port_wait_readable((volatile int**)&from, count, &stop);
             if (!stop && !receive(&received, count, turn % 2)) {
                 printf("not received\n");
                 return 1;
             }
         }
-        if (transmitted < most) {
+        if (transmitted < max) {
             hal_port_wait_writable((volatile int**)&to, count, &stop);
             if (!stop && !transmit(&transmitted, count)) {
                 printf("not transmitted\n");
@@ -82,7 +82,7 @@ int main(void) {
             }
         }
     }
-    printf("size %u, received %d, transmitted %u\n", hal_port_buffer_size(*to), received >= most,
+    printf("size %u, received %d, transmitted %u\n", hal_port_buffer_size(*to), received >= max,
            transmitted);
     hal_port_wait_readable((volatile int**)&from, 1000,
                            &stop); /* more than it holds: until the program is to end */

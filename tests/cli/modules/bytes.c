@@ -12,7 +12,7 @@ void hal_port_clear(int port);
 struct pins {
     volatile int *to, *from;
     volatile bool *clear, *good;
-    volatile uint32_t *written, *read, *waiting, *room, *size;
+    volatile uint32_t *written, *read, *waiting, *capacity, *size;
 };
 static struct pins* pins;
 static int comp;
@@ -26,7 +26,7 @@ static void write_bytes(void* unused, long period) {
     if (hal_port_write(*pins->to, bytes, 5)) {
         *pins->written += 5;
     }
-    *pins->room = hal_port_writable(*pins->to);
+    *pins->capacity = hal_port_writable(*pins->to);
     *pins->size = hal_port_buffer_size(*pins->to);
 }
 static void read_bytes(void* unused, long period) {
@@ -58,7 +58,7 @@ int rtapi_app_main(void) {
     hal_pin_u32_newf(OUT, &pins->written, comp, "bytes.written");
     hal_pin_u32_newf(OUT, &pins->read, comp, "bytes.read");
     hal_pin_u32_newf(OUT, &pins->waiting, comp, "bytes.waiting");
-    hal_pin_u32_newf(OUT, &pins->room, comp, "bytes.room");
+    hal_pin_u32_newf(OUT, &pins->capacity, comp, "bytes.room");
     hal_pin_u32_newf(OUT, &pins->size, comp, "bytes.size");
     *pins->good = 1;
     hal_export_funct("bytes.write", write_bytes, 0, 0, 0, comp);

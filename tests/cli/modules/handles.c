@@ -7,7 +7,7 @@ struct handles {
     volatile double *real, *real_out, *step;
     volatile int64_t *s32, *s32_out, *s64, *s64_out, *old, *cycles, *hidden;
     volatile int *to, *from;
-    volatile uint64_t most;
+    volatile uint64_t max;
 };
 static struct handles* h;
 static int comp;
@@ -22,7 +22,7 @@ static void copy(void* unused, long period) {
     *h->s32_out = (int32_t)*h->s32;
     *h->s64_out = *h->s64;
     *h->old = -*h->s64;
-    if ((uint64_t)*h->cycles < h->most) {
+    if ((uint64_t)*h->cycles < h->max) {
         ++*h->cycles;
     }
     ++*h->hidden;
@@ -52,14 +52,14 @@ int rtapi_app_main(void) {
     bad = bad || hal_pin_new_sint(comp, IN, &h->s64, -5000000000, "handles.s64") ||
           hal_pin_new_sint(comp, OUT, &h->s64_out, 0, "handles.s64-out");
     bad = bad || hal_pin_s64_newf(OUT, &h->old, comp, "handles.%s", "old") ||
-          hal_param_u64_newf(RW, &h->most, comp, "handles.most");
+          hal_param_u64_newf(RW, &h->max, comp, "handles.most");
     bad = bad || hal_param_new_real(comp, RW, &h->step, 0.25, "handles.step") ||
           hal_param_new_sint(comp, RO, &h->cycles, 0, "handles.cycles");
     bad = bad || hal_param_new_fake(comp, &h->hidden) || *h->hidden != 0;
     bad = bad || hal_pin_new_port(comp, OUT, &h->to, "handles.%s", "to") ||
           hal_pin_new_port(comp, IN, &h->from, "handles.from");
     if (bad) return -1;
-    h->most = 3;
+    h->max = 3;
     /* a name of 55 characters is the longest; a pin is not a parameter */
     const int level = rtapi_get_msg_level();
     volatile double* other = 0;

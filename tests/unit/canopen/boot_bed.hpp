@@ -196,7 +196,7 @@ inline NodeSetup example_node(std::uint8_t id = 5) {
     n.serial = 4;
     n.heartbeat_ms = 50;
     n.retry = 200 * millisecond;
-    n.retry_most = 2 * second;
+    n.retry_max = 2 * second;
     n.boot_limit = 3 * second;
     return n;
 }

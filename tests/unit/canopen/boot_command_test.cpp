@@ -177,10 +177,10 @@ TEST(MasterObjects, Show_the_setup_and_accept_commands) {
     EXPECT_EQ(assignment_of(again), assignment_of(b.setup.nodes[2]));
 
     const auto state = [&](std::uint8_t id) {
-        std::array<std::uint8_t, 4> room{};
+        std::array<std::uint8_t, 4> buffer{};
         std::size_t size = 0;
-        EXPECT_EQ(dictionary.read(0x1f82, id, room, size), Abort::none);
-        return room[0];
+        EXPECT_EQ(dictionary.read(0x1f82, id, buffer, size), Abort::none);
+        return buffer[0];
     };
     const auto request = [&](std::uint8_t id, std::uint8_t what) {
         return dictionary.write(0x1f82, id, std::span(&what, 1));

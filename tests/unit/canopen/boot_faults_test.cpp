@@ -20,7 +20,7 @@ struct Plant : Bed {
                   s.master_limit_ms = 5000;
                   s.boot_limit = 60 * second;
                   s.retry = second;
-                  s.retry_most = 5 * second;
+                  s.retry_max = 5 * second;
                   s.on_failure = s.on_loss = reaction;
                   s.writes = {object_write(0x2000, 0, std::uint32_t{9}),
                               object_write(0x2001, 0, std::int16_t{-5})};
@@ -55,7 +55,7 @@ TEST_P(BootFaults, Never_leave_the_network_stuck) {
         Plant b(GetParam(), n, Reaction::restart);
         b.power();
         b.start();
-        Time longest = 0;
+        Time max = 0;
         Time since = b.now;
         Time down = 0;
         auto step = b.status(5).step;
@@ -65,13 +65,13 @@ TEST_P(BootFaults, Never_leave_the_network_stuck) {
                 step = b.status(5).step;
                 since = b.now;
             }
-            longest = std::max(longest, b.now - since);
+            max = std::max(max, b.now - since);
             const auto& network = b.master->status();
             if (network.state == NetworkState::operational) continue;
             down += b.dt;
             ASSERT_NE(network.node, 0) << "every " << n;
         }
-        EXPECT_LE(longest, 30 * second) << "every " << n << ": " << to_string(step);
+        EXPECT_LE(max, 30 * second) << "every " << n << ": " << to_string(step);
         // Only where question or answer is always hit may it be down for long.
         EXPECT_LE(down, (n > 4 ? 30 : 3600) * second)
             << "every " << n << ": " << b.master->sentence();

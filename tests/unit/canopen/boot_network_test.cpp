@@ -121,16 +121,16 @@ TEST(BootNetwork, Limits_the_number_of_nodes_booted_at_a_time) {
     Three b({}, [](MasterSetup& s) { s.parallel = 1; });
     b.power();
     b.start();
-    unsigned most = 0;
+    unsigned max = 0;
     ASSERT_TRUE(b.until([&] {
-        most = std::max<unsigned>(most, static_cast<unsigned>(std::ranges::count_if(
+        max = std::max<unsigned>(max, static_cast<unsigned>(std::ranges::count_if(
                                             b.setup.nodes, [&](const NodeSetup& n) {
             const auto step = b.status(n.id).step;
             return step >= Step::resetting && step <= Step::watching;
         })));
         return b.master->status().state == NetworkState::operational;
     }));
-    EXPECT_EQ(most, 1U);
+    EXPECT_EQ(max, 1U);
 }
 
 TEST(BootNetwork, Keeps_the_NMT_inhibit_time_between_commands) {
@@ -168,14 +168,14 @@ TEST(BootNetwork, Reports_emergencies_and_keeps_the_newest) {
 TEST(BootNetwork, Serves_requests_of_the_application_while_booting) {
     Three b;
     b.power();
-    std::array<std::uint8_t, 8> room{};
-    SdoRequest read{.index = 0x2000, .upload = true, .buffer = room};
+    std::array<std::uint8_t, 8> buffer{};
+    SdoRequest read{.index = 0x2000, .upload = true, .buffer = buffer};
     b.start();
     b.step();
     ASSERT_TRUE(b.master->network().node(6)->sdo().submit(read));
     ASSERT_TRUE(b.operational());
     EXPECT_TRUE(read.ok());
-    EXPECT_EQ(load<std::uint32_t>(room.data()), 0x12345678U);
+    EXPECT_EQ(load<std::uint32_t>(buffer.data()), 0x12345678U);
 }
 
 }  // namespace

@@ -25,9 +25,9 @@ std::vector<Packet> decoded(Decoder& decoder, std::span<const std::uint8_t> byte
 }
 
 std::vector<std::uint8_t> line(Generator& generator, std::size_t bytes) {
-    std::vector<std::uint8_t> room(bytes);
-    generator.fill(room);
-    return room;
+    std::vector<std::uint8_t> buffer(bytes);
+    generator.fill(buffer);
+    return buffer;
 }
 
 TEST(Jr3Stream, gives_back_what_went_in) {

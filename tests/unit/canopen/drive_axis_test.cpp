@@ -68,8 +68,8 @@ struct AxisAndDrive : DriveBench {
         }
     }
     template <class F>
-    bool wait(F&& so, int most = 5000) {
-        for (int n = 0; n < most; ++n) {
+    bool wait(F&& so, int max = 5000) {
+        for (int n = 0; n < max; ++n) {
             if (so()) return true;
             cycle();
         }

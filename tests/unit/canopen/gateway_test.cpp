@@ -45,10 +45,10 @@ struct Gate : testing::Test {
         return text;
     }
     /// What comes of a line, without its line end; several lines are joined by "|".
-    std::string ask(const std::string& line, Time most_ms = 3000) {
+    std::string ask(const std::string& line, Time max_ms = 3000) {
         taken();
         gate.receive(client, line + "\r\n", now);
-        for (Time n = 0; n == 0 || (n < most_ms && !gate.idle()); ++n) {
+        for (Time n = 0; n == 0 || (n < max_ms && !gate.idle()); ++n) {
             run(1);
         }
         std::string text = taken();
@@ -259,12 +259,12 @@ TEST_F(Gate, Init_ends_what_waits_and_so_does_a_client_that_goes) {
     run(5);
 }
 TEST_F(Gate, Lines_that_are_too_long_and_commands_that_are_too_many_are_refused) {
-    gate.receive(client, std::string(Gateway::most_line + 10, 'x'), now);
+    gate.receive(client, std::string(Gateway::max_line + 10, 'x'), now);
     gate.receive(client, "still the same\n[1] 5 start\n", now);
     EXPECT_EQ(taken(),
               "[0] ERROR:101 #syntax error: the line is longer than 4194304 bytes\r\n[1] OK\r\n");
     std::string many;
-    for (unsigned n = 0; n < Gateway::most_pending + 1; ++n) {
+    for (unsigned n = 0; n < Gateway::max_pending + 1; ++n) {
         many += "[" + std::to_string(n) + "] 9 r 0x1000 0\n";
     }
     gate.receive(client, many, now);

@@ -77,7 +77,7 @@ struct Wire : RunnerEvents {
         }
         runner.receive(now);
         if (target != nullptr) {
-            target->wish = static_cast<std::uint64_t>(number);
+            target->output = static_cast<std::uint64_t>(number);
         }
         runner.transmit(now, millisecond);
         node->turn(now);
@@ -111,8 +111,8 @@ struct Wire : RunnerEvents {
     }
     void on_sync_overrun() noexcept override { ++overruns; }
     void on_own_id_collision() noexcept override { ++own_id_taken; }
-    void on_short(std::size_t place, unsigned bytes) noexcept override {
-        cut.emplace_back(place, bytes);
+    void on_short(std::size_t position, unsigned bytes) noexcept override {
+        cut.emplace_back(position, bytes);
     }
 
     void on_foreign(const Foreign& f) noexcept override { foreign.push_back(f); }

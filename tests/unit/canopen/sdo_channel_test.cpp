@@ -181,8 +181,8 @@ TEST(SdoClient, Continues_after_the_segment_a_server_acknowledged_early) {
 
 TEST(SdoClient, Drops_a_stale_abort_and_repeats_the_request_on_timeout) {
     SdoBed p;
-    std::uint8_t room[4];
-    SdoRequest r{.index = 0x2000, .sub = 0, .upload = true, .buffer = room};
+    std::uint8_t buffer[4];
+    SdoRequest r{.index = 0x2000, .sub = 0, .upload = true, .buffer = buffer};
     p.client.submit(r);
     p.client.poll(p.now);
     Frame asked;
@@ -198,7 +198,7 @@ TEST(SdoClient, Drops_a_stale_abort_and_repeats_the_request_on_timeout) {
     }
     EXPECT_TRUE(r.ok());
     EXPECT_EQ(r.retries, 1U);
-    EXPECT_EQ(load<std::uint32_t>(room), 0x12345678U);
+    EXPECT_EQ(load<std::uint32_t>(buffer), 0x12345678U);
 }
 
 TEST(SdoClient, Falls_back_to_segments_when_the_server_has_no_block_transfer) {
@@ -222,8 +222,8 @@ TEST(SdoClient, Aborts_the_transfer_when_the_node_does_not_respond) {
     FrameQueue out(64);
     SdoClient client(out, {.timeout = 10 * millisecond, .resends = 2, .restarts = 0});
     client.configure(9);
-    std::uint8_t room[4];
-    SdoRequest r{.index = 0x1000, .upload = true, .buffer = room};
+    std::uint8_t buffer[4];
+    SdoRequest r{.index = 0x1000, .upload = true, .buffer = buffer};
     client.submit(r);
     for (Time t = 0; t < 100 * millisecond && !r.done(); t += millisecond) {
         client.poll(t);
@@ -263,8 +263,8 @@ TEST(SdoClient, Does_not_write_beyond_its_buffer) {
     SdoRequest down{.index = 0x2006, .data = data};
     ASSERT_TRUE(p.run(down));
     for (const auto mode : {SdoMode::segmented, SdoMode::block}) {
-        std::vector<std::uint8_t> room(999);
-        SdoRequest up{.index = 0x2006, .upload = true, .mode = mode, .buffer = room};
+        std::vector<std::uint8_t> buffer(999);
+        SdoRequest up{.index = 0x2006, .upload = true, .mode = mode, .buffer = buffer};
         ASSERT_TRUE(p.run(up));
         EXPECT_EQ(up.abort, Abort::memory);
         EXPECT_FALSE(up.aborted_by_server);
@@ -301,8 +301,8 @@ TEST(SdoClient, Fails_when_no_frame_can_be_sent_within_the_response_timeout) {
         EXPECT_FALSE(r.aborted_by_server);
         EXPECT_EQ(out.size(), waiting);  // no abort behind all that
         out.clear();
-        std::uint8_t room[4];
-        SdoRequest next{.index = 0x1000, .upload = true, .buffer = room};
+        std::uint8_t buffer[4];
+        SdoRequest next{.index = 0x1000, .upload = true, .buffer = buffer};
         client.submit(next);
         client.poll(t);
         ASSERT_EQ(out.size(), 1U);

@@ -16,16 +16,16 @@ TEST_P(Sizes, Transfers_complete_in_both_directions_on_a_good_wire) {
     const auto [size, mode] = GetParam();
     SdoBed p;
     const auto data = pattern(size, 1);
-    std::vector<std::uint8_t> room(size + 3);
+    std::vector<std::uint8_t> buffer(size + 3);
     SdoRequest down{.index = 0x2006, .mode = mode, .data = data};
 
-    SdoRequest up{.index = 0x2006, .upload = true, .mode = mode, .buffer = room};
+    SdoRequest up{.index = 0x2006, .upload = true, .mode = mode, .buffer = buffer};
     ASSERT_TRUE(p.run(down));
     EXPECT_TRUE(down.ok()) << to_string(down.abort);
     ASSERT_TRUE(p.run(up));
     EXPECT_TRUE(up.ok()) << to_string(up.abort);
     EXPECT_EQ(up.size, size);
-    EXPECT_TRUE(std::equal(data.begin(), data.end(), room.begin()));
+    EXPECT_TRUE(std::equal(data.begin(), data.end(), buffer.begin()));
     EXPECT_EQ(down.retries + up.retries, 0U);
     EXPECT_EQ(p.client.unexpected_responses(), 0U);
 }
@@ -56,10 +56,10 @@ TEST_P(Disturbed, Transfers_are_correct_or_report_failure_on_a_disturbed_wire) {
                         .repeat = fault == Fault::repeat ? n : 0,
                         .delay = fault == Fault::delay ? n : 0};
         const auto data = pattern(size, n);
-        std::vector<std::uint8_t> room(size);
+        std::vector<std::uint8_t> buffer(size);
         SdoRequest down{.index = 0x2006, .mode = mode, .data = data};
 
-        SdoRequest up{.index = 0x2006, .upload = true, .mode = mode, .buffer = room};
+        SdoRequest up{.index = 0x2006, .upload = true, .mode = mode, .buffer = buffer};
         ASSERT_TRUE(p.run(down)) << size;
         const auto& e = *p.device.dictionary().find(0x2006, 0);
         if (down.ok()) {
@@ -76,7 +76,7 @@ TEST_P(Disturbed, Transfers_are_correct_or_report_failure_on_a_disturbed_wire) {
         ASSERT_TRUE(p.run(up)) << size;
         if (up.ok()) {
             ASSERT_EQ(up.size, size);
-            ASSERT_EQ(room, data) << size;
+            ASSERT_EQ(buffer, data) << size;
         }
         // The protocol recovers blocks, and segments if the server tolerates repeats.
         const bool recoverable = n >= 5 && (fault != Fault::delay) &&

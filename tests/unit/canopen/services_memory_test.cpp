@@ -51,7 +51,7 @@ TEST(Memory, Is_not_taken_after_setup) {
     FrameQueue out(1024);
     Network network(out, events);
     auto& node = network.add(5);
-    static std::uint8_t data[5000], room[5000];
+    static std::uint8_t data[5000], buffer[5000];
     Time now = 0;
     int failed = 0;
     const auto turn = [&] {
@@ -86,7 +86,7 @@ TEST(Memory, Is_not_taken_after_setup) {
     device.start(now);
     for (const auto mode : {SdoMode::segmented, SdoMode::block}) {
         for (const bool up : {false, true}) {
-            SdoRequest r{.index = 0x2006, .upload = up, .mode = mode, .data = data, .buffer = room};
+            SdoRequest r{.index = 0x2006, .upload = up, .mode = mode, .data = data, .buffer = buffer};
             serve(r);
         }
     }
@@ -134,7 +134,7 @@ TEST(Memory, Is_not_taken_while_a_master_boots_loses_and_restarts_nodes) {
     n.heartbeat_ms = 20;
     n.master_limit_ms = 500;
     n.retry = 50 * millisecond;
-    n.retry_most = 100 * millisecond;
+    n.retry_max = 100 * millisecond;
     MasterSetup setup;
     setup.sdo.timeout = 20 * millisecond;
     setup.nodes = {n, n, n};

@@ -200,7 +200,7 @@ TEST(Encoder, Velocity_and_interpolation_at_constant_speed) {
     e.set("position-scale", 100.0);
     e.set("min-speed-estimate", 0.1);
     std::int64_t at = 0;
-    double largest = 0.0;
+    double max = 0.0;
     // 137 cycles of 50 us per count: 145.985 counts/s
     for (int cycle = 1; cycle <= 20'000; ++cycle) {
         if (cycle % 137 == 0) {
@@ -211,11 +211,11 @@ TEST(Encoder, Velocity_and_interpolation_at_constant_speed) {
         e.capture();
         if (cycle < 1000) continue;
         ASSERT_NEAR(e.get<double>("velocity"), 1e9 / (137.0 * base_ns) / 100.0, 1e-9);
-        largest = std::max(
-            largest, std::abs(e.get<double>("position-interpolated") - cycle / 137.0 / 100.0));
+        max = std::max(
+            max, std::abs(e.get<double>("position-interpolated") - cycle / 137.0 / 100.0));
     }
     // an edge is seen up to a fast cycle late: 1/137 of a count; not the count of 1e-2
-    EXPECT_LT(largest, 0.5e-3);
+    EXPECT_LT(max, 0.5e-3);
     EXPECT_DOUBLE_EQ(e.get<double>("velocity-rpm"), e.get<double>("velocity") * 60.0);
 }
 

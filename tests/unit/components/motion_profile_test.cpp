@@ -42,11 +42,11 @@ double excess(const Path& path, const Limits& limits) {
     for (int i = 0; i <= 200; ++i) {
         const State s = path.at(path.duration() * i / 200 * (1 - 1e-13), jerk);
         const bool at_rest = std::fabs(s.velocity) < 1e-9 * limits.velocity;
-        const double least =
+        const double min =
             s.velocity * s.acceleration >= 0.0 ? limits.acceleration : limits.deceleration;
-        const double most = at_rest ? std::max(limits.acceleration, limits.deceleration) : least;
+        const double max = at_rest ? std::max(limits.acceleration, limits.deceleration) : min;
         worst = std::max({worst, std::fabs(s.velocity) / limits.velocity - 1,
-                          std::fabs(s.acceleration) / most - 1, std::fabs(jerk) / limits.jerk - 1});
+                          std::fabs(s.acceleration) / max - 1, std::fabs(jerk) / limits.jerk - 1});
     }
     return worst;
 }
@@ -94,14 +94,14 @@ TEST(MotionProfile, Limits_changed_on_the_way_are_recovered_and_the_target_reach
             ASSERT_LT(miss(path, target), 1e-11) << "trial " << trial;
             double jerk = 0.0;
             double speed = std::fabs(start.velocity);
-            const double most =
+            const double max =
                 std::max({speed, std::fabs(Path(start, limits.jerk).settled()), limits.velocity});
             for (int i = 0; i <= 100; ++i) {
                 speed =
                     std::max(speed, std::fabs(path.at(path.duration() * i / 100, jerk).velocity));
             }
             // a start beyond a limit of acceleration takes the settled speed with it, and no more
-            ASSERT_LT(speed, most * (1 + 1e-9)) << "trial " << trial;
+            ASSERT_LT(speed, max * (1 + 1e-9)) << "trial " << trial;
             start = path.at(path.duration() * random.between(0, 1), jerk);
         }
     }

@@ -99,14 +99,14 @@ TEST(Furuta, A_free_swing_halves_in_some_fifteen_seconds) {
     Instance furuta("furuta", {{"pendulum_angle", "0.5"}});
     furuta.set("enable", false);
     furuta.set("rotor-inertia", 1e6);
-    double largest = 0.0;
+    double max = 0.0;
     for (int i = 0; i < 16000; ++i) {
         furuta.run("update", 1'000'000);
         if (i >= 14000) {
-            largest = std::max(largest, furuta.get<double>("pendulum-angle"));
+            max = std::max(max, furuta.get<double>("pendulum-angle"));
         }
     }
-    EXPECT_NEAR(largest, 0.25, 0.05);
+    EXPECT_NEAR(max, 0.25, 0.05);
 }
 
 TEST(Furuta, Push_gives_the_centre_of_mass_its_speed_and_is_taken_back) {

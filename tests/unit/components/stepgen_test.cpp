@@ -92,7 +92,7 @@ TEST(Stepgen, Keeps_every_time_of_step_and_direction) {
     int low = 1000;
     int dir_age = 1000;
     int shortest_high = 1000;
-    int longest_high = 0;
+    int max_high = 0;
 
     int shortest_low = 1000;
     int shortest_hold = 1000;
@@ -118,7 +118,7 @@ TEST(Stepgen, Keeps_every_time_of_step_and_direction) {
             }
             if (!now && step) {
                 shortest_high = std::min(shortest_high, high);
-                longest_high = std::max(longest_high, high);
+                max_high = std::max(max_high, high);
                 low = 0;
             }
             ++(now ? high : low);
@@ -129,7 +129,7 @@ TEST(Stepgen, Keeps_every_time_of_step_and_direction) {
     }
     EXPECT_GT(reversals, 20);
     EXPECT_EQ(shortest_high, 2);
-    EXPECT_EQ(longest_high, 2);
+    EXPECT_EQ(max_high, 2);
     EXPECT_EQ(shortest_low, 3);
     EXPECT_EQ(shortest_hold, 4);
     EXPECT_EQ(shortest_setup, 5);
@@ -240,7 +240,7 @@ std::vector<unsigned> states(Stepgen& s, int phases, int steps) {
 TEST(Stepgen, Unipolar_phases_are_switched_in_the_documented_way) {
     struct Case {
         const char* type;
-        int phases, length, fewest_on, most_on;
+        int phases, length, fewest_on, max_on;
     };
     for (const Case c : {Case{"2", 2, 4, 0, 2}, Case{"3", 3, 3, 1, 1}, Case{"4", 3, 6, 1, 2},
                          Case{"5", 4, 4, 1, 1}, Case{"6", 4, 4, 2, 2}, Case{"9", 4, 8, 1, 2},
@@ -249,10 +249,10 @@ TEST(Stepgen, Unipolar_phases_are_switched_in_the_documented_way) {
         Stepgen s(c.type, "v");
         const std::vector<unsigned> seen = states(s, c.phases, 24);
         // half steps and quadrature: one phase changes; else one comes, one goes
-        const bool alternates = c.fewest_on != c.most_on;
+        const bool alternates = c.fewest_on != c.max_on;
         for (std::size_t k = 0; k < seen.size(); ++k) {
             EXPECT_GE(std::popcount(seen[k]), c.fewest_on) << c.type;
-            EXPECT_LE(std::popcount(seen[k]), c.most_on) << c.type;
+            EXPECT_LE(std::popcount(seen[k]), c.max_on) << c.type;
             if (k > 0) {
                 EXPECT_EQ(std::popcount(seen[k] ^ seen[k - 1]), alternates ? 1 : 2) << c.type;
             }

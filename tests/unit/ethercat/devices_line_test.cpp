@@ -276,7 +276,7 @@ TEST_F(Devices, Mailbox_device_answers_ARP_and_echo_once_it_has_an_address) {
     ip.address = 0xc0a8020a;
     ip.mask = 0xffffff00;
     std::copy(own.begin(), own.end(), ip.mac.begin());
-    Bytes settings(eoe::header_bytes + eoe::largest_ip);
+    Bytes settings(eoe::header_bytes + eoe::max_ip);
     eoe::Header h;
     h.type = eoe::Type::set_ip;
     h.last = true;

@@ -150,7 +150,7 @@ TEST_F(Line, Ring_returns_at_the_other_end_and_survives_a_break) {
 TEST_F(Line, Circulating_frame_is_destroyed) {
     row(2);
     w.line.power_on(0);
-    std::array<std::uint8_t, largest_frame_bytes> buffer{};
+    std::array<std::uint8_t, max_frame_bytes> buffer{};
     FrameWriter writer(buffer, {1, 2, 3, 4, 5, 6});
     writer.add(Command::brd, 0, 0, 1);
     const std::size_t length = writer.finish().size();

@@ -61,7 +61,7 @@ struct World {
     std::int64_t gap_ns = 100'000;    ///< from frame to frame
     esc::End end = esc::End::primary;
     esc::Line::Passage out;
-    std::array<std::uint8_t, largest_frame_bytes> frame{};
+    std::array<std::uint8_t, max_frame_bytes> frame{};
     std::vector<std::uint8_t> data;   ///< of the answer
     std::uint16_t event = 0;
 

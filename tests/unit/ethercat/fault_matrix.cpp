@@ -102,7 +102,7 @@ void Machine::cycle() {
     }
 }
 
-unsigned Machine::recover(unsigned most) {
+unsigned Machine::recover(unsigned max) {
     const auto arrives = [&] {
         auto& out = static_cast<devices::IoBehaviour&>(devices[io].firmware->behaviour());
         if (!master->status().operational ||
@@ -115,7 +115,7 @@ unsigned Machine::recover(unsigned most) {
         return true;
     };
     unsigned in_a_row = 0;
-    for (unsigned n = 1; n <= most; ++n) {
+    for (unsigned n = 1; n <= max; ++n) {
         cycle();
         in_a_row = arrives() ? in_a_row + 1 : 0;
         if (in_a_row == 50) return n;

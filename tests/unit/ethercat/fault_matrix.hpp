@@ -218,7 +218,7 @@ struct Machine {
     }
     /// Runs until the bus is operational and its outputs arrive. Returns the cycles it took; 0:
     /// never within `most`.
-    unsigned recover(unsigned most = 60'000);
+    unsigned recover(unsigned max = 60'000);
     /// Makes whole what is broken.
     void repair();
     std::int64_t deviation_ns(std::size_t drive);

@@ -27,12 +27,12 @@ struct Summary {
     std::uint64_t faults = 0;
     std::uint64_t hits = 0;
     std::int64_t virtual_ns = 0;
-    unsigned longest = 0;
+    unsigned max = 0;
     std::string at;
     void add(unsigned cycles, const std::string& what) {
         ++faults;
-        if (cycles > longest) {
-            longest = cycles;
+        if (cycles > max) {
+            max = cycles;
             at = what;
         }
     }
@@ -41,7 +41,7 @@ struct Summary {
             "%llu faults, %llu frames hit, %.0f s of virtual time; longest way back to OP %u ms "
             "(%s)\n",
             static_cast<unsigned long long>(faults), static_cast<unsigned long long>(hits),
-            static_cast<double>(virtual_ns) * 1e-9, longest, at.c_str());
+            static_cast<double>(virtual_ns) * 1e-9, max, at.c_str());
     }
 };
 

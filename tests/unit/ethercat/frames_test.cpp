@@ -13,7 +13,7 @@ namespace {
 using namespace hal::ethercat;
 
 TEST(EthercatFrame, Reader_gives_back_what_the_writer_wrote) {
-    std::array<std::uint8_t, largest_frame_bytes> buffer{};
+    std::array<std::uint8_t, max_frame_bytes> buffer{};
     FrameWriter writer(buffer, {2, 1, 2, 3, 4, 5});
     std::uint8_t* first = writer.add(Command::brd, 7, at_position(0, registers::al_status), 2);
     ASSERT_NE(first, nullptr);
@@ -40,7 +40,7 @@ TEST(EthercatFrame, Reader_gives_back_what_the_writer_wrote) {
 }
 
 TEST(EthercatFrame, Datagram_beyond_the_frame_is_not_read) {
-    std::array<std::uint8_t, largest_frame_bytes> buffer{};
+    std::array<std::uint8_t, max_frame_bytes> buffer{};
     FrameWriter writer(buffer, {});
     writer.add(Command::brd, 7, 0, 100);
     const auto frame = writer.finish();

@@ -51,7 +51,7 @@ struct CoeSlave : MailboxSlave {
         ASSERT_EQ(m.type, MailboxType::coe);
         ASSERT_GE(m.payload.size(), 3U);
         const std::uint8_t command = m.payload[2];
-        const std::size_t room = bus.area().in_size - 6U;
+        const std::size_t capacity = bus.area().in_size - 6U;
         Bytes p(10);
         if (coe::service_of(m.payload.data()) == coe::Service::sdo_information) {
             return information(m);
@@ -76,7 +76,7 @@ struct CoeSlave : MailboxSlave {
                         {static_cast<std::uint8_t>(0x43 | (4 - size) << 2), index, sub, value});
                     return answer(p);
                 }
-                at = std::min(size, room - 10);
+                at = std::min(size, capacity - 10);
                 coe::write_sdo(p.data(), coe::Service::sdo_response,
                                {0x41, index, sub, static_cast<std::uint32_t>(size)});
                 p.insert(p.end(), target->begin(), target->begin() + static_cast<long>(at));
@@ -96,7 +96,7 @@ struct CoeSlave : MailboxSlave {
         }
         case 3: {
             if ((command & 0x10) != toggle) return abort(0x05030000);
-            const std::size_t count = std::min(size - at, room - 3);
+            const std::size_t count = std::min(size - at, capacity - 3);
             p.resize(3);
             p[0] = 0;
             p[1] = 0x30;
@@ -123,7 +123,7 @@ struct CoeSlave : MailboxSlave {
         }
     }
     void information(const MailboxMessage& m) {
-        const std::size_t room = bus.area().in_size - 6U;
+        const std::size_t capacity = bus.area().in_size - 6U;
         Bytes data;
         if (m.payload[2] == 1) {
             data = {m.payload[6], m.payload[7]};
@@ -141,7 +141,7 @@ struct CoeSlave : MailboxSlave {
         } else {
             data = {m.payload[6], m.payload[7], m.payload[8], 0, 5, 0, 8, 0, 0x3f, 0, 'V'};
         }
-        const std::size_t chunk = (room - 6) / 2 * 2;
+        const std::size_t chunk = (capacity - 6) / 2 * 2;
         const std::size_t fragments = (data.size() + chunk - 1) / chunk;
         for (std::size_t i = 0; i < fragments; ++i) {
             Bytes p(6);
@@ -344,7 +344,7 @@ TEST(EthercatCoe, Information_is_joined_from_fragments) {
         ASSERT_TRUE(results[1]) << lose;
         EXPECT_EQ(std::string(name.data(), object.name_length),
                   "A name longer than one mailbox of 64 bytes can hold in one go");
-        EXPECT_EQ(object.largest_sub, 3);
+        EXPECT_EQ(object.max_sub, 3);
         ASSERT_TRUE(results[2]) << lose;
         EXPECT_EQ(entry.bits, 8);
         EXPECT_EQ(name[80], 'V');

@@ -100,7 +100,7 @@ TEST(EthercatGateway, Passes_requests_to_the_slave_by_UDP_and_TCP) {
 struct MasterDictionary {
     std::vector<GatewaySlave> slaves{{0x1001, 0, 2, 0x1234, 0x10000, 7},
                                      {0x1002, 1, 2, 0x5678, 0x10000, 8}};
-    std::size_t capacity = largest_mailbox;
+    std::size_t capacity = max_mailbox;
 
     /// Returns the payload of the answer to a CoE payload.
     Bytes ask(const Bytes& payload) const {
@@ -148,7 +148,7 @@ TEST(EthercatMasterDictionary, Lists_its_objects) {
     EXPECT_EQ(f.describe(coe::Information::list_request, {2, 0}), (Bytes{2, 0, 0, 0, 2, 0}));
     EXPECT_EQ(f.describe(coe::Information::list_request, {6, 0})[0], 7) << "an error";
     f.slaves.resize(4000, f.slaves.front());
-    EXPECT_LE(f.describe(coe::Information::list_request, {1, 0}).size(), largest_mailbox);
+    EXPECT_LE(f.describe(coe::Information::list_request, {1, 0}).size(), max_mailbox);
 }
 
 TEST(EthercatMasterDictionary, Describes_objects_and_entries) {

@@ -99,7 +99,7 @@ TEST_F(EthercatFaults, A_slave_in_OP_that_takes_no_part_in_the_process_data_is_n
     start(2);
     const auto set_fmmus = [&](std::uint8_t active) {
         for (const std::uint16_t fmmu : {0x60c, 0x61c}) {
-            std::array<std::uint8_t, largest_frame_bytes> bytes{};
+            std::array<std::uint8_t, max_frame_bytes> bytes{};
             FrameWriter frame(bytes, {2, 0, 0, 0, 0, 9});
             put(frame.add(Command::fpwr, 0, at_station(0x1002, fmmu), 1), active);
             std::vector<std::uint8_t> sent(frame.finish().size());

@@ -231,7 +231,7 @@ TEST(EthercatMaster, Too_many_slaves_are_reported_once_and_again_when_they_are_o
         w.add(0x100 + n);
     }
     auto setup = drives(1);
-    setup.most_slaves = 3;
+    setup.max_slaves = 3;
     w.begin(setup);
     w.run(2000);
     ASSERT_EQ(w.log.count(Event::too_many_slaves), 1U);

@@ -28,7 +28,7 @@ struct Datagram {
 };
 
 Bytes frame_with(const std::vector<Datagram>& datagrams, std::uint8_t source) {
-    std::array<std::uint8_t, largest_frame_bytes> buffer{};
+    std::array<std::uint8_t, max_frame_bytes> buffer{};
     FrameWriter writer(buffer, {source, 1, 2, 3, 4, 5});
     for (const Datagram& d : datagrams) {
         const auto length = static_cast<std::uint16_t>(d.data.size());

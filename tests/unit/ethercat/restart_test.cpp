@@ -76,19 +76,19 @@ struct Machine {
     }
     /// Returns the cycles after which `done()` is true; `most`: it never is.
     template <class Done>
-    unsigned until(Done done, unsigned most) {
+    unsigned until(Done done, unsigned max) {
         unsigned n = 0;
-        while (n < most && !done()) {
+        while (n < max && !done()) {
             cycle();
             ++n;
         }
         return n;
     }
-    unsigned until_operational(unsigned most) {
-        return until([&] { return !stopped && master->status().operational; }, most);
+    unsigned until_operational(unsigned max) {
+        return until([&] { return !stopped && master->status().operational; }, max);
     }
-    bool finished(master::MailboxRequest& request, unsigned most) {
-        return until([&] { return requests.finished(request); }, most) < most;
+    bool finished(master::MailboxRequest& request, unsigned max) {
+        return until([&] { return requests.finished(request); }, max) < max;
     }
     std::string text() const { return events.text(setup); }
 

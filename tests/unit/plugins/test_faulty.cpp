@@ -92,9 +92,9 @@ struct Faulty : hal::Component {
 private:
     static void keep(void* p) noexcept { asm volatile("" : : "r"(p) : "memory"); }
     static int deeper(int depth) noexcept {
-        volatile char room[4096];
-        room[0] = static_cast<char>(depth);
-        return depth < 0 ? 0 : deeper(depth + 1) + room[0];
+        volatile char buffer[4096];
+        buffer[0] = static_cast<char>(depth);
+        return depth < 0 ? 0 : deeper(depth + 1) + buffer[0];
     }
     void die(std::uint32_t how) noexcept {
         switch (how) {

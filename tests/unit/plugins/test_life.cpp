@@ -35,8 +35,8 @@ struct Life : hal::Component {
     void stop() noexcept { ++watch.stopped; }
     void copy(hal::Cycle) noexcept {
         const int now = ++watch.inside;
-        if (now > watch.most_inside) {
-            watch.most_inside = now;
+        if (now > watch.max_inside) {
+            watch.max_inside = now;
         }
         while (watch.hang) {
             watch.hanging = true;

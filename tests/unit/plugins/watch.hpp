@@ -17,7 +17,7 @@ struct Watch {
     std::atomic<int> emergencies{0};
     /// how many threads run the function now, and ever did
     std::atomic<int> inside{0};
-    std::atomic<int> most_inside{0};
+    std::atomic<int> max_inside{0};
     std::atomic<bool> hang{false};
     std::atomic<bool> hanging{false};
     std::atomic<std::uint64_t> runs{0};

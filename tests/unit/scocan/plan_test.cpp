@@ -63,7 +63,7 @@ public:
             members_[name] = &bus.add(name);
         }
         for (const Message& m : bus.table.messages) {
-            frames_.push_back(longest(m, random));
+            frames_.push_back(max(m, random));
         }
         bus.run(60 * ms);
     }
@@ -173,7 +173,7 @@ private:
         return 0;
     }
     /// Returns a frame that is nearly as long as stuff bits can make it.
-    static hal::can::Frame longest(const Message& m, std::mt19937& random) {
+    static hal::can::Frame max(const Message& m, std::mt19937& random) {
         constexpr std::uint8_t patterns[] = {0x00, 0xff, 0x0f, 0xf0, 0x87,
                                              0x78, 0xc3, 0x3c, 0x1e, 0xe1};
         hal::can::Frame best, f;

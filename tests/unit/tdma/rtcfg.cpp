@@ -90,7 +90,7 @@ struct Cell : Bed {
     }
     void inject(rtcfg::Message message, int from, Time at) {
         message.from = mac(from);
-        std::vector<std::uint8_t> frame(ethernet::largest_frame);
+        std::vector<std::uint8_t> frame(ethernet::max_frame);
         frame.resize(rtcfg::encode(message, frame));
         wire.inject(frame, from, at);
     }
@@ -267,7 +267,7 @@ TEST(Rtcfg_client, ignores_a_fragment_for_another_station) {
     m.id = rtcfg::Id::stage_2_fragment;
     m.from = mac(1);
     m.to = mac(9);
-    std::array<std::uint8_t, ethernet::largest_frame> frame{};
+    std::array<std::uint8_t, ethernet::max_frame> frame{};
     client.arrived(std::span(frame).first(rtcfg::encode(m, frame)), cell.now);
     EXPECT_EQ(1U, client.foreign());
     m.to = mac(2);

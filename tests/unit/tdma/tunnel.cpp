@@ -57,7 +57,7 @@ struct Pair : Bed {
         EXPECT_TRUE(at_m.open() && at_s.open());
     }
     static Bytes next(Tunnel& t) {
-        Bytes out(ethernet::largest_frame);
+        Bytes out(ethernet::max_frame);
         out.resize(t.take(out));
         return out;
     }
@@ -224,7 +224,7 @@ struct Hostile {
 class Hostile_frame : public testing::TestWithParam<Hostile> {};
 TEST_P(Hostile_frame, is_counted_and_rejected) {
     Pair p;
-    Bytes frame(ethernet::largest_frame);
+    Bytes frame(ethernet::max_frame);
     frame.resize(tunnel(packet(mac(2), mac(1), 100), frame));
     ASSERT_TRUE(is_packet(decode(frame), mac(2)));
     GetParam().spoil(frame);
@@ -268,7 +268,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(Tunnel, passes_on_only_valid_packets_from_random_frames) {
     Pair p;
     std::mt19937_64 random{7};
-    Bytes good(ethernet::largest_frame), out(ethernet::largest_frame);
+    Bytes good(ethernet::max_frame), out(ethernet::max_frame);
     good.resize(tunnel(packet(mac(2), mac(1), 300), good));
     std::uint64_t taken = 0;
     for (int i = 0; i < 20'000; ++i) {

@@ -23,7 +23,7 @@ using canopen::SdoRequest;
 namespace {
 
 // of one object; a larger one is a program, not a setting
-constexpr std::size_t most_bytes = 65536;
+constexpr std::size_t max_bytes = 65536;
 
 /// Set-points and outputs of CiA 401 and 402: a write moves the device.
 bool moves(std::uint16_t index) {
@@ -52,7 +52,7 @@ enum class Read { value, refused, failed };
 
 Read read_object(NodeClient& station, std::uint8_t node, std::uint16_t index, std::uint8_t sub,
                  std::vector<std::uint8_t>& bytes, SdoRequest& request) {
-    bytes.resize(most_bytes);
+    bytes.resize(max_bytes);
     request = {.index = index, .sub = sub, .upload = true, .buffer = bytes};
     const bool read = station.transfer(node, request);
     bytes.resize(request.ok() ? request.size : 0);

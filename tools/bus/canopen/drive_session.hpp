@@ -61,7 +61,7 @@ private:
     NodeClient& station_;
     Supervision& supervision_;
     const Settings settings_;
-    std::array<std::unique_ptr<SdoAxis>, cia402::most_axes> axes_;
+    std::array<std::unique_ptr<SdoAxis>, cia402::max_axes> axes_;
     std::atomic<bool> pressed_{false};  // written by the thread of signals
 };
 

@@ -265,7 +265,7 @@ private:
             if (sent < 0) break;
             text.erase(0, static_cast<std::size_t>(sent));
         }
-        return text.size() <= Gateway::most_output || (end(c), false);
+        return text.size() <= Gateway::max_output || (end(c), false);
     }
 
     const GatewayOptions& options_;
@@ -304,9 +304,9 @@ bool read_identity(const GatewayOptions& options, canopen::gateway::Identity& ou
     for (const Name& name : {Name{"--vendor-name", options.vendor_name, out.vendor_name},
                              Name{"--product-name", options.product_name, out.product_name},
                              Name{"--order-code", options.order_code, out.order_code}}) {
-        if (name.given.size() > canopen::gateway::Identity::most_name) {
+        if (name.given.size() > canopen::gateway::Identity::max_name) {
             fail(options, fmt::format("{} has {} bytes; at most {} are allowed", name.option,
-                                      name.given.size(), canopen::gateway::Identity::most_name));
+                                      name.given.size(), canopen::gateway::Identity::max_name));
 
             return false;
         }

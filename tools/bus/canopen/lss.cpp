@@ -57,15 +57,15 @@ struct Lss {
                                              r.error));
         }
     }
-    bool number(std::size_t n, const char* what, std::uint64_t most, std::uint32_t& value) const {
+    bool number(std::size_t n, const char* what, std::uint64_t max, std::uint32_t& value) const {
         const std::string& text = arguments[n];
         const std::optional<std::uint64_t> read = parse_natural(text);
-        if (read && *read <= most) {
+        if (read && *read <= max) {
             value = static_cast<std::uint32_t>(*read);
             return true;
         }
         fail(options,
-             fmt::format("invalid {1} '{0}'; write a number up to {2}, or 0x…", text, what, most));
+             fmt::format("invalid {1} '{0}'; write a number up to {2}, or 0x…", text, what, max));
 
         return false;
     }
@@ -225,7 +225,7 @@ int identify(Lss& l) {
 struct Command {
     const char* name;
     const char* arguments;
-    std::size_t least, most;
+    std::size_t min, max;
     int (*run)(Lss&);
 };
 
@@ -264,7 +264,7 @@ int run_can_lss(const LssOptions& options) {
                                          hint.empty() ? "see: hal help can lss" : hint));
     }
     std::vector<std::string> arguments(options.words.begin() + 2, options.words.end());
-    if (arguments.size() < command->least || arguments.size() > command->most) {
+    if (arguments.size() < command->min || arguments.size() > command->max) {
         return fail(options, fmt::format("wrong arguments of {}; type: hal can lss ADDRESS {}{}",
                                          word, word, command->arguments));
     }

@@ -32,7 +32,7 @@ struct Heard {
     bool has_heartbeat = false;  ///< a heartbeat or a guarding response was received
     canopen::NmtState state = canopen::NmtState::initialising;
     std::int64_t last = 0;
-    std::int64_t longest = 0;  ///< time of the newest one; the longest interval
+    std::int64_t max = 0;  ///< time of the newest one; the longest interval
     std::uint64_t boot_ups = 0;
     std::uint64_t emergencies = 0;
     std::deque<Emergency> newest;
@@ -46,9 +46,9 @@ void take(Nodes& nodes, const can::Frame& f) {
         Heard& n = nodes[f.id & 0x7f];
         if (f.data[0] == 0) {
             ++n.boot_ups;
-            n.longest = 0;
+            n.max = 0;
         } else if (n.has_heartbeat && n.state != canopen::NmtState::initialising) {
-            n.longest = std::max(n.longest, f.time_ns - n.last);
+            n.max = std::max(n.max, f.time_ns - n.last);
         }
         n.state = static_cast<canopen::NmtState>(f.data[0] & 0x7f);
         n.last = f.time_ns;
@@ -68,7 +68,7 @@ double seconds(std::int64_t ns) { return static_cast<double>(ns) / 1e9; }
 
 /// Returns true when no heartbeat was received for more than twice its longest interval.
 bool is_offline(const Heard& n, std::int64_t now) {
-    return n.longest > 0 && now - n.last > 2 * n.longest + 50'000'000;
+    return n.max > 0 && now - n.last > 2 * n.max + 50'000'000;
 }
 
 std::string state_of(const Heard& n) {
@@ -92,7 +92,7 @@ std::string table(const Nodes& nodes, std::int64_t now) {
         std::string line = fmt::format("{:>4}  {:15}  {:>10}  {:>8}  {}", id, state_of(n), age,
                                        n.boot_ups, n.emergencies);
         if (is_offline(n, now)) {
-            line += fmt::format("; OFFLINE: heartbeats were {:.2f} s apart", seconds(n.longest));
+            line += fmt::format("; OFFLINE: heartbeats were {:.2f} s apart", seconds(n.max));
         }
         text += line + "\n";
         for (const Emergency& e : n.newest) {

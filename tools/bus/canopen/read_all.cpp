@@ -78,7 +78,7 @@ private:
 
 int run_can_read_all(const ReadAllOptions& options) {
     // of one object; memory is used only as far as it is filled
-    constexpr std::size_t most_bytes = 64 << 20;
+    constexpr std::size_t max_bytes = 64 << 20;
     if (options.words.size() != 2) {
         return fail(options,
                     "expected ADDRESS NODE; type: hal can read-all ADDRESS NODE --eds FILE");
@@ -99,7 +99,7 @@ int run_can_read_all(const ReadAllOptions& options) {
     }
     NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
-    const auto received = std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes);
+    const auto received = std::make_unique_for_overwrite<std::uint8_t[]>(max_bytes);
     std::string csv = "index,sub,name,type,access,value,data,reason\r\n";
     std::size_t read = 0;
     std::size_t refused = 0;
@@ -114,7 +114,7 @@ int run_can_read_all(const ReadAllOptions& options) {
                 canopen::SdoRequest request{.index = object.index,
                                             .sub = entry.sub,
                                             .upload = true,
-                                            .buffer = {received.get(), most_bytes}};
+                                            .buffer = {received.get(), max_bytes}};
                 const bool good = station.transfer(node, request);
                 if (!good && !request.aborted_by_server) {
                     return station.fail_transfer(node, request, one.object.label());

@@ -19,7 +19,7 @@ using canopen::Type;
 namespace {
 
 // of one object; memory is used only as far as it is filled
-constexpr std::size_t most_bytes = 64 << 20;
+constexpr std::size_t max_bytes = 64 << 20;
 
 struct SdoTarget {
     std::uint8_t node = 0;
@@ -98,13 +98,13 @@ int run_can_sdo_read(const SdoReadOptions& options) {
     }
     NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;
-    const auto received = std::make_unique_for_overwrite<std::uint8_t[]>(most_bytes);
+    const auto received = std::make_unique_for_overwrite<std::uint8_t[]>(max_bytes);
     for (const ObjectName& object : objects) {
         SdoRequest request{.index = object.index,
                            .sub = object.sub,
                            .upload = true,
                            .mode = target.mode,
-                           .buffer = {received.get(), most_bytes}};
+                           .buffer = {received.get(), max_bytes}};
         if (!station.transfer(target.node, request)) {
             return station.fail_transfer(target.node, request, object.label());
         }

@@ -55,7 +55,7 @@ WireDatagram write_datagram(std::size_t position, std::uint16_t address,
 
 DatagramExchange::Flight DatagramExchange::send(std::span<WireDatagram> datagrams,
                                                 std::size_t first) {
-    std::array<std::uint8_t, ethercat::largest_frame_bytes> buffer;
+    std::array<std::uint8_t, ethercat::max_frame_bytes> buffer;
     const std::size_t max_bytes = ethernet::header_bytes + access_.port().statistics().mtu;
     ethercat::FrameWriter frame(buffer, access_.port().address(), max_bytes);
     Flight flight{.first = first, .count = 0, .index = ++index_};

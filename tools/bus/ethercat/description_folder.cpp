@@ -13,7 +13,7 @@ namespace esi = ethercat::esi;
 
 namespace {
 
-constexpr std::size_t largest_file = 256'000'000;  // bytes; a maker's largest has about 80 MB
+constexpr std::size_t max_file = 256'000'000;  // bytes; a maker's largest has about 80 MB
 
 /// Returns how well a match fits; 0: there is no device.
 int fit(const esi::Match& match) {
@@ -43,7 +43,7 @@ std::vector<std::filesystem::path> descriptions_in(const std::filesystem::path& 
 
 std::string DescriptionFolder::add(const std::filesystem::path& path) {
     std::string bytes;
-    if (!read_regular_file(path.string(), largest_file, bytes)) {
+    if (!read_regular_file(path.string(), max_file, bytes)) {
         return fmt::format("cannot read '{}': {}", path.string(), bytes);
     }
     esi::File file = esi::read(bytes);

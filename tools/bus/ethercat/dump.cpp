@@ -56,7 +56,7 @@ public:
     std::uint64_t datagrams() const { return datagrams_; }
 
 private:
-    static constexpr std::size_t most_bytes = 16;
+    static constexpr std::size_t max_bytes = 16;
     double seconds(std::int64_t time_ns) const {
         return static_cast<double>(time_ns - first_ns_) / 1e9;
     }
@@ -77,10 +77,10 @@ private:
                                          ? ""
                                          : fmt::format(" {:04X}", d.register_address());
         std::string bytes;
-        for (std::size_t i = 0; i < std::min<std::size_t>(d.length, most_bytes); ++i) {
+        for (std::size_t i = 0; i < std::min<std::size_t>(d.length, max_bytes); ++i) {
             bytes += fmt::format(" {:02X}", d.data[i]);
         }
-        if (d.length > most_bytes) {
+        if (d.length > max_bytes) {
             bytes += " …";
         }
         std::string text = fmt::format("{:12.6f}  {}  {:4} {}{}  [{}]{}  WKC {}", seconds(time_ns),

@@ -265,9 +265,9 @@ int run_node_ethercat(const EthercatLineOptions& options) {
     }
     std::vector<devices::Device> devices;
     if (!read_devices(options, devices)) return 1;
-    if (options.faults.size() > esc::Line::most_disturbances) {
+    if (options.faults.size() > esc::Line::max_disturbances) {
         return fail(options,
-                    fmt::format("at most {} faults are possible", esc::Line::most_disturbances));
+                    fmt::format("at most {} faults are possible", esc::Line::max_disturbances));
     }
     std::vector<esc::LineCommand> faults(options.faults.size());
     for (std::size_t n = 0; n < faults.size(); ++n) {

@@ -82,7 +82,7 @@ std::string GatewayLine::open(const std::string& address) {
 
             s.state = State::preop;
             s.mailbox = {request_area, small_mailbox, reply_area,
-                         static_cast<std::uint16_t>(largest_mailbox)};
+                         static_cast<std::uint16_t>(max_mailbox)};
             s.protocols = ethercat::bit_of(ethercat::MailboxType::coe);
             slaves_.push_back(s);
         }

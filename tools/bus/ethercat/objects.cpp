@@ -114,7 +114,7 @@ int run_ethercat_sdos(const EthercatPositionOptions& options) {
         json += fmt::format("{}{{\"index\":{},\"name\":{},\"entries\":[",
                             json.empty() ? "[" : ",\n ", index, json_string(title));
         bool first = true;
-        for (unsigned sub = 0; sub <= object.object.largest_sub; ++sub) {
+        for (unsigned sub = 0; sub <= object.object.max_sub; ++sub) {
             MailboxRequest entry;
             entry.slave = s->number;
             entry.kind = MailboxRequest::Kind::entry;

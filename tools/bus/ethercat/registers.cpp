@@ -55,7 +55,7 @@ int run_ethercat_reg_read(const EthercatPositionOptions& options) {
     const auto& words = wire.arguments();
     const auto address = ethercat_number(words.empty() ? "" : words[0], 0xffff);
     const auto length = words.size() == 2
-                            ? ethercat_number(words[1], ethercat::largest_datagram_data)
+                            ? ethercat_number(words[1], ethercat::max_datagram_data)
                             : std::optional<std::uint64_t>(2);
     if (words.size() > 2 || !address || !length || *length == 0) {
         return fail(options,

@@ -16,12 +16,12 @@ namespace {
 
 constexpr std::int64_t cycle_ns = 1'000'000;
 constexpr std::int64_t second = 1'000'000'000;
-constexpr std::uint16_t most_slaves = 1024;
+constexpr std::uint16_t max_slaves = 1024;
 
 }  // namespace
 
 EthercatSession::EthercatSession()
-    : mailboxes_(most_slaves),
+    : mailboxes_(max_slaves),
       server_(mailboxes_, [this](std::uint16_t n) { return find(n); }),
       requests_(server_.open()) {}
 
@@ -56,7 +56,7 @@ bool EthercatSession::open(const EthercatOptions& options, bool objects) {
     setup.cycle_ns = cycle_ns;
     // this program and an emulated line share the processor with others
     setup.frame_timeout_ns = 20'000'000;
-    setup.most_slaves = most_slaves;
+    setup.max_slaves = max_slaves;
     setup.frame_bytes = ethernet::header_bytes + port->statistics().mtu;
     master_ = std::make_unique<master::Master>(setup, port->address(),
                                                static_cast<master::Events&>(*this), server_.coe());

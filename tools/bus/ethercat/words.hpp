@@ -16,12 +16,12 @@
 namespace hal::tools {
 
 /// Returns a number in decimal, 0x… or 0…; nullopt: invalid, or above `most`. [any]
-inline std::optional<std::uint64_t> ethercat_number(const std::string& text, std::uint64_t most) {
+inline std::optional<std::uint64_t> ethercat_number(const std::string& text, std::uint64_t max) {
     char* end = nullptr;
     errno = 0;
     const std::uint64_t value = std::strtoull(text.c_str(), &end, 0);
     if (text.empty() || text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0 ||
-        value > most) {
+        value > max) {
         return std::nullopt;
     }
     return value;

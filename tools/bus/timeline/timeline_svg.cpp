@@ -207,11 +207,11 @@ private:
         y_ += bar_height + 12;
     }
     /// Returns the length of a bar.
-    double response_length(std::int64_t ns, std::int64_t longest_ns) const {
-        return response_width * static_cast<double>(ns) / static_cast<double>(longest_ns);
+    double response_length(std::int64_t ns, std::int64_t max_ns) const {
+        return response_width * static_cast<double>(ns) / static_cast<double>(max_ns);
     }
-    void response_bar_of(std::int64_t ns, std::int64_t longest_ns, double at_y, Colour colour) {
-        const double length = ns < 0 ? 0 : response_length(ns, longest_ns);
+    void response_bar_of(std::int64_t ns, std::int64_t max_ns, double at_y, Colour colour) {
+        const double length = ns < 0 ? 0 : response_length(ns, max_ns);
         if (ns >= 0) {
             box(left, left + length, at_y, response_bar, code_of(colour),
                 " stroke=\"#8899aa\" stroke-width=\"0.5\"");
@@ -220,29 +220,29 @@ private:
             ns < 0 ? "unbounded" : fmt::format("{:.3f}", static_cast<double>(ns) / 1e6);
         text(left + length + 6, at_y + response_bar, 9, "start", number);
     }
-    std::int64_t longest_response() const {
-        std::int64_t longest = 1;
+    std::int64_t max_response() const {
+        std::int64_t max = 1;
         for (const ResponseTime& one : timeline_.responses) {
-            longest = std::max({longest, one.worst_ns, one.compared_ns.value_or(0),
+            max = std::max({max, one.worst_ns, one.compared_ns.value_or(0),
                                 one.deadline_ns.value_or(0)});
         }
-        return longest;
+        return max;
     }
     void responses() {
         if (timeline_.responses.empty()) return;
         y_ = std::max(y_, top - 12);
         text(16, y_ + 14, 13, "start", timeline_.response_title, bold);
         y_ += 26;
-        const std::int64_t longest = longest_response();
+        const std::int64_t max = max_response();
         for (const ResponseTime& one : timeline_.responses) {
             text(left - 8, y_ + 13, 11, "end", fitting(one.name));
-            response_bar_of(one.worst_ns, longest, y_ + 2, one.colour);
+            response_bar_of(one.worst_ns, max, y_ + 2, one.colour);
             if (one.compared_ns) {
-                response_bar_of(*one.compared_ns, longest, y_ + 2 + response_bar + 1,
+                response_bar_of(*one.compared_ns, max, y_ + 2 + response_bar + 1,
                                 Colour::compared);
             }
             if (one.deadline_ns) {
-                const double at = left + response_length(*one.deadline_ns, longest);
+                const double at = left + response_length(*one.deadline_ns, max);
                 line(at, y_, at, y_ + response_height - 3,
                      fmt::format("stroke=\"{}\" stroke-width=\"1.5\"", tick_colour));
             }

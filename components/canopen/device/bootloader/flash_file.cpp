@@ -22,7 +22,7 @@ std::string problem(const char* what, const std::string& path) {
 }
 }  // namespace
 
-std::string read_flash(const std::string& path, std::size_t most,
+std::string read_flash(const std::string& path, std::size_t max,
                        std::optional<std::vector<std::uint8_t>>& image) {
     image.reset();
     errno = 0;
@@ -36,14 +36,14 @@ std::string read_flash(const std::string& path, std::size_t most,
         return "cannot create '" + path + "': missing folder; type: mkdir -p " + folder;
     }
     if (!file) return problem("cannot read", path);
-    std::vector<std::uint8_t> room(most + 1);
-    const auto size = std::fread(room.data(), 1, room.size(), file.get());
+    std::vector<std::uint8_t> buffer(max + 1);
+    const auto size = std::fread(buffer.data(), 1, buffer.size(), file.get());
     if (std::ferror(file.get()) != 0) return problem("cannot read", path);
-    if (size > most) {
-        return "'" + path + "' is longer than the flash of " + std::to_string(most) + " bytes";
+    if (size > max) {
+        return "'" + path + "' is longer than the flash of " + std::to_string(max) + " bytes";
     }
-    room.resize(size);
-    image = std::move(room);
+    buffer.resize(size);
+    image = std::move(buffer);
     return {};
 }
 

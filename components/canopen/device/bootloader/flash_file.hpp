@@ -12,7 +12,7 @@ namespace hal::canopen {
 
 /// Reads an image of at most `most` bytes; a file that does not exist leaves `image` empty. Returns
 /// the problem, or "". [setup]
-std::string read_flash(const std::string& path, std::size_t most,
+std::string read_flash(const std::string& path, std::size_t max,
                        std::optional<std::vector<std::uint8_t>>& image);
 /// Replaces the file atomically: it has the new image or the old one. Returns the problem, or "".
 /// [setup]

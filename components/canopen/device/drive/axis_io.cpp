@@ -31,7 +31,7 @@ constexpr std::uint16_t sync_missing = 0x8700;
 
 constexpr std::uint16_t heartbeat_lost = 0x8130;
 // a process suspended for longer does not make the plant jump
-constexpr Time longest_step = 20 * millisecond;
+constexpr Time max_step = 20 * millisecond;
 
 std::uint8_t register_bits(std::uint16_t code) noexcept {
     if (code == heartbeat_lost || code == sync_missing) return error_communication;
@@ -173,7 +173,7 @@ void AxisIo::stop_for(std::uint16_t code) noexcept {
 /// Samples the counters.
 void AxisIo::sample(Time now) noexcept {
     if (stepped_once_ && now > stepped_) {
-        plant_->step(duty(), statusword_ == enabled, std::min(now - stepped_, longest_step));
+        plant_->step(duty(), statusword_ == enabled, std::min(now - stepped_, max_step));
     }
     stepped_ = now;
     stepped_once_ = true;

@@ -20,7 +20,7 @@ Drive::Drive(const DriveSettings& settings, const DeviceSettings& device, Events
 Drive::Drive(const Description& description, const DriveSettings& settings,
              const DeviceSettings& device, Events* also)
     : also_(also != nullptr ? *also : nobody), device_(description, device, *this) {
-    for (unsigned n = 0; n < std::clamp(settings.axes, 1U, cia402::most_axes); ++n) {
+    for (unsigned n = 0; n < std::clamp(settings.axes, 1U, cia402::max_axes); ++n) {
         axes_.push_back(std::make_unique<AxisBinding>(n, settings.axis[n]));
         axes_[n]->attach(device_);
         axes_[n]->axis().power_up();

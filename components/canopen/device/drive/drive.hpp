@@ -28,7 +28,7 @@ namespace hal::canopen {
 /// Settings of the node.
 struct DriveSettings {
     unsigned axes = 1;  ///< 1–8
-    std::array<cia402::AxisSettings, cia402::most_axes> axis{};
+    std::array<cia402::AxisSettings, cia402::max_axes> axis{};
     std::uint32_t vendor = 0;
     std::uint32_t product = 0x402;
     std::uint32_t revision = 0x00010000;

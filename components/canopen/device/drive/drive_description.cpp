@@ -74,7 +74,7 @@ void add_axis(Description& d, unsigned axis, const AxisSettings& settings) {
 }  // namespace
 
 Description drive_description(const DriveSettings& settings) {
-    const auto axes = std::clamp(settings.axes, 1U, most_axes);
+    const auto axes = std::clamp(settings.axes, 1U, max_axes);
     Description d =
         basic_device({.device_type = (axes == 1 ? servo_drive : 0xffff0000) | profile_number,
                       .vendor = settings.vendor,

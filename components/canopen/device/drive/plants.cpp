@@ -19,7 +19,7 @@ class Slide final : public Plant {
 public:
     void step(double duty, bool on, Time time_ns) noexcept override {
         const sim::Winding winding{0.4, 0.0008, 0.12, 12.0};
-        const auto steps = std::max<Time>(1, (time_ns + longest_ns - 1) / longest_ns);
+        const auto steps = std::max<Time>(1, (time_ns + max_ns - 1) / max_ns);
         const double dt = static_cast<double>(time_ns) * 1e-9 / static_cast<double>(steps);
         for (Time n = 0; n < steps; ++n) {
             const double before = current_;
@@ -65,7 +65,7 @@ public:
     }
 
 private:
-    static constexpr Time longest_ns = 100'000;
+    static constexpr Time max_ns = 100'000;
     static constexpr std::int64_t counts = 2000;
     static constexpr double metres_per_rad = 0.005 / (2 * std::numbers::pi);
     static constexpr double mass = 20.0;

@@ -61,13 +61,13 @@ public:
     void written(Entry&) noexcept override;
 
 private:
-    static constexpr unsigned most_bits = 64;
+    static constexpr unsigned max_bits = 64;
 
 private:
-    static constexpr unsigned most_analog = 12;
+    static constexpr unsigned max_analog = 12;
 
 private:
-    static constexpr unsigned bytes = most_bits / 8;
+    static constexpr unsigned bytes = max_bits / 8;
     using Block = std::array<std::uint8_t, bytes>;
 
     void sample(Time now) noexcept;
@@ -86,11 +86,11 @@ private:
     Block terminals_in_{};
     Block terminals_out_{};
     Block filtered_{};
-    std::array<Time, most_bits> differs_since_{};
-    std::array<std::int16_t, most_analog> analog_in_{}, analog_out_{}, analog_terminals_{};
-    std::array<std::int32_t, most_analog> upper_{}, lower_{}, error_analog_{}, sent_{};
-    std::array<std::uint32_t, most_analog> delta_{}, negative_delta_{}, positive_delta_{};
-    std::array<std::uint8_t, most_analog> triggers_{}, analog_error_mode_{};
+    std::array<Time, max_bits> differs_since_{};
+    std::array<std::int16_t, max_analog> analog_in_{}, analog_out_{}, analog_terminals_{};
+    std::array<std::int32_t, max_analog> upper_{}, lower_{}, error_analog_{}, sent_{};
+    std::array<std::uint32_t, max_analog> delta_{}, negative_delta_{}, positive_delta_{};
+    std::array<std::uint8_t, max_analog> triggers_{}, analog_error_mode_{};
     std::uint8_t interrupts_on_ = 1;
     std::uint8_t analog_interrupts_on_ = 0;
     std::uint16_t filter_ms_ = 10;

@@ -91,10 +91,10 @@ constexpr Common common[] = {
 double power(std::uint8_t n) noexcept { return powers[std::min<unsigned>(n, 6)]; }
 
 std::int32_t cut(double value, unsigned bits) noexcept {
-    const double most = static_cast<double>((std::int64_t{1} << (bits - 1)) - 1);
+    const double max = static_cast<double>((std::int64_t{1} << (bits - 1)) - 1);
     return std::isnan(value)
                ? 0
-               : static_cast<std::int32_t>(std::llround(std::clamp(value, -most - 1, most)));
+               : static_cast<std::int32_t>(std::llround(std::clamp(value, -max - 1, max)));
 }
 
 /// Returns the initial value of an object that all channels have.

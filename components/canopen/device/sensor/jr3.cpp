@@ -12,7 +12,7 @@ namespace hal::canopen {
 
 namespace {
 constexpr Time silence = 10 * millisecond;             // without a packet: no sensor
-constexpr Time most_at_once = 100 * millisecond;  // bits of the line older than this are lost
+constexpr Time max_at_once = 100 * millisecond;  // bits of the line older than this are lost
 constexpr double overload_over_below = 0.95;  // of the limit
 constexpr std::int16_t supply_low = 22937;
 constexpr std::int16_t supply_high = 26214;  // 70 % and 80 %; nominal 75 %
@@ -83,7 +83,7 @@ void Jr3::sample(Time now) noexcept {
         started_ = true;
         last_ = heard_ = began_ = now;
     }
-    const Time passed = std::clamp<Time>(now - last_, 0, most_at_once);
+    const Time passed = std::clamp<Time>(now - last_, 0, max_at_once);
     last_ = now;
     clocks_ += static_cast<double>(passed) * 1e-9 * jr3::clock_hz;
     const auto due = static_cast<unsigned>(clocks_);
@@ -234,10 +234,10 @@ Abort Jr3::Memory::open_read(Entry&, std::uint32_t& size) noexcept {
     return Abort::none;
 }
 
-Abort Jr3::Memory::read(Entry&, std::uint32_t offset, std::span<std::uint8_t> room) noexcept {
+Abort Jr3::Memory::read(Entry&, std::uint32_t offset, std::span<std::uint8_t> buffer) noexcept {
     const auto memory = node_.memory_reader_.memory();
-    if (offset > memory.size() || room.size() > memory.size() - offset) return Abort::local_control;
-    std::copy_n(memory.begin() + offset, room.size(), room.begin());
+    if (offset > memory.size() || buffer.size() > memory.size() - offset) return Abort::local_control;
+    std::copy_n(memory.begin() + offset, buffer.size(), buffer.begin());
     return Abort::none;
 }
 

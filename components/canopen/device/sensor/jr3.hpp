@@ -85,7 +85,7 @@ private:
     public:
         explicit Memory(Jr3& node) : node_(node) {}
         Abort open_read(Entry&, std::uint32_t& size) noexcept override;
-        Abort read(Entry&, std::uint32_t offset, std::span<std::uint8_t> room) noexcept override;
+        Abort read(Entry&, std::uint32_t offset, std::span<std::uint8_t> buffer) noexcept override;
         Abort open_write(Entry&, std::uint32_t) noexcept override { return Abort::read_only; }
         Abort write(Entry&, std::uint32_t, std::span<const std::uint8_t>) noexcept override {
             return Abort::read_only;

@@ -9,7 +9,7 @@
 namespace hal::canopen::jr3 {
 
 namespace {
-constexpr double largest_load = 1e12;  // keeps infinite loads finite; beyond any full scale
+constexpr double max_load = 1e12;  // keeps infinite loads finite; beyond any full scale
 }  // namespace
 
 Six Calibration::wrench(const std::array<std::int16_t, 6>& raw) const noexcept {
@@ -30,7 +30,7 @@ std::array<std::int16_t, 6> Calibration::raw(const Six& wrench,
     for (std::size_t row = 0; row < 6; ++row) {
         double sum = 0;
         for (std::size_t n = 0; n < 6; ++n) {
-            const double applied = std::clamp(wrench[n], -largest_load, largest_load);
+            const double applied = std::clamp(wrench[n], -max_load, max_load);
             sum += inverse[row][n] * applied / full_scale[n];
         }
         const double counts = sum * full_scale_counts;

@@ -7,9 +7,9 @@ namespace hal::canopen::jr3 {
 
 namespace {
 constexpr std::uint8_t shortest_pulse = start_clocks - 1;
-constexpr std::uint8_t longest_pulse = start_clocks + 2;
+constexpr std::uint8_t max_pulse = start_clocks + 2;
 
-constexpr std::uint8_t least_gap = 2;
+constexpr std::uint8_t min_gap = 2;
 }  // namespace
 
 void Decoder::lose(State next) noexcept {
@@ -29,7 +29,7 @@ bool Decoder::take(bool bit) noexcept {
         return false;
     case State::pulse:
         if (bit) {
-            if (++count_ > longest_pulse) {
+            if (++count_ > max_pulse) {
                 lose(State::stuck);
             }
         } else if (count_ < shortest_pulse) {
@@ -49,7 +49,7 @@ bool Decoder::take(bool bit) noexcept {
         shift_ = shift_ << 1 | (bit ? 1U : 0U);
         if (--count_ == 0) {
             state_ = State::gap;
-            count_ = least_gap;
+            count_ = min_gap;
         }
         return false;
     case State::gap:
@@ -74,8 +74,8 @@ bool Generator::next() noexcept {
     if (clock_ == 0) {
         auto value = static_cast<std::uint16_t>(values_[address_]);
         if (address_ == calibration_address && memory_ != nullptr) {
-            value = static_cast<std::uint16_t>((place_ & 0xff) << 8 | memory_[place_]);
-            place_ = (place_ + 1) % memory_size;
+            value = static_cast<std::uint16_t>((index_ & 0xff) << 8 | memory_[index_]);
+            index_ = (index_ + 1) % memory_size;
         }
         word_ = address_ << 16 | value;
         address_ = (address_ + 1) % addresses;
@@ -87,8 +87,8 @@ bool Generator::next() noexcept {
     return (word_ >> (start_clocks + 20 - at) & 1) != 0;
 }
 
-void Generator::fill(std::span<std::uint8_t> room) noexcept {
-    for (auto& byte : room) {
+void Generator::fill(std::span<std::uint8_t> buffer) noexcept {
+    for (auto& byte : buffer) {
         for (unsigned bit = 0; bit < 8; ++bit) {
             byte = static_cast<std::uint8_t>(byte << 1 | (next() ? 1 : 0));
         }

@@ -74,12 +74,12 @@ public:
     bool next() noexcept;
     /// Writes the next clocks, eight per byte, the first in the most significant bit: the format of
     /// a recording. [any]
-    void fill(std::span<std::uint8_t> room) noexcept;
+    void fill(std::span<std::uint8_t> buffer) noexcept;
 
 private:
     std::array<std::int16_t, addresses> values_{};
     const std::uint8_t* memory_ = nullptr;
-    std::size_t place_ = 0;
+    std::size_t index_ = 0;
     unsigned address_ = 0;
     unsigned clock_ = 0;
     std::uint32_t word_ = 0;

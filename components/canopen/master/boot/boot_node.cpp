@@ -418,7 +418,7 @@ void Master::Node::react(Reaction reaction, Time delay, BootStart how) noexcept 
 }
 
 void Master::Node::retry_after(Time delay, BootStart how) noexcept {
-    const Time max_backoff = std::max(setup.retry, setup.retry_most);
+    const Time max_backoff = std::max(setup.retry, setup.retry_max);
     backoff_ = backoff_ == 0 ? setup.retry : std::min(backoff_ * 2, max_backoff);
     status.next_try = now() + delay;
     next_start_ = delay != 0 && how == BootStart::booted ? BootStart::reset : how;

@@ -50,7 +50,7 @@ void add_master_objects(Description& d, const MasterSetup& s) {
     d.add(0x102a, 0, Type::unsigned16, read_only,
           static_cast<std::uint64_t>(s.nmt_inhibit / (100 * microsecond)), "NMT inhibit time");
     d.add(0x1f80, 0, Type::unsigned32, read_only, startup_of(s), "NMT startup");
-    Time longest = 0;
+    Time max = 0;
     struct List {
         std::uint16_t index;
         const char* name;
@@ -73,12 +73,12 @@ void add_master_objects(Description& d, const MasterSetup& s) {
     d.add(request_nmt, 0, Type::unsigned8, constant, all_nodes, "Request NMT");
     for (const auto& n : s.nodes) {
         d.add(request_nmt, n.id, Type::unsigned8, read_write);
-        if (n.mandatory && n.boot_limit > longest) {
-            longest = n.boot_limit;
+        if (n.mandatory && n.boot_limit > max) {
+            max = n.boot_limit;
         }
     }
     d.add(request_nmt, all_nodes, Type::unsigned8, write_only);
-    d.add(0x1f89, 0, Type::unsigned32, read_only, static_cast<std::uint64_t>(longest / millisecond),
+    d.add(0x1f89, 0, Type::unsigned32, read_only, static_cast<std::uint64_t>(max / millisecond),
           "Boot time");
 }
 

@@ -76,9 +76,9 @@ struct NodeSetup {
     std::uint16_t master_limit_ms = 0;
 
     Time boot_limit = 10 * second;  ///< boot timeout of a mandatory node (1F89h)
-    /// interval between boots; doubles up to retry_most while they fail
+    /// interval between boots; doubles up to retry_max while they fail
     Time retry = 1 * second;
-    Time retry_most = 10 * second;
+    Time retry_max = 10 * second;
     /// responds but cannot be booted, or a mandatory node missed boot_limit
     Reaction on_failure = Reaction::restart;
     Reaction on_loss = Reaction::restart;  ///< was operational and is lost

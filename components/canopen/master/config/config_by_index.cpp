@@ -97,26 +97,26 @@ private:
 
 }  // namespace
 
-Reading read(const ByIndex& wish, const ReadFile& read_file) {
+Reading read(const ByIndex& request, const ReadFile& read_file) {
     // Other instances may have nodes on the same bus: they are not reset.
     std::string text =
-        "[bus]\nsync = cycle\nreset-at-start = no\nnode-id = " + std::to_string(wish.master);
-    text += "\n[node " + std::to_string(wish.slave) + "]\n";
-    if (!wish.eds.empty()) {
-        text += "eds = " + wish.eds + "\n";
+        "[bus]\nsync = cycle\nreset-at-start = no\nnode-id = " + std::to_string(request.master);
+    text += "\n[node " + std::to_string(request.slave) + "]\n";
+    if (!request.eds.empty()) {
+        text += "eds = " + request.eds + "\n";
     }
     Report report;
-    if (wish.slave == wish.master) {
+    if (request.slave == request.master) {
         report.argument(Topic::node, "slavenodeid",
-                        "slavenodeid= and masternodeid= are both " + std::to_string(wish.slave),
+                        "slavenodeid= and masternodeid= are both " + std::to_string(request.slave),
                         "use different node IDs");
     }
-    Writer writer(wish, report);
-    if (!wish.inputs.empty()) {
-        writer.add(wish.inputs, true);
+    Writer writer(request, report);
+    if (!request.inputs.empty()) {
+        writer.add(request.inputs, true);
     }
-    if (!wish.outputs.empty()) {
-        writer.add(wish.outputs, false);
+    if (!request.outputs.empty()) {
+        writer.add(request.outputs, false);
     }
     if (report.failed()) return {{}, std::move(report.all)};
     return read(text + writer.text(), "", read_file);

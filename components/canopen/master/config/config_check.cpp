@@ -107,7 +107,7 @@ void check_network(const MasterConfig& config, Report& report) {
         const Node* node;
         const Pdo* pdo;
     };
-    constexpr std::size_t most_multiplexed = 48 * 254;  // rows of 1FD0h to 1FFFh
+    constexpr std::size_t max_multiplexed = 48 * 254;  // rows of 1FD0h to 1FFFh
     std::size_t multiplexed = 0;
     std::multimap<std::uint32_t, User> users;
     unsigned sent = 0;
@@ -165,11 +165,11 @@ void check_network(const MasterConfig& config, Report& report) {
                          "move some nodes to a second bus with its own configuration");
         }
     }
-    if (multiplexed > most_multiplexed) {
+    if (multiplexed > max_multiplexed) {
         report.error(Topic::node, config.at,
                      "the nodes send " + std::to_string(multiplexed) +
                          " objects in multiplexed PDOs; the limit is " +
-                         std::to_string(most_multiplexed),
+                         std::to_string(max_multiplexed),
                      "move some nodes to a second bus with its own configuration");
     }
     if (safety > Srdos::max_srdos) {

@@ -208,7 +208,7 @@ const bus::KeyTable<Settings>& node_keys() {
         {"retry", bus::time(of_setup(&S::retry), millisecond, 3600 * second), "`1s`",
          "initial interval between boot attempts. It doubles while they fail, and returns to this "
          "value once the node has been operational for this time"},
-        {"retry-most", bus::time(of_setup(&S::retry_most), millisecond, 3600 * second), "`10s`",
+        {"retry-most", bus::time(of_setup(&S::retry_max), millisecond, 3600 * second), "`10s`",
          "maximum interval between boot attempts"},
         {"tpdoN", "objects, default, none", "from the EDS", "[TPDO](#pdos) N of the node"},
         {"rpdoN", "objects, default, none", "from the EDS", "[RPDO](#pdos) N of the node"},
@@ -293,7 +293,7 @@ private:
         keys_.find("type");
         Settings to{node_, descriptions_, report_};
         node_keys().apply(keys_, to, key_report_);
-        s.retry_most = std::max(s.retry, s.retry_most);
+        s.retry_max = std::max(s.retry, s.retry_max);
         check_silence();
         check_watch();
     }

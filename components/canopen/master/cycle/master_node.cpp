@@ -109,7 +109,7 @@ private:
         } else {
             for (const config::Object& object : pdo.objects) {
                 const Placed* at =
-                    object.filler ? nullptr : &out_.placed[place(node, false, object)];
+                    object.filler ? nullptr : &out_.placed[position(node, false, object)];
                 p.mapping.push_back(at == nullptr ? map_entry(filler, 0, object.bits)
                                                   : map_entry(at->index, at->sub, object.bits));
             }
@@ -120,7 +120,7 @@ private:
 
     /// A row of 1FD0h–1FFFh: which of our objects takes that of the node.
     void dispatch(std::size_t node, const config::Object& object) {
-        const Placed& at = out_.placed[place(node, false, object, object.type)];
+        const Placed& at = out_.placed[position(node, false, object, object.type)];
         const std::uint8_t id = config_.nodes[node].setup.id;
         const auto row = std::uint64_t{1} << 56 | std::uint64_t{at.index} << 40 |
                          std::uint64_t{at.sub} << 32 | std::uint64_t{object.index} << 16 |
@@ -148,7 +148,7 @@ private:
         for (const config::Object& object : pdo.objects) {
             if (!object.filler) {
                 sent->parts.push_back(
-                    {place(node, true, object), static_cast<std::uint8_t>(bit), object.bits});
+                    {position(node, true, object), static_cast<std::uint8_t>(bit), object.bits});
             }
             bit += object.bits;
         }
@@ -164,7 +164,7 @@ private:
         s.cob = pdo.cob;
         OwnSrdo own{node, &pdo, static_cast<unsigned>(out_.srdos.size() + 1)};
         for (const config::Object& object : pdo.objects) {
-            own.placed.push_back(place(node, pdo.to_node, object));
+            own.placed.push_back(position(node, pdo.to_node, object));
             const Placed& at = out_.placed[own.placed.back()];
             s.mapping.push_back(map_entry(at.index, at.sub, object.bits));
             s.mapping.push_back(map_entry(filler, 0, object.bits));
@@ -200,7 +200,7 @@ private:
         add_tpdo(out_.description, sent.number, p);
     }
 
-    std::size_t place(std::size_t node, bool to_node, const config::Object& object,
+    std::size_t position(std::size_t node, bool to_node, const config::Object& object,
                       Type type = Type::none) {
         for (std::size_t i = 0; i < out_.placed.size(); ++i) {
             if (out_.placed[i].node == node && out_.placed[i].to_node == to_node &&

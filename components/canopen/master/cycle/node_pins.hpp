@@ -66,18 +66,18 @@ public:
         std::uint32_t invalid = 0;
         ins_.each(
             [slots = runner.slots(), &invalid]<class T>(const In<T>& pin, const Bound& b) noexcept {
-            std::uint64_t& wish = slots[b.slot].wish;
+            std::uint64_t& output = slots[b.slot].output;
             if constexpr (std::is_same_v<T, bool>) {
-                wish = (wish & ~b.mask) | (pin ? b.high : 0);
+                output = (output & ~b.mask) | (pin ? b.high : 0);
             } else if constexpr (std::is_same_v<T, double>) {
                 const double value = pin * b.scale + b.offset;
                 if (!std::isfinite(value)) {
                     ++invalid;
                     return;  // the last one stays
                 }
-                wish = b.codec.encode(value);
+                output = b.codec.encode(value);
             } else {
-                wish = b.codec.encode(pin.get());
+                output = b.codec.encode(pin.get());
             }
         });
         taken_invalid_.fetch_add(invalid, std::memory_order_relaxed);
@@ -208,10 +208,10 @@ struct NodePins {
           restart(c, (n + ".restart").c_str(), "rising edge: resets it and boots it anew") {}
 
     /// [realtime]
-    void show(Runner& runner, std::size_t place, Time now) noexcept {
-        const NodeStatus& s = runner.status(place);
+    void show(Runner& runner, std::size_t position, Time now) noexcept {
+        const NodeStatus& s = runner.status(position);
         online = s.online;
-        operational = runner.operational(place);
+        operational = runner.operational(position);
         if (operational) {
             is_faulty = false;
         }
@@ -231,7 +231,7 @@ struct NodePins {
         }
         age = s.last_heard == 0 ? -1.0 : static_cast<double>(now - s.last_heard) * 1e-6;
         if (restart && !was_restart) {
-            runner.restart_node(place, now);
+            runner.restart_node(position, now);
         }
         was_restart = restart;
     }

@@ -69,15 +69,15 @@ Runner::Runner(const config::MasterConfig& config, RunnerEvents& events)
 }
 
 void Runner::add_nodes() {
-    place_.fill(255);
+    position_.fill(255);
     const bool stops = config_.at_stop == config::AtStop::stopped;
     const NmtCommand command = stops ? NmtCommand::stop : NmtCommand::enter_pre_operational;
     for (std::size_t n = 0; n < config_.nodes.size(); ++n) {
         const std::uint8_t id = config_.nodes[n].setup.id;
-        place_[id] = static_cast<std::uint8_t>(n);
+        position_[id] = static_cast<std::uint8_t>(n);
         statuses_.push_back(&master_.status(id));
         if (config_.at_stop != config::AtStop::nothing) {
-            farewell_.emplace_back(
+            stop_commands_.emplace_back(
                 0U, std::initializer_list<std::uint8_t>{static_cast<std::uint8_t>(command), id});
         }
     }
@@ -108,7 +108,7 @@ void Runner::add_outputs() {
             {&sent, make_frame(sent.pdo->cob, static_cast<std::uint8_t>(sent.pdo->bytes()))});
         if (!sent.pdo->multiplexed()) continue;
         for (const Sent::Part& part : sent.parts) {
-            alone_.push_back(
+            multiplexed_.push_back(
                 {sent.number, part.placed, sent.pdo->inhibit_100us * 100 * microsecond});
         }
     }
@@ -174,7 +174,7 @@ void Runner::boot(Time now) noexcept {
         config_.sync_at_boot || std::any_of(config_.nodes.begin(), config_.nodes.end(),
                                             [](const auto& n) { return n.setup.keep_alive; });
     steps_changed_ = true;
-    vain_waits_ = 0;
+    unanswered_waits_ = 0;
 }
 
 /// The network goes over to this master or to another one.
@@ -250,10 +250,10 @@ void Runner::receive(Time now) noexcept {
 }
 
 std::size_t Runner::take_frames(Time now) noexcept {
-    constexpr std::size_t most = 4096;
+    constexpr std::size_t max = 4096;
     std::array<can::Frame, 32> frames;
     std::size_t taken = 0;
-    while (taken < most) {
+    while (taken < max) {
         const std::size_t count = link_->receive(frames, now);
         for (std::size_t i = 0; i < count; ++i) {
             take(frames[i], now);
@@ -278,7 +278,7 @@ void Runner::take(const can::Frame& f, Time now) noexcept {
     device_.handle(f, now);
     if (!active()) return;
     if (f.id >> 7 == 0x580 >> 7) {
-        vain_waits_ = 0;
+        unanswered_waits_ = 0;
     }
     master_.handle(f, now);
     open_and_close();  // what follows in this cycle may be the node's first PDO
@@ -336,7 +336,7 @@ void Runner::send_all_to(std::size_t node) noexcept {
             device_.pdos().trigger(out.sent->number);
         }
     }
-    for (Alone& a : alone_) {
+    for (Multiplexed& a : multiplexed_) {
         if (slots_[a.slot].node == node) {
             a.sent = false;
         }
@@ -353,7 +353,7 @@ void Runner::forget_inputs_of(std::size_t node) noexcept {
     }
 }
 
-void Runner::take_wishes() noexcept {
+void Runner::accept_outputs() noexcept {
     for (std::size_t n = 0; n < statuses_.size(); ++n) {
         const bool exchanges = operational(n);
         if (exchanges && was_operational_[n] == 0) {
@@ -374,7 +374,7 @@ void Runner::take_wishes() noexcept {
         // what we would have it held at.
         const bool kept = config_.nodes[s.node].setup.keep_alive && ever_operational_[s.node] == 0;
         if (operational(s.node) || kept) {
-            set_value(*s.entry, s.wish);
+            set_value(*s.entry, s.output);
         } else if (s.has_safe) {
             set_value(*s.entry, s.safe);
         }
@@ -382,10 +382,10 @@ void Runner::take_wishes() noexcept {
 }
 
 /// Round robin, so that an object that changes in every cycle does not block the others.
-void Runner::tell_alone(Time now) noexcept {
-    for (std::size_t n = alone_.size(); n > 0;
-         --n, next_alone_ = (next_alone_ + 1) % alone_.size()) {
-        Alone& a = alone_[next_alone_ % alone_.size()];
+void Runner::send_multiplexed(Time now) noexcept {
+    for (std::size_t n = multiplexed_.size(); n > 0;
+         --n, next_multiplexed_ = (next_multiplexed_ + 1) % multiplexed_.size()) {
+        Multiplexed& a = multiplexed_[next_multiplexed_ % multiplexed_.size()];
         const Slot& s = slots_[a.slot];
         const auto value = static_cast<std::uint32_t>(number_in(*s.entry) &
                                                       (~std::uint64_t{0} >> (64 - s.object->bits)));
@@ -456,7 +456,7 @@ void Runner::watch_srdos(Time now) noexcept {
 void Runner::transmit(Time now, Time period, bool leads) noexcept {
     if (link_ == nullptr || boots_.load()) return;
     now_ = now;
-    take_wishes();
+    accept_outputs();
     open_and_close();
     sync_open_ = sync_open_ || mandatory_are_configured();
     if (produces_ && sync_open_ && leads && active()) {
@@ -466,7 +466,7 @@ void Runner::transmit(Time now, Time period, bool leads) noexcept {
         produce_time(now);
     }
     if (active()) {
-        tell_alone(now);
+        send_multiplexed(now);
         ask(now);
     }
     device_.poll(now);
@@ -484,17 +484,17 @@ void Runner::transmit(Time now, Time period, bool leads) noexcept {
 /// wait, and afterwards the slot of this cycle may have passed.
 void Runner::serve_boot(Time now, Time period) noexcept {
     constexpr Time slow = 2 * millisecond;
-    constexpr Time longest_wait = millisecond;
-    constexpr unsigned most_vain_waits = 5;
+    constexpr Time max_wait = millisecond;
+    constexpr unsigned max_unanswered_waits = 5;
     const NetworkStatus& network = master_.status();
     if (period < slow || !active() || network.state != NetworkState::booting ||
-        network.booting == 0 || vain_waits_ >= most_vain_waits || link_->description().simulated ||
+        network.booting == 0 || unanswered_waits_ >= max_unanswered_waits || link_->description().simulated ||
         link_->description().in_slots) {
         return;
     }
     const Time begun = monotonic_ns();
     bool any = false;
-    for (Time at = begun, heard = begun; at - begun < period / 4 && at - heard < longest_wait;
+    for (Time at = begun, heard = begun; at - begun < period / 4 && at - heard < max_wait;
          at = monotonic_ns()) {
         const Time then = now + (at - begun);
         if (take_frames(then) == 0) continue;
@@ -504,7 +504,7 @@ void Runner::serve_boot(Time now, Time period) noexcept {
         open_and_close();
         send(then);
     }
-    vain_waits_ = any ? 0 : vain_waits_ + 1;
+    unanswered_waits_ = any ? 0 : unanswered_waits_ + 1;
 }
 
 void Runner::produce_sync(Time now, Time period) noexcept {
@@ -555,14 +555,14 @@ void Runner::produce_time(Time now) noexcept {
 
 void Runner::send(Time now) noexcept {
     const bool stuck = is_stuck(now);
-    if (!stuck && std::exchange(kept_back_, false)) {
-        tell_again();
+    if (!stuck && std::exchange(holds_frames_, false)) {
+        send_held_values();
     }
     while (const Frame* f = device_.out().front()) {
         const bool heartbeat = f->id == 0x700U + config_.node_id && !f->extended;
         if (stuck && is_process_data(*f)) {
             ++withheld_;
-            kept_back_ = true;
+            holds_frames_ = true;
             device_.out().drop();
             continue;
         }
@@ -576,11 +576,11 @@ void Runner::send(Time now) noexcept {
 }
 
 /// What is sent on a change only was lost with what was kept back.
-void Runner::tell_again() noexcept {
+void Runner::send_held_values() noexcept {
     for (const Output& out : outputs_) {
         device_.pdos().trigger(out.sent->number);
     }
-    for (Alone& a : alone_) {
+    for (Multiplexed& a : multiplexed_) {
         a.sent = false;
     }
 }
@@ -588,14 +588,14 @@ void Runner::tell_again() noexcept {
 /// The bus takes nothing: nobody acknowledges, or others keep it. Set-points of these cycles would
 /// wait in the queue, and move the machine by what was wanted long ago when the cable is back.
 bool Runner::is_stuck(Time now) noexcept {
-    constexpr Time longest_wait = 20 * millisecond;
-    constexpr Time longest_frame_bits = 160;  // 29-bit identifier, eight bytes, all stuff bits
+    constexpr Time max_wait = 20 * millisecond;
+    constexpr Time max_frame_bits = 160;  // 29-bit identifier, eight bytes, all stuff bits
     const can::Statistics s = link_->statistics();
     if (moved_ == 0 || s.queued == 0 || s.sent != sent_before_) {
         moved_ = now;
     }
     sent_before_ = s.sent;
-    return now - moved_ > std::max(longest_wait, 100 * longest_frame_bits * second /
+    return now - moved_ > std::max(max_wait, 100 * max_frame_bits * second /
                                                      std::max<Time>(config_.bit_rate, 1));
 }
 
@@ -663,7 +663,7 @@ bool Runner::send_safe_values() noexcept {
     for (const Output& out : outputs_) {
         if (!out.open) continue;
         if (out.sent->pdo->multiplexed()) {
-            all = make_safe_alone(out) && all;
+            all = make_multiplexed_safe(out) && all;
             continue;
         }
         can::Frame f = out.frame;
@@ -684,7 +684,7 @@ bool Runner::send_safe_values() noexcept {
         store(f.data.data(), ~image);
         send(f);
     }
-    for (const can::Frame& f : farewell_) {
+    for (const can::Frame& f : stop_commands_) {
         send(f);
     }
     link_->flush(now_);
@@ -692,7 +692,7 @@ bool Runner::send_safe_values() noexcept {
 }
 
 /// Returns whether the link took all of them.
-bool Runner::make_safe_alone(const Output& out) noexcept {
+bool Runner::make_multiplexed_safe(const Output& out) noexcept {
     bool all = true;
     for (const Sent::Part& part : out.sent->parts) {
         const Slot& s = slots_[part.placed];
@@ -731,14 +731,14 @@ void Runner::drop_backlog(Time now) noexcept {
 
 void Runner::on_step(const NodeStatus& status) noexcept {
     steps_changed_ = true;
-    if (place_[status.id & 0x7f] != 255) {
-        events_.on_step(place_[status.id & 0x7f], status);
+    if (position_[status.id & 0x7f] != 255) {
+        events_.on_step(position_[status.id & 0x7f], status);
     }
 }
 void Runner::on_network(const NetworkStatus& status) noexcept { events_.on_network(status); }
 void Runner::on_emergency(std::uint8_t node, const Emergency& e) noexcept {
-    if (place_[node & 0x7f] != 255) {
-        events_.on_emergency(place_[node & 0x7f], e);
+    if (position_[node & 0x7f] != 255) {
+        events_.on_emergency(position_[node & 0x7f], e);
     }
 }
 

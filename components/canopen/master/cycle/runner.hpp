@@ -34,7 +34,7 @@ struct Slot {
     bool has_safe = false;
     std::uint64_t safe = 0;
     /// to_node: what is to be sent while the node is operational
-    std::uint64_t wish = 0;
+    std::uint64_t output = 0;
     const config::Object* object = nullptr;
 };
 
@@ -55,10 +55,10 @@ public:
     virtual void on_emergency(std::size_t node, const Emergency&) noexcept { (void)node; }
     /// A PDO of a node did not come for `silence`, its timeout, in ns. `place` is that in
     /// OwnNode::received.
-    virtual void on_late(std::size_t place, Time silence) noexcept { (void)place, (void)silence; }
+    virtual void on_late(std::size_t position, Time silence) noexcept { (void)position, (void)silence; }
     /// It came with fewer bytes than its objects have; they keep their values. `place` is that in
     /// OwnNode::received.
-    virtual void on_short(std::size_t place, unsigned bytes) noexcept { (void)place, (void)bytes; }
+    virtual void on_short(std::size_t position, unsigned bytes) noexcept { (void)position, (void)bytes; }
     /// Another device sends what only this master may send.
     using Foreign = ForeignFrames;
     virtual void on_foreign(const Foreign&) noexcept {}
@@ -66,7 +66,7 @@ public:
     virtual void on_own_id_collision() noexcept {}
     /// The data of an SRDO is invalid; its objects have their safe values. `place` is that in
     /// OwnNode::srdos.
-    virtual void on_srdo_fault(std::size_t place, SrdoFault) noexcept { (void)place; }
+    virtual void on_srdo_fault(std::size_t position, SrdoFault) noexcept { (void)position; }
     virtual void on_bus_state(can::State) noexcept {}
     /// The link did not pass on what its sender may not send.
     virtual void on_rejected(const can::Rejected&) noexcept {}
@@ -100,7 +100,7 @@ public:
         return statuses_[node]->operational && late_pdos_[node] == 0;
     }
     /// A TPDO is late. `place` is that in OwnNode::received. [realtime]
-    bool late(std::size_t place) const noexcept { return watches_[place].late(); }
+    bool late(std::size_t position) const noexcept { return watches_[position].late(); }
     /// A TPDO of a mandatory node is late. [realtime]
     bool any_late() const noexcept;
     const NodeStatus& status(std::size_t node) const noexcept { return *statuses_[node]; }
@@ -134,12 +134,12 @@ public:
             boot(now);
         }
     }
-    Srdos::Status srdo(std::size_t place) const noexcept {
-        return device_.srdos().status(own_.srdos[place].number);
+    Srdos::Status srdo(std::size_t position) const noexcept {
+        return device_.srdos().status(own_.srdos[position].number);
     }
     /// Acknowledges the fault of an SRDO; its data is valid from the next valid SRDO on. [realtime]
-    void acknowledge_srdo(std::size_t place, Time now) noexcept {
-        device_.srdos().acknowledge(own_.srdos[place].number, now);
+    void acknowledge_srdo(std::size_t position, Time now) noexcept {
+        device_.srdos().acknowledge(own_.srdos[position].number, now);
     }
     /// The global fail-safe command goes out with the next transmit(). [realtime]
     bool send_fail_safe() noexcept { return device_.srdos().send_fail_safe(); }
@@ -152,7 +152,7 @@ private:
         bool open = false;  // for a node that is configured
     };
     /// An object that goes alone, by a multiplexed PDO, whenever its value is another.
-    struct Alone {
+    struct Multiplexed {
         unsigned number = 0;  // of our TPDO
         std::size_t slot = 0;
         Time inhibit = 0;
@@ -185,11 +185,11 @@ private:
     void produce_time(Time now) noexcept;
     void send_all_to(std::size_t node) noexcept;
     void forget_inputs_of(std::size_t node) noexcept;
-    void take_wishes() noexcept;
-    void tell_alone(Time now) noexcept;
+    void accept_outputs() noexcept;
+    void send_multiplexed(Time now) noexcept;
     void ask(Time now) noexcept;
-    void tell_again() noexcept;
-    bool make_safe_alone(const Output&) noexcept;
+    void send_held_values() noexcept;
+    bool make_multiplexed_safe(const Output&) noexcept;
     void watch_pdos(Time now) noexcept;
     void watch_srdos(Time now) noexcept;
 
@@ -214,12 +214,12 @@ private:
     can::Link* link_ = nullptr;
     std::vector<Slot> slots_;
     std::vector<const NodeStatus*> statuses_;
-    std::array<std::uint8_t, 128> place_{};  // node-id to place in the configuration; 255: none
+    std::array<std::uint8_t, 128> position_{};  // node-id to place in the configuration; 255: none
     std::vector<std::uint8_t> open_;  // by node: it is configured, so PDOs go to and fro
     bool steps_changed_ = true;
     bool sync_open_ = false;
     ForeignSenders foreign_;
-    unsigned vain_waits_ = 0;  // of serve_boot(), in a row
+    unsigned unanswered_waits_ = 0;  // of serve_boot(), in a row
     std::vector<PdoWatch> watches_;  // in the order of OwnNode::received
     std::vector<std::uint8_t> late_pdos_;  // by node
     // by node; started: without regard to late TPDOs; ever: since the network was booted
@@ -233,9 +233,9 @@ private:
         Time next = 0;
     };
     std::vector<Asked> asked_;
-    std::vector<Alone> alone_;
-    std::size_t next_alone_ = 0;
-    std::vector<can::Frame> farewell_;  // NMT commands for make_safe()
+    std::vector<Multiplexed> multiplexed_;
+    std::size_t next_multiplexed_ = 0;
+    std::vector<can::Frame> stop_commands_;  // NMT commands for make_safe()
     can::Frame sync_frame_;
     can::Statistics statistics_{};
     can::State bus_state_ = can::State::active;
@@ -250,7 +250,7 @@ private:
     std::uint64_t withheld_ = 0;  // for is_stuck()
     Time moved_ = 0;
     // something was withheld since the bus took the last
-    bool kept_back_ = false;
+    bool holds_frames_ = false;
     bool sync_ours_ = false;
     bool was_active_ = false;
     bool had_bus_ = false;

@@ -70,8 +70,8 @@ public:
     }
 
     /// Returns the message of a fault, formatted before the first cycle. [realtime]
-    const char* words(std::size_t place, SrdoFault fault) const noexcept {
-        return rows_[place].words[static_cast<std::size_t>(fault) & 7].c_str();
+    const char* words(std::size_t position, SrdoFault fault) const noexcept {
+        return rows_[position].words[static_cast<std::size_t>(fault) & 7].c_str();
     }
 
 private:

@@ -10,7 +10,7 @@ namespace hal::canopen {
 
 class SharedBus {
 public:
-    static constexpr std::size_t most = 64;
+    static constexpr std::size_t max = 64;
 
     explicit SharedBus(std::unique_ptr<can::Link> opened) : link(std::move(opened)) {}
 
@@ -53,7 +53,7 @@ public:
     }
 
     const std::unique_ptr<can::Link> link;
-    std::array<SharedLink*, most> users{};
+    std::array<SharedLink*, max> users{};
     std::size_t count = 0;
     struct Leader {
         std::atomic<const SharedLink*> link{nullptr};
@@ -79,8 +79,8 @@ std::unique_ptr<SharedLink> SharedLink::open(const std::string& address,
         }
         all[address] = bus = std::make_shared<SharedBus>(std::move(opened.link));
     }
-    if (bus->count >= SharedBus::most) {
-        problem = address + " has " + std::to_string(SharedBus::most) + " masters already";
+    if (bus->count >= SharedBus::max) {
+        problem = address + " has " + std::to_string(SharedBus::max) + " masters already";
 
         return nullptr;
     }
@@ -130,17 +130,17 @@ void SharedLink::flush(std::int64_t now_ns) noexcept {
     }
 }
 
-std::size_t SharedLink::receive(std::span<can::Frame> room, std::int64_t now_ns) noexcept {
+std::size_t SharedLink::receive(std::span<can::Frame> buffer, std::int64_t now_ns) noexcept {
     const SharedBus::Try held(*bus_);
     if (!held) return 0;
-    if (bus_->count == 1 && incoming_.front() == nullptr) return bus_->link->receive(room, now_ns);
+    if (bus_->count == 1 && incoming_.front() == nullptr) return bus_->link->receive(buffer, now_ns);
     for (can::Frame frame; bus_->link->receive(std::span(&frame, 1), now_ns) == 1;) {
         bus_->deliver(frame, nullptr);
     }
     std::size_t taken = 0;
-    for (const can::Frame* f; taken < room.size() && (f = incoming_.front()) != nullptr;
+    for (const can::Frame* f; taken < buffer.size() && (f = incoming_.front()) != nullptr;
          incoming_.drop()) {
-        room[taken++] = *f;
+        buffer[taken++] = *f;
     }
     return taken;
 }

@@ -31,7 +31,7 @@ public:
 
     can::Sent send(const can::Frame&, std::int64_t now_ns) noexcept override;
     void flush(std::int64_t now_ns) noexcept override;
-    std::size_t receive(std::span<can::Frame> room, std::int64_t now_ns) noexcept override;
+    std::size_t receive(std::span<can::Frame> buffer, std::int64_t now_ns) noexcept override;
     can::Statistics statistics() const noexcept override;
     can::State state() const noexcept override;
     void restart() noexcept override;

@@ -73,7 +73,7 @@ public:
     Time silence(Time now) const noexcept { return now - came_; }
 
 private:
-    static constexpr unsigned most_missed = 5;
+    static constexpr unsigned max_missed = 5;
 
     Notice take(Time came, Time every, Time start, Time period) noexcept {
         const Time phase = config_.sync_phase >= 0 ? config_.sync_phase : period / 2;
@@ -96,7 +96,7 @@ private:
 
     Notice miss(Time every, Time start) noexcept {
         if (start - came_ <= static_cast<Time>(missed_ + 2) * every) return Notice::nothing;
-        if (++missed_ < most_missed) {
+        if (++missed_ < max_missed) {
             clock_.step(beat_.coast(every, clock_.limit_ns()));
             return Notice::nothing;
         }

@@ -29,9 +29,9 @@ namespace hal::canopen::gateway {
 /// The gateway: nets count from 1, clients are numbers from connect().
 class Gateway {
 public:
-    static constexpr std::size_t most_line = Clients::max_line;
-    static constexpr std::size_t most_output = 32 << 20;
-    static constexpr std::size_t most_pending = Clients::max_pending;
+    static constexpr std::size_t max_line = Clients::max_line;
+    static constexpr std::size_t max_output = 32 << 20;
+    static constexpr std::size_t max_pending = Clients::max_pending;
 
     /// Creates a gateway with `nets` networks. A single net is the default of every client.
     explicit Gateway(unsigned nets, Identity identity = {});
@@ -56,7 +56,7 @@ public:
     /// Processes bytes from a client, complete lines or parts.
     void receive(int client, std::string_view bytes, Time now);
     /// Returns the output for a client; the caller removes what it sent. A client whose output
-    /// exceeds most_output does not read and should be disconnected.
+    /// exceeds max_output does not read and should be disconnected.
     std::string& output(int client) { return clients_.output(client); }
     /// Returns true when all commands of a client are done and the caller has sent the output.
     bool is_served(int client) const { return clients_.is_served(client); }

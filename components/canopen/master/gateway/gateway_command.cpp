@@ -18,8 +18,8 @@ struct Row {
     std::string_view first, second;  ///< words; the second may be empty
     Verb verb;
     Scope scope;
-    std::uint8_t least = 0;
-    std::uint8_t most = 0;  ///< numbers behind them
+    std::uint8_t min = 0;
+    std::uint8_t max = 0;  ///< numbers behind them
 };
 
 constexpr Row rows[] = {
@@ -91,10 +91,10 @@ bool split(std::string_view line, std::vector<std::string>& words) {
     return true;
 }
 
-bool number(std::string_view text, std::uint32_t most, std::uint32_t& value) {
+bool number(std::string_view text, std::uint32_t max, std::uint32_t& value) {
     bool negative = false;
     std::uint64_t read = 0;
-    if (!read_number(text, negative, read) || negative || read > most) return false;
+    if (!read_number(text, negative, read) || negative || read > max) return false;
     value = static_cast<std::uint32_t>(read);
     return true;
 }
@@ -110,9 +110,9 @@ struct Reader {
         return false;
     }
     bool more() const { return at < words.size(); }
-    bool take(std::uint32_t most, std::uint32_t& value, const char* what) {
+    bool take(std::uint32_t max, std::uint32_t& value, const char* what) {
         if (!more()) return fail(std::string("the ") + what + " is missing");
-        if (!number(words[at], most, value)) {
+        if (!number(words[at], max, value)) {
             return fail("'" + words[at].substr(0, 40) + "' is no " + what);
         }
         ++at;
@@ -122,14 +122,14 @@ struct Reader {
         return !more() || fail("nothing is expected at '" + words[at].substr(0, 40) + "'");
     }
 
-    bool numbers(std::size_t least, std::size_t most) {
+    bool numbers(std::size_t min, std::size_t max) {
         Command& c = out.command;
-        while (more() && c.numbers.size() < most) {
+        while (more() && c.numbers.size() < max) {
             std::uint32_t value = 0;
             if (!take(UINT32_MAX, value, "number")) return false;
             c.numbers.push_back(value);
         }
-        return c.numbers.size() < least ? fail("a number is missing") : end();
+        return c.numbers.size() < min ? fail("a number is missing") : end();
     }
     /// How many numbers, net and node, may stand before a command.
     static std::size_t max_numbers(Scope scope) {
@@ -275,7 +275,7 @@ bool Reader::simple(const std::string& first, const std::vector<std::uint32_t>& 
             ++at;
         }
         out.command.verb = row.verb;
-        return scope(row.scope, before) && numbers(row.least, row.most);
+        return scope(row.scope, before) && numbers(row.min, row.max);
     }
     if (!known) {
         return fail("unknown command '" + first.substr(0, 40) + "'; see: help",

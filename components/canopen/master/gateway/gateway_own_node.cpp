@@ -53,7 +53,7 @@ std::string OwnNode::transfer(const Command& c, Time now) {
         }
         return "OK";
     }
-    std::uint8_t value[Identity::most_name];  // as long as the longest of own_objects()
+    std::uint8_t value[Identity::max_name];  // as long as the longest of own_objects()
     std::size_t size = 0;
     const Abort abort = dictionary_.read(c.index, c.sub, value, size);
     if (abort != Abort::none) return abort_text(abort);

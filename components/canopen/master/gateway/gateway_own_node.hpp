@@ -20,7 +20,7 @@ std::string value_text(std::span<const std::uint8_t> value, const Format*);
 /// The identity of a gateway in `info version`, and in its own node as 1018h, 1008h (product name)
 /// and 2000h (the three names).
 struct Identity {
-    static constexpr std::size_t most_name = 200;  ///< bytes of a name
+    static constexpr std::size_t max_name = 200;  ///< bytes of a name
     /// as registered with CiA; 0: none. revision: major << 16 | minor
     std::uint32_t vendor = 0;
     std::uint32_t product = 0;

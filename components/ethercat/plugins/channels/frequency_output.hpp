@@ -43,7 +43,7 @@ public:
                  "pulses of one unit of the position", {.initial = 1.0}) {}
 
     void read(const SlaveImage& image) noexcept override {
-        for (ObjectRequest* const object : {&base_, &largest_, &rise_, &fall_, &factor_}) {
+        for (ObjectRequest* const object : {&base_, &max_, &rise_, &fall_, &factor_}) {
             object->step(image);
         }
         show_limits();
@@ -74,7 +74,7 @@ public:
         target_field_.write_limited(image, raw);
     }
     void restart() noexcept override {
-        for (ObjectRequest* const object : {&base_, &largest_, &rise_, &fall_, &factor_}) {
+        for (ObjectRequest* const object : {&base_, &max_, &rise_, &fall_, &factor_}) {
             object->restart();
         }
     }
@@ -96,14 +96,14 @@ private:
     };
 
     void show_limits() noexcept {
-        if (!base_.known() || !largest_.known() || !rise_.known() || !fall_.known() ||
+        if (!base_.known() || !max_.known() || !rise_.known() || !fall_.known() ||
             !factor_.known()) {
             return;
         }
         const double scale = usable_scale(scale_);
         const auto base = static_cast<double>(base_.value());
-        const auto largest = static_cast<double>(largest_.value());
-        max_velocity_ = (largest > 0 ? largest * base / full_scale : base) / scale;
+        const auto max = static_cast<double>(max_.value());
+        max_velocity_ = (max > 0 ? max * base / full_scale : base) / scale;
         // in steps of 10 Hz/s or 1 kHz/s
         const double step = (factor_.value() & 1) != 0 ? 1000.0 : 10.0;
         max_rise_ = step * static_cast<double>(rise_.value()) / scale;
@@ -124,7 +124,7 @@ private:
     ObjectRequest rise_{0x8001, 4, 16, false};     ///< ramp, rising
     ObjectRequest fall_{0x8001, 5, 16, false};     ///< ramp, falling
     ObjectRequest factor_{0x8000, 7, 8, false};    ///< unit of the ramps
-    ObjectRequest largest_{0x8800, 2, 16, false};  ///< largest value of the target, or 0
+    ObjectRequest max_{0x8800, 2, 16, false};  ///< largest value of the target, or 0
     std::uint16_t last_raw_ = 0;
     bool was_operational_ = false;
 };

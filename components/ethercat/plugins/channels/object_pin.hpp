@@ -20,7 +20,7 @@ public:
                   static_cast<unsigned>(plan.channel.setting("bits", 32)),
                   plan.channel.setting("signed", 0) != 0),
           per_unit_(plan.channel.setting("per-unit", 0)),
-          largest_(std::exp2(plan.channel.setting("bits", 32)) - 1) {
+          max_(std::exp2(plan.channel.setting("bits", 32)) - 1) {
         constexpr const char* about = "written by SDO when it changes";
         if (per_unit_ != 0.0) {
             scaled_.emplace(plan.component, plan.writes, plan.pin("").c_str(), about);
@@ -46,7 +46,7 @@ private:
     std::int64_t requested() const noexcept {
         if (scaled_) {
             const double raw = std::round(scaled_->get() * per_unit_);
-            return std::isfinite(raw) ? static_cast<std::int64_t>(std::clamp(raw, 0.0, largest_))
+            return std::isfinite(raw) ? static_cast<std::int64_t>(std::clamp(raw, 0.0, max_))
                                       : object_.value();
         }
         return signed_ ? std::int64_t{signed_->get()} : std::int64_t{unsigned_->get()};
@@ -58,7 +58,7 @@ private:
 
     ObjectRequest object_;
     double per_unit_ = 0.0;
-    double largest_ = 0.0;
+    double max_ = 0.0;
     std::optional<In<double>> scaled_;
     std::optional<In<std::int32_t>> signed_;
     std::optional<In<std::uint32_t>> unsigned_;

@@ -107,7 +107,7 @@ private:
             p.shared_load += static_cast<double>(l.frame) / static_cast<double>(m.period);
         }
         std::vector<const Message*> higher;
-        std::uint32_t longest = m.bytes;
+        std::uint32_t max = m.bytes;
         double load =
             static_cast<double>(l.frame) / static_cast<double>(std::max<Time>(m.period, 1));
         for (const Message& other : t_.messages) {
@@ -116,10 +116,10 @@ private:
             }
             if (other.id > m.id) continue;
             higher.push_back(&other);
-            longest = std::max(longest, other.bytes);
+            max = std::max(max, other.bytes);
             load += static_cast<double>(t_.frame(other.bytes)) / static_cast<double>(other.period);
         }
-        const Time usable = t_.last_start(longest);
+        const Time usable = t_.last_start(max);
         std::size_t shared = 0;
         for (std::uint32_t slot = 1; slot < t_.slots * cycles_; ++slot) {
             shared += is_shared(slot);

@@ -137,7 +137,7 @@ private:
                     meet(slot, uses[k], u);
                 }
                 if (u.kind == Kind::priv && u.ids.empty() && t_.last_start(8) < 0) {
-                    error(u.at, too_long(slot, most_id),
+                    error(u.at, too_long(slot, max_id),
                           "use fewer slots, a longer cycle, a higher bit rate, or name short "
                           "messages");
                 }
@@ -211,7 +211,7 @@ private:
         }
     }
 
-    static constexpr std::uint32_t most_id = 0x7ff;  // stands for any message: 8 bytes
+    static constexpr std::uint32_t max_id = 0x7ff;  // stands for any message: 8 bytes
     const Table& t_;
     text::Messages<Topic>& report_;
 };

@@ -132,7 +132,7 @@ private:
         if (name == "first") return ethernet::to_string(duplicate_address(h.value));
         if (name == "station") return of_index(static_cast<std::size_t>(h.value));
         if (name == "heartbeat") return std::to_string(2 * schedule_.heartbeat_ms);
-        if (name == "bytes") return std::to_string(longest_stage_1());
+        if (name == "bytes") return std::to_string(max_stage_1());
         if (name == "identity") {
             return known_as_.empty() ? "mac " + called(h.who) : "ip " + known_as_;
         }
@@ -149,13 +149,13 @@ private:
         return index < schedule_.stations.size() ? schedule_.stations[index].name
                                                  : "station " + std::to_string(index);
     }
-    std::size_t longest_stage_1() const {
-        std::size_t longest = 0;
+    std::size_t max_stage_1() const {
+        std::size_t max = 0;
         for (std::size_t i = 0; i < schedule_.stations.size(); ++i) {
-            longest = std::max(longest, config::block_of(schedule_, i).size() +
+            max = std::max(max, config::block_of(schedule_, i).size() +
                                             (schedule_.stations[i].ip ? 13 : 5));
         }
-        return longest;
+        return max;
     }
 
     const config::Schedule& schedule_;

@@ -68,7 +68,7 @@ std::optional<std::size_t> loops_of(const Schedule& s) {
     return {};
 }
 
-std::size_t longest(const StationEntry& e, std::size_t index = 0) {
+std::size_t max(const StationEntry& e, std::size_t index = 0) {
     return ethernet::header_bytes + std::max<std::size_t>(e.slots[index].setup.size, 46);
 }
 
@@ -93,10 +93,10 @@ Plan plan_of(const Schedule& s) {
         t.station = i;
         t.read = e.phase;
         t.up = leaves(s, e, t.read);
-        t.up_arrives = t.up + s.path(longest(e));
+        t.up_arrives = t.up + s.path(max(e));
         t.master = next(m.phase, s.cycle, t.up_arrives);
         t.down = leaves(s, m, t.master);
-        t.down_arrives = t.down + s.path(longest(m));
+        t.down_arrives = t.down + s.path(max(m));
         t.output = next(e.phase, s.cycle, t.down_arrives);
         t.worst = t.output - t.read + s.cycle;
         t.cycles = static_cast<std::uint32_t>((t.output - t.read) / s.cycle);
@@ -110,14 +110,14 @@ std::vector<Way> ways_of(const Schedule& s, std::size_t here, std::size_t slot) 
     const StationEntry& own = s.stations[here];
     // Back at this station's thread, in a cycle's first moment, with what the other's thread read.
     const auto back_from = [&](const StationEntry& e, Time read) {
-        return next(own.phase, s.cycle, leaves(s, e, read) + s.path(longest(e)));
+        return next(own.phase, s.cycle, leaves(s, e, read) + s.path(max(e)));
     };
     for (std::size_t i = 0; i < s.stations.size(); ++i) {
         const StationEntry& e = s.stations[i];
         if (i == here || e.slots.empty()) continue;
         const Time begun = own.phase;
         const Time taken =
-            next(e.phase, s.cycle, leaves(s, own, begun, slot) + s.path(longest(own, slot)));
+            next(e.phase, s.cycle, leaves(s, own, begun, slot) + s.path(max(own, slot)));
         // what was taken is at a terminal; the next cycle there reads it back
         const Time home = back_from(e, taken + s.cycle);
         const Time read = e.phase;

@@ -96,7 +96,7 @@ private:
     Time sent_at_ = INT64_MIN / 2;
     Address reply_to_{};
     bool reply_ = false;
-    std::array<std::uint8_t, ethernet::largest_frame> frame_{};
+    std::array<std::uint8_t, ethernet::max_frame> frame_{};
 };
 
 }  // namespace hal::tdma::rtcfg

@@ -90,7 +90,7 @@ private:
     Time began_ = 0;
     // local, last before_slots()
     Time last_slots_ = 0;
-    std::array<std::uint8_t, ethernet::largest_frame> frame_{};
+    std::array<std::uint8_t, ethernet::max_frame> frame_{};
 };
 
 }  // namespace hal::tdma::rtcfg

@@ -18,7 +18,7 @@ bool Slot::push(std::span<const std::uint8_t> frame, unsigned priority,
                 ethernet::Finisher* finisher, std::uint32_t epoch) noexcept {
     if (frame.size() < ethernet::header_bytes ||
         frame.size() > ethernet::header_bytes + capacity() ||
-        frame.size() > ethernet::largest_frame ||
+        frame.size() > ethernet::max_frame ||
         ahead_of(priority, epoch) + ethernet::wire_bytes(frame.size()) > turn_bytes()) {
         return false;
     }
@@ -58,7 +58,7 @@ std::size_t Slot::ahead_of(unsigned priority, std::uint32_t epoch) const noexcep
 }
 
 /// Returns the index of the frame that leaves first; count_: none. Drops frames of earlier epochs.
-std::size_t Slot::most_urgent() noexcept {
+std::size_t Slot::max_urgent() noexcept {
     if (waiting() == 0) return count_;
     // Returns the order of sending: smaller leaves first.
     const auto rank = [](const Entry& entry) {
@@ -79,7 +79,7 @@ std::size_t Slot::most_urgent() noexcept {
 }
 
 std::span<const std::uint8_t> Slot::front() noexcept {
-    front_ = most_urgent();
+    front_ = max_urgent();
     if (front_ == count_) {
         return {};
     }

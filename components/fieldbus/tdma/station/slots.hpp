@@ -100,13 +100,13 @@ private:
         std::atomic<std::uint32_t> length{0}, priority{0}, epoch{0};
         std::uint64_t order = 0;
         ethernet::Finisher* finisher = nullptr;
-        std::array<std::uint8_t, ethernet::largest_frame> bytes;
+        std::array<std::uint8_t, ethernet::max_frame> bytes;
 
         bool is_ready() const noexcept {
             return state.load(std::memory_order_acquire) == State::ready;
         }
     };
-    std::size_t most_urgent() noexcept;
+    std::size_t max_urgent() noexcept;
     // bytes on the line
     std::size_t ahead_of(unsigned priority, std::uint32_t epoch) const noexcept;
     bool release(Entry& entry) noexcept;

@@ -50,7 +50,7 @@ void check(const StationSetup& s) {
         if (slot.period == 0 || slot.phasing >= slot.period) {
             throw std::invalid_argument(which + ": phasing exceeds its period");
         }
-        if (slot.size > ethernet::largest_frame - ethernet::header_bytes) {
+        if (slot.size > ethernet::max_frame - ethernet::header_bytes) {
             throw std::invalid_argument(which + " is longer than a frame");
         }
         for (std::size_t k = 0; k < i; ++k) {

@@ -154,7 +154,7 @@ private:
     bool carrier_ = false;
     unsigned gone_ = 0;
     // space for a VLAN tag, so that such a frame is counted
-    std::array<std::uint8_t, ethernet::largest_frame + 4> buffer_{};
+    std::array<std::uint8_t, ethernet::max_frame + 4> buffer_{};
     // written by the cycle, taken by the thread; 0: none
     std::atomic<std::uint64_t> news_{0};
     std::atomic<bool> ended_{false};

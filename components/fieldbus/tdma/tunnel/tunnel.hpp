@@ -19,10 +19,10 @@ namespace hal::tdma {
 constexpr std::size_t tunnel_mtu(std::size_t size) noexcept {
     constexpr std::size_t smallest = 68;
 
-    constexpr std::size_t largest = ethernet::largest_frame - ethernet::header_bytes - rtmac_bytes;
+    constexpr std::size_t max = ethernet::max_frame - ethernet::header_bytes - rtmac_bytes;
     if (size < smallest + rtmac_bytes) return 0;
-    if (size - rtmac_bytes < largest) return size - rtmac_bytes;
-    return largest;
+    if (size - rtmac_bytes < max) return size - rtmac_bytes;
+    return max;
 }
 
 /// Returns the MTU of a station's slot for ordinary packets; 0: no such slot. [any]
@@ -48,7 +48,7 @@ public:
     /// Queues an Ethernet frame for slot 1. Returns false and counts it when the queue is full, the
     /// frame is too long, or the station may not send. [any] one thread
     bool give(std::span<const std::uint8_t> frame) noexcept;
-    /// Copies the oldest received Ethernet frame to `out` (at least largest_frame bytes) and
+    /// Copies the oldest received Ethernet frame to `out` (at least max_frame bytes) and
     /// returns its length; 0: none. [any] one thread
     std::size_t take(std::span<std::uint8_t> out) noexcept;
 
@@ -71,7 +71,7 @@ public:
 private:
     struct Packet {
         std::size_t length = 0;
-        std::array<std::uint8_t, ethernet::largest_frame> bytes;
+        std::array<std::uint8_t, ethernet::max_frame> bytes;
     };
     using Counter = std::atomic<std::uint64_t>;
     static std::uint64_t read(const Counter& c) noexcept {

@@ -76,14 +76,14 @@ STOPPED(ssize_t, write, (int file, const void* from, std::size_t bytes), (file, 
 STOPPED(ssize_t, readv, (int file, const iovec* to, int count), (file, to, count))
 STOPPED(ssize_t, writev, (int file, const iovec* from, int count), (file, from, count))
 STOPPED(int, poll, (pollfd * files, nfds_t count, int ms), (files, count, ms))
-STOPPED(int, ppoll, (pollfd * files, nfds_t count, const timespec* most, const sigset_t* signals),
-        (files, count, most, signals))
-STOPPED(int, select, (int count, fd_set* reads, fd_set* writes, fd_set* others, timeval* most),
-        (count, reads, writes, others, most))
-STOPPED(int, epoll_wait, (int file, epoll_event* events, int most, int ms),
-        (file, events, most, ms))
-STOPPED(int, recvmmsg, (int file, mmsghdr* to, unsigned count, int flags, timespec* most),
-        (file, to, count, flags, most))
+STOPPED(int, ppoll, (pollfd * files, nfds_t count, const timespec* max, const sigset_t* signals),
+        (files, count, max, signals))
+STOPPED(int, select, (int count, fd_set* reads, fd_set* writes, fd_set* others, timeval* max),
+        (count, reads, writes, others, max))
+STOPPED(int, epoll_wait, (int file, epoll_event* events, int max, int ms),
+        (file, events, max, ms))
+STOPPED(int, recvmmsg, (int file, mmsghdr* to, unsigned count, int flags, timespec* max),
+        (file, to, count, flags, max))
 STOPPED(int, sendmmsg, (int file, mmsghdr* from, unsigned count, int flags),
         (file, from, count, flags))
 STOPPED(int, clock_nanosleep, (clockid_t clock, int flags, const timespec* wanted, timespec* left),

@@ -51,7 +51,7 @@ static bool take_element(const struct halcyon_parameter* p, int index, const cha
 
 static bool take_parameter(const struct halcyon_parameter* p) {
     char fallback[128] = "";
-    if (p->most == 0) {
+    if (p->max == 0) {
         if (p->type == 'i') {
             snprintf(fallback, sizeof fallback, "%d", *(int*)p->place);
         } else if (p->type == 'l') {
@@ -63,16 +63,16 @@ static bool take_parameter(const struct halcyon_parameter* p) {
     const hal_argument_decl decl = {sizeof decl, 0, p->name, p->doc, fallback};
     const char* const given = halcyon_current_host->argument(halcyon_current_host, &decl);
     if (!given || given == fallback) { /* a default may be written to as a given value may */
-        const char* const usual = p->type == 's' && p->most == 0 ? *(char**)p->place : NULL;
+        const char* const usual = p->type == 's' && p->max == 0 ? *(char**)p->place : NULL;
         return !usual || take_element(p, 0, usual);
     }
-    if (p->most == 0) return take_element(p, 0, given);
+    if (p->max == 0) return take_element(p, 0, given);
     int index = 0;
     for (const char* at = given;; ++index) {
         const char* const comma = strchrnul(at, ',');
-        if (index >= p->most) {
+        if (index >= p->max) {
             char why[40];
-            snprintf(why, sizeof why, "has more than %d values", p->most);
+            snprintf(why, sizeof why, "has more than %d values", p->max);
             return reject_value(p->name, given, why);
         }
         char* const element = strndup(at, (size_t)(comma - at));

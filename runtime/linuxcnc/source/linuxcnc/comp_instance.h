@@ -40,7 +40,7 @@ static int comp_id __attribute__((unused)) = 1; /* what hal_init() would have gi
 
 typedef struct __comp_item {
     size_t offset; /* of the first hal_pin in the instance */
-    unsigned most; /* capacity in elements */
+    unsigned max; /* capacity in elements */
     hal_type type;
     hal_dir dir;
     unsigned flags;
@@ -100,7 +100,7 @@ static inline bool __comp_personality(const __comp_context* context, const char*
 
 static inline void __comp_prepare(void* instance, const __comp_item* items, size_t count) {
     for (size_t i = 0; i < count; ++i) {
-        for (unsigned k = 0; k < items[i].most; ++k) {
+        for (unsigned k = 0; k < items[i].max; ++k) {
             hal_pin* const pin = (hal_pin*)((char*)instance + items[i].offset) + k;
             pin->slot = &pin->own;
         }
@@ -158,22 +158,22 @@ static inline bool __comp_counted(const __comp_context* context, int result) {
 static inline long __comp_count(long wanted) { return wanted < 0 ? 0 : wanted; }
 
 /* The name as the runtime takes it. */
-static inline const char* __comp_full(const __comp_context* context, const char* name, char* room,
+static inline const char* __comp_full(const __comp_context* context, const char* name, char* capacity,
                                       size_t size) {
     if (!context->whole) return name;
-    snprintf(room, size, *name ? "%s.%s" : "%s", context->prefix, name);
-    return room;
+    snprintf(capacity, size, *name ? "%s.%s" : "%s", context->prefix, name);
+    return capacity;
 }
 
 /* The name with its block of # as a number; without one, the name itself. */
-static inline void __comp_numbered(char* to, size_t room, const char* name, unsigned index) {
+static inline void __comp_numbered(char* to, size_t capacity, const char* name, unsigned index) {
     const char* const hash = strchr(name, '#');
     if (!hash) {
-        snprintf(to, room, "%s", name);
+        snprintf(to, capacity, "%s", name);
         return;
     }
     const int width = (int)strspn(hash, "#");
-    snprintf(to, room, "%.*s%0*u%s", (int)(hash - name), name, width, index, hash + width);
+    snprintf(to, capacity, "%.*s%0*u%s", (int)(hash - name), name, width, index, hash + width);
 }
 
 /* counts: elements of an array; 1 or 0 for anything else, -1 standing for 1. */
@@ -182,10 +182,10 @@ static inline bool __comp_pins(const __comp_context* context, void* instance,
     char name[512], full[800], reason[700];
     for (size_t i = 0; i < count; ++i) {
         const long wanted = counts[i] < 0 ? 1 : counts[i];
-        if (wanted > (long)items[i].most) {
+        if (wanted > (long)items[i].max) {
             snprintf(reason, sizeof reason,
                      "personality asks for %ld pins %s, there are at most %u", wanted,
-                     items[i].name, items[i].most);
+                     items[i].name, items[i].max);
             return __comp_fail(context, reason);
         }
         for (unsigned k = 0; k < (unsigned)wanted; ++k) {

@@ -11,10 +11,10 @@
 #include "inside.h"
 #include "program.h"
 
-enum { most_names = 16 };
+enum { max_names = 16 };
 
 int count;
-char* names[most_names];
+char* names[max_names];
 void user_mainloop(void);
 void userinit(int argc, char** argv) __attribute__((weak));
 extern const hal_component hal_plugin;
@@ -35,8 +35,8 @@ static bool take_word(char* word) {
     char* rest = NULL;
     int found = 0;
     for (char* name = strtok_r(word + 6, ",", &rest); name; name = strtok_r(NULL, ",", &rest)) {
-        if (found == most_names) {
-            fprintf(stderr, "%s: names= has more than %d names\n", hal_plugin.name, most_names);
+        if (found == max_names) {
+            fprintf(stderr, "%s: names= has more than %d names\n", hal_plugin.name, max_names);
             exit(1);
         }
         names[found++] = name;
@@ -93,7 +93,7 @@ int main(int argc, char** argv) {
     if (single) {
         wanted = 1;
     }
-    for (int i = 0; names[0] ? i < most_names && names[i] : i < wanted; ++i) {
+    for (int i = 0; names[0] ? i < max_names && names[i] : i < wanted; ++i) {
         if (names[0]) {
             snprintf(halcyon_program_prefix, sizeof halcyon_program_prefix, "%s", names[i]);
         } else if (single) {

@@ -300,13 +300,13 @@ static inline int pmMatQuatConvert(const PmRotationMatrix* m, PmQuaternion* to) 
     const double zx = m->z.x - m->x.z;
     const double xy = m->x.y - m->y.x;
     PmQuaternion q;
-    int largest = 0;
+    int max = 0;
     for (int i = 1; i < 4; ++i) {
-        if (four[i] > four[largest]) {
-            largest = i;
+        if (four[i] > four[max]) {
+            max = i;
         }
     }
-    switch (largest) {
+    switch (max) {
     case 0: q = (PmQuaternion){four[0], yz, zx, xy}; break;
     case 1: q = (PmQuaternion){yz, four[1], m->x.y + m->y.x, m->x.z + m->z.x}; break;
     case 2: q = (PmQuaternion){zx, m->x.y + m->y.x, four[2], m->y.z + m->z.y}; break;

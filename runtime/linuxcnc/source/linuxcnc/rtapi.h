@@ -67,16 +67,16 @@ struct halcyon_parameter {
     const char *name, *doc;
     void* place;
     int type; /* 'i' int, 'l' long, 's' char * */
-    int most; /* elements of an array; 0: not an array */
+    int max; /* elements of an array; 0: not an array */
 };
 struct halcyon_note {
     const char *key, *text;
 };
 
 #define HALCYON_IN_SECTION(section_name) __attribute__((used, section(section_name)))
-#define HALCYON_PARAMETER(var, doc, type, most)                                                    \
+#define HALCYON_PARAMETER(var, doc, type, max)                                                    \
     static const struct halcyon_parameter halcyon_parameter_##var = {#var, doc, (void*)&var, type, \
-                                                                     most};                        \
+                                                                     max};                        \
     static const struct halcyon_parameter* const halcyon_parameter_entry_##var HALCYON_IN_SECTION( \
         "halcyon_parameters") = &halcyon_parameter_##var;
 #define HALCYON_PASTE_(a, b) a##b
