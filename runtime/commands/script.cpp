@@ -179,8 +179,8 @@ void Script::run_line(const Command& command) {
     }
     const CommandRow* const row = row_of(command);
     if (!row) return report_unknown(command);
-    if (session_.journal().wanted() && !only_looks(*row, command)) {
-        session_.journal().add(row->edits() ? "edit" : "command",
+    if (session_.event_log().wanted() && !only_looks(*row, command)) {
+        session_.event_log().add(row->edits() ? "edit" : "command",
                                std::string(session_.sources.text(command.span)));
     }
     if (!row->edits() && !check_arity(row->usage(), command.name, command.args, pending_)) {

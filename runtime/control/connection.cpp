@@ -412,7 +412,7 @@ Connection::Urgent Connection::halted(std::string_view line, std::string& reply)
     case ThreadControl::Halt::hung: return Urgent::lost;
     case ThreadControl::Halt::done: break;
     }
-    state.session.journal().note("command", "stop");
+    state.session.event_log().note("command", "stop");
     ++state.requests;
     const std::string id = id_text(Json::parse(line.begin(), line.end(), nullptr, false));
     reply += "{\"id\":" + id + ",\"ok\":true,\"status\":0,\"out\":\"\",\"err\":\"\"}\n";

@@ -55,8 +55,8 @@ ProbeFeeds::~ProbeFeeds() {
     for (const Feed& feed : all_) {
         session_.probes().detach(feed.probe);
     }
-    if (journal_) {
-        session_.journal().end();
+    if (event_position_) {
+        session_.event_log().end();
     }
 }
 
@@ -98,25 +98,25 @@ std::optional<std::uint64_t> ProbeFeeds::remove(std::uint64_t id) {
 
 void ProbeFeeds::journal(bool on) {
     const std::scoped_lock own(mutex_);
-    if (on == journal_.has_value()) return;
+    if (on == event_position_.has_value()) return;
     const auto lock = session_.lock();
     if (on) {
-        journal_ = session_.journal().begin();
+        event_position_ = session_.event_log().begin();
     } else {
-        session_.journal().end();
-        journal_.reset();
+        session_.event_log().end();
+        event_position_.reset();
     }
     journal_due_ns_ = monotonic_ns();
 }
 
 bool ProbeFeeds::empty() const {
     const std::scoped_lock own(mutex_);
-    return all_.empty() && !journal_;
+    return all_.empty() && !event_position_;
 }
 
 std::int64_t ProbeFeeds::next_due_ns() const {
     const std::scoped_lock own(mutex_);
-    std::int64_t due = journal_ ? journal_due_ns_ : std::numeric_limits<std::int64_t>::max();
+    std::int64_t due = event_position_ ? journal_due_ns_ : std::numeric_limits<std::int64_t>::max();
     for (const Feed& feed : all_) {
         due = std::min(due, feed.due_ns);
     }
@@ -132,11 +132,11 @@ void ProbeFeeds::publish(std::int64_t now_ns, bool congested, std::string& event
             publish(feed, now_ns, events);
         }
     }
-    if (!journal_ || journal_due_ns_ > now_ns) return;
+    if (!event_position_ || journal_due_ns_ > now_ns) return;
     journal_due_ns_ = now_ns + journal_every_ns;
     if (congested) return;
     const auto lock = session_.lock();
-    for (const JournalEntry& entry : session_.journal().after(*journal_)) {
+    for (const LoggedEvent& entry : session_.event_log().after(*event_position_)) {
         json_quote(events += "{\"event\":\"journal\",\"time_ns\":" + std::to_string(entry.time_ns) +
                              ",\"kind\":",
                    entry.kind);

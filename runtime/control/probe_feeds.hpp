@@ -49,7 +49,7 @@ private:
     mutable std::mutex mutex_;
     std::vector<Feed> all_;  ///< guarded by mutex_, as is all below
     std::uint64_t next_ = 1;
-    std::optional<Journal::Position> journal_;
+    std::optional<EventLog::Position> event_position_;
     std::int64_t journal_due_ns_ = 0;
 };
 

@@ -60,7 +60,7 @@ void ValueRequests::set(const Json& body, std::string& reply) {
         resolve_set(session_.model(), command);
         const CommandRow& row = *find_command(command.name.text);
         if (!check_lock(row, command, session_.locked, session_.model(), diagnostics)) break;
-        session_.journal().add(
+        session_.event_log().add(
             "edit", command.name.text + " " + command.args[0].text + " " + command.args[1].text);
         transaction.apply(row.form(), command, diagnostics);
     }

@@ -99,7 +99,7 @@ TEST_F(ProbeProtocol, the_journal_has_edits_and_commands_but_no_queries) {
     ask({{"journal", true}});
     machine.must("getp s.out\nsetp s.in1 4\nstart\n");
     ask({{"set", {{"a.in1", true}}}});
-    const hal_messages& messages = machine.session.journal().for_plugins();
+    const hal_messages& messages = machine.session.event_log().for_plugins();
     constexpr std::string_view line = "canopen.0: node 3: emergency 8110h";
     messages.add(&messages, line.data(), line.size());  // of an instance
     std::string events;

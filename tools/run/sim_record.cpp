@@ -35,7 +35,7 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
     Session& session = machine.session;
     std::shared_ptr<LiveProbe> probe;
     ProbeLayout layout;
-    Journal::Position journal;
+    EventLog::Position journal;
     std::string problem;
     {
         const auto lock = session.lock();
@@ -47,7 +47,7 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
         probe = session.probes().attach({chosen_values(session.model(), patterns)}, problem);
         if (!probe) return fail(options, "--record: " + problem);
         layout = Probes::layout(*probe);
-        journal = session.journal().begin();
+        journal = session.event_log().begin();
     }
     const auto sink = make_sink(
         options.record, Probes::columns(*probe),
@@ -70,7 +70,7 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
         left_cycles -= std::min(step_cycles, left_cycles);
         left_ns -= step_ns;
         const auto lock = session.lock();
-        for (const JournalEntry& entry : session.journal().after(journal)) {
+        for (const LoggedEvent& entry : session.event_log().after(journal)) {
             good = good && sink->event({entry.time_ns, entry.kind, entry.text});
         }
         for (const ProbeRows& batch : session.probes().take(*probe, std::size_t{1} << 28)) {
@@ -80,7 +80,7 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
     {
         const auto lock = session.lock();
         session.probes().detach(probe);
-        session.journal().end();
+        session.event_log().end();
     }
     if (!sink->close() || !good) return fail(options, cannot_write(*sink, options.record));
     if (!options.quiet) {

@@ -48,10 +48,10 @@ void SessionState::offer_names(Diagnostics& diagnostics) {
 
 Failure SessionState::start(Instance& instance) {
     if (!options.sink) {
-        return start_instance(instance, model, *executor, status, journal.for_plugins());
+        return start_instance(instance, model, *executor, status, event_log.for_plugins());
     }
     const Acquisition acquisition;
-    Failure failure = start_instance(instance, model, *executor, status, journal.for_plugins());
+    Failure failure = start_instance(instance, model, *executor, status, event_log.for_plugins());
     OutsideWorld outside = acquisition.result();
     outside.streams = instance.streams.size();
     if (failure.empty() && !outside.empty()) {
@@ -118,7 +118,7 @@ RunningModel::~RunningModel() {
 const SessionOptions& RunningModel::options() const { return state_->options; }
 const Model& RunningModel::model() const { return state_->model; }
 Probes& RunningModel::probes() { return state_->probes; }
-Journal& RunningModel::journal() { return state_->journal; }
+EventLog& RunningModel::event_log() { return state_->event_log; }
 Traces& RunningModel::traces() { return state_->traces; }
 Absences& RunningModel::absences() { return state_->absences; }
 

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "machine/load/plugin_host.hpp"
-#include "machine/report/journal.hpp"
+#include "machine/report/event_log.hpp"
 #include "machine/report/reports.hpp"
 #include "machine/report/traces.hpp"
 #include "machine/run/live_values.hpp"
@@ -110,7 +110,7 @@ public:
     const ThreadControl& threads() const { return threads_; }
     LiveValues& values() { return values_; }
     Probes& probes();
-    Journal& journal();
+    EventLog& event_log();
     Traces& traces();
     Reports& reports() { return reports_; }
     const Reports& reports() const { return reports_; }

@@ -12,7 +12,7 @@
 #include "machine/load/construct.hpp"
 #include "machine/load/plugins.hpp"
 #include "machine/report/fault_log.hpp"
-#include "machine/report/journal.hpp"
+#include "machine/report/event_log.hpp"
 #include "machine/report/machine_view.hpp"
 #include "machine/report/traces.hpp"
 #include "machine/run/open_transaction.hpp"
@@ -44,7 +44,7 @@ struct SessionState {
     Absences absences;  ///< of `hal check`: of all texts so far
     Probes probes{*this};
     FaultLog faults{view};
-    Journal journal{*executor, faults};
+    EventLog event_log{*executor, faults};
     Traces traces{view};
     hal_status status{sizeof status, nullptr, nullptr};  ///< for plugins
     std::vector<std::string> refused;  ///< by the system: "memory locking"

@@ -18,17 +18,17 @@ namespace hal {
 class Executor;
 class FaultLog;
 
-struct JournalEntry {
+struct LoggedEvent {
     std::int64_t time_ns = 0;  ///< on the machine's clock
     std::string kind;  ///< fault, edit, command, message
     std::string text;
 };
 
 /// Part of a Session. [setup]
-class Journal {
+class EventLog {
 public:
-    Journal(const Executor& executor, FaultLog& faults) : executor_(executor), faults_(faults) {}
-    Journal(const Journal&) = delete;
+    EventLog(const Executor& executor, FaultLog& faults) : executor_(executor), faults_(faults) {}
+    EventLog(const EventLog&) = delete;
 
     /// Where a listener is: it has what was added before.
     struct Position {
@@ -39,7 +39,7 @@ public:
     Position begin();
     void end();
     /// Returns what was added since `position`, oldest first, and advances it.
-    std::vector<JournalEntry> after(Position& position);
+    std::vector<LoggedEvent> after(Position& position);
     /// Adds an entry; does nothing while nobody listens.
     void add(const char* kind, std::string text);
     bool wanted() const { return listeners_ > 0; }
@@ -52,20 +52,20 @@ public:
     const hal_messages& for_plugins() const { return for_plugins_; }
 
 private:
-    void append(JournalEntry entry);
+    void append(LoggedEvent entry);
     void collect_messages();
     static constexpr std::size_t kept = 10'000;
     const Executor& executor_;
     FaultLog& faults_;
     std::atomic<std::size_t> listeners_{0};  // written under the session's lock
-    std::deque<JournalEntry> entries_;
+    std::deque<LoggedEvent> entries_;
     std::uint64_t count_ = 0;  // of all entries ever
     std::mutex messages_mutex_;
-    std::vector<JournalEntry> messages_;  // guarded by it: what is not in entries_ yet
+    std::vector<LoggedEvent> messages_;  // guarded by it: what is not in entries_ yet
     std::uint64_t messages_lost_ = 0;  // guarded by it: what did not fit there
     const hal_messages for_plugins_{
         sizeof(hal_messages), [](const hal_messages* self, const char* line, std::size_t bytes) {
-        static_cast<Journal*>(self->data)->message({line, bytes});
+        static_cast<EventLog*>(self->data)->message({line, bytes});
     }, this};
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "machine/report/journal.hpp"
+#include "machine/report/event_log.hpp"
 
 #include <algorithm>
 #include <new>
@@ -20,26 +20,26 @@ std::string missing(std::uint64_t lines) {
 
 }  // namespace
 
-Journal::Position Journal::begin() {
+EventLog::Position EventLog::begin() {
     ++listeners_;
     faults_.collect();
     collect_messages();
     return {count_, faults_.newest_number()};
 }
 
-void Journal::end() {
+void EventLog::end() {
     if (--listeners_ != 0) return;
     collect_messages();
     entries_.clear();
 }
 
-void Journal::add(const char* kind, std::string text) {
+void EventLog::add(const char* kind, std::string text) {
     if (!wanted()) return;
     collect_messages();
     append({executor_.now_ns(), kind, std::move(text)});
 }
 
-void Journal::append(JournalEntry entry) {
+void EventLog::append(LoggedEvent entry) {
     entries_.push_back(std::move(entry));
     ++count_;
     if (entries_.size() > kept) {
@@ -47,10 +47,10 @@ void Journal::append(JournalEntry entry) {
     }
 }
 
-void Journal::note(const char* kind, std::string_view line) noexcept {
+void EventLog::note(const char* kind, std::string_view line) noexcept {
     if (!wanted()) return;
     try {
-        JournalEntry entry{executor_.now_ns(), kind, std::string(line)};
+        LoggedEvent entry{executor_.now_ns(), kind, std::string(line)};
         const std::scoped_lock own(messages_mutex_);
         if (messages_.size() < kept) {
             messages_.push_back(std::move(entry));
@@ -61,15 +61,15 @@ void Journal::note(const char* kind, std::string_view line) noexcept {
     }  // it was printed
 }
 
-void Journal::collect_messages() {
-    std::vector<JournalEntry> messages;
+void EventLog::collect_messages() {
+    std::vector<LoggedEvent> messages;
     std::uint64_t lost = 0;
     {
         const std::scoped_lock own(messages_mutex_);
         messages.swap(messages_);
         lost = std::exchange(messages_lost_, 0);
     }
-    for (JournalEntry& one : messages) {
+    for (LoggedEvent& one : messages) {
         append(std::move(one));
     }
     if (lost != 0) {
@@ -77,10 +77,10 @@ void Journal::collect_messages() {
     }
 }
 
-std::vector<JournalEntry> Journal::after(Position& position) {
+std::vector<LoggedEvent> EventLog::after(Position& position) {
     faults_.collect();
     collect_messages();
-    std::vector<JournalEntry> all;
+    std::vector<LoggedEvent> all;
     const std::uint64_t first = count_ - entries_.size();
     if (first > position.entry) {
         all.push_back({entries_.front().time_ns, "message", missing(first - position.entry)});
@@ -94,7 +94,7 @@ std::vector<JournalEntry> Journal::after(Position& position) {
         all.push_back({-record.age_ns, "fault", record.sentence});  // an age at time 0
         position.fault = record.number;
     }
-    std::stable_sort(all.begin(), all.end(), [](const JournalEntry& a, const JournalEntry& b) {
+    std::stable_sort(all.begin(), all.end(), [](const LoggedEvent& a, const LoggedEvent& b) {
         return a.time_ns < b.time_ns;
     });
     return all;
