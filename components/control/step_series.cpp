@@ -15,7 +15,7 @@ struct Series {
           deviation(c, (std::string(name) + "-sd").c_str(),
                     (std::string(doc) + ", standard deviation").c_str(), {.unit = unit}),
           max(c, (std::string(name) + "-max").c_str(), (std::string(doc) + ", worst step").c_str(),
-               {.unit = unit}),
+              {.unit = unit}),
           retained_(c, {{"square", square_}}) {}
 
     void add(double value, std::uint32_t count) noexcept {

@@ -259,8 +259,9 @@ private:
         }
         void word() {
             const std::size_t begin = offset;
-            while (offset < text.size() &&
-                   (std::isalnum(static_cast<unsigned char>(text[offset])) || text[offset] == '_')) {
+            while (
+                offset < text.size() &&
+                (std::isalnum(static_cast<unsigned char>(text[offset])) || text[offset] == '_')) {
                 ++offset;
             }
             const std::string name(text.substr(begin, offset - begin));

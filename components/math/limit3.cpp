@@ -72,7 +72,8 @@ bool lands(double way, double speed, double a, int moves) {
 
 // The speed after `before`, to go `way` by at most `most` in a cycle; speeds and way are relative
 // to the goal, which may be moving.
-double next_speed(double way, double before, double max_speed, double a, double m, bool moving = false) {
+double next_speed(double way, double before, double max_speed, double a, double m,
+                  bool moving = false) {
     const double side = std::copysign(1.0, way);
     const double limit = side * stopping_speed(way, a, m);
 
@@ -87,10 +88,12 @@ double next_speed(double way, double before, double max_speed, double a, double 
         // at most two cycles later.
         const int moves_on_line =
             static_cast<int>(std::min(8.0, std::ceil(on_line / a - rounding)));
-        if (m == 1.0 && limit < max_speed && on_line > slower && on_line < faster && side * way > a) {
+        if (m == 1.0 && limit < max_speed && on_line > slower && on_line < faster &&
+            side * way > a) {
             for (int moves = 0; moves <= moves_on_line + (moving ? 0 : -2); ++moves) {
                 for (const double speed : {slower, faster}) {
-                    if (speed <= max_speed && lands(side * way, speed, a, moves)) return side * speed;
+                    if (speed <= max_speed && lands(side * way, speed, a, moves))
+                        return side * speed;
                 }
             }
         }

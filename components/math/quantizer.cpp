@@ -54,15 +54,18 @@ struct Quantizer : hal::Component {
                 wanted = level_;
             }
         }
-        const double low = std::isfinite(min) ? std::clamp(std::ceil(min), -max_exact, max_exact) : -max_exact;
-        const double high = std::isfinite(max) ? std::clamp(std::floor(max), -max_exact, max_exact) : max_exact;
+        const double low =
+            std::isfinite(min) ? std::clamp(std::ceil(min), -max_exact, max_exact) : -max_exact;
+        const double high =
+            std::isfinite(max) ? std::clamp(std::floor(max), -max_exact, max_exact) : max_exact;
         level_ = std::min(std::max(wanted, low), high);
         known_ = true;
         show(level_ * height + origin, level_, level_ != wanted);
     }
 
 private:
-    static constexpr double max_exact = 9007199254740992.0;  // 2^53: whole numbers are exact up to here
+    static constexpr double max_exact =
+        9007199254740992.0;  // 2^53: whole numbers are exact up to here
     double rounded(double exact) const noexcept {
         switch (mode) {
         case down: return std::floor(exact);

@@ -149,8 +149,7 @@ struct DiffDrive : hal::Component {
 
     void command(hal::Cycle cycle) noexcept {
         const double wanted_v = std::isfinite(linear) ? std::clamp(linear.get(), -max, max) : 0.0;
-        const double wanted_w =
-            std::isfinite(angular) ? std::clamp(angular.get(), -max, max) : 0.0;
+        const double wanted_w = std::isfinite(angular) ? std::clamp(angular.get(), -max, max) : 0.0;
         // All limits scale (v, w) as a vector, so that the robot stays on its curve.
         double share = 1.0;
         const auto within = [&](double value, double limit) {

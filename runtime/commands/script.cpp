@@ -181,7 +181,7 @@ void Script::run_line(const Command& command) {
     if (!row) return report_unknown(command);
     if (session_.event_log().wanted() && !only_looks(*row, command)) {
         session_.event_log().add(row->edits() ? "edit" : "command",
-                               std::string(session_.sources.text(command.span)));
+                                 std::string(session_.sources.text(command.span)));
     }
     if (!row->edits() && !check_arity(row->usage(), command.name, command.args, pending_)) {
         return effects_.add_line(command.span);

@@ -163,8 +163,7 @@ void show_thread(Request& request) {
         const std::int32_t last = values[2 * i].s32;
         const std::int32_t max = values[2 * i + 1].s32;
         if (request.script()) {
-            request.add("{} YES {} {:>8} {}", thread->options.period_ns, thread->name, last,
-                        max);
+            request.add("{} YES {} {:>8} {}", thread->options.period_ns, thread->name, last, max);
         } else {
             request.add("{:>11}  YES  {:>20} ( {:>8}, {:>8} )\n", thread->options.period_ns,
                         thread->name, last, max);

@@ -285,7 +285,9 @@ bool Executor::observe(const std::vector<std::pair<Core*, Observation*>>& observ
     }
     bool all = true;
     for (const auto& [core, observation] : observations) {
-        const auto done = [observation = observation] { return observation->done.load(std::memory_order_acquire); };
+        const auto done = [observation = observation] {
+            return observation->done.load(std::memory_order_acquire);
+        };
         wait([&, core = core] { return done() || hangs(*core, timeout_ns); },
              timeout_ns + 2 * core->period_ns());
         if (done()) continue;
@@ -304,7 +306,9 @@ bool Executor::write(const std::vector<std::pair<Core*, std::vector<Write>>>& ro
         if (hangs(*core, timeout_ns)) return false;
     }
     for (const auto& [core, row] : rows) {
-        const auto fits = [&, core = core, needed = row.size()] { return core->capacity() >= needed; };
+        const auto fits = [&, core = core, needed = row.size()] {
+            return core->capacity() >= needed;
+        };
         if (fits()) continue;
         wait([&, core = core] {
             call(runner(*core));

@@ -283,7 +283,8 @@ double bare_loop(const Options& options, int frames_in, std::size_t bytes) {
         address.sll_family = AF_PACKET;
         address.sll_protocol = 0x2390;
         address.sll_ifindex = static_cast<int>(if_nametoindex(interface));
-        if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+        if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) !=
+            0) {
             throw std::runtime_error("no raw socket");
         }
         return socket;

@@ -61,7 +61,8 @@ public:
         if (stamps) {
             setsockopt(socket_.get(), SOL_SOCKET, SO_TIMESTAMPNS, &one, sizeof one);
         }
-        if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+        if (::bind(socket_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) !=
+            0) {
             throw std::runtime_error("no raw socket");
         }
     }

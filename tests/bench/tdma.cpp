@@ -331,7 +331,7 @@ void axis_meanwhile(const Options& options, Report& report) {
                            std::to_string(done.status));
     }
     const double max = std::max(std::abs(std::atof(words[words.size() - 2].c_str())),
-                                 std::abs(std::atof(words.back().c_str())));
+                                std::abs(std::atof(words.back().c_str())));
     report.row({.what = "  largest following error of an axis meanwhile (virtual clock)",
                 .unit = "mm",
                 .ours = max,

@@ -278,8 +278,7 @@ private:
 
         const std::string name = element.attribute("name").as_string();
         std::string bytes;
-        if (!read_bytes((std::filesystem::path(name_).parent_path() / file).string(), max,
-                        bytes) ||
+        if (!read_bytes((std::filesystem::path(name_).parent_path() / file).string(), max, bytes) ||
             images_.size() >= 100) {
             return error(
                 element,

@@ -58,8 +58,7 @@ public:
         }
         for (const Xml object : dictionary.child("Objects").children("Object")) {
             if (values_ > max_values) {
-                context_.warn(object, "the dictionary has more than " +
-                                          std::to_string(max_values) +
+                context_.warn(object, "the dictionary has more than " + std::to_string(max_values) +
                                           " values; the rest is ignored");
                 break;
             }

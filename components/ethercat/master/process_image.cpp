@@ -84,7 +84,8 @@ void ProcessImage::lay_out(const Setup& setup) {
                     image.out_bytes + image.in_bytes == 0) {
                     continue;
                 }
-                if (block.out_bytes + block.in_bytes + image.out_bytes + image.in_bytes > capacity()) {
+                if (block.out_bytes + block.in_bytes + image.out_bytes + image.in_bytes >
+                    capacity()) {
                     close(block, at);
                 }
                 block.out_bytes += image.out_bytes;

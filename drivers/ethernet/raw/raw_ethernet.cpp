@@ -63,7 +63,7 @@ public:
         if (now >= launch.at_ns) return sender_.leave(frame, launch);
         if (pacer_) {
             return frame.size() <= max_frame ? pacer_->send(frame, launch, now)
-                                                 : sender_.drop(Sent::rejected);
+                                             : sender_.drop(Sent::rejected);
         }
         if (launch.at_ns - now > options_.spin_ns) return sender_.drop(Sent::full);
         sender_.await(launch.at_ns);

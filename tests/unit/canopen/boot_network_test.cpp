@@ -124,7 +124,7 @@ TEST(BootNetwork, Limits_the_number_of_nodes_booted_at_a_time) {
     unsigned max = 0;
     ASSERT_TRUE(b.until([&] {
         max = std::max<unsigned>(max, static_cast<unsigned>(std::ranges::count_if(
-                                            b.setup.nodes, [&](const NodeSetup& n) {
+                                          b.setup.nodes, [&](const NodeSetup& n) {
             const auto step = b.status(n.id).step;
             return step >= Step::resetting && step <= Step::watching;
         })));

@@ -86,7 +86,8 @@ TEST(Memory, Is_not_taken_after_setup) {
     device.start(now);
     for (const auto mode : {SdoMode::segmented, SdoMode::block}) {
         for (const bool up : {false, true}) {
-            SdoRequest r{.index = 0x2006, .upload = up, .mode = mode, .data = data, .buffer = buffer};
+            SdoRequest r{
+                .index = 0x2006, .upload = up, .mode = mode, .data = data, .buffer = buffer};
             serve(r);
         }
     }

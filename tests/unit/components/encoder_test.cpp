@@ -211,8 +211,8 @@ TEST(Encoder, Velocity_and_interpolation_at_constant_speed) {
         e.capture();
         if (cycle < 1000) continue;
         ASSERT_NEAR(e.get<double>("velocity"), 1e9 / (137.0 * base_ns) / 100.0, 1e-9);
-        max = std::max(
-            max, std::abs(e.get<double>("position-interpolated") - cycle / 137.0 / 100.0));
+        max =
+            std::max(max, std::abs(e.get<double>("position-interpolated") - cycle / 137.0 / 100.0));
     }
     // an edge is seen up to a fast cycle late: 1/137 of a count; not the count of 1e-2
     EXPECT_LT(max, 0.5e-3);

@@ -54,9 +54,8 @@ int run_ethercat_reg_read(const EthercatPositionOptions& options) {
     if (!wire.open(options)) return 1;
     const auto& words = wire.arguments();
     const auto address = ethercat_number(words.empty() ? "" : words[0], 0xffff);
-    const auto length = words.size() == 2
-                            ? ethercat_number(words[1], ethercat::max_datagram_data)
-                            : std::optional<std::uint64_t>(2);
+    const auto length = words.size() == 2 ? ethercat_number(words[1], ethercat::max_datagram_data)
+                                          : std::optional<std::uint64_t>(2);
     if (words.size() > 2 || !address || !length || *length == 0) {
         return fail(options,
                     "type: hal ethercat reg-read ADDRESS -p N REGISTER [BYTES]; "

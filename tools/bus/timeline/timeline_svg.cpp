@@ -223,8 +223,8 @@ private:
     std::int64_t max_response() const {
         std::int64_t max = 1;
         for (const ResponseTime& one : timeline_.responses) {
-            max = std::max({max, one.worst_ns, one.compared_ns.value_or(0),
-                                one.deadline_ns.value_or(0)});
+            max = std::max(
+                {max, one.worst_ns, one.compared_ns.value_or(0), one.deadline_ns.value_or(0)});
         }
         return max;
     }
@@ -238,8 +238,7 @@ private:
             text(left - 8, y_ + 13, 11, "end", fitting(one.name));
             response_bar_of(one.worst_ns, max, y_ + 2, one.colour);
             if (one.compared_ns) {
-                response_bar_of(*one.compared_ns, max, y_ + 2 + response_bar + 1,
-                                Colour::compared);
+                response_bar_of(*one.compared_ns, max, y_ + 2 + response_bar + 1, Colour::compared);
             }
             if (one.deadline_ns) {
                 const double at = left + response_length(*one.deadline_ns, max);

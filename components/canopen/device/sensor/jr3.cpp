@@ -236,7 +236,8 @@ Abort Jr3::Memory::open_read(Entry&, std::uint32_t& size) noexcept {
 
 Abort Jr3::Memory::read(Entry&, std::uint32_t offset, std::span<std::uint8_t> buffer) noexcept {
     const auto memory = node_.memory_reader_.memory();
-    if (offset > memory.size() || buffer.size() > memory.size() - offset) return Abort::local_control;
+    if (offset > memory.size() || buffer.size() > memory.size() - offset)
+        return Abort::local_control;
     std::copy_n(memory.begin() + offset, buffer.size(), buffer.begin());
     return Abort::none;
 }

@@ -201,7 +201,7 @@ private:
     }
 
     std::size_t position(std::size_t node, bool to_node, const config::Object& object,
-                      Type type = Type::none) {
+                         Type type = Type::none) {
         for (std::size_t i = 0; i < out_.placed.size(); ++i) {
             if (out_.placed[i].node == node && out_.placed[i].to_node == to_node &&
                 out_.placed[i].object->same(object)) {

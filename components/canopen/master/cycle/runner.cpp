@@ -488,8 +488,8 @@ void Runner::serve_boot(Time now, Time period) noexcept {
     constexpr unsigned max_unanswered_waits = 5;
     const NetworkStatus& network = master_.status();
     if (period < slow || !active() || network.state != NetworkState::booting ||
-        network.booting == 0 || unanswered_waits_ >= max_unanswered_waits || link_->description().simulated ||
-        link_->description().in_slots) {
+        network.booting == 0 || unanswered_waits_ >= max_unanswered_waits ||
+        link_->description().simulated || link_->description().in_slots) {
         return;
     }
     const Time begun = monotonic_ns();
@@ -595,8 +595,8 @@ bool Runner::is_stuck(Time now) noexcept {
         moved_ = now;
     }
     sent_before_ = s.sent;
-    return now - moved_ > std::max(max_wait, 100 * max_frame_bits * second /
-                                                     std::max<Time>(config_.bit_rate, 1));
+    return now - moved_ >
+           std::max(max_wait, 100 * max_frame_bits * second / std::max<Time>(config_.bit_rate, 1));
 }
 
 bool Runner::is_process_data(const can::Frame& f) const noexcept {

@@ -55,10 +55,14 @@ public:
     virtual void on_emergency(std::size_t node, const Emergency&) noexcept { (void)node; }
     /// A PDO of a node did not come for `silence`, its timeout, in ns. `place` is that in
     /// OwnNode::received.
-    virtual void on_late(std::size_t position, Time silence) noexcept { (void)position, (void)silence; }
+    virtual void on_late(std::size_t position, Time silence) noexcept {
+        (void)position, (void)silence;
+    }
     /// It came with fewer bytes than its objects have; they keep their values. `place` is that in
     /// OwnNode::received.
-    virtual void on_short(std::size_t position, unsigned bytes) noexcept { (void)position, (void)bytes; }
+    virtual void on_short(std::size_t position, unsigned bytes) noexcept {
+        (void)position, (void)bytes;
+    }
     /// Another device sends what only this master may send.
     using Foreign = ForeignFrames;
     virtual void on_foreign(const Foreign&) noexcept {}

@@ -133,7 +133,8 @@ void SharedLink::flush(std::int64_t now_ns) noexcept {
 std::size_t SharedLink::receive(std::span<can::Frame> buffer, std::int64_t now_ns) noexcept {
     const SharedBus::Try held(*bus_);
     if (!held) return 0;
-    if (bus_->count == 1 && incoming_.front() == nullptr) return bus_->link->receive(buffer, now_ns);
+    if (bus_->count == 1 && incoming_.front() == nullptr)
+        return bus_->link->receive(buffer, now_ns);
     for (can::Frame frame; bus_->link->receive(std::span(&frame, 1), now_ns) == 1;) {
         bus_->deliver(frame, nullptr);
     }

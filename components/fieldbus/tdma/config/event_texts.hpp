@@ -152,8 +152,8 @@ private:
     std::size_t max_stage_1() const {
         std::size_t max = 0;
         for (std::size_t i = 0; i < schedule_.stations.size(); ++i) {
-            max = std::max(max, config::block_of(schedule_, i).size() +
-                                            (schedule_.stations[i].ip ? 13 : 5));
+            max = std::max(
+                max, config::block_of(schedule_, i).size() + (schedule_.stations[i].ip ? 13 : 5));
         }
         return max;
     }

@@ -17,8 +17,7 @@ Slot::Slot(const SlotSetup& setup, std::size_t queue)
 bool Slot::push(std::span<const std::uint8_t> frame, unsigned priority,
                 ethernet::Finisher* finisher, std::uint32_t epoch) noexcept {
     if (frame.size() < ethernet::header_bytes ||
-        frame.size() > ethernet::header_bytes + capacity() ||
-        frame.size() > ethernet::max_frame ||
+        frame.size() > ethernet::header_bytes + capacity() || frame.size() > ethernet::max_frame ||
         ahead_of(priority, epoch) + ethernet::wire_bytes(frame.size()) > turn_bytes()) {
         return false;
     }

@@ -14,8 +14,7 @@ constexpr std::uint16_t ipv4 = 0x0800;
 constexpr std::uint16_t arp = 0x0806;
 constexpr std::uint16_t ipv6 = 0x86dd;
 
-constexpr std::size_t max_payload_size =
-    ethernet::max_frame - ethernet::header_bytes - rtmac_bytes;
+constexpr std::size_t max_payload_size = ethernet::max_frame - ethernet::header_bytes - rtmac_bytes;
 
 bool is_group(const Address& a) noexcept { return (a[0] & 1) != 0; }
 

@@ -80,8 +80,7 @@ STOPPED(int, ppoll, (pollfd * files, nfds_t count, const timespec* max, const si
         (files, count, max, signals))
 STOPPED(int, select, (int count, fd_set* reads, fd_set* writes, fd_set* others, timeval* max),
         (count, reads, writes, others, max))
-STOPPED(int, epoll_wait, (int file, epoll_event* events, int max, int ms),
-        (file, events, max, ms))
+STOPPED(int, epoll_wait, (int file, epoll_event* events, int max, int ms), (file, events, max, ms))
 STOPPED(int, recvmmsg, (int file, mmsghdr* to, unsigned count, int flags, timespec* max),
         (file, to, count, flags, max))
 STOPPED(int, sendmmsg, (int file, mmsghdr* from, unsigned count, int flags),

@@ -158,8 +158,8 @@ static inline bool __comp_counted(const __comp_context* context, int result) {
 static inline long __comp_count(long wanted) { return wanted < 0 ? 0 : wanted; }
 
 /* The name as the runtime takes it. */
-static inline const char* __comp_full(const __comp_context* context, const char* name, char* capacity,
-                                      size_t size) {
+static inline const char* __comp_full(const __comp_context* context, const char* name,
+                                      char* capacity, size_t size) {
     if (!context->whole) return name;
     snprintf(capacity, size, *name ? "%s.%s" : "%s", context->prefix, name);
     return capacity;

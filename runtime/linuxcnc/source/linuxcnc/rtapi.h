@@ -74,9 +74,9 @@ struct halcyon_note {
 };
 
 #define HALCYON_IN_SECTION(section_name) __attribute__((used, section(section_name)))
-#define HALCYON_PARAMETER(var, doc, type, max)                                                    \
+#define HALCYON_PARAMETER(var, doc, type, max)                                                     \
     static const struct halcyon_parameter halcyon_parameter_##var = {#var, doc, (void*)&var, type, \
-                                                                     max};                        \
+                                                                     max};                         \
     static const struct halcyon_parameter* const halcyon_parameter_entry_##var HALCYON_IN_SECTION( \
         "halcyon_parameters") = &halcyon_parameter_##var;
 #define HALCYON_PASTE_(a, b) a##b
