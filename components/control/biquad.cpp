@@ -2,6 +2,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -44,10 +45,9 @@ struct Biquad : hal::Component {
     hal::Function run{*this, "", &Biquad::update, "filters"};
 
     void update(hal::Cycle cycle) noexcept {
-        if (enable && !was_enabled_) {
+        if (enable_edge_.rises(enable)) {
             valid = design(cycle.seconds());
         }
-        was_enabled_ = enable;
         const double x = in;
         if (!enable || !valid) {
             out = x;
@@ -92,8 +92,8 @@ private:
         return true;
     }
 
-    bool was_enabled_ = false;
-    hal::Retained retained_{*this, {{"was-enabled", was_enabled_}}};
+    hal::RisingEdge enable_edge_;
+    hal::Retained retained_{*this, {{"was-enabled", enable_edge_}}};
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -20,10 +21,9 @@ struct Time : hal::Component {
 
     void update(hal::Cycle cycle) noexcept {
         const bool running = begin || pause;
-        if (running && !was_running_) {
+        if (running_edge_.rises(running)) {
             elapsed_ns_ = 0;
         }
-        was_running_ = running;
         if (!begin || pause) return;
         elapsed_ns_ += cycle.period_ns();
         const std::int64_t whole = elapsed_ns_ / 1'000'000'000;
@@ -34,8 +34,8 @@ struct Time : hal::Component {
 
 private:
     std::int64_t elapsed_ns_ = 0;
-    bool was_running_ = false;
-    hal::Retained retained_{*this, {{"elapsed-ns", elapsed_ns_}, {"was-running", was_running_}}};
+    hal::RisingEdge running_edge_;
+    hal::Retained retained_{*this, {{"elapsed-ns", elapsed_ns_}, {"was-running", running_edge_}}};
 };
 
 }  // namespace

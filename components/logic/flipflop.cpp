@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -16,10 +17,9 @@ struct Flipflop : hal::Component {
 
     void update(hal::Cycle) noexcept {
         bool stored = out;
-        if (clk && !was_clk_) {
+        if (clock_edge_.rises(clk)) {
             stored = data;
         }
-        was_clk_ = clk;
         if (set) {
             stored = true;
         }
@@ -31,8 +31,8 @@ struct Flipflop : hal::Component {
     }
 
 private:
-    bool was_clk_ = false;
-    hal::Retained retained_{*this, {{"was-clk", was_clk_}}};
+    hal::RisingEdge clock_edge_;
+    hal::Retained retained_{*this, {{"was-clk", clock_edge_}}};
 };
 
 }  // namespace

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 #include "iec_time.hpp"
 
@@ -14,8 +15,7 @@ struct Tp : hal::Component {
 
     void update(hal::Cycle cycle) noexcept {
         pt.correct_sign();
-        const bool rising_edge = in && !was_in_;
-        was_in_ = in;
+        const bool rising_edge = in_edge_.rises(in);
         if (!q && !rising_edge) {
             et = 0.0;
             return;
@@ -27,8 +27,8 @@ struct Tp : hal::Component {
     }
 
 private:
-    bool was_in_ = false;
-    hal::Retained retained_{*this, {{"was-in", was_in_}}};
+    hal::RisingEdge in_edge_;
+    hal::Retained retained_{*this, {{"was-in", in_edge_}}};
 };
 
 }  // namespace

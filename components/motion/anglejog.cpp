@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
 
@@ -47,14 +48,13 @@ struct Anglejog : hal::Component {
         }
         started_ = true;
         const std::int64_t now = std::int64_t{factor_} * counts_in;
-        if (enabled && !was_enabled_) {
+        if (enable_edge_.rises(enabled)) {
             last_counts_ = now;
             waiting_ = true;
             commanded_counts_ = counts_at(magnitude_);
         }
         const std::int64_t turned = now - last_counts_;
         last_counts_ = now;
-        was_enabled_ = enabled;
         if (turned != 0) {
             waiting_ = false;
         }
@@ -136,7 +136,7 @@ private:
     }
 
     bool started_ = false;
-    bool was_enabled_ = false;
+    hal::RisingEdge enable_edge_;
     bool waiting_ = false;  // for the first count since enable-in became TRUE
     double angle_ = 0.0;
     double scale_ = 0.0;
@@ -148,7 +148,7 @@ private:
     std::int64_t commanded_counts_ = 0;
     hal::Retained retained_{*this,
                             {{"started", started_},
-                             {"was-enabled", was_enabled_},
+                             {"was-enabled", enable_edge_},
                              {"waiting", waiting_},
                              {"angle", angle_},
                              {"scale", scale_},

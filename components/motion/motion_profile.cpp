@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 #include "profile.hpp"
 
@@ -185,8 +186,7 @@ private:
     void apply_edges() noexcept {
         waiting_ = mode == set_points && new_set_point && (waiting_ || !was_new_);
         was_new_ = new_set_point;
-        start_table_ = run_table && !was_run_;
-        was_run_ = run_table;
+        start_table_ = run_edge_.rises(run_table);
     }
     /// Discards all set-points; the profile brakes to a stop unless a new target follows.
     void forget() noexcept {
@@ -377,7 +377,7 @@ private:
     bool counted_ = false;
     bool in_table_ = false;
     bool start_table_ = false;
-    bool was_run_ = false;
+    hal::RisingEdge run_edge_;
     hal::Retained retained_{*this,
                             {{"generator", generator_},
                              {"limits", limits_},
@@ -394,7 +394,7 @@ private:
                              {"counted", counted_},
                              {"in-table", in_table_},
                              {"start-table", start_table_},
-                             {"was-run", was_run_}}};
+                             {"was-run", run_edge_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -22,11 +23,10 @@ struct Orient : hal::Component {
     hal::Function run{*this, "", &Orient::update, "computes command and the error"};
 
     void update(hal::Cycle) noexcept {
-        if (enable && !was_enabled_) {
+        if (enable_edge_.rises(enable)) {
             choose();
             settled_cycles_ = 0;
         }
-        was_enabled_ = enable;
         if (!enable) {
             is_oriented = false;
             return;
@@ -51,10 +51,10 @@ private:
     }
 
     static constexpr int required_cycles = 101;
-    bool was_enabled_ = false;
+    hal::RisingEdge enable_edge_;
     int settled_cycles_ = 0;  // since the rising edge of enable, within the tolerance
     hal::Retained retained_{*this,
-                            {{"was-enabled", was_enabled_}, {"settled-cycles", settled_cycles_}}};
+                            {{"was-enabled", enable_edge_}, {"settled-cycles", settled_cycles_}}};
 };
 
 }  // namespace

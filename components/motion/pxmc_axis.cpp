@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
 #include "profile.hpp"
@@ -94,10 +95,8 @@ struct PxmcAxis : hal::Component {
 
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
-        const bool gone = go && !was_go_;
-        const bool cleared = reset && !was_reset_;
-        was_go_ = go;
-        was_reset_ = reset;
+        const bool gone = go_edge_.rises(go);
+        const bool cleared = reset_edge_.rises(reset);
 
         const bool measured =
             std::isfinite(actual_position) && std::fabs(actual_position) <= motion::farthest;
@@ -256,8 +255,8 @@ private:
     double target_ = 0.0;
     std::uint32_t code_ = none;
     // TRUE from the first cycle on: not a rising edge
-    bool was_go_ = true;
-    bool was_reset_ = true;
+    hal::RisingEdge go_edge_{true};
+    hal::RisingEdge reset_edge_{true};
     bool was_on_ = false;
     bool interrupted_ = false;  // until enable is FALSE
     bool closing_ = true;
@@ -271,8 +270,8 @@ private:
                              {"integral", integral_},
                              {"target", target_},
                              {"code", code_},
-                             {"was-go", was_go_},
-                             {"was-reset", was_reset_},
+                             {"was-go", go_edge_},
+                             {"was-reset", reset_edge_},
                              {"was-on", was_on_},
                              {"interrupted", interrupted_},
                              {"closing", closing_},

@@ -11,6 +11,7 @@
 #include <fnmatch.h>
 
 #include "hal/any_pin.hpp"
+#include "hal/edge.hpp"
 #include "hal/texts.hpp"
 #include "recording/mcap/playback_pin.hpp"
 #include "recording/mcap/recording.hpp"
@@ -46,8 +47,7 @@ struct Playback : hal::Component {
                       "sets the outputs to the values recorded at this time"};
 
     void update(hal::Cycle cycle) noexcept {
-        const bool again = restart && !was_restart_;
-        was_restart_ = restart;
+        const bool again = restart_edge_.rises(restart);
         if (again || (loop && done)) {
             rewind();
         }
@@ -204,7 +204,7 @@ private:
     std::int64_t elapsed_ns_ = 0;
     bool begun_ = false;
     bool rewound_ = false;  // it no longer begins at `begin`
-    bool was_restart_ = false;
+    hal::RisingEdge restart_edge_;
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -73,8 +74,7 @@ struct DualChannel : hal::Component {
     hal::Function run{*this, "", &DualChannel::update, "compares the channels"};
 
     void update(hal::Cycle cycle) noexcept {
-        const bool reset_edge = reset && !was_reset_;
-        was_reset_ = reset;
+        const bool reset_edge = reset_edge_.rises(reset);
         // the host wrote the safe value
         if (latch && fault_ == agree && !ok && was_ok_) {
             fault_ = not_reset;
@@ -189,14 +189,14 @@ private:
     double good_ = 0.0;
     double max_ = 0.0;
     std::uint32_t fault_ = agree;
-    bool was_reset_ = true;  // TRUE from the first cycle on: not a rising edge
+    hal::RisingEdge reset_edge_{true};  // TRUE from the first cycle on: not a rising edge
     bool was_ok_ = false;
     hal::Retained retained_{*this,
                             {{"for", for_},
                              {"good", good_},
                              {"largest", max_},
                              {"fault", fault_},
-                             {"was-reset", was_reset_},
+                             {"was-reset", reset_edge_},
                              {"was-ok", was_ok_}}};
 };
 

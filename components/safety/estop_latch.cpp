@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -21,8 +22,7 @@ struct EstopLatch : hal::Component {
     hal::Function run{*this, "", &EstopLatch::update, "updates the state"};
 
     void update(hal::Cycle) noexcept {
-        const bool pressed = reset && !was_reset_;
-        was_reset_ = reset;
+        const bool pressed = reset_edge_.rises(reset);
         const bool healthy = ok_in && !fault_in;
         const bool ok = healthy && (ok_out || pressed);
         ok_out = ok;
@@ -33,8 +33,8 @@ struct EstopLatch : hal::Component {
     }
 
 private:
-    bool was_reset_ = false;
-    hal::Retained retained_{*this, {{"was-reset", was_reset_}}};
+    hal::RisingEdge reset_edge_;
+    hal::Retained retained_{*this, {{"was-reset", reset_edge_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 #include "hal/supervision.h"
 
@@ -53,10 +54,9 @@ private:
     // A button often resets drives by the same edge: their faults are over some cycles later. A
     // fault that comes while the button is pressed is not acknowledged, and ends that.
     void acknowledge() noexcept {
-        if (reset && !was_reset_) {
+        if (reset_edge_.rises(reset)) {
             acknowledged_ = count;
         }
-        was_reset_ = reset;
         if (reset && active && acknowledged_ == count) {
             record_->clear(record_);
         } else if (acknowledged_ != count) {
@@ -69,9 +69,9 @@ private:
     const hal_supervision* supervision_ = nullptr;
     std::uint64_t seen_ = 0;
     std::uint64_t acknowledged_ = no_count;  // count at the last edge of reset
-    bool was_reset_ = true;  // TRUE from the first cycle on: not a rising edge
+    hal::RisingEdge reset_edge_{true};  // TRUE from the first cycle on: not a rising edge
     hal::Retained retained_{
-        *this, {{"seen", seen_}, {"acknowledged", acknowledged_}, {"was-reset", was_reset_}}};
+        *this, {{"seen", seen_}, {"acknowledged", acknowledged_}, {"was-reset", reset_edge_}}};
 };
 
 }  // namespace

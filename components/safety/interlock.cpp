@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
 
@@ -61,10 +62,8 @@ struct Interlock : hal::Component {
     hal::Function run{*this, "", &Interlock::update, "evaluates the conditions"};
 
     void update(hal::Cycle cycle) noexcept {
-        const bool pressed = reset && !was_reset_;
-        const bool heard = acknowledge && !was_acknowledged_;
-        was_reset_ = reset;
-        was_acknowledged_ = acknowledge;
+        const bool pressed = reset_edge_.rises(reset);
+        const bool heard = acknowledge_edge_.rises(acknowledge);
         const double dt = cycle.seconds();
         phase_ns_ = (phase_ns_ + cycle.period_ns()) % second_ns;
         const std::uint64_t watched = use & everything();
@@ -165,8 +164,8 @@ private:
     std::uint64_t unheard_ = 0;
     std::uint64_t first_ = 0;
     std::int64_t phase_ns_ = 0;
-    bool was_reset_ = true;  // TRUE from the first cycle on: not a rising edge
-    bool was_acknowledged_ = false;
+    hal::RisingEdge reset_edge_{true};  // TRUE from the first cycle on: not a rising edge
+    hal::RisingEdge acknowledge_edge_;
     bool was_ok_ = false;
     bool waits_ = false;
 
@@ -179,8 +178,8 @@ private:
                              {"unheard", unheard_},
                              {"first", first_},
                              {"phase-ns", phase_ns_},
-                             {"was-reset", was_reset_},
-                             {"was-acknowledged", was_acknowledged_},
+                             {"was-reset", reset_edge_},
+                             {"was-acknowledged", acknowledge_edge_},
                              {"was-ok", was_ok_},
                              {"waits", waits_},
                              {"has-run", has_run_}}};

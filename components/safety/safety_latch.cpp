@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -30,8 +31,7 @@ struct SafetyLatch : hal::Component {
     hal::Function run{*this, "", &SafetyLatch::update, "counts the errors"};
 
     void update(hal::Cycle) noexcept {
-        const bool cleared = reset && !was_reset_;
-        was_reset_ = reset;
+        const bool cleared = reset_edge_.rises(reset);
         if (!enable || cleared) {
             count_ = 0;
             latched_ = false;
@@ -51,9 +51,9 @@ struct SafetyLatch : hal::Component {
 private:
     std::int64_t count_ = 0;
     bool latched_ = false;
-    bool was_reset_ = true;  // TRUE from the first cycle on: not a rising edge
+    hal::RisingEdge reset_edge_{true};  // TRUE from the first cycle on: not a rising edge
     hal::Retained retained_{*this,
-                            {{"count", count_}, {"latched", latched_}, {"was-reset", was_reset_}}};
+                            {{"count", count_}, {"latched", latched_}, {"was-reset", reset_edge_}}};
 };
 
 }  // namespace

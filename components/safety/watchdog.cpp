@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -42,8 +43,7 @@ struct Watchdog : hal::Component {
     void watch(hal::Cycle cycle) noexcept {
         // a rising edge of enable-in is not lost: it is detected later
         if (!limits_known_.load(std::memory_order_acquire)) return;
-        const bool restart = enable && !was_enabled_;
-        was_enabled_ = enable;
+        const bool restart = enable_edge_.rises(enable);
         const bool all_alive = note_signs_of_life();
         starting_ = enable && (restart || starting_);
         if (!enable) {
@@ -121,13 +121,13 @@ private:
     std::unique_ptr<Watched[]> watched_ =
         std::make_unique<Watched[]>(static_cast<std::size_t>(inputs));
     std::atomic<bool> limits_known_{false};  // set-timeouts writes, process reads
-    bool was_enabled_ = false;
+    hal::RisingEdge enable_edge_;
     // enabled, and ok-out waits for an input that tripped the watchdog
     bool starting_ = false;
     hal::Retained retained_{*this,
                             {{"watched", watched_.get(), static_cast<std::size_t>(inputs)},
                              {"limits-known", limits_known_},
-                             {"was-enabled", was_enabled_},
+                             {"was-enabled", enable_edge_},
                              {"starting", starting_}}};
 };
 

@@ -3,6 +3,7 @@
 
 #include "furuta_rig.hpp"
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
 
@@ -193,11 +194,9 @@ struct Furuta : hal::Component {
     }
 
     void update(hal::Cycle cycle) noexcept {
-        const bool is_reset = reset;
-        if (is_reset && !was_reset_) {
+        if (reset_edge_.rises(reset)) {
             rest();
         }
-        was_reset_ = is_reset;
 
         const sim::FurutaConstants now = constants();
         if (const double given = push; given != 0.0) {
@@ -272,8 +271,8 @@ private:
     }
 
     sim::FurutaRig rig_;
-    bool was_reset_ = false;
-    hal::Retained retained_{*this, {{"rig", rig_}, {"was-reset", was_reset_}}};
+    hal::RisingEdge reset_edge_;
+    hal::Retained retained_{*this, {{"rig", rig_}, {"was-reset", reset_edge_}}};
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -49,15 +50,14 @@ private:
             index_enable = false;
             return;
         }
-        if (index_enable && !was_enabled_) {
+        if (enable_edge_.rises(index_enable)) {
             left_ms_ = index_delay;
         }
-        was_enabled_ = index_enable;
     }
 
     double left_ms_ = 0.0;  // until index-enable is cleared; 0: not waiting
-    bool was_enabled_ = false;
-    hal::Retained retained_{*this, {{"left-ms", left_ms_}, {"was-enabled", was_enabled_}}};
+    hal::RisingEdge enable_edge_;
+    hal::Retained retained_{*this, {{"left-ms", left_ms_}, {"was-enabled", enable_edge_}}};
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "canopen/device/component.hpp"
 #include "canopen/device/safety/safe_io.hpp"
+#include "hal/edge.hpp"
 
 namespace {
 
@@ -34,14 +35,12 @@ struct CanopenSafeIo final : NodeComponent {
         for (unsigned n = 0; n < 8; ++n) {
             io_->set_input(n, in[n]);
         }
-        if (acknowledge && !was_acknowledge_) {
+        if (acknowledge_edge_.rises(acknowledge)) {
             io_->acknowledge(cycle.start_ns());
         }
-        if (fail_safe && !was_fail_safe_) {
+        if (fail_safe_edge_.rises(fail_safe)) {
             io_->send_fail_safe();
         }
-        was_acknowledge_ = acknowledge;
-        was_fail_safe_ = fail_safe;
         turn(cycle);
         const bool on = node().powered();
         for (unsigned n = 0; n < 8; ++n) {
@@ -58,8 +57,8 @@ private:
         return *io_;
     }
     std::unique_ptr<SafeIo> io_;
-    bool was_acknowledge_ = false;
-    bool was_fail_safe_ = false;
+    hal::RisingEdge acknowledge_edge_;
+    hal::RisingEdge fail_safe_edge_;
 };
 
 }  // namespace
