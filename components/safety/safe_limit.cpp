@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -123,8 +125,7 @@ struct SafeLimit : hal::Component {
 
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
-        const bool pressed = reset && !was_reset_;
-        was_reset_ = reset;
+        const bool pressed = reset_edge_.rises(reset);
         // The host wrote the safe value (stop, a fault): a reset is required.
         if (state_ != powerless && !power && has_run_) {
             trip(powerless, not_reset);
@@ -155,32 +156,38 @@ private:
     static bool usable(double x) noexcept { return std::fabs(x) <= 1e15; }
 
     bool parameters_sound() const noexcept {
-        return min_position <= max_position && max_speed >= 0.0 && max_slew >= 0.0 &&
-               filter_time >= 0.0 && stop_deceleration > 0.0 && stop_time >= 0.0 &&
-               standstill_speed >= 0.0 && standstill_time >= 0.0 && standstill_window >= 0.0 &&
-               std::max({position_reaction.get(), speed_reaction.get(), slew_reaction.get()}) <=
-                   stop_0;
+        const double amounts[] = {max_speed,        max_slew,        filter_time,      stop_time,
+                                  standstill_speed, standstill_time, standstill_window};
+        const std::uint32_t reactions[] = {position_reaction, speed_reaction, slew_reaction};
+        return min_position <= max_position && stop_deceleration > 0.0 &&
+               std::ranges::all_of(amounts, [](double amount) { return amount >= 0.0; }) &&
+               std::ranges::max(reactions) <= stop_0;
     }
 
+    /// Updates position, speed and slew. Returns false if they are not usable numbers.
     bool measure(double dt) noexcept {
-        if (!usable(position) || (velocity.linked() && !usable(velocity))) {
+        const bool has_sensor = velocity.linked();
+        if (!usable(position) || (has_sensor && !usable(velocity))) {
             known_ = 0;
             return false;
         }
-        const double difference = known_ > 0 ? (position - position_) / dt : 0.0;
-        const double raw = velocity.linked() ? velocity.get() : difference;
-        const double share =
-            !velocity.linked() && speed_filter > 0.0 ? dt / (speed_filter + dt) : 1.0;
+        const double raw = has_sensor ? velocity.get() : speed_from_position(dt);
         const double before = speed_;
-        speed_ = known_ > 0 ? speed_ + share * (raw - speed_) : raw;
-        const int needed = velocity.linked() ? 0 : 1;
-        slew_ = known_ > needed ? (speed_ - before) / dt : 0.0;
-        if (!std::isfinite(slew_)) {
-            slew_ = 0.0;
-        }
+        speed_ = known_ > 0 ? speed_ + filter_share(dt) * (raw - speed_) : raw;
+        const double slew = (speed_ - before) / dt;
+        const bool has_slew = known_ > (has_sensor ? 0 : 1) && std::isfinite(slew);
+        slew_ = has_slew ? slew : 0.0;
         position_ = position;
         known_ = std::min(known_ + 1, 2);
         return true;
+    }
+    double speed_from_position(double dt) const noexcept {
+        return known_ > 0 ? (position - position_) / dt : 0.0;
+    }
+    /// Returns the share of a new speed in the filtered one.
+    double filter_share(double dt) const noexcept {
+        if (velocity.linked() || !(speed_filter > 0.0)) return 1.0;
+        return dt / (speed_filter + dt);
     }
 
     std::uint32_t reaction(std::uint32_t what) const noexcept {
@@ -202,32 +209,48 @@ private:
         return powerless;
     }
 
-    /// What has been exceeded for longer than the filter time; of several what has the strongest
-    /// reaction.
+    /// By reason: whether its limit is exceeded in this cycle.
+    using Exceeded = std::array<bool, slew + 1>;
+
+    /// Returns what has been exceeded for longer than the filter time; of several what has the
+    /// strongest reaction.
     std::uint32_t check(bool measured, double dt) noexcept {
-        const bool exceeded[] = {position<min_position, position> max_position,
-                                 std::fabs(speed_) > max_speed, std::fabs(slew_) > max_slew};
-        const double outwards = returning_ == position_above ? speed_ : -speed_;
-        if (returning_ != none && measured &&
-            (!exceeded[returning_ - 1] || outwards > standstill_speed)) {
-            returning_ = none;
+        Exceeded exceeded{};
+        if (measured) {
+            exceeded = {false, position<min_position, position> max_position,
+                        std::fabs(speed_) > max_speed, std::fabs(slew_) > max_slew};
+            follow_return(exceeded);
         }
         std::uint32_t worst = none;
         for (std::uint32_t what = position_below; what <= slew; ++what) {
-            double& since = since_[what];
-            if (!measured || !exceeded[what - 1] || reaction(what) == off) {
-                since = 0.0;
-                continue;
-            }
-            since += dt;
-            if (since <= filter_time + dt * 1e-6 && filter_time > 0.0) continue;
-            if (worst == none || reaction(what) > reaction(worst)) {
+            if (lasts(what, exceeded[what], dt) &&
+                (worst == none || reaction(what) > reaction(worst))) {
                 worst = what;
             }
         }
         may_return_ = (worst == position_below || worst == position_above) &&
                       std::fabs(speed_) <= standstill_speed;
         return worst;
+    }
+
+    /// Counts the time for which a limit with a reaction is exceeded. Returns whether it is longer
+    /// than the filter time.
+    bool lasts(std::uint32_t what, bool exceeded, double dt) noexcept {
+        double& since = since_[what];
+        if (!exceeded || reaction(what) == off) {
+            since = 0.0;
+            return false;
+        }
+        since += dt;
+        return !(since <= filter_time + dt * 1e-6 && filter_time > 0.0);
+    }
+
+    /// Ends the return into the permitted range when the axis is back or moves outwards.
+    void follow_return(const Exceeded& exceeded) noexcept {
+        const double outwards = returning_ == position_above ? speed_ : -speed_;
+        if (!exceeded[returning_] || outwards > standstill_speed) {
+            returning_ = none;
+        }
     }
 
     /// A stronger stop takes over from a weaker one; the first reason stays.
@@ -259,57 +282,68 @@ private:
         if (state_ == running || state_ == powerless) return;
         lasted_ += dt;
         stood_for_ = std::fabs(speed_) <= standstill_speed && given_ == 0.0 ? stood_for_ + dt : 0.0;
-        const bool stands = stood_for_ > standstill_time + dt * 1e-6;
         if (state_ == standing_2) {
-            const bool moved =
-                standstill_window > 0.0 && std::fabs(position_ - stood_at_) > standstill_window;
-            if (moved) {
-                state_ = powerless;
-                reason_ = did_not_stand;
+            const double moved = std::fabs(position_ - stood_at_);
+            if (standstill_window > 0.0 && moved > standstill_window) {
+                remove_power(did_not_stand);
             }
-        } else if (stands) {
+        } else if (stood_for_ > standstill_time + dt * 1e-6) {
             stood_at_ = position_;
             state_ = state_ == braking_2 ? standing_2 : powerless;
         } else if (lasted_ > stop_time) {
-            state_ = powerless;
-            reason_ = did_not_stop;
+            remove_power(did_not_stop);
+        }
+    }
+    void remove_power(Reason why) noexcept {
+        state_ = powerless;
+        reason_ = why;
+    }
+
+    /// Returns the speed command that the state permits.
+    double permitted(double wanted, double dt) const noexcept {
+        const double less = stop_deceleration * dt;
+        switch (state_) {
+        case running: return limited(wanted, dt);
+        case braking_1:
+        case braking_2:
+            return std::fabs(given_) <= less ? 0.0 : given_ - std::copysign(less, given_);
+        default: return 0.0;
         }
     }
 
-    void pass(std::uint32_t found, double dt) noexcept {
-        const double wanted = usable(command) ? command.get() : 0.0;
-        if (state_ == powerless || state_ == standing_2) {
-            given_ = 0.0;
-        } else if (state_ != running) {
-            const double less = stop_deceleration * dt;
-            given_ = std::fabs(given_) <= less ? 0.0 : given_ - std::copysign(less, given_);
-        } else {
-            double allowed = wanted;
-            if (speed_reaction == limit) {
-                allowed = std::clamp(allowed, -max_speed, +max_speed);
-            }
-            if (slew_reaction == limit) {
-                allowed = std::clamp(allowed, given_ - max_slew * dt, given_ + max_slew * dt);
-            }
-            // Inwards is always free; also out of a place in which a reset was given.
-            if (position_reaction != off && position_reaction != warn) {
-                if (position_ >= max_position) {
-                    allowed = std::min(allowed, 0.0);
-                }
-                if (position_ <= min_position) {
-                    allowed = std::max(allowed, 0.0);
-                }
-            }
-            given_ = allowed;
+    /// Returns the command of a running axis within the limits whose reaction is to limit it, or to
+    /// stop at a position.
+    double limited(double wanted, double dt) const noexcept {
+        double allowed = wanted;
+        if (speed_reaction == limit) {
+            allowed = std::clamp(allowed, -max_speed, +max_speed);
         }
+        if (slew_reaction == limit) {
+            allowed = std::clamp(allowed, given_ - max_slew * dt, given_ + max_slew * dt);
+        }
+        if (position_reaction < limit) return allowed;
+        // Inwards is always free; also out of a place in which a reset was given.
+        if (position_ >= max_position) {
+            allowed = std::min(allowed, 0.0);
+        }
+        if (position_ <= min_position) {
+            allowed = std::max(allowed, 0.0);
+        }
+        return allowed;
+    }
+
+    void pass(std::uint32_t found, double dt) noexcept {
+        const bool runs = state_ == running;
+        const double wanted = usable(command) ? command.get() : 0.0;
+        given_ = permitted(wanted, dt);
         command_out = given_;
         power = state_ != powerless;
         warning = found != none;
-        limiting = state_ == running && given_ != wanted;
-        stopping = state_ != running;
-        ok = state_ == running && found == none;
+        limiting = runs && given_ != wanted;
+        stopping = !runs;
+        ok = runs && found == none;
         state = state_;
-        reason = state_ != running ? reason_ : found;
+        reason = runs ? found : reason_;
         speed_out = speed_;
         slew_out = slew_;
     }
@@ -327,7 +361,7 @@ private:
     std::uint32_t reason_ = not_reset;
     std::uint32_t returning_ = none;
     int known_ = 0;  // measurements so far: speed needs two, slew three
-    bool was_reset_ = true;  // TRUE from the first cycle on: not a rising edge
+    hal::RisingEdge reset_edge_{true};  // TRUE from the first cycle on: not a rising edge
     bool has_run_ = false;
     bool may_return_ = false;
     hal::Retained retained_{*this,
@@ -343,7 +377,7 @@ private:
                              {"reason", reason_},
                              {"returning", returning_},
                              {"known", known_},
-                             {"was-reset", was_reset_},
+                             {"was-reset", reset_edge_},
                              {"has-run", has_run_},
                              {"may-return", may_return_}}};
 };
