@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 #include "hal/component.hpp"
@@ -68,65 +70,69 @@ struct Contact {
 /// on B half a period later.
 class PulseTest {
 public:
-    bool feed_a = true;
+    struct Channel {
+        bool feed = true;       ///< level of the output
+        bool hides = false;     ///< a test pulse makes this contact appear open
+        bool was_high = false;  ///< level of the input at the start of the pulse
+    };
+    /// By channel: the levels at the inputs.
+    using Levels = std::array<bool, 2>;
 
-public:
-    bool feed_b = true;      // levels of the outputs
-    bool hides_a = false;
-    bool hides_b = false;  // a test pulse makes this contact appear open
+    const Channel& a() const noexcept { return channels_[0]; }
+    const Channel& b() const noexcept { return channels_[1]; }
 
-    /// Runs one cycle; returns the fault found or 0. `a` and `b` are the levels at the inputs.
-    std::uint32_t step(bool a, bool b, const Times& times, std::int64_t period_ns) noexcept {
+    /// Runs one cycle; returns the fault found or 0. [realtime]
+    std::uint32_t step(const Levels& high, const Times& times, std::int64_t period_ns) noexcept {
         if (times.test_period == 0) {
             *this = PulseTest();
             return 0;
         }
-        std::uint32_t found = 0;
+        idle_ns_ += period_ns;
         if (pulse_ns_ < 0) {
-            idle_ns_ += period_ns;
-            if (2 * idle_ns_ < times.test_period) return 0;
-            idle_ns_ = pulse_ns_ = 0;
-            on_b_ = !on_b_;
-            tested_was_high_ = on_b_ ? b : a;
-            other_was_high_ = on_b_ ? a : b;
-            other_dropped_ = false;
-            (on_b_ ? feed_b : feed_a) = false;
-            (on_b_ ? hides_b : hides_a) = tested_was_high_;
+            if (2 * idle_ns_ >= times.test_period) {
+                begin(high);
+            }
             return 0;
         }
-        idle_ns_ += period_ns;
         pulse_ns_ += period_ns;
-        const bool tested = on_b_ ? b : a;
-        const bool other = on_b_ ? a : b;
-        bool& feed = on_b_ ? feed_b : feed_a;
-        if (!feed) {
-            other_dropped_ = other_dropped_ || (other_was_high_ && !other);
+        Channel& tested = channels_[tested_];
+        const std::size_t other = 1 - tested_;
+        std::uint32_t found = 0;
+        if (!tested.feed) {
+            other_dropped_ |= channels_[other].was_high && !high[other];
             if (pulse_ns_ < times.test_width) return 0;
-            if (tested_was_high_ && tested) {
-                found = on_b_ ? test_b_failed : test_a_failed;
+            if (tested.was_high && high[tested_]) {
+                found = failures[tested_];
             }
-            feed = true;
+            tested.feed = true;
         }
         if (pulse_ns_ < times.test_width + times.test_response) return found;
         // it returned with the end of the pulse: it is fed by the same wire
-        if (other_dropped_ && other) {
+        if (other_dropped_ && high[other]) {
             found = cross_short;
         }
-        hides_a = hides_b = false;
+        tested.hides = false;
         pulse_ns_ = -1;
         return found;
     }
 
 private:
-    // since the start of the last pulse; since the start of this one, or -1
-    std::int64_t idle_ns_ = 0;
+    static constexpr std::array<std::uint32_t, 2> failures{test_a_failed, test_b_failed};
 
-private:
-    // since the start of the last pulse; since the start of this one, or -1
-    std::int64_t pulse_ns_ = -1;
-    bool on_b_ = true;
-    bool tested_was_high_ = false;
-    bool other_was_high_ = false;
+    void begin(const Levels& high) noexcept {
+        tested_ = 1 - tested_;
+        channels_[0].was_high = high[0];
+        channels_[1].was_high = high[1];
+        channels_[tested_].feed = false;
+        channels_[tested_].hides = high[tested_];
+        other_dropped_ = false;
+        idle_ns_ = pulse_ns_ = 0;
+    }
+
+    std::array<Channel, 2> channels_;
+    std::size_t tested_ = 1;
+    std::int64_t idle_ns_ = 0;    // since the start of the last pulse
+    std::int64_t pulse_ns_ = -1;  // since the start of this one, or -1
     bool other_dropped_ = false;
 };
 
@@ -210,11 +216,11 @@ struct SafetySwitch : hal::Component {
 
         const bool sound = times.sound(period_ns) && reset_mode <= 2;
         const std::uint32_t broken =
-            !sound ? std::uint32_t{bad_parameters} : test_.step(in_a, in_b, times, period_ns);
-        if (!test_.hides_a) {
+            !sound ? std::uint32_t{bad_parameters} : test_.step({in_a, in_b}, times, period_ns);
+        if (!test_.a().hides) {
             a_.follow(in_a, times, period_ns);
         }
-        if (!test_.hides_b) {
+        if (!test_.b().hides) {
             b_.follow(antivalent ? !in_b : in_b.get(), times, period_ns);
         }
 
@@ -225,8 +231,8 @@ struct SafetySwitch : hal::Component {
             move(accepted, times, period_ns);
         }
 
-        test_a = test_.feed_a;
-        test_b = test_.feed_b;
+        test_a = test_.a().feed;
+        test_b = test_.b().feed;
         show(sound);
     }
 
@@ -239,55 +245,35 @@ private:
         return state_ == waits_for_reset || (latched() && both_open());
     }
 
-    void enter(std::uint32_t state) noexcept {
-        state_ = state;
-        disagree_ns_ = 0;
-    }
-
-    /// The state machine, one cycle. Once a contact has opened, both must have been open before
-    /// both may be closed.
+    /// Runs the state machine for one cycle.
     void move(bool accepted, const Times& times, std::int64_t period_ns) noexcept {
-        switch (state_) {
-        case contacts_open:
-            if (both_closed()) {
-                enter(waits_for_reset);
-            } else if (!both_open()) {
-                enter(waits_for_closing);
-            }
-            break;
-        case waits_for_closing:
-            if (both_closed()) {
-                enter(waits_for_reset);
-            } else if (both_open()) {
-                enter(contacts_open);
-            } else if ((disagree_ns_ += period_ns) > times.discrepancy) {
-                enter(did_not_close);
-            }
-            break;
-        case waits_for_reset:
-        case is_safe:
-            if (both_open()) {
-                enter(contacts_open);
-            } else if (!both_closed()) {
-                enter(waits_for_opening);
-            } else if (accepted) {
-                enter(is_safe);
-            }
-            break;
-        case waits_for_opening:
-            if (both_open()) {
-                enter(contacts_open);
-            } else if ((disagree_ns_ += period_ns) > times.discrepancy) {
-                enter(did_not_open);
-            }
-            break;
-        default:
-            if (accepted && both_open()) {
-                enter(contacts_open);
-            }
+        in_state_ns_ += period_ns;
+        const std::uint32_t next = next_state(accepted, in_state_ns_ > times.discrepancy);
+        if (next != state_) {
+            state_ = next;
+            in_state_ns_ = 0;
         }
         if (state_ == waits_for_reset && reset_mode == 0) {
-            enter(is_safe);
+            state_ = is_safe;
+        }
+    }
+
+    /// Once a contact has opened, both must have been open before both may be closed. `overdue`: the
+    /// contacts have disagreed for too long.
+    std::uint32_t next_state(bool accepted, bool overdue) const noexcept {
+        if (latched() && !accepted) return state_;
+        if (both_open()) return contacts_open;
+        switch (state_) {
+        case contacts_open: return both_closed() ? waits_for_reset : waits_for_closing;
+        case waits_for_closing:
+            if (both_closed()) return waits_for_reset;
+            return overdue ? std::uint32_t{did_not_close} : state_;
+        case waits_for_opening: return overdue ? std::uint32_t{did_not_open} : state_;
+        case waits_for_reset:
+        case is_safe:
+            if (!both_closed()) return waits_for_opening;
+            return accepted ? std::uint32_t{is_safe} : state_;
+        default: return state_;
         }
     }
 
@@ -331,7 +317,7 @@ private:
     PulseTest test_;
     Contact a_, b_;
     std::uint32_t state_ = contacts_open;
-    std::int64_t disagree_ns_ = 0;
+    std::int64_t in_state_ns_ = 0;
     std::int64_t pressed_ns_ = 0;
     bool was_down_ = false;
     bool counts_ = false;
@@ -341,7 +327,7 @@ private:
                              {"a", a_},
                              {"b", b_},
                              {"state", state_},
-                             {"disagree-ns", disagree_ns_},
+                             {"in-state-ns", in_state_ns_},
                              {"pressed-ns", pressed_ns_},
                              {"was-down", was_down_},
                              {"counts", counts_},
