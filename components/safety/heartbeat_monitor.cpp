@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -79,8 +80,7 @@ struct HeartbeatMonitor : hal::Component {
     hal::Function run{*this, "", &HeartbeatMonitor::update, "monitors the heartbeat"};
 
     void update(hal::Cycle cycle) noexcept {
-        const bool pressed = reset && !was_reset_;
-        was_reset_ = reset;
+        const bool pressed = reset_edge_.rises(reset);
         const bool watched = enable && sound();
         if (!watched || (pressed && fault_ != alive) || !was_watched_) {
             begin();
@@ -89,13 +89,12 @@ struct HeartbeatMonitor : hal::Component {
         if (was_ok_ && !ok && watched && fault_ == alive && latch) {
             fault_ = not_reset;
         }
-        std::uint32_t wrong = alive;
-        const bool beat = watched && beaten(wrong);
-        was_watched_ = watched;
-        remember();
         if (watched) {
-            judge(beat, wrong, cycle.period_ns());
+            follow(cycle.period_ns());
         }
+        was_watched_ = watched;
+        last_toggle_ = toggle;
+        last_counter_ = counter;
         show(watched);
     }
 
@@ -117,54 +116,49 @@ private:
         first_ = true;
     }
 
-    /// Returns whether there is a heartbeat in this cycle; sets `wrong` if it is not the expected
-    /// one. The first cycle has none.
-    bool beaten(std::uint32_t& wrong) noexcept {
+    /// Returns the increment of the counter in its width.
+    std::uint32_t increment() const noexcept { return (counter - last_counter_) & mask(); }
+    std::uint32_t mask() const noexcept { return UINT32_MAX >> (32 - bits); }
+
+    /// Returns whether there is a heartbeat in this cycle. The first cycle has none.
+    bool received() const noexcept {
         if (!was_watched_) return false;
         switch (mode) {
         case toggle_edges: return toggle != last_toggle_;
         case rising_edges: return toggle && !last_toggle_;
         case any_change: return counter != last_counter_;
-        default: {
-            const std::uint32_t mask = bits >= 32 ? UINT32_MAX : (std::uint32_t{1} << bits) - 1;
-            const std::uint32_t moved = (counter - last_counter_) & mask;
-            if (moved != 0 && moved != (step & mask) && !first_) {
-                wrong = skipped;
-            }
-            return moved != 0;
+        default: return increment() != 0;
         }
-        }
-    }
-    void remember() noexcept {
-        last_toggle_ = toggle;
-        last_counter_ = counter;
     }
 
-    void judge(bool beat, std::uint32_t wrong, std::int64_t period_ns) noexcept {
+    /// Returns what is wrong with the heartbeat of this cycle; `alive`: nothing.
+    std::uint32_t defect() const noexcept {
+        if (first_) return alive;
+        if (mode == counts_by_step && increment() != (step & mask())) return skipped;
+        return age_ns_ < ns(min_time) ? too_early : alive;
+    }
+
+    void follow(std::int64_t period_ns) noexcept {
         age_ns_ = std::min(age_ns_ + period_ns, std::int64_t{1} << 60);
-        if (beat) {
-            if (!first_ && wrong == alive && age_ns_ < ns(min_time)) {
-                wrong = too_early;
-            }
-            if (!first_) {
-                interval_ns_ = age_ns_;
-            }
-            beats = beats + 1;
-            age_ns_ = 0;
-            first_ = false;
-            if (wrong == alive) {
-                bad_ = 0;
-                good_ = std::min(good_ + 1, UINT32_MAX - 1);
-            } else {
-                miss(wrong, bad_ >= misses_allowed);
-            }
-            if (!latch && fault_ != alive && wrong == alive && good_ >= beats_needed) {
-                fault_ = alive;
-            }
-        } else if (age_ns_ > ns(first_ && start_time > 0.0 ? start_time : timeout)) {
-            if (fault_ != silent) {
-                miss(silent, true);
-            }
+        if (received()) return accept(defect());
+        const double limit = first_ && start_time > 0.0 ? start_time : timeout;
+        if (age_ns_ > ns(limit) && fault_ != silent) {
+            miss(silent, true);
+        }
+    }
+
+    void accept(std::uint32_t wrong) noexcept {
+        if (!first_) {
+            interval_ns_ = age_ns_;
+        }
+        beats = beats + 1;
+        age_ns_ = 0;
+        first_ = false;
+        if (wrong != alive) return miss(wrong, bad_ >= misses_allowed);
+        bad_ = 0;
+        good_ = std::min(good_ + 1, UINT32_MAX - 1);
+        if (!latch && good_ >= beats_needed) {
+            fault_ = alive;
         }
     }
     void miss(std::uint32_t why, bool counts) noexcept {
@@ -184,19 +178,16 @@ private:
         was_ok_ = healthy;
         ok = healthy;
         fault = watched ? fault_ != alive : enable.get();
-        if (!watched) {
-            reason = enable ? bad_parameter : disabled;
-        } else {
-            if (fault_ != alive) {
-                reason = fault_;
-            } else if (healthy) {
-                reason = std::uint32_t{alive};
-            } else {
-                reason = std::uint32_t{waiting};
-            }
-        }
+        reason = shown_reason(watched);
         age = static_cast<double>(age_ns_) * 1e-9;
         interval = static_cast<double>(interval_ns_) * 1e-9;
+    }
+
+    std::uint32_t shown_reason(bool watched) const noexcept {
+        if (!enable) return disabled;
+        if (!watched) return bad_parameter;
+        if (fault_ != alive) return fault_;
+        return was_ok_ ? alive : waiting;
     }
 
     std::int64_t age_ns_ = 0;
@@ -207,7 +198,7 @@ private:
     std::uint32_t fault_ = alive;
     bool last_toggle_ = false;
     bool was_watched_ = false;
-    bool was_reset_ = true;  // TRUE from the first cycle on: not a rising edge
+    hal::RisingEdge reset_edge_{true};  // TRUE from the first cycle on: not a rising edge
     bool first_ = true;
 
     bool was_ok_ = false;
@@ -220,7 +211,7 @@ private:
                              {"fault", fault_},
                              {"last-toggle", last_toggle_},
                              {"was-watched", was_watched_},
-                             {"was-reset", was_reset_},
+                             {"was-reset", reset_edge_},
                              {"first", first_},
                              {"was-ok", was_ok_}}};
 };
