@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <cstdlib>
+#include <iterator>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -8,6 +12,7 @@
 #include "bldc_angles.hpp"
 #include "hal/component.hpp"
 #include "hal/corrected.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -15,23 +20,23 @@ namespace {
 /// What the letters of cfg= select.
 struct Config {
     explicit Config(const std::string& text) {
+        struct Letter {
+            char letter;
+            bool Config::* flag;
+        };
+        constexpr Letter letters[] = {{'h', &Config::hall},     {'a', &Config::absolute},
+                                      {'q', &Config::counting}, {'i', &Config::index},
+                                      {'f', &Config::gray},     {'B', &Config::bits},
+                                      {'6', &Config::six},      {'H', &Config::hall_out},
+                                      {'F', &Config::gray_out}, {'T', &Config::trapezoid}};
         for (const char letter : text) {
-            switch (letter) {
-            case 'n': break;
-            case 'h': hall = true; break;
-            case 'a': absolute = true; break;
-            case 'q': counting = true; break;
-            case 'i': index = true; break;
-            case 'f': gray = true; break;
-            case 'B': bits = true; break;
-            case '6': six = true; break;
-            case 'H': hall_out = true; break;
-            case 'F': gray_out = true; break;
-            case 'T': trapezoid = true; break;
-            default:
+            if (letter == 'n') continue;
+            const auto* const found = std::ranges::find(letters, letter, &Letter::letter);
+            if (found == std::end(letters)) {
                 throw std::invalid_argument(std::string("cfg has the letter '") + letter +
                                             "'; it may have n h a q i f B 6 H F T");
             }
+            this->*found->flag = true;
         }
     }
     bool hall = false;
@@ -47,6 +52,8 @@ struct Config {
     bool encoder() const { return absolute || counting; }
     bool aligns() const { return counting && !hall && !absolute; }
     bool free() const { return !hall && !encoder() && !index; }
+    /// The field leads the rotor; without a sensor of its angle there is no rotor to lead.
+    bool leads() const { return hall || encoder() || (gray && !index); }
     bool phases() const { return !hall_out && !gray_out; }
 };
 
@@ -166,34 +173,42 @@ private:
     void count() noexcept {
         if (!has.encoder()) return;
         const std::int32_t raw = raw_counts[0];
+        if (!started_) {
+            started_ = true;
+            counts_ = last_raw_ = raw;
+        }
         // By differences, so that an overflow of the counter causes no jump.
-        moved_ = started_ ? static_cast<std::int32_t>(static_cast<std::uint32_t>(raw) -
-                                                      static_cast<std::uint32_t>(last_raw_))
-                          : 0;
-        counts_ = started_ ? counts_ + moved_ : raw;
+        moved_ = static_cast<std::int32_t>(static_cast<std::uint32_t>(raw) -
+                                           static_cast<std::uint32_t>(last_raw_));
+        counts_ += moved_;
         last_raw_ = raw;
-        started_ = true;
-        if (!has.counting || has.absolute) return;
         if (has.aligns()) {
-            if (init[0] && !was_init_) {
-                state_ = State::aligning;
-                elapsed_ = 0.0;
-                if (has.index) {
-                    index_enable[0] = true;
-                }
-            }
-            was_init_ = init[0];
-            if (has.index && state_ == State::aligning && !index_enable[0]) {
-                set_zero(counts_ + encoder_offset[0]);
-            }
-            init_done[0] = state_ == State::found;
-        } else if (has.index && state_ != State::found) {
-            if (state_ == State::waiting) {
+            follow_init();
+        } else if (has.index && !found()) {
+            find_index();
+        }
+    }
+
+    void follow_init() noexcept {
+        if (init_edge_.rises(init[0])) {
+            state_ = State::aligning;
+            elapsed_ = 0.0;
+            if (has.index) {
                 index_enable[0] = true;
-                state_ = State::aligning;
-            } else if (!index_enable[0]) {
-                set_zero(counts_ + encoder_offset[0]);
             }
+        }
+        if (has.index && state_ == State::aligning && !index_enable[0]) {
+            set_zero(counts_ + encoder_offset[0]);
+        }
+        init_done[0] = state_ == State::found;
+    }
+
+    void find_index() noexcept {
+        if (state_ == State::waiting) {
+            index_enable[0] = true;
+            state_ = State::aligning;
+        } else if (!index_enable[0]) {
+            set_zero(counts_ + encoder_offset[0]);
         }
     }
 
@@ -217,32 +232,36 @@ private:
     double from_hall() noexcept {
         source_ = 1;
         trapezoid_ = true;
-        if (pattern[0] >= bldc::pattern_count) {
-            pattern[0].correct(0);
-        }
-        if (pattern[0] != used_pattern_) {
-            used_pattern_ = pattern[0];
-            hall_state_ = -1;
-            error_ = false;
-        }
+        apply_pattern();
         const unsigned code = unsigned{hall[0]} << 2 | unsigned{hall[1]} << 1 | unsigned{hall[2]};
         const int state = bldc::state_of(code, used_pattern_);
-        const int moved = state < 0 || hall_state_ < 0 ? 0 : (state - hall_state_ + 9) % 6 - 3;
-        error_ = error_ || state < 0 || moved > 1 || moved < -1;
+        const bool valid = state >= 0;
+        const int moved = valid && hall_state_ >= 0 ? (state - hall_state_ + 9) % 6 - 3 : 0;
+        error_ = error_ || !valid || std::abs(moved) > 1;
         hall_error[0] = error_;
         const double centre = static_cast<double>(state + 1) / 6.0;
         // the edge between two states is an exact angle
-        if (has.counting && !has.index && !has.absolute && (moved == 1 || moved == -1)) {
+        if (std::abs(moved) == 1 && has.counting && !has.index && !has.absolute) {
             const double edge = centre - static_cast<double>(moved) / 12.0;
             set_zero(counts_ - static_cast<std::int64_t>(
                                    std::clamp(std::round(edge * per_turn()), -1e9, 1e9)));
         }
-        if (state >= 0) {
+        if (valid) {
             hall_state_ = state;
         } else {
             amplitude_ = 0.0;
         }
         return centre;
+    }
+
+    void apply_pattern() noexcept {
+        if (pattern[0] >= bldc::pattern_count) {
+            pattern[0].correct(0);
+        }
+        if (pattern[0] == used_pattern_) return;
+        used_pattern_ = pattern[0];
+        hall_state_ = -1;
+        error_ = false;
     }
 
     double from_gray() const noexcept {
@@ -289,42 +308,47 @@ private:
                                     : 0.0;
     }
 
-    void publish(double rotor) noexcept {
-        const bool is_open_loop = has.free() && !has.gray;
-        const bool has_index_only = has.index && !has.encoder() && !has.hall;
-        double lead = is_open_loop || has_index_only ? 0.0 : 0.25;
-        if (has.encoder() && std::isfinite(lead_angle[0])) {
-            lead = lead_angle[0] / 360.0;
-        }
-        if (source_ >= 4) {
-            lead = 0.0;
-        }
-        const double phase = bldc::fraction(rotor + (amplitude_ < 0.0 ? -lead : lead));
+    /// Returns the angle by which the field leads the rotor, in turns.
+    double lead() const noexcept {
+        if (source_ >= 4) return 0.0;
+        if (has.encoder() && std::isfinite(lead_angle[0])) return lead_angle[0] / 360.0;
+        return has.leads() ? 0.25 : 0.0;
+    }
 
+    void publish(double rotor) noexcept {
+        const bool is_negative = amplitude_ < 0.0;
         const double size = std::fabs(amplitude_);
+        const double phase = bldc::fraction(is_negative ? rotor - lead() : rotor + lead());
         const double back =
             source_ == 4 && std::isfinite(drive_offset) ? drive_offset / 360.0 : 0.0;
         rotor_angle = bldc::fraction(rotor - back);
         phase_angle = phase;
         out = amplitude_;
         out_abs = size;
-        out_dir = amplitude_ < 0.0;
+        out_dir = is_negative;
         in_type = source_;
         out_type = trapezoid_ ? 1 : 0;
         if (has.phases()) {
             drive(phase, size);
         }
         if (has.hall_out) {
-            const unsigned code = bldc::code_of(rotor, output_pattern[0]);
-            for (unsigned i = 0; i < 3; ++i) {
-                hall_out[i] = (code >> (2 - i) & 1u) != 0;
-            }
+            emulate_hall(bldc::code_of(rotor, output_pattern[0]));
         }
         if (has.gray_out) {
-            const auto at = static_cast<unsigned>(rotor * 16.0) & 15u;
-            for (unsigned i = 0; i < 4; ++i) {
-                *gray_out[i] = ((at ^ (at >> 1)) >> i & 1u) != 0;
-            }
+            emulate_gray(static_cast<unsigned>(rotor * 16.0) & 15u);
+        }
+    }
+
+    void emulate_hall(unsigned code) noexcept {
+        for (unsigned i = 0; i < 3; ++i) {
+            hall_out[i] = (code >> (2 - i) & 1u) != 0;
+        }
+    }
+
+    void emulate_gray(unsigned sector) noexcept {
+        const unsigned code = sector ^ (sector >> 1);
+        for (unsigned i = 0; i < 4; ++i) {
+            *gray_out[i] = (code >> i & 1u) != 0;
         }
     }
 
@@ -349,7 +373,7 @@ private:
     enum class State : std::uint8_t { waiting, aligning, found };
     State state_ = State::waiting;
     bool started_ = false;
-    bool was_init_ = false;
+    hal::RisingEdge init_edge_;
     bool trapezoid_ = false;
     bool error_ = false;
     int source_ = 0;
@@ -365,7 +389,7 @@ private:
     hal::Retained retained_{*this,
                             {{"state", state_},
                              {"started", started_},
-                             {"was-init", was_init_},
+                             {"was-init", init_edge_},
                              {"trapezoid", trapezoid_},
                              {"error", error_},
                              {"source", source_},
