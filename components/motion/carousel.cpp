@@ -3,6 +3,7 @@
 #include <string>
 
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -102,17 +103,13 @@ struct Carousel : hal::Component {
             homed = false;
         }
         look();
-        if (!enable && state_ != State::homing && state_ != State::jogging &&
-            state_ != State::rests) {
+        const bool stops = state_ != State::homing && state_ != State::jogging;
+        if (!enable && stops) {
             enter(State::rests);
         }
-        const bool called = enable && !was_enabled_;
-        const bool forward = jog_fwd && !was_jog_fwd_;
-
-        const bool back = jog_rev && !was_jog_rev_ && directions == 2;
-        was_enabled_ = enable;
-        was_jog_fwd_ = jog_fwd;
-        was_jog_rev_ = jog_rev;
+        const bool called = enable_edge_.rises(enable);
+        const bool forward = forward_edge_.rises(jog_fwd);
+        const bool back = reverse_edge_.rises(jog_rev) && directions == 2;
         if (called && (state_ == State::rests || state_ == State::jogging)) {
             begin();
         } else if (state_ == State::rests && !enable && forward != back) {
@@ -168,32 +165,51 @@ private:
         if (!coded) {
             parity_error = false;
         } else if (strobe) {
-            bool odd = parity;
-            for (const auto& s : sense) {
-                odd = odd != s.get();
-            }
-            parity_error = odd != (parity_wanted != 0);
+            parity_error = has_odd_parity() != (parity_wanted != 0);
         }
     }
 
+    /// Returns whether the number of TRUE bits of the code and its parity bit is odd.
+    bool has_odd_parity() const noexcept {
+        bool odd = parity;
+        for (const auto& bit : sense) {
+            odd = odd != bit.get();
+        }
+        return odd;
+    }
+
+    /// Returns the number of the pocket that the sensors show; 0: none.
     std::int64_t code() const noexcept {
-        std::uint64_t bits = 0;
+        switch (encoding) {
+        case Encoding::single: return first_sensor();
+        case Encoding::gray: return from_gray(bits());
+        case Encoding::bcd: return from_bcd(bits());
+        default: return bits();
+        }
+    }
+    std::int64_t first_sensor() const noexcept {
         for (std::size_t i = 0; i < sense.size(); ++i) {
-            if (!sense[i]) continue;
-            if (encoding == Encoding::single) return static_cast<std::int64_t>(i) + 1;
-            if (i < 32) {
-                bits |= std::uint64_t{1} << i;
-            }
+            if (sense[i]) return static_cast<std::int64_t>(i) + 1;
         }
-        if (encoding == Encoding::gray) {
-            for (unsigned shift = 1; shift < 32; shift *= 2) {
-                bits ^= bits >> shift;
-            }
+        return 0;
+    }
+    std::uint32_t bits() const noexcept {
+        std::uint32_t bits = 0;
+        for (std::size_t i = 0; i < std::min<std::size_t>(sense.size(), 32); ++i) {
+            bits |= std::uint32_t{sense[i]} << i;
         }
-        if (encoding != Encoding::bcd) return static_cast<std::int64_t>(bits);
+        return bits;
+    }
+    static std::uint32_t from_gray(std::uint32_t bits) noexcept {
+        for (unsigned shift = 1; shift < 32; shift *= 2) {
+            bits ^= bits >> shift;
+        }
+        return bits;
+    }
+    static std::int64_t from_bcd(std::uint32_t bits) noexcept {
         std::int64_t value = 0;
-        for (int digit = 7; digit >= 0; --digit) {
-            value = value * 10 + static_cast<std::int64_t>(bits >> (4 * digit) & 15u);
+        for (int shift = 28; shift >= 0; shift -= 4) {
+            value = value * 10 + (bits >> shift & 15u);
         }
         return value;
     }
@@ -211,23 +227,27 @@ private:
     }
 
     void look_at_pulses() noexcept {
-        const bool index = sense[0];
+        const bool both_edges = encoding == Encoding::edge;
         const bool pulse = sense[1];
-        const bool changed = strobe && pulse != was_pulse_;
-        // it passes the same marker again
-        const bool aligning = state_ >= State::slows && state_ <= State::returns;
-        if (strobe) {
-            was_pulse_ = pulse;
-        }
-        marker_ = encoding == Encoding::edge || pulse;
+        marker_ = both_edges || pulse;
         if (!strobe) return;
-        if (state_ == State::homing ? index && pulse : changed && index && pulse && !aligning) {
+        const bool changed = pulse != was_pulse_;
+        was_pulse_ = pulse;
+        const bool at_index = sense[0] && pulse;
+        // while it aligns, it passes the same marker again
+        const bool aligns = state_ >= State::slows && state_ <= State::returns;
+        if (state_ == State::homing && at_index) {
             position_ = 1;
-            if (state_ == State::homing) {
-                homed = true;
-            }
-        } else if (changed && !aligning && (pulse || encoding == Encoding::edge) &&
-                   position_ != 0) {
+            homed = true;
+        } else if (changed && !aligns && marker_) {
+            pass_pocket(at_index);
+        }
+    }
+    /// Counts a pocket that was passed; the index is at pocket 1.
+    void pass_pocket(bool at_index) noexcept {
+        if (at_index) {
+            position_ = 1;
+        } else if (position_ != 0) {
             position_ = wrapped(position_ + direction_);
         }
     }
@@ -236,11 +256,7 @@ private:
         const std::int64_t now = counts;
         if (state_ == State::homing && strobe &&
             (sense[0] || (requested_index_ && !index_enable))) {
-            zero_ = now + home_offset;
-            homed = true;
-            index_enable = false;
-            position_ = 1;
-            last_pocket_ = 0.0;
+            set_home(now + home_offset);
         }
         if (!homed) return;
         const double step = scale != 0 ? static_cast<double>(scale) : 1.0;
@@ -248,17 +264,26 @@ private:
         const double pocket = turned / step;
 
         const double nearest = std::floor(pocket + 0.5);
+        const double below = std::floor(pocket);
+        const double last_below = std::floor(last_pocket_);
         if (std::fabs(turned - nearest * step) <= std::fabs(static_cast<double>(width))) {
             reach(nearest);
         }
         // it has passed the centre between two cycles
-        else if (std::floor(pocket) > std::floor(last_pocket_)) {
-            reach(std::floor(pocket));
-        } else if (std::floor(pocket) < std::floor(last_pocket_)) {
-            reach(std::floor(pocket) + 1.0);
+        else if (below > last_below) {
+            reach(below);
+        } else if (below < last_below) {
+            reach(below + 1.0);
         }
         last_pocket_ = pocket;
         marker_ = true;
+    }
+    void set_home(std::int64_t zero) noexcept {
+        zero_ = zero;
+        homed = true;
+        index_enable = false;
+        position_ = 1;
+        last_pocket_ = 0.0;
     }
     void reach(double pocket) noexcept {
         position_ = wrapped(1 + static_cast<std::int64_t>(std::clamp(pocket, -1e12, 1e12)));
@@ -290,11 +315,7 @@ private:
         case State::slows: step_slowdown(); break;
         case State::seeks: enter_if(marker_, State::leaves); break;
         case State::leaves: enter_if(!marker_, State::returns); break;
-        case State::returns:
-            if (marker_) {
-                arrive();
-            }
-            break;
+        case State::returns: step_return(); break;
         case State::locks: step_lock(); break;
         case State::jogging:
             ready = false;
@@ -340,6 +361,12 @@ private:
         enter(too_short ? State::seeks : State::leaves);
     }
 
+    void step_return() noexcept {
+        if (marker_) {
+            arrive();
+        }
+    }
+
     void step_lock() noexcept {
         if (left_ > 0.0) return;
         ready = true;
@@ -357,7 +384,6 @@ private:
     }
 
     void publish() noexcept {
-        const double slow = std::fabs(align_dc);
         int turns = 0;
         double velocity = hold_dc;
         switch (state_) {
@@ -372,11 +398,11 @@ private:
         case State::seeks:
         case State::leaves:
             turns = -1;
-            velocity = -slow;
+            velocity = -std::fabs(align_dc);
             break;
         case State::returns:
             turns = 1;
-            velocity = slow;
+            velocity = std::fabs(align_dc);
             break;
         case State::locks:
             turns = -1;
@@ -395,9 +421,9 @@ private:
     }
 
     State state_ = State::rests;
-    bool was_enabled_ = false;
-    bool was_jog_fwd_ = false;
-    bool was_jog_rev_ = false;
+    hal::RisingEdge enable_edge_;
+    hal::RisingEdge forward_edge_;
+    hal::RisingEdge reverse_edge_;
     bool was_pulse_ = false;
     bool marker_ = false;  // at the centre of a pocket
     bool moved_ = false;
@@ -413,9 +439,9 @@ private:
     double last_pocket_ = 0.0;
     hal::Retained retained_{*this,
                             {{"state", state_},
-                             {"was-enabled", was_enabled_},
-                             {"was-jog-fwd", was_jog_fwd_},
-                             {"was-jog-rev", was_jog_rev_},
+                             {"was-enabled", enable_edge_},
+                             {"was-jog-fwd", forward_edge_},
+                             {"was-jog-rev", reverse_edge_},
                              {"was-pulse", was_pulse_},
                              {"marker", marker_},
                              {"moved", moved_},
