@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <deque>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -30,51 +34,59 @@ struct Item {
 struct Text {
     static constexpr unsigned capacity = 24;
     void clear() noexcept { length = 0; }
-    void add(char c) noexcept {
-        if (length < capacity) {
+    void add(char c, unsigned count = 1) noexcept {
+        for (; count > 0 && length < capacity; --count) {
             characters[length++] = c;
+        }
+    }
+    void add(std::string_view text) noexcept {
+        for (const char c : text) {
+            add(c);
         }
     }
     std::array<char, capacity> characters{};
     unsigned length = 0;
 };
 
-/// Formats a magnitude in `base`, with its sign and `decimals` digits after the separator, in the
-/// width of the item; asterisks if it does not fit.
-void number(Text& text, const Item& item, std::uint64_t magnitude, bool negative, unsigned base,
-            unsigned decimals, char separator) noexcept {
-    std::array<char, Text::capacity> digits{};  // the last one first
+/// The digits of a number, the last one first, in fixed memory.
+struct Digits {
+    std::array<char, Text::capacity> characters{};
     unsigned count = 0;
-    while (count < digits.size() &&
-           (magnitude != 0 || count < decimals + (decimals > 0 ? 2u : 1u))) {
-        if (decimals > 0 && count == decimals) {
-            digits[count++] = separator;
-            continue;
+    bool complete = true;  // the number has no more digits
+
+    /// Formats a magnitude in `base` with `decimals` digits after the separator.
+    Digits(std::uint64_t magnitude, unsigned base, unsigned decimals, char separator) noexcept {
+        const unsigned at_least = decimals > 0 ? decimals + 2 : 1;
+        while (count < characters.size() && (magnitude != 0 || count < at_least)) {
+            if (decimals > 0 && count == decimals) {
+                characters[count++] = separator;
+            } else {
+                characters[count++] = "0123456789ABCDEF"[magnitude % base];
+                magnitude /= base;
+            }
         }
-        digits[count++] = "0123456789ABCDEF"[magnitude % base];
-        magnitude /= base;
+        complete = magnitude == 0;
     }
-    const char plus = item.plus ? '+' : '\0';
-    const char sign = negative ? '-' : plus;
-    const unsigned needed = count + (sign ? 1u : 0u);
+};
+
+/// Writes a number with its sign in the width of the item; asterisks if it does not fit.
+void number(Text& text, const Item& item, const Digits& digits, bool negative) noexcept {
+    const std::string_view plus = item.plus ? "+" : "";
+    const std::string_view sign = negative ? "-" : plus;
+    const unsigned needed = digits.count + static_cast<unsigned>(sign.size());
     const unsigned width = item.width != 0 ? item.width : needed;
-    if (magnitude != 0 || needed > width || needed > Text::capacity) {
-        for (unsigned i = 0; i < std::max(width < Text::capacity ? width : 1u, 1u); ++i) {
-            text.add('*');
-        }
-        return;
+    if (!digits.complete || needed > std::min(width, Text::capacity)) {
+        return text.add('*', width < Text::capacity ? width : 1);
     }
-    if (sign && item.zeros) {
+    if (item.zeros) {
+        text.add(sign);
+        text.add('0', width - needed);
+    } else {
+        text.add(' ', width - needed);
         text.add(sign);
     }
-    for (unsigned i = needed; i < width; ++i) {
-        text.add(item.zeros ? '0' : ' ');
-    }
-    if (sign && !item.zeros) {
-        text.add(sign);
-    }
-    while (count > 0) {
-        text.add(digits[--count]);
+    for (unsigned i = digits.count; i-- > 0;) {
+        text.add(digits.characters[i]);
     }
 }
 
@@ -86,8 +98,8 @@ void real(Text& text, const Item& item, double value, char separator) noexcept {
     scaled = std::floor(scaled + 0.5);
     const bool possible = scaled < 1e18;  // false for NaN, too
     const std::uint64_t magnitude = possible ? static_cast<std::uint64_t>(scaled) : UINT64_MAX;
-    number(text, item, magnitude, std::signbit(value) && scaled != 0.0, 10, item.precision,
-           separator);
+    number(text, item, Digits(magnitude, 10, item.precision, separator),
+           std::signbit(value) && scaled != 0.0);
 }
 
 struct Lcd : hal::Component {
@@ -147,16 +159,9 @@ private:
     void render() noexcept {
         at_ = 0;
         text_.clear();
-        if (item_ == 0) {
-            const double wanted =
-                std::isfinite(contrast) ? std::clamp(contrast.get(), 0.0, 1.0) : contrast_;
-            if (wanted != contrast_) {
-                contrast_ = wanted;
-                contrast_code_[2] =
-                    static_cast<char>(0x20 + static_cast<int>(wanted * (0xBF - 0x20)));
-                control_ = {contrast_code_.data(), contrast_code_.size()};
-                return;
-            }
+        if (item_ == 0 && contrast_changes()) {
+            control_ = {contrast_code_.data(), contrast_code_.size()};
+            return;
         }
         const std::size_t count = page_ < pages_.size() ? pages_[page_].size() : 0;
         if (item_ >= count) {
@@ -172,28 +177,40 @@ private:
         }
     }
 
+    /// Follows the pin; returns whether a new code is to be sent.
+    bool contrast_changes() noexcept {
+        const double before = contrast_;
+        if (std::isfinite(contrast)) {
+            contrast_ = std::clamp(contrast.get(), 0.0, 1.0);
+        }
+        contrast_code_[2] = static_cast<char>(0x20 + static_cast<int>(contrast_ * (0xBF - 0x20)));
+        return contrast_ != before;
+    }
+
     void write(const Item& item) noexcept {
         const char dot = static_cast<char>(separator & 0xFFu);
         switch (item.kind) {
-        case 'f': real(text_, item, std::get<0>(*item.value), dot); break;
+        case 'f': return real(text_, item, std::get<0>(*item.value), dot);
         case 'd': {
             const std::int64_t value = std::get<1>(*item.value);
-            number(text_, item, static_cast<std::uint64_t>(value < 0 ? -value : value), value < 0,
-                   10, 0, dot);
-            break;
+            const auto magnitude = static_cast<std::uint64_t>(std::abs(value));
+            return number(text_, item, Digits(magnitude, 10, 0, dot), value < 0);
         }
-        case 'u': number(text_, item, std::get<2>(*item.value), false, 10, 0, dot); break;
-        case 'x': number(text_, item, std::get<2>(*item.value), false, 16, 0, dot); break;
-        case 'o': number(text_, item, std::get<2>(*item.value), false, 8, 0, dot); break;
-        case 'c': {
-            const std::uint32_t code = std::get<2>(*item.value);
-            for (unsigned i = 0; code >= 32 && code < 256 && i < std::max(item.width, 1u); ++i) {
-                text_.add(static_cast<char>(code));
-            }
-            break;
+        case 'u': return write_unsigned(item, 10);
+        case 'x': return write_unsigned(item, 16);
+        case 'o': return write_unsigned(item, 8);
+        case 'c': return write_character(item);
+        case 'b': return text_.add(std::get<3>(*item.value) ? item.character : item.other);
+        default: return text_.add(item.character);
         }
-        case 'b': text_.add(std::get<3>(*item.value) ? item.character : item.other); break;
-        default: text_.add(item.character);
+    }
+    void write_unsigned(const Item& item, unsigned base) noexcept {
+        number(text_, item, Digits(std::get<2>(*item.value), base, 0, ' '), false);
+    }
+    void write_character(const Item& item) noexcept {
+        const std::uint32_t code = std::get<2>(*item.value);
+        if (code >= 32 && code < 256) {
+            text_.add(static_cast<char>(code), std::max(item.width, 1u));
         }
     }
 
@@ -207,15 +224,25 @@ private:
                 pages_.emplace_back();
             } else if (c == '%') {
                 read_value(all, i);
-            } else if (c == '\\' && i < all.size() && all[i] == 'n') {
-                ++i;
-                pages_.back().push_back({.kind = '\n'});
-            } else if (c == '\\' && i < all.size() && all[i] == 't') {
-                ++i;
-                pages_.back().insert(pages_.back().end(), 4, Item{});
+            } else if (c == '\\') {
+                read_escape(all, i);
             } else {
-                pages_.back().push_back({.character = c == '\\' ? escaped(all, i) : c});
+                pages_.back().push_back({.character = c});
             }
+        }
+    }
+
+    /// Appends what the text after a backslash stands for.
+    void read_escape(const std::string& all, std::size_t& i) {
+        auto& page = pages_.back();
+        if (all[i] == 'n') {
+            ++i;
+            page.push_back({.kind = '\n'});
+        } else if (all[i] == 't') {
+            ++i;
+            page.insert(page.end(), 4, Item{});
+        } else {
+            page.push_back({.character = escaped(all, i)});
         }
     }
 
@@ -236,72 +263,62 @@ private:
 
     static unsigned digits(const std::string& all, std::size_t& i, unsigned max) {
         unsigned value = 0;
-        for (; i < all.size() && all[i] >= '0' && all[i] <= '9'; ++i) {
+        for (; all[i] >= '0' && all[i] <= '9'; ++i) {
             value = std::min(value * 10 + static_cast<unsigned>(all[i] - '0'), max);
         }
         return value;
     }
 
     void read_value(const std::string& all, std::size_t& i) {
+        struct Format {
+            std::string_view letters;
+            char kind;  // of the item; '\0': the letter
+            const Value* (Lcd::*pin)();
+        };
+        static constexpr Format formats[] = {{"fF", 'f', &Lcd::pin<0>},
+                                             {"id", 'd', &Lcd::pin<1>},
+                                             {"uoc", '\0', &Lcd::pin<2>},
+                                             {"xX", 'x', &Lcd::pin<2>},
+                                             {"b", 'b', &Lcd::pin<3>}};
         const std::size_t start = i - 1;
         Item item;
-        for (; i < all.size() && (all[i] == ' ' || all[i] == '0' || all[i] == '+'); ++i) {
-            if (all[i] == '0') {
-                item.zeros = true;
-            }
-            if (all[i] == '+') {
-                item.plus = true;
-            }
-        }
+        const std::size_t end_of_flags = std::min(all.find_first_not_of(" 0+", i), all.size());
+        const std::string flags = all.substr(i, end_of_flags - i);
+        item.zeros = flags.find('0') != std::string::npos;
+        item.plus = flags.find('+') != std::string::npos;
+        i = end_of_flags;
         item.width = digits(all, i, 20);
-        if (i < all.size() && all[i] == '.') {
+        if (all[i] == '.') {
             item.precision = digits(all, ++i, 14);
         }
         const char letter = i < all.size() ? all[i++] : '\0';
         if (letter == '%') {
             return pages_.back().push_back({.character = '%'});
         }
-        switch (letter) {
-        case 'f':
-        case 'F':
-            item.kind = 'f';
-            item.value = pin<0>();
-            break;
-        case 'i':
-        case 'd':
-            item.kind = 'd';
-            item.value = pin<1>();
-            break;
-        case 'u':
-        case 'o':
-        case 'c':
-            item.kind = letter;
-            item.value = pin<2>();
-            break;
-        case 'x':
-        case 'X':
-            item.kind = 'x';
-            item.value = pin<2>();
-            break;
-        case 'b':
-            item.kind = 'b';
-            for (char* choice : {&item.character, &item.other}) {
-                if (i >= all.size()) {
-                    throw std::invalid_argument(
-                        "fmt_strings: %b must be followed by two characters, for TRUE and for "
-                        "FALSE");
-                }
-                const char c = all[i++];
-                *choice = c == '\\' ? escaped(all, i) : c;
-            }
-            item.value = pin<3>();
-            break;
-        default:
+        const auto* const row = std::ranges::find_if(
+            formats, [&](const Format& f) { return f.letters.find(letter) != f.letters.npos; });
+        if (row == std::end(formats)) {
             throw std::invalid_argument(
                 "fmt_strings: '" + all.substr(start, i - start) +
                 "' is not a valid format; it must end with one of f d i u x o c b");
         }
+        item.kind = row->kind != '\0' ? row->kind : letter;
+        if (item.kind == 'b') {
+            item.character = choice(all, i);
+            item.other = choice(all, i);
+        }
+        item.value = (this->*row->pin)();
         pages_.back().push_back(item);
+    }
+
+    /// Parses one of the two characters that %b shows.
+    static char choice(const std::string& all, std::size_t& i) {
+        if (i >= all.size()) {
+            throw std::invalid_argument(
+                "fmt_strings: %b must be followed by two characters, for TRUE and for FALSE");
+        }
+        const char c = all[i++];
+        return c == '\\' ? escaped(all, i) : c;
     }
 
     template <std::size_t Type>
