@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -88,31 +89,16 @@ struct RecorderTrigger : hal::Component {
                       "delays the values and detects the trigger"};
 
     void update(hal::Cycle cycle) noexcept {
-        const bool armed_now = arm && !was_arm_;
-        const bool forced = force && !was_force_;
-        was_arm_ = arm;
-        was_force_ = force;
+        const bool armed_now = arm_edge_.rises(arm);
+        const bool forced = force_edge_.rises(force);
         store();
         const bool fires = looks();
-
         const std::uint32_t before = std::min(pre.get(), static_cast<std::uint32_t>(size_ - 1));
-        if (!arm && state_ != recording) {
-            state_ = idle;
-        } else if (armed_now && state_ != recording) {
-            state_ = filling;
-            filled_ = 0;  // cycles before arming belong to no record
+        bool starts = false;
+        if (state_ != recording) {
+            follow_arming(armed_now, before, cycle.seconds());
+            starts = forced || (state_ == armed && fires);
         }
-        if (state_ == holding_off && (waited_ += cycle.seconds()) > hold_off) {
-            state_ = filling;
-        }
-        if (state_ == filling) {
-            if (filled_ >= before) {
-                state_ = armed;
-            } else {
-                ++filled_;
-            }
-        }
-        const bool starts = (state_ == armed && fires) || (forced && state_ != recording);
         if (starts) {
             begin(before);
         }
@@ -129,6 +115,24 @@ struct RecorderTrigger : hal::Component {
     }
 
 private:
+    /// Advances a recorder that records nothing: arms it when the pre-trigger is filled.
+    void follow_arming(bool armed_now, std::uint32_t before, double dt) noexcept {
+        if (!arm) {
+            state_ = idle;
+        } else if (armed_now) {
+            state_ = filling;
+            filled_ = 0;  // cycles before arming belong to no record
+        }
+        if (state_ == holding_off && (waited_ += dt) > hold_off) {
+            state_ = filling;
+        }
+        if (state_ != filling) return;
+        if (filled_ >= before) {
+            state_ = armed;
+        } else {
+            ++filled_;
+        }
+    }
     void begin(std::uint32_t before) noexcept {
         state_ = recording;
         back_ = before;
@@ -144,24 +148,16 @@ private:
 
     void store() noexcept {
         newest_ = (newest_ + 1) % size_;
-        for (std::size_t i = 0; i < in.size(); ++i) {
-            values_[newest_ * in.size() + i] = in[i];
-        }
-        for (std::size_t i = 0; i < bit_in.size(); ++i) {
-            bits_[newest_ * bit_in.size() + i] = bit_in[i];
-        }
+        std::ranges::copy(in, values_.get() + newest_ * in.size());
+        std::ranges::copy(bit_in, bits_.get() + newest_ * bit_in.size());
     }
-    /// Returns the delay; during a record the delay at its trigger.
+    /// Outputs the delayed values; during a record with the delay at its trigger.
     void give() noexcept {
         const std::size_t back =
             state_ == recording ? back_ : std::min<std::size_t>(pre, size_ - 1);
         const std::size_t from = (newest_ + size_ - back) % size_;
-        for (std::size_t i = 0; i < out.size(); ++i) {
-            out[i] = values_[from * out.size() + i];
-        }
-        for (std::size_t i = 0; i < bit_out.size(); ++i) {
-            bit_out[i] = bits_[from * bit_out.size() + i];
-        }
+        std::copy_n(values_.get() + from * out.size(), out.size(), out.begin());
+        std::copy_n(bits_.get() + from * bit_out.size(), bit_out.size(), bit_out.begin());
     }
 
     bool looks() noexcept {
@@ -191,20 +187,9 @@ private:
         const double band = std::fabs(hysteresis);
         const bool rises = was_below_ && x >= threshold;
         const bool falls = was_above_ && x <= threshold;
-        if (rises) {
-            was_below_ = false;
-        }
-        if (falls) {
-            was_above_ = false;
-        }
-        if (x < threshold - band) {
-            was_below_ = true;
-        }
-        if (x > threshold + band) {
-            was_above_ = true;
-        }
+        was_below_ = x < threshold - band || (was_below_ && !rises);
+        was_above_ = x > threshold + band || (was_above_ && !falls);
         const double low = std::min(threshold.get(), threshold_2.get());
-
         const double high = std::max(threshold.get(), threshold_2.get());
         switch (value_mode) {
         case value_rises: return rises;
@@ -230,8 +215,8 @@ private:
     std::int64_t after_ = 1;
     double waited_ = 0.0;
     std::uint32_t state_ = idle;
-    bool was_arm_ = false;
-    bool was_force_ = false;
+    hal::RisingEdge arm_edge_;
+    hal::RisingEdge force_edge_;
     bool was_bit_ = false;
     bool was_known_ = false;
 
@@ -248,8 +233,8 @@ private:
                              {"after", after_},
                              {"waited", waited_},
                              {"state", state_},
-                             {"was-arm", was_arm_},
-                             {"was-force", was_force_},
+                             {"was-arm", arm_edge_},
+                             {"was-force", force_edge_},
                              {"was-bit", was_bit_},
                              {"was-known", was_known_},
                              {"was-below", was_below_},
