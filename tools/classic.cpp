@@ -7,6 +7,7 @@
 #include "classic_views.hpp"
 #include "comp/halcompile.hpp"
 #include "tcl/tcl.hpp"
+#include "text/find_row.hpp"
 
 namespace hal::tools {
 
@@ -28,10 +29,7 @@ constexpr Classic table[] = {
 }  // namespace
 
 const Classic* find_classic(std::string_view program) {
-    for (const Classic& row : table) {
-        if (program == row.name) return &row;
-    }
-    return nullptr;
+    return find_row(table, program, &Classic::name);
 }
 
 }  // namespace hal::tools

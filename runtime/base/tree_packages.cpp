@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cctype>
 
+#include "text/find_row.hpp"
+
 namespace hal {
 
 const TreePackage* find_tree_package(std::string_view name) {
-    const auto found = std::find_if(tree_packages.begin(), tree_packages.end(),
-                                    [&](const TreePackage& p) { return p.name == name; });
-    return found == tree_packages.end() ? nullptr : &*found;
+    return find_row(tree_packages, name, &TreePackage::name);
 }
 
 std::string package_switch(std::string_view name) {

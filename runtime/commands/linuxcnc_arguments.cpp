@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "text/find_row.hpp"
 #include "text/quoting.hpp"
 
 namespace hal {
@@ -237,11 +238,9 @@ void check_threads(const std::vector<Given>& given, Diagnostics& diagnostics) {
 }
 
 const IntegerFunction* integer_function(const LoadedFunction& function) {
-    const auto found = std::find_if(std::begin(integer_functions), std::end(integer_functions),
-                                    [&](const auto& row) {
+    return find_row_if(integer_functions, [&](const auto& row) {
         return row.component == function.component->name && function.name.ends_with(row.suffix);
     });
-    return found == std::end(integer_functions) ? nullptr : found;
 }
 
 bool has_float_pins(const LoadedComponent& component, const LoadedFunction& function) {

@@ -312,10 +312,9 @@ Json environment_for(std::string_view text) {
         if (at < text.size() && text[at] == '(') {
             ++at;
         }
-        std::string name;
-        while (at < text.size() && is_name_character(text[at])) {
-            name += text[at++];
-        }
+        const std::size_t end = end_of_run(text, at, is_name_character);
+        const std::string name(text.substr(at, end - at));
+        at = end;
         if (const char* const value = std::getenv(name.c_str())) {
             variables[name] = value;
         }

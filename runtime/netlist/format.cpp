@@ -112,9 +112,7 @@ private:
         }
         std::vector<std::string_view> words;
         for (std::size_t at = 0;;) {
-            while (at < text.size() && is_blank(text[at])) {
-                ++at;
-            }
+            at = end_of_run(text, at, is_blank);
             if (at == text.size()) return words;
             const std::size_t stop = word_end(text, at);
             words.push_back(text.substr(at, stop - at));

@@ -165,9 +165,7 @@ void name_at(std::string_view text, std::size_t start, std::size_t at, Reference
         stop = std::min(text.find_first_of(")($[", at + 1), text.size());
         reference.name = text.substr(at + 1, stop - at - 1);
     } else {
-        while (stop < text.size() && is_name_character(text[stop])) {
-            ++stop;
-        }
+        stop = end_of_run(text, at, is_name_character);
         reference.name = text.substr(at, stop - at);
     }
     const bool closed = !enclosed || (stop < text.size() && text[stop] == ')');

@@ -299,9 +299,7 @@ private:
             return stop;
         };
         for (;;) {
-            while (at < text.size() && is_blank(text[at])) {
-                ++at;
-            }
+            at = end_of_run(text, at, is_blank);
             if (at == text.size()) break;
             const std::size_t stop = word_end(at);
             Token token{std::string(text.substr(at, stop - at)), line.span(at, stop)};

@@ -51,6 +51,16 @@ inline bool same_word(std::string_view a, std::string_view b) {
                       [](char x, char y) { return lower(x) == lower(y); });
 }
 
+/// Returns the index of the first character from `from` on that does not satisfy the predicate; the
+/// size of the text if all do.
+template <class Predicate>
+constexpr std::size_t end_of_run(std::string_view text, std::size_t from, Predicate satisfies) {
+    while (from < text.size() && satisfies(text[from])) {
+        ++from;
+    }
+    return from;
+}
+
 /// Removes blanks and line ends at both ends.
 constexpr std::string_view trimmed(std::string_view text) {
     const auto gap = [](char c) { return is_blank(c) || c == '\r' || c == '\n'; };

@@ -71,9 +71,7 @@ std::size_t find_word(std::string_view code, std::string_view word, std::size_t 
             at = behind;
         } else if (is_word(code[at])) {
             const std::size_t begin = at;
-            while (at < code.size() && is_word(code[at])) {
-                ++at;
-            }
+            at = end_of_run(code, begin, is_word);
             if (code.substr(begin, at - begin) == word) return begin;
         } else {
             ++at;

@@ -9,6 +9,7 @@
 #include "execute/core.hpp"
 #include "machine/processes/address.hpp"
 #include "machine/run/running_model.hpp"
+#include "text/find_row.hpp"
 #include "text/netlist_name.hpp"
 
 namespace hal {
@@ -100,19 +101,15 @@ std::uint64_t Programs::add(pid_t pid, const std::string& name, const Command& c
 
 Programs::Entry* Programs::find(std::string_view name) {
     if (name.empty()) return nullptr;
-    const auto at = std::ranges::find(entries_, name, &Entry::name);
-    return at == entries_.end() ? nullptr : &*at;
+    return find_row(entries_, name, &Entry::name);
 }
 
 Programs::Entry* Programs::find(pid_t pid) {
-    const auto at =
-        std::ranges::find_if(entries_, [&](const Entry& e) { return e.pid == pid && !e.gone(); });
-    return at == entries_.end() ? nullptr : &*at;
+    return find_row_if(entries_, [&](const Entry& e) { return e.pid == pid && !e.gone(); });
 }
 
 Programs::Entry* Programs::find_number(std::uint64_t number) {
-    const auto at = std::ranges::find(entries_, number, &Entry::number);
-    return at == entries_.end() ? nullptr : &*at;
+    return find_row(entries_, number, &Entry::number);
 }
 
 bool Programs::answers(std::uint64_t owner) const {
@@ -189,10 +186,9 @@ std::string Programs::conflict_with(const Entry& entry, pid_t pid) const {
 /// Returns the entry that loadusr made for the process under a name of its own, because its name
 /// was a dead program's; nullptr: none.
 Programs::Entry* Programs::find_newcomer(const Entry& dead, pid_t pid) {
-    const auto at = std::ranges::find_if(entries_, [&](const Entry& e) {
+    return find_row_if(entries_, [&](const Entry& e) {
         return &e != &dead && e.pid == pid && e.running() && !e.registered() && !e.reserved;
     });
-    return at == entries_.end() ? nullptr : &*at;
 }
 
 /// The process takes over the component of a dead one. Returns its entry.
