@@ -12,6 +12,7 @@
 #include "base/poll_all.hpp"
 #include "commands/table.hpp"
 #include "machine/processes/programs.hpp"
+#include "text/find_row.hpp"
 
 namespace hal {
 namespace {
@@ -30,96 +31,102 @@ struct Plan {
     std::int64_t timeout_ns = 0;  ///< of waiting; 0: none
 };
 
-/// The time behind `-t` at argument i, or 0 after reporting.
-std::int64_t timeout_option(Context& context, std::size_t i) {
-    if (i < context.count()) {
-        if (const auto time = parse_duration_ns(context.argument(i));
-            time && *time >= 1'000'000 && *time <= 86'400'000'000'000) {
-            return *time;
-        }
-    }
-    context.diagnostics.error("unknown-option", context.span(i),
-                              "-t requires a duration of 1ms..24h, such as -t 10s");
-    return 0;
+/// Returns the duration if it is in the range; else nothing.
+std::optional<std::int64_t> duration_in(std::string_view text, std::int64_t min_ns,
+                                        std::int64_t max_ns) {
+    const auto time = parse_duration_ns(text);
+    return time && *time >= min_ns && *time <= max_ns ? time : std::nullopt;
 }
 
-/// True for an option about restarts, which it has then taken or reported.
-bool restart_option(Context& context, Plan& plan, std::size_t i, const std::string& option) {
-    const auto equals = option.find('=');
-    const std::string key = option.substr(0, equals);
+/// The time behind `-t` at argument i, or 0 after reporting.
+std::int64_t timeout_option(Context& context, std::size_t i) {
+    const std::string text = i < context.count() ? context.argument(i) : "";
+    const auto time = duration_in(text, 1'000'000, 86'400'000'000'000);
+    if (!time) {
+        context.diagnostics.error("unknown-option", context.span(i),
+                                  "-t requires a duration of 1ms..24h, such as -t 10s");
+    }
+    return time.value_or(0);
+}
 
-    const std::string value = equals == option.npos ? "" : option.substr(equals + 1);
-    if (key == "--restart") {
-        static constexpr std::pair<const char*, Restart> words[] = {
-            {"no", Restart::no}, {"on-failure", Restart::on_failure}, {"always", Restart::always}};
-        const auto word = std::find_if(std::begin(words), std::end(words),
-                                       [&](const auto& w) { return value == w.first; });
-        if (word != std::end(words)) {
-            plan.restart.when = word->second;
-        } else {
-            context.diagnostics.error("unknown-option", context.span(i),
-                                      "--restart must be no, on-failure or always", "",
-                                      context.usage());
-        }
+/// Reports an invalid option of loadusr; false.
+bool reject(Context& context, std::size_t at, std::string message) {
+    context.diagnostics.error("unknown-option", context.span(at), std::move(message), "",
+                              context.usage());
+    return false;
+}
+
+/// Reads `--restart=` and `--restart-delay=`. False after reporting.
+bool read_restart(Context& context, Plan& plan, std::size_t i) {
+    static constexpr std::pair<std::string_view, Restart> policies[] = {
+        {"no", Restart::no}, {"on-failure", Restart::on_failure}, {"always", Restart::always}};
+    const std::string& option = context.argument(i);
+    const std::string key = option.substr(0, option.find('='));
+    const std::string value = option.substr(std::min(key.size() + 1, option.size()));
+    if (key == "--restart-delay") {
+        const auto delay = duration_in(value, 10'000'000, 3'600'000'000'000);
+        plan.restart.delay_ns = delay.value_or(0);
+        return delay || reject(context, i, "--restart-delay must be a duration of 10ms..1h");
+    }
+    for (const auto& [name, policy] : policies) {
+        if (value != name) continue;
+        plan.restart.when = policy;
         return true;
     }
-    if (key != "--restart-delay") return false;
-    if (const auto delay = parse_duration_ns(value);
-        delay && *delay >= 10'000'000 && *delay <= 3'600'000'000'000) {
-        plan.restart.delay_ns = *delay;
-    } else {
-        context.diagnostics.error("unknown-option", context.span(i),
-                                  "--restart-delay must be a duration of 10ms..1h", "",
-                                  context.usage());
+    return reject(context, i, "--restart must be no, on-failure or always");
+}
+
+/// An option without an argument, and what it sets.
+struct Flag {
+    std::string_view option;
+    bool wait_ready, wait_end, ignore_status;
+};
+constexpr Flag flags[] = {{"-W", true, false, false},
+                          {"-w", false, true, false},
+                          {"-i", false, false, true},
+                          {"-iw", false, true, true},
+                          {"-wi", false, true, true}};
+
+/// Reads the option at argument i; moves i to its last word. False after reporting.
+bool read_option(Context& context, Plan& plan, std::size_t& i) {
+    const std::string& option = context.argument(i);
+    if (const Flag* const flag = find_row(flags, option, &Flag::option)) {
+        plan.wait_ready |= flag->wait_ready;
+        plan.wait_end |= flag->wait_end;
+        plan.ignore_status |= flag->ignore_status;
+        return true;
     }
+    const std::string key = option.substr(0, option.find('='));
+    if (key == "--restart" || key == "--restart-delay") return read_restart(context, plan, i);
+    if (option == "-t") {
+        plan.timeout_ns = timeout_option(context, ++i);
+        return plan.timeout_ns != 0;
+    }
+    if (option != "-Wn") return reject(context, i, "loadusr has no option '" + option + "'");
+    if (i + 1 == context.count()) {
+        return reject(context, i, "loadusr has no option '-Wn' without a name");
+    }
+    plan.wait_ready = true;
+    plan.any_name = false;
+    plan.name = context.argument(++i);
+    plan.name_at = i;
     return true;
 }
 
-/// The options before the program. False after reporting.
+/// Reads the options before the program, and its name. False after reporting.
 bool read_options(Context& context, Plan& plan) {
-    const std::size_t errors_before = context.diagnostics.errors();
     std::size_t i = 0;
     for (; i < context.count() && context.argument(i).starts_with('-'); ++i) {
-        const std::string& option = context.argument(i);
-        if (option == "-W") {
-            plan.wait_ready = true;
-        } else if (option == "-w") {
-            plan.wait_end = true;
-        } else if (option == "-i") {
-            plan.ignore_status = true;
-        } else if (option == "-iw" || option == "-wi") {
-            plan.wait_end = plan.ignore_status = true;
-        } else if (restart_option(context, plan, i, option)) {
-            if (context.diagnostics.errors() > errors_before) return false;
-        } else if (option == "-Wn" && i + 1 < context.count()) {
-            plan.wait_ready = true;
-            plan.any_name = false;
-            plan.name = context.argument(++i);
-            plan.name_at = i;
-        } else if (option == "-t") {
-            plan.timeout_ns = timeout_option(context, ++i);
-            if (plan.timeout_ns == 0) return false;
-        } else {
-            context.diagnostics.error("unknown-option", context.span(i),
-                                      "loadusr has no option '" + option + "'" +
-                                          (option == "-Wn" ? " without a name" : ""),
-                                      "", context.usage());
-            return false;
-        }
+        if (!read_option(context, plan, i)) return false;
     }
     plan.program = i;
     if (plan.timeout_ns != 0 && !plan.wait_ready && !plan.wait_end) {
-        context.diagnostics.error("unknown-option", context.span(0),
-                                  "-t requires -W, -Wn or -w, whose wait it limits", "",
-                                  context.usage());
-        return false;
+        return reject(context, 0, "-t requires -W, -Wn or -w, whose wait it limits");
     }
     if (plan.wait_end && plan.restart.when != Restart::no) {
-        context.diagnostics.error("unknown-option", context.span(0),
-                                  "-w and --restart exclude each other: -w waits for the program "
-                                  "to end, --restart starts it again",
-                                  "", context.usage());
-        return false;
+        return reject(context, 0,
+                      "-w and --restart exclude each other: -w waits for the program to end, "
+                      "--restart starts it again");
     }
     if (i == context.count()) {
         context.diagnostics.error("wrong-arguments", context.command.name.span,
@@ -170,33 +177,37 @@ public:
                                     pollfd{pipes_[1][0], POLLIN, 0}};
         const timespec timeout{timeout_ms / 1000, timeout_ms % 1000 * 1'000'000L};
         poll_all(ready, &timeout);
-        for (std::size_t i = 0; i < 2; ++i) {
-            if (pipes_[i][0] < 0) continue;
+        for (auto& pipe : pipes_) {
+            if (pipe[0] < 0) continue;
             std::array<char, 4096> text;
             ssize_t got;
-            while ((got = read(pipes_[i][0], text.data(), text.size())) > 0) {
-                const std::string_view part(text.data(), static_cast<std::size_t>(got));
-                // read and discarded, so that the program does not block
-                if (total_ > max) continue;
-                total_ += part.size();
-                if (i == 0) {
-                    output.out(part);
-                } else {
-                    output.err(part);
-                }
-                if (total_ > max) {
-                    output.err("\n(output truncated after 1 MiB)\n");
-                }
+            while ((got = read(pipe[0], text.data(), text.size())) > 0) {
+                write(output, &pipe == &pipes_[0], {text.data(), static_cast<std::size_t>(got)});
             }
             if (got == 0) {
-                close_one(pipes_[i][0]);
+                close_one(pipe[0]);
             }
         }
         return pipes_[0][0] >= 0 || pipes_[1][0] >= 0;
     }
 
 private:
-    static constexpr std::size_t max = std::size_t{1} << 20;
+    static constexpr std::size_t max_bytes = std::size_t{1} << 20;
+
+    /// Passes on a part of the output. The rest of a long one is read and discarded, so that the
+    /// program does not block.
+    void write(Output& output, bool to_stdout, std::string_view part) {
+        if (total_ > max_bytes) return;
+        total_ += part.size();
+        if (to_stdout) {
+            output.out(part);
+        } else {
+            output.err(part);
+        }
+        if (total_ > max_bytes) {
+            output.err("\n(output truncated after 1 MiB)\n");
+        }
+    }
     static void close_one(int& file) {
         if (file >= 0) {
             close(file);
