@@ -8,6 +8,7 @@
 #include "commands/files.hpp"
 #include "commands/foreign_file.hpp"
 #include "commands/two_pass.hpp"
+#include "text/find_row.hpp"
 #include "text/quoting.hpp"
 
 namespace hal {
@@ -256,13 +257,7 @@ void Script::defer(const Command& command, const CommandRow& row) {
 
 void Script::act(const Command& command, const CommandRow& row) {
     const bool checking = shell_.options.check;
-    if (checking && row.function.act == command_loadusr) {
-        note_program(session_.absences(), command);
-    }
-    if (checking && !row.is_checked()) return;
-    if (checking) {
-        session_.absences().begin(command.span);
-    }
+    if (checking && !begin_check(command, row)) return;
     // a check is one transaction: nothing acts
     const bool looks = only_looks(row, command);
     const bool apart = checking || row.is_apart() || looks;
@@ -278,18 +273,35 @@ void Script::act(const Command& command, const CommandRow& row) {
         return finish();
     }
     act_on_each(command, row);
-    if (only_looks(row, command) && !pending_.failed() && session_.ending()) {
+    if (looks && !pending_.failed() && session_.ending()) {
         report_end(command);  // what it has printed may be incomplete
     }
-    // its component remembers the text
+    keep_remembered(command, row);
+    note_effect(command, row, apart, pending_.errors() > errors_before);
+}
+
+/// Notes what `hal check` does not carry out. Returns whether the command is checked.
+bool Script::begin_check(const Command& command, const CommandRow& row) {
     if (row.function.act == command_loadusr) {
+        note_program(session_.absences(), command);
+    }
+    if (!row.is_checked()) return false;
+    session_.absences().begin(command.span);
+    return true;
+}
+
+/// Keeps the texts of commands that are remembered: a component knows its loadusr, and the warning
+/// that nothing ran names an advance.
+void Script::keep_remembered(const Command& command, const CommandRow& row) {
+    const bool advances = row.function.act == command_advance;
+    if (row.function.act == command_loadusr ||
+        (advances && session_.threads().note_advance(command.span))) {
         texts_.keep();
     }
-    // for the warning that nothing ran
-    if (row.function.act == command_advance && session_.threads().note_advance(command.span)) {
-        texts_.keep();
-    }
-    const bool failed = pending_.errors() > errors_before;
+}
+
+/// Notes what a command has done; one that acts by itself ends its transaction.
+void Script::note_effect(const Command& command, const CommandRow& row, bool apart, bool failed) {
     if (apart) {
         if (failed && row.function.act != command_source) {
             effects_.add_line(command.span);
@@ -336,38 +348,41 @@ void Script::act_on(const Command& command, const CommandRow& row) {
 
 /// Returns a collected command that cannot be in a transaction with this one, or nullptr.
 const Command* Script::find_conflict(const Command& command) const {
-    const auto other = std::ranges::find_if(state_.collected, [&](const Command& one) {
+    return find_row_if(state_.collected, [&](const Command& one) {
         return one.name.text != command.name.text &&
                row_of(one)->behaviour.timing == Timing::at_request;
     });
-    return other == state_.collected.end() ? nullptr : &*other;
 }
 
 bool Script::collect(const Command& command, const CommandRow& row) {
-    if (row.can_be_collected()) {
-        const bool acts = row.behaviour.timing == Timing::at_request;
-        if (const Command* const other = acts ? find_conflict(command) : nullptr) {
-            Diagnostic found{
-                Severity::error,
-                "open-transaction",
-                "'" + command.name.text + "' and '" + other->name.text +
-                    "' cannot be in the same transaction",
-                {{command.name.span, "second"}, {other->name.span, "first"}},
-                {"all commands of a transaction take effect together; commit first, then type " +
-                 command.name.text}};
-            pending_.add(std::move(found));
-            effects_.add_line(command.span);
-            return true;
-        }
-        if (checked_begin_) return false;
-        state_.collected.push_back(command);
-        session_.sources.hold(command.span.source);
-        texts_.keep();
+    if (!row.can_be_collected()) return reject_in_transaction(command, row);
+    const bool acts = row.behaviour.timing == Timing::at_request;
+    if (const Command* const other = acts ? find_conflict(command) : nullptr) {
+        report_conflict(command, *other);
         return true;
     }
-    if (row.is_apart() || row.is_query() || row.function.act == command_advance) {
-        return false;
-    }
+    if (checked_begin_) return false;
+    state_.collected.push_back(command);
+    session_.sources.hold(command.span.source);
+    texts_.keep();
+    return true;
+}
+
+void Script::report_conflict(const Command& command, const Command& other) {
+    pending_.add({Severity::error,
+                  "open-transaction",
+                  "'" + command.name.text + "' and '" + other.name.text +
+                      "' cannot be in the same transaction",
+                  {{command.name.span, "second"}, {other.name.span, "first"}},
+                  {"all commands of a transaction take effect together; commit first, then type " +
+                   command.name.text}});
+    effects_.add_line(command.span);
+}
+
+/// Reports a command that cannot be part of a transaction. Returns false for one that does not
+/// disturb it.
+bool Script::reject_in_transaction(const Command& command, const CommandRow& row) {
+    if (row.is_apart() || row.is_query() || row.function.act == command_advance) return false;
     const bool typed = !texts_.is_file(command.span.source);
     pending_.error("open-transaction", command.name.span,
                    "'" + command.name.text + "' cannot be part of a transaction", "",

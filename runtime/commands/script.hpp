@@ -62,6 +62,9 @@ private:
     bool merge_module_load(const Command& command);
     void defer(const Command& command, const CommandRow& row);
     void act(const Command& command, const CommandRow& row);
+    bool begin_check(const Command& command, const CommandRow& row);
+    void keep_remembered(const Command& command, const CommandRow& row);
+    void note_effect(const Command& command, const CommandRow& row, bool apart, bool failed);
     void act_on_each(const Command& command, const CommandRow& row);
     void act_on(const Command& command, const CommandRow& row);
     void finish_before_acting();
@@ -71,6 +74,8 @@ private:
     void commit_collected();
     /// After `begin`: true when the command was collected or rejected.
     bool collect(const Command& command, const CommandRow& row);
+    void report_conflict(const Command& command, const Command& other);
+    bool reject_in_transaction(const Command& command, const CommandRow& row);
     const Command* find_conflict(const Command& command) const;
     void forget_collected(std::size_t from);
     Transaction& transaction();
