@@ -236,22 +236,27 @@ void new_signal(Text& text, const Signal& signal) {
     text.add("newsig {} {:<5}\n", signal.name, name(signal.type));
 }
 
-void save_sig(Context& context, Text& text) {
-    text.add("# signals\n");
+/// Calls `save` for each signal by name, until the machine ends.
+template <class Save>
+void for_each_signal(Context& context, const Save& save) {
     for (const Signal* const signal : signals_by_name(context.session, {})) {
         if (context.session.ending()) return;
-        new_signal(text, *signal);
+        save(*signal);
     }
+}
+
+void save_sig(Context& context, Text& text) {
+    text.add("# signals\n");
+    for_each_signal(context, [&](const Signal& signal) { new_signal(text, signal); });
 }
 
 void save_sigu(Context& context, Text& text) {
     text.add("# signals\n");
-    for (const Signal* const signal : signals_by_name(context.session, {})) {
-        if (context.session.ending()) return;
-        if (signal->pins.empty()) {
-            new_signal(text, *signal);
+    for_each_signal(context, [&](const Signal& signal) {
+        if (signal.pins.empty()) {
+            new_signal(text, signal);
         }
-    }
+    });
 }
 
 void save_links(Context& context, Text& text, bool arrows) {
@@ -278,55 +283,54 @@ std::vector<const Pin*> by_name(const Signal& signal) {
 
 void save_nets(Context& context, Text& text, bool arrows) {
     text.add("# nets\n");
-    for (const Signal* const signal : signals_by_name(context.session, {})) {
-        if (context.session.ending()) return;
-        new_signal(text, *signal);
-        for (const Pin* const pin : by_name(*signal)) {
-            text.add("linksp {} {} {}\n", signal->name, arrows ? arrow_of_signal(*pin) : "",
+    for_each_signal(context, [&](const Signal& signal) {
+        new_signal(text, signal);
+        for (const Pin* const pin : by_name(signal)) {
+            text.add("linksp {} {} {}\n", signal.name, arrows ? arrow_of_signal(*pin) : "",
                      shown_name(*pin));
         }
-    }
+    });
 }
 
 void save_net(Context& context, Text& text) { save_nets(context, text, false); }
 void save_neta(Context& context, Text& text) { save_nets(context, text, true); }
 
-void save_netl(Context& context, Text& text) {
+/// A line `net SIGNAL` for each signal with pins, which `save` completes.
+template <class Save>
+void save_joined(Context& context, Text& text, const Save& save) {
     text.add("# nets\n");
-    for (const Signal* const signal : signals_by_name(context.session, {})) {
-        if (context.session.ending()) return;
-        if (signal->pins.empty()) continue;
-        text.add("net {}", signal->name);
-        for (const Pin* const pin : by_name(*signal)) {
-            text.add(" {}", shown_name(*pin));
-        }
+    for_each_signal(context, [&](const Signal& signal) {
+        if (signal.pins.empty()) return;
+        text.add("net {}", signal.name);
+        save(text, by_name(signal));
         text.add("\n");
-    }
+    });
+}
+
+void save_netl(Context& context, Text& text) {
+    save_joined(context, text, [](Text& line, const std::vector<const Pin*>& pins) {
+        for (const Pin* const pin : pins) {
+            line.add(" {}", shown_name(*pin));
+        }
+    });
 }
 
 /// One line per signal: the writer, =>, the readers; or I/O pins with <=> between, then => and the
 /// readers.
 void save_netla(Context& context, Text& text) {
-    text.add("# nets\n");
-    for (const Signal* const signal : signals_by_name(context.session, {})) {
-        if (context.session.ending()) return;
-        if (signal->pins.empty()) continue;
-        text.add("net {}", signal->name);
-        const auto pins = by_name(*signal);
-        bool sources = false;
-        bool readers = false;
-        for (const Pin* const pin : pins) {
-            if (pin->dir == HAL_DIR_IN) continue;
-            text.add("{} {}", pin->dir == HAL_DIR_IO && sources ? " <=>" : "", shown_name(*pin));
-            sources = true;
+    save_joined(context, text, [](Text& line, std::vector<const Pin*> pins) {
+        const auto readers = std::ranges::stable_partition(
+            pins, [](const Pin* pin) { return pin->dir != HAL_DIR_IN; });
+        for (auto pin = pins.begin(); pin != pins.end(); ++pin) {
+            const char* arrow = "";
+            if (pin != pins.begin() && pin < readers.begin() && (*pin)->dir == HAL_DIR_IO) {
+                arrow = " <=>";
+            } else if (pin != pins.begin() && pin == readers.begin()) {
+                arrow = " =>";
+            }
+            line.add("{} {}", arrow, shown_name(**pin));
         }
-        for (const Pin* const pin : pins) {
-            if (pin->dir != HAL_DIR_IN) continue;
-            text.add("{} {}", readers || !sources ? "" : " =>", shown_name(*pin));
-            readers = true;
-        }
-        text.add("\n");
-    }
+    });
 }
 
 void save_values(Context& context, Text& text, const std::vector<const Pin*>& pins) {
