@@ -34,11 +34,20 @@ struct Search {
             found.push_back({text, std::move(hint)});
         }
     }
-    void add_choices(std::string_view choices) {
-        for (std::size_t at = 0; at <= choices.size();) {
-            const auto bar = std::min(choices.find('|', at), choices.size());
-            add(std::string(choices.substr(at, bar - at)));
-            at = bar + 1;
+    /// Returns whether the word is among those typed from word `from` on.
+    bool is_typed(const std::string& word, std::size_t from = 0) const {
+        return std::find(words.begin() + static_cast<std::ptrdiff_t>(std::min(from, words.size())),
+                         words.end(), word) != words.end();
+    }
+    /// Adds each row of a table by its name.
+    void add_names(const auto& rows) {
+        for (const auto& row : rows) {
+            add(std::string(row.name));
+        }
+    }
+    void add_texts(const std::vector<std::string>& texts) {
+        for (const std::string& text : texts) {
+            add(text);
         }
     }
 };
@@ -76,34 +85,46 @@ void add_functions(Search& search, Wanted&& wanted) {
     }
 }
 
+/// What is on a signal, or is to be: which pins may join it.
+struct Connection {
+    std::optional<hal_type> type;
+    bool has_writer = false;
+    bool has_io = false;
+
+    explicit Connection(const Signal* signal) {
+        if (!signal) return;
+        type = signal->type;
+        has_writer = signal->writer != nullptr;
+        has_io = signal->ios > 0;
+    }
+    void add(const Pin& pin) {
+        type = type.value_or(pin.type);
+        has_writer |= pin.dir == HAL_DIR_OUT;
+        has_io |= pin.dir == HAL_DIR_IO;
+    }
+    bool admits(const Pin& pin) const {
+        if (pin.signal || (type && pin.type != *type)) return false;
+        switch (pin.dir) {
+        case HAL_DIR_IN: return true;
+        case HAL_DIR_OUT: return !has_writer && !has_io;
+        case HAL_DIR_IO: return !has_writer;
+        default: return false;
+        }
+    }
+};
+
 /// After `net SIGNAL`: free pins that may go onto it beside what is on it, and beside the pins
 /// typed so far.
 void add_free_pins(Search& search) {
-    const Signal* const signal =
-        search.words.size() > 1 ? search.model().find_signal(search.words[1]) : nullptr;
-    std::optional<hal_type> type;
-    bool writer = false;
-    bool io = false;
-    if (signal) {
-        type = signal->type;
-        writer = signal->writer != nullptr;
-        io = signal->ios > 0;
-    }
+    const bool has_signal = search.words.size() > 1;
+    Connection connection(has_signal ? search.model().find_signal(search.words[1]) : nullptr);
     for (std::size_t i = 2; i < search.words.size(); ++i) {
-        const Pin* const pin = search.model().find_pin(search.words[i]);
-        if (!pin) continue;
-        if (!type) {
-            type = pin->type;
+        if (const Pin* const pin = search.model().find_pin(search.words[i])) {
+            connection.add(*pin);
         }
-        writer = writer || pin->dir == HAL_DIR_OUT;
-        io = io || pin->dir == HAL_DIR_IO;
     }
     add_pins(search, [&](const Pin& pin) {
-        if (pin.signal || pin.dir == HAL_DIR_PARAM || (type && pin.type != *type)) return false;
-        if (pin.dir == HAL_DIR_OUT && (writer || io)) return false;
-        if (pin.dir == HAL_DIR_IO && writer) return false;
-        return std::find(search.words.begin() + 2, search.words.end(), pin.name) ==
-               search.words.end();
+        return connection.admits(pin) && !search.is_typed(pin.name, 2);
     });
 }
 
@@ -123,12 +144,11 @@ void add_files(Search& search) {
 /// Values: what a bit may be.
 void add_values(Search& search) {
     const std::string& name = search.words[1];
-    const Pin* const pin = search.model().find_pin(name);
-    const Signal* const signal = search.model().find_signal(name);
-    const bool bit = search.words[0] == "sets" ? signal && signal->type == HAL_TYPE_BIT
-                                               : pin && pin->type == HAL_TYPE_BIT;
+    const auto is_bit = [](const auto* one) { return one && one->type == HAL_TYPE_BIT; };
+    const bool bit = search.words[0] == "sets" ? is_bit(search.model().find_signal(name))
+                                               : is_bit(search.model().find_pin(name));
     if (bit) {
-        search.add_choices("TRUE|FALSE");
+        search.add_texts({"TRUE", "FALSE"});
     }
 }
 
@@ -200,20 +220,14 @@ constexpr Kind kinds[] = {
     }
 }},
     {"ARGUMENT=VALUE", add_load_arguments},
-    {"PROCESS",
-     [](Search& s) {
-    for (const auto& name : s.programs.names()) {
-        s.add(name);
-    }
-}},
+    {"PROCESS", [](Search& s) { s.add_texts(s.programs.names()); }},
     {"PROGRAM", add_files},
     {"FILE", add_files},
     {"FUNCTION",
      [](Search& s) {
     const bool placed = s.words[0] == "delf";
     add_functions(s, [&](const LoadedFunction& f) {
-        return (f.thread != nullptr) == placed &&
-               std::find(s.words.begin(), s.words.end(), f.name) == s.words.end();
+        return (f.thread != nullptr) == placed && !s.is_typed(f.name);
     });
 }},
     {"THREAD",
@@ -265,12 +279,7 @@ constexpr Kind kinds[] = {
     }
 }},
     {"VALUE", add_values},
-    {"TYPE",
-     [](Search& s) {
-    for (const auto& row : types) {
-        s.add(row.name);
-    }
-}},
+    {"TYPE", [](Search& s) { s.add_names(types); }},
     {"PATTERN", add_listed},
     {"COMMAND",
      [](Search& s) {
@@ -278,12 +287,7 @@ constexpr Kind kinds[] = {
         s.add(row.name, row.summary);
     }
 }},
-    {"CODE",
-     [](Search& s) {
-    for (const CodePage& row : all_code_pages()) {
-        s.add(row.name);
-    }
-}},
+    {"CODE", [](Search& s) { s.add_names(all_code_pages()); }},
 };
 
 void add_word(Search& search, std::string_view word) {
@@ -308,6 +312,12 @@ void add_word(Search& search, std::string_view word) {
     }
 }
 
+/// Returns whether a typed word may be this word of the usage.
+bool accepts(const UsageWord& word, const std::string& typed) {
+    if (word.text.starts_with('-')) return word.text == typed;
+    return word.of_option || !typed.starts_with('-');
+}
+
 /// Follows the usage through the words typed so far and offers every word that may come next:
 /// optional ones can be left out, repeated ones stay, an option's own argument comes only after the
 /// option.
@@ -325,13 +335,8 @@ void add_arguments(Search& search, const std::vector<UsageWord>& words) {
     reach(here, 0);
     for (std::size_t given = 1; given < search.words.size(); ++given) {
         next.assign(words.size() + 1, false);
-        const bool option = search.words[given].starts_with('-');
         for (std::size_t i = 0; i < words.size(); ++i) {
-            const bool wants_option = words[i].text.starts_with('-');
-            if (!here[i] || (wants_option ? words[i].text != search.words[given]
-                                          : option && !words[i].of_option)) {
-                continue;
-            }
+            if (!here[i] || !accepts(words[i], search.words[given])) continue;
             if (words[i].repeats) {
                 reach(next, i);
             }
