@@ -23,6 +23,32 @@ constexpr std::size_t max_waiting = 64;  // clients without a place
 // a client without a place waits for one at most
 constexpr std::int64_t give_up_ns = 5'000'000'000;
 
+/// Returns whether accept() failed because files or memory are exhausted.
+bool is_exhaustion(int error) {
+    return error == EMFILE || error == ENFILE || error == ENOBUFS || error == ENOMEM;
+}
+
+int accept_client(int listener) {
+    return accept4(listener, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+}
+
+/// Returns true for a client that waits for a place.
+bool waits(const ServedClient& client) { return !client.gone && !client.placed; }
+
+/// Returns the wanted client with the earliest time; nullptr without a wanted one.
+template <class Clients, class Wanted>
+ServedClient* earliest(const Clients& clients, std::int64_t ServedClient::* time,
+                       const Wanted& wanted) {
+    ServedClient* found = nullptr;
+    for (const auto& client : clients) {
+        const bool earlier = !found || client.get()->*time < found->*time;
+        if (earlier && wanted(*client)) {
+            found = client.get();
+        }
+    }
+    return found;
+}
+
 }  // namespace
 
 Admission::~Admission() { close_spare(); }
@@ -39,7 +65,7 @@ std::int64_t Admission::next_due_ns(std::int64_t now_ns) const {
         due = accepts_from_ns_;
     }
     for (const auto& client : clients_.all()) {
-        if (!client->gone && !client->placed) {
+        if (waits(*client)) {
             due = std::min(due, client->came_ns + give_up_ns);
         }
     }
@@ -92,18 +118,18 @@ void Admission::keep_spare() {
 /// Accepts a connection; with the descriptor in reserve when the process has no other. Returns -1
 /// when no client waits, or it cannot be accepted.
 int Admission::accept_one() {
-    int fd = accept4(endpoint_.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    int fd = accept_client(endpoint_.fd());
     if (fd >= 0) return fd;
-    if (errno != EMFILE && errno != ENFILE && errno != ENOBUFS && errno != ENOMEM) return -1;
+    if (!is_exhaustion(errno)) return -1;
     files_short_ = true;
     if (give_up_watch()) {
-        fd = accept4(endpoint_.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+        fd = accept_client(endpoint_.fd());
         if (fd >= 0) return fd;
     }
-    if (!close_one_idle(urgent_ns) && spare_ >= 0) {
-        close(std::exchange(spare_, -1));
+    if (!close_one_idle(urgent_ns)) {
+        close_spare();
     }
-    fd = accept4(endpoint_.fd(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    fd = accept_client(endpoint_.fd());
     if (fd < 0) {
         accepts_from_ns_ = monotonic_ns() + no_files_ns;
     }
@@ -114,16 +140,11 @@ int Admission::accept_one() {
 /// depends; nullptr without such a client.
 ServedClient* Admission::max_idle(std::int64_t idle_ns) const {
     const std::int64_t now = monotonic_ns();
-    ServedClient* max = nullptr;
-    for (const auto& client : clients_.all()) {
-        const bool occupied = client->gone || client->has_turn || client->busy() ||
-                              client->halting_since != 0 || now - client->active_ns < idle_ns;
-        if (occupied || (max && max->active_ns <= client->active_ns)) continue;
-        if (!client->placed || client->connection->idle()) {
-            max = client.get();
-        }
-    }
-    return max;
+    return earliest(clients_.all(), &ServedClient::active_ns, [&](const ServedClient& client) {
+        const bool occupied = client.gone || client.has_turn || client.busy() ||
+                              client.halting_since != 0 || now - client.active_ns < idle_ns;
+        return !occupied && (!client.placed || client.connection->idle());
+    });
 }
 
 /// Closes the client that has been idle longest, for at least this time. Returns false without such
@@ -138,13 +159,9 @@ bool Admission::close_one_idle(std::int64_t idle_ns) {
 /// Closes the client without a place that has been connected longest, if it had the time for an
 /// urgent request. False without such a client.
 bool Admission::make_way() {
-    ServedClient* oldest = nullptr;
-    for (const auto& client : clients_.all()) {
-        if (!client->gone && !client->placed && client->halting_since == 0 &&
-            (!oldest || client->came_ns < oldest->came_ns)) {
-            oldest = client.get();
-        }
-    }
+    ServedClient* const oldest = earliest(
+        clients_.all(), &ServedClient::came_ns,
+        [](const ServedClient& client) { return waits(client) && client.halting_since == 0; });
     if (!oldest || monotonic_ns() - oldest->came_ns < urgent_ns) return false;
     ++reclaimed;
     clients_.close(*oldest, files_short_ ? "the machine has no file descriptor left"
@@ -195,7 +212,7 @@ void Admission::add_client(int fd) {
 void Admission::place_clients() {
     const std::int64_t now = monotonic_ns();
     for (const auto& client : clients_.all()) {
-        if (client->gone || client->placed) continue;
+        if (!waits(*client)) continue;
         if (spare_ >= 0 && clients_.count(true) < places()) {
             client->placed = true;
             client->reserved = clients_.count(true) > options_.max_clients;
@@ -236,15 +253,12 @@ void Admission::reclaim() {
         return;
     }
     for (; living > options_.max_clients; --living) {
-        ServedClient* max = nullptr;
-        for (const auto& client : clients_.all()) {
-            if (max && max->active_ns <= client->active_ns) continue;
-            if (may_reclaim(*client, living == places(), idle_ns, now)) {
-                max = client.get();
-            }
-        }
-        if (!max) return;
-        close_idle(*max);
+        const bool is_full = living == places();
+        ServedClient* const idle = earliest(
+            clients_.all(), &ServedClient::active_ns,
+            [&](const ServedClient& client) { return may_reclaim(client, is_full, idle_ns, now); });
+        if (!idle) return;
+        close_idle(*idle);
     }
 }
 
