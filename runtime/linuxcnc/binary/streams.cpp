@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <string_view>
 #include <sys/shm.h>
 
 #include "linuxcnc/binary/rtapi_interface.hpp"
@@ -41,23 +42,10 @@ std::uint32_t next(const Header& of, std::uint32_t index) {
 }
 
 int type_of(char letter) {
-    switch (letter) {
-    case 'b':
-    case 'B': return 1;
-    case 'f':
-    case 'F':
-    case 'r':
-    case 'R': return 2;
-    case 's':
-    case 'S': return 3;
-    case 'u':
-    case 'U': return 4;
-    case 'l':
-    case 'L': return 6;
-    case 'k':
-    case 'K': return 7;
-    default: return 0;
-    }
+    constexpr std::string_view letters = "bBfFrRsSuUlLkK";
+    constexpr int types[] = {1, 2, 2, 3, 4, 6, 7};
+    const std::size_t index = letters.find(letter);
+    return index == letters.npos ? 0 : types[index / 2];
 }
 
 }  // namespace
