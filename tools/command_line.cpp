@@ -15,6 +15,7 @@
 #include "paths.hpp"
 #include "subcommand.hpp"
 #include "text/diagnostic.hpp"
+#include "text/find_row.hpp"
 #include "text/quoting.hpp"
 
 namespace hal::tools {
@@ -22,10 +23,7 @@ namespace hal::tools {
 namespace {
 
 const Group* find_group(std::string_view name) {
-    for (const Group& group : subcommand_groups()) {
-        if (name == group.name) return &group;
-    }
-    return nullptr;
+    return find_row(subcommand_groups(), name, &Group::name);
 }
 
 /// Whether the name of the command begins with these words, and has more.
@@ -131,6 +129,30 @@ std::string help_of(const Subcommand& row) {
            set.help();
 }
 
+std::vector<std::string> names_in(const Group& group) {
+    std::vector<std::string> names;
+    for (const Subcommand& row : subcommands()) {
+        if (belongs(row, group)) {
+            names.emplace_back(row.name);
+        }
+    }
+    return names;
+}
+
+/// Returns what may follow `hal`: the commands of this build, and the groups.
+std::vector<std::string> first_words() {
+    std::vector<std::string> names = {"help"};
+    for (const Subcommand& row : subcommands()) {
+        if (!row.missing_package()) {
+            names.emplace_back(row.name);
+        }
+    }
+    for (const Group& group : subcommand_groups()) {
+        names.emplace_back(group.name);
+    }
+    return names;
+}
+
 int no_such_command(const std::vector<std::string>& typed) {
     Options options;
     std::string word = typed.front();
@@ -149,35 +171,16 @@ int no_such_command(const std::vector<std::string>& typed) {
                                          "machine type: hal shell {1}",
                                          word, fmt::join(typed, " ")));
     }
-    std::vector<std::string> names = {"help"};
-    std::string where = "hal help";
-    if (const Group* group = find_group(word)) {
-        if (typed.size() > 1) {
-            word += " " + typed[1];
-        }
-        if (const TreePackage* const missing = missing_package(word)) {
-            return refuse(word, *missing);
-        }
-        where += fmt::format(" {}", group->name);
-        names.clear();
-        for (const Subcommand& row : subcommands()) {
-            if (belongs(row, *group)) {
-                names.emplace_back(row.name);
-            }
-        }
-    } else {
-        for (const Subcommand& row : subcommands()) {
-            if (!row.missing_package()) {
-                names.emplace_back(row.name);
-            }
-        }
-        for (const Group& g : subcommand_groups()) {
-            names.emplace_back(g.name);
-        }
+    const Group* const group = find_group(word);
+    if (group && typed.size() > 1) {
+        word += " " + typed[1];
     }
-    const std::string hint = did_you_mean(word, names);
-    return fail(options, fmt::format("unknown command '{}'; {}", word,
-                                     hint.empty() ? "type: " + where : hint));
+    const TreePackage* const missing = group ? missing_package(word) : nullptr;
+    if (missing) return refuse(word, *missing);
+    const std::string hint = did_you_mean(word, group ? names_in(*group) : first_words());
+    if (!hint.empty()) return fail(options, fmt::format("unknown command '{}'; {}", word, hint));
+    const std::string about = group ? fmt::format(" {}", group->name) : "";
+    return fail(options, fmt::format("unknown command '{}'; type: hal help{}", word, about));
 }
 
 std::string version_text() {
@@ -215,8 +218,8 @@ std::string version_json() {
 
 /// `hal --version [--json]`.
 int print_version(const std::vector<std::string>& words) {
-    if (words.empty()) return print(version_text()) ? 0 : 1;
-    if (words.size() == 1 && words[0] == "--json") return print(version_json()) ? 0 : 1;
+    if (words.empty()) return exit_code(print(version_text()));
+    if (words.size() == 1 && words[0] == "--json") return exit_code(print(version_json()));
     const std::string& extra = words[0] == "--json" ? words[1] : words[0];
     return fail(Options{}, fmt::format("unexpected argument '{}'; type: hal --version --json, or "
                                        "hal --version",
@@ -224,7 +227,7 @@ int print_version(const std::vector<std::string>& words) {
 }
 
 int help(const std::vector<std::string>& about) {
-    if (about.empty()) return print(overview()) ? 0 : 1;
+    if (about.empty()) return exit_code(print(overview()));
     if (const Found found = find(about); found.row) {
         const TreePackage* const missing = found.row->missing_package();
         if (missing) return refuse(found.row->name, *missing);
@@ -246,10 +249,9 @@ int help(const std::vector<std::string>& about) {
         }
     }
     if (!text.empty()) {
-        return print(fmt::format("usage: hal {}COMMAND …\n\n{}\nFor details: hal help {}COMMAND.\n",
-                                 start, text, start))
-                   ? 0
-                   : 1;
+        return exit_code(
+            print(fmt::format("usage: hal {}COMMAND …\n\n{}\nFor details: hal help {}COMMAND.\n",
+                              start, text, start)));
     }
     return no_such_command(about);
 }
@@ -285,55 +287,52 @@ std::optional<int> read(const Subcommand& row, std::vector<std::string> argument
     const OptionSet::Reading reading = set.read(std::move(arguments));
     switch (reading.outcome) {
     case OptionSet::Outcome::good: break;
-    case OptionSet::Outcome::help: return print(help_of(row)) ? 0 : 1;
+    case OptionSet::Outcome::help: return exit_code(print(help_of(row)));
     case OptionSet::Outcome::missing:
         return fail(options, fmt::format("missing argument; type: hal {} {}", row.name, row.usage));
     case OptionSet::Outcome::bad:
         return fail(options, fmt::format("{}; see: hal help {}", reading.problem, row.name));
     }
-    const std::vector<std::string>& extra = reading.extra;
-    if (row.verbatim) {
-        if (!extra.empty() && extra.front().size() > 1 && extra.front()[0] == '-' &&
-            !(extra.front() == "--")) {
-            return fail(options, fmt::format("unknown option '{}'; {}", extra.front(),
-                                             option_hint(row, extra.front(), set.names())));
+    std::vector<std::string> extra = reading.extra;
+    const bool dashed = !extra.empty() && extra.front().starts_with('-');
+    if (row.verbatim && (!dashed || extra.front().size() == 1 || extra.front() == "--")) {
+        if (dashed && extra.front() == "--") {
+            extra.erase(extra.begin());
         }
-        options.words.assign(extra.begin() + (!extra.empty() && extra.front() == "--"),
-                             extra.end());
+        options.words = std::move(extra);
+    } else if (dashed) {
+        return fail(options, fmt::format("unknown option '{}'; {}", extra.front(),
+                                         option_hint(row, extra.front(), set.names())));
     } else if (!extra.empty()) {
-        const bool is_option = extra.front().starts_with('-');
-        return fail(options, is_option ? fmt::format("unknown option '{}'; {}", extra.front(),
-                                                     option_hint(row, extra.front(), set.names()))
-                                       : fmt::format("unexpected argument '{}'; see: hal help {}",
-                                                     extra.front(), row.name));
+        return fail(options, fmt::format("unexpected argument '{}'; see: hal help {}",
+                                         extra.front(), row.name));
     }
     return std::nullopt;
+}
+
+bool is_help(std::string_view word) { return word == "help" || word == "--help" || word == "-h"; }
+
+/// Handles words that name no command: a group alone prints its help.
+int run_group(const std::vector<std::string>& all) {
+    const Group* const group = find_group(all[0]);
+    if (!group) return no_such_command(all);
+    if (const TreePackage* const missing = missing_package(group->name)) {
+        return refuse(group->name, *missing);
+    }
+    return all.size() == 1 || is_help(all[1]) ? help({all[0]}) : no_such_command(all);
 }
 
 }  // namespace
 
 int run_command_line(int argc, char** argv) {
     const std::vector<std::string> all(argv + std::min(argc, 1), argv + argc);
-    if (all.empty()) {
-        return help({});
-    }
-    if (all[0] == "help" || all[0] == "--help" || all[0] == "-h") {
-        return help({all.begin() + 1, all.end()});
-    }
+    if (all.empty()) return help({});
+    if (is_help(all[0])) return help({all.begin() + 1, all.end()});
     if (all[0] == "--version" || all[0] == "version") {
         return print_version({all.begin() + 1, all.end()});
     }
     const auto [row, name_words] = find(all);
-    if (const Group* const group = row ? nullptr : find_group(all[0])) {
-        if (const TreePackage* const missing = missing_package(group->name)) {
-            return refuse(group->name, *missing);
-        }
-    }
-    if (!row && find_group(all[0]) &&
-        (all.size() == 1 || all[1] == "help" || all[1] == "--help" || all[1] == "-h")) {
-        return help({all[0]});
-    }
-    if (!row) return no_such_command(all);
+    if (!row) return run_group(all);
     if (const TreePackage* const missing = row->missing_package()) {
         return refuse(row->name, *missing);
     }
