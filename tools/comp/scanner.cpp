@@ -52,21 +52,19 @@ std::size_t unescape(std::string_view raw, std::size_t at, std::string& text) {
         return at;
     }
     ++at;
-    switch (c) {
-    case 'n': text += '\n'; break;
-    case 't': text += '\t'; break;
-    case 'a':
-    case 'b':
-    case 'f':
-    case 'v': text += ' '; break;
-    case '\\':
-    case '"':
-    case '\'': text += c; break;
-    case 'r':
-    case '\n': break;
-    case 'x': append_utf8(text, code_point(raw, at, 2, 16)); break;
-    case 'u': append_utf8(text, code_point(raw, at, 4, 16)); break;
-    default: text += '\\'; text += c;
+    if (c == 'x' || c == 'u') {
+        append_utf8(text, code_point(raw, at, c == 'x' ? 2 : 4, 16));
+        return at;
+    }
+    constexpr std::string_view plain = "nt\\\"'abfvr\n";
+    constexpr std::string_view meanings[] = {"\n", "\t", "\\", "\"", "'", " ",
+                                             " ",  " ",  " ",  "",   ""};
+    const std::size_t row = plain.find(c);
+    if (row == plain.npos) {
+        text += '\\';
+        text += c;
+    } else {
+        text += meanings[row];
     }
     return at;
 }
@@ -124,13 +122,10 @@ bool Scanner::take(char c) {
 bool Scanner::at_code() {
     skip();
     if (!starts(";;")) return false;
-    for (std::size_t i = at_; i > 0 && text_[i - 1] != '\n'; --i) {
-        if (!is_gap(text_[i - 1])) return false;
-    }
-    for (std::size_t i = at_ + 2; i < text_.size() && text_[i] != '\n'; ++i) {
-        if (!is_gap(text_[i])) return false;
-    }
-    return true;
+    const std::size_t begin = text_.rfind('\n', at_) + 1;
+    const std::size_t end = std::min(text_.find('\n', at_), text_.size());
+    return end_of_run(text_, begin, is_gap) == at_ &&
+           end_of_run(text_.substr(0, end), at_ + 2, is_gap) == end;
 }
 
 Span Scanner::read_code() {
@@ -145,13 +140,8 @@ Text Scanner::taken(std::size_t begin) {
 
 std::string_view Scanner::peek_word() {
     skip();
-    std::size_t end = at_;
-    if (end < text_.size() && begins_word(text_[end])) {
-        while (end < text_.size() && is_word(text_[end])) {
-            ++end;
-        }
-    }
-    return text_.substr(at_, end - at_);
+    if (at_ >= text_.size() || !begins_word(text_[at_])) return {};
+    return text_.substr(at_, end_of_run(text_, at_, is_word) - at_);
 }
 
 Text Scanner::word() {
@@ -167,26 +157,35 @@ Text Scanner::word() {
 Text Scanner::hal_name() {
     skip();
     const std::size_t begin = at_;
-    if (at_ < text_.size() && (begins_word(text_[at_]) || text_[at_] == '#' || text_[at_] == '.')) {
-        while (at_ < text_.size() && is_hal(text_[at_])) {
-            ++at_;
-        }
-    }
-    return at_ == begin ? Text{} : taken(begin);
+    const char first = next();
+    if (!begins_word(first) && first != '#' && first != '.') return {};
+    at_ = end_of_run(text_, at_, is_hal);
+    return taken(begin);
 }
 
 // Where the opening quotes are; npos when no string comes next.
 std::size_t Scanner::string_start() const {
-    std::size_t quote = at_;
-    if (quote < text_.size() && (text_[quote] == 'r' || text_[quote] == 'R')) {
-        ++quote;
-    }
-    return quote < text_.size() && text_[quote] == '"' ? quote : std::string_view::npos;
+    const std::string_view rest = text_.substr(at_);
+    if (rest.starts_with('"')) return at_;
+    return rest.starts_with("r\"") || rest.starts_with("R\"") ? at_ + 1 : std::string_view::npos;
 }
 
 bool Scanner::at_string() {
     skip();
     return string_start() != std::string_view::npos;
+}
+
+/// Returns where the closing quotes are, searched from `from` on; npos: nowhere. A string between
+/// single quotation marks ends in its line.
+std::size_t Scanner::closing_quotes(std::size_t from, std::string_view closing) const {
+    for (std::size_t end = from; end < text_.size(); ++end) {
+        if (text_.substr(end).starts_with(closing)) return end;
+        if (text_[end] == '\n' && closing.size() == 1) break;
+        if (text_[end] == '\\') {
+            ++end;
+        }
+    }
+    return std::string_view::npos;
 }
 
 std::optional<Text> Scanner::string() {
@@ -200,12 +199,8 @@ std::optional<Text> Scanner::string() {
     const bool triple = text_.substr(quote).starts_with("\"\"\"");
     const std::string_view closing = triple ? "\"\"\"" : "\"";
     const std::size_t from = quote + closing.size();
-    std::size_t end = from;
-    while (end < text_.size() && !text_.substr(end).starts_with(closing) &&
-           (triple || text_[end] != '\n')) {
-        end += text_[end] == '\\' && end + 1 < text_.size() ? 2 : 1;
-    }
-    if (end >= text_.size() || !text_.substr(end).starts_with(closing)) {
+    const std::size_t end = closing_quotes(from, closing);
+    if (end == std::string_view::npos) {
         error(span(begin, from), "unterminated string", "",
               triple ? "end it with \"\"\""
                      : "end it with \"; text of several lines goes between \"\"\" and \"\"\"");
@@ -249,13 +244,8 @@ bool Scanner::at_expression_end(std::string_view stops, const Nesting& nesting) 
 
 /// The length of a number or a word of C; 0 when none comes next.
 std::size_t Scanner::operand_length() const {
-    const char first = text_[at_];
-    if (!is_word(first)) return 0;
-    std::size_t end = at_;
-    while (end < text_.size() && (is_word(text_[end]) || (text_[end] == '.' && end > at_))) {
-        ++end;
-    }
-    return end - at_;
+    if (!is_word(text_[at_])) return 0;
+    return end_of_run(text_, at_, [](char c) { return is_word(c) || c == '.'; }) - at_;
 }
 
 /// The length of the token that comes next in an expression.
@@ -330,13 +320,7 @@ Span Scanner::here() {
         text_.substr(last_, at_ - last_).find('\n') != std::string_view::npos) {
         return behind();
     }
-    std::size_t end = at_ + 1;
-    if (is_hal(text_[at_])) {
-        while (end < text_.size() && is_hal(text_[end])) {
-            ++end;
-        }
-    }
-    return span(at_, end);
+    return span(at_, std::max(end_of_run(text_, at_, is_hal), at_ + 1));
 }
 
 }  // namespace hal::comp

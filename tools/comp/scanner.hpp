@@ -58,6 +58,7 @@ public:
 private:
     bool starts(std::string_view what) const { return text_.substr(at_).starts_with(what); }
     std::size_t string_start() const;
+    std::size_t closing_quotes(std::size_t from, std::string_view closing) const;
     /// What is open in an expression.
     struct Nesting {
         int depth = 0;  ///< of parentheses
