@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "doc/page_walk.hpp"
 
+#include <algorithm>
 #include <fmt/core.h>
+#include <tuple>
 
 #include "base/types.hpp"
 #include "text/characters.hpp"
@@ -62,33 +64,24 @@ std::string without_number(const std::string& doc, const std::string& number) {
 /// The two names differ in one number only, and the second's is one more; their docs differ at most
 /// in that number. `doc` is that of both.
 bool follows(const Page::Pin& a, const Page::Pin& b, std::string& doc) {
-    if (a.type != b.type || a.dir != b.dir || a.read_only != b.read_only || a.unit != b.unit ||
-        a.function != b.function || a.initial.raw != b.initial.raw) {
-        return false;
-    }
-    std::size_t from = 0;
-    while (from < a.name.size() && from < b.name.size() && a.name[from] == b.name[from]) {
-        ++from;
-    }
+    const auto traits = [](const Page::Pin& pin) {
+        return std::tie(pin.type, pin.dir, pin.read_only, pin.unit, pin.function, pin.initial.raw);
+    };
+    if (traits(a) != traits(b)) return false;
+    const auto difference = std::ranges::mismatch(a.name, b.name);
+    auto from = static_cast<std::size_t>(difference.in1 - a.name.begin());
     while (from > 0 && is_digit(a.name[from - 1])) {
         --from;
     }
-    std::size_t a_end = from;
-    std::size_t b_end = from;
-    while (a_end < a.name.size() && is_digit(a.name[a_end])) {
-        ++a_end;
-    }
-    while (b_end < b.name.size() && is_digit(b.name[b_end])) {
-        ++b_end;
-    }
+    const std::size_t a_end = end_of_run(a.name, from, is_digit);
+    const std::size_t b_end = end_of_run(b.name, from, is_digit);
+    const std::string first = a.name.substr(from, a_end - from);
+    const std::string second = b.name.substr(from, b_end - from);
     constexpr std::size_t max = 9;
-    if (a_end == from || b_end == from || a_end - from > max || b_end - from > max ||
-        a.name.substr(a_end) != b.name.substr(b_end)) {
+    if (first.empty() || second.empty() || std::max(first.size(), second.size()) > max) {
         return false;
     }
-    const std::string first = a.name.substr(from, a_end - from);
-
-    const std::string second = b.name.substr(from, b_end - from);
+    if (a.name.substr(a_end) != b.name.substr(b_end)) return false;
     if (std::stoul(first) + 1 != std::stoul(second)) return false;
     if (a.doc == b.doc) {
         doc = a.doc;
