@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
+#include <optional>
 #include <utility>
 
+#include "text/characters.hpp"
+#include "text/find_row.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::tools {
@@ -14,10 +17,21 @@ namespace {
 
 constexpr double hysteresis = 0.01;  // of the range
 
-std::string_view trimmed(std::string_view text) {
-    const auto begin = text.find_first_not_of(' ');
-    return begin == text.npos ? std::string_view{}
-                              : text.substr(begin, text.find_last_not_of(' ') - begin + 1);
+/// A relation as written, and the edges that it means: by itself, and after the word `level`.
+struct Relation {
+    std::string_view text;
+    Edge edge;
+    std::optional<Edge> level;
+};
+constexpr Relation relations[] = {{"<>", Edge::either, std::nullopt},
+                                  {">=", Edge::rising, Edge::above},
+                                  {">", Edge::rising, Edge::above},
+                                  {"<=", Edge::falling, Edge::below},
+                                  {"<", Edge::falling, Edge::below}};
+
+const char* relation_of(Edge edge) {
+    if (edge == Edge::either) return "<>";
+    return edge == Edge::falling || edge == Edge::below ? "<" : ">";
 }
 
 }  // namespace
@@ -33,51 +47,29 @@ TriggerText read_trigger(std::string_view text) {
     }
     const auto at = rest.find_first_of("<>");
     if (at == rest.npos) {
-        const bool falling = rest.starts_with('!');
-        if (state) {
-            if (falling) {
-                rest = trimmed(rest.substr(1));
-            }
-            read.trigger.edge = (falling ? Edge::below : Edge::above);
-        } else if (falling) {
-            if (falling) {
-                rest = trimmed(rest.substr(1));
-            }
-            read.trigger.edge = Edge::falling;
-        } else {
-            if (falling) {
-                rest = trimmed(rest.substr(1));
-            }
-            read.trigger.edge = Edge::rising;
-        }
+        const bool inverted = rest.starts_with('!');
+        constexpr Edge edges[][2] = {{Edge::rising, Edge::falling}, {Edge::above, Edge::below}};
+        read.trigger.edge = edges[state][inverted];
         read.trigger.level = 0.5;
+        rest = trimmed(rest.substr(inverted ? 1 : 0));
     } else {
-        const std::string_view relation =
-            rest.substr(at, rest.substr(at).starts_with("<>") ? 2 : 1);
-        std::string_view value = rest.substr(at + relation.size());
-        if (relation != "<>" && value.starts_with('=')) {
-            value.remove_prefix(1);
-        }
-        const auto level = parse_real(trimmed(value));
+        const Relation& relation = *find_row_if(
+            relations, [&](const Relation& r) { return rest.substr(at).starts_with(r.text); });
+        const std::string_view value = trimmed(rest.substr(at + relation.text.size()));
+        const auto level = parse_real(value);
         if (!level) {
             read.problem = fmt::format("invalid trigger '{}': '{}' is not a number; {}", text,
-                                       trimmed(value), examples);
+                                       value, examples);
             return read;
         }
-        if (state && relation == "<>") {
+        if (state && !relation.level) {
             read.problem = fmt::format("invalid trigger '{}': a level trigger takes > or <; {}",
                                        text, examples);
             return read;
         }
         read.trigger.level = *level;
         read.has_level = true;
-        if (relation == "<>") {
-            read.trigger.edge = Edge::either;
-        } else if (relation == ">") {
-            read.trigger.edge = (state ? Edge::above : Edge::rising);
-        } else {
-            read.trigger.edge = (state ? Edge::below : Edge::falling);
-        }
+        read.trigger.edge = state ? *relation.level : relation.edge;
         rest = trimmed(rest.substr(0, at));
     }
     if (rest.size() > 2 && rest.front() == '|' && rest.back() == '|') {
@@ -97,16 +89,12 @@ std::string format_trigger(const Trigger& trigger, const std::vector<Channel>& c
     const Channel& channel = channels[trigger.source];
     const std::string name = trigger.magnitude ? "|" + channel.name + "|" : channel.name;
     const bool state = trigger.edge == Edge::above || trigger.edge == Edge::below;
-    const bool downwards = trigger.edge == Edge::falling || trigger.edge == Edge::below;
     const char* const level = state ? "level " : "";
+    const char* const relation = relation_of(trigger.edge);
     if (channel.bit && trigger.edge != Edge::either) {
-        return fmt::format("{}{}{}", level, downwards ? "!" : "", name);
+        return fmt::format("{}{}{}", level, *relation == '<' ? "!" : "", name);
     }
-    return fmt::format("{}{} {} {:g}", level, name,
-                       trigger.edge == Edge::either ? "<>"
-                       : downwards                  ? "<"
-                                                    : ">",
-                       trigger.level);
+    return fmt::format("{}{} {} {:g}", level, name, relation, trigger.level);
 }
 
 /// Returns the hysteresis of an edge: a share of the range of the values so far.
