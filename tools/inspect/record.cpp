@@ -13,6 +13,7 @@
 #include "cli/signals.hpp"
 #include "inspect/stream.hpp"
 #include "link/record_file.hpp"
+#include "record/csv_field.hpp"
 #include "text/numbers.hpp"
 #include "text/quoting.hpp"
 
@@ -27,35 +28,14 @@ double real_of(const json& value) {
                              : value.get<double>();
 }
 
-/// LinuxCNC's form: bits 0 and 1, floats with six decimals, a blank after each value.
-void append_plain(std::string& to, hal_type type, const json& value) {
-    if (type == HAL_TYPE_BIT) {
-        to += value.get<bool>() ? "1 " : "0 ";
-    } else if (type == HAL_TYPE_FLOAT) {
-        to += fmt::format("{:f} ", real_of(value));
-    } else {
-        to += value.dump() + " ";
+/// Returns a value as text, bits as 0 and 1. In CSV floats have the digits needed to read the same
+/// value again; in LinuxCNC's form they have six decimals.
+std::string value_text(hal_type type, const json& value, bool csv) {
+    switch (type) {
+    case HAL_TYPE_BIT: return value.get<bool>() ? "1" : "0";
+    case HAL_TYPE_FLOAT: return fmt::format(fmt::runtime(csv ? "{}" : "{:f}"), real_of(value));
+    default: return value.dump();
     }
-}
-
-/// Formats floats with the digits needed to read the same value again.
-void append_csv(std::string& to, hal_type type, const json& value) {
-    if (type == HAL_TYPE_BIT) {
-        to += value.get<bool>() ? "1" : "0";
-    } else if (type == HAL_TYPE_FLOAT) {
-        to += fmt::format("{}", real_of(value));
-    } else {
-        to += value.dump();
-    }
-}
-
-std::string csv_field(const std::string& text) {
-    if (text.find_first_of(",\"\n") == std::string::npos) return text;
-    std::string quoted = "\"";
-    for (const char c : text) {
-        quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-    }
-    return quoted + '"';
 }
 
 /// The signals linked to the columns, or the pins' own names.
@@ -93,33 +73,34 @@ public:
         const json& records = reply.at("records");
         const json losses = reply.value("lost_before", json::array());
         for (std::size_t i = 0; i < records.size(); ++i) {
-            const auto number = reply.at("numbers").at(i).get<std::int64_t>();
             const std::uint64_t lost = i < losses.size() ? losses[i].get<std::uint64_t>() : 0;
-            std::string text;
-            if (known_ && lost != lost_) {
-                lost_in_all_ += lost - lost_;
-                text += csv_ ? "" : "overrun\n";
-            }
+            const bool overrun = known_ && lost != lost_;
+            lost_in_all_ += overrun ? lost - lost_ : 0;
             known_ = true;
             lost_ = lost;
-            if (tag_) {
-                text += fmt::format("{}{}", number, csv_ ? "" : " ");
-            }
-            if (csv_ && timed_) {
-                const auto ns = reply.at("times_ns").at(i).get<std::int64_t>();
-                text += fmt::format("{}{}.{:09}", tag_ ? "," : "", ns / 1'000'000'000,
-                                    ns % 1'000'000'000);
-            }
-            for (std::size_t c = 0; c < types_.size(); ++c) {
-                if (csv_ && (tag_ || timed_ || c > 0)) {
-                    text += ',';
-                }
-                (csv_ ? append_csv : append_plain)(text, types_[c], records[i].at(c));
-            }
-            text += '\n';
+            const std::string text = (overrun && !csv_ ? "overrun\n" : "") + line(reply, i);
             if (!file.put(text)) return false;
         }
         return file.flush();
+    }
+
+    /// Returns a record as a line; a blank follows each value of LinuxCNC's form.
+    std::string line(const json& reply, std::size_t i) const {
+        const char* const separator = csv_ ? "," : " ";
+        std::string line;
+        if (tag_) {
+            line = std::to_string(reply.at("numbers").at(i).get<std::int64_t>());
+        }
+        if (csv_ && timed_) {
+            const auto ns = reply.at("times_ns").at(i).get<std::int64_t>();
+            append_item(line, fmt::format("{}.{:09}", ns / 1'000'000'000, ns % 1'000'000'000),
+                        separator);
+        }
+        const json& values = reply.at("records").at(i);
+        for (std::size_t c = 0; c < types_.size(); ++c) {
+            append_item(line, value_text(types_[c], values.at(c), csv_), separator);
+        }
+        return line + (csv_ ? "\n" : " \n");
     }
 
     /// Prints how many records are missing in a CSV, which does not show it.

@@ -7,20 +7,12 @@
 #include <unistd.h>
 
 #include "link/record_file.hpp"
+#include "record/csv_field.hpp"
 #include "record/sink.hpp"
 #include "recording/mcap/held_file.hpp"
 
 namespace hal::tools {
 namespace {
-
-std::string field(const std::string& text) {
-    if (text.find_first_of(",\"\n") == std::string::npos) return text;
-    std::string quoted = "\"";
-    for (const char c : text) {
-        quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-    }
-    return quoted + '"';
-}
 
 /// A line per row: the time, then all values; those of other threads are empty. Events have no
 /// place in it.
@@ -32,7 +24,7 @@ public:
         if (held_.file < 0) return;
         std::string line = "time_s";
         for (const ProbeColumn& column : columns_) {
-            line += "," + field(column.name);
+            line += "," + csv_field(column.name);
         }
         put(line + "\n");
     }
