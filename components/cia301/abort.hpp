@@ -48,6 +48,10 @@ enum class Abort : std::uint32_t {
 
 /// Returns the number that a frame carries. [any]
 constexpr std::uint32_t code_of(Abort abort) noexcept { return static_cast<std::uint32_t>(abort); }
+/// Returns `why` if the condition is true, else none. [any]
+constexpr Abort abort_if(bool condition, Abort why) noexcept {
+    return condition ? why : Abort::none;
+}
 /// Returns the description of the abort code; "unknown abort code" if it is not listed above. [any]
 const char* to_string(Abort) noexcept;
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "cia301/shorthand.hpp"
+#include "text/find_row.hpp"
 
 namespace hal::canopen {
 
@@ -51,10 +52,8 @@ EntryDescription& Description::add_domain(std::uint16_t index, std::uint8_t sub,
     return e;
 }
 EntryDescription* Description::find(std::uint16_t index, std::uint8_t sub) {
-    const auto found = std::find_if(entries.begin(), entries.end(), [&](const auto& e) {
-        return e.index == index && e.sub == sub;
-    });
-    return found == entries.end() ? nullptr : &*found;
+    return find_row_if(entries,
+                       [&](const EntryDescription& e) { return e.index == index && e.sub == sub; });
 }
 
 Description basic_device(const Basics& basics) {

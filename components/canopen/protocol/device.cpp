@@ -281,10 +281,9 @@ Abort Device::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
     const auto cob = load<std::uint32_t>(value.data());
     const auto was = load<std::uint32_t>(e.data);
     if ((cob & cob_invalid) != 0) return Abort::none;
-    const auto id = cob_id(cob);
-    const bool of_sdo = (id >= 0x581 && id <= 0x5ff) || (id >= 0x601 && id <= 0x67f);
-    if ((cob & cob_extended) == 0 && restricted(id) && !of_sdo) return Abort::value;
-    return (was & cob_invalid) == 0 && cob != was ? Abort::value : Abort::none;
+    const bool moved = (was & cob_invalid) == 0 && cob != was;
+    const bool taken = has_restricted_id(cob) && !is_sdo_id(cob_id(cob));
+    return abort_if(moved || taken, Abort::value);
 }
 
 void Device::written(Entry& e) noexcept {

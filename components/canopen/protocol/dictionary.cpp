@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <concepts>
 #include <cstdio>
 
 namespace hal::canopen {
@@ -104,26 +105,26 @@ Type standard_type(std::uint16_t index, std::uint8_t sub) noexcept {
     return Type::none;
 }
 
+template <std::integral T>
+Abort check_range(T value, T low, T high) noexcept {
+    if (value > high) return Abort::too_high;
+    return abort_if(value < low, Abort::too_low);
+}
+
 Abort check_range(const Entry& e, std::span<const std::uint8_t> bytes) noexcept {
     if (is_real(e.type)) {
         const double value = e.type == Type::real32 ? static_cast<double>(load<float>(bytes.data()))
                                                     : load<double>(bytes.data());
         // NaN is outside any range
         if (!(value <= std::bit_cast<double>(e.high))) return Abort::too_high;
-        return value < std::bit_cast<double>(e.low) ? Abort::too_low : Abort::none;
+        return abort_if(value < std::bit_cast<double>(e.low), Abort::too_low);
     }
     const auto value = cia301::integer_of(e.type, bytes);
     if (e.type == Type::unsigned64) {
-        if (static_cast<std::uint64_t>(value) > static_cast<std::uint64_t>(e.high)) {
-            return Abort::too_high;
-        }
-        return static_cast<std::uint64_t>(value) < static_cast<std::uint64_t>(e.low)
-                   ? Abort::too_low
-                   : Abort::none;
+        return check_range(static_cast<std::uint64_t>(value), static_cast<std::uint64_t>(e.low),
+                           static_cast<std::uint64_t>(e.high));
     }
-    if (value > e.high) return Abort::too_high;
-    if (value < e.low) return Abort::too_low;
-    return Abort::none;
+    return check_range(value, e.low, e.high);
 }
 
 }  // namespace
@@ -210,11 +211,8 @@ Entry Dictionary::make_entry(const EntryDescription& from) {
 }
 
 Entry* Dictionary::find(std::uint16_t index, std::uint8_t sub) noexcept {
-    const auto wanted = std::uint32_t{index} << 8 | sub;
-    const auto found = std::lower_bound(keys_.begin(), keys_.end(), wanted);
-    return found == keys_.end() || *found != wanted
-               ? nullptr
-               : &entries_[static_cast<std::size_t>(found - keys_.begin())];
+    Abort why;
+    return find(index, sub, why);
 }
 
 Entry* Dictionary::find(std::uint16_t index, std::uint8_t sub, Abort& why) noexcept {
@@ -261,7 +259,7 @@ Abort Dictionary::read(std::uint16_t index, std::uint8_t sub, std::span<std::uin
 
 Abort Dictionary::check_length(const Entry& e, std::uint64_t size) noexcept {
     if (size > e.capacity) return Abort::too_long;
-    return e.bits != 0 && size < e.capacity ? Abort::too_short : Abort::none;
+    return abort_if(e.bits != 0 && size < e.capacity, Abort::too_short);
 }
 
 Abort Dictionary::write(std::uint16_t index, std::uint8_t sub,

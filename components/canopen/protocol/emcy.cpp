@@ -108,15 +108,14 @@ void Emcy::poll(Time now) noexcept {
 }
 
 Abort Emcy::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
-    if (e.index == 0x1003) return value[0] == 0 ? Abort::none : Abort::value;
-    if (e.index == 0x1015) return (cob_ & cob_invalid) == 0 ? Abort::device_state : Abort::none;
+    const bool in_use = (cob_ & cob_invalid) == 0;
+    if (e.index == 0x1003) return abort_if(value[0] != 0, Abort::value);
+    if (e.index == 0x1015) return abort_if(in_use, Abort::device_state);
     const auto cob = load<std::uint32_t>(value.data());
     if ((cob & cob_flag30) != 0) return Abort::value;
     if ((cob & cob_invalid) != 0) return Abort::none;
-    const bool moved = (cob_ & cob_invalid) == 0 && cob_ != cob;
-    const auto id = cob_id(cob);
-    return moved || ((cob & cob_extended) == 0 && (restricted(id) || id == 0x80)) ? Abort::value
-                                                                                  : Abort::none;
+    const bool moved = in_use && cob_ != cob;
+    return abort_if(moved || is_reserved(cob), Abort::value);
 }
 
 void Emcy::written(Entry& e) noexcept {

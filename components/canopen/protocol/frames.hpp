@@ -74,6 +74,10 @@ private:
     std::uint64_t rejected_ = 0;
 };
 
+/// Returns true if the frame has the identifier in `cob` (a COB-ID object). [realtime]
+inline bool has_id(const Frame& frame, std::uint32_t cob) noexcept {
+    return frame.id == cob_id(cob) && frame.extended == ((cob & cob_extended) != 0);
+}
 /// Returns a data frame with the identifier in `cob` (a COB-ID object), `length` bytes (0..8) and
 /// zero data. [realtime]
 inline Frame make_frame(std::uint32_t cob, std::uint8_t length) noexcept {

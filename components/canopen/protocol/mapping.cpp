@@ -6,9 +6,6 @@
 namespace hal::canopen {
 
 namespace {
-constexpr std::uint64_t ones(unsigned bits) noexcept {
-    return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
-}
 constexpr std::uint16_t index_of(std::uint32_t entry) noexcept {
     return static_cast<std::uint16_t>(entry >> 16);
 }
@@ -26,29 +23,28 @@ Mapping::Mapping(std::size_t capacity) : capacity_(std::min<std::size_t>(capacit
     items_.reserve(capacity_);
 }
 
+/// Returns whether `bits` bits of the object may be mapped.
+static bool fits(const Entry& e, unsigned bits) noexcept {
+    if (bits == 0 || bits > 64) return false;
+    if (e.type == Type::boolean) return bits == 1 || bits == 8;
+    if (e.bits == 0) return bits % 8 == 0 && bits / 8 <= e.capacity && e.type != Type::domain;
+    // The low bits of an integer may be mapped; a REAL only completely.
+    return bits == e.bits || (bits < e.bits && !is_real(e.type));
+}
+
 Abort Mapping::check(Dictionary& dictionary, std::uint32_t entry, bool received) noexcept {
     const auto bits = bits_in(entry);
     if (is_dummy(entry)) {
         if (!received) return Abort::not_mappable;
-        return bits == bits_of(static_cast<Type>(index_of(entry))) ? Abort::none
-                                                                   : Abort::pdo_length;
+        return abort_if(bits != bits_of(static_cast<Type>(index_of(entry))), Abort::pdo_length);
     }
     Abort why;
     const Entry* e = dictionary.find(index_of(entry), sub_of(entry), why);
     if (e == nullptr) return why;
-    if (received ? !e->rpdo || !writable(e->access) : !e->tpdo || !readable(e->access)) {
-        return Abort::not_mappable;
-    }
-    if (bits == 0 || bits > 64) return Abort::pdo_length;
-    if (e->type == Type::boolean) return bits == 1 || bits == 8 ? Abort::none : Abort::pdo_length;
-    if (e->bits == 0) {
-        return bits % 8 == 0 && bits / 8 <= e->capacity && e->type != Type::domain
-                   ? Abort::none
-                   : Abort::pdo_length;
-    }
-    // The low bits of an integer may be mapped; a REAL only completely.
-    return bits == e->bits || (bits < e->bits && !is_real(e->type)) ? Abort::none
-                                                                    : Abort::pdo_length;
+    const bool into_object = e->rpdo && writable(e->access);
+    const bool from_object = e->tpdo && readable(e->access);
+    if (!(received ? into_object : from_object)) return Abort::not_mappable;
+    return abort_if(!fits(*e, bits), Abort::pdo_length);
 }
 
 Abort Mapping::build(Dictionary& dictionary, std::span<const std::uint32_t> entries,

@@ -9,6 +9,11 @@
 
 namespace hal::canopen {
 
+/// Returns a mask of the lowest `bits` bits, 0..64. [any]
+constexpr std::uint64_t ones(unsigned bits) noexcept {
+    return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
+}
+
 /// The mapping of one PDO. All calls belong to one thread.
 class Mapping {
 public:

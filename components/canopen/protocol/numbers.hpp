@@ -66,11 +66,35 @@ inline constexpr std::uint32_t cob_extended = 0x20000000;
 constexpr std::uint32_t cob_id(std::uint32_t cob) noexcept {
     return cob & ((cob & cob_extended) != 0 ? 0x1fffffffU : 0x7ffU);
 }
+/// Returns true for the 11-bit identifiers of SDO channels (CiA 301, without the default ones of
+/// node IDs that do not exist). [any]
+constexpr bool is_sdo_id(std::uint32_t id) noexcept {
+    return (id >= 0x581 && id <= 0x5ff) || (id >= 0x601 && id <= 0x67f);
+}
 /// Returns true for the 11-bit identifiers that CiA 301 and CiA 304 restrict to one service. [any]
 constexpr bool restricted(std::uint32_t id) noexcept {
-    return id <= 0x07f || (id >= 0x101 && id <= 0x180) || (id >= 0x581 && id <= 0x5ff) ||
-           (id >= 0x601 && id <= 0x67f) || (id >= 0x6e0 && id <= 0x6ff) ||
-           (id >= 0x701 && id <= 0x77f) || id >= 0x780;
+    struct Range {
+        std::uint32_t first, last;
+    };
+    constexpr Range ranges[] = {{0, 0x07f},     {0x101, 0x180}, {0x581, 0x5ff},     {0x601, 0x67f},
+                                {0x6e0, 0x6ff}, {0x701, 0x77f}, {0x780, 0xffffffff}};
+    for (const Range& range : ranges) {
+        if (id >= range.first && id <= range.last) return true;
+    }
+    return false;
+}
+/// Returns true if a COB-ID object has an 11-bit identifier that is restricted to one service.
+/// [any]
+constexpr bool has_restricted_id(std::uint32_t cob) noexcept {
+    return (cob & cob_extended) == 0 && restricted(cob_id(cob));
+}
+/// Returns true if a COB-ID object has such an identifier, or the default one of SYNC. [any]
+constexpr bool is_reserved(std::uint32_t cob) noexcept {
+    return has_restricted_id(cob) || ((cob & cob_extended) == 0 && cob_id(cob) == 0x80);
+}
+/// Returns true if two COB-ID objects differ in their identifiers or the length of these. [any]
+constexpr bool differs_in_id(std::uint32_t cob, std::uint32_t other) noexcept {
+    return ((cob ^ other) & 0x3fffffff) != 0;
 }
 
 /// Returns the CRC-16 of SDO block transfer and SRDO signatures: polynomial 1021h, initial value 0,

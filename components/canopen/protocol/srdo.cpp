@@ -16,24 +16,19 @@ constexpr std::uint32_t gfc_id = 0x001;
 // "communication"; the manufacturer bytes carry SRDO number and fault
 constexpr std::uint16_t emergency = 0x8100;
 
-constexpr std::uint64_t ones(unsigned bits) noexcept {
-    return bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
-}
 std::uint64_t data_of(const Frame& f) noexcept { return load<std::uint64_t>(f.data.data()); }
 }  // namespace
 
 const char* to_string(SrdoFault fault) noexcept {
-    switch (fault) {
-    case SrdoFault::none: return "no fault";
-    case SrdoFault::late: return "no SRDO within the SCT";
-    case SrdoFault::incomplete: return "second frame missing within the SRVT";
-    case SrdoFault::order: return "frames out of order";
-    case SrdoFault::length: return "frame length does not match the mapping";
-    case SrdoFault::complement: return "second frame is not the inverse of the first";
-    case SrdoFault::fail_safe: return "global fail-safe command received";
-    case SrdoFault::own_data: return "its objects are not complementary, so nothing is sent";
-    }
-    return "";
+    constexpr const char* texts[] = {"no fault",
+                                     "no SRDO within the SCT",
+                                     "second frame missing within the SRVT",
+                                     "frames out of order",
+                                     "frame length does not match the mapping",
+                                     "second frame is not the inverse of the first",
+                                     "global fail-safe command received",
+                                     "its objects are not complementary, so nothing is sent"};
+    return texts[static_cast<std::size_t>(fault)];
 }
 
 Srdos::Srdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy)
@@ -59,9 +54,8 @@ Srdos::Srdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy)
 }
 
 Srdos::Srdo* Srdos::find(unsigned number) noexcept {
-    return number < 1 || number > max_srdos || of_number_[number] < 0
-               ? nullptr
-               : &srdos_[static_cast<std::size_t>(of_number_[number])];
+    if (number >= of_number_.size() || of_number_[number] < 0) return nullptr;
+    return &srdos_[static_cast<std::size_t>(of_number_[number])];
 }
 
 std::uint16_t Srdos::signature(unsigned number) const noexcept {
@@ -163,19 +157,18 @@ void Srdos::reset(std::uint8_t node_id) noexcept {
 Abort Srdos::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
     if (operational_) return Abort::device_state;
     if (e.index == valid_index) {
-        if (value[0] != valid_mark) return value[0] == 0 ? Abort::none : Abort::value;
-        return configure();
+        return value[0] == valid_mark ? configure() : abort_if(value[0] != 0, Abort::value);
     }
     if (e.index > mapping_base || e.sub == 0) return Abort::none;
-    switch (e.sub) {
-    case 1: return value[0] > 2 ? Abort::value : Abort::none;
-    case 2: return load<std::uint16_t>(value.data()) == 0 ? Abort::value : Abort::none;
-    case 5:
-    case 6: {
+    const auto is_srdo_id = [&](std::uint32_t odd) {
         const auto cob = load<std::uint32_t>(value.data());
-        return cob < first_id || cob > last_id || (cob % 2 == 1) != (e.sub == 5) ? Abort::value
-                                                                                 : Abort::none;
-    }
+        return cob >= first_id && cob <= last_id && cob % 2 == odd;
+    };
+    switch (e.sub) {
+    case 1: return abort_if(value[0] > 2, Abort::value);
+    case 2: return abort_if(load<std::uint16_t>(value.data()) == 0, Abort::value);
+    case 5: return abort_if(!is_srdo_id(1), Abort::value);
+    case 6: return abort_if(!is_srdo_id(0), Abort::value);
     default: return Abort::none;
     }
 }
@@ -247,15 +240,13 @@ void Srdos::fail(Srdo& s, SrdoFault fault, Time now) noexcept {
 
 void Srdos::take(Srdo& s, const Frame& f, bool is_second, Time now) noexcept {
     if (f.length != s.plain.bytes()) return fail(s, SrdoFault::length, now);
+    if (s.half != is_second) return fail(s, SrdoFault::order, now);
+    s.half = !is_second;
     if (!is_second) {
-        if (s.half) return fail(s, SrdoFault::order, now);
-        s.half = true;
         s.first = data_of(f);
         s.first_at = now;
         return;
     }
-    if (!s.half) return fail(s, SrdoFault::order, now);
-    s.half = false;
     if (now - s.first_at > s.validation) return fail(s, SrdoFault::incomplete, now);
     const auto data = data_of(f);
     if (((s.first ^ data) & ones(8U * f.length)) != ones(8U * f.length)) {
@@ -276,26 +267,34 @@ bool Srdos::handle(const Frame& f, Time now) noexcept {
     if (srdos_.empty() || f.extended || f.remote || f.id > last_id) return false;
     now_ = now;
     if (f.id == gfc_id) {
-        if (!operational_ || f.length != 0 || dictionary_.get<std::uint8_t>(gfc_index, 0, 0) == 0) {
-            return true;
-        }
-        if (events_ != nullptr) {
-            events_->on_fail_safe(now);
-        }
-        for (auto& s : srdos_) {
-            if (s.direction == SrdoDirection::receives && !s.ignored) {
-                fail(s, SrdoFault::fail_safe, now);
-            }
+        if (fail_safe_enabled() && f.length == 0) {
+            on_fail_safe(now);
         }
         return true;
     }
     if (f.id < first_id || of_id_[f.id - first_id] < 0) return false;
     auto& s = srdos_[static_cast<std::size_t>(of_id_[f.id - first_id])];
     // After a fault all data is invalid until the fault is acknowledged.
-    if (operational_ && valid_ && !s.ignored && s.fault == SrdoFault::none) {
+    if (operational_ && valid_ && !s.suspended()) {
         take(s, f, f.id != s.cob, now);
     }
     return true;
+}
+
+/// Returns whether the global fail-safe command is sent and obeyed (1300h).
+bool Srdos::fail_safe_enabled() const noexcept {
+    return operational_ && dictionary_.get<std::uint8_t>(gfc_index, 0, 0) != 0;
+}
+
+void Srdos::on_fail_safe(Time now) noexcept {
+    if (events_ != nullptr) {
+        events_->on_fail_safe(now);
+    }
+    for (auto& s : srdos_) {
+        if (s.direction == SrdoDirection::receives && !s.ignored) {
+            fail(s, SrdoFault::fail_safe, now);
+        }
+    }
 }
 
 void Srdos::send(Srdo& s, Time now) noexcept {
@@ -325,35 +324,34 @@ void Srdos::poll(Time now) noexcept {
     now_ = now;
     if (!operational_ || !valid_) return;
     for (auto& s : srdos_) {
-        if (s.fault != SrdoFault::none || s.ignored) continue;
-        if (s.direction == SrdoDirection::sends) {
-            if (s.now || now >= s.next) {
-                send(s, now);
-            }
-        } else if (s.direction == SrdoDirection::receives) {
-            if (s.half && now - s.first_at > s.validation) {
-                fail(s, SrdoFault::incomplete, now);
-            } else if (too_late(s, now)) {
-                fail(s, SrdoFault::late, now);
-            }
+        if (s.suspended()) continue;
+        if (s.direction == SrdoDirection::receives) {
+            check_times(s, now);
+        } else if (s.direction == SrdoDirection::sends && (s.now || now >= s.next)) {
+            send(s, now);
         }
     }
 }
 
+/// Fails if the second frame, or the next pair of frames, is overdue.
+void Srdos::check_times(Srdo& s, Time now) noexcept {
+    if (s.half && now - s.first_at > s.validation) {
+        fail(s, SrdoFault::incomplete, now);
+    } else if (too_late(s, now)) {
+        fail(s, SrdoFault::late, now);
+    }
+}
+
 bool Srdos::send_fail_safe() noexcept {
-    if (!operational_ || dictionary_.get<std::uint8_t>(gfc_index, 0, 0) == 0) return false;
-    return out_.push(make_frame(gfc_id, 0));
+    return fail_safe_enabled() && out_.push(make_frame(gfc_id, 0));
 }
 
 Srdos::Status Srdos::status(unsigned number) const noexcept {
     const auto* s = const_cast<Srdos*>(this)->find(number);
-    if (s == nullptr) {
-        return {};
-    }
+    if (s == nullptr) return {};
     const bool active = valid_ && operational_ && s->direction != SrdoDirection::none;
-    return {
-        true,         active,   active && s->heard && s->fault == SrdoFault::none && !s->ignored,
-        s->direction, s->fault, s->count};
+    const bool good = active && s->heard && !s->suspended();
+    return {true, active, good, s->direction, s->fault, s->count};
 }
 
 }  // namespace hal::canopen

@@ -133,6 +133,8 @@ private:
         std::uint64_t count = 0;
         Srdo(unsigned n, std::size_t capacity)
             : number(static_cast<std::uint8_t>(n)), plain(capacity), inverted(capacity) {}
+        /// It is neither sent nor received.
+        bool suspended() const noexcept { return fault != SrdoFault::none || ignored; }
     };
     static constexpr std::uint32_t first_id = 0x101;
     static constexpr std::uint32_t last_id = 0x180;
@@ -145,6 +147,9 @@ private:
         return (s.heard || s.strict) && now - s.last > s.cycle;
     }
     void send(Srdo&, Time now) noexcept;
+    void check_times(Srdo&, Time now) noexcept;
+    bool fail_safe_enabled() const noexcept;
+    void on_fail_safe(Time now) noexcept;
     Abort configure() noexcept;
     Abort configure(Srdo&) noexcept;
 

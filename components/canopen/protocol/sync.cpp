@@ -36,10 +36,7 @@ void Sync::set_active(bool active) noexcept {
 }
 
 bool Sync::handle(const Frame& f, Time now) noexcept {
-    if (f.id != cob_id(cob_) || f.extended != ((cob_ & cob_extended) != 0) || f.remote) {
-        return false;
-    }
-    if (!active_) return false;
+    if (!has_id(f, cob_) || f.remote || !active_) return false;
     const std::uint8_t expected = overflow_ != 0 ? 1 : 0;
     if (f.length != expected) {
         emcy_.raise(0x8240, error_communication, {f.length, expected});
@@ -55,13 +52,13 @@ bool Sync::handle(const Frame& f, Time now) noexcept {
 
 bool Sync::produce(Time now) noexcept {
     if (!producer() || !active_) return false;
-    Frame f = make_frame(cob_, overflow_ != 0 ? 1 : 0);
+    const bool counts = overflow_ != 0;
+    Frame f = make_frame(cob_, counts ? 1 : 0);
     f.data[0] = next_counter_;
     if (!out_.push(f)) return false;
-    counter_ = overflow_ != 0 ? next_counter_ : 0;
-    if (overflow_ != 0) {
-        next_counter_ =
-            next_counter_ >= overflow_ ? 1 : static_cast<std::uint8_t>(next_counter_ + 1);
+    counter_ = counts ? next_counter_ : 0;
+    if (counts) {
+        next_counter_ = static_cast<std::uint8_t>(next_counter_ % overflow_ + 1);
     }
     last_ = now;
     return true;
@@ -92,15 +89,12 @@ bool Sync::lost(Time now) noexcept {
 Abort Sync::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
     if (e.index == 0x1005) {
         const auto cob = load<std::uint32_t>(value.data());
-        const bool moved = ((cob ^ cob_) & 0x3fffffff) != 0;
-        if (moved && producer()) return Abort::value;
-        const auto id = cob_id(cob);
-        if ((cob & cob_extended) == 0 && restricted(id)) return Abort::value;
-    } else if (e.index == 0x1019) {
-        if (value[0] == 1 || value[0] > 240) return Abort::value;
-        if (period_ != 0) return Abort::device_state;
+        const bool moved = producer() && differs_in_id(cob, cob_);
+        return abort_if(moved || has_restricted_id(cob), Abort::value);
     }
-    return Abort::none;
+    if (e.index != 0x1019) return Abort::none;
+    if (value[0] == 1 || value[0] > 240) return Abort::value;
+    return abort_if(period_ != 0, Abort::device_state);
 }
 
 TimeStamp::TimeStamp(Dictionary& dictionary, FrameQueue& out) : dictionary_(dictionary), out_(out) {
@@ -108,10 +102,7 @@ TimeStamp::TimeStamp(Dictionary& dictionary, FrameQueue& out) : dictionary_(dict
 }
 
 bool TimeStamp::handle(const Frame& f, TimeOfDay& time) noexcept {
-    if ((cob_ & 0x80000000) == 0 || f.remote || f.id != cob_id(cob_) ||
-        f.extended != ((cob_ & cob_extended) != 0) || f.length != 6) {
-        return false;
-    }
+    if ((cob_ & 0x80000000) == 0 || f.remote || !has_id(f, cob_) || f.length != 6) return false;
     time = {load<std::uint32_t>(f.data.data()) & 0x0fffffff,
             load<std::uint16_t>(f.data.data() + 4)};
     return true;
@@ -128,10 +119,8 @@ bool TimeStamp::produce(const TimeOfDay& time) noexcept {
 Abort TimeStamp::writing(Entry&, std::span<const std::uint8_t> value) noexcept {
     const auto cob = load<std::uint32_t>(value.data());
     const bool in_use = (cob_ & 0xc0000000) != 0;
-    const bool moved = ((cob ^ cob_) & 0x3fffffff) != 0;
-    return (in_use && moved) || ((cob & cob_extended) == 0 && restricted(cob_id(cob)))
-               ? Abort::value
-               : Abort::none;
+    const bool moved = in_use && differs_in_id(cob, cob_);
+    return abort_if(moved || has_restricted_id(cob), Abort::value);
 }
 
 }  // namespace hal::canopen
