@@ -7,12 +7,33 @@
 namespace hal::canopen {
 
 namespace {
+/// Returns the PDO of this number, or nullptr.
+template <class P, class Indices>
+P* find(std::vector<P>& pdos, const Indices& index_of, unsigned number) noexcept {
+    if (number >= index_of.size() || index_of[number] < 0) return nullptr;
+    return &pdos[static_cast<std::size_t>(index_of[number])];
+}
+
 constexpr std::uint16_t rpdo_base = 0x1400;
 constexpr std::uint16_t tpdo_base = 0x1800;
 constexpr std::uint16_t mapping_offset = 0x200;
 
 constexpr std::uint16_t scanner_first = 0x1fa0;
 constexpr std::uint16_t scanner_last = 0x1fcf;
+
+/// Which parameter of which PDO an object is.
+struct Parameter {
+    explicit Parameter(std::uint16_t index) noexcept
+        : received(index < tpdo_base),
+          mapping((index & mapping_offset) != 0),
+          number(((index - rpdo_base) & 0x1ff) + 1U) {}
+    bool received;
+    bool mapping;
+    unsigned number;
+};
+
+/// Returns whether a multiplexed PDO may carry the object from this node.
+bool is_multiplexable(const Entry* e) noexcept { return e != nullptr && e->tpdo && e->size <= 4; }
 }  // namespace
 
 Pdos::Pdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy, Events& events,
@@ -27,25 +48,18 @@ Pdos::Pdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy, Events& events,
         }
         return capacity;
     };
-    const auto handled = [&](unsigned communication) {
-        const auto index = static_cast<std::uint16_t>(communication);
-        const auto mapping = static_cast<std::uint16_t>(index + mapping_offset);
-        if (dictionary.find(index, 1) == nullptr) return false;
-        dictionary.handle(index, *this);
+    const auto create = [&](unsigned base, unsigned n, auto& pdos, auto& index_of) {
+        const auto communication = static_cast<std::uint16_t>(base + n - 1);
+        const auto mapping = static_cast<std::uint16_t>(communication + mapping_offset);
+        if (dictionary.find(communication, 1) == nullptr) return;
+        dictionary.handle(communication, *this);
         dictionary.handle(mapping, *this);
-        return true;
+        index_of[n] = static_cast<std::int16_t>(pdos.size());
+        pdos.emplace_back(n, capacity_of(mapping));
     };
     for (unsigned n = 1; n <= max_pdos; ++n) {
-        if (handled(rpdo_base + n - 1)) {
-            rpdo_of_[n] = static_cast<std::int16_t>(rpdos_.size());
-            rpdos_.emplace_back(
-                n, capacity_of(static_cast<std::uint16_t>(rpdo_base + mapping_offset + n - 1)));
-        }
-        if (handled(tpdo_base + n - 1)) {
-            tpdo_of_[n] = static_cast<std::int16_t>(tpdos_.size());
-            tpdos_.emplace_back(
-                n, capacity_of(static_cast<std::uint16_t>(tpdo_base + mapping_offset + n - 1)));
-        }
+        create(rpdo_base, n, rpdos_, rpdo_of_);
+        create(tpdo_base, n, tpdos_, tpdo_of_);
     }
     bool scans = false;
     for (unsigned list = scanner_first; list <= scanner_last; ++list) {
@@ -57,16 +71,8 @@ Pdos::Pdos(Dictionary& dictionary, FrameQueue& out, Emcy& emcy, Events& events,
     index_identifiers();
 }
 
-Pdos::Rpdo* Pdos::find_rpdo(unsigned number) noexcept {
-    return number < 1 || number > max_pdos || rpdo_of_[number] < 0
-               ? nullptr
-               : &rpdos_[static_cast<std::size_t>(rpdo_of_[number])];
-}
-Pdos::Tpdo* Pdos::find_tpdo(unsigned number) noexcept {
-    return number < 1 || number > max_pdos || tpdo_of_[number] < 0
-               ? nullptr
-               : &tpdos_[static_cast<std::size_t>(tpdo_of_[number])];
-}
+Pdos::Rpdo* Pdos::find_rpdo(unsigned number) noexcept { return find(rpdos_, rpdo_of_, number); }
+Pdos::Tpdo* Pdos::find_tpdo(unsigned number) noexcept { return find(tpdos_, tpdo_of_, number); }
 
 void Pdos::read_communication(Rpdo& p) noexcept {
     const auto index = static_cast<std::uint16_t>(rpdo_base + p.number - 1);
@@ -83,17 +89,20 @@ void Pdos::read_communication(Tpdo& p) noexcept {
     p.sync_start = dictionary_.get<std::uint8_t>(index, 6, 0);
 }
 
+/// Returns the kind that the number of mapped objects selects.
+Pdos::Kind Pdos::kind_of(std::uint8_t count) noexcept {
+    switch (count) {
+    case 0xff: return Kind::destination_address;
+    case 0xfe: return Kind::source_address;
+    default: return Kind::plain;
+    }
+}
+
 Abort Pdos::read_mapping(Pdo& p, bool received) noexcept {
     const auto index = static_cast<std::uint16_t>((received ? rpdo_base : tpdo_base) +
                                                   mapping_offset + p.number - 1);
     const auto count = dictionary_.get<std::uint8_t>(index, 0, 0);
-    if (count == 0xff) {
-        p.kind = Kind::destination_address;
-    } else if (count == 0xfe) {
-        p.kind = Kind::source_address;
-    } else {
-        p.kind = Kind::plain;
-    }
+    p.kind = kind_of(count);
     p.mapping.clear();
     if (p.kind != Kind::plain) return Abort::none;
     std::array<std::uint32_t, 64> entries{};
@@ -167,20 +176,15 @@ Abort Pdos::check_communication(const Entry& e, std::span<const std::uint8_t> va
     case 1: {
         const auto cob = load<std::uint32_t>(value.data());
         if ((cob & cob_invalid) != 0) return Abort::none;
-        if (p.valid() && ((cob ^ p.cob) & 0x3fffffff) != 0) return Abort::value;
+        if (p.valid() && differs_in_id(cob, p.cob)) return Abort::value;
         if ((cob & cob_extended) != 0) return Abort::none;
-        const auto id = cob_id(cob);
-        const bool reserved = restricted(id) || id == 0x80 || (cob & 0x1ffff800) != 0;
-        return reserved ? Abort::value : Abort::none;
+        return abort_if(is_reserved(cob) || (cob & 0x1ffff800) != 0, Abort::value);
     }
-    case 2:
-        if (value[0] > 240 && value[0] < (received ? 254 : 252)) return Abort::value;
-        return Abort::none;
-    case 3: return p.valid() && !received ? Abort::access : Abort::none;
+    case 2: return abort_if(value[0] > 240 && value[0] < (received ? 254 : 252), Abort::value);
+    case 3: return abort_if(p.valid() && !received, Abort::access);
     case 6:
         if (p.valid()) return Abort::access;
-        if (value[0] > 240) return Abort::value;
-        return Abort::none;
+        return abort_if(value[0] > 240, Abort::value);
     default: return Abort::none;
     }
 }
@@ -194,7 +198,7 @@ Abort Pdos::check_mapping(const Entry& e, std::span<const std::uint8_t> value, b
         return entry == 0 ? Abort::none : Mapping::check(dictionary_, entry, received);
     }
     const auto count = value[0];
-    if (count == 0xff || count == 0xfe) return Abort::none;
+    if (kind_of(count) != Kind::plain) return Abort::none;
     if (count > 64 || (count != 0 && dictionary_.find(e.index, count) == nullptr)) {
         return Abort::pdo_length;
     }
@@ -206,37 +210,34 @@ Abort Pdos::check_mapping(const Entry& e, std::span<const std::uint8_t> value, b
         }
         bits += entry & 0xff;
     }
-    return bits > 64 ? Abort::pdo_length : Abort::none;
+    return abort_if(bits > 64, Abort::pdo_length);
 }
 
 Abort Pdos::writing(Entry& e, std::span<const std::uint8_t> value) noexcept {
     if (e.index >= scanner_first) return Abort::none;
-    const bool received = e.index < tpdo_base;
-    const unsigned number = ((e.index - (received ? rpdo_base : tpdo_base)) & 0x1ff) + 1U;
+    const Parameter parameter(e.index);
     Pdo* p = nullptr;
-    if (received) {
-        p = find_rpdo(number);
+    if (parameter.received) {
+        p = find_rpdo(parameter.number);
     } else {
-        p = find_tpdo(number);
+        p = find_tpdo(parameter.number);
     }
     if (p == nullptr) return Abort::none;
-    const bool mapping = (e.index & mapping_offset) != 0;
-    return mapping ? check_mapping(e, value, received, *p)
-                   : check_communication(e, value, received, *p);
+    if (parameter.mapping) return check_mapping(e, value, parameter.received, *p);
+    return check_communication(e, value, parameter.received, *p);
 }
 
 void Pdos::written(Entry& e) noexcept {
     if (e.index >= scanner_first) return read_scanner_list();
-    const bool received = e.index < tpdo_base;
-    const bool mapping = (e.index & mapping_offset) != 0;
-    const unsigned number = ((e.index - (received ? rpdo_base : tpdo_base)) & 0x1ff) + 1U;
-    if (Rpdo* p = received ? find_rpdo(number) : nullptr; p != nullptr) {
-        apply_parameter(*p, mapping);
+    const Parameter parameter(e.index);
+    Rpdo* const rpdo = find_rpdo(parameter.number);
+    Tpdo* const tpdo = find_tpdo(parameter.number);
+    if (parameter.received && rpdo != nullptr) {
+        apply_parameter(*rpdo, parameter.mapping);
+    } else if (!parameter.received && tpdo != nullptr) {
+        apply_parameter(*tpdo, parameter.mapping, e.sub);
     }
-    if (Tpdo* p = received ? nullptr : find_tpdo(number); p != nullptr) {
-        apply_parameter(*p, mapping, e.sub);
-    }
-    if (!mapping && e.sub == 1) {
+    if (!parameter.mapping && e.sub == 1) {
         index_identifiers();
     }
 }
@@ -273,8 +274,7 @@ void Pdos::read_scanner_list() noexcept {
             for (unsigned n = 0; n < std::max(value >> 24, 1U) && (value & 0xff) + n <= 0xff; ++n) {
                 Entry* e = dictionary_.find(static_cast<std::uint16_t>(value >> 8),
                                             static_cast<std::uint8_t>((value & 0xff) + n));
-                if (e != nullptr && e->tpdo && e->size <= 4 &&
-                    scanned_.size() < scanned_.capacity()) {
+                if (is_multiplexable(e) && scanned_.size() < scanned_.capacity()) {
                     scanned_.push_back({e});
                 }
             }
@@ -291,38 +291,42 @@ bool Pdos::handle(const Frame& f, Time now) noexcept {
     return f.remote ? handle_request(f, slot, now) : handle_data(f, slot, now);
 }
 
-bool Pdos::handle_request(const Frame& f, std::size_t slot, Time now) noexcept {
-    bool ours = false;
-    for (auto n = tpdo_heads_[slot]; n >= 0; n = tpdos_[static_cast<std::size_t>(n)].next) {
-        auto& p = tpdos_[static_cast<std::size_t>(n)];
+/// Calls `action` for each PDO with the identifier of the frame. Returns false if there is none.
+template <class List, class Heads, class Action>
+static bool for_identifier(List& pdos, const Heads& heads, const Frame& f, std::size_t slot,
+                           const Action& action) noexcept {
+    bool found = false;
+    for (auto n = heads[slot]; n >= 0; n = pdos[static_cast<std::size_t>(n)].next) {
+        auto& p = pdos[static_cast<std::size_t>(n)];
         if (cob_id(p.cob) != f.id) continue;
-        ours = true;
+        found = true;
+        action(p);
+    }
+    return found;
+}
+
+bool Pdos::handle_request(const Frame& f, std::size_t slot, Time now) noexcept {
+    return for_identifier(tpdos_, tpdo_heads_, f, slot, [&](Tpdo& p) {
         const bool answers = operational_ && !p.held && (p.cob & cob_flag30) == 0 &&
                              p.kind == Kind::plain && !p.synchronous();
-        if (!answers) continue;
+        if (!answers) return;
         if (p.transmission != 252) {
             send(p, p.mapping.pack(), now);
         } else if (p.sampled) {
             send(p, p.image, now);
         }
-    }
-    return ours;
+    });
 }
 
 bool Pdos::handle_data(const Frame& f, std::size_t slot, Time now) noexcept {
-    bool ours = false;
-    for (auto n = rpdo_heads_[slot]; n >= 0; n = rpdos_[static_cast<std::size_t>(n)].next) {
-        auto& p = rpdos_[static_cast<std::size_t>(n)];
-        if (cob_id(p.cob) != f.id) continue;
-        ours = true;
-        if (!operational_ || p.held) continue;
+    return for_identifier(rpdos_, rpdo_heads_, f, slot, [&](Rpdo& p) {
+        if (!operational_ || p.held) return;
         const bool good =
             p.kind == Kind::plain ? receive(p, f, now) : receive_multiplexed(p, f, now);
         if (!good) {
             ++p.errors;
         }
-    }
-    return ours;
+    });
 }
 
 /// Returns false if the PDO is too short. A wrong length is reported by an emergency.
@@ -338,11 +342,13 @@ bool Pdos::check_length(Rpdo& p, const Frame& f, Time now) noexcept {
         emcy_.raise(0x8210, error_communication, details);
         return false;
     }
-    if (f.length > bytes && settings_.report_too_long) {
-        p.wrong_length = true;
-        emcy_.raise(0x8220, error_communication, details);
+    if (f.length > bytes) {
+        if (settings_.report_too_long) {
+            p.wrong_length = true;
+            emcy_.raise(0x8220, error_communication, details);
+        }
+        return true;
     }
-    if (f.length > bytes) return true;
     p.wrong_length = false;
     const bool none_wrong =
         std::none_of(rpdos_.begin(), rpdos_.end(), [](const Rpdo& r) { return r.wrong_length; });
@@ -360,8 +366,7 @@ bool Pdos::receive(Rpdo& p, const Frame& f, Time now) noexcept {
         apply(p, load<std::uint64_t>(f.data.data()), now);
         return true;
     }
-    // arrived after the synchronous window
-    if (window_ != 0 && synced_ != 0 && now - synced_ > window_) return false;
+    if (synced_ != 0 && is_after_window(now)) return false;
     p.image = load<std::uint64_t>(f.data.data());
     p.fresh = true;
     return true;
@@ -579,14 +584,7 @@ void Pdos::poll(Tpdo& p, Time now) noexcept {
         scan(p, now);
     }
     if (p.kind != Kind::plain) return;
-    if (p.retry && p.synchronous()) {
-        if (window_ != 0 && now - synced_ > window_) {
-            p.retry = false;
-        } else {
-            send(p, p.image, now);
-        }
-        return;
-    }
+    if (p.synchronous()) return retry(p, now);
     if (!p.event_driven()) return;
     if (p.on_change && !p.pending && p.mapping.pack() != p.last_sent) {
         p.pending = true;
@@ -594,6 +592,16 @@ void Pdos::poll(Tpdo& p, Time now) noexcept {
     const bool due = p.pending || (p.event != 0 && has_expired(p.last, p.event, 2, now));
     if (due && (!p.sent_once || has_expired(p.last, p.inhibit, 16, now))) {
         send(p, p.mapping.pack(), now);
+    }
+}
+
+/// Sends what did not fit into the queue at the SYNC, within the synchronous window.
+void Pdos::retry(Tpdo& p, Time now) noexcept {
+    if (!p.retry) return;
+    if (is_after_window(now)) {
+        p.retry = false;
+    } else {
+        send(p, p.image, now);
     }
 }
 
@@ -608,36 +616,40 @@ void Pdos::check_deadline(Rpdo& p, Time now) noexcept {
 
 bool Pdos::send_dam(unsigned number, std::uint8_t destination, std::uint16_t index,
                     std::uint8_t sub, std::uint32_t value) noexcept {
-    auto* p = find_tpdo(number);
-    if (p == nullptr || !p->valid() || !operational_ || p->kind != Kind::destination_address) {
-        return false;
-    }
-    Frame f = make_frame(p->cob, 8);
-    f.data[0] = static_cast<std::uint8_t>(0x80 | (destination & 0x7f));
-    store(f.data.data() + 1, index);
-    f.data[3] = sub;
-    store(f.data.data() + 4, value);
-    if (!out_.push(f)) return false;
-    ++p->count;
-    p->last = now_;
-    return true;
+    auto* p = find_multiplexed(number, Kind::destination_address);
+    if (p == nullptr) return false;
+    std::array<std::uint8_t, 4> bytes{};
+    store(bytes.data(), value);
+    return send_multiplexed(*p, static_cast<std::uint8_t>(0x80 | (destination & 0x7f)), index, sub,
+                            bytes);
 }
 
 bool Pdos::send_sam(unsigned number, std::uint16_t index, std::uint8_t sub) noexcept {
-    auto* p = find_tpdo(number);
+    auto* p = find_multiplexed(number, Kind::source_address);
     const Entry* e = dictionary_.find(index, sub);
-    if (p == nullptr || e == nullptr || !p->valid() || !operational_ ||
-        p->kind != Kind::source_address || !e->tpdo || e->size > 4) {
-        return false;
-    }
-    Frame f = make_frame(p->cob, 8);
-    f.data[0] = node_id_;
+    if (p == nullptr || !is_multiplexable(e)) return false;
+    return send_multiplexed(*p, node_id_, index, sub, {e->data, e->size});
+}
+
+/// Returns the TPDO if it is a multiplexed one that may be sent now, or nullptr.
+Pdos::Tpdo* Pdos::find_multiplexed(unsigned number, Kind kind) noexcept {
+    auto* p = find_tpdo(number);
+    const bool sends = p != nullptr && p->valid() && operational_ && p->kind == kind;
+    return sends ? p : nullptr;
+}
+
+/// `address`: the first byte, node ID and the kind of addressing (CiA 301). Returns false if the
+/// queue is full.
+bool Pdos::send_multiplexed(Tpdo& p, std::uint8_t address, std::uint16_t index, std::uint8_t sub,
+                            std::span<const std::uint8_t> bytes) noexcept {
+    Frame f = make_frame(p.cob, 8);
+    f.data[0] = address;
     store(f.data.data() + 1, index);
     f.data[3] = sub;
-    std::memcpy(f.data.data() + 4, e->data, e->size);
+    std::ranges::copy(bytes, f.data.begin() + 4);
     if (!out_.push(f)) return false;
-    ++p->count;
-    p->last = now_;
+    ++p.count;
+    p.last = now_;
     return true;
 }
 
@@ -662,21 +674,17 @@ void Pdos::scan(Tpdo& p, Time now) noexcept {
 
 // State.
 
-Pdos::Status Pdos::rpdo(unsigned number) const noexcept {
-    const auto* p = const_cast<Pdos*>(this)->find_rpdo(number);
-    if (p == nullptr) {
-        return {};
-    }
-    return {true,     p->valid(), p->late, p->cob, p->transmission, p->mapping.bytes(),
+Pdos::Status Pdos::status_of(const Pdo* p, bool late) noexcept {
+    if (p == nullptr) return {};
+    return {true,     p->valid(), late,   p->cob, p->transmission, p->mapping.bytes(),
             p->count, p->errors,  p->last};
 }
+Pdos::Status Pdos::rpdo(unsigned number) const noexcept {
+    const auto* p = const_cast<Pdos*>(this)->find_rpdo(number);
+    return status_of(p, p != nullptr && p->late);
+}
 Pdos::Status Pdos::tpdo(unsigned number) const noexcept {
-    const auto* p = const_cast<Pdos*>(this)->find_tpdo(number);
-    if (p == nullptr) {
-        return {};
-    }
-    return {true,     p->valid(), false,  p->cob, p->transmission, p->mapping.bytes(),
-            p->count, p->errors,  p->last};
+    return status_of(const_cast<Pdos*>(this)->find_tpdo(number), false);
 }
 
 }  // namespace hal::canopen

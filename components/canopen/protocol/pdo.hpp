@@ -159,6 +159,8 @@ private:
     Tpdo* find_tpdo(unsigned number) noexcept;
     void read_communication(Rpdo&) noexcept;
     void read_communication(Tpdo&) noexcept;
+    static Kind kind_of(std::uint8_t count) noexcept;
+    static Status status_of(const Pdo*, bool late) noexcept;
     Abort read_mapping(Pdo&, bool received) noexcept;
     void restart(Tpdo&, Time now) noexcept;
     void index_identifiers() noexcept;
@@ -175,6 +177,14 @@ private:
     bool is_due_at_sync(Tpdo&, std::uint8_t counter, bool counted) const noexcept;
     bool has_expired(Time since, Time timer, Time part, Time now) const noexcept;
     void poll(Tpdo&, Time now) noexcept;
+    void retry(Tpdo&, Time now) noexcept;
+    Tpdo* find_multiplexed(unsigned number, Kind) noexcept;
+    bool send_multiplexed(Tpdo&, std::uint8_t address, std::uint16_t index, std::uint8_t sub,
+                          std::span<const std::uint8_t> bytes) noexcept;
+    /// Returns true if the synchronous window after the SYNC is over.
+    bool is_after_window(Time now) const noexcept {
+        return window_ != 0 && now - synced_ > window_;
+    }
     void apply(Rpdo&, std::uint64_t image, Time now) noexcept;
     void restart_deadline(Rpdo&, Time now) noexcept;
     void read_scanner_list() noexcept;
