@@ -118,18 +118,16 @@ bool LssSlave::handle(const Frame& f) noexcept {
 bool LssSlave::handle_in_any_state(const Frame& f) noexcept {
     const auto command = f.data[0];
     const auto value = load<std::uint32_t>(f.data.data() + 1);
+    if (command >= 0x40 && command <= 0x43) {
+        select(command - 0x40U, value);
+        return true;
+    }
+    if (command >= 0x46 && command <= 0x4b) {
+        identify(command - 0x46U, value);
+        return true;
+    }
     switch (command) {
     case 0x04: switch_global(f.data[1]); return true;
-    case 0x40:
-    case 0x41:
-    case 0x42:
-    case 0x43: select(command - 0x40U, value); return true;
-    case 0x46:
-    case 0x47:
-    case 0x48:
-    case 0x49:
-    case 0x4a:
-    case 0x4b: identify(command - 0x46U, value); return true;
     case 0x4c:
         if (is_unconfigured()) {
             answer(0x50);
@@ -148,12 +146,11 @@ void LssSlave::handle_configuration(const Frame& f) noexcept {
     case 0x13: return configure_bit_timing(f);
     case 0x15: return activate_bit_timing(load<std::uint16_t>(f.data.data() + 1));
     case 0x17: return answer(0x17, events_.on_lss_store(pending_id_, pending_rate_) ? 0 : 2);
-    case 0x5a:
-    case 0x5b:
-    case 0x5c:
-    case 0x5d: return answer(command, identity_[command - 0x5aU]);
     case 0x5e: return answer(command, active_id_);
-    default: return;
+    default: break;
+    }
+    if (command >= 0x5a && command <= 0x5d) {
+        answer(command, identity_[command - 0x5aU]);
     }
 }
 

@@ -2,6 +2,7 @@
 #include "sdo_client.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 namespace hal::canopen {
 
@@ -180,20 +181,27 @@ void SdoClient::dispatch(const Frame& f) noexcept {
         return;
     }
     if (f.data[0] == 0x80) return on_abort(f);
-    switch (state_) {
-    case State::download_start: return on_download_start(f);
-    case State::download: return on_download_segment(f);
-    case State::upload_start: return on_upload_start(f);
-    case State::upload: return on_upload_segment(f);
-    case State::block_download_start: return on_block_download_start(f);
-    case State::block_download: return on_block_acknowledge(f);
-    case State::block_download_end:
-        return f.data[0] == 0xa1 ? finish(Abort::none) : unexpected(Abort::command);
-    case State::block_upload_start: return on_block_upload_start(f);
-    case State::block_upload: return on_block_segment(f);
-    case State::block_upload_end: return on_block_end(f);
-    case State::idle: return;
-    }
+    using Receive = void (SdoClient::*)(const Frame&);
+    static constexpr Receive handlers[] = {
+        nullptr,
+        &SdoClient::on_download_start,
+        &SdoClient::on_download_segment,
+        &SdoClient::on_upload_start,
+        &SdoClient::on_upload_segment,
+        &SdoClient::on_block_download_start,
+        &SdoClient::on_block_acknowledge,
+        &SdoClient::on_block_download_end,
+        &SdoClient::on_block_upload_start,
+        &SdoClient::on_block_segment,
+        &SdoClient::on_block_end,
+    };
+    static_assert(std::size(handlers) == static_cast<std::size_t>(State::block_upload_end) + 1);
+    (this->*handlers[static_cast<std::size_t>(state_)])(f);
+}
+
+void SdoClient::on_block_download_end(const Frame& f) noexcept {
+    if (f.data[0] != 0xa1) return unexpected(Abort::command);
+    finish(Abort::none);
 }
 
 /// Returns true until the server has accepted the transfer.

@@ -117,6 +117,7 @@ public:
     std::size_t announced() const noexcept { return first_ != nullptr ? size_ : 0; }
 
 private:
+    /// dispatch() has the handler of each, in this order.
     enum class State : std::uint8_t {
         idle,
         download_start,
@@ -156,6 +157,7 @@ private:
     void on_block_acknowledge(const Frame&) noexcept;
     void on_block_upload_start(const Frame&) noexcept;
     void on_block_segment(const Frame&) noexcept;
+    void on_block_download_end(const Frame&) noexcept;
     void on_block_end(const Frame&) noexcept;
     void on_timeout() noexcept;
     void queue_full() noexcept;
