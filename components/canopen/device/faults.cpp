@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "text/find_row.hpp"
 #include "text/numbers.hpp"
 #include "text/quoting.hpp"
 
@@ -104,9 +105,7 @@ constexpr bool is_pdo(const Frame& f, std::uint8_t node) noexcept {
 std::span<const FaultRow> fault_rows() noexcept { return rows; }
 
 const FaultRow* find_fault(std::string_view name) noexcept {
-    const auto* found = std::find_if(std::begin(rows), std::end(rows),
-                                     [&](const FaultRow& row) { return name == row.name; });
-    return found == std::end(rows) ? nullptr : found;
+    return find_row(rows, name, &FaultRow::name);
 }
 
 bool parse_fault(std::string_view text, Fault& fault, FaultSetting& setting, std::string& problem) {

@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "eds_reader.hpp"
+#include "text/find_row.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::canopen::eds {
@@ -393,11 +394,7 @@ Reading read_eds(std::string_view bytes) {
     return out;
 }
 
-const Entry* Object::find(std::uint8_t sub) const {
-    const auto found =
-        std::find_if(entries.begin(), entries.end(), [&](const Entry& e) { return e.sub == sub; });
-    return found == entries.end() ? nullptr : &*found;
-}
+const Entry* Object::find(std::uint8_t sub) const { return find_row(entries, sub, &Entry::sub); }
 Entry* Object::find(std::uint8_t sub) { return const_cast<Entry*>(std::as_const(*this).find(sub)); }
 
 const Object* DeviceDescription::find(std::uint16_t index) const {

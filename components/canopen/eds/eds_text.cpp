@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "eds_text.hpp"
+#include "text/find_row.hpp"
 
 #include <algorithm>
 #include <array>
@@ -30,30 +31,31 @@ void append_utf8(std::string& out, std::uint32_t c) {
     add(0x80 | (c & 0x3F));
 }
 
+/// Well-formed characters of more than one byte (Unicode, table 3-7): the ranges of the first and
+/// of the second byte. All others are 80..BF.
+struct Utf8Row {
+    unsigned first_min, first_max, second_min, second_max;
+    std::size_t bytes;
+};
+constexpr Utf8Row well_formed[] = {{0xC2, 0xDF, 0x80, 0xBF, 2}, {0xE0, 0xE0, 0xA0, 0xBF, 3},
+                                   {0xE1, 0xEC, 0x80, 0xBF, 3}, {0xED, 0xED, 0x80, 0x9F, 3},
+                                   {0xEE, 0xEF, 0x80, 0xBF, 3}, {0xF0, 0xF0, 0x90, 0xBF, 4},
+                                   {0xF1, 0xF3, 0x80, 0xBF, 4}, {0xF4, 0xF4, 0x80, 0x8F, 4}};
+
 /// Returns the bytes of the UTF-8 character at `at`; 0 for invalid UTF-8.
 std::size_t utf8_at(std::string_view text, std::size_t at) {
     const auto byte = [&](std::size_t i) {
         return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
     };
-    const auto follows = [&](std::size_t n) {
-        for (std::size_t i = 1; i <= n; ++i) {
-            if ((byte(at + i) & 0xC0) != 0x80) return false;
+    for (const Utf8Row& row : well_formed) {
+        if (byte(at) < row.first_min || byte(at) > row.first_max) continue;
+        if (byte(at + 1) < row.second_min || byte(at + 1) > row.second_max) return 0;
+        for (std::size_t i = 2; i < row.bytes; ++i) {
+            if ((byte(at + i) & 0xC0) != 0x80) return 0;
         }
-        return true;
-    };
-    const unsigned first = byte(at);
-    const unsigned second = byte(at + 1);
-    if (first < 0x80) return 1;
-    if (first >= 0xC2 && first < 0xE0) return follows(1) ? 2 : 0;
-    if (first >= 0xE0 && first < 0xF0) {
-        if ((first == 0xE0 && second < 0xA0) || (first == 0xED && second >= 0xA0)) return 0;
-        return follows(2) ? 3 : 0;
+        return row.bytes;
     }
-    if (first >= 0xF0 && first < 0xF5) {
-        if ((first == 0xF0 && second < 0x90) || (first == 0xF4 && second >= 0x90)) return 0;
-        return follows(3) ? 4 : 0;
-    }
-    return 0;
+    return byte(at) < 0x80 ? 1 : 0;
 }
 
 std::size_t first_bad_utf8(std::string_view text) {
@@ -216,9 +218,7 @@ bool decode(std::string_view bytes, std::string& text, std::vector<Message>& mes
 }
 
 IniKey* IniSection::find(std::string_view key) {
-    const auto found = std::find_if(keys.begin(), keys.end(),
-                                    [&](const IniKey& one) { return same_word(one.name, key); });
-    return found == keys.end() ? nullptr : &*found;
+    return find_row_if(keys, [&](const IniKey& one) { return same_word(one.name, key); });
 }
 
 IniSection* Ini::find(std::string_view name) {

@@ -21,6 +21,7 @@ using hal::trimmed;
 using text::Span;
 
 /// Subject of a message: its diagnostic code, with a page each (`hal explain`).
+/// `hal can eds check` has a code for each, in this order.
 enum class Topic : std::uint8_t {
     unreadable,  ///< the file is rejected
     syntax,      ///< lines, sections, encoding

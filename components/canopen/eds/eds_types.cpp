@@ -12,6 +12,7 @@
 
 #include "eds_text.hpp"
 #include "text/characters.hpp"
+#include "text/find_row.hpp"
 #include "text/numbers.hpp"
 #include "text/quoting.hpp"
 
@@ -299,17 +300,10 @@ std::vector<std::uint8_t> utf16(std::string_view text) {
 
 std::span<const DataType> data_types() { return table; }
 
-const DataType* data_type(std::uint16_t code) {
-    const auto* found = std::find_if(std::begin(table), std::end(table),
-                                     [&](const DataType& type) { return type.code == code; });
-    return found == std::end(table) ? nullptr : found;
-}
+const DataType* data_type(std::uint16_t code) { return find_row(table, code, &DataType::code); }
 
 const DataType* data_type(std::string_view name) {
-    const auto* found = std::find_if(std::begin(table), std::end(table), [&](const DataType& type) {
-        return same_word(type.name, name);
-    });
-    return found == std::end(table) ? nullptr : found;
+    return find_row_if(table, [&](const DataType& type) { return same_word(type.name, name); });
 }
 
 std::optional<Number> parse_number(std::string_view text) {

@@ -19,19 +19,10 @@ namespace {
 namespace eds = canopen::eds;
 
 Code code_of(eds::Topic topic) {
-    switch (topic) {
-    case eds::Topic::unreadable: return "eds-unreadable";
-    case eds::Topic::syntax: return "eds-syntax";
-    case eds::Topic::missing: return "eds-missing";
-    case eds::Topic::count: return "eds-count";
-    case eds::Topic::value: return "eds-value";
-    case eds::Topic::number: return "eds-value";
-    case eds::Topic::conflict: return "eds-syntax";
-    case eds::Topic::undescribed: return "eds-missing";
-    case eds::Topic::truncated: return "eds-syntax";
-    case eds::Topic::object: break;
-    }
-    return "eds-object";
+    constexpr Code codes[] = {"eds-unreadable", "eds-syntax", "eds-missing", "eds-count",
+                              "eds-value",      "eds-object", "eds-value",   "eds-syntax",
+                              "eds-missing",    "eds-syntax"};
+    return codes[static_cast<std::size_t>(topic)];
 }
 
 Diagnostic worded(const eds::Message& message, std::uint32_t source) {

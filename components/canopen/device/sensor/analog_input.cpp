@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 namespace hal::canopen {
@@ -181,22 +182,21 @@ void AnalogInputs::attach(Device& device, unsigned channels) {
 }
 
 float* AnalogInputs::value(Channel& c, std::uint8_t part) noexcept {
-    switch (part) {
-    case field_part: return &c.field_shown;
-    case fv1_part: return &c.fv1;
-    case pv1_part: return &c.pv1;
-    case fv2_part: return &c.fv2;
-    case pv2_part: return &c.pv2;
-    case offset_part: return &c.offset;
-    case factor_part: return &c.factor;
-    case scaling_offset_part: return &c.scaling_offset;
-    case process_part: return &c.process;
-    case delta_part: return &c.delta;
-    case lower_part: return &c.lower;
-    case upper_part: return &c.upper;
-    case tare_part: return &c.tare;
-    default: return &c.net_shown;
-    }
+    struct Row {
+        std::uint8_t part;
+        float Channel::* value;
+    };
+    static constexpr Row rows[] = {
+        {field_part, &Channel::field_shown}, {fv1_part, &Channel::fv1},
+        {pv1_part, &Channel::pv1},           {fv2_part, &Channel::fv2},
+        {pv2_part, &Channel::pv2},           {offset_part, &Channel::offset},
+        {factor_part, &Channel::factor},     {scaling_offset_part, &Channel::scaling_offset},
+        {process_part, &Channel::process},   {delta_part, &Channel::delta},
+        {lower_part, &Channel::lower},       {upper_part, &Channel::upper},
+        {tare_part, &Channel::tare},
+    };
+    const auto* const row = std::ranges::find(rows, part, &Row::part);
+    return &(c.*(row != std::end(rows) ? row->value : &Channel::net_shown));
 }
 
 void AnalogInputs::reset() noexcept {
