@@ -18,6 +18,10 @@ bool in_fault(State s) noexcept { return s == State::fault || s == State::fault_
 bool by_position(Mode m) noexcept {
     return m == Mode::cyclic_position || m == Mode::interpolated_position;
 }
+bool by_velocity(Mode m) noexcept {
+    return m == Mode::profile_velocity || m == Mode::velocity || m == Mode::cyclic_velocity;
+}
+bool by_torque(Mode m) noexcept { return m == Mode::profile_torque || m == Mode::cyclic_torque; }
 /// Returns true for modes with a halt bit (bit 8).
 bool can_halt(Mode m) noexcept {
     return m != Mode::cyclic_position && m != Mode::cyclic_velocity && m != Mode::cyclic_torque;
@@ -102,8 +106,7 @@ void Axis::follow_restart(Time now) noexcept {
         restart_ = Restart::recent;
         restarted_at_ = now;
         // The outputs of a stopped thread disable the drive, which may still be braking.
-        disable_sent_ = true;
-        disable_sent_at_ = now;
+        note_disable(now);
     } else if (restart_ == Restart::recent && now - restarted_at_ >= restart_window) {
         restart_ = Restart::no;
     }
@@ -120,13 +123,12 @@ void Axis::observe(const AxisFeedback& in, const AxisRules& rules, Time now) noe
         velocity_ = torque_ = 0.0;
         return;
     }
-    const bool first = !counter_.known();
+    const bool continues = counter_.known() && !jumped_;
     counter_.follow(in.position, rules.counter_bits);
-    last_position_ = first || jumped_
-                         ? rules.position.to_user(static_cast<double>(counter_.count()))
-                         : position_;
-    jumped_ = false;
+    const double before = position_;
     position_ = rules.position.to_user(static_cast<double>(counter_.count()));
+    last_position_ = continues ? before : position_;
+    jumped_ = false;
     if (in.has_vl_velocity && in.mode == Mode::velocity && rules.vl.sound()) {
         velocity_ = rules.vl.to_user(in.vl_velocity);
     } else if (in.has_velocity && rules.velocity.sound()) {
@@ -158,23 +160,38 @@ void Axis::decide(const AxisCommand& command, const AxisRules& rules) noexcept {
         }
     }
     if (enable_edge && !failure_) {
-        if (const Factor* const f = unsound_factor(rules)) {
-            fail(Cause::bad_factor, Request::enable);
-            failure_.value = f->ratio();
-        } else {
-            wanted_ = true;
-        }
+        request_enable(rules);
     }
     if (!command.enable || command.quick_stop || !whole) {
         wanted_ = false;
     }
     if (!in_.operational) {
-        if (wanted_ && was_operational_ && restart_ == Restart::no) {
-            fail(Cause::lost, enabled_ ? Request::run : Request::enable);
-        }
-        restart_ = Restart::no;
-        homed_ = false;
+        lose_drive();
     }
+}
+
+void Axis::request_enable(const AxisRules& rules) noexcept {
+    const Factor* const factor = unsound_factor(rules);
+    wanted_ = factor == nullptr;
+    if (!wanted_) {
+        fail(Cause::bad_factor, Request::enable);
+        failure_.value = factor->ratio();
+    }
+}
+
+/// The loss of a drive that the axis uses is a failure, except while the bus returns from a stop.
+void Axis::lose_drive() noexcept {
+    if (wanted_ && was_operational_ && restart_ == Restart::no) {
+        fail(Cause::lost, enabled_ ? Request::run : Request::enable);
+    }
+    restart_ = Restart::no;
+    homed_ = false;
+}
+
+/// Notes that the drive is commanded off, and may not have executed it yet.
+void Axis::note_disable(Time now) noexcept {
+    disable_sent_ = true;
+    disable_sent_at_ = now;
 }
 
 void Axis::walk(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
@@ -183,8 +200,7 @@ void Axis::walk(const AxisCommand& command, const AxisRules& rules, Time now) no
         walk_.want(State::switch_on_disabled, Request::disable);
         enabled_ = false;
         orders_.controlword = command::quick_stop;
-        disable_sent_ = true;
-        disable_sent_at_ = now;
+        note_disable(now);
         return;
     }
     const State state = state_of(in_.statusword);
@@ -211,8 +227,7 @@ void Axis::watch_enabled(State state, const AxisRules& rules, Time now) noexcept
     if (state != State::operation_enabled) {
         disable_sent_ = false;
     } else if (!wanted_) {
-        disable_sent_ = true;
-        disable_sent_at_ = now;
+        note_disable(now);
     }
 }
 
@@ -233,8 +248,7 @@ void Axis::want_state(State state, bool quick_stop) noexcept {
 /// Takes over the failures of the state machine, and faults of a drive that was off.
 void Axis::take_failures(State state) noexcept {
     if (walk_.failure() && !failure_) {
-        failure_ = walk_.failure();
-        wanted_ = false;
+        adopt_failure(walk_.failure());
     }
     if (state == State::fault && !failure_ && !walk_.resetting() && !wanted_) {
         fail(Cause::drive_fault, Request::enable);
@@ -266,90 +280,107 @@ void Axis::select_mode(const AxisCommand& command, const AxisRules& rules, Time 
 
 void Axis::home(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     if (command.home && !was_home_) {
-        if (enabled_) {
-            home_ = Home::entering;
-            home_cycles_ = 0;
-            homed_ = false;
-        } else if (!failure_) {
-            fail(Cause::not_enabled, Request::home);
-        }
+        request_homing();
     }
-    if (home_ == Home::no) return;
     if (!enabled_) {
         home_ = Home::no;
-        return;
     }
     ++home_cycles_;
-    if (home_ == Home::leaving) {
-        if (mode_shown_ && home_cycles_ > mode_change_cycles) {
+    // for some cycles the displayed mode in flight may be the old one
+    const bool shown = mode_shown_ && home_cycles_ > mode_change_cycles;
+    switch (home_) {
+    case Home::no: return;
+    case Home::leaving:
+        if (shown) {
             home_ = Home::no;
         }
         return;
-    }
-    if (!command.home) {
-        home_ = Home::leaving;
-        home_cycles_ = 0;
-        return;
-    }
-    if (home_ == Home::entering) {
-        if (orders_.mode != Mode::homing || !mode_shown_ || home_cycles_ <= mode_change_cycles) {
-            return;
-        }
+    case Home::entering:
+        if (!command.home) return leave_homing();
+        if (orders_.mode != Mode::homing || !shown) return;
         home_ = Home::running;
         homing_run_.begin();
+        break;
+    case Home::running:
+        if (!command.home) return leave_homing();
+        break;
     }
+    run_homing(command, rules, now);
+}
+
+void Axis::request_homing() noexcept {
+    if (enabled_) {
+        home_ = Home::entering;
+        home_cycles_ = 0;
+        homed_ = false;
+    } else if (!failure_) {
+        fail(Cause::not_enabled, Request::home);
+    }
+}
+
+void Axis::leave_homing() noexcept {
+    home_ = Home::leaving;
+    home_cycles_ = 0;
+}
+
+void Axis::run_homing(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     switch (homing_run_.step(in_.statusword, command.halt, now, rules.limits.step, rules.homing)) {
     case HomingRun::Result::running: orders_.controlword |= control::start_homing; break;
     case HomingRun::Result::attained:
         homed_ = jumped_ = true;
         counter_.put(in_.position);
         position_ = rules.position.to_user(static_cast<double>(counter_.count()));
-        home_ = Home::leaving;
-        home_cycles_ = 0;
+        leave_homing();
         break;
     case HomingRun::Result::failed:
-        failure_ = homing_run_.failure();
-        wanted_ = false;
+        adopt_failure(homing_run_.failure());
         home_ = Home::no;
         break;
     }
+}
+
+/// Takes over the failure of a part.
+void Axis::adopt_failure(const Failure& failure) noexcept {
+    failure_ = failure;
+    wanted_ = false;
+}
+
+/// Returns true for a position that is beyond the counter, or not a number.
+bool Axis::is_too_far(double position, const AxisRules& rules) noexcept {
+    return !(std::fabs(position * rules.position.ratio()) < farthest_count);
+}
+
+/// Fails because of a step of the command; of the first one when the axis was to be enabled.
+void Axis::reject_step(double step, double max_step) noexcept {
+    fail(Cause::step_rejected, step, max_step);
+    if (following_) return;
+    failure_.request = Request::enable;
+    failure_.step = Step::enable_operation;
 }
 
 /// Follows the position command in csp and ip, after blending out its distance from the axis at
 /// enabling.
 void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     const double asked = command.position;
-    if (!(std::fabs(asked * rules.position.ratio()) < farthest_count)) {
-        return fail(Cause::bad_command, asked, 0.0);
+    if (is_too_far(asked, rules)) return fail(Cause::bad_command, asked, 0.0);
+    const double step = std::fabs(asked - (following_ ? joined_ : position_));
+    if (rules.max_step > 0.0 && step > rules.max_step) {
+        return reject_step(step, rules.max_step);
     }
     if (!following_) {
-        const double away = position_ - asked;
-        if (rules.max_step > 0.0 && std::fabs(away) > rules.max_step) {
-            fail(Cause::step_rejected, std::fabs(away), rules.max_step);
-            failure_.request = Request::enable;
-            failure_.step = Step::enable_operation;
-            return;
-        }
         following_ = true;
-        offset_ = rules.max_step > 0.0 || rules.blend <= 0 ? 0.0 : away;
+        offset_ = rules.max_step > 0.0 || rules.blend <= 0 ? 0.0 : position_ - asked;
         joined_at_ = now;
-    } else if (rules.max_step > 0.0 && std::fabs(asked - joined_) > rules.max_step) {
-        return fail(Cause::step_rejected, std::fabs(asked - joined_), rules.max_step);
     }
     joined_ = asked;
+    commanded_ = asked;
     if (offset_ != 0.0) {
         const double left =
             falling(static_cast<double>(now - joined_at_) / static_cast<double>(rules.blend));
-        if (left == 0.0) {
-            offset_ = 0.0;
-        }
-        commanded_ = asked + offset_ * left;
-    } else {
-        commanded_ = asked;
+        commanded_ += offset_ * left;
+        offset_ = left == 0.0 ? 0.0 : offset_;
     }
-    if (!(std::fabs(commanded_ * rules.position.ratio()) < farthest_count)) {
-        return fail(Cause::bad_command, commanded_, 0.0);
-    }
+    if (is_too_far(commanded_, rules)) return fail(Cause::bad_command, commanded_, 0.0);
     const auto count = static_cast<std::int64_t>(std::llround(commanded_ * rules.position.ratio()));
     orders_.target_position =
         Counter::low_bits(static_cast<std::uint32_t>(count), rules.counter_bits);
@@ -435,8 +466,7 @@ void Axis::move_by_set_points(const AxisCommand& command, const AxisRules& rules
         set_points_.step(in_.statusword, now, rules.limits.step, orders_.target_position);
     target_reached_ = set_points_.done();
     if (set_points_.failure()) {
-        failure_ = set_points_.failure();
-        wanted_ = false;
+        adopt_failure(set_points_.failure());
         active_ = false;
     }
 }
@@ -445,29 +475,16 @@ void Axis::move_by_set_points(const AxisCommand& command, const AxisRules& rules
 void Axis::set_velocity_and_torque(const AxisCommand& command, const AxisRules& rules) noexcept {
     const Mode mode = orders_.mode;
     const bool still = !active_ || (command.halt && !can_halt(mode));
-    const bool by_velocity =
-        mode == Mode::profile_velocity || mode == Mode::velocity || mode == Mode::cyclic_velocity;
-    const bool by_torque = mode == Mode::profile_torque || mode == Mode::cyclic_torque;
     const bool feeds_torque = following_ || (!still && mode == Mode::cyclic_velocity);
-    orders_.target_velocity = 0;
+    const auto velocity = rules.velocity.to_drive<std::int32_t>(command.velocity);
+    const auto torque = rules.torque.to_drive<std::int16_t>(command.torque);
+    orders_.target_velocity = !still && by_velocity(mode) ? velocity : 0;
     orders_.vl_target_velocity = 0;
-    orders_.target_torque = 0;
-    orders_.velocity_offset = 0;
-    orders_.torque_offset = 0;
-    if (!still && by_velocity) {
-        orders_.target_velocity = rules.velocity.to_drive<std::int32_t>(command.velocity);
-    }
+    orders_.target_torque = !still && by_torque(mode) ? torque : std::int16_t{0};
+    orders_.velocity_offset = following_ ? velocity : 0;
+    orders_.torque_offset = feeds_torque ? torque : std::int16_t{0};
     if (!still && mode == Mode::velocity) {
         orders_.vl_target_velocity = rules.vl.to_drive<std::int16_t>(command.velocity);
-    }
-    if (!still && by_torque) {
-        orders_.target_torque = rules.torque.to_drive<std::int16_t>(command.torque);
-    }
-    if (following_) {
-        orders_.velocity_offset = rules.velocity.to_drive<std::int32_t>(command.velocity);
-    }
-    if (feeds_torque) {
-        orders_.torque_offset = rules.torque.to_drive<std::int16_t>(command.torque);
     }
     orders_.profile_velocity = rules.velocity.amount(command.profile_velocity);
     orders_.profile_acceleration = rules.acceleration.amount(command.profile_acceleration);

@@ -165,7 +165,16 @@ private:
     void take_failures(State) noexcept;
     void stop_now(const AxisCommand&, const AxisRules&, Time now) noexcept;
     void select_mode(const AxisCommand&, const AxisRules&, Time now) noexcept;
+    void request_enable(const AxisRules&) noexcept;
+    void lose_drive() noexcept;
+    void note_disable(Time now) noexcept;
     void home(const AxisCommand&, const AxisRules&, Time now) noexcept;
+    void request_homing() noexcept;
+    void leave_homing() noexcept;
+    void run_homing(const AxisCommand&, const AxisRules&, Time now) noexcept;
+    void adopt_failure(const Failure&) noexcept;
+    static bool is_too_far(double position, const AxisRules&) noexcept;
+    void reject_step(double step, double max_step) noexcept;
     void follow_position(const AxisCommand&, const AxisRules&, Time now) noexcept;
     void check_numbers(const AxisCommand&, const AxisRules&) noexcept;
     void move(const AxisCommand&, const AxisRules&, Time now) noexcept;
