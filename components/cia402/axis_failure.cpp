@@ -53,25 +53,26 @@ enum class Number : std::uint8_t { none, value, time, statusword };
 struct CauseRow {
     Number number;
     const char* placeholder;  ///< of the number, in a message formatted in advance
+    const char* text;         ///< of a cause without details; nullptr: sentence() composes it
 };
 // by Cause
 constexpr CauseRow cause_rows[] = {
-    {Number::statusword, " (statusword {x})"},  // none
-    {Number::time, " for {} s"},                // stays
-    {Number::statusword, " (statusword {x})"},  // drive_fault
-    {Number::statusword, " (statusword {x})"},  // left
-    {Number::none, ""},                         // lost
-    {Number::time, " for {} s"},                // mode_rejected
-    {Number::value, ": {}"},                    // following_error
-    {Number::value, ": {}"},                    // step_rejected
-    {Number::value, ": {}"},                    // bad_command
-    {Number::value, ": {}"},                    // bad_factor
-    {Number::statusword, " (statusword {x})"},  // homing_error
-    {Number::time, " within {} s"},             // homing_timeout
-    {Number::time, " for {} s"},                // set_point
-    {Number::none, ""},                         // not_enabled
-    {Number::none, ""},                         // unwritten
-    {Number::none, ""},                         // unread
+    {Number::statusword, " (statusword {x})", nullptr},  // none
+    {Number::time, " for {} s", nullptr},                // stays
+    {Number::statusword, " (statusword {x})", nullptr},  // drive_fault
+    {Number::statusword, " (statusword {x})", nullptr},  // left
+    {Number::none, "", "drive lost: node no longer operational"},                         // lost
+    {Number::time, " for {} s", nullptr},                // mode_rejected
+    {Number::value, ": {}", "following error above max-following-error"},  // following_error
+    {Number::value, ": {}", nullptr},  // step_rejected
+    {Number::value, ": {}", "the command is not a number, or too large"},  // bad_command
+    {Number::value, ": {}", "a scale is 0 or not a number"},  // bad_factor
+    {Number::statusword, " (statusword {x})", nullptr},  // homing_error
+    {Number::time, " within {} s", "home position not attained"},  // homing_timeout
+    {Number::time, " for {} s", nullptr},  // set_point
+    {Number::none, "", "the axis is not enabled"},  // not_enabled
+    {Number::none, "", "function write-all does not run"},  // unwritten
+    {Number::none, "", "function read-all does not run"},  // unread
 };
 static_assert(std::size(cause_rows) == causes);
 
@@ -117,6 +118,7 @@ const char* to_string(Step step) noexcept {
 
 std::string sentence(const Failure& f) {
     const std::string asked = std::string(to_string(f.request)) + ": ";
+    if (const char* const text = row_of(f.cause).text) return asked + text;
     switch (f.cause) {
     case Cause::none: return "";
     case Cause::stays:
@@ -129,28 +131,20 @@ std::string sentence(const Failure& f) {
     case Cause::left:
         return asked + "drive left " + quoted(to_string(f.before)) + " for " +
                state_words(f.state) + " without a command";
-    case Cause::lost: return asked + "drive lost: node no longer operational";
     case Cause::mode_rejected:
         return asked + "drive does not accept mode " + name(f.mode) + ", displays " + name(f.shown);
-    case Cause::following_error: return asked + "following error above max-following-error";
     case Cause::step_rejected:
         return asked + (f.step == Step::wait
                             ? "position-cmd steps farther than max-step"
                             : "position-cmd is farther from position-fb than max-step");
-    case Cause::bad_command: return asked + "the command is not a number, or too large";
-    case Cause::bad_factor: return asked + "a scale is 0 or not a number";
     case Cause::homing_error:
         return asked + "drive reports " + quoted(to_string(homing_of(f.statusword)));
-    case Cause::homing_timeout: return asked + "home position not attained";
     case Cause::set_point:
         return asked + ((f.statusword & status::set_point_acknowledge) == 0
                             ? "drive does not acknowledge the set-point"
                             : "drive does not clear its acknowledge");
-    case Cause::not_enabled: return asked + "the axis is not enabled";
-    case Cause::unwritten: return asked + "function write-all does not run";
-    case Cause::unread: return asked + "function read-all does not run";
+    default: return asked + "failed";
     }
-    return asked + "failed";
 }
 
 std::string text(const Failure& f) {
