@@ -128,27 +128,34 @@ inline constexpr std::uint32_t timeout = 0x745;
 }  // namespace error
 /// Returns the meaning of an ADS error; nullptr for others, which may be SDO abort codes. [any]
 constexpr const char* error_text(std::uint32_t code) noexcept {
-    switch (code) {
-    case error::none: return "ok";
-    case error::no_port: return "target port not found";
-    case error::no_machine: return "target machine not found";
-    case error::unknown_command: return "unknown command";
-    case error::device: return "device error";
-    case error::unsupported: return "service not supported";
-    case error::group: return "invalid index group";
-    case error::offset: return "invalid index offset";
-    case error::access: return "access denied";
-    case error::size: return "invalid size";
-    case error::data: return "invalid data";
-    case error::not_ready: return "device not ready";
-    case error::busy: return "device busy";
-    case error::context: return "invalid context";
-    case error::memory: return "out of memory";
-    case error::parameter: return "invalid parameter";
-    case error::not_found: return "not found";
-    case error::timeout: return "timeout";
-    default: return nullptr;
+    struct Row {
+        std::uint32_t code;
+        const char* text;
+    };
+    constexpr Row rows[] = {
+        {error::none, "ok"},
+        {error::no_port, "target port not found"},
+        {error::no_machine, "target machine not found"},
+        {error::unknown_command, "unknown command"},
+        {error::device, "device error"},
+        {error::unsupported, "service not supported"},
+        {error::group, "invalid index group"},
+        {error::offset, "invalid index offset"},
+        {error::access, "access denied"},
+        {error::size, "invalid size"},
+        {error::data, "invalid data"},
+        {error::not_ready, "device not ready"},
+        {error::busy, "device busy"},
+        {error::context, "invalid context"},
+        {error::memory, "out of memory"},
+        {error::parameter, "invalid parameter"},
+        {error::not_found, "not found"},
+        {error::timeout, "timeout"},
+    };
+    for (const Row& row : rows) {
+        if (row.code == code) return row.text;
     }
+    return nullptr;
 }
 
 }  // namespace hal::ethercat::aoe
