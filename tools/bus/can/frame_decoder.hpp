@@ -36,13 +36,15 @@ public:
     DecodedFrame decode(const can::Frame&);
 
 private:
-    DecodedFrame request(unsigned node, const can::Frame&);
-    DecodedFrame answer(unsigned node, const can::Frame&);
     struct Blocks {
         /// segments without a command come from the client, from the server
         bool down = false;
         bool up = false;
     };
+    static std::string request_text(const can::Frame&, Blocks&);
+    static std::string answer_text(const can::Frame&, Blocks&);
+    DecodedFrame request(unsigned node, const can::Frame&);
+    DecodedFrame answer(unsigned node, const can::Frame&);
     std::array<Blocks, 128> blocks_{};
 };
 

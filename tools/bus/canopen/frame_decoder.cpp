@@ -60,22 +60,25 @@ std::string block_segment(const Frame& f) {
                        (f.data[0] & 0x80) != 0 ? ", the last" : "");
 }
 
+const char* name_of(canopen::NmtCommand command) {
+    switch (command) {
+    case canopen::NmtCommand::start: return "start";
+    case canopen::NmtCommand::stop: return "stop";
+    case canopen::NmtCommand::enter_pre_operational: return "enter pre-operational";
+    case canopen::NmtCommand::reset_node: return "reset node";
+    case canopen::NmtCommand::reset_communication: return "reset communication";
+    }
+    return nullptr;
+}
+
 DecodedFrame nmt(const Frame& f) {
     if (f.remote || f.length != 2) {
         return {FrameKind::nmt, "NMT with a wrong length: it has 2 bytes"};
     }
-    const char* what = nullptr;
-    switch (static_cast<canopen::NmtCommand>(f.data[0])) {
-    case canopen::NmtCommand::start: what = "start"; break;
-    case canopen::NmtCommand::stop: what = "stop"; break;
-    case canopen::NmtCommand::enter_pre_operational: what = "enter pre-operational"; break;
-    case canopen::NmtCommand::reset_node: what = "reset node"; break;
-    case canopen::NmtCommand::reset_communication: what = "reset communication"; break;
-    }
-    const std::string command = what ? what : fmt::format("unknown command 0x{:02X}", f.data[0]);
-    return {FrameKind::nmt,
-            fmt::format("NMT {}: {}", command,
-                        f.data[1] == 0 ? "all nodes" : fmt::format("node {}", f.data[1]))};
+    const char* const known = name_of(static_cast<canopen::NmtCommand>(f.data[0]));
+    const std::string command = known ? known : fmt::format("unknown command 0x{:02X}", f.data[0]);
+    const std::string who = f.data[1] == 0 ? "all nodes" : fmt::format("node {}", f.data[1]);
+    return {FrameKind::nmt, fmt::format("NMT {}: {}", command, who)};
 }
 
 DecodedFrame emergency(unsigned node, const Frame& f) {
@@ -99,12 +102,6 @@ DecodedFrame time_stamp(const Frame& f) {
         (from_1970_to_1984 + static_cast<std::time_t>(number(f, 4, 2))) * 86400 + ms / 1000;
     return {FrameKind::time,
             fmt::format("TIME {:%Y-%m-%d %H:%M:%S}.{:03}", fmt::gmtime(seconds), ms % 1000)};
-}
-
-DecodedFrame pdo(unsigned function, unsigned node, const Frame& f) {
-    const bool transmit = function % 2 == 1;  // 180h, 280h …: from the node
-    return {FrameKind::pdo, fmt::format("{}{}PDO{} of node {}", f.remote ? "request for " : "",
-                                        transmit ? 'T' : 'R', (function - 1) / 2, node)};
 }
 
 DecodedFrame heartbeat(unsigned node, const Frame& f) {
@@ -171,148 +168,170 @@ DecodedFrame lss(bool master, const Frame& f) {
     return {FrameKind::lss, who + fmt::format("unknown command 0x{:02X}", f.data[0])};
 }
 
+/// The services of the predefined connection set (CiA 301, clause 7.3.5), of LSS (CiA 305) and of
+/// CANopen Safety (EN 50325-5).
+enum class Service : std::uint8_t {
+    nmt,
+    fail_safe,
+    sync,
+    emergency,
+    time,
+    srdo,
+    pdo,
+    sdo_answer,
+    sdo_request,
+    heartbeat,
+    lss_slave,
+    lss_master
+};
+
+struct ServiceRow {
+    std::uint32_t first, last;  ///< identifiers
+    Service service;
+    const char* name;
+};
+constexpr ServiceRow services[] = {
+    {0x000, 0x000, Service::nmt, "NMT"},
+    {0x001, 0x001, Service::fail_safe, "global fail-safe command"},
+    {0x080, 0x080, Service::sync, "SYNC"},
+    {0x081, 0x0ff, Service::emergency, "EMCY of node {node}"},
+    {0x100, 0x100, Service::time, "TIME"},
+    {0x101, 0x180, Service::srdo, "SRDO {srdo:03X}, {half}"},
+    {0x181, 0x57f, Service::pdo, "{direction}PDO{pdo} of node {node}"},
+    {0x581, 0x5ff, Service::sdo_answer, "SDO from node {node}"},
+    {0x601, 0x67f, Service::sdo_request, "SDO to node {node}"},
+    {0x701, 0x77f, Service::heartbeat, "heartbeat of node {node}"},
+    {0x7e4, 0x7e4, Service::lss_slave, "LSS slave"},
+    {0x7e5, 0x7e5, Service::lss_master, "LSS master"},
+};
+
+/// Returns the service of an 11-bit identifier; nullptr: none. A PDO has a node.
+const ServiceRow* find_service(std::uint32_t id) {
+    for (const ServiceRow& row : services) {
+        if (id < row.first || id > row.last) continue;
+        return row.service == Service::pdo && (id & 0x7f) == 0 ? nullptr : &row;
+    }
+    return nullptr;
+}
+
+std::string acknowledge_text(const Frame& f) {
+    return fmt::format("block received up to segment {}, next has {}", f.data[1], f.data[2]);
+}
+
+/// Returns the size that starts a block transfer, if the frame has it.
+std::string block_size_text(const Frame& f) {
+    return (f.data[0] & 2) != 0 ? fmt::format(", {} bytes", number(f, 4, 4)) : "";
+}
+
+/// Decodes an SDO frame in one direction. `in_segments`: this side sends segments of a block
+/// transfer; `text` decodes its other commands.
+template <class Blocks>
+DecodedFrame sdo(const std::string& who, const Frame& f, Blocks& blocks, bool Blocks::* in_segments,
+                 std::string (*text)(const Frame&, Blocks&)) {
+    const auto decoded = [&](const std::string& what) {
+        return DecodedFrame{FrameKind::sdo, who + what};
+    };
+    if (f.remote || f.length != 8) return decoded("wrong length: it has 8 bytes");
+    if (blocks.*in_segments && f.data[0] != 0x80) {
+        blocks.*in_segments = (f.data[0] & 0x80) == 0;
+        return decoded(block_segment(f));
+    }
+    if (f.data[0] >> 5 == 4) {
+        blocks = {};
+        return decoded(abort_text(f));
+    }
+    return decoded(text(f, blocks));
+}
+
 }  // namespace
 
-DecodedFrame FrameDecoder::request(unsigned node, const Frame& f) {
-    const std::string who = fmt::format("SDO to node {}: ", node);
-    const auto sdo = [&](const std::string& text) {
-        return DecodedFrame{FrameKind::sdo, who + text};
-    };
-    if (f.remote || f.length != 8) return sdo("wrong length: it has 8 bytes");
-    Blocks& blocks = blocks_[node];
-    const unsigned command = f.data[0] >> 5;
-    if (blocks.down && f.data[0] != 0x80) {
-        if ((f.data[0] & 0x80) != 0) {
-            blocks.down = false;
-        }
-        return sdo(block_segment(f));
-    }
-    switch (command) {
-    case 0: return sdo("write " + segment(f));
-    case 1: return sdo("write " + initiated(f));
-    case 2: return sdo("read " + object(f));
-    case 3: return sdo("read next segment");
-    case 4: blocks = {}; return sdo(abort_text(f));
+std::string FrameDecoder::request_text(const Frame& f, Blocks& blocks) {
+    const bool ends = (f.data[0] & 1) != 0;
+    switch (f.data[0] >> 5) {
+    case 0: return "write " + segment(f);
+    case 1: return "write " + initiated(f);
+    case 2: return "read " + object(f);
+    case 3: return "read next segment";
     case 5:
         switch (f.data[0] & 3) {
-        case 0: return sdo(fmt::format("read {} in blocks of {}", object(f), f.data[4]));
-        case 1: return sdo("block read done");
-        case 2:
-            return sdo(
-                fmt::format("block received up to segment {}, next has {}", f.data[1], f.data[2]));
-        default: blocks.up = true; return sdo("start block upload");
+        case 0: return fmt::format("read {} in blocks of {}", object(f), f.data[4]);
+        case 1: return "block read done";
+        case 2: return acknowledge_text(f);
+        default: blocks.up = true; return "start block upload";
         }
     case 6:
-        if ((f.data[0] & 1) == 0) {
-            return sdo("write " + object(f) + " in blocks" +
-                       ((f.data[0] & 2) != 0 ? fmt::format(", {} bytes", number(f, 4, 4)) : ""));
-        }
-        return sdo(fmt::format("block write done, CRC 0x{:04X}", number(f, 1, 2)));
-    default: return sdo(fmt::format("unknown command 0x{:02X}", f.data[0]));
+        if (ends) return fmt::format("block write done, CRC 0x{:04X}", number(f, 1, 2));
+        return fmt::format("write {} in blocks{}", object(f), block_size_text(f));
+    default: return fmt::format("unknown command 0x{:02X}", f.data[0]);
     }
 }
 
-DecodedFrame FrameDecoder::answer(unsigned node, const Frame& f) {
-    const std::string who = fmt::format("SDO from node {}: ", node);
-    const auto sdo = [&](const std::string& text) {
-        return DecodedFrame{FrameKind::sdo, who + text};
-    };
-    if (f.remote || f.length != 8) return sdo("wrong length: it has 8 bytes");
-    Blocks& blocks = blocks_[node];
-    const unsigned command = f.data[0] >> 5;
-    if (blocks.up && f.data[0] != 0x80) {
-        if ((f.data[0] & 0x80) != 0) {
-            blocks.up = false;
-        }
-        return sdo(block_segment(f));
-    }
-    switch (command) {
-    case 0: return sdo("read " + segment(f));
-    case 1: return sdo("segment written");
-    case 2: return sdo("read " + initiated(f));
-    case 3: return sdo("written " + object(f));
-    case 4: blocks = {}; return sdo(abort_text(f));
+std::string FrameDecoder::answer_text(const Frame& f, Blocks& blocks) {
+    const bool ends = (f.data[0] & 1) != 0;
+    switch (f.data[0] >> 5) {
+    case 0: return "read " + segment(f);
+    case 1: return "segment written";
+    case 2: return "read " + initiated(f);
+    case 3: return "written " + object(f);
     case 5:
         switch (f.data[0] & 3) {
         case 0:
             blocks.down = true;
-            return sdo(fmt::format("ready for {} in blocks of {}", object(f), f.data[4]));
-        case 1: return sdo("block write confirmed");
-        default:
-            return sdo(
-                fmt::format("block received up to segment {}, next has {}", f.data[1], f.data[2]));
+            return fmt::format("ready for {} in blocks of {}", object(f), f.data[4]);
+        case 1: return "block write confirmed";
+        default: return acknowledge_text(f);
         }
     case 6:
-        if ((f.data[0] & 1) == 0) {
-            return sdo("has " + object(f) + " in blocks" +
-                       ((f.data[0] & 2) != 0 ? fmt::format(", {} bytes", number(f, 4, 4)) : ""));
-        }
-        return sdo(fmt::format("blocks end, CRC 0x{:04X}", number(f, 1, 2)));
-    default: return sdo(fmt::format("unknown command 0x{:02X}", f.data[0]));
+        if (ends) return fmt::format("blocks end, CRC 0x{:04X}", number(f, 1, 2));
+        return fmt::format("has {} in blocks{}", object(f), block_size_text(f));
+    default: return fmt::format("unknown command 0x{:02X}", f.data[0]);
     }
+}
+
+DecodedFrame FrameDecoder::request(unsigned node, const Frame& f) {
+    return sdo(fmt::format("SDO to node {}: ", node), f, blocks_[node], &Blocks::down,
+               request_text);
+}
+
+DecodedFrame FrameDecoder::answer(unsigned node, const Frame& f) {
+    return sdo(fmt::format("SDO from node {}: ", node), f, blocks_[node], &Blocks::up, answer_text);
 }
 
 DecodedFrame FrameDecoder::decode(const Frame& f) {
     if (f.error) return {FrameKind::error, error_frame_text(f)};
-    if (f.extended || f.fd) {
-        return {};
-    }
+    const ServiceRow* const row = f.extended || f.fd ? nullptr : find_service(f.id);
+    if (row == nullptr) return {};
     const unsigned node = f.id & 0x7f;
-    const unsigned function = f.id >> 7;
-    if (f.id == 0x000) return nmt(f);
-    if (f.id == 0x080) {
-        return {FrameKind::sync, f.length == 1 ? fmt::format("SYNC {}", f.data[0]) : "SYNC"};
-    }
-    if (f.id == 0x100) return time_stamp(f);
-    if (f.id == 0x001 && f.length == 0) {
+    switch (row->service) {
+    case Service::nmt: return nmt(f);
+    case Service::fail_safe:
+        if (f.length != 0) return {};
         return {FrameKind::nmt, "global fail-safe command (EN 50325-5)"};
+    case Service::sync:
+        return {FrameKind::sync, f.length == 1 ? fmt::format("SYNC {}", f.data[0]) : "SYNC"};
+    case Service::emergency: return emergency(node, f);
+    case Service::time: return time_stamp(f);
+    case Service::srdo: return {FrameKind::pdo, service_name(f.id, false)};
+    case Service::pdo:
+        return {FrameKind::pdo, (f.remote ? "request for " : "") + service_name(f.id, false)};
+    case Service::sdo_answer: return answer(node, f);
+    case Service::sdo_request: return request(node, f);
+    case Service::heartbeat: return heartbeat(node, f);
+    case Service::lss_slave: return lss(false, f);
+    case Service::lss_master: return lss(true, f);
     }
-    if (f.id > 0x100 && f.id <= 0x180) {
-        return {FrameKind::pdo, service_name(f.id, false)};
-    }
-    if (f.id == 0x7e4 || f.id == 0x7e5) return lss(f.id == 0x7e5, f);
-    if (node == 0) {
-        return {};
-    }
-    if (function == 1) return emergency(node, f);
-    if (function >= 3 && function <= 10) return pdo(function, node, f);
-    if (function == 11) return answer(node, f);
-    if (function == 12) return request(node, f);
-    if (function == 14) return heartbeat(node, f);
     return {};
 }
 
 std::string service_name(std::uint32_t id, bool extended) {
-    if (extended) return "";
-    const unsigned node = id & 0x7f;
+    const ServiceRow* const row = extended ? nullptr : find_service(id);
+    if (row == nullptr) return "";
     const unsigned function = id >> 7;
-    if (id == 0x000) return "NMT";
-    if (id == 0x080) return "SYNC";
-    if (id == 0x100) return "TIME";
-    if (id == 0x001) return "global fail-safe command";
-    if (id > 0x100 && id <= 0x180) {
-        return fmt::format("SRDO {:03X}, {}", (id - 1) | 1, id % 2 == 1 ? "plain" : "inverted");
-    }
-    if (id == 0x7e4) return "LSS slave";
-    if (id == 0x7e5) return "LSS master";
-    if (node == 0) return "";
-    if (function == 1) {
-        return fmt::format("EMCY of node {}", node);
-    }
-    if (function >= 3 && function <= 10) {
-        return fmt::format("{}PDO{} of node {}", function % 2 == 1 ? 'T' : 'R', (function - 1) / 2,
-                           node);
-    }
-    if (function == 11) {
-        return fmt::format("SDO from node {}", node);
-    }
-    if (function == 12) {
-        return fmt::format("SDO to node {}", node);
-    }
-    if (function == 14) {
-        return fmt::format("heartbeat of node {}", node);
-    }
-    return "";
+    const bool odd = function % 2 == 1;  // 180h, 280h …: from the node
+    return fmt::format(fmt::runtime(row->name), fmt::arg("node", id & 0x7f),
+                       fmt::arg("direction", odd ? 'T' : 'R'), fmt::arg("pdo", (function - 1) / 2),
+                       fmt::arg("srdo", (id - 1) | 1),
+                       fmt::arg("half", id % 2 == 1 ? "plain" : "inverted"));
 }
 
 }  // namespace hal::tools
