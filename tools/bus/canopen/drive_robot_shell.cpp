@@ -9,6 +9,7 @@
 #include "cli/output.hpp"
 #include "text/characters.hpp"
 #include "text/diagnostic.hpp"
+#include "text/find_row.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::tools {
@@ -93,9 +94,7 @@ const RobotShell::Command RobotShell::commands[] = {
 };
 
 const RobotShell::Command* RobotShell::find_command(std::string_view name) {
-    const auto* found = std::find_if(std::begin(commands), std::end(commands),
-                                     [&](const Command& c) { return name == c.name; });
-    return found == std::end(commands) ? nullptr : found;
+    return find_row(commands, name, &Command::name);
 }
 
 std::string RobotShell::usage(const Command& c) {

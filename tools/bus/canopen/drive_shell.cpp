@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/core.h>
+#include <string_view>
 
 #include "base/types.hpp"
 #include "cli/output.hpp"
 #include "text/diagnostic.hpp"
+#include "text/find_row.hpp"
 
 namespace hal::tools {
 
@@ -46,11 +48,24 @@ constexpr Verb verbs[] = {
     {"quit", "", "end the session and leave the axes as they are: enabled, or moving"},
 };
 
-const Verb* find_verb(const std::string& name) {
-    const auto* row = std::find_if(std::begin(verbs), std::end(verbs),
-                                   [&](const Verb& v) { return name == v.name; });
-    return row == std::end(verbs) ? nullptr : row;
-}
+/// A command without arguments that acts on the axis, and what is printed after it.
+struct SimpleVerb {
+    std::string_view name;
+    bool (SdoAxis::*run)();
+    const char* report;
+    bool has_position;  ///< the report ends with it
+    bool needs_watch;   ///< the node must be supervised
+};
+constexpr SimpleVerb simple_verbs[] = {
+    {"on", &SdoAxis::on, "on", false, true},
+    {"off", &SdoAxis::off, "off", false, false},
+    {"stop", &SdoAxis::stop, "stopped at", true, false},
+    {"quickstop", &SdoAxis::quick_stop, "stopped and off, at", true, false},
+    {"reset", &SdoAxis::reset, "no fault", false, true},
+    {"wait", &SdoAxis::wait, "at", true, false},
+};
+
+const Verb* find_verb(const std::string& name) { return find_row(verbs, name, &Verb::name); }
 
 std::string usage_of(const SdoAxis& a, const Verb& verb) {
     const std::string text = fmt::format("type: {} {}", a.letter(), verb.name);
@@ -208,22 +223,12 @@ bool DriveShell::set_mode(SdoAxis& a, const std::string& wanted) {
 
 /// A command without arguments.
 bool DriveShell::simple(SdoAxis& a, const std::string& verb) {
-    const char letter = a.letter();
-    const auto report = [&](const char* what) {
-        return session_.print_line(fmt::format("{}: {}", letter, what));
-    };
-    const auto report_at = [&](const char* what) {
-        return session_.print_line(fmt::format("{}: {} {:.10g}", letter, what, a.position()));
-    };
-    const bool needs_watch = verb == "on" || verb == "reset";
-    if (needs_watch && !session_.watched(a)) return false;
-    if (verb == "on") return a.on() && report("on");
-    if (verb == "off") return a.off() && report("off");
-    if (verb == "stop") return a.stop() && report_at("stopped at");
-    if (verb == "quickstop") return a.quick_stop() && report_at("stopped and off, at");
-    if (verb == "reset") return a.reset() && report("no fault");
-    if (verb == "wait") return a.wait() && report_at("at");
-    return values_.status(a);
+    const SimpleVerb* const row = find_row(simple_verbs, verb, &SimpleVerb::name);
+    if (!row) return values_.status(a);
+    if (row->needs_watch && !session_.watched(a)) return false;
+    if (!(a.*row->run)()) return false;
+    const std::string at = row->has_position ? fmt::format(" {:.10g}", a.position()) : "";
+    return session_.print_line(fmt::format("{}: {}{}", a.letter(), row->report, at));
 }
 
 bool DriveShell::command(SdoAxis& a, const std::string& verb, Words arguments) {

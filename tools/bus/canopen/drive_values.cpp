@@ -8,6 +8,7 @@
 #include "cia402/error_words.hpp"
 #include "cli/output.hpp"
 #include "text/diagnostic.hpp"
+#include "text/find_row.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::tools {
@@ -55,9 +56,7 @@ constexpr Setting drive_settings[] = {
 constexpr const char* factors[] = {"position-factor", "velocity-factor", "acceleration-factor"};
 
 const Setting* find_setting(const std::string& name) {
-    const auto* s = std::find_if(std::begin(drive_settings), std::end(drive_settings),
-                                 [&](const Setting& each) { return name == each.name; });
-    return s == std::end(drive_settings) ? nullptr : s;
+    return find_row(drive_settings, name, &Setting::name);
 }
 
 double factor_of(const SdoAxis& a, Setting::Unit unit) {
@@ -102,9 +101,7 @@ constexpr Report reports[] = {
 };
 
 const Report* find_report(const std::string& name) {
-    const auto* found = std::find_if(std::begin(reports), std::end(reports),
-                                     [&](const Report& each) { return name == each.name; });
-    return found == std::end(reports) ? nullptr : found;
+    return find_row(reports, name, &Report::name);
 }
 
 /// The values of an object of `bytes`, as numbers.
