@@ -2,13 +2,13 @@
 #include "bus/canopen/objects.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <fmt/core.h>
 
 #include "bus/json_text.hpp"
 #include "canopen/eds/xdd.hpp"
 #include "canopen/master/gateway/gateway_values.hpp"
 #include "cli/output.hpp"
+#include "text/characters.hpp"
 #include "text/diagnostic.hpp"
 #include "text/glyphs.hpp"
 #include "text/numbers.hpp"
@@ -21,23 +21,6 @@ namespace gateway = canopen::gateway;
 using canopen::Type;
 
 namespace {
-
-/// Lower case, everything but letters and digits as single dashes: for tolerant comparison of
-/// names.
-std::string plain(std::string_view name) {
-    std::string out;
-    for (const char c : name) {
-        if (std::isalnum(static_cast<unsigned char>(c))) {
-            out += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-        } else if (!out.empty() && out.back() != '-') {
-            out += '-';
-        }
-    }
-    while (out.ends_with('-')) {
-        out.pop_back();
-    }
-    return out;
-}
 
 bool hex_number(std::string_view text, unsigned max, unsigned& value) {
     remove_hex_prefix(text);
@@ -81,12 +64,27 @@ std::uint64_t natural(std::span<const std::uint8_t> bytes) {
 }
 
 bool is_text(Type type) { return type == Type::visible_string; }
+bool is_time(Type type) { return type == Type::time_of_day || type == Type::time_difference; }
 bool is_number(Type type, std::size_t size) {
-    return canopen::bits_of(type) != 0 && canopen::bytes_of(type) == size &&
-           type != Type::time_of_day && type != Type::time_difference;
+    return canopen::bits_of(type) != 0 && canopen::bytes_of(type) == size && !is_time(type);
 }
 
 }  // namespace
+
+/// Parses INDEX, INDEX:SUB or INDEXsubSUB in hex. An index without 0x has four digits.
+static bool parse_numbers(const std::string& text, ObjectName& out) {
+    unsigned index = 0;
+    unsigned sub = 0;
+    const auto colon = std::min(text.find(':'), text.find("sub"));
+    const std::string first = text.substr(0, colon);
+    if (first.size() != 4 && !first.starts_with("0x")) return false;
+    if (!hex_number(first, 0xffff, index)) return false;
+    const std::size_t separator = text.size() > colon && text[colon] == ':' ? 1 : 3;
+    if (colon != text.npos && !hex_number(text.substr(colon + separator), 0xff, sub)) return false;
+    out.index = static_cast<std::uint16_t>(index);
+    out.sub = static_cast<std::uint8_t>(sub);
+    return true;
+}
 
 std::string ObjectName::label() const {
     return fmt::format("{:04X}:{:X}{}", index, sub, name.empty() ? "" : " " + hal::printable(name));
@@ -115,11 +113,11 @@ bool ObjectNames::load(const Options& options, const std::string& file) {
         for (const eds::Entry& entry : object.entries) {
             const ObjectName name = object_of(object, entry);
             if (object.single() || entry.sub == 0) {
-                rows_.push_back({plain(object.name), name});
+                rows_.push_back({dashed(object.name), name});
+                continue;
             }
-            if (object.single() || entry.sub == 0) continue;
-            rows_.push_back({plain(object.name + " " + entry.name), name});
-            rows_.push_back({plain(entry.name), name});
+            rows_.push_back({dashed(object.name + " " + entry.name), name});
+            rows_.push_back({dashed(entry.name), name});
         }
     }
     return true;
@@ -147,16 +145,23 @@ ObjectName ObjectNames::named(std::uint16_t index, std::uint8_t sub) const {
     return {index, sub, Type::none, {}};
 }
 
+/// Returns the objects with this name, each once.
+std::vector<const ObjectName*> ObjectNames::objects_named(const std::string& name) const {
+    std::vector<const ObjectName*> found;
+    for (const Row& row : rows_) {
+        const bool again = std::ranges::any_of(found, [&](const ObjectName* f) {
+            return f->index == row.object.index && f->sub == row.object.sub;
+        });
+        if (row.words == name && !again) {
+            found.push_back(&row.object);
+        }
+    }
+    return found;
+}
+
 bool ObjectNames::find(const std::string& text, ObjectName& out, std::string& problem) const {
-    unsigned index = 0;
-    unsigned sub = 0;
-    const auto colon = std::min(text.find(':'), text.find("sub"));
-    const std::string first = text.substr(0, colon);
-    const bool numbered =
-        hex_number(first, 0xffff, index) && (first.size() == 4 || first.starts_with("0x"));
-    if (numbered && (colon == text.npos ||
-                     hex_number(text.substr(colon + (text[colon] == ':' ? 1 : 3)), 0xff, sub))) {
-        out = named(static_cast<std::uint16_t>(index), static_cast<std::uint8_t>(sub));
+    if (parse_numbers(text, out)) {
+        out = named(out.index, out.sub);
         return true;
     }
     if (!description_) {
@@ -167,23 +172,17 @@ bool ObjectNames::find(const std::string& text, ObjectName& out, std::string& pr
 
         return false;
     }
-    const std::string wanted = plain(text);
-    std::vector<const ObjectName*> found;
-    std::vector<std::string> names;
-    for (const Row& row : rows_) {
-        names.push_back(row.words);
-        const bool again = std::any_of(found.begin(), found.end(), [&](const ObjectName* f) {
-            return f->index == row.object.index && f->sub == row.object.sub;
-        });
-        if (row.words == wanted && !again) {
-            found.push_back(&row.object);
-        }
-    }
+    const std::string wanted = dashed(text);
+    const std::vector<const ObjectName*> found = objects_named(wanted);
     if (found.size() == 1) {
         out = *found[0];
         return true;
     }
     if (found.empty()) {
+        std::vector<std::string> names;
+        for (const Row& row : rows_) {
+            names.push_back(row.words);
+        }
         const std::string hint = did_you_mean(wanted, names);
         problem = fmt::format("unknown object '{}' in {}; {}", text, file_,
                               hint.empty() ? "write INDEX:SUB in hex, or one of its names" : hint);
@@ -191,8 +190,8 @@ bool ObjectNames::find(const std::string& text, ObjectName& out, std::string& pr
         return false;
     }
     std::string all;
-    for (std::size_t n = 0; n < found.size() && n < 4; ++n) {
-        all += (n == 0 ? "" : ", ") + fmt::format("{:04X}:{:X}", found[n]->index, found[n]->sub);
+    for (std::size_t n = 0; n < std::min<std::size_t>(found.size(), 4); ++n) {
+        append_item(all, fmt::format("{:04X}:{:X}", found[n]->index, found[n]->sub));
     }
     problem = fmt::format(
         "ambiguous name '{}' of {} objects ({}{}); write the index, such as {:04X}:{:X}", text,
@@ -237,42 +236,57 @@ std::string hex_bytes(std::span<const std::uint8_t> bytes, const char* separator
     return text;
 }
 
-std::string value_text(std::span<const std::uint8_t> bytes, Type type) {
-    if (bytes.empty()) return "empty (0 bytes)";
-    const std::string raw =
-        bytes.size() <= 8 ? fmt::format("0x{:0{}X}", natural(bytes), 2 * bytes.size()) : "";
-    if (type == Type::boolean && bytes.size() == 1) {
-        return fmt::format("{} ({})", bytes[0] != 0 ? "true" : "false", raw);
-    }
-    if (is_number(type, bytes.size())) {
-        const std::string decimal = gateway::text_of(bytes, *gateway::format(type));
-        return canopen::is_signed(type) || canopen::is_real(type)
-                   ? fmt::format("{} ({})", decimal, raw)
-                   : fmt::format("{} ({})", raw, decimal);
-    }
-    if ((type == Type::time_of_day || type == Type::time_difference) && bytes.size() == 6) {
-        const auto ms = natural(bytes.first(4)) & 0x0fffffff;
-        return fmt::format("{} days {:02}:{:02}:{:02}.{:03} ({})", natural(bytes.subspan(4)),
-                           ms / 3'600'000, ms / 60'000 % 60, ms / 1000 % 60, ms % 1000, raw);
-    }
-    const std::string count = counted(bytes.size(), "byte");
-    if (is_text(type) || (type == Type::none && bytes.size() > 8 && looks_like_text(bytes))) {
-        return fmt::format("\"{}\" ({})", hal::printable(text_in(bytes), 10'000), count);
-    }
-    if (type == Type::none && bytes.size() <= 8) {
-        const unsigned unused = 64 - 8 * static_cast<unsigned>(bytes.size());
-        const auto integer = static_cast<std::int64_t>(natural(bytes) << unused) >> unused;
-        return fmt::format(
-            "{} ({}{}{})", raw, natural(bytes), integer < 0 ? fmt::format(", or {}", integer) : "",
-            looks_like_text(bytes) ? fmt::format(", or \"{}\"", text_in(bytes)) : "");
-    }
+namespace {
+
+std::string number_text(std::span<const std::uint8_t> bytes, Type type, const std::string& raw) {
+    const std::string decimal = gateway::text_of(bytes, *gateway::format(type));
+    const bool decimal_first = canopen::is_signed(type) || canopen::is_real(type);
+    return decimal_first ? fmt::format("{} ({})", decimal, raw)
+                         : fmt::format("{} ({})", raw, decimal);
+}
+
+std::string time_text(std::span<const std::uint8_t> bytes, const std::string& raw) {
+    const auto ms = natural(bytes.first(4)) & 0x0fffffff;
+    return fmt::format("{} days {:02}:{:02}:{:02}.{:03} ({})", natural(bytes.subspan(4)),
+                       ms / 3'600'000, ms / 60'000 % 60, ms / 1000 % 60, ms % 1000, raw);
+}
+
+/// Everything that up to eight bytes without a type may mean.
+std::string guesses(std::span<const std::uint8_t> bytes, const std::string& raw) {
+    const unsigned unused = 64 - 8 * static_cast<unsigned>(bytes.size());
+    const auto integer = static_cast<std::int64_t>(natural(bytes) << unused) >> unused;
+    return fmt::format("{} ({}{}{})", raw, natural(bytes),
+                       integer < 0 ? fmt::format(", or {}", integer) : "",
+                       looks_like_text(bytes) ? fmt::format(", or \"{}\"", text_in(bytes)) : "");
+}
+
+std::string bytes_text(std::span<const std::uint8_t> bytes, Type type) {
     constexpr std::size_t max = 32;
     const std::string no_such =
         canopen::bits_of(type) != 0
             ? fmt::format("; {} has {}", type_word(type), canopen::bytes_of(type))
             : "";
     return fmt::format("{}{} ({}{})", hex_bytes(bytes.first(std::min(bytes.size(), max)), " "),
-                       bytes.size() > max ? " …" : "", count, no_such);
+                       bytes.size() > max ? " …" : "", counted(bytes.size(), "byte"), no_such);
+}
+
+}  // namespace
+
+std::string value_text(std::span<const std::uint8_t> bytes, Type type) {
+    const std::size_t size = bytes.size();
+    if (size == 0) return "empty (0 bytes)";
+    const std::string raw = size <= 8 ? fmt::format("0x{:0{}X}", natural(bytes), 2 * size) : "";
+    if (type == Type::boolean && size == 1) {
+        return fmt::format("{} ({})", bytes[0] != 0 ? "true" : "false", raw);
+    }
+    if (is_number(type, size)) return number_text(bytes, type, raw);
+    if (is_time(type) && size == 6) return time_text(bytes, raw);
+    const bool untyped = type == Type::none;
+    if (is_text(type) || (untyped && size > 8 && looks_like_text(bytes))) {
+        return fmt::format("\"{}\" ({})", hal::printable(text_in(bytes), 10'000),
+                           counted(size, "byte"));
+    }
+    return untyped && size <= 8 ? guesses(bytes, raw) : bytes_text(bytes, type);
 }
 
 std::string value_json(std::span<const std::uint8_t> bytes, Type type) {

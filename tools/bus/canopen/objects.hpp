@@ -42,8 +42,9 @@ public:
 
 private:
     void print_doubts(const Options&) const;
+    std::vector<const ObjectName*> objects_named(const std::string& name) const;
     struct Row {
-        std::string words;  ///< as returned by `plain`
+        std::string words;  ///< as returned by dashed()
         ObjectName object;
     };
     std::optional<canopen::eds::DeviceDescription> description_;
