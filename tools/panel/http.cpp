@@ -9,6 +9,7 @@
 #include "panel/assets.hpp"
 #include "panel/metrics.hpp"
 #include "panel/server.hpp"
+#include "text/find_row.hpp"
 
 namespace hal::tools {
 
@@ -65,10 +66,7 @@ const Asset* find_asset(std::string_view path) {
     if (path == "/") {
         path = "/index.html";
     }
-    for (const Asset& asset : assets) {
-        if (asset.path == path) return &asset;
-    }
-    return nullptr;
+    return find_row(assets, path, &Asset::path);
 }
 
 int answer_text(lws* wsi, unsigned status, std::string_view type, std::string text,

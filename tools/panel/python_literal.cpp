@@ -64,30 +64,25 @@ private:
         return all;
     }
 
-    std::optional<Json> sum() {
-        auto left = product();
-        while (left && (next() == '+' || next() == '-')) {
+    std::optional<Json> sum() { return operations("+-", &Literal::product); }
+    std::optional<Json> product() { return operations("*/", &Literal::value); }
+
+    /// Operands with one of the signs between them.
+    std::optional<Json> operations(std::string_view signs,
+                                   std::optional<Json> (Literal::*operand)()) {
+        auto left = (this->*operand)();
+        while (left && signs.find(next()) != signs.npos) {
             const char sign = text_[at_++];
-            const auto right = product();
+            const auto right = (this->*operand)();
             if (!right) return std::nullopt;
-            if (sign == '+' && left->is_string() && right->is_string()) {
-                left = left->get<std::string>() + right->get<std::string>();
-                continue;
-            }
             left = calculate(*left, *right, sign);
         }
         return left;
     }
 
-    std::optional<Json> product() {
-        auto left = value();
-        while (left && (next() == '*' || next() == '/')) {
-            const char sign = text_[at_++];
-            const auto right = value();
-            if (!right) return std::nullopt;
-            left = calculate(*left, *right, sign);
-        }
-        return left;
+    static Json number_of(double value, bool whole) {
+        if (whole && std::abs(value) < 1e15) return static_cast<std::int64_t>(value);
+        return value;
     }
 
     static double applied(double a, char sign, double b) {
@@ -100,14 +95,14 @@ private:
     }
 
     static std::optional<Json> calculate(const Json& left, const Json& right, char sign) {
+        if (sign == '+' && left.is_string() && right.is_string()) {
+            return left.get<std::string>() + right.get<std::string>();
+        }
         if (!left.is_number() || !right.is_number()) return std::nullopt;
         const double result = applied(left.get<double>(), sign, right.get<double>());
         if (!std::isfinite(result)) return std::nullopt;
-        if (left.is_number_integer() && right.is_number_integer() && sign != '/' &&
-            std::abs(result) < 1e15) {
-            return Json(static_cast<std::int64_t>(result));
-        }
-        return Json(result);
+        const bool whole = left.is_number_integer() && right.is_number_integer() && sign != '/';
+        return number_of(result, whole);
     }
 
     std::optional<Json> value() {
@@ -151,24 +146,35 @@ private:
     std::optional<Json> string() {
         std::string all;
         while (next() == '"' || next() == '\'') {  // neighbours are joined
-            const char quote = text_[at_++];
-            while (at_ < text_.size() && text_[at_] != quote) {
-                char c = text_[at_++];
-                if (c == '\\' && at_ < text_.size()) {
-                    c = text_[at_++];
-                    if (c == 'n') {
-                        c = '\n';
-                    } else if (c == 't') {
-                        c = '\t';
-                    } else if (c != '\\' && c != '"' && c != '\'') {
-                        all += '\\';
-                    }
-                }
-                all += c;
-            }
-            if (!take(quote)) return std::nullopt;
+            if (!append_quoted(all)) return std::nullopt;
         }
         return all;
+    }
+
+    bool append_quoted(std::string& all) {
+        const char quote = text_[at_++];
+        while (at_ < text_.size() && text_[at_] != quote) {
+            const char c = text_[at_++];
+            if (c == '\\' && at_ < text_.size()) {
+                append_escape(all, text_[at_++]);
+            } else {
+                all += c;
+            }
+        }
+        return take(quote);
+    }
+
+    /// The backslash of an unknown escape stays.
+    static void append_escape(std::string& all, char c) {
+        switch (c) {
+        case 'n': all += '\n'; return;
+        case 't': all += '\t'; return;
+        case '\\':
+        case '"':
+        case '\'': break;
+        default: all += '\\';
+        }
+        all += c;
     }
 
     std::optional<Json> number() {
@@ -179,22 +185,17 @@ private:
         if (error != std::errc{} || !std::isfinite(real)) return std::nullopt;
         const std::string_view digits(begin, static_cast<std::size_t>(stop - begin));
         at_ += digits.size();
-        if (at_ < text_.size() && text_[at_] == '.' &&
-            digits.find_first_of(".eE") == digits.npos) {  // 1.
+        bool whole = digits.find_first_of(".eE") == digits.npos;
+        if (whole && text_.substr(at_).starts_with('.')) {  // 1.
             ++at_;
-            return Json(real);
+            whole = false;
         }
-        if (digits.find_first_of(".eE") == digits.npos && real < 1e15) {
-            return Json(static_cast<std::int64_t>(real));
-        }
-        return Json(real);
+        return number_of(real, whole);
     }
 
     std::optional<Json> word() {
         const std::size_t begin = at_;
-        while (at_ < text_.size() && (is_letter(text_[at_]) || text_[at_] == '_')) {
-            ++at_;
-        }
+        at_ = end_of_run(text_, begin, [](char c) { return is_letter(c) || c == '_'; });
         const std::string_view name = text_.substr(begin, at_ - begin);
         if (name == "True") return Json(true);
         if (name == "False") return Json(false);
