@@ -9,48 +9,72 @@
 #include "canopen/protocol/numbers.hpp"
 #include "cli/output.hpp"
 #include "text/diagnostic.hpp"
+#include "text/find_row.hpp"
 
 namespace hal::tools {
 
-int run_can_produce(const ProduceOptions& options) {
-    const std::vector<std::string> kinds{"heartbeat", "sync", "guarding"};
-    const std::string kind = options.words.size() > 1 ? options.words[1] : "";
-    if (kind != "heartbeat" && kind != "sync" && kind != "guarding") {
-        const std::string hint = did_you_mean(kind, kinds);
+namespace {
+
+can::Frame heartbeat(std::uint8_t node, std::uint8_t, std::uint64_t) {
+    return {0x700U + node, {static_cast<std::uint8_t>(canopen::NmtState::operational)}};
+}
+
+/// `counter`: the overflow value 1019h; 0: a SYNC without a counter.
+can::Frame sync(std::uint8_t, std::uint8_t counter, std::uint64_t n) {
+    if (counter == 0) return {0x80, {}};
+    return {0x80, {static_cast<std::uint8_t>(n % counter + 1)}};
+}
+
+can::Frame guarding(std::uint8_t node, std::uint8_t, std::uint64_t) {
+    return can::Frame::request(0x700U + node, 1);
+}
+
+struct Kind {
+    const char* name;
+    bool of_node;
+    std::int64_t period_ns;  ///< without --every
+    can::Frame (*frame)(std::uint8_t node, std::uint8_t counter, std::uint64_t n);
+};
+constexpr Kind kinds[] = {{"heartbeat", true, 100'000'000, heartbeat},
+                          {"sync", false, 10'000'000, sync},
+                          {"guarding", true, 100'000'000, guarding}};
+
+int unknown_kind(const ProduceOptions& options, const std::string& name) {
+    if (name.empty()) {
         return fail(options,
-                    kind.empty()
-                        ? "missing KIND; type: hal can produce ADDRESS heartbeat NODE | sync | "
-                          "guarding NODE"
-                        : fmt::format("unknown kind '{}'; {}", kind,
-                                      hint.empty() ? "write heartbeat, sync or guarding" : hint));
+                    "missing KIND; type: hal can produce ADDRESS heartbeat NODE | sync | guarding "
+                    "NODE");
     }
-    std::uint8_t node = 0;
-    const bool of_node = kind != "sync";
-    if (options.words.size() != (of_node ? 3U : 2U)) {
+    const std::string hint = did_you_mean(name, {"heartbeat", "sync", "guarding"});
+    return fail(options, fmt::format("unknown kind '{}'; {}", name,
+                                     hint.empty() ? "write heartbeat, sync or guarding" : hint));
+}
+
+}  // namespace
+
+int run_can_produce(const ProduceOptions& options) {
+    const std::string name = options.words.size() > 1 ? options.words[1] : "";
+    const Kind* const kind = find_row(kinds, name, &Kind::name);
+    if (!kind) return unknown_kind(options, name);
+    if (options.words.size() != (kind->of_node ? 3U : 2U)) {
         return fail(
             options,
-            of_node
-                ? fmt::format("expected one node; type: hal can produce ADDRESS {} NODE", kind)
+            kind->of_node
+                ? fmt::format("expected one node; type: hal can produce ADDRESS {} NODE", name)
                 : fmt::format("unexpected argument '{}'; a SYNC has no node", options.words[2]));
     }
-    if (of_node && !node_of(options, options.words[2], node)) return 1;
+    std::uint8_t node = 0;
+    if (kind->of_node && !node_of(options, options.words[2], node)) return 1;
     if (options.counter > 240 || options.counter == 1) {
         return fail(options, fmt::format("invalid --counter {}; write 2..240", options.counter));
     }
-    if (options.counter != 0 && of_node) return fail(options, "--counter is valid with sync only");
+    if (options.counter != 0 && kind->of_node)
+        return fail(options, "--counter is valid with sync only");
     Bus bus;
     if (!bus.open(options, options.words[0], false)) return 1;
-    const std::int64_t usual = kind == "sync" ? 10'000'000 : 100'000'000;
-    return send_periodically(bus, options, options.every_ns > 0 ? options.every_ns : usual,
-                             [&](std::uint64_t n) {
-        if (kind == "guarding") return can::Frame::request(0x700U + node, 1);
-        if (kind == "heartbeat") {
-            return can::Frame(0x700U + node,
-                              {static_cast<std::uint8_t>(canopen::NmtState::operational)});
-        }
-        return options.counter == 0
-                   ? can::Frame(0x80, {})
-                   : can::Frame(0x80, {static_cast<std::uint8_t>(n % options.counter + 1)});
+    const std::int64_t period_ns = options.every_ns > 0 ? options.every_ns : kind->period_ns;
+    return send_periodically(bus, options, period_ns, [&](std::uint64_t n) {
+        return kind->frame(node, static_cast<std::uint8_t>(options.counter), n);
     });
 }
 
