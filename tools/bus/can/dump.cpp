@@ -180,19 +180,66 @@ bool report(const DumpOptions& options, const Source& source, double seconds) {
     return true;
 }
 
+/// Formats the frames of all buses, and counts them.
+class DumpText {
+public:
+    DumpText(const DumpOptions& options, std::size_t name_width, bool coloured)
+        : options_(options), name_width_(name_width), coloured_(coloured) {}
+
+    bool complete() const { return options_.count != 0 && frames_ >= options_.count; }
+
+    std::string add(const can::Frame& f, Source& source) {
+        const double time = seconds_of(f, source);
+        ++frames_;
+        ++source.frames;
+        if (!f.error) {
+            const can::Description& about = source.link->description();
+            source.busy += can::duration_ns(can::frame_bits(f), about.bit_rate, about.data_rate);
+        }
+        const DecodedFrame decoded = source.decoder.decode(f);
+        if (options_.json) return json_line(f, time, source, decoded);
+        const std::string name =
+            name_width_ == 0 ? "" : fmt::format("{:{}}  ", source.name, name_width_);
+        return line(f, time, name, decoded, coloured_);
+    }
+
+private:
+    /// Returns the time of the frame as --time has it: since the first frame of all buses by default.
+    double seconds_of(const can::Frame& f, Source& source) {
+        if (options_.time == "absolute") {
+            if (source.frames == 0) {
+                source.to_wall = shift_to_wall(*source.link, f);
+            }
+            return static_cast<double>(f.time_ns + source.to_wall) / 1e9;
+        }
+        if (frames_ == 0) {
+            before_ = f.time_ns;
+        }
+        const std::int64_t since = f.time_ns - before_;
+        if (options_.time == "delta") {
+            before_ = f.time_ns;
+        }
+        return static_cast<double>(since) / 1e9;
+    }
+
+    const DumpOptions& options_;
+    const std::size_t name_width_;
+    const bool coloured_;
+    std::uint64_t frames_ = 0;
+    std::int64_t before_ = 0;  // time of the first frame, or of the previous one
+};
+
 }  // namespace
 
 int run_can_dump(const DumpOptions& options) {
-    const bool delta = options.time == "delta";
-    const bool absolute = options.time == "absolute";
-    if (!options.time.empty() && options.time != "relative" && !delta && !absolute) {
+    constexpr std::string_view times[] = {"", "relative", "delta", "absolute"};
+    if (std::ranges::find(times, options.time) == std::end(times)) {
         return fail(options, fmt::format("invalid --time '{}'; write relative, delta or absolute",
                                          options.time));
     }
     Bus bus;
     if (!bus.open(options, options.words, options.filters)) return 1;
     bus.announce(options);
-    const bool coloured = !options.json && colours(STDOUT_FILENO);
     std::vector<Source> sources(1 + bus.more.size());
     std::size_t width = 0;
     for (std::size_t n = 0; n < sources.size(); ++n) {
@@ -202,40 +249,17 @@ int run_can_dump(const DumpOptions& options) {
         }
         width = std::max(width, sources[n].name.size());
     }
-    std::uint64_t frames = 0;
-    std::int64_t before = 0;
+    DumpText lines{options, width, !options.json && colours(STDOUT_FILENO)};
     const std::int64_t began = monotonic_ns();
     bool written = true;
     listen_to_all(bus, sources, options.for_ns, [&](std::span<const Heard> batch) {
         std::string text;
         for (const auto& [frame, source] : batch) {
-            const can::Frame& f = *frame;
-            if (absolute && source->frames == 0) {
-                source->to_wall = shift_to_wall(*source->link, f);
-            }
-            if (frames++ == 0) {
-                before = f.time_ns;
-            }
-            ++source->frames;
-            const double time =
-                static_cast<double>(absolute ? f.time_ns + source->to_wall : f.time_ns - before) /
-                1e9;
-            if (delta) {
-                before = f.time_ns;
-            }
-            const DecodedFrame decoded = source->decoder.decode(f);
-            const std::string name = width == 0 ? "" : fmt::format("{:{}}  ", source->name, width);
-            text += options.json ? json_line(f, time, *source, decoded)
-                                 : line(f, time, name, decoded, coloured);
-            const can::Description& about = source->link->description();
-            if (!f.error) {
-                source->busy +=
-                    can::duration_ns(can::frame_bits(f), about.bit_rate, about.data_rate);
-            }
-            if (frames == options.count) break;
+            text += lines.add(*frame, *source);
+            if (lines.complete()) break;
         }
         written = print(text);
-        return written && (options.count == 0 || frames < options.count);
+        return written && !lines.complete();
     });
     if (!written) return 1;
     const double seconds = static_cast<double>(monotonic_ns() - began) / 1e9;
