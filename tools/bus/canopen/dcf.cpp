@@ -29,13 +29,10 @@ constexpr std::size_t max_bytes = 65536;
 bool moves(std::uint16_t index) {
     if (index < 0x6000 || index >= 0xa000) return false;
     const unsigned first_axis = 0x6000 + (index - 0x6000U) % 0x800;
-    constexpr std::uint16_t drive[] = {0x6040, 0x6042, 0x6071, 0x607a, 0x60b0,
-                                       0x60b1, 0x60b2, 0x60c1, 0x60fe, 0x60ff};
-    const bool outputs = first_axis >= 0x6410 && first_axis <= 0x6413;
-    const bool lines = first_axis == 0x6200 || first_axis == 0x6220 || first_axis == 0x6300 ||
-                       first_axis == 0x6320;
-    return outputs || lines ||
-           std::find(std::begin(drive), std::end(drive), first_axis) != std::end(drive);
+    constexpr std::uint16_t acting[] = {0x6040, 0x6042, 0x6071, 0x607a, 0x60b0, 0x60b1,
+                                        0x60b2, 0x60c1, 0x60fe, 0x60ff, 0x6200, 0x6220,
+                                        0x6300, 0x6320, 0x6410, 0x6411, 0x6412, 0x6413};
+    return std::ranges::find(acting, first_axis) != std::end(acting);
 }
 
 /// Returns true for a setting to save and restore: not an object that acts when written, moves the
@@ -131,7 +128,7 @@ int run_can_dcf_read(const DcfReadOptions& options) {
     commissioning.baud_rate =
         static_cast<std::uint16_t>(station.bus.link->description().bit_rate / 1000);
     const std::string text = eds::write_eds(description);
-    if (options.output.empty()) return print(text) ? 0 : 1;
+    if (options.output.empty()) return exit_code(print(text));
     if (const std::string wrong = write_file(options.output, text); !wrong.empty()) {
         return fail(options, fmt::format("cannot write '{}': {}", options.output, wrong));
     }
@@ -178,25 +175,12 @@ public:
             if (!compare(*write)) return 1;
         }
         std::size_t written = 0;
-        if (!options_.check) {
-            for (const eds::Write& write : writes_) {
-                if (differing_.contains(group(write))) {
-                    if (!put(write)) return 1;
-                    ++written;
-                }
-            }
+        if (!options_.check && !write_differing(written)) return 1;
+        const char* const done = differences_ == 0 ? "differed" : "differed and were written";
+        if (!print(fmt::format("node {}: {} of {} settings {}\n", node_, differences_,
+                               wanted_.size(), options_.check ? "differ" : done))) {
+            return 1;
         }
-        if (!options_.check) {
-            for (const auto& [at, write] : wanted_) {
-                if (differing_.contains(group(*write)) && !verify(*write)) return 1;
-            }
-        }
-        const std::string what =
-            fmt::format("node {}: {} of {} settings {}\n", node_, differences_, wanted_.size(),
-                        options_.check      ? "differ"
-                        : differences_ == 0 ? "differed"
-                                            : "differed and were written");
-        if (!print(what)) return 1;
         if (written != 0 && !print(fmt::format("not stored: they are lost at power-off; to store "
                                                "them: hal can sdo write {} {} 1010:1 0x65766173 "
                                                "--type u32\n",
@@ -207,6 +191,19 @@ public:
     }
 
 private:
+    /// Writes the settings that differ, counts them, and reads them back. Returns false after
+    /// printing the reason.
+    bool write_differing(std::size_t& written) {
+        for (const eds::Write& write : writes_) {
+            if (!differing_.contains(group(write))) continue;
+            if (!put(write)) return false;
+            ++written;
+        }
+        return std::ranges::all_of(wanted_, [&](const auto& row) {
+            const eds::Write& write = *row.second;
+            return !differing_.contains(group(write)) || verify(write);
+        });
+    }
     static std::uint32_t key(const eds::Write& write) {
         return std::uint32_t{write.index} << 8 | write.sub;
     }
