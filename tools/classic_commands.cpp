@@ -89,12 +89,12 @@ int halcmd(int argc, char** argv) {
         if (letter == 'C') return complete_word();
         if (letter != 'h') return bad_option;
         move_words(options, argc, argv);
-        if (options.words.empty()) return print(halcmd_usage) ? 0 : 1;
+        if (options.words.empty()) return exit_code(print(halcmd_usage));
         options.words.insert(options.words.begin(), "help");
         return run_shell(options);
     }
     move_words(options, argc, argv);
-    if (options.words.empty() && !options.from_file) return print(halcmd_usage) ? 0 : 1;
+    if (options.words.empty() && !options.from_file) return exit_code(print(halcmd_usage));
     if (!options.ini.empty() && !options.from_file) {
         fail(options, "-i needs -f");
         return bad_option;
@@ -141,7 +141,7 @@ int halrun(int argc, char** argv) {
         case 'I': options.interactive = true; break;
         case 'U': return end_running(options);
         case 'T': options.tcl = true; break;
-        case 'h': return print(halrun_usage) ? 0 : 1;
+        case 'h': return exit_code(print(halrun_usage));
         default: return 1;
         }
     }

@@ -184,7 +184,7 @@ std::optional<int> parse_options(int argc, char** argv, Mode& mode, CompileOptio
                         "--install-doc is not needed: the page is in the plugin; --install it, "
                         "then type: hal doc NAME");
         case 'U': break;
-        case 'h': return print(usage) ? 0 : 1;
+        case 'h': return exit_code(print(usage));
         default: return 1;
         }
     }

@@ -160,7 +160,7 @@ int run_trial(const DoctorOptions& options, const std::vector<InterfaceSetting>&
                                   setting, options.interface));
     }
     if (lost.empty() && !options.json) print("restored\n");
-    return lost.empty() ? 0 : 1;
+    return exit_code(lost.empty());
 }
 
 int run_measurement(const DoctorOptions& options, nlohmann::ordered_json& report) {
@@ -174,7 +174,7 @@ int run_measurement(const DoctorOptions& options, nlohmann::ordered_json& report
     }
     report["round_trip"] = json_of(trip);
     if (options.json) return 0;
-    return print(head_of_rows(options.interface) + row_of("as it is", trip)) ? 0 : 1;
+    return exit_code(print(head_of_rows(options.interface) + row_of("as it is", trip)));
 }
 
 }  // namespace

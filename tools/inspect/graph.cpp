@@ -85,7 +85,7 @@ int run_graph(const GraphOptions& options) {
     const GraphView view(drawn.model(), drawn.sources, request);
     if (!view.problem().empty()) return fail(options, view.problem());
     const std::string dot = as_dot(drawn.model(), view, options.words.front());
-    if (options.output.empty()) return print(dot) ? 0 : 1;
+    if (options.output.empty()) return exit_code(print(dot));
     std::string drawing;
     if (svg) {
         if (const std::string why = run_filter({"dot", "-Tsvg"}, dot, drawing, "graphviz");

@@ -79,7 +79,7 @@ std::vector<Remedy> remedies_of(const std::vector<Finding>& findings) {
 }
 
 int carry_out(const DoctorOptions& options, const std::vector<Remedy>& remedies) {
-    if (remedies.empty()) return print("\nnothing to fix by a command\n") ? 0 : 1;
+    if (remedies.empty()) return exit_code(print("\nnothing to fix by a command\n"));
     const bool root = ::geteuid() == 0;
     if (!root && !found_in_path("sudo")) {
         std::string text = "\nsudo is not installed; as root (su -), type:\n";

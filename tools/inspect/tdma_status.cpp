@@ -134,7 +134,7 @@ int run_tdma_status(const TdmaStatusOptions& options) {
         return fail(options, fmt::format("instance '{}' has no station of a segment (loadrt tdma)",
                                          client->instance()));
     }
-    if (options.json) return print(json(instances).dump() + "\n") ? 0 : 1;
+    if (options.json) return exit_code(print(json(instances).dump() + "\n"));
     std::string text;
     for (const auto& [instance, pins] : instances) {
         text += rows(instance, pins);

@@ -68,7 +68,7 @@ bool is_picture(const std::string& file) {
 
 /// Writes the picture in the format of the file's name, and prints that name.
 int write_picture(const PlotOptions& options, const std::string& svg) {
-    if (options.output == "-") return print(svg) ? 0 : 1;
+    if (options.output == "-") return exit_code(print(svg));
     const std::string& file = options.words.front();
     const std::string output =
         options.output.empty() ? file.substr(0, file.rfind('.')) + ".svg" : options.output;

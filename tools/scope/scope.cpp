@@ -177,11 +177,9 @@ int run_once(const ScopeOptions& options, Source& source) {
         fail(options,
              fmt::format("{} samples were lost; type a larger --every", source.input().lost()));
     }
-    return options.csv == "-" ||
-                   print(fmt::format("{}\n{}", title_of(acquisition, record),
-                                     measurement_table(acquisition.channels(), record)))
-               ? 0
-               : 1;
+    return exit_code(options.csv == "-" ||
+                     print(fmt::format("{}\n{}", title_of(acquisition, record),
+                                       measurement_table(acquisition.channels(), record))));
 }
 
 /// Writes the shown record as CSV and SVG. Returns the sentence about it.

@@ -31,7 +31,7 @@ int haltcl(int argc, char** argv) {
     int at = 1;
     for (; at < argc && argv[at][0] == '-'; ++at) {
         const std::string_view option(argv[at]);
-        if (option == "-h" || option == "--help") return print(haltcl_usage) ? 0 : 1;
+        if (option == "-h" || option == "--help") return exit_code(print(haltcl_usage));
         if (option != "-i" && option != "-ini") {
             return fail(options, fmt::format("unknown option '{}'; see: haltcl -h", option));
         }

@@ -59,7 +59,7 @@ int run_can_record(const CanRecordOptions& options) {
     const can::Statistics s = bus.link->statistics();
     write_all(STDERR_FILENO,
               fmt::format("{} in {}, {} lost\n", counted(frames, "frame"), file, s.lost));
-    return s.lost == 0 ? 0 : 1;  // the file is incomplete
+    return exit_code(s.lost == 0);  // the file is incomplete
 }
 
 int run_can_replay(const CanReplayOptions& options) {

@@ -99,7 +99,7 @@ int run_can_sniff(const SniffOptions& options) {
             bus.stop.request();
         }
     });
-    if (live) return written ? 0 : 1;
+    if (live) return exit_code(written);
     if (rows.empty()) return fail(options, "no frames received");
     return exit_code(print(table(rows, 0, colours(STDOUT_FILENO))));
 }

@@ -154,8 +154,8 @@ int run_can_nodes(const NodesOptions& options) {
             bus.stop.request();
         }
     });
-    if (live) return written ? 0 : 1;
-    if (options.json) return print(json(nodes, now())) ? 0 : 1;
+    if (live) return exit_code(written);
+    if (options.json) return exit_code(print(json(nodes, now())));
     if (nodes.empty()) {
         return fail(options,
                     fmt::format("no heartbeat and no emergency received within {:g} s; to query "

@@ -141,7 +141,7 @@ int run_can_read_all(const ReadAllOptions& options) {
     }
     const std::string sum = fmt::format("{} objects of node {} read, {} rejected, {} write-only\n",
                                         read, node, refused, write_only);
-    if (!options.output.empty()) return print(options.output + ": " + sum) ? 0 : 1;
+    if (!options.output.empty()) return exit_code(print(options.output + ": " + sum));
     write_all(STDERR_FILENO, sum);
     return 0;
 }

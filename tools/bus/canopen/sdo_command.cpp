@@ -110,7 +110,7 @@ int run_can_sdo_read(const SdoReadOptions& options) {
         }
         const std::span<const std::uint8_t> bytes(received.get(), request.size);
         const Type type = target.type.value_or(object.type);
-        if (!options.output.empty()) return save(options, bytes) ? 0 : 1;
+        if (!options.output.empty()) return exit_code(save(options, bytes));
         if (!print(options.json
                        ? json_line(target.node, object, type, bytes)
                        : fmt::format("{} = {}\n", object.label(), value_text(bytes, type)))) {

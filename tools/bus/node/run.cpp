@@ -332,7 +332,7 @@ private:
 }  // namespace
 
 int run_node(const NodeOptions& options, const NodeKind& kind, canopen::Program& program) {
-    if (options.eds) return print(eds_text(kind, program)) ? 0 : 1;
+    if (options.eds) return exit_code(print(eds_text(kind, program)));
     std::string problem;
     std::uint8_t id = 0;
     if (options.link.empty()) {
