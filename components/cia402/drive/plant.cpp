@@ -18,10 +18,10 @@ double towards(double value, double goal, double dt, double time_constant) noexc
 std::optional<double> Range::edge(double before, double after, bool rising) const noexcept {
     if (!exists()) return std::nullopt;
     const bool forward = after > before;
-    const double position = forward == rising ? from : to;
+    const double place = forward == rising ? from : to;
     const bool passed =
-        forward ? before < position && position <= after : before >= position && position > after;
-    return passed ? std::optional(position) : std::nullopt;
+        forward ? before < place && place <= after : before >= place && place > after;
+    return passed ? std::optional(place) : std::nullopt;
 }
 
 Plant::Plant(const MotorSettings& motor) noexcept

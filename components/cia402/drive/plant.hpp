@@ -21,7 +21,7 @@ namespace hal::cia402 {
 struct Range {
     double from = 0;
     double to = 0;
-    bool holds(double position) const noexcept { return position >= from && position < to; }
+    bool holds(double place) const noexcept { return place >= from && place < to; }
     bool exists() const noexcept { return from < to; }
     /// Returns the first place where a motion enters (`rising`) or leaves it. [realtime]
     std::optional<double> edge(double before, double after, bool rising) const noexcept;
@@ -34,7 +34,7 @@ public:
     /// Stable for any `dt`. [realtime]
     void step(double dt, double torque, double load, bool brake_closed) noexcept;
 
-    double position() const noexcept { return position_; }  ///< encoder increments
+    double place() const noexcept { return place_; }  ///< encoder increments
     double before() const noexcept { return before_; }  ///< the same, one step ago
     double speed() const noexcept { return speed_; }  ///< rad/s
     double torque() const noexcept { return torque_; }
@@ -49,14 +49,14 @@ public:
     /// [realtime]
     std::optional<double> index_pulse(double from, int direction) const noexcept;
     std::optional<double> index_pulse() const noexcept {
-        return index_pulse(before_, position_ < before_ ? -1 : 1);
+        return index_pulse(before_, place_ < before_ ? -1 : 1);
     }
     const MotorSettings& motor() const noexcept { return motor_; }
 
 private:
     const MotorSettings motor_;
     const double per_radian_;
-    double position_, before_, speed_ = 0, torque_ = 0, heat_ = 0;
+    double place_, before_, speed_ = 0, torque_ = 0, heat_ = 0;
 };
 
 }  // namespace hal::cia402

@@ -25,7 +25,7 @@ struct AnyPinOptions {
 
 namespace detail {
 template <hal_dir direction, PinType T>
-using PinOf = std::conditional_t<
+using DirectedPin = std::conditional_t<
     direction == HAL_DIR_IN, In<T>,
     std::conditional_t<direction == HAL_DIR_OUT, Out<T>,
                        std::conditional_t<direction == HAL_DIR_IO, Io<T>, Param<T>>>>;
@@ -107,7 +107,7 @@ public:
 
 private:
     template <PinType T>
-    using Row = detail::PinRow<detail::PinOf<direction, T>, Data>;
+    using Row = detail::PinRow<detail::DirectedPin<direction, T>, Data>;
 
     std::tuple<Row<bool>, Row<std::int32_t>, Row<std::uint32_t>, Row<std::int64_t>,
                Row<std::uint64_t>, Row<double>>

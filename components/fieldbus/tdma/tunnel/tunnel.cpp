@@ -14,7 +14,8 @@ constexpr std::uint16_t ipv4 = 0x0800;
 constexpr std::uint16_t arp = 0x0806;
 constexpr std::uint16_t ipv6 = 0x86dd;
 
-constexpr std::size_t max_payload_size = ethernet::max_frame - ethernet::header_bytes - rtmac_bytes;
+constexpr std::size_t max_payload_size =
+    ethernet::max_frame - ethernet::header_bytes - rtmac_bytes;
 
 bool is_group(const Address& a) noexcept { return (a[0] & 1) != 0; }
 
@@ -60,10 +61,10 @@ Tunnel::Tunnel(Station& station) : station_(station), mtu_(tunnel_mtu(station.se
 
 void Tunnel::arrived(std::span<const std::uint8_t> frame, Time) noexcept {
     if (!is_packet(decode(frame), station_.address())) return count(rejected_);
-    Packet* packet = in_.packet();
-    if (packet == nullptr) return count(dropped_in_);
-    std::copy(frame.begin(), frame.end(), packet->bytes.begin());
-    packet->length = frame.size();
+    Packet* place = in_.place();
+    if (place == nullptr) return count(dropped_in_);
+    std::copy(frame.begin(), frame.end(), place->bytes.begin());
+    place->length = frame.size();
     in_.commit();
     count(received_);
 }
@@ -88,12 +89,12 @@ void Tunnel::before_slots(Time now) noexcept {
 }
 
 bool Tunnel::give(std::span<const std::uint8_t> frame) noexcept {
-    Packet* packet =
-        open() && frame.size() <= ethernet::header_bytes + mtu() ? out_.packet() : nullptr;
-    if (packet != nullptr) {
-        packet->length = tunnel(frame, packet->bytes);
+    Packet* place =
+        open() && frame.size() <= ethernet::header_bytes + mtu() ? out_.place() : nullptr;
+    if (place != nullptr) {
+        place->length = tunnel(frame, place->bytes);
     }
-    if (packet == nullptr || packet->length == 0) {
+    if (place == nullptr || place->length == 0) {
         count(dropped_out_);
         return false;
     }
