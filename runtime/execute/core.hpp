@@ -110,6 +110,8 @@ public:
     Missing missing() const noexcept;
     /// Executes the cycle of the record in the inputs.
     void replay() noexcept;
+    /// This process is a copy that continues the re-execution.
+    void continue_in_copy() noexcept { stopped_.continue_in_copy(); }
     /// Takes offered probes, and answers an observation without a number.
     void serve_at_rest() noexcept;
 

@@ -18,7 +18,14 @@ public:
 
     bool load(std::memory_order order) const noexcept { return !page_->may_run.load(order); }
     void store(bool stopped, std::memory_order order) noexcept {
+        stopped_.store(stopped, std::memory_order_relaxed);
         page_->may_run.store(!stopped, order);
+    }
+    /// This process is a copy that continues in the place of its parent: the flag has the value
+    /// that it had there.
+    void continue_in_copy() noexcept {
+        page_->may_run = !stopped_;
+        page_->original = true;
     }
     /// Returns true in a child process.
     bool in_copy() const noexcept { return !page_->original.load(std::memory_order_relaxed); }
@@ -31,6 +38,7 @@ private:
         std::atomic<bool> original{true};
     };
     Page* const page_;
+    std::atomic<bool> stopped_{false};  // the same value in memory that a child keeps
 };
 
 }  // namespace hal

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "machine/processes/programs.hpp"
+#include "machine/report/crash.hpp"
 #include "machine/session.hpp"
 
 namespace hal {
@@ -219,6 +220,15 @@ ReExecution::State ReExecution::advance() {
     return state_;
 }
 
+void ReExecution::continue_in_copy() {
+    hal::continue_in_copy();
+    for (auto& [number, cursor] : cursors_) {
+        if (cursor.core) {
+            cursor.core->continue_in_copy();
+        }
+    }
+}
+
 ReExecution::State ReExecution::end_of_journal() {
     for (const auto& [number, cursor] : cursors_) {
         if (!cursor.thread || !cursor.thread->record() || cursor.ended) continue;
@@ -266,9 +276,11 @@ bool ReExecution::make(const ExecutionEntry& entry) {
                     "an edit was rolled back after threads had taken it: its cycles "
                     "cannot be executed again");
     case ExecutionEntry::Kind::sampled: sampled_(entry.names); return true;
+    case ExecutionEntry::Kind::opened:
+        outside_ = outside_ || !entry.resources.empty() || entry.threads > 0;
+        return true;
     case ExecutionEntry::Kind::start:
     case ExecutionEntry::Kind::stop:
-    case ExecutionEntry::Kind::opened:
     case ExecutionEntry::Kind::end: return true;  // the cycles have it
     }
     return true;

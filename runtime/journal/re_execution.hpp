@@ -61,6 +61,11 @@ public:
     const JournaledCycle& newest() const { return newest_; }
     std::uint64_t cycles() const { return cycles_; }
     std::uint64_t edits() const { return edits_; }
+    /// Returns true once an instance has opened something outside of the process, or has created a
+    /// thread: from then on the process cannot be copied.
+    bool has_outside() const { return outside_; }
+    /// This process is a copy of the one that has executed so far, and continues.
+    void continue_in_copy();
     /// Returns what `differs` is about: other values, or another number of inputs.
     CycleInputs::Match match() const { return match_; }
 
@@ -116,6 +121,7 @@ private:
     std::size_t entry_ = 0;  // the next one
     State state_ = State::goes_on;
     bool finished_ = false;
+    bool outside_ = false;
     std::string reason_;
     JournaledCycle newest_;
     CycleInputs::Match match_ = CycleInputs::Match::same;

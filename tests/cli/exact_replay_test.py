@@ -216,6 +216,89 @@ class ExactReplay(Case):
         ]:
             self.assertIn(problem, self.replay(*words, status=1))
 
+    def shell_in_the_past(self, lines, *options, status=0):
+        done = self.run_program(
+            "replay", "--exact", "run.mcap", "--shell", *options, given="\n".join(lines) + "\n"
+        )
+        self.assertEqual(status, done.returncode, done.stdout + done.stderr)
+        return done.stdout.splitlines(), done.stderr
+
+    def test_a_shell_goes_to_any_cycle_and_back(self):
+        machine = self.run_journaled(MACHINE, "--values", "position")
+        self.wait_for_cycles(1500)
+        self.finish(machine)
+        read = ["where", "gets position", "gets total", "getp servo.time"]
+        forward, _ = self.shell_in_the_past(["goto 0.4s", *read, "step 700", *read])
+        lines = ["goto 0.4s", "step 700", *read, "step back 700", *read, "step 699", "step"]
+        there, _ = self.shell_in_the_past([*lines, *read, "goto 0.4s", *read])
+        self.assertEqual(forward[5:10], there[1:6])
+        self.assertEqual(forward[0:5], there[6:11])
+        self.assertEqual(forward[6:10], there[13:17])
+        self.assertEqual(forward[0:5], there[17:22])
+        numbers = [
+            int(re.fullmatch(r"cycle (\d+) of 'slow' at \S+ s", line)[1])
+            for line in self.shell_in_the_past(
+                ["goto 0.5s", "step slow", "step 5 slow", "step back 5 slow", "step back slow"]
+            )[0][1:]
+        ]
+        self.assertEqual([0, 5, 0, -1], [number - numbers[0] for number in numbers])
+        begin, _ = self.shell_in_the_past(["step back 99999", "step 3", "goto 0s", "step back 9"])
+        self.assertEqual("before the first cycle", begin[0])
+        self.assertEqual("before the first cycle", begin[3])
+
+    def test_reverse_finds_where_a_condition_began(self):
+        machine = self.run_journaled(MACHINE)
+        self.wait_for_cycles(1500)
+        self.finish(machine)
+        forward, _ = self.shell_in_the_past(
+            ["continue", "continue", "continue", "gets sine"], "--break", "sine > 0.5"
+        )
+        self.assertEqual(4, len({line.split(":")[0] for line in forward[:4]}), forward)
+        back, _ = self.shell_in_the_past(
+            ["break sine > 0.5", "goto 99s", "reverse", "reverse", "goto 0s"]
+            + ["continue"] * 4
+            + ["reverse"] * 4
+        )
+        self.assertEqual("the journal has no further cycle", back[1])
+        self.assertRegex(back[2], r"^cycle \d+ of 'fast' at \S+ s: sine 0\.5\d*$")
+        self.assertEqual(forward[0:4], back[5:9])
+        self.assertEqual(forward[2::-1], back[9:12])
+        self.assertEqual("the condition begins to hold in no earlier cycle", back[12])
+
+    def test_the_past_cannot_be_changed(self):
+        machine = self.run_journaled(MACHINE)
+        self.wait_for_cycles(200)
+        self.finish(machine)
+        lines = ["setp pid.x.Pgain 3", "sets sum 3", "pid.x.Pgain = 3", "loadrt sum2", "stop"]
+        out, _ = self.shell_in_the_past(["goto 100", *lines, "getp pid.x.Pgain"], status=1)
+        for line, text in zip(lines, out[1:]):
+            self.assertRegex(
+                text, "is not possible: this is a moment of the past|unknown command 'pid.x.Pgain'"
+            )
+        self.assertEqual("4", out[-1])
+        for line, problem in [
+            ("step 3 wheel", "the journal has no thread 'wheel'"),
+            ("step 0", "the number of cycles is 1 or more"),
+            ("goto soon", "goto: write a cycle or a time"),
+            ("break sine =>", "break: invalid condition 'sine =>'"),
+            ("reverse", "reverse: no break condition"),
+        ]:
+            self.assertIn(problem, self.shell_in_the_past([line], status=1)[1])
+        self.assertIn(
+            "break: the machine has no 'wheel'",
+            self.shell_in_the_past(["continue"], "--break", "wheel > 3")[0],
+        )
+
+    def test_an_end_before_the_goal_is_reported(self):
+        machine = self.run_journaled(MACHINE)
+        self.wait_for_cycles(100)
+        self.finish(machine)
+        self.assertIn("--until 99s: the journal ends before it", self.replay("--until", "99s"))
+        self.assertIn(
+            "--break 'sine > 7': it holds in no cycle of the journal",
+            self.replay("--break", "sine > 7"),
+        )
+
     def test_what_a_killed_machine_left_is_executed(self):
         machine = self.run_journaled(MACHINE)
         self.wait_for_cycles(3000)

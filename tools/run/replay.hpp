@@ -18,6 +18,7 @@ struct ReplayOptions : NetlistOptions {
     bool quiet = false;
     bool exact = false;
     bool anyway = false;
+    bool shell = false;
     std::string until;              ///< a time or a cycle number
     std::string break_condition;    ///< NAME > VALUE
     std::vector<std::string> show;  ///< names, separated by commas
@@ -45,6 +46,9 @@ struct ReplayOptions : NetlistOptions {
         set.values("--show", show, "NAMES",
                    "with --exact: print these pins, parameters and signals at the end; may be "
                    "repeated");
+        set.flag("--shell", shell,
+                 "with --exact: a shell on the machine at any of its cycles; goes to --until or "
+                 "--break first, type help in it");
         set.flag("--anyway", anyway,
                  "with --exact: also with another program or plugin, and when instances open "
                  "devices or sockets again");

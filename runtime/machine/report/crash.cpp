@@ -222,6 +222,11 @@ void on_quick_exit() {
 
 bool end_is_reported() noexcept { return reported.load(); }
 
+void continue_in_copy() noexcept {
+    machine_process = getpid();
+    in_process_copy = false;
+}
+
 bool is_machine_process() noexcept { return machine_process.load() == getpid(); }
 
 // A machine ends by its own orders.

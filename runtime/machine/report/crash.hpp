@@ -32,6 +32,9 @@ bool end_is_reported() noexcept;
 /// Ends the process as _exit() does; the caller has reported why. async-signal-safe
 [[noreturn]] void end_process(int status) noexcept;
 
+/// This process is a copy of one with machines, made between two cycles, and has them from now on.
+void continue_in_copy() noexcept;
+
 /// Reports of crashes and escaped exceptions name what `machine` contains, until
 /// end_watch_for_crashes(). [setup]
 void watch_for_crashes(const MachineView& machine);

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: MIT
+// `hal replay --exact FILE --shell`: the commands of a machine, in the past.
+#pragma once
+
+#include "journal/journal_file.hpp"
+#include "run/replay.hpp"
+
+namespace hal::tools {
+
+/// Reads commands from standard input until quit. Returns the exit status.
+int run_replay_shell(const ReplayOptions& options, JournalFile& file);
+
+}  // namespace hal::tools

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: MIT
+#include "run/replayed_machine.hpp"
+
+#include <algorithm>
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include "commands/table.hpp"
+#include "run/replay_note.hpp"
+#include "run/sim_summary.hpp"
+#include "text/numbers.hpp"
+#include "text/quoting.hpp"
+
+namespace hal::tools {
+namespace {
+
+constexpr std::uint64_t compare_every = 256;  // cycles
+
+std::string fastest_thread(JournalFile& file) {
+    const auto& threads = file.threads();
+    const auto fastest = std::ranges::min_element(
+        threads, {}, [](const auto& entry) { return entry.second.period_ns; });
+    return fastest == threads.end() ? "" : fastest->second.name;
+}
+
+/// The journal has the edits.
+const ReplayOptions& without_netlists(const ReplayOptions& options, ReplayOptions& copy) {
+    copy = options;
+    copy.words.clear();
+    return copy;
+}
+
+}  // namespace
+
+ReplayedMachine::ReplayedMachine(const ReplayOptions& options, JournalFile& file, Compare compare)
+    : options_(options),
+      file_(file),
+      with_values_(compare == Compare::values),
+      fastest_(fastest_thread(file)),
+      execution_(file),
+      machine_(without_netlists(options, machine_options_), fmt::format("replay-{}", ::getpid()),
+               true, {.schedule = &execution_}) {
+    execution_.attach(
+        machine_.session,
+        [](Transaction& transaction, const Command& command, Diagnostics& diagnostics) {
+        apply_edit(transaction, command, diagnostics);
+    }, [this](const std::vector<std::string>& names) { begin_values(names); });
+}
+
+void ReplayedMachine::begin_values(const std::vector<std::string>& names) {
+    if (!with_values_) return;
+    values_ = std::make_unique<ValueCheck>(options_.words[0], file_.unix_offset_ns());
+    if (values_->problem().empty()) {
+        values_->begin(machine_.session, names);
+    }
+    if (!values_->problem().empty()) {
+        note(options_, "the recorded values are not compared: " + values_->problem());
+    }
+}
+
+bool ReplayedMachine::advance() {
+    if (execution_.advance() != ReExecution::State::goes_on) return false;
+    if (!values_ || ++uncompared_ < compare_every) return true;
+    uncompared_ = 0;
+    return values_->compare();
+}
+
+std::optional<std::uint64_t> ReplayedMachine::compared() const {
+    if (!values_) return std::nullopt;
+    return values_->values();
+}
+
+const ValueDifference* ReplayedMachine::value_difference() const {
+    return values_ && values_->difference() ? &*values_->difference() : nullptr;
+}
+
+std::string ReplayedMachine::difference() const {
+    if (const ValueDifference* const at = value_difference()) return value_text(*at);
+    if (execution_.state() != ReExecution::State::differs) return "";
+    const JournaledCycle& at = execution_.newest();
+    const bool reads = execution_.match() == CycleInputs::Match::other_reads;
+    return fmt::format(
+        "first difference: cycle {} of thread '{}' at {:.6f} s {}\n{}", at.number, at.thread,
+        seconds(at.time_ns),
+        reads ? "reads another number of inputs" : "has values with another checksum",
+        values_ ? "" : "to have the value named, write the journal with: --values '*'\n");
+}
+
+std::string ReplayedMachine::value_text(const ValueDifference& at) const {
+    const auto text = [&at](std::uint64_t word) {
+        return format_exact(at.type, hal_value{.raw = word});
+    };
+    const std::string others = at.others == 0 ? ""
+                                              : fmt::format(", and {} of the same cycle",
+                                                            counted(at.others, "further value"));
+    return fmt::format(
+        "first difference: '{}'{} in cycle {} of thread '{}': {} instead of "
+        "{}{}\n",
+        at.name, function_text(at.name), at.cycle, at.thread, text(at.executed), text(at.recorded),
+        others);
+}
+
+/// Returns the pin that the value is computed for; nullptr: none.
+const Pin* ReplayedMachine::writer(const std::string& name) const {
+    const Model& model = machine_.session.model();
+    const Pin* const pin = model.find_pin(name);
+    const Signal* const signal = pin ? pin->signal : model.find_signal(name);
+    const Pin* const from = signal && signal->writer ? signal->writer : pin;
+    return from && from->instance ? from : nullptr;
+}
+
+const LoadedFunction* ReplayedMachine::function_of(const std::string& name) const {
+    const Pin* const pin = writer(name);
+    if (!pin) return nullptr;
+    if (pin->function) return pin->function;
+    const auto& functions = pin->instance->functions;
+    return functions.empty() ? nullptr : functions.front();
+}
+
+/// Returns " ('x' of pid, function 'x.do-pid-calcs')" of what computes the value.
+std::string ReplayedMachine::function_text(const std::string& name) const {
+    const Pin* const pin = writer(name);
+    if (!pin) return "";
+    const Instance& instance = *pin->instance;
+    std::string text = fmt::format(" ('{}' of {}", instance.name, instance.component->name);
+    if (const LoadedFunction* const function = function_of(name)) {
+        text += fmt::format(", function '{}'", function->name);
+    }
+    return text + ")";
+}
+
+}  // namespace hal::tools

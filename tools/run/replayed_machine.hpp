@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// The machine of a journal, whose cycles are executed again and compared.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "journal/journal_file.hpp"
+#include "journal/re_execution.hpp"
+#include "run/hosted_machine.hpp"
+#include "run/replay.hpp"
+#include "run/value_check.hpp"
+
+namespace hal::tools {
+
+/// [setup]. Members are called with the session's lock held.
+class ReplayedMachine {
+public:
+    enum class Compare : std::uint8_t { values, checksums };
+
+    /// Both outlive it. With Compare::values, the values that were recorded with the journal are
+    /// compared, too.
+    ReplayedMachine(const ReplayOptions& options, JournalFile& file, Compare compare);
+
+    Session& session() { return machine_.session; }
+    HostedMachine& host() { return machine_; }
+    ReExecution& execution() { return execution_; }
+    const ReExecution& execution() const { return execution_; }
+    /// Returns the name of the thread with the shortest period; "" when there is none.
+    const std::string& fastest() const { return fastest_; }
+    /// Executes one cycle. Returns false when it was not possible, or something differs.
+    bool advance();
+    /// Compares what has been executed. Returns false when a value differs.
+    bool compare() { return !values_ || values_->compare(); }
+    /// Returns how many recorded values were compared; nothing when none are recorded.
+    std::optional<std::uint64_t> compared() const;
+    const ValueDifference* value_difference() const;
+    /// Names the first difference; "" when there is none.
+    std::string difference() const;
+    /// Returns the function that computes this value; nullptr: unknown.
+    const LoadedFunction* function_of(const std::string& name) const;
+
+private:
+    void begin_values(const std::vector<std::string>& names);
+    std::string value_text(const ValueDifference& at) const;
+    std::string function_text(const std::string& name) const;
+    const Pin* writer(const std::string& name) const;
+
+    const ReplayOptions& options_;
+    JournalFile& file_;
+    const bool with_values_;
+    const std::string fastest_;
+    ReExecution execution_;
+    ReplayOptions machine_options_;
+    HostedMachine machine_;
+    std::unique_ptr<ValueCheck> values_;
+    std::uint64_t uncompared_ = 0;  // cycles since the last comparison
+};
+
+}  // namespace hal::tools
