@@ -875,20 +875,73 @@ void Core::step_clock(std::int64_t ns) noexcept {
     }
 }
 
-void Core::pass(const plan::Gate& gate) noexcept {
-    if (!inputs_) return;
+/// Takes the next ticket. In a re-execution, waits for the turn of the journaled one.
+///   1. enter: inside + 1   2. ticket, overlaps if inside was > 0    3. reads the state if so
+///   4. the function runs   5. ticket, overlaps if it is not the next one or inside > 1
+///   6. reads the state if so   7. leave: inside - 1
+/// A function that enters between 5 and 7 of another one overlaps, and reads the state that the
+/// other one has left.
+std::uint64_t Core::pass(plan::Gate& gate, bool enters, bool& overlaps) noexcept {
     if (inputs_->replays()) {
-        inputs_->wait_for_turn(inputs_->note(0));
+        const std::uint64_t word = inputs_->note(0);
+        overlaps = (word & 1) != 0;
+        inputs_->wait_for_turn(word >> 1, gate.state.covered());
+        return word >> 1;
+    }
+    plan::GateCounters& counters = *gate.counters;
+    const std::uint32_t others = enters
+                                     ? counters.inside.fetch_add(1, std::memory_order_acq_rel)
+                                     : counters.inside.load(std::memory_order_acquire) - 1;
+    const std::uint64_t ticket = counters.tickets.fetch_add(1, std::memory_order_acq_rel);
+    overlaps = others > 0 || (!enters && ticket != gate.entered + 1);
+    inputs_->note(ticket << 1 | (overlaps ? 1 : 0));
+    return ticket;
+}
+
+void Core::exchange(plan::SharedState& state) noexcept {
+    if (inputs_->replays()) {
+        state.read([this]() noexcept { return inputs_->note(0); });
     } else {
-        inputs_->note(gate.tickets->fetch_add(1, std::memory_order_acq_rel));
+        state.write([this](std::uint64_t word) noexcept { inputs_->note(word); });
+    }
+}
+
+void Core::enter(plan::Gate& gate) noexcept {
+    if (!inputs_) return;
+    bool overlaps = false;
+    gate.entered = pass(gate, true, overlaps);
+    gate.state.begin();
+    if (overlaps) [[unlikely]] {
+        exchange(gate.state);
     }
     const std::uint64_t progress = note(__atomic_load_n(gate.progress, __ATOMIC_RELAXED));
     __atomic_store_n(gate.seen_progress, progress, __ATOMIC_RELAXED);
 }
 
-void pass_gate(void* self, const hal_cycle*) {
-    const auto& gate = *static_cast<const plan::Gate*>(self);
-    static_cast<Core*>(gate.core)->pass(gate);
+void Core::leave(plan::Gate& gate) noexcept {
+    if (!inputs_) return;
+    bool overlaps = false;
+    pass(gate, false, overlaps);
+    const bool live = !inputs_->replays();
+    if (live) {
+        gate.state.look();
+    }
+    if (overlaps) [[unlikely]] {
+        exchange(gate.state);
+    }
+    if (live) {
+        gate.counters->inside.fetch_sub(1, std::memory_order_acq_rel);
+    }
+}
+
+void enter_gate(void* self, const hal_cycle*) {
+    auto& gate = *static_cast<plan::Gate*>(self);
+    static_cast<Core*>(gate.core)->enter(gate);
+}
+
+void leave_gate(void* self, const hal_cycle*) {
+    auto& gate = *static_cast<plan::Gate*>(self);
+    static_cast<Core*>(gate.core)->leave(gate);
 }
 
 void check_finite(void* self, const hal_cycle* cycle) {

@@ -75,8 +75,10 @@ public:
     /// Does the same at the end of the thread; waits while the supervisor does it. Not in a cycle
     void make_safe_at_end() noexcept;
     void raise(FaultEvent event) noexcept;
-    /// Notes the order of functions that share state; in a re-execution, waits for it. [realtime]
-    void pass(const plan::Gate& gate) noexcept;
+    /// Notes the order of functions that share state, and their state when another one runs at the
+    /// same time; in a re-execution, waits for it. [realtime]
+    void enter(plan::Gate& gate) noexcept;
+    void leave(plan::Gate& gate) noexcept;
     /// Notes what the running function reads outside of the machine: a clock, a random number.
     /// Returns what it gets, which is from the journal in a re-execution. [realtime]
     std::uint64_t note_reading(std::uint64_t value) noexcept {
@@ -226,6 +228,8 @@ private:
     std::uint64_t note(std::uint64_t value) noexcept {
         return inputs_ ? inputs_->note(value) : value;
     }
+    std::uint64_t pass(plan::Gate& gate, bool enters, bool& overlaps) noexcept;
+    void exchange(plan::SharedState& state) noexcept;
     void end_record() noexcept;
     std::uint64_t checksum() const noexcept;
     void keep_history() noexcept;
@@ -304,9 +308,10 @@ private:
     ModeCheck modes_;
 };
 
-/// The step that the compiler inserts before and after a function that shares state with one of
+/// The steps that the compiler inserts before and after a function that shares state with one of
 /// another thread; `self` is a plan::Gate. [realtime]
-void pass_gate(void* self, const hal_cycle* cycle);
+void enter_gate(void* self, const hal_cycle* cycle);
+void leave_gate(void* self, const hal_cycle* cycle);
 
 /// The step that the compiler inserts after a function with a declared-finite output; `self` is a
 /// plan::FiniteCheck whose sink is the Core. [realtime]

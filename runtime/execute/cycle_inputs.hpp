@@ -39,7 +39,8 @@ class FunctionOrder {
 public:
     virtual ~FunctionOrder() = default;
     /// Returns when all steps with smaller tickets have run. Other cycles are executed meanwhile.
-    virtual void wait_for(std::uint64_t ticket) = 0;
+    /// `covered`: what functions read of each other while both ran is in the journal.
+    virtual void wait_for(std::uint64_t ticket, bool covered) = 0;
 };
 
 /// Records the inputs of the cycles of one thread, or gives them back. [realtime] for the thread,
@@ -82,9 +83,9 @@ public:
         return value;
     }
     /// Only in a re-execution.
-    void wait_for_turn(std::uint64_t ticket) {
+    void wait_for_turn(std::uint64_t ticket, bool covered) {
         if (order_) {
-            order_->wait_for(ticket);
+            order_->wait_for(ticket, covered);
         }
     }
     void answered(std::uint64_t observation) noexcept { record_.observation = observation; }

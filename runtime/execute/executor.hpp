@@ -33,7 +33,7 @@ public:
     Core& add(const CoreOptions& options, ThreadPins pins);
     /// The cycles of all threads have a journal. Before the first thread and instance.
     void begin_journal() { journaled_ = true; }
-    /// Returns the gate of functions that share state, without its core; nullptr: no journal.
+    /// Returns what gates of functions that share state have in common; nullptr: no journal.
     const plan::Gate* gate() const { return journaled_ || schedule_ ? &gate_ : nullptr; }
     /// Returns what components see of the supervisor.
     const hal_supervision& seen_supervision() const {
@@ -132,10 +132,10 @@ private:
     const std::int64_t epoch_ns_;  // all positions of the grid are epoch + k * period
     std::uint32_t next_id_ = 1;
     bool journaled_ = false;
-    std::atomic<std::uint64_t> tickets_{0};  // written by all threads in gates
+    plan::GateCounters counters_;  // written by all threads in gates
     // written by threads in gates, so that a journal has what they read
     hal_supervision seen_supervision_{sizeof(hal_supervision), 0, 0};
-    const plan::Gate gate_{&tickets_, &supervisor_.shared.progress, &seen_supervision_.progress};
+    const plan::Gate gate_{&counters_, &supervisor_.shared.progress, &seen_supervision_.progress};
 };
 
 }  // namespace hal

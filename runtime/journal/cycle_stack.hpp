@@ -3,6 +3,7 @@
 // several threads overlap like this on a single thread.
 #pragma once
 
+#include <csetjmp>
 #include <functional>
 #include <memory>
 
@@ -30,7 +31,10 @@ private:
     std::unique_ptr<char[]> memory_;
     ucontext_t own_{};
     ucontext_t caller_{};
+    std::jmp_buf own_jump_;
+    std::jmp_buf caller_jump_;
     std::function<void()> work_;
+    bool begun_ = false;
     bool ended_ = true;
 };
 

@@ -6,7 +6,7 @@
 
 namespace hal::journal_format {
 
-inline constexpr std::string_view version = "1";
+inline constexpr std::string_view version = "2";
 /// name of the metadata record: format, version, commit, program, unix_offset_ns
 inline constexpr std::string_view head = "halcyon-journal";
 inline constexpr std::string_view entries_topic = "/hal/journal/entries";

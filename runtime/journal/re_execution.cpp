@@ -185,24 +185,24 @@ void ReExecution::finish_cycle(Cursor& cursor) {
 }
 
 /// Called by a cycle before and after a function that shares state.
-void ReExecution::wait_for(std::uint64_t ticket) {
+void ReExecution::wait_for(std::uint64_t ticket, bool covered) {
     Cursor& cursor = *running_;
     while (ticket > next_ticket_) {
         cursor.ticket = ticket;
         cursor.stack->leave();
     }
     next_ticket_ = ticket + 1;
-    note_overlap(cursor, ticket);
+    note_overlap(cursor, ticket, covered);
 }
 
-void ReExecution::note_overlap(Cursor& cursor, std::uint64_t ticket) {
+void ReExecution::note_overlap(Cursor& cursor, std::uint64_t ticket, bool covered) {
     if (!cursor.entered) {
         cursor.entered = ticket;
         return;
     }
     const bool overlapped = ticket != *cursor.entered + 1;
     cursor.entered.reset();
-    if (overlapped && overlaps_++ == 0) {
+    if (overlapped && !covered && overlaps_++ == 0) {
         first_overlap_ = cycle_of(cursor);
     }
 }

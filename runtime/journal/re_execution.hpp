@@ -76,8 +76,8 @@ public:
     bool step() override;
     std::int64_t now_ns() const override { return now_ns_; }
 
-    /// Returns how often functions that share state ran at the same time, so that what one read of
-    /// the other is unknown, and the first such cycle.
+    /// Returns how often functions that share state ran at the same time and the journal has not
+    /// their state, so that what one read of the other is unknown, and the first such cycle.
     std::uint64_t overlaps() const { return overlaps_; }
     const JournaledCycle& first_overlap() const { return first_overlap_; }
 
@@ -95,8 +95,8 @@ private:
     Cursor* next(bool& needs_edit, bool in_edit);
     bool execute(Cursor& cursor);
     void finish_cycle(Cursor& cursor);
-    void wait_for(std::uint64_t ticket) override;
-    void note_overlap(Cursor& cursor, std::uint64_t ticket);
+    void wait_for(std::uint64_t ticket, bool covered) override;
+    void note_overlap(Cursor& cursor, std::uint64_t ticket, bool covered);
     JournaledCycle cycle_of(const Cursor& cursor) const;
     void load(Cursor& cursor);
     State end_of_journal();

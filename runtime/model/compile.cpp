@@ -245,10 +245,6 @@ private:
             }
         }
         plan.finite_checks = std::make_unique<plan::FiniteCheck[]>(checks);
-        if (input_.journaled()) {
-            plan.gate = std::make_unique<plan::Gate>(*input_.gate);
-            plan.gate->core = input_.core_of(thread);
-        }
         std::size_t check = 0;
         std::unordered_set<const Instance*> met;
         const auto fill = [&](const std::vector<LoadedFunction*>& row, std::vector<plan::Step>& to,
@@ -256,9 +252,11 @@ private:
             for (LoadedFunction* function : row) {
                 if (excluded(function)) continue;
                 const auto begin = static_cast<std::uint32_t>(to.size());
-                const bool gated = plan.gate && shares_state(*function);
-                if (gated) {
-                    to.push_back({input_.pass_gate, plan.gate.get()});
+                plan::Gate* const gate = input_.journaled() && shares_state(*function)
+                                             ? add_gate(thread, *function, plan)
+                                             : nullptr;
+                if (gate) {
+                    to.push_back({input_.enter_gate, gate});
                 }
                 to.insert(to.end(), function->steps.begin(), function->steps.end());
                 for (const Instance* instance : function->instances) {
@@ -269,8 +267,8 @@ private:
                         to.push_back({input_.check_finite, &plan.finite_checks[check++]});
                     }
                 }
-                if (gated) {
-                    to.push_back({input_.pass_gate, plan.gate.get()});
+                if (gate) {
+                    to.push_back({input_.leave_gate, gate});
                 }
                 functions.push_back({begin, static_cast<std::uint32_t>(to.size()), function->id,
                                      function->times.get()});
@@ -302,6 +300,45 @@ private:
                    std::ranges::any_of(instance->functions, elsewhere) ||
                    std::ranges::any_of(instance->pins, cell);
         });
+    }
+
+    plan::Gate* add_gate(const Thread& thread, const LoadedFunction& function,
+                         plan::Plan& plan) const {
+        plan.gates.push_back(std::make_unique<plan::Gate>());
+        plan::Gate& gate = *plan.gates.back();
+        gate.counters = input_.gate->counters;
+        gate.progress = input_.gate->progress;
+        gate.seen_progress = input_.gate->seen_progress;
+        gate.core = input_.core_of(thread);
+        for (const Instance* instance : function.instances) {
+            add_state(*instance, gate.state);
+        }
+        gate.state.complete();
+        return &gate;
+    }
+
+    /// All words of its memory but the pointers that a plan sets.
+    static void add_state(const Instance& instance, plan::SharedState& state) {
+        std::unordered_set<const void*> pointers;
+        for (const auto& pin : instance.pins) {
+            pointers.insert(&pin->memory->slot);
+            pointers.insert(pin->pointer);
+            if (pin->dir == HAL_DIR_OUT || pin->dir == HAL_DIR_IO) {
+                state.add(pin->memory);
+            }
+        }
+        const auto add = [&](void* memory, std::size_t bytes) {
+            auto* const words = static_cast<std::uint64_t*>(memory);
+            for (std::size_t i = 0; i < bytes / sizeof *words; ++i) {
+                if (!pointers.contains(words + i)) {
+                    state.add(words + i);
+                }
+            }
+        };
+        add(instance.memory, instance.component->plugin->instance_size);
+        for (const Instance::Block& block : instance.blocks) {
+            add(block.memory.get(), block.used);
+        }
     }
 
     void rows(const Thread& thread, plan::Plan& plan) const {

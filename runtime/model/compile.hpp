@@ -28,10 +28,11 @@ struct CompileInput {
     const std::unordered_map<const Pin*, hal_pin*>* old_memory = nullptr;
     std::function<void*(const Thread&)> core_of;  ///< the sink of finite checks
     hal_step check_finite = nullptr;
-    /// Not nullptr: the threads have a journal, whose checksums cover their values. The gate around
-    /// functions that share state, without its core, and the step that passes it.
+    /// Not nullptr: the threads have a journal, whose checksums cover their values. What the gates
+    /// around functions that share state have in common, and the steps that pass them.
     const plan::Gate* gate = nullptr;
-    hal_step pass_gate = nullptr;
+    hal_step enter_gate = nullptr;
+    hal_step leave_gate = nullptr;
     bool journaled() const { return gate != nullptr; }
 };
 
@@ -45,8 +46,8 @@ struct Compiled {
         std::vector<std::pair<Thread*, hal_value*>> copies;
         std::shared_ptr<hal_value> cell;
     };
-    std::vector<Place> places;                        ///< of every signal
-    std::vector<std::pair<Pin*, Thread*>> homes;      ///< of pins whose thread changes
+    std::vector<Place> places;  ///< of every signal
+    std::vector<std::pair<Pin*, Thread*>> homes;  ///< of pins whose thread changes
     struct SessionRebind {
         hal_pin* pin;
         hal_value* slot;

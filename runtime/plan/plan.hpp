@@ -13,6 +13,7 @@
 
 #include "hal/abi.h"
 #include "plan/probe.hpp"
+#include "plan/shared_state.hpp"
 
 namespace hal::plan {
 
@@ -129,13 +130,22 @@ struct Safe {
     hal_value value;
 };
 
+/// What all gates of a machine share.
+struct GateCounters {
+    std::atomic<std::uint64_t> tickets{0};
+    std::atomic<std::uint32_t> inside{0};  ///< functions between their two steps
+};
+
 /// `self` of the steps before and after a function that shares state with a function of another
-/// thread: with a journal, the order in which they ran is noted.
+/// thread: with a journal, the order in which they ran is noted, and their state when they ran at
+/// the same time.
 struct Gate {
-    std::atomic<std::uint64_t>* tickets = nullptr;  ///< of all gates of the machine
+    GateCounters* counters = nullptr;
     const std::uint64_t* progress = nullptr;  ///< of the supervisor
     std::uint64_t* seen_progress = nullptr;  ///< what components see of it
     void* core = nullptr;
+    SharedState state = {};
+    std::uint64_t entered = 0;  ///< ticket with which the function began
 };
 
 /// A value that the checksum of a journaled cycle covers.
@@ -192,7 +202,7 @@ struct Plan {
     /// made safe by a call: instances of this thread with a hal::Emergency
     std::vector<Step> emergency;
     std::unique_ptr<FiniteCheck[]> finite_checks;
-    std::unique_ptr<Gate> gate;  ///< of all its gated functions; nullptr: it has no journal
+    std::vector<std::unique_ptr<Gate>> gates;  ///< one per gated function
     /// the slots of this thread's signals, in order of first use
     std::unique_ptr<hal_value[]> image;
     std::size_t image_size = 0;

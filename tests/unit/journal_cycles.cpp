@@ -12,6 +12,7 @@
 #include "execute/cycle_inputs.hpp"
 #include "journal/cycle_codec.hpp"
 #include "journal/journal_entry.hpp"
+#include "plan/shared_state.hpp"
 
 namespace hal::test {
 namespace {
@@ -198,6 +199,68 @@ TEST(ExecutionEntry, Is_nothing_when_it_is_damaged) {
           R"({"kind":"edit","epoch":-1,"commands":[1],"files":[]})"}) {
         EXPECT_FALSE(execution_entry(text)) << text;
     }
+}
+
+TEST(SharedState, Copies_the_words_that_have_changed_and_the_outputs_but_no_addresses) {
+    std::uint64_t live[] = {1, 2, 3, 0x7f0000001000};
+    std::uint64_t again[] = {1, 2, 3, 0x7f0000009000};
+    hal_value value{.raw = 5};
+    hal_value other{.raw = 6};
+    hal_pin output{.slot = &value, .own = {}};
+    hal_pin second{.slot = &other, .own = {}};
+    plan::SharedState from;
+    plan::SharedState to;
+    for (std::size_t i = 0; i < 4; ++i) {
+        from.add(&live[i]);
+        to.add(&again[i]);
+    }
+    from.add(&output);
+    to.add(&second);
+    from.complete();
+    to.complete();
+    from.begin();
+    live[1] = 20;
+    live[3] = 0x7f0000001008;
+    from.look();
+    live[1] = 21;
+    Words words;
+    from.write([&words](std::uint64_t word) { words.push_back(word); });
+    EXPECT_EQ(words, (Words{1, 1, 21, 5}));
+    again[2] = 9;
+    std::size_t at = 0;
+    to.read([&] { return words[at++]; });
+    EXPECT_EQ(again[0], 1u);
+    EXPECT_EQ(again[1], 21u);
+    EXPECT_EQ(again[2], 9u);
+    EXPECT_EQ(again[3], 0x7f0000009000u);
+    EXPECT_EQ(other.raw, 5u);
+}
+
+TEST(SharedState, Does_not_trust_the_words_of_a_journal) {
+    std::uint64_t word = 1;
+    plan::SharedState state;
+    state.add(&word);
+    state.complete();
+    const Words words = {3, 7, 1, UINT64_MAX, 2, 0, 4};
+    std::size_t at = 0;
+    state.read([&] { return at < words.size() ? words[at++] : 0; });
+    EXPECT_EQ(word, 4u);
+}
+
+TEST(SharedState, Leaves_out_a_state_that_is_too_large) {
+    std::vector<std::uint64_t> memory(plan::SharedState::max_words + 1);
+    plan::SharedState state;
+    for (std::uint64_t& word : memory) {
+        state.add(&word);
+    }
+    state.complete();
+    EXPECT_FALSE(state.covered());
+    state.begin();
+    memory[0] = 1;
+    state.look();
+    Words words;
+    state.write([&words](std::uint64_t one) { words.push_back(one); });
+    EXPECT_EQ(words, Words{0});
 }
 
 }  // namespace

@@ -419,7 +419,8 @@ bool ThreadPlans::swap(Edit& edit, EarlierValues& before, const Functions& witho
     input.core_of = [this](const Thread& thread) -> void* { return core(&thread); };
     input.check_finite = check_finite;
     input.gate = state_.executor->gate();
-    input.pass_gate = pass_gate;
+    input.enter_gate = enter_gate;
+    input.leave_gate = leave_gate;
     Compiled compiled = compile(state_.model, input);
     state_.probes.enter(compiled);
     observe_unknowns(compiled);
