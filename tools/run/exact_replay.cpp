@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <chrono>
 #include <fmt/core.h>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "cli/output.hpp"
+#include "run/difference_inputs.hpp"
 #include "run/journaled_program.hpp"
 #include "run/replay_note.hpp"
 #include "run/replay_shell.hpp"
@@ -44,7 +46,11 @@ public:
         execution_.finish();
         return status;
     }
-    const ReplayedMachine& machine() const { return machine_; }
+    /// Returns the first value that differs.
+    std::optional<ValueDifference> difference() const {
+        const ValueDifference* const at = machine_.value_difference();
+        return at ? std::optional(*at) : std::nullopt;
+    }
 
 private:
     /// Returns true when a rule or the user has stopped it before the end.
@@ -178,7 +184,15 @@ int run_exact_replay(const ReplayOptions& options) {
         program.name_uncopied();
         return run_replay_shell(options, file);
     }
-    return ExactReplay(options, file, until, condition).run();
+    std::optional<ValueDifference> difference;
+    int status = 0;
+    {
+        ExactReplay replay(options, file, until, condition);
+        status = replay.run();
+        difference = replay.difference();
+    }
+    if (difference && !print(inputs_of(options, *difference))) return 1;
+    return status;
 }
 
 }  // namespace hal::tools

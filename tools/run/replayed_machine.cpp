@@ -100,7 +100,6 @@ std::string ReplayedMachine::value_text(const ValueDifference& at) const {
         others);
 }
 
-/// Returns the pin that the value is computed for; nullptr: none.
 const Pin* ReplayedMachine::writer(const std::string& name) const {
     const Model& model = machine_.session.model();
     const Pin* const pin = model.find_pin(name);

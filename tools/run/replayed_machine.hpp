@@ -40,6 +40,8 @@ public:
     const ValueDifference* value_difference() const;
     /// Names the first difference; "" when there is none.
     std::string difference() const;
+    /// Returns the pin that the value is computed for; nullptr: no component computes it.
+    const Pin* writer(const std::string& name) const;
     /// Returns the function that computes this value; nullptr: unknown.
     const LoadedFunction* function_of(const std::string& name) const;
 
@@ -47,7 +49,6 @@ private:
     void begin_values(const std::vector<std::string>& names);
     std::string value_text(const ValueDifference& at) const;
     std::string function_text(const std::string& name) const;
-    const Pin* writer(const std::string& name) const;
 
     const ReplayOptions& options_;
     JournalFile& file_;

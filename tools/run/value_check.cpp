@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <string_view>
 
 namespace hal::tools {
 namespace {
@@ -50,6 +51,11 @@ bool ValueCheck::compare() {
 void ValueCheck::compare(const ProbeRows& rows) {
     if (rows.layout) {
         layout_ = *rows.layout;
+        for (auto& [thread, positions] : tables_) {
+            for (Position& position : positions) {
+                position.pairs.clear();
+            }
+        }
     }
     std::size_t at = 0;
     for (const auto& part : rows.parts) {
@@ -80,6 +86,23 @@ std::size_t ValueCheck::rank(const std::string& name) const {
     return last;
 }
 
+/// Returns which word of an executed row is which column of a recorded one.
+std::vector<std::pair<std::size_t, std::size_t>> ValueCheck::pairs_of(
+    const mcap::Table& table, const std::vector<std::size_t>& columns) const {
+    std::map<std::string_view, std::size_t> index_of;
+    for (std::size_t i = 0; i < table.columns.size(); ++i) {
+        index_of.emplace(table.columns[i].name, i);
+    }
+    std::vector<std::pair<std::size_t, std::size_t>> pairs;
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+        const auto found = index_of.find(Probes::columns(*probe_)[columns[i]].name);
+        if (found != index_of.end()) {
+            pairs.emplace_back(i, found->second);
+        }
+    }
+    return pairs;
+}
+
 void ValueCheck::compare(const Row& row) {
     const std::int64_t time_ns = row.time_ns + unix_offset_ns_;
     std::optional<ValueDifference> first;
@@ -91,18 +114,24 @@ void ValueCheck::compare(const Row& row) {
             ++at;
         }
         if (at == table.rows() || table.times_ns[at] != time_ns) continue;
-        for (std::size_t i = 0; i < row.columns->size(); ++i) {
-            const std::string& name = Probes::columns(*probe_)[(*row.columns)[i]].name;
-            const auto column = std::ranges::find(table.columns, name, &mcap::Column::name);
-            if (column == table.columns.end()) continue;
-            const auto index = static_cast<std::size_t>(column - table.columns.begin());
-            const std::uint64_t recorded = table.word(at, index);
-            ++values_;
-            if (recorded == row.words[i]) continue;
+        if (position.pairs.empty()) {
+            position.pairs = pairs_of(table, *row.columns);
+        }
+        values_ += position.pairs.size();
+        const std::uint64_t* const recorded = &table.words[at * table.columns.size()];
+        for (const auto& [executed, column] : position.pairs) {
+            if (recorded[column] == row.words[executed]) continue;
             ++others;
+            const std::string& name = table.columns[column].name;
             if (!first || rank(name) < rank(first->name)) {
-                first = {name,         row.thread, row.cycle,    row.time_ns,
-                         column->type, recorded,   row.words[i], 0};
+                first = {name,
+                         row.thread,
+                         row.cycle,
+                         row.time_ns,
+                         table.columns[column].type,
+                         recorded[column],
+                         row.words[executed],
+                         0};
             }
         }
     }

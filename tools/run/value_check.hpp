@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "machine/session.hpp"
@@ -47,6 +48,8 @@ private:
     struct Position {
         const mcap::Table* table;
         std::size_t row = 0;
+        /// index in an executed row and in a recorded one; empty: to be found
+        std::vector<std::pair<std::size_t, std::size_t>> pairs = {};
     };
     struct Row {
         std::string thread;
@@ -57,6 +60,8 @@ private:
     };
     void compare(const ProbeRows& rows);
     void compare(const Row& row);
+    std::vector<std::pair<std::size_t, std::size_t>> pairs_of(
+        const mcap::Table& table, const std::vector<std::size_t>& columns) const;
     std::size_t rank(const std::string& name) const;
 
     const std::int64_t unix_offset_ns_;
