@@ -900,7 +900,7 @@ std::uint64_t Core::pass(plan::Gate& gate, bool enters, bool& overlaps) noexcept
 
 void Core::exchange(plan::SharedState& state) noexcept {
     if (inputs_->replays()) {
-        state.read([this]() noexcept { return inputs_->note(0); });
+        state.read([this]() noexcept { return inputs_->note(0); }, inputs_->has_state());
     } else {
         state.write([this](std::uint64_t word) noexcept { inputs_->note(word); });
     }

@@ -114,6 +114,9 @@ public:
     /// Sets the record of the next cycle. At most max_notes notes.
     void load(const CycleRecord& record, std::span<const std::uint64_t> notes);
     const std::uint64_t* notes() const noexcept { return notes_.get(); }
+    /// From now on the machine is another one: what was noted of its own state is ignored.
+    void ignore_state() noexcept { has_state_ = false; }
+    bool has_state() const noexcept { return has_state_; }
     enum class Match : std::uint8_t {
         same,
         other_reads,  ///< the cycle has read more or less than the journaled one
@@ -127,6 +130,7 @@ private:
 
     CycleRecord record_;
     std::size_t count_ = 0;  // of notes
+    bool has_state_ = true;
     std::unique_ptr<std::uint64_t[]> notes_;
     Match match_ = Match::same;
     FunctionOrder* const order_ = nullptr;

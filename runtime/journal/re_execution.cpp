@@ -177,8 +177,10 @@ void ReExecution::finish_cycle(Cursor& cursor) {
     newest_ = cycle_of(cursor);
     ++cycles_;
     match_ = cursor.inputs->match();
-    if (match_ != CycleInputs::Match::same) {
+    if (match_ != CycleInputs::Match::same && !accepts_differences_) {
         fail(State::differs, "");
+    } else if (match_ != CycleInputs::Match::same && !diverged_) {
+        diverged_ = newest_;
     }
     cursor.thread->next();
     load(cursor);
@@ -218,6 +220,13 @@ ReExecution::State ReExecution::advance() {
         if (!make_next_edit()) break;
     }
     return state_;
+}
+
+void ReExecution::accept_differences() {
+    accepts_differences_ = true;
+    for (auto& [number, cursor] : cursors_) {
+        cursor.inputs->ignore_state();
+    }
 }
 
 void ReExecution::continue_in_copy() {

@@ -64,6 +64,11 @@ public:
     /// Returns true once an instance has opened something outside of the process, or has created a
     /// thread: from then on the process cannot be copied.
     bool has_outside() const { return outside_; }
+    /// The machine has been changed: from now on cycles may differ from the journaled ones, and only
+    /// the first one is noted.
+    void accept_differences();
+    /// Returns the first cycle that differed after accept_differences().
+    const std::optional<JournaledCycle>& diverged() const { return diverged_; }
     /// This process is a copy of the one that has executed so far, and continues.
     void continue_in_copy();
     /// Returns what `differs` is about: other values, or another number of inputs.
@@ -122,6 +127,8 @@ private:
     State state_ = State::goes_on;
     bool finished_ = false;
     bool outside_ = false;
+    bool accepts_differences_ = false;
+    std::optional<JournaledCycle> diverged_;
     std::string reason_;
     JournaledCycle newest_;
     CycleInputs::Match match_ = CycleInputs::Match::same;

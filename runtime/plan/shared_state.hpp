@@ -68,19 +68,23 @@ public:
             note(load(&output->slot->raw));
         }
     }
-    /// Sets the state to the words that `note` returns. In a re-execution, between two functions
+    /// Sets the state to the words that `note` returns, or only reads them unless `sets`. In a
+    /// re-execution, between two functions
     template <class Note>
-    void read(Note note) noexcept {
+    void read(Note note, bool sets = true) noexcept {
         const std::uint64_t count = note();
         for (std::uint64_t pair = 0; pair < count && pair < max_words; ++pair) {
             const std::uint64_t index = note();
             const std::uint64_t value = note();
-            if (index < words_.size() && !is_address(load(words_[index]))) {
+            if (sets && index < words_.size() && !is_address(load(words_[index]))) {
                 *words_[index] = value;
             }
         }
         for (const hal_pin* const output : outputs_) {
-            output->slot->raw = note();
+            const std::uint64_t value = note();
+            if (sets) {
+                output->slot->raw = value;
+            }
         }
     }
 

@@ -286,6 +286,46 @@ class ExactReplay(Case):
             self.shell_in_the_past(["continue"], "--break", "wheel > 3")[0],
         )
 
+    def test_another_value_changes_what_follows(self):
+        machine = self.run_journaled(MACHINE, "--values", "*")
+        self.wait_for_cycles(800)
+        self.finish(machine)
+        show = ["--until", "0.6s", "--show", "position"]
+        as_it_was = self.replay(*show).splitlines()[-1]
+        at = ["--at", "0.3s", *show]
+        text = self.replay("--edit", "setp pid.x.Pgain 9", *at)
+        self.assertRegex(
+            text,
+            r"\nedited after cycle \d+ of 'fast' at 0\.3\d+ s\n"
+            r"first value that differs: 'effort' \('pid\.x' of pid, function "
+            r"'pid\.x\.do-pid-calcs'\) in cycle \d+ of thread 'servo': \S+ instead of \S+, and "
+            r"\d+ further values of the same cycle\n"
+            r"first cycle that differs: \d+ of 'servo' at 0\.3\d+ s\n"
+            r"the journal has no input from outside of the machine but the time: what follows is "
+            r"computed\n",
+        )
+        self.assertNotEqual(as_it_was, text.splitlines()[-1])
+        text = self.replay("--edit", "setp pid.x.Pgain 4", *at)
+        self.assertIn("\nno cycle differs from the journaled ones\n", text)
+        self.assertEqual(as_it_was, text.splitlines()[-1])
+        shell, _ = self.shell_in_the_past(
+            ["goto 0.6s", "gets position", "step back 900", "goto 0.6s", "gets position"],
+            *["--edit", "setp pid.x.Pgain 9", "--at", "0.3s"],
+        )
+        self.assertEqual(shell[1], shell[4])
+        for edit, at, problem in [
+            ("setp pid.x.output 3", "0.3s", "--edit: 'pid.x.output' is linked to signal 'effort'"),
+            ("sets effort 3", "0.3s", "--edit: signal 'effort' is written by 'pid.x.output'"),
+            ("setp wheel 3", "0.3s", "--edit: the machine has no pin or parameter 'wheel'"),
+            ("setp pid.x.Pgain x", "0.3s", "--edit: 'pid.x.Pgain': 'x' is not a number"),
+            ("setp pid.x.Pgain 3", "99s", "--at 99s: the execution ended before it"),
+            ("net x y", "0.3s", "--edit: invalid edit 'net x y'"),
+            ("setp pid.x.Pgain 3", "soon", "--at: invalid cycle or time 'soon'"),
+        ]:
+            self.assertIn(problem, self.replay("--edit", edit, "--at", at, status=1))
+        self.assertIn("--at needs --edit", self.replay("--at", "3s", status=1))
+        self.assertIn("--edit needs --at", self.replay("--edit", "setp a 3", status=1))
+
     def test_an_end_before_the_goal_is_reported(self):
         machine = self.run_journaled(MACHINE)
         self.wait_for_cycles(100)

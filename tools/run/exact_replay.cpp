@@ -26,12 +26,12 @@ class ExactReplay {
 public:
     /// All outlive it.
     ExactReplay(const ReplayOptions& options, JournalFile& file, const JournalPosition& until,
-                const ValueCondition& condition)
+                const ValueCondition& condition, const WhatIf& change)
         : options_(options),
           file_(file),
           until_(until),
           condition_(condition),
-          machine_(options, file, ReplayedMachine::Compare::values),
+          machine_(options, file, ReplayedMachine::Compare::values, change),
           execution_(machine_.execution()) {}
 
     /// Executes the journal and prints the result. Returns the exit status.
@@ -78,14 +78,22 @@ private:
         bool good = !differs;
         if (differs) {
             text += difference;
+        } else if (!machine_.change_problem().empty()) {
+            good = false;
+            text += "--edit: " + machine_.change_problem() + "\n";
         } else if (execution_.state() == ReExecution::State::fails) {
             good = false;
             text += execution_.reason() + "\n";
         } else if (execution_.state() == ReExecution::State::ends) {
             good = !file_.complete() && !has_gap();
             text += "the journal ends: " + execution_.reason() + "\n";
-        } else {
+        } else if (!machine_.change().done()) {
             text += verdict(stopped);
+        }
+        text += machine_.consequences();
+        if (!machine_.change().empty() && !machine_.change().done() && !differs) {
+            note(options_, fmt::format("--at {}: the execution ended before it", options_.at));
+            good = false;
         }
         if (condition_.is_unknown(machine_.session())) {
             note(options_, fmt::format("--break: the machine has no '{}'", condition_.name()));
@@ -169,6 +177,10 @@ int run_exact_replay(const ReplayOptions& options) {
         return fail(options, fmt::format("--break: invalid condition '{}'; {}",
                                          options.break_condition, ValueCondition::form));
     }
+    WhatIf change;
+    if (const std::string problem = change.parse(options); !problem.empty()) {
+        return fail(options, problem);
+    }
     JournalFile file;
     if (!file.open(options.words[0])) {
         return fail(options,
@@ -182,12 +194,12 @@ int run_exact_replay(const ReplayOptions& options) {
     program.name_readers();
     if (options.shell) {
         program.name_uncopied();
-        return run_replay_shell(options, file);
+        return run_replay_shell(options, file, change);
     }
     std::optional<ValueDifference> difference;
     int status = 0;
     {
-        ExactReplay replay(options, file, until, condition);
+        ExactReplay replay(options, file, until, condition, change);
         status = replay.run();
         difference = replay.difference();
     }

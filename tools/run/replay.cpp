@@ -484,8 +484,9 @@ private:
 int run_replay(const ReplayOptions& options) {
     if (options.exact) return run_exact_replay(options);
     if (!options.until.empty() || !options.break_condition.empty() || !options.show.empty() ||
-        options.anyway || options.shell) {
-        return fail(options, "--until, --break, --show, --shell and --anyway need --exact");
+        options.anyway || options.shell || !options.edits.empty() || !options.at.empty()) {
+        return fail(options,
+                    "--until, --break, --show, --shell, --edit, --at and --anyway need --exact");
     }
     if (options.words.size() < 2) return fail(options, "missing netlist: hal replay FILE NETLIST");
     const std::string file = std::filesystem::absolute(options.words.front()).string();

@@ -19,6 +19,8 @@ struct ReplayOptions : NetlistOptions {
     bool exact = false;
     bool anyway = false;
     bool shell = false;
+    std::vector<std::string> edits;  ///< setp NAME VALUE, sets NAME VALUE
+    std::string at;                  ///< a time or a cycle number
     std::string until;              ///< a time or a cycle number
     std::string break_condition;    ///< NAME > VALUE
     std::vector<std::string> show;  ///< names, separated by commas
@@ -49,6 +51,11 @@ struct ReplayOptions : NetlistOptions {
         set.flag("--shell", shell,
                  "with --exact: a shell on the machine at any of its cycles; goes to --until or "
                  "--break first, type help in it");
+        set.values("--edit", edits, "EDIT",
+                   "with --exact: from --at on, execute with another value: 'setp NAME VALUE' or "
+                   "'sets SIGNAL VALUE'; may be repeated");
+        set.value("--at", at, "CYCLE|TIME",
+                  "with --exact: the cycle of the fastest thread, or the time, of --edit");
         set.flag("--anyway", anyway,
                  "with --exact: also with another program or plugin, and when instances open "
                  "devices or sockets again");

@@ -282,7 +282,7 @@ std::optional<std::string> ReplayShell::receive() {
 
 }  // namespace
 
-int run_replay_shell(const ReplayOptions& options, JournalFile& file) {
+int run_replay_shell(const ReplayOptions& options, JournalFile& file, const WhatIf& change) {
     int ends[2];
     if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) {
         return fail(options, fmt::format("cannot create a socket: {}", std::strerror(errno)));
@@ -295,7 +295,7 @@ int run_replay_shell(const ReplayOptions& options, JournalFile& file) {
     if (moment == 0) {
         ::close(ends[0]);
         std::signal(SIGTTOU, SIG_IGN);  // it prints while the front has the terminal
-        ReplayedMoment(options, file, frames, ends[1]).serve();
+        ReplayedMoment(options, file, frames, change, ends[1]).serve();
     }
     ::close(ends[1]);
     StopRequest stop;

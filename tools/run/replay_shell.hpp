@@ -4,10 +4,11 @@
 
 #include "journal/journal_file.hpp"
 #include "run/replay.hpp"
+#include "run/what_if.hpp"
 
 namespace hal::tools {
 
-/// Reads commands from standard input until quit. Returns the exit status.
-int run_replay_shell(const ReplayOptions& options, JournalFile& file);
+/// Reads commands from standard input until quit. The machine is changed by `change`. Returns the exit status.
+int run_replay_shell(const ReplayOptions& options, JournalFile& file, const WhatIf& change);
 
 }  // namespace hal::tools

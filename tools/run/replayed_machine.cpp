@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <fmt/core.h>
 #include <unistd.h>
+#include <utility>
 
 #include "commands/table.hpp"
 #include "run/replay_note.hpp"
@@ -32,14 +33,16 @@ const ReplayOptions& without_netlists(const ReplayOptions& options, ReplayOption
 
 }  // namespace
 
-ReplayedMachine::ReplayedMachine(const ReplayOptions& options, JournalFile& file, Compare compare)
+ReplayedMachine::ReplayedMachine(const ReplayOptions& options, JournalFile& file, Compare compare,
+                                 WhatIf change)
     : options_(options),
       file_(file),
       with_values_(compare == Compare::values),
       fastest_(fastest_thread(file)),
       execution_(file),
       machine_(without_netlists(options, machine_options_), fmt::format("replay-{}", ::getpid()),
-               true, {.schedule = &execution_}) {
+               true, {.schedule = &execution_}),
+      change_(std::move(change)) {
     execution_.attach(
         machine_.session,
         [](Transaction& transaction, const Command& command, Diagnostics& diagnostics) {
@@ -59,10 +62,45 @@ void ReplayedMachine::begin_values(const std::vector<std::string>& names) {
 }
 
 bool ReplayedMachine::advance() {
+    if (change_.is_due(execution_.newest(), fastest_) && !make_change()) return false;
     if (execution_.advance() != ReExecution::State::goes_on) return false;
     if (!values_ || ++uncompared_ < compare_every) return true;
     uncompared_ = 0;
-    return values_->compare();
+    return values_->compare() || change_.done();
+}
+
+/// Returns false when something differs before it, or when it is not possible.
+bool ReplayedMachine::make_change() {
+    if (!compare()) return false;
+    change_problem_ = change_.apply(machine_.session, execution_.newest());
+    if (!change_problem_.empty()) return false;
+    execution_.accept_differences();
+    return true;
+}
+
+std::string ReplayedMachine::consequences() const {
+    if (!change_.done() || !change_problem_.empty()) return "";
+    const JournaledCycle& since = change_.since();
+    std::string text = fmt::format("edited after cycle {} of '{}' at {:.6f} s\n", since.number,
+                                   since.thread, seconds(since.time_ns));
+    if (values_ && values_->difference()) {
+        text += value_text(*values_->difference(), "first value that differs");
+    }
+    if (const auto& diverged = execution_.diverged()) {
+        text += fmt::format("first cycle that differs: {} of '{}' at {:.6f} s\n", diverged->number,
+                            diverged->thread, seconds(diverged->time_ns));
+        const std::string inputs = outside_inputs(file_);
+        text += inputs.empty()
+                    ? "the journal has no input from outside of the machine but the time: what "
+                      "follows is computed\n"
+                    : fmt::format(
+                          "from this cycle on, inputs no longer belong to the outputs: "
+                          "{}\n",
+                          inputs);
+    } else {
+        text += "no cycle differs from the journaled ones\n";
+    }
+    return text;
 }
 
 std::optional<std::uint64_t> ReplayedMachine::compared() const {
@@ -71,11 +109,13 @@ std::optional<std::uint64_t> ReplayedMachine::compared() const {
 }
 
 const ValueDifference* ReplayedMachine::value_difference() const {
-    return values_ && values_->difference() ? &*values_->difference() : nullptr;
+    const bool has_one = values_ && values_->difference() && !change_.done();
+    return has_one ? &*values_->difference() : nullptr;
 }
 
 std::string ReplayedMachine::difference() const {
-    if (const ValueDifference* const at = value_difference()) return value_text(*at);
+    if (const ValueDifference* const at = value_difference())
+        return value_text(*at, "first difference");
     if (execution_.state() != ReExecution::State::differs) return "";
     const JournaledCycle& at = execution_.newest();
     const bool reads = execution_.match() == CycleInputs::Match::other_reads;
@@ -86,7 +126,7 @@ std::string ReplayedMachine::difference() const {
         values_ ? "" : "to have the value named, write the journal with: --values '*'\n");
 }
 
-std::string ReplayedMachine::value_text(const ValueDifference& at) const {
+std::string ReplayedMachine::value_text(const ValueDifference& at, const char* title) const {
     const auto text = [&at](std::uint64_t word) {
         return format_exact(at.type, hal_value{.raw = word});
     };
@@ -94,10 +134,10 @@ std::string ReplayedMachine::value_text(const ValueDifference& at) const {
                                               : fmt::format(", and {} of the same cycle",
                                                             counted(at.others, "further value"));
     return fmt::format(
-        "first difference: '{}'{} in cycle {} of thread '{}': {} instead of "
+        "{}: '{}'{} in cycle {} of thread '{}': {} instead of "
         "{}{}\n",
-        at.name, function_text(at.name), at.cycle, at.thread, text(at.executed), text(at.recorded),
-        others);
+        title, at.name, function_text(at.name), at.cycle, at.thread, text(at.executed),
+        text(at.recorded), others);
 }
 
 const Pin* ReplayedMachine::writer(const std::string& name) const {

@@ -13,6 +13,7 @@
 #include "run/hosted_machine.hpp"
 #include "run/replay.hpp"
 #include "run/value_check.hpp"
+#include "run/what_if.hpp"
 
 namespace hal::tools {
 
@@ -23,7 +24,8 @@ public:
 
     /// Both outlive it. With Compare::values, the values that were recorded with the journal are
     /// compared, too.
-    ReplayedMachine(const ReplayOptions& options, JournalFile& file, Compare compare);
+    ReplayedMachine(const ReplayOptions& options, JournalFile& file, Compare compare,
+                    WhatIf change = {});
 
     Session& session() { return machine_.session; }
     HostedMachine& host() { return machine_; }
@@ -31,7 +33,14 @@ public:
     const ReExecution& execution() const { return execution_; }
     /// Returns the name of the thread with the shortest period; "" when there is none.
     const std::string& fastest() const { return fastest_; }
-    /// Executes one cycle. Returns false when it was not possible, or something differs.
+    /// Returns the change of --edit.
+    const WhatIf& change() const { return change_; }
+    /// Returns why the change cannot be made; "" when it can.
+    const std::string& change_problem() const { return change_problem_; }
+    /// Describes what the change has caused so far; "" before it.
+    std::string consequences() const;
+    /// Executes one cycle. Returns false when it was not possible, or something differs that
+    /// --edit has not caused.
     bool advance();
     /// Compares what has been executed. Returns false when a value differs.
     bool compare() { return !values_ || values_->compare(); }
@@ -46,8 +55,9 @@ public:
     const LoadedFunction* function_of(const std::string& name) const;
 
 private:
+    bool make_change();
     void begin_values(const std::vector<std::string>& names);
-    std::string value_text(const ValueDifference& at) const;
+    std::string value_text(const ValueDifference& at, const char* title) const;
     std::string function_text(const std::string& name) const;
 
     const ReplayOptions& options_;
@@ -58,6 +68,8 @@ private:
     ReplayOptions machine_options_;
     HostedMachine machine_;
     std::unique_ptr<ValueCheck> values_;
+    WhatIf change_;
+    std::string change_problem_;
     std::uint64_t uncompared_ = 0;  // cycles since the last comparison
 };
 

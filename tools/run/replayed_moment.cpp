@@ -25,11 +25,11 @@ constexpr std::uint64_t look_every = 64;  // cycles: at the clock and at the fro
 }  // namespace
 
 ReplayedMoment::ReplayedMoment(const ReplayOptions& options, JournalFile& file, Keyframes& frames,
-                               int socket)
+                               const WhatIf& change, int socket)
     : options_(options),
       frames_(frames),
       socket_(socket),
-      machine_(options, file, ReplayedMachine::Compare::values),
+      machine_(options, file, ReplayedMachine::Compare::values, change),
       spacing_(min_spacing) {}
 
 void ReplayedMoment::serve() {
@@ -253,9 +253,11 @@ std::string ReplayedMoment::state_text() {
     if (interrupted_) return "interrupted\n";
     machine_.compare();
     if (std::string text = machine_.difference(); !text.empty()) return text;
+    if (!machine_.change_problem().empty()) return "--edit: " + machine_.change_problem() + "\n";
     const ReExecution& execution = machine_.execution();
     switch (execution.state()) {
-    case ReExecution::State::complete: return "the journal has no further cycle\n";
+    case ReExecution::State::complete:
+        return "the journal has no further cycle\n" + machine_.consequences();
     case ReExecution::State::ends: return "the journal ends: " + execution.reason() + "\n";
     case ReExecution::State::fails: return execution.reason() + "\n";
     default: return "";

@@ -40,7 +40,8 @@ struct Errand {
 class ReplayedMoment {
 public:
     /// `socket`: of the front. All others outlive it.
-    ReplayedMoment(const ReplayOptions& options, JournalFile& file, Keyframes& frames, int socket);
+    ReplayedMoment(const ReplayOptions& options, JournalFile& file, Keyframes& frames,
+                   const WhatIf& change, int socket);
 
     /// Answers the front until it ends. Does not return: a copy has not the threads that a
     /// destructor would wait for.
