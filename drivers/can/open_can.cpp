@@ -5,6 +5,8 @@
 #include <optional>
 
 #include "can/cane/cane.hpp"
+#include "can/journal/journaled_link.hpp"
+#include "can/journal/ordered_link.hpp"
 #include "can/replay/can_replay.hpp"
 #include "can/scocan/scocan_link.hpp"
 #include "can/sim/sim_can.hpp"
@@ -19,17 +21,26 @@ namespace hal::can {
 
 namespace {
 
-constexpr link::Driver<Opened, Options, Description> drivers[] = {
+using Driver = link::Driver<Opened, Options, Description>;
+using EventLog = Driver::EventLog;
+
+constexpr Driver drivers[] = {
     {link::form_of(address_forms, "can"), socketcan::open, socketcan::describe},
-    {link::form_of(address_forms, "sim"), simbus::open, simbus::describe},
+    {link::form_of(address_forms, "sim"),
+     simbus::open,
+     simbus::describe,
+     nullptr,
+     nullptr,
+     {},
+     EventLog::order},
     {link::form_of(address_forms, "udp"), canudp::open, canudp::describe, nullptr, nullptr,
      "restart"},
     {link::form_of(address_forms, "slcan"), slcan::open, slcan::describe, nullptr, nullptr,
      "own errors restart receivequeue"},
     {link::form_of(address_forms, "cane"), cane::open, cane::describe, cane::is_own_option,
-     cane::own_options, "bitrate datarate own errors restart"},
+     cane::own_options, "bitrate datarate own errors restart", EventLog::carrier},
     {link::form_of(address_forms, "scocan"), scocan::open, scocan::describe, scocan::is_own_option,
-     scocan::own_options, "bitrate datarate fd own errors stamps restart"},
+     scocan::own_options, "bitrate datarate fd own errors stamps restart", EventLog::carrier},
     {link::form_of(address_forms, "replay"), replay::open, replay::describe, nullptr, nullptr,
      "own restart sendqueue receivequeue"},
 };
@@ -100,11 +111,22 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
            "receivequeue";
 }
 
+/// Opens a link as the journal of the calling program has it.
+Opened open_journaled(const Driver& driver, const std::string& target, const Options& options) {
+    const auto open = [&] { return driver.open(target, options); };
+    switch (driver.journal) {
+    case EventLog::results: return journal::open_journaled(open);
+    case EventLog::order: return journal::open_ordered(target, open);
+    case EventLog::carrier: break;
+    }
+    return open();
+}
+
 }  // namespace
 
 Opened open(std::string_view address, const Options& given) {
     return link::open_address<Opened, Options, Description>(address, given, drivers, apply,
-                                                            "a CAN bus");
+                                                            "a CAN bus", open_journaled);
 }
 
 Description describe(std::string_view address) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <charconv>
 
+#include "ethernet/journal/journaled_port.hpp"
+#include "ethernet/journal/ordered_port.hpp"
 #include "ethernet/raw/raw_ethernet.hpp"
 #include "ethernet/replay/ethernet_replay.hpp"
 #include "ethernet/sim/sim_ethernet.hpp"
@@ -15,9 +17,18 @@ namespace hal::ethernet {
 
 namespace {
 
-constexpr link::Driver<Opened, Options, Description> drivers[] = {
+using Driver = link::Driver<Opened, Options, Description>;
+using EventLog = Driver::EventLog;
+
+constexpr Driver drivers[] = {
     {link::form_of(address_forms, "eth"), rawether::open, rawether::describe},
-    {link::form_of(address_forms, "sim"), simbus::open, simbus::describe},
+    {link::form_of(address_forms, "sim"),
+     simbus::open,
+     simbus::describe,
+     nullptr,
+     nullptr,
+     {},
+     EventLog::order},
     {link::form_of(address_forms, "udp"), udp::open, udp::describe, nullptr, nullptr,
      "policy pacer priority cpu promiscuous txstamps speed forward noise mac sendqueue"},
     {link::form_of(address_forms, "replay"), replay::open, replay::describe},
@@ -97,11 +108,22 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
            "forward, noise, sendqueue, receivequeue";
 }
 
+/// Opens a link as the journal of the calling program has it.
+Opened open_journaled(const Driver& driver, const std::string& target, const Options& options) {
+    const auto open = [&] { return driver.open(target, options); };
+    switch (driver.journal) {
+    case EventLog::results: return journal::open_journaled(open);
+    case EventLog::order: return journal::open_ordered(target, open);
+    case EventLog::carrier: break;
+    }
+    return open();
+}
+
 }  // namespace
 
 Opened open(std::string_view address, const Options& given) {
     return link::open_address<Opened, Options, Description>(address, given, drivers, apply,
-                                                            "an Ethernet segment");
+                                                            "an Ethernet segment", open_journaled);
 }
 
 Description describe(std::string_view address) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <exception>
 #include <span>
 #include <string>
@@ -39,6 +40,12 @@ struct Driver {
     std::string (*own_options)() = nullptr;  ///< their names, for a message
     /// common options it does not support, separated by blanks
     std::string_view without = {};
+    /// how its links are in the journal of a machine
+    enum class EventLog : std::uint8_t {
+        results,  ///< what they give their user
+        order,  ///< the order of the calls: a bus in memory is executed again
+        carrier,  ///< not at all: their frames travel on another link, which is in the journal
+    } journal = EventLog::results;
 
     /// The prefix of its addresses.
     std::string_view name() const { return form.example.substr(0, form.example.find(':')); }
@@ -70,10 +77,11 @@ std::string address_forms(std::span<const Driver<Opened, Options, Description>> 
 
 /// Opens an address with the driver that it names. `apply(key, value, has_value, options)` applies
 /// an option and returns the problem, or ""; `kind` completes "'x' is not the address of ".
-template <class Opened, class Options, class Description, class Apply>
+/// `open(driver, target, options)` calls the driver.
+template <class Opened, class Options, class Description, class Apply, class Open>
 Opened open_address(std::string_view address, Options options,
                     std::span<const Driver<Opened, Options, Description>> drivers, Apply apply,
-                    std::string_view kind) {
+                    std::string_view kind, Open open) {
     const auto colon = address.find(':');
     const auto driver = std::find_if(drivers.begin(), drivers.end(), [&](const auto& d) {
         return d.name() == address.substr(0, colon);
@@ -113,7 +121,7 @@ Opened open_address(std::string_view address, Options options,
         }
     }
     try {
-        auto opened = driver->open(where, options);
+        auto opened = open(*driver, where, options);
         if (!opened) {
             opened.problem = std::string(address) + ": " + opened.problem;
         }

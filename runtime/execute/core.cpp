@@ -479,9 +479,9 @@ std::int64_t Core::clock_ns() noexcept {
 
 /// The time for messages and traces, on which no value depends.
 std::int64_t Core::unnoted_clock_ns() noexcept {
-    reads_itself_ = true;
+    const bool hidden = hide_readings(true);
     const std::int64_t now_ns = monotonic_ns();
-    reads_itself_ = false;
+    hide_readings(hidden);
     return now_ns;
 }
 
@@ -517,11 +517,11 @@ Core::Missing Core::missing() const noexcept {
 void Core::replay() noexcept {
     const CycleRecord record = inputs_->record();
     const DefaultFloatModes modes;
-    if (record.kind == CycleRecord::service) return service();
     if (record.missed > monitor.missed()) {
         skip(record.missed - monitor.missed());
     }
     info_.number = record.number;
+    if (record.kind == CycleRecord::service) return service();
     cycle(record.grid_ns, record.due_ns, record.woke_ns);
 }
 
@@ -770,9 +770,11 @@ void Core::make_safe() noexcept {
     for (const plan::Safe& safe : plan_->safe) {
         __atomic_store_n(&safe.pin->slot->raw, safe.value.raw, __ATOMIC_RELAXED);
     }
+    in_emergency_ = true;
     for (const plan::Step& step : plan_->emergency) {
         step.step(step.self, &info_);
     }
+    in_emergency_ = false;
 }
 
 void Core::make_safe_at_end() noexcept {

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <csetjmp>
 #include <cstdint>
+#include <utility>
 
 #include "execute/cycle_inputs.hpp"
 #include "execute/cycle_mark.hpp"
@@ -82,8 +83,14 @@ public:
     /// Notes what the running function reads outside of the machine: a clock, a random number.
     /// Returns what it gets, which is from the journal in a re-execution. [realtime]
     std::uint64_t note_reading(std::uint64_t value) noexcept {
-        return inputs_ && in_function() && !reads_itself_ ? inputs_->note(value) : value;
+        return inputs_ && in_component() && !reads_itself_ ? inputs_->note(value) : value;
     }
+    /// Returns what takes the results of calls that the running function makes; nullptr: nothing.
+    /// [realtime]
+    CycleInputs* results() noexcept { return in_component() ? inputs_ : nullptr; }
+    /// The readings of the calling thread are those of a driver, whose results are noted. Returns
+    /// what it was before. [realtime]
+    bool hide_readings(bool hidden) noexcept { return std::exchange(reads_itself_, hidden); }
     /// Records a frame that the running function sends or receives. [realtime]
     void trace_frame(TraceEvent::Kind kind, std::uint32_t id, std::size_t bytes) noexcept;
     /// Shifts the grid for all positions after that of this cycle; does nothing outside a function.
@@ -204,6 +211,8 @@ public:
     std::uint32_t interrupted_function() const noexcept;
     std::uint64_t cycle_number() const noexcept { return info_.number; }
     bool in_function() const noexcept { return mark_->in_function.load(std::memory_order_relaxed); }
+    /// Returns true in a function, and in an emergency function that the thread calls.
+    bool in_component() const noexcept { return in_function() || in_emergency_; }
     /// Where the cycle continues when a function does not return to it: Left.
     std::jmp_buf recover;
     enum Left : int { threw = 1, ended_thread = 2 };
@@ -302,6 +311,7 @@ private:
     CycleMark* const mark_;  // own_mark_, or one in shared memory
     CycleInputs* const inputs_;  // nullptr: no journal
     bool reads_itself_ = false;  // not the running function
+    bool in_emergency_ = false;
     bool safe_ = true;
     std::size_t sampled_ = 0;
     bool in_budget_ = true;

@@ -32,6 +32,7 @@ struct CycleRecord {
     std::uint64_t checksum = 0;  ///< of values of the thread at the end
     std::uint64_t imports = 0;  ///< so many of the notes are the finished cycles it read
     std::uint64_t notes = 0;  ///< how many words follow
+    std::uint64_t data = 0;  ///< so many of the notes, the last ones, are bytes of results
 };
 
 /// The order in which functions that share state ran in a journaled machine.
@@ -41,6 +42,8 @@ public:
     /// Returns when all steps with smaller tickets have run. Other cycles are executed meanwhile.
     /// `covered`: what functions read of each other while both ran is in the journal.
     virtual void wait_for(std::uint64_t ticket, bool covered) = 0;
+    /// The same for calls that were made one at a time, whose tickets are a sequence of their own.
+    virtual void wait_for_call(std::uint64_t ticket) = 0;
 };
 
 /// Records the inputs of the cycles of one thread, or gives them back. [realtime] for the thread,
@@ -76,7 +79,7 @@ public:
     /// was read in the journaled cycle.
     std::uint64_t note(std::uint64_t value) noexcept {
         const std::size_t at = count_++;
-        if (replays()) return at < record_.notes ? notes_[at] : value;
+        if (replays()) return at < record_.notes - record_.data ? notes_[at] : value;
         if (at < max_notes) {
             notes_[at] = value;
         }
@@ -88,11 +91,27 @@ public:
             order_->wait_for(ticket, covered);
         }
     }
+    /// Appends the result of a call, or gives it back. A re-execution may ask for more than the
+    /// journaled cycle had: then it returns false, with zeros in `bytes`.
+    void put(const void* bytes, std::size_t size) noexcept;
+    bool get(void* bytes, std::size_t size) noexcept;
+    /// Notes the ticket of a call; in a re-execution, waits for it.
+    void order_call(std::uint64_t ticket) noexcept;
+    /// In a re-execution: `link` has sent other frames than in the journaled cycle. The text
+    /// outlives the cycle.
+    void differs(const char* link) noexcept {
+        if (!differing_link_) {
+            differing_link_ = link;
+        }
+    }
     void answered(std::uint64_t observation) noexcept { record_.observation = observation; }
     /// Ends the record; in a re-execution, compares it.
     void end(std::uint64_t writes, std::uint64_t checksum) noexcept;
     /// Forgets what was noted since begin().
-    void drop() noexcept { count_ = 0; }
+    void drop() noexcept {
+        count_ = 0;
+        data_bytes_ = 0;
+    }
 
     /// Returns the record whose words begin at `words`; its notes follow. [any]
     static CycleRecord record_at(const std::uint64_t* words) noexcept;
@@ -121,17 +140,24 @@ public:
         same,
         other_reads,  ///< the cycle has read more or less than the journaled one
         other_values,
+        other_frames,  ///< a link has sent other frames: differing_link()
     };
     /// Returns how the last cycle compares with its record.
     Match match() const noexcept { return match_; }
+    const char* differing_link() const noexcept { return differing_link_; }
 
 private:
-    void put() noexcept;
+    void put_record() noexcept;
 
     CycleRecord record_;
     std::size_t count_ = 0;  // of notes
     bool has_state_ = true;
     std::unique_ptr<std::uint64_t[]> notes_;
+    std::size_t data_bytes_ = 0;  // of results, that were put or got
+    std::unique_ptr<std::uint64_t[]> data_;
+    std::uint64_t last_call_ = 0;  // ticket of the newest call in this cycle, and one more
+    bool asked_too_much_ = false;
+    const char* differing_link_ = nullptr;
     Match match_ = Match::same;
     FunctionOrder* const order_ = nullptr;
     const std::size_t mask_;

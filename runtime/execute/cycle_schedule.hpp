@@ -4,6 +4,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string>
+
+#include "execute/setup_results.hpp"
 
 namespace hal {
 
@@ -24,6 +28,15 @@ public:
     virtual bool step() = 0;
     /// Returns when the newest cycle woke, on the clock of the journaled machine.
     virtual std::int64_t now_ns() const = 0;
+
+    /// Returns the results of the next call of this name; nullopt: the journal has none.
+    virtual std::optional<SetupResults> results_of(const std::string& /*call*/) {
+        return std::nullopt;
+    }
+    /// Returns the file that was opened next under this name; nullptr: the journal has none.
+    virtual const SetupFile* file_of(const std::string& /*path*/) { return nullptr; }
+    /// Executes cycles until all ordered calls with smaller tickets have been made.
+    virtual void wait_for_setup_call(std::uint64_t /*ticket*/) {}
 };
 
 }  // namespace hal

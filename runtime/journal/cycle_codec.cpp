@@ -49,11 +49,16 @@ void CycleEncoder::add(const CycleRecord& record, std::span<const std::uint64_t>
     put_word(bytes_, record.checksum);
     put_number(bytes_, record.imports);
     put_number(bytes_, notes.size());
-    for (std::size_t i = 0; i < notes.size(); ++i) {
-        put_difference(bytes_, notes[i], note_before(notes_before_, i));
+    put_number(bytes_, record.data);
+    const std::span<const std::uint64_t> differing = notes.first(notes.size() - record.data);
+    for (std::size_t i = 0; i < differing.size(); ++i) {
+        put_difference(bytes_, differing[i], note_before(notes_before_, i));
+    }
+    for (const std::uint64_t word : notes.last(record.data)) {
+        put_word(bytes_, word);
     }
     before_ = record;
-    notes_before_.assign(notes.begin(), notes.end());
+    notes_before_.assign(differing.begin(), differing.end());
     ++records_;
 }
 
@@ -113,18 +118,23 @@ bool CycleDecoder::next(CycleRecord& record, std::vector<std::uint64_t>& notes) 
     record.checksum = word();
     record.imports = number();
     record.notes = number();
+    record.data = number();
     // each note has a byte at least
     if (record.notes > CycleInputs::max_notes || record.notes > bytes_.size() - at_ ||
-        record.imports > record.notes || record.kind > CycleRecord::service) {
+        record.data > record.notes || record.imports > record.notes - record.data ||
+        record.kind > CycleRecord::service) {
         damaged_ = true;
     }
     if (damaged_) return false;
     notes.clear();
-    for (std::uint64_t i = 0; i < record.notes; ++i) {
+    for (std::uint64_t i = 0; i < record.notes - record.data; ++i) {
         notes.push_back(difference(note_before(notes_before_, i)));
     }
     before_ = record;
     notes_before_ = notes;
+    for (std::uint64_t i = 0; i < record.data; ++i) {
+        notes.push_back(word());
+    }
     return !damaged_;
 }
 

@@ -26,11 +26,11 @@ std::int64_t offset_to_unix_ns() {
     return std::int64_t{real.tv_sec} * 1'000'000'000 + real.tv_nsec - monotonic_ns();
 }
 
-/// Two seconds of cycles that read little.
+/// Two seconds of cycles that read little, one of those that receive a full Ethernet frame each.
 std::size_t ring_words(std::int64_t period_ns) {
     constexpr std::int64_t seconds_ns = 2'000'000'000;
     constexpr std::int64_t words_per_cycle = 32;
-    constexpr std::int64_t min_words = std::int64_t{1} << 16;
+    constexpr std::int64_t min_words = std::int64_t{1} << 18;
     constexpr std::int64_t max_words = std::int64_t{1} << 22;
     const std::int64_t words = seconds_ns / std::max<std::int64_t>(period_ns, 1) * words_per_cycle;
     return static_cast<std::size_t>(std::clamp(words, min_words, max_words));
@@ -52,6 +52,9 @@ ExecutionJournal::ExecutionJournal(const std::string& path, const JournalOrigin&
     entries_ = writer_.add_channel(
         writer_.add_schema("halcyon.JournalEntry", "jsonschema", journal_format::entry_schema),
         journal_format::entries_topic, "json", {});
+    setup_ = writer_.add_channel(
+        writer_.add_schema(journal_format::setup_type, "ros2msg", journal_format::setup_schema),
+        journal_format::setup_topic, "cdr", {});
     cycles_schema_ =
         writer_.add_schema(journal_format::cycles_type, "ros2msg", journal_format::cycles_schema);
     worker_ = std::thread([this] { work(); });
@@ -115,6 +118,31 @@ void ExecutionJournal::switched(bool running) {
     add({.kind = running ? ExecutionEntry::Kind::start : ExecutionEntry::Kind::stop});
 }
 
+void ExecutionJournal::add(const SetupRecord& record) {
+    const std::scoped_lock own(mutex_);
+    writer_.message(setup_, setup_count_++, unix_ns(monotonic_ns()), to_cdr(record));
+}
+
+void ExecutionJournal::called(const SetupResults& results) {
+    add({.kind = SetupRecord::call,
+         .name = results.call,
+         .results = results.links,
+         .readings = results.readings});
+}
+
+void ExecutionJournal::file_read(const SetupFile& file) {
+    SetupRecord record{.kind = SetupRecord::file};
+    record.error = static_cast<std::uint32_t>(file.error);
+    record.name = file.path;
+    if (file.error == 0) {
+        record.hash = text_hash(file.bytes);
+    }
+    if (contents_.insert(record.hash).second) {
+        record.results = file.bytes;
+    }
+    add(record);
+}
+
 void ExecutionJournal::opened(const std::string& instance, const std::string& component,
                               const OutsideWorld& outside) {
     ExecutionEntry entry{.kind = ExecutionEntry::Kind::opened};
@@ -122,6 +150,8 @@ void ExecutionJournal::opened(const std::string& instance, const std::string& co
     entry.component = component;
     entry.resources = outside.files;
     entry.threads = outside.threads;
+    entry.helpers = outside.helpers;
+    entry.links = outside.links;
     entry.streams = outside.streams;
     add(std::move(entry));
 }

@@ -16,6 +16,7 @@
 #include "execute/cycle_inputs.hpp"
 #include "journal/cycle_codec.hpp"
 #include "journal/journal_entry.hpp"
+#include "journal/setup_record.hpp"
 #include "machine/run/execution_sink.hpp"
 #include "recording/mcap/writer.hpp"
 
@@ -46,6 +47,8 @@ public:
     void withdrawn() override;
     void written(std::vector<std::pair<std::string, std::uint64_t>> values) override;
     void switched(bool running) override;
+    void called(const SetupResults& results) override;
+    void file_read(const SetupFile& file) override;
     void opened(const std::string& instance, const std::string& component,
                 const OutsideWorld& outside) override;
 
@@ -86,6 +89,7 @@ private:
         std::uint32_t batches = 0;
     };
     void add(ExecutionEntry entry);
+    void add(const SetupRecord& record);
     void work();
     void drain();
     void encode(Thread& thread);
@@ -98,6 +102,9 @@ private:
     std::uint16_t entries_ = 0;
     std::uint16_t cycles_schema_ = 0;
     std::uint32_t entry_count_ = 0;
+    std::uint16_t setup_ = 0;
+    std::uint32_t setup_count_ = 0;
+    std::set<std::string> contents_;  // hashes of files whose bytes were written
     std::vector<std::unique_ptr<Thread>> threads_;
     std::set<std::pair<std::string, std::string>> files_;  // path and hash of what was noted
     std::uint64_t cycles_ = 0;

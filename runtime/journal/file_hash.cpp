@@ -5,23 +5,45 @@
 #include <cstdint>
 #include <fmt/core.h>
 #include <fstream>
+#include <string_view>
 
 namespace hal {
 
+namespace {
+
+/// FNV-1a of 64 bits.
+class Hash {
+public:
+    void add(std::string_view bytes) {
+        constexpr std::uint64_t prime = 0x100000001b3;
+        for (const char byte : bytes) {
+            value_ = (value_ ^ static_cast<unsigned char>(byte)) * prime;
+        }
+    }
+    std::string text() const { return fmt::format("{:016x}", value_); }
+
+private:
+    std::uint64_t value_ = 0xcbf29ce484222325;
+};
+
+}  // namespace
+
 std::string file_hash(const std::string& path) {
-    constexpr std::uint64_t basis = 0xcbf29ce484222325;
-    constexpr std::uint64_t prime = 0x100000001b3;
     std::ifstream file(path, std::ios::binary);
     if (!file) return "";
-    std::uint64_t hash = basis;
+    Hash hash;
     std::array<char, 1 << 16> block;
     while (file) {
         file.read(block.data(), block.size());
-        for (std::streamsize i = 0; i < file.gcount(); ++i) {
-            hash = (hash ^ static_cast<unsigned char>(block[static_cast<std::size_t>(i)])) * prime;
-        }
+        hash.add({block.data(), static_cast<std::size_t>(file.gcount())});
     }
-    return file.bad() ? "" : fmt::format("{:016x}", hash);
+    return file.bad() ? "" : hash.text();
+}
+
+std::string text_hash(std::string_view bytes) {
+    Hash hash;
+    hash.add(bytes);
+    return hash.text();
 }
 
 }  // namespace hal

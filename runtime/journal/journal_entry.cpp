@@ -52,6 +52,8 @@ std::string to_json(const ExecutionEntry& entry) {
         json["component"] = entry.component;
         json["resources"] = entry.resources;
         json["threads"] = entry.threads;
+        json["helpers"] = entry.helpers;
+        json["links"] = entry.links;
         json["streams"] = entry.streams;
         break;
     case Kind::sampled: json["names"] = entry.names; break;
@@ -85,6 +87,8 @@ std::optional<ExecutionEntry> execution_entry(std::string_view text) {
             json.at("component").get_to(entry.component);
             json.at("resources").get_to(entry.resources);
             json.at("threads").get_to(entry.threads);
+            json.at("helpers").get_to(entry.helpers);
+            json.at("links").get_to(entry.links);
             json.at("streams").get_to(entry.streams);
             break;
         case Kind::sampled: json.at("names").get_to(entry.names); break;

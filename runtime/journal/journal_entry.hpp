@@ -26,8 +26,8 @@ struct ExecutionEntry {
         written,    ///< programs wrote pins: values
         start,      ///< functions were started
         stop,
-        opened,  ///< an instance reads what the journal does not have: instance, component,
-                 ///< resources, threads, streams
+        opened,  ///< an instance depends on the outside: instance, component,
+                 ///< resources, threads, helpers, links, streams
         sampled,  ///< the values of these names are recorded from here on: names
         end,      ///< the machine ended in order
     };
@@ -40,6 +40,8 @@ struct ExecutionEntry {
     std::string component = {};
     std::vector<std::string> resources = {};
     std::uint64_t threads = 0;
+    std::uint64_t helpers = 0;
+    std::uint64_t links = 0;
     std::uint64_t streams = 0;
     std::vector<std::string> names = {};
 };

@@ -99,9 +99,12 @@ bool JournalFile::open(const std::string& path) {
     unix_offset_ns_ = number_in<std::int64_t>(head, "unix_offset_ns");
     std::map<std::uint16_t, std::uint32_t> thread_of;
     std::optional<std::uint16_t> entries;
+    std::optional<std::uint16_t> setup;
     for (const auto& [id, channel] : reader.channels()) {
         if (channel.topic == journal_format::entries_topic) {
             entries = id;
+        } else if (channel.topic == journal_format::setup_topic) {
+            setup = id;
         } else if (channel.topic.starts_with(journal_format::cycles_topic)) {
             const auto number = number_in<std::uint32_t>(channel.metadata, "number");
             thread_of[id] = number;
@@ -118,6 +121,10 @@ bool JournalFile::open(const std::string& path) {
             entries_end = entries_end || !entry || message.sequence != entries_.size();
             if (!entries_end) {
                 entries_.push_back(std::move(*entry));
+            }
+        } else if (setup == message.channel) {
+            if (auto record = setup_record(message.payload)) {
+                setup_.add(std::move(*record));
             }
         } else if (const auto thread = thread_of.find(message.channel); thread != thread_of.end()) {
             threads_[thread->second].add_batch(

@@ -11,6 +11,7 @@
 #include "execute/cycle_inputs.hpp"
 #include "journal/cycle_codec.hpp"
 #include "journal/journal_entry.hpp"
+#include "journal/setup_record.hpp"
 
 namespace hal {
 
@@ -58,6 +59,7 @@ public:
     const std::string& program() const { return program_; }  ///< hash of its file
     const std::vector<ExecutionEntry>& entries() const { return entries_; }
     std::map<std::uint32_t, JournaledThread>& threads() { return threads_; }
+    JournaledSetup& setup() { return setup_; }
     /// Returns true when the machine ended in order.
     bool complete() const;
     std::int64_t unix_offset_ns() const { return unix_offset_ns_; }
@@ -68,6 +70,7 @@ private:
     std::string version_, program_;
     std::int64_t unix_offset_ns_ = 0;
     std::vector<ExecutionEntry> entries_;
+    JournaledSetup setup_;
     std::map<std::uint32_t, JournaledThread> threads_;  // by their number
 };
 

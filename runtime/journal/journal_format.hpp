@@ -14,6 +14,11 @@ inline constexpr std::string_view entries_topic = "/hal/journal/entries";
 inline constexpr std::string_view cycles_topic = "/hal/journal/cycles/";
 inline constexpr std::string_view entry_schema =
     R"({"type":"object","properties":{"kind":{"type":"string"}},"required":["kind"]})";
+/// What setup calls got, and the files that they read: SetupRecord, as CDR.
+inline constexpr std::string_view setup_topic = "/hal/journal/setup";
+inline constexpr std::string_view setup_type = "halcyon_msgs/msg/JournaledSetup";
+inline constexpr std::string_view setup_schema =
+    "uint32 kind\nuint32 error\nuint8[] name\nuint8[] hash\nuint8[] results\nuint8[] readings\n";
 /// A batch of records of CycleEncoder, as CDR.
 inline constexpr std::string_view cycles_type = "halcyon_msgs/msg/JournaledCycles";
 inline constexpr std::string_view cycles_schema = "uint32 count\nuint8[] records\n";

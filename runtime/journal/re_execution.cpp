@@ -119,7 +119,7 @@ ReExecution::Cursor* ReExecution::next(bool& needs_edit, bool in_edit) {
     std::vector<Cursor*> waiting;
     for (auto& [number, cursor] : cursors_) {
         if (cursor.suspended) {
-            if (cursor.ticket == next_ticket_) return &cursor;
+            if (cursor.ticket == (cursor.in_call ? next_call_ : next_ticket_)) return &cursor;
         } else if (cursor.thread && cursor.thread->record() && !cursor.ended) {
             waiting.push_back(&cursor);
         }
@@ -133,7 +133,23 @@ ReExecution::Cursor* ReExecution::next(bool& needs_edit, bool in_edit) {
         needs_edit = true;
         if (!in_edit) return nullptr;
     }
-    return nullptr;
+    return accepts_differences_ ? stalled_call() : nullptr;
+}
+
+/// A changed machine may make fewer calls than the journaled one. Returns the thread whose call is
+/// the next one that is made; nullptr: none waits.
+ReExecution::Cursor* ReExecution::stalled_call() {
+    Cursor* first = nullptr;
+    for (auto& [number, cursor] : cursors_) {
+        const bool waits = cursor.suspended && cursor.in_call;
+        if (waits && (!first || cursor.ticket < first->ticket)) {
+            first = &cursor;
+        }
+    }
+    if (first) {
+        next_call_ = first->ticket;
+    }
+    return first;
 }
 
 void ReExecution::load(Cursor& cursor) {
@@ -177,6 +193,9 @@ void ReExecution::finish_cycle(Cursor& cursor) {
     newest_ = cycle_of(cursor);
     ++cycles_;
     match_ = cursor.inputs->match();
+    if (const char* const link = cursor.inputs->differing_link()) {
+        differing_link_ = link;
+    }
     if (match_ != CycleInputs::Match::same && !accepts_differences_) {
         fail(State::differs, "");
     } else if (match_ != CycleInputs::Match::same && !diverged_) {
@@ -188,6 +207,7 @@ void ReExecution::finish_cycle(Cursor& cursor) {
 
 /// Called by a cycle before and after a function that shares state.
 void ReExecution::wait_for(std::uint64_t ticket, bool covered) {
+    if (!running_) return;  // the machine ends, with the cycle suspended
     Cursor& cursor = *running_;
     while (ticket > next_ticket_) {
         cursor.ticket = ticket;
@@ -195,6 +215,26 @@ void ReExecution::wait_for(std::uint64_t ticket, bool covered) {
     }
     next_ticket_ = ticket + 1;
     note_overlap(cursor, ticket, covered);
+}
+
+/// Called by a cycle in an ordered call.
+void ReExecution::wait_for_call(std::uint64_t ticket) {
+    if (!running_) return;
+    Cursor& cursor = *running_;
+    while (ticket > next_call_) {
+        cursor.ticket = ticket;
+        cursor.in_call = true;
+        cursor.stack->leave();
+    }
+    cursor.in_call = false;
+    next_call_ = std::max(next_call_, ticket + 1);
+}
+
+/// Called by a setup call, on the session's stack.
+void ReExecution::wait_for_setup_call(std::uint64_t ticket) {
+    while (ticket > next_call_ && step()) {
+    }
+    next_call_ = std::max(next_call_, ticket + 1);
 }
 
 void ReExecution::note_overlap(Cursor& cursor, std::uint64_t ticket, bool covered) {

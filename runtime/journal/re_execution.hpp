@@ -73,6 +73,8 @@ public:
     void continue_in_copy();
     /// Returns what `differs` is about: other values, or another number of inputs.
     CycleInputs::Match match() const { return match_; }
+    /// Returns the link that has sent other frames; "": none.
+    const std::string& differing_link() const { return differing_link_; }
 
     // CycleSchedule
     CycleInputs& inputs_of(std::uint32_t id) override;
@@ -80,6 +82,13 @@ public:
     void end(Core& core) override;
     bool step() override;
     std::int64_t now_ns() const override { return now_ns_; }
+    std::optional<SetupResults> results_of(const std::string& call) override {
+        return file_.setup().next_call(call);
+    }
+    const SetupFile* file_of(const std::string& path) override {
+        return file_.setup().next_file(path);
+    }
+    void wait_for_setup_call(std::uint64_t ticket) override;
 
     /// Returns how often functions that share state ran at the same time and the journal has not
     /// their state, so that what one read of the other is unknown, and the first such cycle.
@@ -94,14 +103,17 @@ private:
         bool ended = false;
         std::unique_ptr<CycleStack> stack = {};  // of its cycle
         bool suspended = false;  // within a cycle, in a gate
+        bool in_call = false;  // suspended in an ordered call
         std::uint64_t ticket = 0;  // that it waits for
         std::optional<std::uint64_t> entered = {};  // ticket with which its function began
     };
     Cursor* next(bool& needs_edit, bool in_edit);
+    Cursor* stalled_call();
     bool execute(Cursor& cursor);
     void finish_cycle(Cursor& cursor);
     void wait_for(std::uint64_t ticket, bool covered) override;
     void note_overlap(Cursor& cursor, std::uint64_t ticket, bool covered);
+    void wait_for_call(std::uint64_t ticket) override;
     JournaledCycle cycle_of(const Cursor& cursor) const;
     void load(Cursor& cursor);
     State end_of_journal();
@@ -121,6 +133,7 @@ private:
     std::map<std::uint32_t, Cursor> cursors_;
     Cursor* running_ = nullptr;
     std::uint64_t next_ticket_ = 0;
+    std::uint64_t next_call_ = 0;  // ticket
     std::uint64_t overlaps_ = 0;
     JournaledCycle first_overlap_;
     std::size_t entry_ = 0;  // the next one
@@ -132,6 +145,7 @@ private:
     std::string reason_;
     JournaledCycle newest_;
     CycleInputs::Match match_ = CycleInputs::Match::same;
+    std::string differing_link_;
     std::uint64_t cycles_ = 0;
     std::uint64_t edits_ = 0;
     std::optional<std::int64_t> begin_ns_;

@@ -143,6 +143,7 @@ struct Instance {
     bool started = false;
     bool own_threads = false;  ///< uses its pins in threads of its own, at any moment
     bool reads_supervision = false;  ///< it reads the progress of the supervisor
+    std::size_t helpers = 0;  ///< pieces of work outside of the cycle, since its last start
     bool leads_clock = false;  ///< it disciplines the threads to an external clock reference
     Span loaded;
     /// which of the component's loads made it, as which of that load's instances

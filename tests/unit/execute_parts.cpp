@@ -33,6 +33,29 @@ TEST(Core, is_not_late_before_its_first_cycle_is_due) {
     EXPECT_EQ(core.monitor.overdue_since_ns(), now + 700'000) << "it has begun";
 }
 
+TEST(Core, has_the_missed_periods_before_a_turn_that_is_executed_again) {
+    constexpr std::int64_t period = 1'000'000;
+    FaultBoard board;
+    Timeline timeline;
+    const std::atomic<bool> running{false};
+    hal_pin missed{};
+    hal_value value{};
+    missed.slot = &value;
+    ThreadPins pins{};
+    pins.missed = &missed;
+    CycleInputs inputs;
+    CycleRecord record;
+    record.kind = CycleRecord::service;
+    record.number = 5;
+    record.missed = 3;
+    inputs.load(record, {});
+    Core core(1, period, pins, board, timeline, running, true, nullptr, &inputs);
+    core.replay();
+    EXPECT_EQ(core.monitor.missed(), 3u);
+    EXPECT_EQ(value.u32, 3u);
+    EXPECT_EQ(core.cycle_number(), 5u);
+}
+
 TEST(FaultBoard, keeps_one_fault_for_each_condition_that_lasts) {
     FaultBoard board;
     const auto open = [&] { return board.shared.faults.count - board.shared.faults.cleared; };

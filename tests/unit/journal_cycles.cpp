@@ -12,6 +12,7 @@
 #include "execute/cycle_inputs.hpp"
 #include "journal/cycle_codec.hpp"
 #include "journal/journal_entry.hpp"
+#include "journal/setup_record.hpp"
 #include "plan/shared_state.hpp"
 
 namespace hal::test {
@@ -105,6 +106,165 @@ TEST(CycleInputs, Gives_back_what_was_read_and_compares_the_end) {
     EXPECT_THROW(inputs.load(cycle, {}), std::invalid_argument);
 }
 
+/// Records a cycle with results, and returns its words.
+template <class Fill>
+Words words_of_cycle(Fill fill) {
+    CycleInputs inputs(std::size_t{1} << 12);
+    inputs.begin(CycleRecord::cycle, 1, 0, 0, 0, 0);
+    fill(inputs);
+    inputs.end(0, 5);
+    Words words;
+    inputs.take(words);
+    return words;
+}
+
+void load(CycleInputs& inputs, const Words& words) {
+    const Words notes(words.begin() + CycleInputs::head_words, words.end());
+    inputs.load(CycleInputs::record_at(words.data()), notes);
+    inputs.begin(CycleRecord::cycle, 1, 0, 0, 0, 0);
+}
+
+TEST(CycleInputs, Gives_back_the_bytes_of_results_between_notes) {
+    const Words words = words_of_cycle([](CycleInputs& inputs) {
+        inputs.note(7);
+        inputs.put("abc", 3);
+        inputs.note(8);
+        inputs.put("0123456789", 10);
+    });
+    CycleInputs again;
+    load(again, words);
+    char first[3];
+    char second[10];
+    EXPECT_EQ(again.note(0), 7u);
+    EXPECT_TRUE(again.get(first, sizeof first));
+    EXPECT_EQ(again.note(0), 8u);
+    EXPECT_TRUE(again.get(second, sizeof second));
+    again.end(0, 5);
+    EXPECT_EQ(again.match(), CycleInputs::Match::same);
+    EXPECT_EQ(std::string(first, 3) + std::string(second, 10), "abc0123456789");
+    load(again, words);
+    again.note(0);
+    again.note(0);
+    again.end(0, 5);
+    EXPECT_EQ(again.match(), CycleInputs::Match::other_reads) << "no results were asked for";
+}
+
+TEST(CycleInputs, Has_zeros_where_more_results_are_asked_for_than_there_are) {
+    const Words words = words_of_cycle([](CycleInputs& inputs) { inputs.put("abcdefgh", 8); });
+    CycleInputs again;
+    load(again, words);
+    char bytes[9] = {};
+    EXPECT_TRUE(again.get(bytes, 8));
+    bytes[0] = 'x';
+    EXPECT_FALSE(again.get(bytes, 1));
+    EXPECT_EQ(bytes[0], '\0');
+    again.end(0, 5);
+    EXPECT_EQ(again.match(), CycleInputs::Match::other_reads);
+    load(again, words);
+    EXPECT_FALSE(again.get(bytes, 9));
+}
+
+TEST(CycleInputs, Drops_a_cycle_with_too_many_results) {
+    CycleInputs inputs(std::size_t{1} << 16);
+    const Words all(CycleInputs::max_notes);
+    inputs.begin(CycleRecord::cycle, 1, 0, 0, 0, 0);
+    inputs.put(all.data(), all.size() * sizeof(std::uint64_t));
+    inputs.end(0, 5);
+    EXPECT_EQ(inputs.lost(), 0u);
+    inputs.begin(CycleRecord::cycle, 2, 0, 0, 0, 0);
+    inputs.put(all.data(), all.size() * sizeof(std::uint64_t));
+    inputs.put("a", 1);
+    inputs.end(0, 5);
+    EXPECT_EQ(inputs.lost(), 1u);
+}
+
+struct OrderOfCalls final : FunctionOrder {
+    Words waited;
+    void wait_for(std::uint64_t, bool) override {}
+    void wait_for_call(std::uint64_t ticket) override { waited.push_back(ticket); }
+};
+
+TEST(CycleInputs, Waits_for_the_tickets_of_ordered_calls) {
+    const Words tickets{1'000'000, 1'000'001, 1'000'003, 1'000'400, 1'000'401, 1'000'657};
+    const Words words = words_of_cycle([&tickets](CycleInputs& inputs) {
+        for (const std::uint64_t ticket : tickets) {
+            inputs.order_call(ticket);
+        }
+    });
+    OrderOfCalls order;
+    CycleInputs again(&order);
+    load(again, words);
+    for (std::size_t i = 0; i < tickets.size(); ++i) {
+        again.order_call(0);
+    }
+    again.end(0, 5);
+    EXPECT_EQ(order.waited, tickets);
+    EXPECT_EQ(again.match(), CycleInputs::Match::same);
+}
+
+TEST(CycleInputs, Names_the_link_that_sends_other_frames) {
+    const Words words = words_of_cycle([](CycleInputs&) {});
+    CycleInputs again;
+    load(again, words);
+    again.differs("udp:a");
+    again.differs("udp:b");
+    again.end(0, 6);
+    EXPECT_EQ(again.match(), CycleInputs::Match::other_frames);
+    EXPECT_STREQ(again.differing_link(), "udp:a");
+    load(again, words);
+    again.end(0, 5);
+    EXPECT_EQ(again.match(), CycleInputs::Match::same);
+    EXPECT_EQ(again.differing_link(), nullptr);
+}
+
+TEST(SetupRecord, Is_the_same_after_a_way_through_CDR) {
+    const SetupRecord file{.kind = SetupRecord::file,
+                           .error = 2,
+                           .name = "x.canopen",
+                           .hash = "0123456789abcdef",
+                           .results = std::string("a\0b", 3),
+                           .readings = ""};
+    const std::string payload = to_cdr(file);
+    const auto again = setup_record(payload);
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->kind, file.kind);
+    EXPECT_EQ(again->error, file.error);
+    EXPECT_EQ(again->name, file.name);
+    EXPECT_EQ(again->hash, file.hash);
+    EXPECT_EQ(again->results, file.results);
+    EXPECT_EQ(again->readings, file.readings);
+    for (std::size_t size = 0; size < payload.size(); ++size) {
+        EXPECT_FALSE(setup_record(payload.substr(0, size))) << size;
+    }
+    std::string changed = payload;
+    changed[4] = 2;
+    EXPECT_FALSE(setup_record(changed));
+}
+
+TEST(JournaledSetup, Gives_back_calls_and_files_in_their_order) {
+    JournaledSetup setup;
+    setup.add({.name = "x start", .results = "1"});
+    setup.add({.name = "y start", .results = "2"});
+    setup.add({.name = "x start", .results = "3"});
+    EXPECT_EQ(setup.next_call("x start")->links, "1");
+    EXPECT_EQ(setup.next_call("x start")->links, "3");
+    EXPECT_EQ(setup.next_call("x start"), std::nullopt);
+    EXPECT_EQ(setup.next_call("y start")->links, "2");
+    setup.add({.kind = SetupRecord::file, .name = "f", .hash = "a", .results = "old"});
+    setup.add({.kind = SetupRecord::file, .name = "g", .hash = "a"});
+    setup.add({.kind = SetupRecord::file, .error = 2, .name = "f"});
+    setup.add({.kind = SetupRecord::file, .name = "f", .hash = "b", .results = "new"});
+    EXPECT_EQ(setup.next_file("f")->bytes, "old");
+    EXPECT_EQ(setup.next_file("f")->error, 2);
+    EXPECT_EQ(setup.next_file("f")->bytes, "new");
+    EXPECT_EQ(setup.next_file("f")->bytes, "new") << "read once more than then";
+    EXPECT_EQ(setup.next_file("g")->bytes, "old") << "the same content";
+    EXPECT_EQ(setup.next_file("h"), nullptr);
+    setup.add({.kind = SetupRecord::file, .name = "/m/x.eds", .hash = "b"});
+    EXPECT_EQ(setup.next_file("x.eds")->bytes, "new") << "beside the netlist";
+    EXPECT_EQ(setup.next_file("eds"), nullptr);
+}
+
 struct Sample {
     CycleRecord record;
     Words notes;
@@ -132,7 +292,8 @@ std::vector<Sample> random_samples(std::size_t count) {
             note = dice() >> (dice() % 64);
         }
         one.record.notes = one.notes.size();
-        one.record.imports = dice() % (one.notes.size() + 1);
+        one.record.data = dice() % (one.notes.size() + 1);
+        one.record.imports = dice() % (one.notes.size() - one.record.data + 1);
     }
     return all;
 }
@@ -188,6 +349,20 @@ TEST(ExecutionEntry, Is_the_same_after_a_way_through_JSON) {
     EXPECT_EQ(again->epoch, 3u);
     EXPECT_EQ(again->commands, edit.commands);
     EXPECT_EQ(again->files.at(0).hash, "0123");
+    ExecutionEntry opened{.kind = ExecutionEntry::Kind::opened};
+    opened.instance = "canopen.0";
+    opened.resources = {"/dev/ttyS0"};
+    opened.threads = 1;
+    opened.helpers = 2;
+    opened.links = 3;
+    opened.streams = 4;
+    const auto opened_again = execution_entry(to_json(opened));
+    ASSERT_TRUE(opened_again);
+    EXPECT_EQ(opened_again->resources, opened.resources);
+    EXPECT_EQ(opened_again->threads, 1u);
+    EXPECT_EQ(opened_again->helpers, 2u);
+    EXPECT_EQ(opened_again->links, 3u);
+    EXPECT_EQ(opened_again->streams, 4u);
     ExecutionEntry written{.kind = ExecutionEntry::Kind::written};
     written.values = {{"panel.x", 0xffff'ffff'ffff'ffff}};
     EXPECT_EQ(execution_entry(to_json(written))->values, written.values);

@@ -44,7 +44,7 @@ int JournaledProgram::check() const {
 
 void JournaledProgram::name_readers() const {
     for (const ExecutionEntry& entry : file_.entries()) {
-        if (entry.kind != ExecutionEntry::Kind::opened) continue;
+        if (entry.kind != ExecutionEntry::Kind::opened || resources(entry).empty()) continue;
         note(options_, fmt::format("'{}' ({}) has {}, whose data are not in the journal: "
                                    "values that depend on them may differ",
                                    entry.instance, entry.component, resources(entry)));
@@ -75,6 +75,9 @@ std::string JournaledProgram::resources(const ExecutionEntry& entry) {
     }
     if (entry.threads > 0) {
         text += (text.empty() ? "" : ", ") + counted(entry.threads, "thread");
+    }
+    if (entry.helpers > 0) {
+        text += (text.empty() ? "" : ", ") + counted(entry.helpers, "helper thread");
     }
     if (entry.streams > 0) {
         text += (text.empty() ? "" : ", ") + counted(entry.streams, "stream");

@@ -118,6 +118,11 @@ std::string ReplayedMachine::difference() const {
         return value_text(*at, "first difference");
     if (execution_.state() != ReExecution::State::differs) return "";
     const JournaledCycle& at = execution_.newest();
+    if (const std::string& link = execution_.differing_link(); !link.empty()) {
+        return fmt::format(
+            "first difference: cycle {} of thread '{}' at {:.6f} s sends other frames on {}\n",
+            at.number, at.thread, seconds(at.time_ns), link);
+    }
     const bool reads = execution_.match() == CycleInputs::Match::other_reads;
     return fmt::format(
         "first difference: cycle {} of thread '{}' at {:.6f} s {}\n{}", at.number, at.thread,

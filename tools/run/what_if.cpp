@@ -94,7 +94,9 @@ std::string WhatIf::apply(Session& session, const JournaledCycle& newest) {
 std::string outside_inputs(const JournalFile& file) {
     std::set<std::string> names;
     for (const ExecutionEntry& entry : file.entries()) {
-        if (entry.kind == ExecutionEntry::Kind::opened) {
+        const bool reads_outside =
+            entry.links + entry.threads + entry.streams > 0 || !entry.resources.empty();
+        if (entry.kind == ExecutionEntry::Kind::opened && reads_outside) {
             names.insert(fmt::format("those of '{}' ({})", entry.instance, entry.component));
         } else if (entry.kind == ExecutionEntry::Kind::written) {
             names.insert("values that programs wrote");

@@ -110,6 +110,7 @@ const Instance* clock_leader(const Model& model) {
 Failure start_instance(Instance& instance, const Model& model, Executor& executor,
                        const hal_status& status, const hal_messages& messages) {
     Starting starting{instance, model, executor, status, messages, {}};
+    instance.helpers = 0;
     executor.clock().claim = claim_clock;
     const hal_host host{
         sizeof host, &starting, [](const hal_host* h, const hal_pin_decl*, hal_pin*) {
@@ -145,7 +146,9 @@ Failure start_instance(Instance& instance, const Model& model, Executor& executo
         if (std::strcmp(id, HAL_PATH_DELAY) == 0) return &path_delay_host;
         if (std::strcmp(id, HAL_SETUP_TIME) == 0) return &setup_time_host;
         if (std::strcmp(id, HAL_BACKGROUND) == 0) {
-            return &static_cast<Starting*>(h->data)->executor.background();
+            Starting& request = *static_cast<Starting*>(h->data);
+            ++request.instance.helpers;
+            return &request.executor.background();
         }
         return nullptr;
     }, [](const hal_host* h, const hal_rejection* rejection) {

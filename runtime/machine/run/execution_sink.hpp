@@ -3,12 +3,14 @@
 // do not compute (docs/internals/journal.md).
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "execute/setup_results.hpp"
 #include "hal/abi.h"
 
 namespace hal {
@@ -20,8 +22,20 @@ struct Model;
 struct OutsideWorld {
     std::vector<std::string> files;  ///< as /proc/self/fd names them: "socket:[5]", "/dev/ttyS0"
     std::size_t threads = 0;
+    std::size_t helpers = 0;  ///< threads of work that a re-execution leaves out
+    std::size_t links = 0;    ///< to buses of the outside, whose results are in the journal
     std::size_t streams = 0;  ///< of records, which programs outside may feed
-    bool empty() const { return files.empty() && threads == 0 && streams == 0; }
+    /// Leaves out what journaled links have, and counts these.
+    void remove_links(const OutsideWorld& others) {
+        std::erase_if(files, [&others](const std::string& file) {
+            return std::ranges::find(others.files, file) != others.files.end();
+        });
+        threads -= std::min(threads, others.threads);
+        links += others.links;
+    }
+    bool empty() const {
+        return files.empty() && threads == 0 && helpers == 0 && links == 0 && streams == 0;
+    }
 };
 
 /// [setup], with the session's lock held. Given in SessionOptions; outlives the session.
@@ -42,7 +56,10 @@ public:
     virtual void written(std::vector<std::pair<std::string, std::uint64_t>> values) = 0;
     /// The functions were started or stopped.
     virtual void switched(bool running) = 0;
-    /// An instance has started, and reads what the journal does not have.
+    /// The transaction that takes effect next has made this call, or opened this file.
+    virtual void called(const SetupResults& results) = 0;
+    virtual void file_read(const SetupFile& file) = 0;
+    /// An instance has started, and depends on what is outside of the process.
     virtual void opened(const std::string& instance, const std::string& component,
                         const OutsideWorld& outside) = 0;
 };

@@ -130,6 +130,7 @@ bool OpenTransaction::commit(Diagnostics& diagnostics) {
 void OpenTransaction::journal(std::uint64_t epoch) noexcept {
     if (!state_.options.sink) return;
     try {
+        state_.setup->flush(*state_.options.sink);
         state_.options.sink->edited(epoch, std::exchange(words_, {}), state_.model);
     } catch (const std::bad_alloc&) {
         // The edit has taken effect. The re-execution ends where the first cycle needs it.
@@ -196,6 +197,9 @@ bool OpenTransaction::start_added(Diagnostics& diagnostics) {
 
 /// Undoes the transaction, in the model and in threads that have taken it.
 void OpenTransaction::withdraw(Diagnostics* diagnostics) {
+    if (state_.setup) {
+        state_.setup->forget();
+    }
     if (touched_ && state_.options.sink) {
         state_.options.sink->withdrawn();
     }

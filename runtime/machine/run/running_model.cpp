@@ -30,6 +30,9 @@ SessionState::SessionState(SessionOptions o)
     if (options.sink) {
         executor->begin_journal();
     }
+    if (options.sink || options.schedule) {
+        setup.emplace(options.schedule);
+    }
     if (!options.virtual_clock && !options.check_only) {
         refused = prepare_process();
     }
@@ -53,6 +56,9 @@ Failure SessionState::start(Instance& instance) {
     const Acquisition acquisition;
     Failure failure = start_instance(instance, model, *executor, status, event_log.for_plugins());
     OutsideWorld outside = acquisition.result();
+    outside.remove_links(setup->take_acquired());
+    outside.helpers = std::min(instance.helpers, outside.threads);
+    outside.threads -= outside.helpers;
     outside.streams = instance.streams.size();
     if (failure.empty() && !outside.empty()) {
         options.sink->opened(instance.name, instance.component->name, outside);

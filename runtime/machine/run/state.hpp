@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "machine/run/open_transaction.hpp"
 #include "machine/run/probes.hpp"
 #include "machine/run/running_model.hpp"
+#include "machine/run/setup_journal.hpp"
 #include "machine/run/thread_plans.hpp"
 #include "model/names.hpp"
 
@@ -34,6 +36,7 @@ struct SessionState {
     ~SessionState();
 
     SessionOptions options;
+    std::optional<SetupJournal> setup;  ///< of a machine with a journal, or of one executed again
     Plugins plugins;
     Model model;
     std::unique_ptr<Executor> executor;

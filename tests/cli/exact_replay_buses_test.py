@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: MIT
+# packages: canopen
+"""Machines on buses, executed again from their journal: what links gave them, and the order of the calls on a bus in memory."""
+
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import unittest
+
+from harness import HAL, ROOT, SANITIZED, Case, needs_package, wait_until
+
+AXIS = ROOT / "halfiles" / "canopen-axis"
+
+# The master and its drive are in two threads, on a bus that loses frames.
+TWO_THREADS = """loadrt threads name1=fast period1=500000 name2=servo period2=1000000
+loadrt canopen config=axis.canopen
+loadrt canopen_drive link=sim:axis id=2
+loadrt can_faults link=sim:axis faults=loss:every=50
+addf canopen.0.receive servo
+addf canopen.0.transmit servo
+addf canopen-drive.0.update fast
+addf can-faults.0.update fast
+"""
+
+DRIVE = """loadrt threads name1=servo period1=1000000
+loadrt canopen_drive link={bus} id=2
+addf canopen-drive.0.update servo
+"""
+
+# What a stream feeds is not in the journal: other frames are sent.
+SENDER = """loadrt threads name1=servo period1=1000000
+loadrt streamer
+loadrt conv_float_s32 names=whole
+loadrt can_send link={bus} fields=value:s32
+addf streamer.0 servo
+addf whole servo
+addf can-send.0.update servo
+net value streamer.0.pin.0 => whole.in
+net number whole.out => can-send.0.value
+setp can-send.0.on-change TRUE
+"""
+
+STATION = """loadrt threads name1=servo period1=1000000
+loadrt tdma link=eth:{port} config=cnc.tdma station={station}
+addf tdma.0.receive servo
+addf tdma.0.transmit servo
+"""
+
+
+class ExactReplayOfBuses(Case):
+    def setUp(self):
+        super().setUp()
+        dice = random.Random(os.urandom(8))  # tests run side by side: each has its own bus
+        group = f"239.{dice.randrange(1, 255)}.{dice.randrange(256)}.{dice.randrange(1, 255)}"
+        self.bus = f"udp:{group}%lo:{dice.randrange(20000, 60000)}"
+
+    def configure(self, bus):
+        return self.write(
+            "axis.canopen", (AXIS / "axis.canopen").read_text().replace("sim:axis", bus)
+        )
+
+    def load_cpus(self):
+        for _ in range(2):
+            busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+            self.addCleanup(busy.wait)
+            self.addCleanup(busy.kill)
+
+    def wait_for(self, pin, value):
+        wait_until(lambda: self.shell("getp", pin).stdout.strip() == value, f"{pin} {value}")
+
+    def wait_for_cycles(self, thread, count):
+        start = int(self.shell("getp", f"{thread}.threadbeat").stdout)
+        wait_until(
+            lambda: int(self.shell("getp", f"{thread}.threadbeat").stdout) >= start + count,
+            f"{count} cycles",
+        )
+
+    def finish(self, machine):
+        out, error = self.end(machine)
+        self.assertEqual(0, machine.returncode, out + error)
+
+    def replay(self, status=0):
+        done = self.run_program("replay", "--exact", "run.mcap")
+        self.assertEqual(status, done.returncode, done.stdout + done.stderr)
+        self.assertNotIn("opens again", done.stderr)
+        return done.stdout
+
+    def test_two_threads_share_a_bus_in_memory(self):
+        self.configure("sim:axis")
+        self.load_cpus()
+        machine = self.start(
+            "run",
+            self.write("a.hal", TWO_THREADS),
+            "--journal",
+            "run.mcap",
+            "--values",
+            "canopen.0.x.*,canopen-drive.0.*,can-faults.0.*",
+        )
+        self.wait_for("canopen.0.nodes-operational", "1")
+        self.wait_for_cycles("servo", 1000)
+        self.finish(machine)
+        text = self.replay()
+        self.assertRegex(text, r"\nno difference, \d{5,} values compared\n$")
+        self.assertGreater(int(re.match(r"(\d+) cycles of 2 threads", text)[1]), 2000)
+
+    @unittest.skipIf(SANITIZED, "a sanitizer has the functions of the clock and of files")
+    def test_a_master_whose_node_is_killed(self):
+        self.configure(self.bus)
+        lines = [
+            line.replace("servo-thread", "servo")
+            for line in (AXIS / "axis.hal").read_text().splitlines(True)
+            if "canopen_drive" not in line and "canopen-drive" not in line
+        ]
+        drive_file = self.write("drive.hal", DRIVE.format(bus=self.bus))
+
+        def start_drive(name):
+            return self.start("run", "--name", name, drive_file, instance=name)
+
+        drive = start_drive("drive")
+        machine = self.start(
+            "run", self.write("a.hal", "".join(lines)), "--journal", "run.mcap", "--values", "x*"
+        )
+        self.wait_for("canopen.0.nodes-operational", "1")
+        self.wait_for_cycles("servo", 300)
+        drive.send_signal(signal.SIGKILL)
+        drive.wait()
+        self.wait_for("canopen.0.nodes-operational", "0")
+        start_drive("other")
+        self.wait_for("canopen.0.nodes-operational", "1")
+        self.say("stop")  # its outputs are made safe, which sends frames
+        self.say("start")
+        self.wait_for_cycles("servo", 300)
+        self.finish(machine)
+        # the configuration is the one of then
+        self.write("axis.canopen", "[bus]\nlink = can:nowhere\n")
+        self.assertRegex(self.replay(), r"\nno difference, \d{5,} values compared\n$")
+        (self.folder / "axis.canopen").unlink()
+        self.replay()
+
+    def test_other_frames_are_a_difference(self):
+        machine = self.start(
+            "run", self.write("a.hal", SENDER.format(bus=self.bus)), "--journal", "run.mcap"
+        )
+        self.write("in.txt", "".join(f"{value}\n" for value in range(1, 40)))
+        self.good("play", "in.txt")
+        self.comes("can-send.0.sent", "39")
+        self.finish(machine)
+        self.assertRegex(
+            self.replay(status=1),
+            r"first difference: cycle \d+ of thread 'servo' at \S+ s sends other frames on udp:",
+        )
+
+    @needs_package("tdma")
+    @unittest.skipIf(os.geteuid() != 0, "needs network namespaces: run it as root")
+    def test_a_station_whose_cable_is_pulled(self):
+        if SANITIZED:
+            self.skipTest("a station under a sanitizer misses its slots")
+        namespace = subprocess.Popen(
+            ["unshare", "--net", "sh", "-c", "echo; exec sleep 600"], stdout=subprocess.PIPE
+        )
+        self.addCleanup(namespace.stdout.close)
+        self.addCleanup(namespace.wait)
+        self.addCleanup(namespace.kill)
+        if not namespace.stdout.readline():
+            self.skipTest("no network namespaces here")
+        within = ["nsenter", "--net", "--target", str(namespace.pid)]
+
+        def ip(*words):
+            return subprocess.run([*within, "ip", *words], capture_output=True, text=True)
+
+        if ip("link", "add", "m0", "type", "veth", "peer", "name", "m1").returncode != 0:
+            self.skipTest("no veth pairs here")
+        for port in ("m0", "m1"):
+            self.assertEqual(0, ip("link", "set", port, "up").returncode)
+        shutil.copy(ROOT / "halfiles" / "ethernet-cnc" / "cnc.tdma", self.folder)
+        for name, port, station in (("clock", "m0", "clock"), ("default", "m1", "control")):
+            text = STATION.format(port=port, station=station)
+            machine = self.start_within(
+                within, name, self.write(f"{name}.hal", text), "--journal", f"{name}.mcap"
+            )
+        self.wait_for("tdma.0.running", "TRUE")
+        self.wait_for_cycles("servo", 300)
+        ip("link", "set", "m0", "down")
+        self.wait_for("tdma.0.link-up", "FALSE")
+        ip("link", "set", "m0", "up")
+        self.wait_for("tdma.0.link-up", "TRUE")
+        self.wait_for_cycles("servo", 300)
+        self.finish(machine)
+        (self.folder / "default.mcap").rename(self.folder / "run.mcap")
+        self.assertIn("\nno difference\n", self.replay())
+
+    def start_within(self, within, name, *words):
+        machine = subprocess.Popen(
+            [*within, str(HAL), "run", "--name", name, *map(str, words)],
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.addCleanup(self.end, machine)
+
+        def runs():
+            return self.value("servo.threadbeat", instance=name) not in ("", "0")
+
+        wait_until(runs, f"the machine '{name}' runs")
+        return machine
+
+
+if __name__ == "__main__":
+    unittest.main()
