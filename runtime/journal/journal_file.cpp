@@ -94,6 +94,7 @@ bool JournalFile::open(const std::string& path) {
                                text_in(head, "format"), journal_format::version);
         return false;
     }
+    head_ = head;
     version_ = text_in(head, "version") + " " + text_in(head, "commit");
     program_ = text_in(head, "program");
     unix_offset_ns_ = number_in<std::int64_t>(head, "unix_offset_ns");

@@ -57,6 +57,8 @@ public:
 
     const std::string& version() const { return version_; }  ///< of the program, with its commit
     const std::string& program() const { return program_; }  ///< hash of its file
+    /// Returns the metadata of its head, as they are.
+    const std::map<std::string, std::string>& head() const { return head_; }
     const std::vector<ExecutionEntry>& entries() const { return entries_; }
     std::map<std::uint32_t, JournaledThread>& threads() { return threads_; }
     JournaledSetup& setup() { return setup_; }
@@ -68,6 +70,7 @@ private:
     std::string problem_;
     std::vector<std::string> notes_;
     std::string version_, program_;
+    std::map<std::string, std::string> head_;
     std::int64_t unix_offset_ns_ = 0;
     std::vector<ExecutionEntry> entries_;
     JournaledSetup setup_;

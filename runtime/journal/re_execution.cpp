@@ -192,6 +192,7 @@ bool ReExecution::execute(Cursor& cursor) {
 void ReExecution::finish_cycle(Cursor& cursor) {
     newest_ = cycle_of(cursor);
     ++cycles_;
+    ++cursor.executed;
     match_ = cursor.inputs->match();
     if (const char* const link = cursor.inputs->differing_link()) {
         differing_link_ = link;
@@ -200,6 +201,7 @@ void ReExecution::finish_cycle(Cursor& cursor) {
         fail(State::differs, "");
     } else if (match_ != CycleInputs::Match::same && !diverged_) {
         diverged_ = newest_;
+        ignore_state();
     }
     cursor.thread->next();
     load(cursor);
@@ -262,8 +264,15 @@ ReExecution::State ReExecution::advance() {
     return state_;
 }
 
-void ReExecution::accept_differences() {
-    accepts_differences_ = true;
+JournalProgress ReExecution::progress() const {
+    JournalProgress progress{.entries = entry_, .records = {}};
+    for (const auto& [number, cursor] : cursors_) {
+        progress.records[number] = cursor.executed;
+    }
+    return progress;
+}
+
+void ReExecution::ignore_state() {
     for (auto& [number, cursor] : cursors_) {
         cursor.inputs->ignore_state();
     }

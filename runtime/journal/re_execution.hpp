@@ -15,6 +15,7 @@
 #include "execute/cycle_schedule.hpp"
 #include "journal/cycle_stack.hpp"
 #include "journal/journal_file.hpp"
+#include "journal/shortened_journal.hpp"
 #include "netlist/netlist.hpp"
 #include "text/diagnostic.hpp"
 
@@ -64,9 +65,12 @@ public:
     /// Returns true once an instance has opened something outside of the process, or has created a
     /// thread: from then on the process cannot be copied.
     bool has_outside() const { return outside_; }
-    /// The machine has been changed: from now on cycles may differ from the journaled ones, and only
-    /// the first one is noted.
-    void accept_differences();
+    /// Returns how much of the journal has been executed.
+    JournalProgress progress() const;
+    /// From now on cycles may differ from the journaled ones, and only the first one is noted.
+    void accept_differences() { accepts_differences_ = true; }
+    /// The machine has been changed: what the journal has of its state is of another one.
+    void ignore_state();
     /// Returns the first cycle that differed after accept_differences().
     const std::optional<JournaledCycle>& diverged() const { return diverged_; }
     /// This process is a copy of the one that has executed so far, and continues.
@@ -101,6 +105,7 @@ private:
         std::unique_ptr<CycleInputs> inputs;
         Core* core = nullptr;  // nullptr: the thread does not exist yet, or no more
         bool ended = false;
+        std::uint64_t executed = 0;  // records
         std::unique_ptr<CycleStack> stack = {};  // of its cycle
         bool suspended = false;  // within a cycle, in a gate
         bool in_call = false;  // suspended in an ordered call

@@ -326,6 +326,55 @@ class ExactReplay(Case):
         self.assertIn("--at needs --edit", self.replay("--at", "3s", status=1))
         self.assertIn("--edit needs --at", self.replay("--edit", "setp a 3", status=1))
 
+    def test_an_incident_becomes_a_test(self):
+        own = self.folder / "plugins"
+        own.mkdir()
+        shutil.copy(HAL.parent.parent / "components" / "sum2.so", own)
+        self.environment["HALCYON_PLUGIN_PATH"] = f"{own}:{PLUGINS}"
+        machine = self.run_journaled(MACHINE, "--values", "*")
+        self.give(["setp siggen.0.amplitude 1.5"])
+        self.wait_for_cycles(1500)
+        self.finish(machine)
+        text = self.replay("--break", "sine > 1.4", "--show", "sine,effort", "--as-test", "case")
+        self.assertRegex(
+            text, r"\ncase: \d+ cycles, 2 values expected; to run it, type: hal replay case\n"
+        )
+        case = self.folder / "case"
+        self.assertLess((case / "journal.mcap").stat().st_size, 40_000)
+        self.assertEqual(
+            re.search(r"(?m)^sine .*\neffort .*\n", text)[0], (case / "expected").read_text()
+        )
+        self.assertIn("\nsetp siggen.0.amplitude 1.5\n", (case / "test.hal").read_text())
+        self.assertEqual(0, self.run_program("check", case / "test.hal").returncode)
+        self.assertRegex(
+            self.good("replay", "case"), r"^\d+ cycles: 2 values, 0 not as expected\n$"
+        )
+        # a changed plugin is what the test is for
+        with open(own / "sum2.so", "ab") as plugin:
+            plugin.write(b"x")
+        self.good("replay", "case")
+        (case / "expected").write_text("effort 7\nwheel 3\n")
+        done = self.run_program("replay", "case")
+        self.assertEqual(1, done.returncode)
+        self.assertRegex(
+            done.stdout,
+            r"^effort \S+ instead of 7\nwheel unknown instead of 3\n"
+            r"\d+ cycles: 2 values, 2 not as expected\n$",
+        )
+        (case / "expected").write_text("\n")
+        done = self.run_program("replay", "case")
+        self.assertEqual(1, done.returncode)
+        self.assertIn("'expected' has no line with a name and a value", done.stdout)
+        whole = (case / "journal.mcap").read_bytes()
+        (case / "journal.mcap").write_bytes(whole[:10])
+        self.assertIn("cannot execute 'case/journal.mcap'", self.bad("replay", "case"))
+        self.write("file", "")
+        for words, problem in [
+            (["--as-test", "file/case"], "cannot create the folder 'file/case'"),
+            (["--as-test", "b", "--shell"], "--as-test is for the journal as it is"),
+        ]:
+            self.assertIn(problem, self.replay("--anyway", *words, status=1))
+
     def test_an_end_before_the_goal_is_reported(self):
         machine = self.run_journaled(MACHINE)
         self.wait_for_cycles(100)

@@ -10,6 +10,7 @@
 
 #include "cli/output.hpp"
 #include "run/difference_inputs.hpp"
+#include "run/journal_test.hpp"
 #include "run/journaled_program.hpp"
 #include "run/replay_note.hpp"
 #include "run/replay_shell.hpp"
@@ -41,8 +42,11 @@ public:
         const bool stopped = execute();
         const auto took = std::chrono::steady_clock::now() - begun;
         machine_.compare();
-        const int status = report(stopped, took);
+        int status = report(stopped, took);
         show();
+        if (!options_.as_test.empty() && status == 0) {
+            status = write_journal_test(options_, file_, machine_);
+        }
         execution_.finish();
         return status;
     }
@@ -176,6 +180,9 @@ int run_exact_replay(const ReplayOptions& options) {
     if (!options.break_condition.empty() && !condition.parse(options.break_condition)) {
         return fail(options, fmt::format("--break: invalid condition '{}'; {}",
                                          options.break_condition, ValueCondition::form));
+    }
+    if (!options.as_test.empty() && (!options.edits.empty() || options.shell)) {
+        return fail(options, "--as-test is for the journal as it is: without --edit and --shell");
     }
     WhatIf change;
     if (const std::string problem = change.parse(options); !problem.empty()) {

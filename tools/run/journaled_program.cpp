@@ -30,6 +30,20 @@ int JournaledProgram::check() const {
             problems += outside(entry);
         }
     }
+    return reject(problems);
+}
+
+int JournaledProgram::check_devices() const {
+    std::string problems;
+    for (const ExecutionEntry& entry : file_.entries()) {
+        if (entry.kind == ExecutionEntry::Kind::opened) {
+            problems += outside(entry);
+        }
+    }
+    return reject(problems);
+}
+
+int JournaledProgram::reject(const std::string& problems) const {
     if (problems.empty()) return 0;
     const std::string text =
         fmt::format("'{}' may not be executed exactly:\n{}", options_.words[0], problems);

@@ -18,12 +18,15 @@ public:
 
     /// Returns an exit status: 1 after printing why the journal is not executed.
     int check() const;
+    /// The same for devices only: the program and the plugins may be others.
+    int check_devices() const;
     /// Prints which instances may read what the journal does not have.
     void name_readers() const;
     /// Prints which instances prevent keyframes.
     void name_uncopied() const;
 
 private:
+    int reject(const std::string& problems) const;
     static std::string changed(const JournaledFile& plugin);
     static std::string outside(const ExecutionEntry& entry);
     static std::string resources(const ExecutionEntry& entry);

@@ -20,6 +20,7 @@
 #include "recording/mcap/recording.hpp"
 #include "run/exact_replay.hpp"
 #include "run/hosted_machine.hpp"
+#include "run/journal_test.hpp"
 #include "run/sim_summary.hpp"
 #include "text/quoting.hpp"
 #include "text/suggest.hpp"
@@ -483,10 +484,15 @@ private:
 
 int run_replay(const ReplayOptions& options) {
     if (options.exact) return run_exact_replay(options);
+    if (options.words.size() == 1 && is_journal_test(options.words[0])) {
+        return run_journal_test(options);
+    }
     if (!options.until.empty() || !options.break_condition.empty() || !options.show.empty() ||
-        options.anyway || options.shell || !options.edits.empty() || !options.at.empty()) {
+        options.anyway || options.shell || !options.edits.empty() || !options.at.empty() ||
+        !options.as_test.empty()) {
         return fail(options,
-                    "--until, --break, --show, --shell, --edit, --at and --anyway need --exact");
+                    "--until, --break, --show, --shell, --edit, --at, --as-test and --anyway need "
+                    "--exact");
     }
     if (options.words.size() < 2) return fail(options, "missing netlist: hal replay FILE NETLIST");
     const std::string file = std::filesystem::absolute(options.words.front()).string();

@@ -19,6 +19,7 @@ struct ReplayOptions : NetlistOptions {
     bool exact = false;
     bool anyway = false;
     bool shell = false;
+    std::string as_test;  ///< a folder
     std::vector<std::string> edits;  ///< setp NAME VALUE, sets NAME VALUE
     std::string at;                  ///< a time or a cycle number
     std::string until;              ///< a time or a cycle number
@@ -56,6 +57,9 @@ struct ReplayOptions : NetlistOptions {
                    "'sets SIGNAL VALUE'; may be repeated");
         set.value("--at", at, "CYCLE|TIME",
                   "with --exact: the cycle of the fastest thread, or the time, of --edit");
+        set.value("--as-test", as_test, "DIR",
+                  "with --exact: write a test of the journal up to here, whose --show values are "
+                  "expected; run it with: hal replay DIR");
         set.flag("--anyway", anyway,
                  "with --exact: also with another program or plugin, and when instances open "
                  "devices or sockets again");

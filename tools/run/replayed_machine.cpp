@@ -75,6 +75,7 @@ bool ReplayedMachine::make_change() {
     change_problem_ = change_.apply(machine_.session, execution_.newest());
     if (!change_problem_.empty()) return false;
     execution_.accept_differences();
+    execution_.ignore_state();
     return true;
 }
 
