@@ -44,6 +44,7 @@
 #include "panel/panel.hpp"
 #include "record/plot.hpp"
 #include "run/check.hpp"
+#include "run/determinism_check.hpp"
 #include "run/examples.hpp"
 #include "run/fmt.hpp"
 #include "run/replay.hpp"
@@ -92,6 +93,22 @@ constexpr Subcommand run_command() {
     return row;
 }
 
+constexpr Subcommand check_command() {
+    Subcommand row = command<CheckOptions, IN_CORE(run_check)>(
+        "check", "FILE… [--assume NAME]", "check netlists without running them");
+#ifdef HALCYON_TOOLS_PROGRAM
+    row.run = [](const Options& options) {
+        const auto& own = static_cast<const CheckOptions&>(options);
+        return own.deterministic ? run_determinism_check(own) : run_check(own);
+    };
+#else
+    row.needs_tools = [](const Options& options) {
+        return static_cast<const CheckOptions&>(options).deterministic;
+    };
+#endif
+    return row;
+}
+
 constexpr Subcommand table[] = {
     run_command(),
     command<ExamplesOptions, IN_CORE(run_examples)>("examples", "[NAME [OPTION of hal run…]]",
@@ -105,8 +122,7 @@ constexpr Subcommand table[] = {
     command<RemoteShellOptions, IN_CORE(run_shell)>(
         "shell", "[COMMAND…]",
         "command a running instance: one command, a file of commands, or interactively", true),
-    command<CheckOptions, IN_CORE(run_check)>("check", "FILE… [--assume NAME]",
-                                              "check netlists without running them"),
+    check_command(),
     command<FmtOptions, IN_CORE(run_fmt)>("fmt", "FILE…", "format netlists"),
     command<GraphOptions, IN_TOOLS(run_graph)>(
         "graph", "FILE… [-o OUT] [--cluster KIND] [--around NAME [--depth N]]", "draw netlists"),

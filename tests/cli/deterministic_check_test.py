@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""hal check --deterministic: components that compute other values from the same inputs are named."""
+
+import re
+import unittest
+from pathlib import Path
+
+from harness import SANITIZED, Case
+
+KINDS = ["address", "clock", "time", "memory", "thread", "process", "hash", "random"]
+SEEDS = (
+    "loadrt threads name1=servo period1=1000000\n"
+    f"loadrt seeds names=clean,{','.join(KINDS)}\n"
+    "loadrt sum2 names=after,later\n"
+    + "".join(f"setp {name}.kind {number + 1}\n" for number, name in enumerate(KINDS))
+    + "net a clock.out => after.in0\nnet b after.out => later.in0\nnet c later.out => clean.in\n"
+    + "".join(f"addf {name} servo\n" for name in [*KINDS, "after", "later", "clean"])
+)
+CLEAN = """loadrt threads name1=servo period1=1000000
+loadrt siggen
+loadrt noise
+loadrt lowpass
+addf siggen.0.update servo
+addf noise.0 servo
+addf lowpass.0 servo
+net wave siggen.0.sine => lowpass.0.in
+getp lowpass.0.out
+"""
+
+
+class DeterministicCheck(Case):
+    @unittest.skipIf(
+        SANITIZED, "a sanitizer fills memory itself, and has the functions of the clock"
+    )
+    def test_components_that_depend_on_the_process_are_named(self):
+        source = Path(__file__).parent / "sources/seeds.cpp"
+        done = self.run_program("compile", source)
+        self.assertEqual(0, done.returncode, done.stderr)
+        netlist = self.write("a.hal", SEEDS)
+        done = self.run_program("check", "--deterministic", "--for", "50ms", netlist)
+        self.assertEqual(1, done.returncode, done.stderr)
+        named = re.findall(
+            r"(?m)^'(\w+)' \(seeds\) is not deterministic: function '\1' sets '\1\.out' to \S+ and "
+            r"to \S+ in cycle \d+ of thread 'servo', from the same inputs$",
+            done.stdout,
+        )
+        self.assertEqual(sorted(KINDS), sorted(named), done.stdout)
+        self.assertIn(
+            "\ntwo simulations differ: 8 instances are not deterministic, 3 instances differ "
+            "because of them\n",
+            done.stdout,
+        )
+
+    def test_a_deterministic_machine_is_equal_in_all_values(self):
+        netlist = self.write("a.hal", CLEAN)
+        done = self.run_program("check", "--deterministic", "--for", "50ms", netlist)
+        self.assertEqual(0, done.returncode, done.stdout + done.stderr)
+        self.assertRegex(done.stdout, r"^two simulations are equal in \d{3,} values\n$")
+
+    def test_an_error_of_the_netlist_comes_first(self):
+        netlist = self.write("a.hal", "loadrt nothing-like-this\n")
+        done = self.run_program("check", "--deterministic", netlist)
+        self.assertEqual(1, done.returncode)
+        self.assertNotIn("two simulations", done.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
