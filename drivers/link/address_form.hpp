@@ -57,3 +57,16 @@ inline constexpr link::AddressForm address_forms[] = {
 };
 
 }  // namespace hal::ethernet
+
+namespace hal::line {
+
+/// How the addresses of lines of bytes are written.
+inline constexpr link::AddressForm address_forms[] = {
+    {"serial:/dev/ttyUSB0", "a serial line of this machine"},
+    {"pty:PATH", "a pseudo terminal that others open by PATH"},
+    {"tcp:HOST:PORT", "a connection to a TCP port"},
+    {"listen:PORT", "a TCP port for one connection"},
+    {"sim:NAME", "a line in memory", link::Reach::process},
+};
+
+}  // namespace hal::line

@@ -80,6 +80,7 @@ ROWS = {
         "runtime/sdk",
         "runtime/text",
     ],
+    "drivers/line": ["drivers/link", "runtime/text"],
     "drivers/ethernet": ["drivers/capture", "drivers/netlink", "runtime/sdk", "runtime/text"],
     "components/logic": ["components"],
     "components/math": ["components"],

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// The table from the address of a line to its driver.
+#include "line/serial_line.hpp"
+#include "line/sim_line.hpp"
+#include "line/tcp_line.hpp"
+#include "link/address.hpp"
+#include "text/numbers.hpp"
+
+namespace hal::line {
+
+namespace {
+
+constexpr link::Driver<Opened, Options, Description> line_drivers[] = {
+    {link::form_of(address_forms, "serial"), serial::open, serial::describe},
+    {link::form_of(address_forms, "pty"), serial::open_pty, serial::describe_pty, nullptr, nullptr,
+     "rs485"},
+    {link::form_of(address_forms, "tcp"), tcp::open, tcp::describe, nullptr, nullptr,
+     "baud format rs485"},
+    {link::form_of(address_forms, "listen"), tcp::open_listener, tcp::describe_listener, nullptr,
+     nullptr, "baud format rs485"},
+    {link::form_of(address_forms, "sim"), sim::open, sim::describe, nullptr, nullptr, "rs485"},
+};
+
+/// Applies an option. Returns the problem, or "".
+std::string apply_line_option(std::string_view key, std::string_view value, bool has_value,
+                              Options& o) {
+    if (key == "rs485") return link::to_flag(key, value, has_value, o.rs485);
+    if (key == "format") {
+        if (parse_format(value, o)) return {};
+        return "invalid format " + link::quoted(value) + "; write 8N1, 8E1, 8O1 or 8N2";
+    }
+    if (key == "baud") {
+        std::uint32_t baud = 0;
+        if (!parse_whole(value, baud) || baud < 300 || baud > 4'000'000) {
+            return "invalid baud " + link::quoted(value) + "; write a number 300..4000000";
+        }
+        o.baud = baud;
+        return {};
+    }
+    return std::string(link::no_option) + link::quoted(key) + "; options are baud, format, rs485";
+}
+
+}  // namespace
+
+Opened open(std::string_view address, const Options& given) {
+    return link::open_address<Opened, Options, Description>(address, given, line_drivers,
+                                                            apply_line_option, "a line");
+}
+
+Description describe(std::string_view address) {
+    return link::describe_address<Opened, Options, Description>(address, line_drivers);
+}
+
+bool parse_format(std::string_view text, Options& options) {
+    if (text.size() != 3 || text[0] != '8' || (text[2] != '1' && text[2] != '2')) return false;
+    switch (text[1]) {
+    case 'N': options.parity = Parity::none; break;
+    case 'E': options.parity = Parity::even; break;
+    case 'O': options.parity = Parity::odd; break;
+    default: return false;
+    }
+    options.stop_bits = text[2] == '2' ? 2 : 1;
+    return true;
+}
+
+std::string format_text(const Options& options) {
+    constexpr char parities[] = {'N', 'E', 'O'};
+    return std::to_string(options.baud) + " 8" +
+           parities[static_cast<std::size_t>(options.parity)] + std::to_string(options.stop_bits);
+}
+
+}  // namespace hal::line
