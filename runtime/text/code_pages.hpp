@@ -365,6 +365,22 @@ inline constexpr CodePage code_pages[] = {
      "Formulas have + - * / ^, brackets, pi, sin cos tan asin acos atan atan2 sqrt exp log abs "
      "tanh min max. `hal doc ekf` has an "
      "example."},
+    {"modbus-line",
+     "A line of a Modbus configuration is invalid at its position: an unknown section, key or "
+     "option, or a value without one.\n\n"
+     "The sections are [bus], [slave N NAME], [type NAME] and [defaults]. docs/modbus.md lists "
+     "their keys."},
+    {"modbus-slave",
+     "The slaves of a Modbus configuration cannot work together: a duplicate address or name, two "
+     "values that write the same register, or a profile without its registers. The warning about "
+     "a missing stop telegram is also of this kind: a slave keeps its last command when the "
+     "machine ends.\n\n"
+     "`hal modbus plan FILE` shows the telegrams of a valid configuration."},
+    {"modbus-value",
+     "A value of a Modbus configuration is invalid: a number, a time, a register, a type. The help "
+     "line shows the valid values.\n\n"
+     "Registers are written as the table and the address on the wire, `holding 0x2103`, or as in "
+     "manuals, `48452`. A bit of a register is `holding 0x2101.3`."},
     {"module-in-use",
      "A LinuxCNC module cannot be unloaded while another loaded module calls its code: motmod uses "
      "a trajectory planner, a homing and a "

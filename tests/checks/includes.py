@@ -65,6 +65,7 @@ ROWS = {
         "components/ethercat/recorded",
         "components/ethercat/devices",
         "components/ethercat/config",
+        "components/modbus/device",
     ],  # hal can, ethercat, node, tdma
     "tools/panel": ["tools/cli"],
     "tools/python": ["runtime/control"],
@@ -149,6 +150,22 @@ ROWS = {
         "components/canopen/device",
         "components/bus/component",
     ],
+    "components/modbus/wire": [],
+    "components/modbus/config": [
+        "components/modbus/wire",
+        "components/bus/config",
+        "runtime/text",
+        "drivers/link",
+    ],
+    "components/modbus/master": ["components/modbus/config"],
+    "components/modbus/device": ["components/modbus/config"],
+    "components/modbus/guardian": ["components/modbus/master", "runtime/sdk"],
+    "components/modbus/plugins": [
+        "components/modbus/guardian",
+        "components/modbus/device",
+        "components/bus/component",
+        "components/bus/events",
+    ],
     "components/fieldbus/can_timing": ["drivers/link"],
     "components/fieldbus/segment": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/fieldbus/scocan/table": [
@@ -209,6 +226,14 @@ BANS = {
         "components/ethercat/devices",
         "components/ethercat/master",
     ): "master and emulated slaves share only wire/",
+    (
+        "components/modbus/master",
+        "components/modbus/device",
+    ): "master and device never include each other",
+    (
+        "components/modbus/device",
+        "components/modbus/master",
+    ): "master and device never include each other",
     (
         "components/canopen/master",
         "components/canopen/device",

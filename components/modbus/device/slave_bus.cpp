@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+#include "slave_bus.hpp"
+
+#include <algorithm>
+
+#include "modbus/config/plan.hpp"
+#include "text/numbers.hpp"
+
+namespace hal::modbus {
+
+namespace {
+
+constexpr std::int64_t tick_ns = 10'000'000;
+
+bool parse_fault_option(std::string_view key, std::string_view value, SlaveFault& fault) {
+    if (key == "unit") return parse_whole(value, fault.unit);
+    if (key == "every") return parse_whole(value, fault.every) && fault.every > 0;
+    const auto time = parse_duration_ns(value);
+    if (!time || *time < 0) return false;
+    if (key == "late") {
+        fault.late_ns = *time;
+    } else if (key == "from") {
+        fault.from_ns = *time;
+    } else if (key == "for") {
+        fault.until_ns = *time;
+    } else {
+        return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+std::string parse_fault(std::string_view text, SlaveFault& fault) {
+    const std::string_view name = text.substr(0, text.find(':'));
+    const auto* at = std::find(std::begin(fault_names), std::end(fault_names), name);
+    if (at == std::end(fault_names)) {
+        return "unknown fault '" + std::string(name) +
+               "'; write silence, late, corrupt, wrong-unit, exception or half";
+    }
+    fault.kind = static_cast<FaultKind>(at - std::begin(fault_names));
+    for (auto rest = text.substr(name.size()); !rest.empty();) {
+        rest.remove_prefix(1);
+        const std::string_view item = rest.substr(0, rest.find(':'));
+        rest.remove_prefix(item.size());
+        const auto equals = std::min(item.find('='), item.size());
+        const std::string_view value = item.substr(std::min(equals + 1, item.size()));
+        if (!parse_fault_option(item.substr(0, equals), value, fault)) {
+            return "invalid option '" + std::string(item) +
+                   "'; options are unit=N, every=N, late=TIME, from=TIME, for=TIME";
+        }
+    }
+    if (fault.until_ns != INT64_MAX) {
+        fault.until_ns += fault.from_ns;
+    }
+    return {};
+}
+
+SlaveBus::SlaveBus(const Bus& bus) : bus_(bus) {
+    for (const Slave& slave : bus.slaves) {
+        slaves_.emplace_back(slave);
+    }
+}
+
+void SlaveBus::attach(line::Line& line) {
+    line_ = &line;
+    framing_ = bus_.framing_on(line.description());
+    silence_ns_ = line.description().is_stream ? 0 : silence_ns(bus_.line);
+}
+
+EmulatedSlave* SlaveBus::find(std::uint8_t unit) {
+    for (EmulatedSlave& slave : slaves_) {
+        if (slave.config().unit == unit) return &slave;
+    }
+    return nullptr;
+}
+
+bool SlaveBus::dialect(std::uint8_t unit) {
+    const EmulatedSlave* const slave = find(unit);
+    return slave != nullptr && slave->is_huanyang();
+}
+
+std::int64_t SlaveBus::work(std::int64_t now_ns) {
+    if (begin_ns_ == 0) {
+        begin_ns_ = now_ns;
+    }
+    for (EmulatedSlave& slave : slaves_) {
+        slave.advance(now_ns);
+    }
+    if (!line_->is_open(now_ns)) {
+        buffer_.clear();
+        pending_.clear();
+        return now_ns + tick_ns;
+    }
+    // bytes before a silence do not belong to the next frame
+    const bool is_stale = framing_ == Framing::rtu && !buffer_.empty() &&
+                          now_ns - last_byte_ns_ > std::max<std::int64_t>(silence_ns_, 20'000'000);
+    if (is_stale) {
+        buffer_.clear();
+    }
+    while (const std::size_t count = line_->receive(buffer_.free_space(), now_ns)) {
+        last_byte_ns_ = now_ns;
+        buffer_.added(count);
+        if (buffer_.free_space().empty()) break;
+    }
+    while (!buffer_.empty()) {
+        Found found;
+        const Scan result =
+            scan(framing_, Role::requests, dialect(buffer_.span()[0]), buffer_.span(), found);
+        if (result == Scan::incomplete) break;
+        if (result == Scan::corrupt) {
+            buffer_.clear();
+            break;
+        }
+        serve(found, now_ns);
+        buffer_.drop(found.length);
+    }
+    if (buffer_.free_space().empty()) {
+        buffer_.clear();
+    }
+    std::int64_t next = now_ns + tick_ns;
+    for (auto at = pending_.begin(); at != pending_.end();) {
+        if (at->at_ns <= now_ns) {
+            line_->send(at->frame.span(), now_ns);
+            at = pending_.erase(at);
+        } else {
+            next = std::min(next, at->at_ns);
+            ++at;
+        }
+    }
+    return next;
+}
+
+bool SlaveBus::hits(SlaveFault& fault, std::uint8_t unit, std::int64_t now_ns) const {
+    if (!fault.is_active || (fault.unit != 0 && fault.unit != unit)) return false;
+    const std::int64_t since = now_ns - begin_ns_;
+    if (since < fault.from_ns || since >= fault.until_ns) return false;
+    return ++fault.matches % fault.every == 0;
+}
+
+void SlaveBus::serve(const Found& found, std::int64_t now_ns) {
+    if (found.unit == 0) {  // a broadcast is not answered
+        for (EmulatedSlave& slave : slaves_) {
+            slave.answer(found.pdu);
+        }
+        return;
+    }
+    EmulatedSlave* const slave = find(found.unit);
+    if (slave == nullptr) return;
+    ++requests_;
+    std::uint8_t unit = found.unit;
+    std::int64_t at = now_ns + thinking_ns_ + silence_ns_;
+    bool corrupt = false;
+    bool half = false;
+    Pdu exception;
+    for (SlaveFault& fault : faults_) {
+        if (!hits(fault, found.unit, now_ns)) continue;
+        switch (fault.kind) {
+        case FaultKind::silence: return;
+        case FaultKind::late: at += fault.late_ns; break;
+        case FaultKind::corrupt: corrupt = true; break;
+        case FaultKind::wrong_unit: unit = static_cast<std::uint8_t>(unit % 247 + 1); break;
+        case FaultKind::half: half = true; break;
+        case FaultKind::exception:
+            exception.add8(found.pdu[0] | exception_flag);
+            exception.add8(4);
+            break;
+        }
+    }
+    const Pdu answer = exception.size != 0 ? exception : slave->answer(found.pdu);
+    if (answer.size == 0) return;
+    Frame frame = encode(framing_, unit, found.transaction, answer);
+    if (corrupt) {
+        frame.bytes[frame.size / 2] = static_cast<std::uint8_t>(frame.bytes[frame.size / 2] ^ 0x10);
+    }
+    if (half) {
+        frame.size /= 2;
+    }
+    pending_.push_back({at, frame});
+}
+
+}  // namespace hal::modbus

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+// The spindle pins of a frequency converter: what the drive is commanded, and what its values mean.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "modbus/master/image.hpp"
+
+namespace hal::modbus {
+
+/// All functions are [realtime].
+class DriveAxis {
+public:
+    struct Inputs {
+        bool run = false;
+        double speed_rpm = 0.0;  ///< negative: reverse
+        bool reset = false;
+    };
+    struct Feedback {
+        bool is_online = false;
+        bool has_speed = false;  ///< the actual speed has been read
+        double speed_rpm = 0.0;  ///< without sign
+        bool has_running = false;  ///< `is_running` has been read
+        bool is_running = false;
+        bool is_faulty = false;
+    };
+    struct Outputs {
+        std::uint32_t command = drive_stop;
+        double speed_rpm = 0.0;  ///< without sign
+        bool at_speed = false;
+        bool fault = false;
+        bool stalled = false;
+        bool running = false;
+        double speed_feedback_rpm = 0.0;  ///< with sign
+    };
+
+    DriveAxis(double max_speed_rpm, double tolerance, std::int64_t stall_ns) noexcept
+        : max_speed_(max_speed_rpm), tolerance_(tolerance), stall_ns_(stall_ns) {}
+
+    /// The drive was stopped by something else: `run` starts it with its next rising edge only.
+    void require_edge() noexcept {
+        may_run_ = false;
+        direction_ = drive_stop;
+    }
+
+    /// One cycle. A reversal stops the drive first.
+    Outputs step(const Inputs& in, const Feedback& feedback, std::int64_t now_ns) noexcept {
+        const bool can_run = feedback.is_online && feedback.has_speed && !feedback.is_faulty;
+        if (!can_run) {
+            require_edge();
+        } else if (in.run && !was_run_) {
+            may_run_ = true;
+        }
+        was_run_ = in.run;
+        if (std::isfinite(in.speed_rpm)) {
+            speed_ = in.speed_rpm;
+        }
+        choose_direction(in.run && may_run_ && speed_ != 0.0, feedback);
+
+        Outputs out;
+        out.command = direction_ | (in.reset ? std::uint32_t{drive_reset} : 0U);
+        out.speed_rpm = direction_ == drive_stop ? 0.0 : std::fmin(std::fabs(speed_), max_speed_);
+        out.fault = feedback.is_faulty;
+        out.running = feedback.has_running ? feedback.is_running : feedback.speed_rpm > 0.0;
+        out.speed_feedback_rpm = turns_back_ ? -feedback.speed_rpm : feedback.speed_rpm;
+        const double error = std::fabs(feedback.speed_rpm - out.speed_rpm);
+        const double allowed = tolerance_ * (out.speed_rpm > 0.0 ? out.speed_rpm : max_speed_);
+        const bool is_commanded = direction_ == wanted_;
+        out.at_speed = feedback.is_online && is_commanded && error <= allowed;
+        out.stalled = stalls(out.speed_rpm, feedback, now_ns);
+        return out;
+    }
+
+private:
+    void choose_direction(bool runs, const Feedback& feedback) noexcept {
+        wanted_ = drive_stop;
+        if (runs) {
+            wanted_ = speed_ < 0.0 ? drive_reverse : drive_forward;
+        }
+        const bool reverses =
+            direction_ != drive_stop && wanted_ != drive_stop && direction_ != wanted_;
+        const bool still_turns = feedback.speed_rpm > 0.01 * max_speed_;
+        const bool turns_other_way =
+            wanted_ != drive_stop && still_turns && turns_back_ != (wanted_ == drive_reverse);
+        direction_ = reverses || turns_other_way ? std::uint32_t{drive_stop} : wanted_;
+        if (direction_ != drive_stop) {
+            turns_back_ = direction_ == drive_reverse;
+        }
+    }
+
+    bool stalls(double commanded_rpm, const Feedback& feedback, std::int64_t now_ns) noexcept {
+        const bool turns = feedback.speed_rpm >= 0.1 * commanded_rpm;
+        if (commanded_rpm == 0.0 || !feedback.is_online || turns) {
+            turned_at_ns_ = now_ns;
+        }
+        return now_ns - turned_at_ns_ >= stall_ns_;
+    }
+
+    const double max_speed_, tolerance_;
+    const std::int64_t stall_ns_;
+    bool may_run_ = false;
+    bool was_run_ = true;  // a machine that starts with `run` TRUE waits for an edge
+    bool turns_back_ = false;
+    double speed_ = 0.0;
+    std::uint32_t direction_ = drive_stop;
+    std::uint32_t wanted_ = drive_stop;
+    std::int64_t turned_at_ns_ = 0;
+};
+
+}  // namespace hal::modbus

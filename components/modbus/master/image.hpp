@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: MIT
+// The memory in which the values of a bus meet the cycle. It has no pointers, so that the master may
+// be in another process (the guardian) that maps the same memory.
+//
+// Every member has one writer: `engine` is the thread or process with the line, `cycle` the
+// real-time thread. All are lock-free atomics; a value is one of them, so that it never tears.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "modbus/config/plan.hpp"
+
+namespace hal::modbus {
+
+/// What happened on a bus; the rows of plugins/event_texts.hpp are in this order.
+enum class Event : std::uint8_t {
+    slave_online,
+    slave_offline,
+    slave_corrupt,  ///< answers with wrong check sequences
+    exception,  ///< value: the code
+    line_lost,
+    line_open,
+    stopping,  ///< value: the StopReason
+    stop_acknowledged,  ///< value: ns since the stop
+    stop_unconfirmed,
+    guardian_lost,
+    previous_stop,  ///< value: what the guardian of the previous run did
+};
+
+/// Why the drives are stopped.
+enum class StopReason : std::uint32_t {
+    none,
+    unload,  ///< the component ends
+    fault,  ///< the thread was stopped, or a fault
+    estop,  ///< the pin estop
+    heartbeat,  ///< no cycle
+    death,  ///< the process ended
+};
+
+struct EventRecord {
+    Event event = Event::slave_online;
+    std::uint32_t slave = 0;
+    std::uint32_t telegram = 0;
+    std::int64_t value = 0;
+};
+
+/// The phase of the engine.
+enum class Phase : std::uint32_t { starting, running, stopping, stopped, ended };
+
+struct SlaveImage {
+    // written by the engine
+    std::atomic<std::uint32_t> online{0};
+    std::atomic<std::uint32_t> stopped{0};  ///< the stop telegrams are acknowledged
+    std::atomic<std::uint32_t> timeouts{0};
+    std::atomic<std::uint32_t> errors{0};  ///< corrupt answers
+    std::atomic<std::uint32_t> exceptions{0};
+    // written by the cycle
+    std::atomic<std::uint32_t> command{0};  ///< DriveCommand
+    std::atomic<std::uint64_t> speed{0};  ///< double, rpm
+};
+
+/// Command of a drive: direction, and bit 2 for a reset.
+enum DriveCommand : std::uint32_t {
+    drive_stop = 0,
+    drive_forward = 1,
+    drive_reverse = 2,
+    drive_reset = 4
+};
+
+struct ImageHeader {
+    static constexpr std::size_t event_capacity = 256;
+
+    // written by the cycle
+    std::atomic<std::uint64_t> heartbeat{0};  ///< cycles
+    std::atomic<std::int64_t> limit_ns{0};  ///< longest time between two cycles
+    std::atomic<std::uint32_t> outputs_valid{0};  ///< the cycle has written all outputs
+    std::atomic<std::uint32_t> event_tail{0};
+    // written by any thread of the runtime
+    std::atomic<std::uint32_t> stop_count{0};  ///< requests to stop, for those that were short
+    std::atomic<std::uint32_t> stop_reason{0};  ///< of the last request
+    std::atomic<std::uint32_t> stop_held{0};  ///< StopReason bits that last
+    std::atomic<std::uint32_t> ending{0};  ///< stop, then end
+    // written by the engine
+    std::atomic<std::uint32_t> phase{0};
+    std::atomic<std::uint32_t> event_head{0};
+    std::atomic<std::uint32_t> events_lost{0};
+    std::atomic<std::uint32_t> line_open{0};
+    /// why the guardian could not start; written before Phase::ended
+    std::array<char, 256> problem{};
+    std::atomic<std::uint64_t> changes{0};  ///< telegrams with values
+    std::atomic<std::uint64_t> telegrams{0};  ///< answered
+    std::atomic<std::int64_t> busy_ns{0};
+    std::array<EventRecord, event_capacity> events{};
+};
+static_assert(std::atomic<std::uint64_t>::is_always_lock_free &&
+              std::atomic<std::int64_t>::is_always_lock_free);
+
+/// A view of the memory. Copies see the same memory.
+class Image {
+public:
+    Image() = default;
+    /// Returns the bytes that a plan needs. [setup]
+    static std::size_t size_of(const Bus& bus, const Plan& plan) {
+        return offset_values(bus.slaves.size(), plan.telegrams.size()) +
+               plan.values.size() * sizeof(std::atomic<std::uint64_t>);
+    }
+    /// `memory` has size_of() bytes at a multiple of 64. `fresh`: it is initialised. [setup]
+    Image(void* memory, const Bus& bus, const Plan& plan, bool fresh);
+
+    ImageHeader& header() const noexcept { return *header_; }
+    SlaveImage& slave(std::size_t n) const noexcept { return slaves_[n]; }
+    /// When the last answer of a telegram arrived, in ns; 0: never.
+    std::atomic<std::int64_t>& stamp(std::size_t telegram) const noexcept {
+        return stamps_[telegram];
+    }
+    /// The bits of a value: a double when it is scaled or a float, else a whole number.
+    std::atomic<std::uint64_t>& value(std::size_t n) const noexcept { return values_[n]; }
+
+    /// Queues an event; the engine calls it. A full queue counts it.
+    void tell(const EventRecord& event) const noexcept {
+        const std::uint32_t head = header_->event_head.load(std::memory_order_relaxed);
+        if (head - header_->event_tail.load(std::memory_order_acquire) >=
+            ImageHeader::event_capacity) {
+            header_->events_lost.fetch_add(1, std::memory_order_relaxed);
+            return;
+        }
+        header_->events[head % ImageHeader::event_capacity] = event;
+        header_->event_head.store(head + 1, std::memory_order_release);
+    }
+    /// Takes the oldest event; the cycle calls it. [realtime]
+    bool pop(EventRecord& event) const noexcept {
+        const std::uint32_t tail = header_->event_tail.load(std::memory_order_relaxed);
+        if (tail == header_->event_head.load(std::memory_order_acquire)) return false;
+        event = header_->events[tail % ImageHeader::event_capacity];
+        header_->event_tail.store(tail + 1, std::memory_order_release);
+        return true;
+    }
+    /// Requests a stop. [any]
+    void stop(StopReason reason) const noexcept {
+        header_->stop_reason.store(static_cast<std::uint32_t>(reason), std::memory_order_relaxed);
+        header_->stop_count.fetch_add(1, std::memory_order_release);
+    }
+
+private:
+    static std::size_t offset_stamps(std::size_t slaves) {
+        return sizeof(ImageHeader) + slaves * sizeof(SlaveImage);
+    }
+    static std::size_t offset_values(std::size_t slaves, std::size_t telegrams) {
+        return offset_stamps(slaves) + telegrams * sizeof(std::atomic<std::int64_t>);
+    }
+
+    ImageHeader* header_ = nullptr;
+    SlaveImage* slaves_ = nullptr;
+    std::atomic<std::int64_t>* stamps_ = nullptr;
+    std::atomic<std::uint64_t>* values_ = nullptr;
+};
+
+}  // namespace hal::modbus

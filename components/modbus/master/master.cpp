@@ -1,0 +1,703 @@
+// SPDX-License-Identifier: MIT
+#include "master.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "modbus/master/value_codec.hpp"
+
+namespace hal::modbus {
+
+namespace {
+
+constexpr std::int64_t millisecond = 1'000'000;
+// USB adapters deliver bytes in bursts, up to 16 ms apart
+constexpr std::int64_t burst_ns = 20 * millisecond;
+constexpr std::int64_t exception_pause_ns = 1'000 * millisecond;
+constexpr std::int64_t poll_ns = millisecond;  // of set-points and stop requests
+constexpr std::int64_t probe_share = 20;       // 1/20 of the line: 5 %
+
+Function read_function(Table table) noexcept {
+    switch (table) {
+    case Table::coil: return Function::read_coils;
+    case Table::discrete: return Function::read_discrete;
+    case Table::input: return Function::read_input;
+    default: return Function::read_holding;
+    }
+}
+
+/// The registers of a value in the data of an answer; 16 bits are one register, the first bit the
+/// least significant.
+Registers registers_at(const PlannedValue& p, std::span<const std::uint8_t> data) noexcept {
+    Registers r;
+    const Value& v = *p.value;
+    if (is_bits(v.table)) {
+        unsigned number = 0;
+        for (unsigned n = 0; n < v.size(); ++n) {
+            const std::size_t bit = p.offset + n;
+            number |= (data[bit / 8] >> bit % 8 & 1U) << n;
+        }
+        r.words[0] = static_cast<std::uint16_t>(number);
+        r.count = 1;
+        return r;
+    }
+    r.count = v.size();
+    for (std::size_t n = 0; n < r.count; ++n) {
+        r.words[n] = word_at(data, 2 * (p.offset + n));
+    }
+    return r;
+}
+
+}  // namespace
+
+Master::Master(const Bus& bus, const Plan& plan, Image image)
+    : bus_(bus), plan_(plan), image_(image) {
+    slaves_.resize(bus.slaves.size());
+    telegrams_.resize(plan.telegrams.size());
+    std::size_t max_cells = 2;
+    for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
+        telegrams_[n].sent.resize(cells_of(n));
+        max_cells = std::max(max_cells, cells_of(n));
+    }
+    job_.cells.reserve(max_cells);
+}
+
+void Master::attach(line::Line& line, std::int64_t now_ns) {
+    line_ = &line;
+    framing_ = bus_.framing_on(line.description());
+    const bool serial = !line.description().is_stream;
+    silence_ns_ = serial ? silence_ns(bus_.line) : 0;
+    quiet_ns_ = std::max(burst_ns, 2 * silence_ns_);
+    free_at_ns_ = now_ns + silence_ns_;
+    for (TelegramState& state : telegrams_) {
+        state.due_ns = now_ns;
+    }
+}
+
+std::int64_t Master::work(std::int64_t now_ns) noexcept {
+    follow_requests(now_ns);
+    if (!follow_line(now_ns)) {
+        finish_stop(now_ns);
+        return now_ns + 10 * millisecond;
+    }
+    receive(now_ns);
+    while (true) {
+        if (waits_ && !finish_exchange(now_ns)) {
+            return std::min(deadline_ns_, now_ns + 10 * millisecond);
+        }
+        if (now_ns < free_at_ns_) return free_at_ns_;
+        if (!has_job_ && !choose(now_ns)) return next_due(now_ns);
+        send(now_ns);
+    }
+}
+
+void Master::stop(StopReason reason, std::int64_t now_ns) noexcept {
+    if (!held_ || !stopping_) {
+        image_.tell({Event::stopping, 0, 0, static_cast<std::int64_t>(reason)});
+    }
+    held_ = true;
+    stopping_ = true;
+    stop_at_ns_ = now_ns;
+    stop_turn_ = 0;
+    image_.header().phase.store(static_cast<std::uint32_t>(Phase::stopping));
+    for (std::size_t n = 0; n < slaves_.size(); ++n) {
+        slaves_[n].stop_next = 0;
+        slaves_[n].stop_attempts = 0;
+        image_.slave(n).stopped.store(0, std::memory_order_relaxed);
+    }
+    if (has_job_ && job_.telegram != stop_job && !waits_) {
+        end_of_job();
+    }
+    finish_stop(now_ns);
+}
+
+void Master::release() noexcept {
+    if (!held_ || stopping_) return;
+    held_ = false;
+    image_.header().phase.store(static_cast<std::uint32_t>(Phase::running));
+    for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
+        telegrams_[n].is_sent = false;
+    }
+    for (std::size_t n = 0; n < slaves_.size(); ++n) {
+        image_.slave(n).stopped.store(0, std::memory_order_relaxed);
+    }
+}
+
+void Master::follow_requests(std::int64_t now_ns) noexcept {
+    const std::uint32_t count = image_.header().stop_count.load(std::memory_order_acquire);
+    if (count == stop_seen_) return;
+    stop_seen_ = count;
+    stop(static_cast<StopReason>(image_.header().stop_reason.load(std::memory_order_relaxed)),
+         now_ns);
+}
+
+/// Returns false while the line is lost.
+bool Master::follow_line(std::int64_t now_ns) noexcept {
+    const bool is_open = line_ != nullptr && line_->is_open(now_ns);
+    if (is_open == line_was_open_ && line_reported_) return is_open;
+    if (!line_reported_ && !is_open && now_ns < free_at_ns_ + 1'500 * millisecond) {
+        return false;  // a connection is being made
+    }
+    if (!is_open || line_reported_) {
+        image_.tell({is_open ? Event::line_open : Event::line_lost, 0, 0, 0});
+    }
+    line_reported_ = true;
+    line_was_open_ = is_open;
+    image_.header().line_open.store(is_open ? 1 : 0, std::memory_order_relaxed);
+    buffer_.clear();
+    if (!is_open) {
+        if (has_job_) {
+            waits_ = false;
+            end_of_job();
+        }
+        for (std::size_t n = 0; n < slaves_.size(); ++n) {
+            image_.slave(n).online.store(0, std::memory_order_relaxed);
+            slaves_[n].is_known = false;
+        }
+    }
+    for (TelegramState& state : telegrams_) {
+        state.is_sent = false;
+    }
+    return is_open;
+}
+
+void Master::receive(std::int64_t now_ns) noexcept {
+    while (true) {
+        auto space = buffer_.free_space();
+        if (space.empty()) {
+            buffer_.clear();
+            space = buffer_.free_space();
+        }
+        const std::size_t count = line_->receive(space, now_ns);
+        if (count == 0) return;
+        last_byte_ns_ = now_ns;
+        buffer_.added(count);
+        if (!waits_) {
+            buffer_.clear();  // nothing was asked: a late answer, or noise
+            free_at_ns_ = std::max(free_at_ns_, now_ns + silence_ns_);
+        }
+    }
+}
+
+/// Returns whether the exchange is over.
+bool Master::finish_exchange(std::int64_t now_ns) noexcept {
+    const bool huanyang = bus_.slaves[job_.slave].is_huanyang();
+    if (framing_ == Framing::rtu && buffer_.span().size() >= sent_.size &&
+        std::equal(sent_.bytes.begin(),
+                   sent_.bytes.begin() + static_cast<std::ptrdiff_t>(sent_.size),
+                   buffer_.span().begin())) {
+        const std::uint8_t function = sent_.bytes[1];
+        if (has_echo_ || (!huanyang && function <= 4)) {
+            has_echo_ = true;
+            buffer_.drop(sent_.size);
+        }
+    }
+    while (!buffer_.empty()) {
+        Found found;
+        const Scan result = scan(framing_, Role::answers, huanyang, buffer_.span(), found);
+        if (result == Scan::incomplete) break;
+        if (result == Scan::corrupt) {
+            if (now_ns - last_byte_ns_ < silence_ns_ && framing_ == Framing::rtu) return false;
+            fail(Failure::corrupt, 0, now_ns);
+            return true;
+        }
+        const bool accepted = accept(found, now_ns);
+        buffer_.drop(found.length);
+        if (accepted) return true;
+    }
+    if (!buffer_.empty() && now_ns - last_byte_ns_ >= quiet_ns_) {
+        fail(Failure::corrupt, 0, now_ns);
+        return true;
+    }
+    if (now_ns < deadline_ns_ || !buffer_.empty()) return false;
+    fail(Failure::timeout, 0, now_ns);
+    return true;
+}
+
+/// Returns whether the frame is the answer.
+bool Master::accept(const Found& found, std::int64_t now_ns) noexcept {
+    const Slave& slave = bus_.slaves[job_.slave];
+    if (found.unit != slave.unit) return false;
+    if (framing_ == Framing::tcp && found.transaction != transaction_) return false;
+    const Answer answer = decode(job_.requests[job_.next], found.pdu, slave.is_huanyang());
+    switch (answer.verdict) {
+    case Verdict::foreign: return false;
+    case Verdict::exception: fail(Failure::exception, answer.code, now_ns); return true;
+    case Verdict::good: succeed(answer.data, now_ns); return true;
+    }
+    return false;
+}
+
+void Master::succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept {
+    SlaveState& state = slaves_[job_.slave];
+    waits_ = false;
+    free_at_ns_ = now_ns + silence_ns_;
+    ImageHeader& header = image_.header();
+    header.telegrams.fetch_add(1, std::memory_order_relaxed);
+    header.busy_ns.fetch_add(now_ns - sent_at_ns_ + silence_ns_, std::memory_order_relaxed);
+    answered(state, job_.slave);
+    if (++job_.next < job_.count) {
+        if (stopping_ && job_.telegram != stop_job) {
+            end_of_job();  // the rest of a command must not come behind the stop
+        }
+        return;
+    }
+    if (job_.telegram == stop_job) {
+        const Slave& slave = bus_.slaves[job_.slave];
+        state.stop_attempts = 0;
+        if (++state.stop_next == slave.stop.size()) {
+            image_.slave(job_.slave).stopped.store(1, std::memory_order_relaxed);
+            image_.tell({Event::stop_acknowledged, job_.slave, 0, now_ns - stop_at_ns_});
+        }
+        end_of_job();
+        finish_stop(now_ns);
+        return;
+    }
+    const Telegram& t = plan_.telegrams[job_.telegram];
+    TelegramState& own = telegrams_[job_.telegram];
+    if (t.kind == Telegram::Kind::read) {
+        store(t, data);
+    } else {
+        own.sent = job_.cells;
+        own.is_sent = true;
+    }
+    image_.stamp(job_.telegram).store(now_ns, std::memory_order_relaxed);
+    header.changes.fetch_add(1, std::memory_order_release);
+    end_of_job();
+}
+
+void Master::store(const Telegram& t, std::span<const std::uint8_t> data) noexcept {
+    for (const std::uint32_t n : t.values) {
+        const PlannedValue& planned = plan_.values[n];
+        Registers r;
+        if (t.table == Table::huanyang) {
+            // index, then the number (function 04 of the dialect)
+            if (data.size() < 3) return;
+            r.words[0] = word_at(data, 1);
+            r.count = 1;
+        } else {
+            r = registers_at(planned, data);
+        }
+        auto& cell = image_.value(n);
+        cell.store(decode_value(*planned.value, r, cell.load(std::memory_order_relaxed)),
+                   std::memory_order_relaxed);
+    }
+}
+
+void Master::answered(SlaveState& state, std::uint32_t slave) noexcept {
+    const bool returns = !state.is_known || state.is_offline;
+    state.failures = 0;
+    state.is_offline = false;
+    if (!returns) return;
+    state.is_known = true;
+    state.is_corrupt = false;
+    image_.slave(slave).online.store(1, std::memory_order_relaxed);
+    image_.tell({Event::slave_online, slave, 0, 0});
+    for (std::size_t n = 0; n < telegrams_.size(); ++n) {
+        if (plan_.telegrams[n].slave == slave) {
+            telegrams_[n].is_sent = false;
+        }
+    }
+}
+
+void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexcept {
+    const Slave& slave = bus_.slaves[job_.slave];
+    SlaveState& state = slaves_[job_.slave];
+    SlaveImage& own = image_.slave(job_.slave);
+    waits_ = false;
+    buffer_.clear();
+    image_.header().busy_ns.fetch_add(now_ns - sent_at_ns_, std::memory_order_relaxed);
+    free_at_ns_ = now_ns + silence_ns_;
+    // 10 and 11: a gateway did not reach the slave
+    const bool is_answer = failure == Failure::exception && code != 10 && code != 11;
+    if (is_answer) {
+        own.exceptions.fetch_add(1, std::memory_order_relaxed);
+        answered(state, job_.slave);
+        reject(code, now_ns);
+        return;
+    }
+    if (failure == Failure::corrupt) {
+        own.errors.fetch_add(1, std::memory_order_relaxed);
+        if (!state.is_corrupt) {
+            state.is_corrupt = true;
+            image_.tell({Event::slave_corrupt, job_.slave, 0, 0});
+        }
+    } else {
+        own.timeouts.fetch_add(1, std::memory_order_relaxed);
+        if (framing_ == Framing::rtu) {
+            // a late answer would be that of the next request: nothing in RTU distinguishes them
+            free_at_ns_ = now_ns + slave.timeout_ns;
+        }
+    }
+    ++state.failures;
+    if (!state.is_offline && state.failures >= slave.lost) {
+        state.is_offline = true;
+        state.is_known = true;
+        own.online.store(0, std::memory_order_relaxed);
+        image_.tell({Event::slave_offline, job_.slave, 0, 0});
+    }
+    if (job_.telegram == stop_job) return fail_stop(now_ns);
+    telegrams_[job_.telegram].due_ns =
+        now_ns + (plan_.telegrams[job_.telegram].kind == Telegram::Kind::read
+                      ? plan_.telegrams[job_.telegram].period_ns
+                      : 0);
+    end_of_job();
+}
+
+/// An exception: the slave is there and does not do what was asked.
+void Master::reject(std::uint8_t code, std::int64_t now_ns) noexcept {
+    if (job_.telegram == stop_job) {
+        image_.tell({Event::exception, job_.slave, stop_job, code});
+        return fail_stop(now_ns);
+    }
+    image_.tell({Event::exception, job_.slave, job_.telegram, code});
+    TelegramState& own = telegrams_[job_.telegram];
+    own.due_ns = now_ns + std::max(exception_pause_ns, plan_.telegrams[job_.telegram].period_ns);
+    own.sent = job_.cells;  // is written again when it is due, not at once
+    own.is_sent = plan_.telegrams[job_.telegram].kind != Telegram::Kind::read;
+    end_of_job();
+}
+
+void Master::fail_stop(std::int64_t now_ns) noexcept {
+    SlaveState& state = slaves_[job_.slave];
+    const Slave& slave = bus_.slaves[job_.slave];
+    end_of_job();
+    if (++state.stop_attempts < slave.stop_attempts) return;
+    state.stop_attempts = 0;
+    // the further telegrams of the list may still have an effect
+    if (++state.stop_next >= slave.stop.size()) {
+        image_.tell({Event::stop_unconfirmed, static_cast<std::uint32_t>(&state - slaves_.data()),
+                     0, now_ns - stop_at_ns_});
+    }
+    finish_stop(now_ns);
+}
+
+void Master::end_of_job() noexcept {
+    has_job_ = false;
+    job_.count = 0;
+    job_.next = 0;
+    job_.cells.clear();
+}
+
+/// Ends the stop when no slave has a stop telegram left, or the line is lost for a second.
+void Master::finish_stop(std::int64_t now_ns) noexcept {
+    if (!stopping_) return;
+    bool done = true;
+    for (std::size_t n = 0; n < slaves_.size(); ++n) {
+        done = done && slaves_[n].stop_next >= bus_.slaves[n].stop.size();
+    }
+    const bool is_lost = !line_was_open_ && now_ns - stop_at_ns_ > 1'000 * millisecond;
+    if (!done && !is_lost) return;
+    for (std::uint32_t n = 0; n < slaves_.size() && !done; ++n) {
+        if (slaves_[n].stop_next < bus_.slaves[n].stop.size()) {
+            image_.tell({Event::stop_unconfirmed, n, 0, now_ns - stop_at_ns_});
+        }
+    }
+    stopping_ = false;
+    image_.header().phase.store(static_cast<std::uint32_t>(Phase::stopped));
+}
+
+// --- What is next
+
+bool Master::may_write() const noexcept {
+    return !held_ && image_.header().outputs_valid.load(std::memory_order_acquire) != 0;
+}
+
+bool Master::choose(std::int64_t now_ns) noexcept {
+    if (stopping_) return choose_stop(now_ns);
+    if (choose_set_point(now_ns)) {
+        last_was_set_point_ = true;
+        return true;
+    }
+    last_was_set_point_ = false;
+    return choose_probe(now_ns) || choose_due(now_ns);
+}
+
+/// One stop telegram of each slave in turn, so that a slave that is offline does not delay others.
+bool Master::choose_stop(std::int64_t) noexcept {
+    const auto count = static_cast<std::uint32_t>(slaves_.size());
+    for (std::uint32_t n = 0; n < count; ++n) {
+        const std::uint32_t slave = (stop_turn_ + n) % count;
+        const auto& stops = bus_.slaves[slave].stop;
+        if (slaves_[slave].stop_next >= stops.size()) continue;
+        stop_turn_ = slave + 1;
+        has_job_ = true;
+        job_.telegram = stop_job;
+        job_.slave = slave;
+        add_write(stops[slaves_[slave].stop_next]);
+        return true;
+    }
+    return false;
+}
+
+bool Master::choose_set_point(std::int64_t now_ns) noexcept {
+    if (!may_write()) return false;
+    if (last_was_set_point_) {
+        for (std::size_t n = 0; n < telegrams_.size(); ++n) {
+            const Telegram& t = plan_.telegrams[n];
+            if (t.kind == Telegram::Kind::read && !slaves_[t.slave].is_offline &&
+                now_ns - telegrams_[n].due_ns > t.period_ns) {
+                return false;
+            }
+        }
+    }
+    // the one that was due first is first: no set-point starves another
+    std::uint32_t best = UINT32_MAX;
+    for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
+        const Telegram& t = plan_.telegrams[n];
+        if (t.kind == Telegram::Kind::read || slaves_[t.slave].is_offline) continue;
+        if (!has_changed(n)) continue;
+        if (best == UINT32_MAX || telegrams_[n].due_ns < telegrams_[best].due_ns) {
+            best = n;
+        }
+    }
+    return best != UINT32_MAX && begin(best, now_ns);
+}
+
+bool Master::choose_probe(std::int64_t now_ns) noexcept {
+    if (now_ns < probe_at_ns_) return false;
+    const auto count = static_cast<std::uint32_t>(slaves_.size());
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const std::uint32_t slave = (probe_next_ + i) % count;
+        if (!slaves_[slave].is_offline) continue;
+        for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
+            const Telegram& t = plan_.telegrams[n];
+            if (t.slave != slave || t.kind != Telegram::Kind::read || !begin(n, now_ns)) continue;
+            probe_next_ = slave + 1;
+            probe_at_ns_ = now_ns + probe_share * 2 * bus_.slaves[slave].timeout_ns;
+            return true;
+        }
+    }
+    return false;
+}
+
+bool Master::choose_due(std::int64_t now_ns) noexcept {
+    std::uint32_t best = UINT32_MAX;
+    for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
+        const Telegram& t = plan_.telegrams[n];
+        if (telegrams_[n].due_ns > now_ns || slaves_[t.slave].is_offline) continue;
+        if (t.kind != Telegram::Kind::read && !may_write()) continue;
+        if (best == UINT32_MAX || telegrams_[n].due_ns < telegrams_[best].due_ns) {
+            best = n;
+        }
+    }
+    if (best == UINT32_MAX) return false;
+    if (plan_.telegrams[best].kind != Telegram::Kind::read) {
+        telegrams_[best].is_sent = false;  // writes everything again
+    }
+    return begin(best, now_ns);
+}
+
+std::int64_t Master::next_due(std::int64_t now_ns) const noexcept {
+    std::int64_t next = now_ns + 100 * millisecond;
+    for (std::size_t n = 0; n < telegrams_.size(); ++n) {
+        const Telegram& t = plan_.telegrams[n];
+        if (t.kind != Telegram::Kind::read) {
+            next = std::min(next, now_ns + poll_ns);
+        } else if (!slaves_[t.slave].is_offline) {
+            next = std::min(next, telegrams_[n].due_ns);
+        }
+    }
+    return std::max(next, now_ns + 1);
+}
+
+/// Makes the requests of a telegram. Returns false when there is nothing to send.
+bool Master::begin(std::uint32_t telegram, std::int64_t now_ns) noexcept {
+    const Telegram& t = plan_.telegrams[telegram];
+    TelegramState& own = telegrams_[telegram];
+    end_of_job();
+    job_.telegram = telegram;
+    job_.slave = t.slave;
+    for (std::size_t n = 0; n < cells_of(telegram); ++n) {
+        job_.cells.push_back(cell_of(telegram, n));
+    }
+    bool has_requests = true;
+    switch (t.kind) {
+    case Telegram::Kind::read: make_read(t); break;
+    case Telegram::Kind::write: has_requests = make_write(t); break;
+    case Telegram::Kind::drive: make_drive(t); break;
+    }
+    // the grid stays, and what is late does not come twice
+    own.due_ns = std::max(own.due_ns + t.period_ns, now_ns + t.period_ns / 2);
+    if (!has_requests || job_.count == 0) {
+        own.sent = job_.cells;
+        own.is_sent = true;
+        end_of_job();
+        return false;
+    }
+    has_job_ = true;
+    return true;
+}
+
+bool Master::has_changed(std::uint32_t telegram) const noexcept {
+    const TelegramState& own = telegrams_[telegram];
+    if (!own.is_sent) return true;
+    for (std::size_t n = 0; n < own.sent.size(); ++n) {
+        if (own.sent[n] != cell_of(telegram, n)) return true;
+    }
+    return false;
+}
+
+/// The cells that a telegram writes; of a drive: command and speed.
+std::size_t Master::cells_of(std::uint32_t telegram) const noexcept {
+    const Telegram& t = plan_.telegrams[telegram];
+    if (t.kind == Telegram::Kind::read) return 0;
+    return t.kind == Telegram::Kind::drive ? 2 : t.values.size();
+}
+std::uint64_t Master::cell_of(std::uint32_t telegram, std::size_t n) const noexcept {
+    const Telegram& t = plan_.telegrams[telegram];
+    if (t.kind != Telegram::Kind::drive) {
+        return image_.value(t.values[n]).load(std::memory_order_relaxed);
+    }
+    const SlaveImage& slave = image_.slave(t.slave);
+    return n == 0 ? slave.command.load(std::memory_order_relaxed)
+                  : slave.speed.load(std::memory_order_relaxed);
+}
+
+// --- Requests
+
+void Master::make_read(const Telegram& t) noexcept {
+    if (t.table == Table::huanyang) {
+        const std::uint8_t data[] = {static_cast<std::uint8_t>(t.address), 0, 0};
+        job_.add(huanyang_request(4, data));
+        return;
+    }
+    job_.add(read_request(read_function(t.table), t.address, t.count));
+}
+
+/// Returns false when a value is not finite: the slave keeps the last one.
+bool Master::make_write(const Telegram& t) noexcept {
+    std::array<std::uint16_t, max_write_registers> words{};
+    std::array<std::uint8_t, (max_write_bits + 7) / 8> bits{};
+    for (std::size_t n = 0; n < t.values.size(); ++n) {
+        const PlannedValue& planned = plan_.values[t.values[n]];
+        Registers r;
+        if (!encode_value(*planned.value, job_.cells[n], r)) return false;
+        if (is_bits(t.table)) {
+            const unsigned on = r.words[0] & 1U;
+            bits[planned.offset / 8] =
+                static_cast<std::uint8_t>(bits[planned.offset / 8] | on << planned.offset % 8);
+            continue;
+        }
+        std::copy_n(r.words.begin(), r.count, words.begin() + planned.offset);
+    }
+    if (is_bits(t.table)) {
+        job_.add(t.count == 1 ? write_coil_request(t.address, bits[0] != 0)
+                              : write_coils_request(t.address, t.count,
+                                                    std::span(bits).first((t.count + 7U) / 8)));
+        return true;
+    }
+    job_.add(t.count == 1 ? write_register_request(t.address, words[0])
+                          : write_registers_request(t.address, std::span(words).first(t.count)));
+    return true;
+}
+
+/// Speed first, then run; the stop first, then speed 0. What has not changed is not sent.
+void Master::make_drive(const Telegram& t) noexcept {
+    const Drive& drive = *bus_.slaves[t.slave].drive;
+    const TelegramState& own = telegrams_[job_.telegram];
+    const auto command = static_cast<std::uint32_t>(job_.cells[0]);
+    const double rpm = std::bit_cast<double>(job_.cells[1]);
+    const auto sent_command = static_cast<std::uint32_t>(own.sent[0]);
+    const std::uint32_t direction = command & 3U;
+    const std::vector<Write>* writes = &drive.stop;
+    if (direction == drive_forward) {
+        writes = &drive.forward;
+    } else if (direction == drive_reverse) {
+        writes = drive.reverse.empty() ? &drive.stop : &drive.reverse;
+    }
+    if (drive.one_telegram) {
+        const double share = direction == drive_stop ? 0.0 : rpm / drive.max_speed_rpm;
+        const auto reference =
+            static_cast<unsigned>(std::lround(std::clamp(share, 0.0, 1.0) * drive.speed.value));
+        const bool resets = (command & drive_reset) != 0 && !drive.reset.empty();
+        const unsigned word =
+            resets ? drive.reset.front().value : (writes->empty() ? 0U : writes->front().value);
+        const std::uint8_t bits[] = {
+            static_cast<std::uint8_t>(word), static_cast<std::uint8_t>(word >> 8),
+            static_cast<std::uint8_t>(reference), static_cast<std::uint8_t>(reference >> 8)};
+        job_.add(write_coils_request(writes->empty() ? 0 : writes->front().address, 32, bits));
+        return;
+    }
+    const bool command_changed = !own.is_sent || sent_command != command;
+    const bool speed_changed = !own.is_sent || own.sent[1] != job_.cells[1];
+    const std::uint32_t reset_edge =
+        own.is_sent ? (sent_command ^ command) & drive_reset : command & drive_reset;
+    if (reset_edge != 0) {
+        for (Write write : drive.reset) {
+            if ((command & drive_reset) == 0) {
+                write.value = 0;
+            }
+            const bool shares_register =
+                !drive.stop.empty() && write.address == drive.stop[0].address;
+            if ((command & drive_reset) != 0 || !shares_register) {
+                add_write(write);
+            }
+        }
+    }
+    if (direction != drive_stop && speed_changed) {
+        add_speed(drive, rpm);
+    }
+    if (command_changed) {
+        for (const Write& write : *writes) {
+            add_write(write);
+        }
+    }
+    if (direction == drive_stop && (speed_changed || command_changed)) {
+        add_speed(drive, 0.0);
+    }
+}
+
+void Master::add_write(const Write& write) noexcept {
+    switch (write.table) {
+    case Table::coil: {
+        const Slave& slave = bus_.slaves[job_.slave];
+        if (slave.drive && slave.drive->one_telegram && write.value > 1) {
+            const std::uint8_t bits[] = {static_cast<std::uint8_t>(write.value),
+                                         static_cast<std::uint8_t>(write.value >> 8), 0, 0};
+            job_.add(write_coils_request(write.address, 32, bits));
+        } else {
+            job_.add(write_coil_request(write.address, write.value != 0));
+        }
+        break;
+    }
+    case Table::huanyang: {
+        const std::uint8_t data[] = {static_cast<std::uint8_t>(write.value)};
+        job_.add(huanyang_request(static_cast<std::uint8_t>(write.address), data));
+        break;
+    }
+    default: job_.add(write_register_request(write.address, write.value)); break;
+    }
+}
+
+void Master::add_speed(const Drive& drive, double rpm) noexcept {
+    const double share = std::clamp(rpm / drive.max_speed_rpm, 0.0, 1.0);
+    const auto counts = static_cast<std::uint16_t>(std::lround(share * drive.speed.value));
+    if (drive.speed.table == Table::huanyang) {
+        const std::uint8_t data[] = {static_cast<std::uint8_t>(counts >> 8),
+                                     static_cast<std::uint8_t>(counts)};
+        job_.add(huanyang_request(static_cast<std::uint8_t>(drive.speed.address), data));
+        return;
+    }
+    job_.add(write_register_request(drive.speed.address, counts));
+}
+
+void Master::send(std::int64_t now_ns) noexcept {
+    const Slave& slave = bus_.slaves[job_.slave];
+    const std::int64_t earliest =
+        std::max(last_byte_ns_, line_->sent_until_ns()) + std::max(silence_ns_, slave.gap_ns);
+    if (framing_ == Framing::rtu && now_ns < earliest) {
+        free_at_ns_ = earliest;
+        return;
+    }
+    const Pdu& request = job_.requests[job_.next];
+    sent_ = encode(framing_, slave.unit, ++transaction_, request);
+    buffer_.clear();
+    sent_at_ns_ = now_ns;
+    waits_ = true;
+    // a failed send is a request that is not answered; is_open() reports a lost line
+    line_->send(sent_.span(), now_ns);
+    deadline_ns_ = std::max(now_ns, line_->sent_until_ns()) + slave.timeout_ns;
+}
+
+}  // namespace hal::modbus

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+// The engine of a bus: decides which telegram is next, sends it, decodes the answer, and stops the
+// drives. It has no thread and no clock. The owner of the line calls work() when bytes have arrived,
+// and when the time that the last call returned has come.
+//
+// Which telegram is next:
+//   1. stop telegrams, when a stop was requested: nothing else until they are acknowledged or their
+//      attempts are used up;
+//   2. set-points that have changed, so that one waits for at most the telegram that is on the line;
+//      a read that is overdue for a whole period comes between two of them;
+//   3. a request to a slave that is offline, such that all of them use at most 5 % of the line;
+//   4. what is due, the earliest first.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "modbus/config/plan.hpp"
+#include "modbus/master/image.hpp"
+
+namespace hal::modbus {
+
+class Master {
+public:
+    /// `bus`, `plan` and the memory of the image outlive it. [setup]
+    Master(const Bus& bus, const Plan& plan, Image image);
+
+    /// The line on which it works from now on; it outlives the master or the next attach().
+    void attach(line::Line& line, std::int64_t now_ns);
+    /// Does what is due. Returns when there will be something to do, if no byte arrives before.
+    std::int64_t work(std::int64_t now_ns) noexcept;
+
+    /// Sends the stop telegrams and holds all writes until release().
+    void stop(StopReason reason, std::int64_t now_ns) noexcept;
+    /// Writes are allowed again. Everything is written anew.
+    void release() noexcept;
+    /// Returns whether the stop telegrams of the last stop are acknowledged or given up.
+    bool is_stopped() const noexcept { return held_ && !stopping_; }
+    bool is_held() const noexcept { return held_; }
+
+private:
+    static constexpr std::size_t max_requests = 10;
+    static constexpr std::uint32_t stop_job = UINT32_MAX;
+
+    struct SlaveState {
+        std::uint32_t failures = 0;  ///< in a row
+        bool is_offline = false;
+        bool is_known = false;  ///< an answer has arrived, or it was reported offline
+        bool is_corrupt = false;  ///< reported
+        std::size_t stop_next = 0;  ///< the next stop telegram
+        std::uint32_t stop_attempts = 0;
+    };
+    struct TelegramState {
+        std::int64_t due_ns = 0;
+        std::vector<std::uint64_t> sent;  ///< cells that the slave has acknowledged
+        bool is_sent = false;  ///< `sent` is valid
+    };
+    /// The requests of a telegram, or a stop telegram, one after the other.
+    struct Job {
+        std::uint32_t telegram = 0;
+        std::uint32_t slave = 0;
+        std::array<Pdu, max_requests> requests{};
+        std::size_t count = 0;
+        std::size_t next = 0;
+        std::vector<std::uint64_t> cells;  ///< what it writes
+
+        void add(const Pdu& pdu) noexcept {
+            if (count < max_requests) {
+                requests[count++] = pdu;
+            }
+        }
+    };
+    enum class Failure : std::uint8_t { none, timeout, corrupt, exception };
+
+    void follow_requests(std::int64_t now_ns) noexcept;
+    bool follow_line(std::int64_t now_ns) noexcept;
+    void receive(std::int64_t now_ns) noexcept;
+    bool finish_exchange(std::int64_t now_ns) noexcept;
+    bool accept(const Found& found, std::int64_t now_ns) noexcept;
+    void succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept;
+    void store(const Telegram& t, std::span<const std::uint8_t> data) noexcept;
+    void fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexcept;
+    void fail_stop(std::int64_t now_ns) noexcept;
+    void reject(std::uint8_t code, std::int64_t now_ns) noexcept;
+    void answered(SlaveState& state, std::uint32_t slave) noexcept;
+    void end_of_job() noexcept;
+
+    bool choose(std::int64_t now_ns) noexcept;
+    bool choose_stop(std::int64_t now_ns) noexcept;
+    bool choose_set_point(std::int64_t now_ns) noexcept;
+    bool choose_probe(std::int64_t now_ns) noexcept;
+    bool choose_due(std::int64_t now_ns) noexcept;
+    bool begin(std::uint32_t telegram, std::int64_t now_ns) noexcept;
+    bool has_changed(std::uint32_t telegram) const noexcept;
+    bool may_write() const noexcept;
+    std::int64_t next_due(std::int64_t now_ns) const noexcept;
+    void send(std::int64_t now_ns) noexcept;
+    void finish_stop(std::int64_t now_ns) noexcept;
+
+    void make_read(const Telegram& t) noexcept;
+    bool make_write(const Telegram& t) noexcept;
+    void make_drive(const Telegram& t) noexcept;
+    void add_write(const Write& write) noexcept;
+    void add_speed(const Drive& drive, double rpm) noexcept;
+
+    std::uint64_t cell_of(std::uint32_t telegram, std::size_t n) const noexcept;
+    std::size_t cells_of(std::uint32_t telegram) const noexcept;
+
+    const Bus& bus_;
+    const Plan& plan_;
+    Image image_;
+    line::Line* line_ = nullptr;
+    Framing framing_ = Framing::rtu;
+    std::int64_t silence_ns_ = 0;
+    std::int64_t quiet_ns_ = 0;  // after bytes: the frame is over
+
+    std::vector<SlaveState> slaves_;
+    std::vector<TelegramState> telegrams_;
+    Job job_;
+    bool has_job_ = false;
+    bool waits_ = false;  // for an answer
+    bool line_was_open_ = false;
+    bool line_reported_ = false;
+    bool has_echo_ = false;
+    bool last_was_set_point_ = false;
+    Frame sent_;
+    std::uint16_t transaction_ = 0;
+    std::int64_t sent_at_ns_ = 0;
+    std::int64_t deadline_ns_ = 0;
+    std::int64_t free_at_ns_ = 0;
+    std::int64_t last_byte_ns_ = 0;
+    std::int64_t probe_at_ns_ = 0;
+    std::uint32_t probe_next_ = 0;
+    ReceiveBuffer buffer_;
+
+    bool stopping_ = false;
+    bool held_ = false;
+    std::int64_t stop_at_ns_ = 0;
+    std::uint32_t stop_seen_ = 0;  // ImageHeader::stop_count
+    std::uint32_t stop_turn_ = 0;
+};
+
+}  // namespace hal::modbus

@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: MIT
+#include <dlfcn.h>
+
+#include <deque>
+#include <filesystem>
+
+#include "bus/component/bus_component.hpp"
+#include "event_texts.hpp"
+#include "hal/background.hpp"
+#include "hal/reporter.hpp"
+#include "modbus/guardian/guardian_process.hpp"
+#include "modbus/master/local_master.hpp"
+#include "modbus_arguments.hpp"
+#include "slave_pins.hpp"
+
+namespace {
+
+using namespace hal::modbus;
+
+constexpr std::int64_t millisecond = 1'000'000;
+
+struct Modbus : hal::bus::BusComponent {
+    explicit Modbus(const hal_host* host) : BusComponent(host, "modbus.0") {
+        arguments_.load("modbus");
+        if (!arguments_.loaded) return;
+        const Bus& bus = arguments_.bus;
+        texts_ = std::make_unique<EventTexts>(bus, arguments_.plan);
+        reporter_ = std::make_unique<hal::Reporter<EventRecord>>(
+            name_, [this](const EventRecord& record) { return line(record); }, 256,
+            &EventTexts::subject);
+        for (std::size_t n = 0; n < bus.slaves.size(); ++n) {
+            slaves_.emplace_back(*this, receive_, transmit_, bus, arguments_.plan, n);
+            faults_of_slaves_.emplace_back();
+        }
+    }
+
+    void start() {
+        if (!arguments_.loaded) {
+            throw std::runtime_error("missing configuration: write config=FILE.modbus");
+        }
+        const auto* host = hal::extension<hal_background>(HAL_BACKGROUND);
+        is_virtual_ = host != nullptr && host->is_virtual != 0;
+        const hal::line::Description line = hal::line::describe(arguments_.bus.link);
+        has_guardian_ = !is_virtual_ && !line.in_memory && arguments_.bus.guardian &&
+                        arguments_.bus.has_stops();
+        if (has_guardian_) {
+            start_guardian();
+        } else {
+            start_local();
+        }
+        begin_cycles();
+        is_alive_.store(true);
+        last_changes_ = 0;
+        reporter_->start();
+        background_.start();
+    }
+
+    void stop() noexcept {
+        if (local_) {
+            stop_local();
+        }
+        if (guardian_) {
+            guardian_->end();
+        }
+        background_.stop();
+        drain_events();
+        if (reporter_) {
+            reporter_->stop();
+        }
+        has_image_ = false;
+        local_.reset();
+        guardian_.reset();
+    }
+
+    void receive(hal::Cycle cycle) noexcept {
+        if (!has_image_) return;
+        const std::int64_t now = cycle.start_ns();
+        ImageHeader& header = image_.header();
+        header.limit_ns.store(std::max(arguments_.bus.heartbeat_ns, 3 * cycle.period_ns()),
+                              std::memory_order_relaxed);
+        header.heartbeat.fetch_add(1, std::memory_order_release);
+        const hal::bus::Turn turn = receive_turn(cycle);
+        if (begins_anew(turn)) {
+            header.stop_held.fetch_and(~bit_of(StopReason::fault), std::memory_order_release);
+            for (SlavePins& slave : slaves_) {
+                slave.require_edge();
+            }
+        }
+        if (turn == hal::bus::Turn::leaves) {
+            image_.stop(StopReason::fault);
+            header.outputs_valid.store(0, std::memory_order_release);
+        }
+        const bool alive = is_alive_.load(std::memory_order_acquire);
+        drain_events();
+        if (!alive && !guardian_fault_.lasts()) {
+            tell({Event::guardian_lost, 0, 0, 0});
+        }
+        show(now, alive && !is_offline(turn));
+    }
+
+    void transmit(hal::Cycle cycle) noexcept {
+        if (!has_image_ || !functions_.transmit(cycle)) return;
+        const std::int64_t now = cycle.start_ns();
+        ImageHeader& header = image_.header();
+        follow_estop();
+        const bool may_run = is_alive_.load(std::memory_order_relaxed) &&
+                             header.phase.load(std::memory_order_acquire) ==
+                                 static_cast<std::uint32_t>(Phase::running) &&
+                             header.stop_held.load(std::memory_order_relaxed) == 0;
+        bool invalid = false;
+        for (SlavePins& slave : slaves_) {
+            invalid = slave.transmit(image_, now, may_run) || invalid;
+        }
+        record_invalid_inputs(invalid);
+        header.outputs_valid.store(1, std::memory_order_release);
+    }
+
+    void make_safe(hal::Cycle) noexcept {
+        if (!has_image_) return;
+        image_.header().stop_held.fetch_or(bit_of(StopReason::fault), std::memory_order_release);
+        image_.header().outputs_valid.store(0, std::memory_order_release);
+        image_.stop(StopReason::fault);
+        interrupt();
+    }
+
+private:
+    static constexpr std::uint32_t bit_of(StopReason reason) {
+        return std::uint32_t{1} << static_cast<std::uint32_t>(reason);
+    }
+
+    // --- The master, in this process or in the guardian
+
+    /// It stands below the folder of the drivers' library; the plugin itself may be loaded from
+    /// memory.
+    static std::string guardian_program() {
+        Dl_info info{};
+        dladdr(reinterpret_cast<const void*>(
+                   static_cast<hal::line::Description (*)(std::string_view)>(&hal::line::describe)),
+               &info);
+        const std::filesystem::path library = info.dli_fname != nullptr ? info.dli_fname : "";
+        std::error_code none;
+        return (std::filesystem::weakly_canonical(library, none).parent_path() / "halcyon" /
+                "hal-guardian")
+            .string();
+    }
+
+    void start_guardian() {
+        const std::string& link = arguments_.bus.link;
+        const std::string report = report_file(link);
+        previous_report_ = take_report(report);
+        guardian_ = std::make_unique<GuardianProcess>();
+        const std::string problem =
+            guardian_->start({guardian_program(), name_, arguments_.config.get(), link, report},
+                             arguments_.text, arguments_.bus, arguments_.plan);
+        if (!problem.empty()) {
+            guardian_.reset();
+            throw std::runtime_error(problem);
+        }
+        image_ = guardian_->image();
+        has_image_ = true;
+        if (!previous_report_.empty()) {
+            reporter_->tell({Event::previous_stop, 0, 0, 0});
+        }
+    }
+
+    void start_local() {
+        auto opened = hal::line::open(arguments_.bus.link, arguments_.bus.line);
+        if (!opened) throw std::runtime_error(opened.problem);
+        const std::size_t size = Image::size_of(arguments_.bus, arguments_.plan);
+        if (memory_.empty()) {
+            memory_.resize(size + 64);
+        }
+        void* at = memory_.data();
+        std::size_t space = memory_.size();
+        image_ = Image(std::align(64, size, at, space), arguments_.bus, arguments_.plan, true);
+        has_image_ = true;
+        local_ = std::make_unique<LocalMaster>(arguments_.bus, arguments_.plan, image_,
+                                               std::move(opened.line));
+    }
+
+    /// Waits for the stop telegrams. On the virtual clock no time passes during an unload, and the
+    /// slaves of a simulation end with the machine.
+    void stop_local() noexcept {
+        if (is_virtual_ || !arguments_.bus.has_stops()) return;
+        image_.header().ending.store(1, std::memory_order_release);
+        image_.stop(StopReason::unload);
+        for (int n = 0; n < 1000; ++n) {
+            if (image_.header().phase.load(std::memory_order_acquire) ==
+                static_cast<std::uint32_t>(Phase::stopped)) {
+                return;
+            }
+            const timespec pause{0, 5 * millisecond};
+            nanosleep(&pause, nullptr);
+        }
+    }
+
+    void turn(std::int64_t now_ns, bool may_wait) noexcept {
+        if (local_) {
+            local_->turn(now_ns, may_wait);
+        } else if (guardian_ && is_alive_.load(std::memory_order_relaxed)) {
+            if (guardian_->has_ended_within(may_wait ? 50 * millisecond : 0)) {
+                is_alive_.store(false, std::memory_order_release);
+            }
+        } else if (may_wait) {
+            const timespec pause{0, 50 * millisecond};
+            nanosleep(&pause, nullptr);
+        }
+    }
+
+    // --- Events and pins
+
+    std::string line(const EventRecord& record) const {
+        if (record.event == Event::previous_stop) {
+            return "the guardian of the previous run: " + previous_report_;
+        }
+        return texts_->line(record);
+    }
+
+    void drain_events() noexcept {
+        if (!has_image_) return;
+        for (EventRecord record; image_.pop(record);) {
+            tell(record);
+        }
+    }
+
+    void tell(const EventRecord& record) noexcept {
+        reporter_->tell(record);
+        hal::LastingFault& condition = fault_of(record);
+        const auto& row = event_rows[static_cast<std::size_t>(record.event)];
+        if (row.effect == hal::bus::Effect::ends) {
+            end(condition);
+            return;
+        }
+        if (const auto* text = texts_->fault(record.event, record.slave)) {
+            begin(condition, text->text);
+        }
+    }
+
+    hal::LastingFault& fault_of(const EventRecord& record) noexcept {
+        switch (record.event) {
+        case Event::line_lost:
+        case Event::line_open: return line_fault_;
+        case Event::guardian_lost: return guardian_fault_;
+        default: return faults_of_slaves_[record.slave];
+        }
+    }
+
+    void show(std::int64_t now, bool is_alive) noexcept {
+        const ImageHeader& header = image_.header();
+        const std::uint64_t changes = header.changes.load(std::memory_order_acquire);
+        bool all_online = is_alive;
+        bool faulty = guardian_fault_.lasts() || line_fault_.lasts();
+        for (SlavePins& slave : slaves_) {
+            slave.show(image_, now, is_alive, changes != last_changes_);
+            slave.show_drive(image_);
+            all_online = all_online && slave.is_online();
+            faulty = faulty || faults_of_slaves_[slave.index()].lasts();
+        }
+        last_changes_ = changes;
+        online = all_online;
+        fault = faulty;
+        guarded = has_guardian_ && is_alive;
+        telegrams = header.telegrams.load(std::memory_order_relaxed);
+        show_load(now, header.busy_ns.load(std::memory_order_relaxed));
+    }
+
+    /// The share of the last second.
+    void show_load(std::int64_t now, std::int64_t busy) noexcept {
+        if (load_since_ == 0) {
+            load_since_ = now;
+            load_busy_ = busy;
+        }
+        const std::int64_t elapsed = now - load_since_;
+        if (elapsed < 1000 * millisecond) return;
+        load = static_cast<double>(busy - load_busy_) / static_cast<double>(elapsed);
+        load_since_ = now;
+        load_busy_ = busy;
+    }
+
+    void follow_estop() noexcept {
+        ImageHeader& header = image_.header();
+        if (estop && !was_estop_) {
+            header.stop_held.fetch_or(bit_of(StopReason::estop), std::memory_order_release);
+            image_.stop(StopReason::estop);
+        } else if (!estop && was_estop_) {
+            header.stop_held.fetch_and(~bit_of(StopReason::estop), std::memory_order_release);
+        }
+        was_estop_ = estop;
+    }
+
+    ModbusArguments arguments_{*this};
+    hal::Function receive_{*this,
+                           "receive",
+                           &Modbus::receive,
+                           "shows the values that have arrived; first in the thread",
+                           {.required = true}};
+    hal::Function transmit_{*this,
+                            "transmit",
+                            &Modbus::transmit,
+                            "passes the input pins on to the master; last in the thread",
+                            {.required = true}};
+    hal::Emergency emergency_{*this, &Modbus::make_safe,
+                              "sends the stop telegrams, and nothing else until the thread runs"};
+
+    hal::In<bool> estop{*this, transmit_, "estop",
+                        "TRUE: the stop telegrams are sent, and nothing is written"};
+    hal::Out<bool> online{*this, receive_, "online", "all slaves answer", {.safe = false}};
+    hal::Out<bool> fault{*this, receive_, "fault",
+                         "a slave is offline, or the line or the guardian is lost"};
+    hal::Out<bool> guarded{*this, receive_, "guarded",
+                           "a guardian sends the stop telegrams when this process ends"};
+    hal::Out<double> load{*this, receive_, "load",
+                          "share of the time in which the line is busy, 0..1"};
+    hal::Out<std::uint64_t> telegrams{*this, receive_, "telegrams", "requests that were answered"};
+
+    std::unique_ptr<EventTexts> texts_;
+    std::unique_ptr<hal::Reporter<EventRecord>> reporter_;
+    std::deque<SlavePins> slaves_;
+    std::deque<hal::LastingFault> faults_of_slaves_;
+    hal::LastingFault line_fault_, guardian_fault_;
+    std::string previous_report_;
+
+    std::vector<std::byte> memory_;  // of the image of a local master
+    Image image_;
+    bool has_image_ = false;
+    std::unique_ptr<LocalMaster> local_;
+    std::unique_ptr<GuardianProcess> guardian_;
+    hal::Background background_{[this](std::int64_t now, bool may_wait) { turn(now, may_wait); }};
+    std::atomic<bool> is_alive_{true};  // written by the background thread
+    bool is_virtual_ = false;
+    bool has_guardian_ = false;
+    bool was_estop_ = false;
+    std::uint64_t last_changes_ = 0;
+    std::int64_t load_since_ = 0;
+    std::int64_t load_busy_ = 0;
+};
+
+}  // namespace
+
+HAL_COMPONENT(Modbus, "modbus",
+              "Modbus master (RTU and TCP): registers as pins, drives as spindles, stop telegrams",
+              R"(
+Exchanges registers with the slaves of a Modbus line in the background. A configuration names the line, the slaves and their values:
+
+`spindle.modbus`:
+
+    [bus]
+    link = serial:/dev/ttyUSB0
+    baud = 19200
+
+    [slave 1 spindle]
+    profile = delta-ms300
+    max-speed = 24000
+    max-frequency = 400
+
+    [slave 2 coolant]
+    read level = input 0x0010 s16 scale 0.1 unit l every 1s
+    write pump = coil 3
+    stop = coil 3 0
+
+The netlist:
+
+    loadrt modbus config=spindle.modbus
+    addf modbus.0.receive servo-thread
+    addf modbus.0.transmit servo-thread
+    net speed spindle.0.speed-out => modbus.0.spindle.speed-cmd
+
+A cycle only copies values. The telegrams are exchanged by another process, the guardian, when a slave has stop telegrams, else by a background thread. `age`
+is how old the values of a slave are. Set-points that have changed are sent first. A slave that does not answer is offline after three requests and then uses at
+most 5 % of the line.
+
+A drive starts with a rising edge of `run`, when its speed has been read. After a stop, a lost slave or an e-stop it needs another edge. The stop telegrams
+are sent when `estop` is TRUE, when the thread is stopped or hangs, on `unloadrt`, and when the process ends, however that happens.
+
+`docs/modbus.md` has the keys of the configuration and the table of profiles. `hal modbus plan FILE` shows the telegrams; `hal modbus scan`, `read`
+and `write` talk to slaves by hand; `hal node modbus FILE` emulates the slaves of a file.
+)")

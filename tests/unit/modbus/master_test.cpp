@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: MIT
+#include "world.hpp"
+
+namespace hal::modbus::test {
+namespace {
+
+TEST(Plan, Values_of_one_period_share_a_telegram_within_its_limits) {
+    const ReadResult r = read(
+        "[bus]\nlink = sim:x\n[slave 1 a]\nmax-gap = 4\nmax-registers = 10\n"
+        "read a = holding 0\nread b = holding 5\nread c = holding 11\nread d = holding 12 every "
+        "1s\n"
+        "write e = holding 20\nwrite f = holding 21\nwrite g = holding 23\n",
+        "x");
+    ASSERT_TRUE(r.good());
+    const Plan plan = make_plan(r.bus);
+    std::vector<std::pair<unsigned, unsigned>> found;
+    for (const Telegram& t : plan.telegrams) {
+        found.emplace_back(t.address, t.count);
+    }
+    // written: contiguous ones only; read: a gap of 4 is filled, 10 registers are not exceeded
+    const std::vector<std::pair<unsigned, unsigned>> expected = {
+        {20, 2}, {23, 1}, {0, 6}, {11, 1}, {12, 1}};
+    EXPECT_EQ(found, expected);
+}
+
+TEST(Plan, Times_are_those_of_the_specification) {
+    line::Options line;
+    line.parity = line::Parity::even;  // 11 bits
+    line.baud = 19200;
+    EXPECT_NEAR(static_cast<double>(silence_ns(line)), 2.0e6, 0.01e6);
+    EXPECT_NEAR(static_cast<double>(line::characters_ns(line, 8)), 4.58e6, 0.01e6);
+    line.baud = 115200;
+    EXPECT_EQ(silence_ns(line), 1'750'000);
+}
+
+struct ProfileTest : testing::TestWithParam<std::string> {};
+
+TEST_P(ProfileTest, Drive_runs_both_ways_and_stops) {
+    std::string text = "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 d]\nprofile = " + GetParam() +
+                       "\nmax-speed = 12000\nmax-frequency = 200\n";
+    if (GetParam() == "generic") {
+        text +=
+            "forward = holding 0x10 1\nreverse = holding 0x10 2\nstop = holding 0x10 0\n"
+            "speed = holding 0x11 4000\nfeedback = holding 0x12 4000\n";
+    }
+    World w(text);
+    SlaveImage& slave = w.image.slave(0);
+    DriveModel& motor = *w.slaves->slaves()[0].drive();
+    const auto command = [&](std::uint32_t direction, double rpm) {
+        slave.speed.store(std::bit_cast<std::uint64_t>(rpm));
+        slave.command.store(direction);
+        w.run(3 * second);
+    };
+    w.run(200 * ms);
+    EXPECT_EQ(slave.online.load(), 1U);
+    EXPECT_EQ(motor.speed_rpm, 0.0);
+    command(drive_forward, 6000);
+    EXPECT_NEAR(motor.speed_rpm, 6000, 4);
+    EXPECT_NEAR(w.real("speed-fb"), 6000, 4);
+    command(drive_stop, 0);
+    EXPECT_EQ(motor.speed_rpm, 0.0);
+    command(drive_reverse, 3000);
+    EXPECT_NEAR(motor.speed_rpm, -3000, 4);
+    EXPECT_NEAR(w.real("speed-fb"), 3000, 4);
+
+    // the stop telegrams of the profile, and no command behind them
+    w.image.header().stop_held.store(1);
+    w.image.stop(StopReason::estop);
+    w.run(3 * second);
+    EXPECT_EQ(slave.stopped.load(), 1U);
+    EXPECT_EQ(motor.speed_rpm, 0.0);
+    EXPECT_EQ(slave.exceptions.load(), 0U);
+    EXPECT_EQ(slave.errors.load(), 0U);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ProfileTest, testing::ValuesIn([] {
+                             std::vector<std::string> names;
+                             for (const Profile& p : profiles()) {
+                                 names.emplace_back(p.name);
+                             }
+                             return names;
+                         }()),
+                         [](const auto& of) {
+                             std::string name = of.param;
+                             std::replace(name.begin(), name.end(), '-', '_');
+                             return name;
+                         });
+
+std::string many_slaves(int count) {
+    std::string text =
+        "[bus]\nlink = sim:x\nbaud = 38400\n[defaults]\ntimeout = 20ms\nevery = 10ms\n";
+    for (int unit = 1; unit <= count; ++unit) {
+        text += "[slave " + std::to_string(unit) + "]\nread v = holding 0\n";
+    }
+    return text;
+}
+
+TEST(Master, Dead_slaves_cost_the_others_at_most_a_tenth) {
+    const auto telegrams_of = [](bool some_are_dead) {
+        World w(many_slaves(31));
+        for (const unsigned unit : {3U, 9U, 14U, 20U, 31U}) {
+            SlaveFault fault;
+            fault.unit = static_cast<std::uint8_t>(unit);
+            fault.is_active = some_are_dead;
+            w.slaves->faults().push_back(fault);
+        }
+        w.run(5 * second);  // until they are known to be offline
+        const std::uint64_t before = w.image.header().telegrams.load();
+        w.run(20 * second);
+        return w.image.header().telegrams.load() - before;
+    };
+    const double all = static_cast<double>(telegrams_of(false));
+    const double without = static_cast<double>(telegrams_of(true));
+    EXPECT_GE(without, 0.9 * all) << without << " of " << all;
+}
+
+TEST(Master, Busy_line_is_used_as_far_as_its_gaps_allow) {
+    World w(many_slaves(4));
+    w.run(second);
+    const std::uint64_t before = w.image.header().telegrams.load();
+    w.run(20 * second);
+    const std::uint64_t telegrams = w.image.header().telegrams.load() - before;
+    const TelegramTime time = time_of(w.plan().telegrams[0], w.bus(), Framing::rtu);
+    const double use = static_cast<double>(telegrams) * static_cast<double>(time.all(0)) /
+                       static_cast<double>(20 * second);
+    // a quarter of a millisecond of each telegram is the step of this test
+    EXPECT_GE(use, 0.93) << telegrams;
+    EXPECT_LE(use, 1.0);
+}
+
+TEST(Master, Late_answer_is_never_the_value_of_another_request) {
+    World w(
+        "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\ntimeout = 20ms\nmax-gap = 0\n"
+        "read a = holding 0 every 10ms\nread b = holding 100 every 10ms\n");
+    w.slaves->slaves()[0].set("a", 111);
+    w.slaves->slaves()[0].set("b", 222);
+    SlaveFault fault;
+    fault.kind = FaultKind::late;
+    fault.every = 20;
+    fault.late_ns = 25 * ms;
+    w.slaves->faults().push_back(fault);
+    w.run(100 * ms);
+    for (int n = 0; n < 3000; ++n) {
+        w.run(10 * ms);
+        ASSERT_EQ(w.number("a"), 111U) << n;
+        ASSERT_EQ(w.number("b"), 222U) << n;
+    }
+    EXPECT_GT(w.image.slave(0).timeouts.load(), 100U);
+}
+
+TEST(Master, Corrupted_answer_is_never_a_value) {
+    World w(
+        "[bus]\nlink = sim:x\nbaud = 115200\n[slave 1 s]\ntimeout = 20ms\nlost = 100\n"
+        "read a = holding 0 u64 every 5ms\n");
+    w.slaves->slaves()[0].set("a", 1234567890);
+    w.run(100 * ms);
+    SlaveFault fault;
+    fault.kind = FaultKind::corrupt;
+    fault.every = 3;
+    w.slaves->faults().push_back(fault);
+    for (int n = 0; n < 2000; ++n) {
+        w.run(10 * ms);
+        ASSERT_EQ(w.number("a"), 1234567890U);
+    }
+    EXPECT_GT(w.image.slave(0).errors.load(), 500U);
+}
+
+TEST(Master, Stop_waits_for_at_most_the_telegram_on_the_line) {
+    World w(
+        "[bus]\nlink = sim:x\nbaud = 19200\n[slave 1 s]\nread a = holding 0 every 10ms\n"
+        "write c = holding 50\nstop = holding 50 7\n");
+    w.run(500 * ms);
+    w.image.header().stop_held.store(1);
+    w.image.stop(StopReason::death);
+    const std::int64_t since = w.now;
+    while (w.image.slave(0).stopped.load() == 0 && w.now - since < second) {
+        w.run(ms);
+    }
+    // the running read and the stop telegram with their answers and gaps, at 19200 baud
+    EXPECT_LT(w.now - since, 35 * ms);
+    EXPECT_EQ(w.slaves->slaves()[0].get(Table::holding, 50), 7);
+}
+
+TEST(Master, Stop_of_one_slave_does_not_wait_for_another_that_is_dead) {
+    World w(
+        "[bus]\nlink = sim:x\nbaud = 19200\n[slave 1 dead]\ntimeout = 100ms\n"
+        "write c = holding 50\nstop = holding 50 7\n[slave 2 alive]\nwrite c = holding 50\n"
+        "stop = holding 50 7\n");
+    SlaveFault fault;
+    fault.unit = 1;
+    w.slaves->faults().push_back(fault);
+    w.run(2 * second);
+    w.image.stop(StopReason::death);
+    w.run(300 * ms);
+    EXPECT_EQ(w.slaves->slaves()[1].get(Table::holding, 50), 7);
+    EXPECT_EQ(w.image.slave(1).stopped.load(), 1U);
+    EXPECT_EQ(w.image.slave(0).stopped.load(), 0U);
+}
+
+TEST(Master, Rejected_register_does_not_slow_down_the_others) {
+    World w(
+        "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\nmax-gap = 0\n"
+        "read good = holding 0 every 20ms\nread bad = holding 500 every 20ms\n",
+        "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\nread good = holding 0\n");
+    w.slaves->slaves()[0].set("good", 5);
+    w.run(5 * second);
+    EXPECT_EQ(w.number("good"), 5U);
+    EXPECT_EQ(w.image.slave(0).online.load(), 1U);
+    EXPECT_GE(w.image.slave(0).exceptions.load(), 3U);
+    EXPECT_LE(w.image.slave(0).exceptions.load(), 7U);
+}
+
+TEST(Master, Slave_that_is_not_on_the_line_is_offline) {
+    World w("[bus]\nlink = sim:x\nbaud = 9600\n[slave 1 s]\nread a = holding 0\n");
+    w.slaves->slaves()[0].set("a", 5);
+    auto other = line::open("sim:other-line", w.bus().line);
+    w.slaves->attach(*other.line);  // nobody is on the line of the master
+    w.run(3 * second);
+    EXPECT_EQ(w.image.slave(0).online.load(), 0U);
+    EXPECT_EQ(w.image.stamp(0).load(), 0);
+    EXPECT_EQ(w.number("a"), 0U);
+}
+
+}  // namespace
+}  // namespace hal::modbus::test
