@@ -24,6 +24,7 @@
 #include "bus/ethercat/ethercat_line.hpp"
 #include "bus/ethercat/options.hpp"
 #include "bus/node/kinds.hpp"
+#include "bus/modbus/options.hpp"
 #include "bus/scocan/plan.hpp"
 #include "bus/tdma/plan.hpp"
 #include "comp/compile.hpp"
@@ -301,6 +302,22 @@ constexpr Subcommand table[] = {
     command<EthercatLcecOptions, OF_ETHERCAT(run_ethercat_lcec_conf)>(
         "ethercat lcec-conf", "FILE [--name NAME]",
         "check the configuration of the component lcec, for loadusr (lcec_conf)"),
+    command<ModbusCheckOptions, OF_MODBUS(run_modbus_check)>(
+        "modbus check", "FILE…", "check the configuration of a Modbus line"),
+    command<ModbusPlanOptions, OF_MODBUS(run_modbus_plan)>(
+        "modbus plan", "FILE [--answer TIME] [--json]",
+        "print the telegrams of a Modbus line, its load, and how old each value can be"),
+    command<ModbusScanOptions, OF_MODBUS(run_modbus_scan)>(
+        "modbus scan", "LINE [--first N] [--last N] [--timeout TIME]",
+        "find the slaves on a Modbus line"),
+    command<ModbusAccessOptions, OF_MODBUS(run_modbus_read)>(
+        "modbus read", "LINE SLAVE TABLE ADDRESS [COUNT] [--timeout TIME]",
+        "read registers or bits of a Modbus slave"),
+    command<ModbusAccessOptions, OF_MODBUS(run_modbus_write)>(
+        "modbus write", "LINE SLAVE TABLE ADDRESS VALUE… [--timeout TIME]",
+        "write registers or coils of a Modbus slave"),
+    command<ModbusMonitorOptions, OF_MODBUS(run_modbus_monitor)>(
+        "modbus monitor", "LINE [--for TIME]", "print the frames on a serial line"),
     command<ScocanPlanOptions, OF_SCOCAN(run_scocan_plan)>(
         "scocan plan", "FILE [--mode MODE] [--json | --svg FILE]",
         "print the slots of a CAN bus as a timeline, its load and the worst-case latency of each "
@@ -342,6 +359,9 @@ constexpr Subcommand table[] = {
     command<EthercatLineOptions, OF_ETHERCAT(run_node_ethercat)>(
         "node ethercat", "FILE --link ADDRESS [--backup ADDRESS] [--for TIME]",
         "emulate a line of EtherCAT slaves on a network interface"),
+    command<ModbusNodeOptions, OF_MODBUS(run_node_modbus)>(
+        "node modbus", "FILE [--link ADDRESS] [--fault FAULT] [--for TIME]",
+        "emulate the slaves and drives of a Modbus line on a pseudo terminal or a TCP port"),
     command<Options, OF_CANOPEN(run_node_faults)>(
         "node faults", "", "list the faults that simulated devices can inject"),
     command<TopOptions, IN_TOOLS(run_top)>(
@@ -376,11 +396,12 @@ constexpr Group groups[] = {
     {"can", "CAN bus tools"},
     {"canopen", "tools for the configuration of a CANopen network"},
     {"ethercat", "EtherCAT bus tools"},
+    {"modbus", "Modbus tools"},
     {"scocan", "time slots of a CAN bus"},
     {"tdma", "time slots of an Ethernet segment"},
     {"node",
-     "simulated CANopen devices as processes, an EtherCAT line, and the faults that can be "
-     "injected"},
+     "simulated CANopen devices as processes, an EtherCAT line, Modbus slaves, and the faults that "
+     "can be injected"},
 };
 
 }  // namespace

@@ -16,6 +16,7 @@ inline constexpr char canopen[] = "canopen";
 inline constexpr char ethercat[] = "ethercat";
 inline constexpr char scocan[] = "scocan";
 inline constexpr char tdma[] = "tdma";
+inline constexpr char modbus[] = "modbus";
 inline constexpr char linuxcnc[] = "linuxcnc";
 inline constexpr char panel[] = "panel";
 }  // namespace package
@@ -61,6 +62,11 @@ struct In {
 #define OF_TDMA(run) In<Part::bus, run, package::tdma>
 #else
 #define OF_TDMA(run) In<Part::bus, nullptr, package::tdma>
+#endif
+#if defined(HALCYON_BUS_PROGRAM) && HALCYON_PACKAGE_MODBUS
+#define OF_MODBUS(run) In<Part::bus, run, package::modbus>
+#else
+#define OF_MODBUS(run) In<Part::bus, nullptr, package::modbus>
 #endif
 #if defined(HALCYON_TOOLS_PROGRAM) && HALCYON_PACKAGE_LINUXCNC
 #define OF_LINUXCNC(run) In<Part::tools, run, package::linuxcnc>

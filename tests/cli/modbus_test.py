@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: MIT
+# packages: modbus
+"""hal modbus and hal node modbus on a pseudo terminal and on TCP: check, plan, scan, read, write, monitor, faults, and a spindle in real time."""
+
+import json
+import os
+import pty
+import subprocess
+import time
+import tty
+import unittest
+
+from harness import HAL, TIMEOUT, Case, wait_until
+
+BUS = """[bus]
+link = serial:line
+baud = 38400
+[slave 3 io]
+read level = input 0x10 s16 scale 0.1
+read ready = holding 0x20.3
+write pump = coil 3
+stop = coil 3 0
+[slave 7 spindle]
+profile = vfs11
+every = 100ms
+"""
+
+
+class Modbus(Case):
+    def setUp(self):
+        super().setUp()
+        self.write("bus.modbus", BUS)
+
+    def node(self, link, *words):
+        log = open(self.folder / "node.log", "w")
+        self.addCleanup(log.close)
+        node = subprocess.Popen(
+            ["hal", "node", "modbus", "bus.modbus", "--link", link, *words],
+            executable=str(HAL),
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+        )
+        self.addCleanup(self.end_node, node)
+        wait_until(
+            lambda: "2 slaves on" in (self.folder / "node.log").read_text(), "the slaves run"
+        )
+        return node
+
+    @staticmethod
+    def end_node(node):
+        node.terminate()
+        node.wait(timeout=TIMEOUT)
+
+    def test_check_and_plan(self):
+        self.assertEqual(
+            "bus.modbus: 2 slaves, 7 values, 6 telegrams\n",
+            self.good("modbus", "check", "bus.modbus"),
+        )
+        plan = json.loads(self.good("modbus", "plan", "bus.modbus", "--json"))
+        self.assertEqual(6, len(plan["telegrams"]))
+        self.assertTrue(0 < plan["use"] < 1)
+        for telegram in plan["telegrams"]:
+            self.assertGreater(telegram["age_ns"], telegram["period_ns"])
+        self.write("bad.modbus", "[bus]\n[slave 1 a]\nread x = holding\n")
+        self.assertIn("[modbus-value]", self.bad("modbus", "check", "bad.modbus"))
+        self.assertIn("cannot read", self.bad("modbus", "plan", "none.modbus"))
+
+    def by_hand(self, line):
+        self.assertEqual(
+            "slave 3 answers: illegal data address (exception 2)\n"
+            "slave 7 answers: illegal data address (exception 2)\n",
+            self.good("modbus", "scan", line, "--last", "9", "--timeout", "40ms"),
+        )
+        self.assertEqual(
+            "0x0010  0xFF83  65411  -125\n", self.good("modbus", "read", line, "3", "input", "0x10")
+        )
+        self.assertEqual("0x0003  0\n", self.good("modbus", "read", line, "3", "coil", "3"))
+        self.assertEqual("", self.good("modbus", "write", line, "3", "coil", "3", "1"))
+        self.assertEqual("0x0003  1\n", self.good("modbus", "read", line, "3", "coil", "3"))
+        self.assertEqual(
+            "hal modbus read: slave 3 rejects 'read holding 0x0500': illegal data address (exception 2)\n",
+            self.bad("modbus", "read", line, "3", "holding", "0x500"),
+        )
+        self.assertIn("slave 4 does not answer", self.bad("modbus", "read", line, "4", "coil", "3"))
+        for words in (
+            ("3", "register", "0"),
+            ("3", "coil", "70000"),
+            ("300", "coil", "0"),
+            ("3", "coil"),
+            ("3", "coil", "0", "2001"),
+        ):
+            self.bad("modbus", "read", line, *words)
+        self.bad("modbus", "write", line, "3", "input", "0", "1")
+        self.bad("modbus", "write", line, "3", "coil", "0", "2")
+        self.bad("modbus", "write", line, "3", "holding", "0", "65536")
+        self.bad("modbus", "write", line, "3", "holding", "0")
+
+    def test_by_hand_on_a_terminal(self):
+        self.node("pty:line", "--set", "io.level=-12.5")
+        self.by_hand("serial:line?baud=38400")
+
+    def test_by_hand_on_tcp(self):
+        port = 20000 + os.getpid() % 20000
+        self.node(f"listen:{port}", "--set", "io.level=-12.5")
+        self.by_hand(f"tcp:127.0.0.1:{port}")
+
+    def test_invalid_lines_and_faults(self):
+        self.assertIn("write serial:/dev/ttyUSB0 for", self.bad("modbus", "scan", "usb0"))
+        self.assertIn("cannot open '/dev/none'", self.bad("modbus", "scan", "serial:/dev/none"))
+        self.assertIn("not a serial line", self.bad("modbus", "scan", "serial:/dev/null"))
+        self.assertIn("invalid baud", self.bad("modbus", "scan", "serial:/dev/null?baud=x"))
+        self.assertIn(
+            "unknown fault 'slow'",
+            self.bad("node", "modbus", "bus.modbus", "--link", "pty:l", "--fault", "slow"),
+        )
+        self.assertIn(
+            "invalid option 'every=0'",
+            self.bad("node", "modbus", "bus.modbus", "--link", "pty:l", "--fault", "late:every=0"),
+        )
+        self.assertIn(
+            "there is no value io.x",
+            self.bad("node", "modbus", "bus.modbus", "--link", "pty:l", "--set", "io.x=1"),
+        )
+        self.write("file", "")
+        self.assertIn(
+            "'file' exists", self.bad("node", "modbus", "bus.modbus", "--link", "pty:file")
+        )
+
+    def test_corrupt_and_silent_slaves(self):
+        self.node("pty:line", "--fault", "corrupt:unit=3", "--fault", "silence:unit=7")
+        line = "serial:line?baud=38400"
+        self.assertIn(
+            "wrong check sequence", self.bad("modbus", "read", line, "3", "input", "0x10")
+        )
+        self.assertIn("does not answer", self.bad("modbus", "read", line, "7", "input", "0x10"))
+
+    def test_monitor(self):
+        master, slave = pty.openpty()
+        tty.setraw(master)
+        tty.setraw(slave)
+        os.symlink(os.ttyname(slave), self.folder / "line")
+        monitor = self.start("modbus", "monitor", "serial:line", loaded=False)
+        request = bytes.fromhex("010321030001 7E36")
+
+        def seen():
+            os.write(master, request)
+            return any(
+                os.readlink(f"/proc/{monitor.pid}/fd/{fd}") == os.ttyname(slave)
+                for fd in os.listdir(f"/proc/{monitor.pid}/fd")
+            )
+
+        wait_until(seen, "it listens")
+        os.write(master, request + bytes.fromhex("0103020000B844"))
+        time.sleep(0.2)  # a pause ends a frame
+        os.write(master, request[:5])
+        time.sleep(0.2)
+        out = self.end(monitor)[0]
+        self.assertIn("01 03 21 03 00 01 7E 36 \n", out)
+        self.assertIn("01 03 02 00 00 B8 44 \n", out)
+        self.assertIn("01 03 21 03 00  wrong check sequence", out)
+        os.close(master)
+        os.close(slave)
+
+    def test_a_spindle_in_real_time(self):
+        self.node("pty:line", "--verbose")
+        self.write(
+            "spindle.hal",
+            "loadrt threads name1=servo period1=1000000\n"
+            "loadrt modbus config=bus.modbus\n"
+            "addf modbus.0.receive servo\naddf modbus.0.transmit servo\nstart\n",
+        )
+        machine = self.start("run", "spindle.hal")
+        self.comes("modbus.0.spindle.online", "TRUE")
+        self.say("setp", "modbus.0.spindle.speed-cmd", "-2400")
+        self.say("setp", "modbus.0.spindle.run", "TRUE")
+        self.comes("modbus.0.spindle.speed-fb", "-2400")
+        self.comes("modbus.0.spindle.at-speed", "TRUE")
+        self.end(machine)
+        wait_until(
+            lambda: (self.folder / "node.log").read_text().count("spindle: stop") >= 2,
+            "the spindle is stopped",
+        )
+
+
+if __name__ == "__main__":
+    unittest.main()
