@@ -35,9 +35,9 @@ struct Attributes {
     Attributes() {
         posix_spawnattr_init(&attributes);
         posix_spawn_file_actions_init(&actions);
-        sigset_t none;
-        sigemptyset(&none);
-        posix_spawnattr_setsigmask(&attributes, &none);
+        sigset_t empty;
+        sigemptyset(&empty);
+        posix_spawnattr_setsigmask(&attributes, &empty);
         sigset_t all;
         sigfillset(&all);
         posix_spawnattr_setsigdefault(&attributes, &all);

@@ -53,6 +53,7 @@ enum class Phase : std::uint32_t { starting, running, stopping, stopped, ended }
 
 struct SlaveImage {
     // written by the engine
+    std::atomic<std::uint32_t> activity{0};  ///< counts what may change a pin of the slave
     std::atomic<std::uint32_t> online{0};
     std::atomic<std::uint32_t> stopped{0};  ///< the stop telegrams are acknowledged
     std::atomic<std::uint32_t> timeouts{0};
@@ -91,7 +92,6 @@ struct ImageHeader {
     std::atomic<std::uint32_t> line_open{0};
     /// why the guardian could not start; written before Phase::ended
     std::array<char, 256> problem{};
-    std::atomic<std::uint64_t> changes{0};  ///< telegrams with values
     std::atomic<std::uint64_t> telegrams{0};  ///< answered
     std::atomic<std::int64_t> busy_ns{0};
     std::array<EventRecord, event_capacity> events{};

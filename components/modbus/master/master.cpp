@@ -104,6 +104,7 @@ void Master::stop(StopReason reason, std::int64_t now_ns) noexcept {
         slaves_[n].stop_next = 0;
         slaves_[n].stop_attempts = 0;
         image_.slave(n).stopped.store(0, std::memory_order_relaxed);
+        touch(n);
     }
     if (has_job_ && job_.telegram != stop_job && !waits_) {
         end_of_job();
@@ -120,6 +121,7 @@ void Master::release() noexcept {
     }
     for (std::size_t n = 0; n < slaves_.size(); ++n) {
         image_.slave(n).stopped.store(0, std::memory_order_relaxed);
+        touch(n);
     }
 }
 
@@ -152,6 +154,7 @@ bool Master::follow_line(std::int64_t now_ns) noexcept {
         }
         for (std::size_t n = 0; n < slaves_.size(); ++n) {
             image_.slave(n).online.store(0, std::memory_order_relaxed);
+            touch(n);
             slaves_[n].is_known = false;
         }
     }
@@ -247,6 +250,7 @@ void Master::succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) no
         state.stop_attempts = 0;
         if (++state.stop_next == slave.stop.size()) {
             image_.slave(job_.slave).stopped.store(1, std::memory_order_relaxed);
+            touch(job_.slave);
             image_.tell({Event::stop_acknowledged, job_.slave, 0, now_ns - stop_at_ns_});
         }
         end_of_job();
@@ -262,7 +266,7 @@ void Master::succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) no
         own.is_sent = true;
     }
     image_.stamp(job_.telegram).store(now_ns, std::memory_order_relaxed);
-    header.changes.fetch_add(1, std::memory_order_release);
+    touch(job_.slave);
     end_of_job();
 }
 
@@ -292,6 +296,7 @@ void Master::answered(SlaveState& state, std::uint32_t slave) noexcept {
     state.is_known = true;
     state.is_corrupt = false;
     image_.slave(slave).online.store(1, std::memory_order_relaxed);
+    touch(slave);
     image_.tell({Event::slave_online, slave, 0, 0});
     for (std::size_t n = 0; n < telegrams_.size(); ++n) {
         if (plan_.telegrams[n].slave == slave) {
@@ -312,6 +317,7 @@ void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexc
     const bool is_answer = failure == Failure::exception && code != 10 && code != 11;
     if (is_answer) {
         own.exceptions.fetch_add(1, std::memory_order_relaxed);
+        touch(job_.slave);
         answered(state, job_.slave);
         reject(code, now_ns);
         return;
@@ -336,6 +342,7 @@ void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexc
         own.online.store(0, std::memory_order_relaxed);
         image_.tell({Event::slave_offline, job_.slave, 0, 0});
     }
+    touch(job_.slave);
     if (job_.telegram == stop_job) return fail_stop(now_ns);
     telegrams_[job_.telegram].due_ns =
         now_ns + (plan_.telegrams[job_.telegram].kind == Telegram::Kind::read

@@ -85,6 +85,10 @@ private:
     void reject(std::uint8_t code, std::int64_t now_ns) noexcept;
     void answered(SlaveState& state, std::uint32_t slave) noexcept;
     void end_of_job() noexcept;
+    /// The cycle looks at the slave again; behind the changes that it is to see.
+    void touch(std::size_t slave) const noexcept {
+        image_.slave(slave).activity.fetch_add(1, std::memory_order_release);
+    }
 
     bool choose(std::int64_t now_ns) noexcept;
     bool choose_stop(std::int64_t now_ns) noexcept;

@@ -29,7 +29,7 @@ struct Modbus : hal::bus::BusComponent {
             name_, [this](const EventRecord& record) { return line(record); }, 256,
             &EventTexts::subject);
         for (std::size_t n = 0; n < bus.slaves.size(); ++n) {
-            slaves_.emplace_back(*this, receive_, transmit_, bus, arguments_.plan, n);
+            slaves_.emplace_back(*this, receive_, transmit_, bus, arguments_.plan, n, set_points_);
             faults_of_slaves_.emplace_back();
         }
     }
@@ -50,7 +50,7 @@ struct Modbus : hal::bus::BusComponent {
         }
         begin_cycles();
         is_alive_.store(true);
-        last_changes_ = 0;
+        shown_ns_ = 0;
         reporter_->start();
         background_.start();
     }
@@ -95,7 +95,10 @@ struct Modbus : hal::bus::BusComponent {
         if (!alive && !guardian_fault_.lasts()) {
             tell({Event::guardian_lost, 0, 0, 0});
         }
-        show(now, alive && !is_offline(turn));
+        // a thread that was stopped has written safe values to pins
+        const bool refresh = now - shown_ns_ > 3 * cycle.period_ns() / 2;
+        shown_ns_ = now;
+        show(now, alive && !is_offline(turn), refresh);
     }
 
     void transmit(hal::Cycle cycle) noexcept {
@@ -107,7 +110,7 @@ struct Modbus : hal::bus::BusComponent {
                              header.phase.load(std::memory_order_acquire) ==
                                  static_cast<std::uint32_t>(Phase::running) &&
                              header.stop_held.load(std::memory_order_relaxed) == 0;
-        bool invalid = false;
+        bool invalid = set_points_.transmit(image_);
         for (SlavePins& slave : slaves_) {
             invalid = slave.transmit(image_, now, may_run) || invalid;
         }
@@ -245,18 +248,16 @@ private:
         }
     }
 
-    void show(std::int64_t now, bool is_alive) noexcept {
+    void show(std::int64_t now, bool is_alive, bool refresh) noexcept {
         const ImageHeader& header = image_.header();
-        const std::uint64_t changes = header.changes.load(std::memory_order_acquire);
         bool all_online = is_alive;
         bool faulty = guardian_fault_.lasts() || line_fault_.lasts();
         for (SlavePins& slave : slaves_) {
-            slave.show(image_, now, is_alive, changes != last_changes_);
+            slave.show(image_, now, is_alive, refresh);
             slave.show_drive(image_);
             all_online = all_online && slave.is_online();
             faulty = faulty || faults_of_slaves_[slave.index()].lasts();
         }
-        last_changes_ = changes;
         online = all_online;
         fault = faulty;
         guarded = has_guardian_ && is_alive;
@@ -315,6 +316,7 @@ private:
 
     std::unique_ptr<EventTexts> texts_;
     std::unique_ptr<hal::Reporter<EventRecord>> reporter_;
+    SetPointPins set_points_;
     std::deque<SlavePins> slaves_;
     std::deque<hal::LastingFault> faults_of_slaves_;
     hal::LastingFault line_fault_, guardian_fault_;
@@ -330,7 +332,7 @@ private:
     bool is_virtual_ = false;
     bool has_guardian_ = false;
     bool was_estop_ = false;
-    std::uint64_t last_changes_ = 0;
+    std::int64_t shown_ns_ = 0;
     std::int64_t load_since_ = 0;
     std::int64_t load_busy_ = 0;
 };

@@ -41,11 +41,61 @@ struct DrivePins {
     hal::Out<bool> stalled;
 };
 
+/// Returns the type of the pin of a value. [setup]
+inline hal_type type_of(const Value& v) {
+    const bool wide = v.size() > 2;
+    switch (pin_form(v)) {
+    case PinForm::real: return HAL_TYPE_FLOAT;
+    case PinForm::bit: return HAL_TYPE_BIT;
+    case PinForm::signed_number: return wide ? HAL_TYPE_S64 : HAL_TYPE_S32;
+    case PinForm::unsigned_number: return wide ? HAL_TYPE_U64 : HAL_TYPE_U32;
+    }
+    return HAL_TYPE_U32;
+}
+
+/// The input pins of all slaves: one loop copies them.
+class SetPointPins {
+public:
+    /// [setup]
+    void declare(hal::Component& c, const hal::Function& transmit, const Value& v,
+                 const std::string& name, const char* doc, std::uint32_t value) {
+        pins_.declare(c, &transmit, type_of(v), name, doc, value, {.unit = v.unit.c_str()});
+    }
+    /// Copies the pins to the image. Returns whether one is not finite: its last value stays.
+    /// [realtime]
+    bool transmit(const Image& image) noexcept {
+        bool invalid = false;
+        pins_.each([&](const auto& pin, const std::uint32_t& value) {
+            const auto number = pin.get();
+            if constexpr (std::is_same_v<std::remove_cvref_t<decltype(number)>, double>) {
+                if (!std::isfinite(number)) {
+                    invalid = true;
+                    return;
+                }
+            }
+            image.value(value).store(to_cell(number), std::memory_order_relaxed);
+        });
+        return invalid;
+    }
+
+private:
+    template <class T>
+    static std::uint64_t to_cell(T value) noexcept {
+        if constexpr (std::is_same_v<T, double>) {
+            return std::bit_cast<std::uint64_t>(value);
+        } else {
+            return static_cast<std::uint64_t>(value);
+        }
+    }
+
+    hal::AnyIns<std::uint32_t> pins_;
+};
+
 class SlavePins {
 public:
     /// Declares the pins. [setup]
     SlavePins(hal::Component& c, const hal::Function& receive, const hal::Function& transmit,
-              const Bus& bus, const Plan& plan, std::size_t index)
+              const Bus& bus, const Plan& plan, std::size_t index, SetPointPins& set_points)
         : index_(index),
           online_(c, receive, (name_of(bus, index) + ".online").c_str(), "the slave answers",
                   {.safe = false}),
@@ -66,7 +116,7 @@ public:
             if (!planned.value->is_output) {
                 add_reading(planned.telegram);
             }
-            declare(c, receive, transmit, slave.name, planned, n);
+            declare(c, receive, transmit, slave.name, planned, n, set_points);
         }
         if (slave.drive) {
             drive_ = std::make_unique<DrivePins>(c, receive, transmit, slave.name);
@@ -84,47 +134,25 @@ public:
         }
     }
 
-    /// Shows what the image has. `changed`: values have arrived. [realtime]
-    void show(const Image& image, std::int64_t now_ns, bool is_alive, bool changed) noexcept {
+    /// Shows what the image has. `refresh`: all pins, also where nothing has changed. [realtime]
+    void show(const Image& image, std::int64_t now_ns, bool is_alive, bool refresh) noexcept {
         const SlaveImage& slave = image.slave(index_);
-        const bool was_online = is_online_;
-        is_online_ = is_alive && slave.online.load(std::memory_order_relaxed) != 0;
-        online_ = is_online_;
-        stopped_ = slave.stopped.load(std::memory_order_relaxed) != 0;
-        timeouts_ = slave.timeouts.load(std::memory_order_relaxed);
-        errors_ = slave.errors.load(std::memory_order_relaxed);
-        exceptions_ = slave.exceptions.load(std::memory_order_relaxed);
-        show_ages(image, now_ns);
-        if (!changed && was_online == is_online_) return;
-        outputs_.each([&](auto& pin, const OutputData& data) {
-            using T = std::remove_cvref_t<decltype(pin.get())>;
-            if (!is_online_ && data.has_safe) {
-                pin = static_cast<T>(data.safe);
-                return;
-            }
-            if (image.stamp(data.telegram).load(std::memory_order_relaxed) == 0) return;
-            pin = from_cell<T>(image.value(data.value).load(std::memory_order_relaxed));
-        });
+        const std::uint32_t activity = slave.activity.load(std::memory_order_acquire);
+        if (refresh || activity != activity_ || is_alive != was_alive_) {
+            activity_ = activity;
+            was_alive_ = is_alive;
+            show_all(image, slave, is_alive);
+        }
+        age_ = oldest_ns_ == 0 ? -1.0 : seconds_between(oldest_ns_, now_ns);
+        for (AgePin& age : ages_) {
+            const std::int64_t stamp = image.stamp(age.telegram).load(std::memory_order_relaxed);
+            *age.pin = stamp == 0 ? -1.0 : seconds_between(stamp, now_ns);
+        }
     }
 
-    /// Copies the input pins, and commands the drive. Returns whether an input is not finite.
-    /// [realtime]
+    /// Commands the drive. Returns whether its speed is not finite. [realtime]
     bool transmit(const Image& image, std::int64_t now_ns, bool may_run) noexcept {
-        bool invalid = false;
-        inputs_.each([&](const auto& pin, const std::uint32_t& value) {
-            const auto number = pin.get();
-            if constexpr (std::is_same_v<std::remove_cvref_t<decltype(number)>, double>) {
-                if (!std::isfinite(number)) {
-                    invalid = true;
-                    return;
-                }
-            }
-            image.value(value).store(to_cell(number), std::memory_order_relaxed);
-        });
-        if (drive_) {
-            invalid = command(image, now_ns, may_run) || invalid;
-        }
-        return invalid;
+        return drive_ != nullptr && command(image, now_ns, may_run);
     }
 
     /// Shows what the last command and the values mean. [realtime]
@@ -165,26 +193,6 @@ private:
             return static_cast<T>(cell);
         }
     }
-    template <class T>
-    static std::uint64_t to_cell(T value) noexcept {
-        if constexpr (std::is_same_v<T, double>) {
-            return std::bit_cast<std::uint64_t>(value);
-        } else {
-            return static_cast<std::uint64_t>(value);
-        }
-    }
-
-    static hal_type type_of(const Value& v) {
-        const bool wide = v.size() > 2;
-        switch (pin_form(v)) {
-        case PinForm::real: return HAL_TYPE_FLOAT;
-        case PinForm::bit: return HAL_TYPE_BIT;
-        case PinForm::signed_number: return wide ? HAL_TYPE_S64 : HAL_TYPE_S32;
-        case PinForm::unsigned_number: return wide ? HAL_TYPE_U64 : HAL_TYPE_U32;
-        }
-        return HAL_TYPE_U32;
-    }
-
     void add_reading(std::uint32_t telegram) {
         if (std::find(readings_.begin(), readings_.end(), telegram) == readings_.end()) {
             readings_.push_back(telegram);
@@ -192,7 +200,8 @@ private:
     }
 
     void declare(hal::Component& c, const hal::Function& receive, const hal::Function& transmit,
-                 const std::string& slave, const PlannedValue& planned, std::uint32_t n) {
+                 const std::string& slave, const PlannedValue& planned, std::uint32_t n,
+                 SetPointPins& set_points) {
         const Value& v = *planned.value;
         switch (v.purpose) {
         case Purpose::pin: break;
@@ -209,7 +218,7 @@ private:
                       bus::to_string(v.type));
         const std::string name = slave + "." + v.name;
         if (v.is_output) {
-            inputs_.declare(c, &transmit, type_of(v), name, doc, n, {.unit = v.unit.c_str()});
+            set_points.declare(c, transmit, v, name, doc, n);
             return;
         }
         outputs_.declare(c, &receive, type_of(v), name, doc,
@@ -224,20 +233,34 @@ private:
         }
     }
 
-    static double age_of(const Image& image, std::uint32_t telegram, std::int64_t now_ns) noexcept {
-        const std::int64_t stamp = image.stamp(telegram).load(std::memory_order_relaxed);
-        return stamp == 0 ? -1.0 : std::max(0.0, static_cast<double>(now_ns - stamp) * 1e-9);
+    void show_all(const Image& image, const SlaveImage& slave, bool is_alive) noexcept {
+        is_online_ = is_alive && slave.online.load(std::memory_order_relaxed) != 0;
+        online_ = is_online_;
+        stopped_ = slave.stopped.load(std::memory_order_relaxed) != 0;
+        timeouts_ = slave.timeouts.load(std::memory_order_relaxed);
+        errors_ = slave.errors.load(std::memory_order_relaxed);
+        exceptions_ = slave.exceptions.load(std::memory_order_relaxed);
+        outputs_.each([&](auto& pin, const OutputData& data) {
+            using T = std::remove_cvref_t<decltype(pin.get())>;
+            if (!is_online_ && data.has_safe) {
+                pin = static_cast<T>(data.safe);
+                return;
+            }
+            if (image.stamp(data.telegram).load(std::memory_order_relaxed) == 0) return;
+            pin = from_cell<T>(image.value(data.value).load(std::memory_order_relaxed));
+        });
+        find_oldest(image);
     }
-    void show_ages(const Image& image, std::int64_t now_ns) noexcept {
-        double oldest = readings_.empty() ? -1.0 : 0.0;
+    /// Stores the time of the oldest value; 0: one was not read.
+    void find_oldest(const Image& image) noexcept {
+        oldest_ns_ = readings_.empty() ? 0 : INT64_MAX;
         for (const std::uint32_t telegram : readings_) {
-            const double age = age_of(image, telegram, now_ns);
-            oldest = age < 0.0 || oldest < 0.0 ? -1.0 : std::max(oldest, age);
+            oldest_ns_ =
+                std::min(oldest_ns_, image.stamp(telegram).load(std::memory_order_relaxed));
         }
-        age_ = oldest;
-        for (AgePin& age : ages_) {
-            *age.pin = age_of(image, age.telegram, now_ns);
-        }
+    }
+    static double seconds_between(std::int64_t from_ns, std::int64_t to_ns) noexcept {
+        return to_ns > from_ns ? static_cast<double>(to_ns - from_ns) * 1e-9 : 0.0;
     }
 
     bool command(const Image& image, std::int64_t now_ns, bool may_run) noexcept {
@@ -271,7 +294,6 @@ private:
     hal::Out<std::uint32_t> timeouts_, errors_, exceptions_;
     hal::Out<bool> stopped_;
     hal::AnyOuts<OutputData> outputs_;
-    hal::AnyIns<std::uint32_t> inputs_;
     std::vector<AgePin> ages_;
     std::vector<std::uint32_t> readings_;  // telegrams
     std::unique_ptr<DrivePins> drive_;
@@ -283,6 +305,9 @@ private:
     std::uint32_t fault_ = no_value;
     std::uint32_t speed_telegram_ = 0;
     bool is_online_ = false;
+    bool was_alive_ = false;
+    std::uint32_t activity_ = 0;
+    std::int64_t oldest_ns_ = 0;
 };
 
 }  // namespace hal::modbus
