@@ -5,6 +5,7 @@
 import json
 import os
 import pty
+import signal
 import subprocess
 import time
 import tty
@@ -164,25 +165,34 @@ class Modbus(Case):
         os.close(master)
         os.close(slave)
 
-    def test_a_spindle_in_real_time(self):
-        self.node("pty:line", "--verbose")
+    def spindle_is_stopped(self, node, link, number):
+        """Runs the spindle on a line, ends the machine by a signal, and waits until the emulated drive stops."""
+        self.node(node, "--verbose")
         self.write(
             "spindle.hal",
             "loadrt threads name1=servo period1=1000000\n"
-            "loadrt modbus config=bus.modbus\n"
+            f"loadrt modbus config=bus.modbus link={link}\n"
             "addf modbus.0.receive servo\naddf modbus.0.transmit servo\nstart\n",
         )
         machine = self.start("run", "spindle.hal")
         self.comes("modbus.0.spindle.online", "TRUE")
+        self.assertEqual("TRUE", self.value("modbus.0.guarded"))
         self.say("setp", "modbus.0.spindle.speed-cmd", "-2400")
         self.say("setp", "modbus.0.spindle.run", "TRUE")
         self.comes("modbus.0.spindle.speed-fb", "-2400")
         self.comes("modbus.0.spindle.at-speed", "TRUE")
-        self.end(machine)
+        self.end(machine, number)
         wait_until(
             lambda: (self.folder / "node.log").read_text().count("spindle: stop") >= 2,
             "the spindle is stopped",
         )
+
+    def test_a_spindle_on_a_terminal(self):
+        self.spindle_is_stopped("pty:line", "serial:line", signal.SIGTERM)
+
+    def test_a_spindle_on_tcp_and_a_killed_machine(self):
+        port = 21000 + os.getpid() % 20000
+        self.spindle_is_stopped(f"listen:{port}", f"tcp:127.0.0.1:{port}", signal.SIGKILL)
 
 
 if __name__ == "__main__":

@@ -90,6 +90,7 @@ struct ImageHeader {
     std::atomic<std::uint32_t> event_head{0};
     std::atomic<std::uint32_t> events_lost{0};
     std::atomic<std::uint32_t> line_open{0};
+    std::atomic<std::uint32_t> activity{0};  ///< counts that of all slaves
     /// why the guardian could not start; written before Phase::ended
     std::array<char, 256> problem{};
     std::atomic<std::uint64_t> telegrams{0};  ///< answered

@@ -88,6 +88,7 @@ private:
     /// The cycle looks at the slave again; behind the changes that it is to see.
     void touch(std::size_t slave) const noexcept {
         image_.slave(slave).activity.fetch_add(1, std::memory_order_release);
+        image_.header().activity.fetch_add(1, std::memory_order_release);
     }
 
     bool choose(std::int64_t now_ns) noexcept;

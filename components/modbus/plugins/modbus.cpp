@@ -230,13 +230,13 @@ private:
         reporter_->tell(record);
         hal::LastingFault& condition = fault_of(record);
         const auto& row = event_rows[static_cast<std::size_t>(record.event)];
+        lasting_faults_ -= condition.lasts() ? 1 : 0;
         if (row.effect == hal::bus::Effect::ends) {
             end(condition);
-            return;
-        }
-        if (const auto* text = texts_->fault(record.event, record.slave)) {
+        } else if (const auto* text = texts_->fault(record.event, record.slave)) {
             begin(condition, text->text);
         }
+        lasting_faults_ += condition.lasts() ? 1 : 0;
     }
 
     hal::LastingFault& fault_of(const EventRecord& record) noexcept {
@@ -250,19 +250,30 @@ private:
 
     void show(std::int64_t now, bool is_alive, bool refresh) noexcept {
         const ImageHeader& header = image_.header();
-        bool all_online = is_alive;
-        bool faulty = guardian_fault_.lasts() || line_fault_.lasts();
-        for (SlavePins& slave : slaves_) {
-            slave.show(image_, now, is_alive, refresh);
-            slave.show_drive(image_);
-            all_online = all_online && slave.is_online();
-            faulty = faulty || faults_of_slaves_[slave.index()].lasts();
+        const std::uint32_t activity = header.activity.load(std::memory_order_acquire);
+        refresh = refresh || is_alive != was_alive_;
+        if (refresh || activity != activity_) {
+            activity_ = activity;
+            was_alive_ = is_alive;
+            show_slaves(is_alive, refresh);
         }
-        online = all_online;
-        fault = faulty;
+        for (SlavePins& slave : slaves_) {
+            slave.show_ages(image_, now);
+            slave.show_drive(image_);
+        }
+        fault = lasting_faults_ != 0;
         guarded = has_guardian_ && is_alive;
         telegrams = header.telegrams.load(std::memory_order_relaxed);
         show_load(now, header.busy_ns.load(std::memory_order_relaxed));
+    }
+
+    void show_slaves(bool is_alive, bool refresh) noexcept {
+        bool all_online = is_alive;
+        for (SlavePins& slave : slaves_) {
+            slave.show(image_, is_alive, refresh);
+            all_online = all_online && slave.is_online();
+        }
+        online = all_online;
     }
 
     /// The share of the last second.
@@ -333,6 +344,9 @@ private:
     bool has_guardian_ = false;
     bool was_estop_ = false;
     std::int64_t shown_ns_ = 0;
+    std::uint32_t activity_ = 0;
+    int lasting_faults_ = 0;
+    bool was_alive_ = false;
     std::int64_t load_since_ = 0;
     std::int64_t load_busy_ = 0;
 };

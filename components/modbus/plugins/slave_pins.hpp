@@ -97,10 +97,10 @@ public:
     SlavePins(hal::Component& c, const hal::Function& receive, const hal::Function& transmit,
               const Bus& bus, const Plan& plan, std::size_t index, SetPointPins& set_points)
         : index_(index),
-          online_(c, receive, (name_of(bus, index) + ".online").c_str(), "the slave answers",
-                  {.safe = false}),
           age_(c, receive, (name_of(bus, index) + ".age").c_str(),
                "age of its oldest value; -1: one was not read", {.initial = -1.0, .unit = "s"}),
+          online_(c, receive, (name_of(bus, index) + ".online").c_str(), "the slave answers",
+                  {.safe = false}),
           timeouts_(c, receive, (name_of(bus, index) + ".timeouts").c_str(),
                     "requests without an answer"),
           errors_(c, receive, (name_of(bus, index) + ".errors").c_str(),
@@ -134,15 +134,16 @@ public:
         }
     }
 
-    /// Shows what the image has. `refresh`: all pins, also where nothing has changed. [realtime]
-    void show(const Image& image, std::int64_t now_ns, bool is_alive, bool refresh) noexcept {
+    /// Shows what the image has, if that has changed; `refresh`: in any case. [realtime]
+    void show(const Image& image, bool is_alive, bool refresh) noexcept {
         const SlaveImage& slave = image.slave(index_);
         const std::uint32_t activity = slave.activity.load(std::memory_order_acquire);
-        if (refresh || activity != activity_ || is_alive != was_alive_) {
-            activity_ = activity;
-            was_alive_ = is_alive;
-            show_all(image, slave, is_alive);
-        }
+        if (!refresh && activity == activity_) return;
+        activity_ = activity;
+        show_all(image, slave, is_alive);
+    }
+    /// Shows how old the values are, in each cycle. [realtime]
+    void show_ages(const Image& image, std::int64_t now_ns) noexcept {
         age_ = oldest_ns_ == 0 ? -1.0 : seconds_between(oldest_ns_, now_ns);
         for (AgePin& age : ages_) {
             const std::int64_t stamp = image.stamp(age.telegram).load(std::memory_order_relaxed);
@@ -289,14 +290,16 @@ private:
     }
 
     const std::size_t index_;
-    hal::Out<bool> online_;
+    // what each cycle uses is together
+    std::int64_t oldest_ns_ = 0;
     hal::Out<double> age_;
+    std::vector<AgePin> ages_;
+    std::unique_ptr<DrivePins> drive_;
+    hal::Out<bool> online_;
     hal::Out<std::uint32_t> timeouts_, errors_, exceptions_;
     hal::Out<bool> stopped_;
     hal::AnyOuts<OutputData> outputs_;
-    std::vector<AgePin> ages_;
     std::vector<std::uint32_t> readings_;  // telegrams
-    std::unique_ptr<DrivePins> drive_;
     std::optional<DriveAxis> axis_;
     DriveAxis::Outputs shown_;
     std::uint32_t speed_ = no_value;
@@ -305,9 +308,7 @@ private:
     std::uint32_t fault_ = no_value;
     std::uint32_t speed_telegram_ = 0;
     bool is_online_ = false;
-    bool was_alive_ = false;
     std::uint32_t activity_ = 0;
-    std::int64_t oldest_ns_ = 0;
 };
 
 }  // namespace hal::modbus
