@@ -13,6 +13,8 @@ namespace {
 constexpr std::int64_t millisecond = 1'000'000;
 // USB adapters deliver bytes in bursts, up to 16 ms apart
 constexpr std::int64_t burst_ns = 20 * millisecond;
+// an adapter that echoes makes every write look acknowledged: a read comes first, for this time
+constexpr std::int64_t verify_ns = 3'000 * millisecond;
 constexpr std::int64_t exception_pause_ns = 1'000 * millisecond;
 constexpr std::int64_t poll_ns = millisecond;  // of set-points and stop requests
 constexpr std::int64_t probe_share = 20;       // 1/20 of the line: 5 %
@@ -69,6 +71,11 @@ void Master::attach(line::Line& line, std::int64_t now_ns) {
     silence_ns_ = serial ? silence_ns(bus_.line) : 0;
     quiet_ns_ = std::max(burst_ns, 2 * silence_ns_);
     free_at_ns_ = now_ns + silence_ns_;
+    const bool has_reads =
+        std::any_of(plan_.telegrams.begin(), plan_.telegrams.end(),
+                    [](const Telegram& t) { return t.kind == Telegram::Kind::read; });
+    is_verified_ = framing_ == Framing::tcp || !has_reads;
+    write_from_ns_ = now_ns + verify_ns;
     for (TelegramState& state : telegrams_) {
         state.due_ns = now_ns;
     }
@@ -185,13 +192,14 @@ void Master::receive(std::int64_t now_ns) noexcept {
 /// Returns whether the exchange is over.
 bool Master::finish_exchange(std::int64_t now_ns) noexcept {
     const bool huanyang = bus_.slaves[job_.slave].is_huanyang();
-    if (framing_ == Framing::rtu && buffer_.span().size() >= sent_.size &&
+    if (framing_ == Framing::rtu && echo_is_due_ && buffer_.span().size() >= sent_.size &&
         std::equal(sent_.bytes.begin(),
                    sent_.bytes.begin() + static_cast<std::ptrdiff_t>(sent_.size),
                    buffer_.span().begin())) {
         const std::uint8_t function = sent_.bytes[1];
         if (has_echo_ || (!huanyang && function <= 4)) {
             has_echo_ = true;
+            echo_is_due_ = false;
             buffer_.drop(sent_.size);
         }
     }
@@ -260,6 +268,7 @@ void Master::succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) no
     const Telegram& t = plan_.telegrams[job_.telegram];
     TelegramState& own = telegrams_[job_.telegram];
     if (t.kind == Telegram::Kind::read) {
+        is_verified_ = true;
         store(t, data);
     } else {
         own.sent = job_.cells;
@@ -357,6 +366,7 @@ void Master::reject(std::uint8_t code, std::int64_t now_ns) noexcept {
         image_.tell({Event::exception, job_.slave, stop_job, code});
         return fail_stop(now_ns);
     }
+    is_verified_ = true;  // an exception is not an echo
     image_.tell({Event::exception, job_.slave, job_.telegram, code});
     TelegramState& own = telegrams_[job_.telegram];
     own.due_ns = now_ns + std::max(exception_pause_ns, plan_.telegrams[job_.telegram].period_ns);
@@ -406,8 +416,9 @@ void Master::finish_stop(std::int64_t now_ns) noexcept {
 
 // --- What is next
 
-bool Master::may_write() const noexcept {
-    return !held_ && image_.header().outputs_valid.load(std::memory_order_acquire) != 0;
+bool Master::may_write(std::int64_t now_ns) const noexcept {
+    return !held_ && (is_verified_ || now_ns >= write_from_ns_) &&
+           image_.header().outputs_valid.load(std::memory_order_acquire) != 0;
 }
 
 bool Master::choose(std::int64_t now_ns) noexcept {
@@ -438,7 +449,7 @@ bool Master::choose_stop(std::int64_t) noexcept {
 }
 
 bool Master::choose_set_point(std::int64_t now_ns) noexcept {
-    if (!may_write()) return false;
+    if (!may_write(now_ns)) return false;
     if (last_was_set_point_) {
         for (std::size_t n = 0; n < telegrams_.size(); ++n) {
             const Telegram& t = plan_.telegrams[n];
@@ -483,7 +494,7 @@ bool Master::choose_due(std::int64_t now_ns) noexcept {
     for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
         const Telegram& t = plan_.telegrams[n];
         if (telegrams_[n].due_ns > now_ns || slaves_[t.slave].is_offline) continue;
-        if (t.kind != Telegram::Kind::read && !may_write()) continue;
+        if (t.kind != Telegram::Kind::read && !may_write(now_ns)) continue;
         if (best == UINT32_MAX || telegrams_[n].due_ns < telegrams_[best].due_ns) {
             best = n;
         }
@@ -702,6 +713,7 @@ void Master::send(std::int64_t now_ns) noexcept {
     buffer_.clear();
     sent_at_ns_ = now_ns;
     waits_ = true;
+    echo_is_due_ = true;
     // a failed send is a request that is not answered; is_open() reports a lost line
     line_->send(sent_.span(), now_ns);
     deadline_ns_ = std::max(now_ns, line_->sent_until_ns()) + slave.timeout_ns;

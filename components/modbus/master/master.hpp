@@ -98,7 +98,7 @@ private:
     bool choose_due(std::int64_t now_ns) noexcept;
     bool begin(std::uint32_t telegram, std::int64_t now_ns) noexcept;
     bool has_changed(std::uint32_t telegram) const noexcept;
-    bool may_write() const noexcept;
+    bool may_write(std::int64_t now_ns) const noexcept;
     std::int64_t next_due(std::int64_t now_ns) const noexcept;
     void send(std::int64_t now_ns) noexcept;
     void finish_stop(std::int64_t now_ns) noexcept;
@@ -128,6 +128,9 @@ private:
     bool line_was_open_ = false;
     bool line_reported_ = false;
     bool has_echo_ = false;
+    bool echo_is_due_ = false;  // the answer to a write has the same bytes
+    bool is_verified_ = false;  // a read was answered: an echo is known
+    std::int64_t write_from_ns_ = 0;  // in any case
     bool last_was_set_point_ = false;
     Frame sent_;
     std::uint16_t transaction_ = 0;

@@ -210,6 +210,57 @@ TEST(Master, Rejected_register_does_not_slow_down_the_others) {
     EXPECT_LE(w.image.slave(0).exceptions.load(), 7U);
 }
 
+/// A two-wire adapter without receiver disable: what is sent is also received.
+class EchoLine final : public line::Line {
+public:
+    explicit EchoLine(std::unique_ptr<line::Line> line) : line_(std::move(line)) {}
+    const line::Description& description() const noexcept override { return line_->description(); }
+    bool is_open(std::int64_t now) noexcept override { return line_->is_open(now); }
+    bool send(std::span<const std::uint8_t> bytes, std::int64_t now) noexcept override {
+        echo_.insert(echo_.end(), bytes.begin(), bytes.end());
+        return line_->send(bytes, now);
+    }
+    std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t now) noexcept override {
+        if (now < line_->sent_until_ns()) return 0;
+        const std::size_t count = std::min(bytes.size(), echo_.size());
+        std::copy_n(echo_.begin(), count, bytes.begin());
+        echo_.erase(echo_.begin(), echo_.begin() + static_cast<std::ptrdiff_t>(count));
+        return count != 0 ? count : line_->receive(bytes, now);
+    }
+    std::int64_t sent_until_ns() const noexcept override { return line_->sent_until_ns(); }
+
+private:
+    std::unique_ptr<line::Line> line_;
+    std::vector<std::uint8_t> echo_;
+};
+
+TEST(Master, Echo_of_a_request_is_not_its_answer) {
+    const auto echoing = [](std::unique_ptr<line::Line> line) {
+        return std::make_unique<EchoLine>(std::move(line));
+    };
+    const std::string text =
+        "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\nread a = holding 0\n"
+        "write c = holding 50\nstop = holding 50 7\n[slave 2 dead]\nread a = holding 0\n"
+        "write c = holding 50\nstop = holding 50 7\n";
+    World w(text, {}, echoing);
+    SlaveFault fault;
+    fault.unit = 2;
+    w.slaves->faults().push_back(fault);
+    w.slaves->slaves()[0].set("a", 5);
+    w.image.value(w.value("c")).store(9);
+    w.run(3 * second);
+    EXPECT_EQ(w.number("a"), 5U);
+    EXPECT_EQ(w.slaves->slaves()[0].get(Table::holding, 50), 9);
+    EXPECT_EQ(w.image.slave(0).errors.load(), 0U);
+    EXPECT_EQ(w.image.slave(0).timeouts.load(), 0U);
+    EXPECT_EQ(w.image.slave(1).online.load(), 0U);
+    w.image.header().stop_held.store(1);
+    w.image.stop(StopReason::estop);
+    w.run(3 * second);
+    EXPECT_EQ(w.image.slave(0).stopped.load(), 1U);
+    EXPECT_EQ(w.image.slave(1).stopped.load(), 0U);
+}
+
 TEST(Master, Slave_that_is_not_on_the_line_is_offline) {
     World w("[bus]\nlink = sim:x\nbaud = 9600\n[slave 1 s]\nread a = holding 0\n");
     w.slaves->slaves()[0].set("a", 5);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -21,7 +22,10 @@ constexpr std::int64_t second = 1'000 * ms;
 /// or `other`.
 class World {
 public:
-    explicit World(const std::string& text, const std::string& other = {})
+    /// `wrap` makes another line of that of the master.
+    explicit World(
+        const std::string& text, const std::string& other = {},
+        const std::function<std::unique_ptr<line::Line>(std::unique_ptr<line::Line>)>& wrap = {})
         : config_(read(text, "test.modbus")),
           slaves_config_(read(other.empty() ? text : other, "test.modbus")),
           plan_(make_plan(config_.bus)) {
@@ -35,6 +39,9 @@ public:
         image = Image(std::align(64, space - 64, at, space), config_.bus, plan_, true);
         auto line = line::open(address, config_.bus.line);
         EXPECT_TRUE(line) << line.problem;
+        if (wrap) {
+            line.line = wrap(std::move(line.line));
+        }
         master_ = std::make_unique<LocalMaster>(config_.bus, plan_, image, std::move(line.line));
         other_end_ = line::open(address, config_.bus.line).line;
         slaves = std::make_unique<SlaveBus>(slaves_config_.bus);
