@@ -61,6 +61,7 @@ struct Drive {
     std::string profile;
     std::vector<Write> forward, reverse, stop, reset;
     Write speed;  ///< `value`: counts at `max_speed_rpm`
+    bool speed_by_16 = false;
     bool one_telegram = false;
     double max_speed_rpm = 24000;
     double max_frequency_hz = 400;

@@ -143,7 +143,7 @@ const bus::KeyTable<DriveTarget>& drive_keys() {
         {"speed", "`TABLE ADDRESS COUNTS`", "that of the profile",
          "The register of the set-point, and its value at `max-speed`; `generic` needs it."},
         {"feedback", "`TABLE ADDRESS COUNTS`", "that of the profile",
-         "The register of the actual speed, and its value at `max-speed`."},
+         "The register of the actual speed, and its value at `max-speed`; `generic` needs it."},
         {"load", "`TABLE ADDRESS SCALE`", "that of the profile",
          "The register of the load, and per cent per count."},
         {"fault", "`TABLE ADDRESS [MASK]`", "that of the profile",
@@ -278,8 +278,9 @@ private:
         target.drive.profile = profile->name;
         drive_keys().apply(keys, target, key_report_);
         adopt(*profile, target.drive);
-        override_writes(keys, *profile, target.drive);
+        override_writes(keys, target.drive);
         override_readings(keys);
+        check_registers(*profile, target.drive);
         const std::int64_t period = slave_->period_ns != 0 ? slave_->period_ns : read_period;
         target.drive.period_ns = period;
         slave_->drive = std::move(target.drive);
@@ -306,6 +307,7 @@ private:
             d.reset.push_back(p.reset);
         }
         d.speed = p.speed;
+        d.speed_by_16 = p.speed_by_16;
         d.one_telegram = p.one_telegram;
         if (p.counts_per_hz != 0) {
             d.speed.value = static_cast<std::uint16_t>(
@@ -349,7 +351,7 @@ private:
         return names[static_cast<std::size_t>(purpose)];
     }
 
-    void override_writes(bus::Keys& keys, const Profile& p, Drive& d) {
+    void override_writes(bus::Keys& keys, Drive& d) {
         const auto list = [&](const char* key, std::vector<Write>& to) {
             if (const Entry* entry = keys.find(key)) {
                 to = writes_of(*entry);
@@ -361,11 +363,19 @@ private:
         if (const Entry* entry = keys.find("speed")) {
             d.speed = three(*entry, "COUNTS");
         }
-        if (d.forward.empty() || d.speed.table == Table::none) {
-            error(Topic::slave, slave_->at,
-                  std::string("the profile ") + p.name + " needs the keys forward and speed",
-                  "write forward = holding 0x2000 0x12 and speed = holding 0x2001 10000");
-        }
+    }
+
+    /// A drive is not started before its speed was read.
+    void check_registers(const Profile& p, const Drive& d) {
+        const auto& values = slave_->values;
+        const bool has_feedback = std::any_of(values.begin(), values.end(), [](const Value& v) {
+            return v.purpose == Purpose::speed;
+        });
+        if (!d.forward.empty() && d.speed.table != Table::none && has_feedback) return;
+        error(Topic::slave, slave_->at,
+              std::string("the profile ") + p.name + " needs the keys forward, speed and feedback",
+              "write forward = holding 0x2000 0x12, speed = holding 0x2001 10000, feedback = "
+              "holding 0x2103 10000, on three lines");
     }
 
     void override_readings(bus::Keys& keys) {
@@ -749,8 +759,8 @@ bool Bus::has_stops() const {
                        [](const Slave& slave) { return !slave.stop.empty(); });
 }
 
-Framing Bus::framing_on(const line::Description& line) const {
-    return framing.value_or(line.is_stream ? Framing::tcp : Framing::rtu);
+Framing Bus::framing_on(const line::Description& of) const {
+    return framing.value_or(of.is_stream ? Framing::tcp : Framing::rtu);
 }
 
 ReadResult read(std::string_view text, const std::string& file) {

@@ -56,6 +56,7 @@ struct Profile {
     /// `counts_per_hz`.
     Write speed;
     double counts_per_hz;
+    bool speed_by_16;   ///< the speed is written by function 16, not 06
     bool one_telegram;  ///< command and speed are 32 coils that are written together
     Feedback feedback;
     Reading actual;   ///< Hz, rpm, or the share of full speed

@@ -697,7 +697,8 @@ void Master::add_speed(const Drive& drive, double rpm) noexcept {
         job_.add(huanyang_request(static_cast<std::uint8_t>(drive.speed.address), data));
         return;
     }
-    job_.add(write_register_request(drive.speed.address, counts));
+    job_.add(drive.speed_by_16 ? write_registers_request(drive.speed.address, std::span(&counts, 1))
+                               : write_register_request(drive.speed.address, counts));
 }
 
 void Master::send(std::int64_t now_ns) noexcept {

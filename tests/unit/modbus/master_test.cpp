@@ -86,6 +86,64 @@ INSTANTIATE_TEST_SUITE_P(All, ProfileTest, testing::ValuesIn([] {
                              return name;
                          });
 
+/// Records what is sent.
+class RecordedLine final : public line::Line {
+public:
+    RecordedLine(std::unique_ptr<line::Line> line, std::vector<std::string>& frames)
+        : line_(std::move(line)), frames_(frames) {}
+    const line::Description& description() const noexcept override { return line_->description(); }
+    bool is_open(std::int64_t now) noexcept override { return line_->is_open(now); }
+    bool send(std::span<const std::uint8_t> bytes, std::int64_t now) noexcept override {
+        std::string text;
+        char part[4];
+        for (const std::uint8_t byte : bytes) {
+            std::snprintf(part, sizeof part, "%02X ", byte);
+            text += part;
+        }
+        text.pop_back();
+        frames_.push_back(text);
+        return line_->send(bytes, now);
+    }
+    std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t now) noexcept override {
+        return line_->receive(bytes, now);
+    }
+    std::int64_t sent_until_ns() const noexcept override { return line_->sent_until_ns(); }
+
+private:
+    std::unique_ptr<line::Line> line_;
+    std::vector<std::string>& frames_;
+};
+
+TEST(Drive, Stop_telegrams_are_those_of_the_manuals) {
+    const std::pair<const char*, const char*> telegrams[] = {
+        {"huanyang", "01 03 01 08 F1 8E"},
+        {"huanyang-gt", "01 06 10 00 00 05 4D 09"},
+        {"huanyang-p2a", "01 06 20 00 00 06 02 08"},
+        {"h100", "01 05 00 4B FF 00 FC 2C"},
+        {"yl620", "01 06 20 00 00 01 43 CA"},
+        {"delta-ms300", "01 06 20 00 00 01 43 CA"},
+        {"gs2", "01 06 09 1B 00 00 FA 51"},
+        {"vfs11", "01 06 FA 00 C0 00 E9 12"},
+        {"wj200", "01 05 00 00 00 00 CD CA"},
+        {"danfoss-fc", "01 0F 00 00 00 20 04 3C 04 00 00 89 19"},
+    };
+    EXPECT_EQ(std::size(telegrams) + 1, profiles().size());  // generic has none
+    for (const auto& [profile, telegram] : telegrams) {
+        std::vector<std::string> frames;
+        World w(std::string("[bus]\nlink = sim:x\n[slave 1 d]\nprofile = ") + profile + "\n", {},
+                [&](std::unique_ptr<line::Line> line) {
+            return std::make_unique<RecordedLine>(std::move(line), frames);
+        });
+        w.run(500 * ms);
+        w.image.header().stop_held.store(1);
+        frames.clear();
+        w.image.stop(StopReason::death);
+        w.run(300 * ms);
+        EXPECT_EQ(std::count(frames.begin(), frames.end(), telegram), 1) << profile;
+        EXPECT_EQ(w.image.slave(0).stopped.load(), 1U) << profile;
+    }
+}
+
 std::string many_slaves(int count) {
     std::string text =
         "[bus]\nlink = sim:x\nbaud = 38400\n[defaults]\ntimeout = 20ms\nevery = 10ms\n";
