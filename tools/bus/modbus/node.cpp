@@ -13,6 +13,7 @@
 #include "link/system.hpp"
 #include "modbus/device/slave_bus.hpp"
 #include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -85,7 +86,7 @@ int run_node_modbus(const ModbusNodeOptions& options) {
     if (!opened) return fail(options, opened.problem);
     bus.set_thinking(options.thinking_ns);
     bus.attach(*opened.line);
-    print(fmt::format("modbus: {} slaves on {}\n", bus.slaves().size(), link));
+    print(fmt::format("modbus: {} on {}\n", counted(bus.slaves().size(), "slave"), link));
     DriveReport report;
     const std::int64_t begin = hal::link::monotonic_ns();
     while (!stop.requested()) {
