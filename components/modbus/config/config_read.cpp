@@ -529,8 +529,8 @@ private:
         }
         std::size_t next = is_classic(w[0].text) ? 1 : 2;
         if (!read_type(w, next, v)) return;
-        v.period_ns =
-            is_output ? write_period : (slave_->period_ns != 0 ? slave_->period_ns : read_period);
+        const std::int64_t own_period = slave_->period_ns != 0 ? slave_->period_ns : read_period;
+        v.period_ns = is_output ? write_period : own_period;
         for (; next < w.size(); ++next) {
             if (!read_option(w, next, v)) return;
         }

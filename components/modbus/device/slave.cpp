@@ -214,8 +214,10 @@ Pdu EmulatedSlave::answer_huanyang(std::span<const std::uint8_t> request) {
     if (request.size() < 3 || request.size() != request[1] + 2U) return pdu;
     if (request[0] == 0x03) {
         written(Table::huanyang, 0x03, request[2]);
-        const std::uint8_t status[] = {static_cast<std::uint8_t>(
-            drive_->direction == 0 ? 0 : (drive_->direction > 0 ? 0x09 : 0x2d))};
+        // run and running; reverse sets bits 2 and 5 as well (bit 1 is the jog)
+        const unsigned running = drive_->direction > 0 ? 0x09 : 0x2d;
+        const std::uint8_t status[] = {
+            static_cast<std::uint8_t>(drive_->direction == 0 ? 0 : running)};
         return huanyang_request(0x03, status);
     }
     if (request[0] == 0x05 && request.size() == 4) {

@@ -610,59 +610,67 @@ bool Master::make_write(const Telegram& t) noexcept {
     return true;
 }
 
+/// The writes of a direction. A drive that cannot reverse is stopped instead.
+const std::vector<Write>& Master::writes_of(const Drive& drive, std::uint32_t direction) noexcept {
+    if (direction == drive_forward) return drive.forward;
+    if (direction == drive_reverse && !drive.reverse.empty()) return drive.reverse;
+    return drive.stop;
+}
+
 /// Speed first, then run; the stop first, then speed 0. What has not changed is not sent.
 void Master::make_drive(const Telegram& t) noexcept {
     const Drive& drive = *bus_.slaves[t.slave].drive;
+    if (drive.one_telegram) return make_drive_of_coils(drive);
     const TelegramState& own = telegrams_[job_.telegram];
     const auto command = static_cast<std::uint32_t>(job_.cells[0]);
     const double rpm = std::bit_cast<double>(job_.cells[1]);
-    const auto sent_command = static_cast<std::uint32_t>(own.sent[0]);
-    const std::uint32_t direction = command & 3U;
-    const std::vector<Write>* writes = &drive.stop;
-    if (direction == drive_forward) {
-        writes = &drive.forward;
-    } else if (direction == drive_reverse) {
-        writes = drive.reverse.empty() ? &drive.stop : &drive.reverse;
-    }
-    if (drive.one_telegram) {
-        const double share = direction == drive_stop ? 0.0 : rpm / drive.max_speed_rpm;
-        const auto reference =
-            static_cast<unsigned>(std::lround(std::clamp(share, 0.0, 1.0) * drive.speed.value));
-        const bool resets = (command & drive_reset) != 0 && !drive.reset.empty();
-        const unsigned word =
-            resets ? drive.reset.front().value : (writes->empty() ? 0U : writes->front().value);
-        const std::uint8_t bits[] = {
-            static_cast<std::uint8_t>(word), static_cast<std::uint8_t>(word >> 8),
-            static_cast<std::uint8_t>(reference), static_cast<std::uint8_t>(reference >> 8)};
-        job_.add(write_coils_request(writes->empty() ? 0 : writes->front().address, 32, bits));
-        return;
-    }
+    const auto sent_command = own.is_sent ? static_cast<std::uint32_t>(own.sent[0]) : 0U;
+    const bool stops = (command & 3U) == drive_stop;
     const bool command_changed = !own.is_sent || sent_command != command;
     const bool speed_changed = !own.is_sent || own.sent[1] != job_.cells[1];
-    const std::uint32_t reset_edge =
-        own.is_sent ? (sent_command ^ command) & drive_reset : command & drive_reset;
-    if (reset_edge != 0) {
-        for (Write write : drive.reset) {
-            if ((command & drive_reset) == 0) {
-                write.value = 0;
-            }
-            const bool shares_register =
-                !drive.stop.empty() && write.address == drive.stop[0].address;
-            if ((command & drive_reset) != 0 || !shares_register) {
-                add_write(write);
-            }
-        }
+    if (((sent_command ^ command) & drive_reset) != 0) {
+        add_reset(drive, (command & drive_reset) != 0);
     }
-    if (direction != drive_stop && speed_changed) {
+    if (!stops && speed_changed) {
         add_speed(drive, rpm);
     }
     if (command_changed) {
-        for (const Write& write : *writes) {
+        for (const Write& write : writes_of(drive, command & 3U)) {
             add_write(write);
         }
     }
-    if (direction == drive_stop && (speed_changed || command_changed)) {
+    if (stops && (speed_changed || command_changed)) {
         add_speed(drive, 0.0);
+    }
+}
+
+/// The control word and the reference of the FC profile, 32 coils in one request.
+void Master::make_drive_of_coils(const Drive& drive) noexcept {
+    const auto command = static_cast<std::uint32_t>(job_.cells[0]);
+    const bool stops = (command & 3U) == drive_stop;
+    const double rpm = stops ? 0.0 : std::bit_cast<double>(job_.cells[1]);
+    const double share = std::clamp(rpm / drive.max_speed_rpm, 0.0, 1.0);
+    const auto reference = static_cast<unsigned>(std::lround(share * drive.speed.value));
+    const bool resets = (command & drive_reset) != 0 && !drive.reset.empty();
+    const auto& writes = resets ? drive.reset : writes_of(drive, command & 3U);
+    if (writes.empty()) return;
+    const unsigned word = writes.front().value;
+    const std::uint8_t bits[] = {
+        static_cast<std::uint8_t>(word), static_cast<std::uint8_t>(word >> 8),
+        static_cast<std::uint8_t>(reference), static_cast<std::uint8_t>(reference >> 8)};
+    job_.add(write_coils_request(writes.front().address, 32, bits));
+}
+
+/// The end of a reset writes 0, unless the register is that of the command, which follows.
+void Master::add_reset(const Drive& drive, bool begins) noexcept {
+    for (Write write : drive.reset) {
+        const bool is_command = !drive.stop.empty() && write.address == drive.stop[0].address;
+        if (begins) {
+            add_write(write);
+        } else if (!is_command) {
+            write.value = 0;
+            add_write(write);
+        }
     }
 }
 

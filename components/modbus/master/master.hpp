@@ -105,7 +105,11 @@ private:
 
     void make_read(const Telegram& t) noexcept;
     bool make_write(const Telegram& t) noexcept;
+    static const std::vector<Write>& writes_of(const Drive& drive,
+                                               std::uint32_t direction) noexcept;
     void make_drive(const Telegram& t) noexcept;
+    void make_drive_of_coils(const Drive& drive) noexcept;
+    void add_reset(const Drive& drive, bool begins) noexcept;
     void add_write(const Write& write) noexcept;
     void add_speed(const Drive& drive, double rpm) noexcept;
 

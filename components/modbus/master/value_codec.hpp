@@ -72,7 +72,8 @@ inline Registers split(std::uint64_t number, std::size_t count, Order order) {
 /// Returns the bits of a value for the image. A number that is not finite returns `last`. [any]
 inline std::uint64_t decode_value(const Value& v, const Registers& r, std::uint64_t last) {
     const std::uint64_t number = joined(r, v.order);
-    if (v.is_bit()) return (number & (v.mask != 0 ? v.mask : 1U)) != 0 ? 1 : 0;
+    const std::uint64_t mask = v.mask != 0 ? v.mask : 1U;
+    if (v.is_bit()) return static_cast<std::uint64_t>((number & mask) != 0);
     const unsigned bits = static_cast<unsigned>(r.count) * 16;
     const auto as_signed = static_cast<std::int64_t>(number << (64 - bits)) >> (64 - bits);
     double real = 0.0;

@@ -186,10 +186,11 @@ std::string parse_write(const std::vector<std::string>& words, const Target& tar
     for (std::size_t n = 4; n < words.size(); ++n) {
         const bool negative = words[n].starts_with('-');
         const auto value = parse_natural(std::string_view(words[n]).substr(negative ? 1 : 0));
-        const std::uint64_t max = target.table == Table::coil ? 1 : negative ? 0x8000 : 0xffff;
-        if (!value || *value > max || (negative && target.table == Table::coil)) {
+        const bool is_coil = target.table == Table::coil;
+        const std::uint64_t max_number = negative ? 0x8000 : 0xffff;
+        if (!value || *value > (is_coil ? 1 : max_number) || (negative && is_coil)) {
             return "invalid value '" + words[n] + "'; write " +
-                   (target.table == Table::coil ? "0 or 1" : "-32768..65535");
+                   (is_coil ? "0 or 1" : "-32768..65535");
         }
         const auto word = static_cast<std::uint16_t>(negative ? 0x10000 - *value : *value);
         values.push_back(word);
