@@ -22,7 +22,7 @@ namespace hal::can {
 namespace {
 
 using Driver = link::Driver<Opened, Options, Description>;
-using EventLog = Driver::EventLog;
+using Journal = Driver::Journal;
 
 constexpr Driver drivers[] = {
     {link::form_of(address_forms, "can"), socketcan::open, socketcan::describe},
@@ -32,15 +32,15 @@ constexpr Driver drivers[] = {
      nullptr,
      nullptr,
      {},
-     EventLog::order},
+     Journal::order},
     {link::form_of(address_forms, "udp"), canudp::open, canudp::describe, nullptr, nullptr,
      "restart"},
     {link::form_of(address_forms, "slcan"), slcan::open, slcan::describe, nullptr, nullptr,
      "own errors restart receivequeue"},
     {link::form_of(address_forms, "cane"), cane::open, cane::describe, cane::is_own_option,
-     cane::own_options, "bitrate datarate own errors restart", EventLog::carrier},
+     cane::own_options, "bitrate datarate own errors restart", Journal::carrier},
     {link::form_of(address_forms, "scocan"), scocan::open, scocan::describe, scocan::is_own_option,
-     scocan::own_options, "bitrate datarate fd own errors stamps restart", EventLog::carrier},
+     scocan::own_options, "bitrate datarate fd own errors stamps restart", Journal::carrier},
     {link::form_of(address_forms, "replay"), replay::open, replay::describe, nullptr, nullptr,
      "own restart sendqueue receivequeue"},
 };
@@ -115,9 +115,9 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
 Opened open_journaled(const Driver& driver, const std::string& target, const Options& options) {
     const auto open = [&] { return driver.open(target, options); };
     switch (driver.journal) {
-    case EventLog::results: return journal::open_journaled(open);
-    case EventLog::order: return journal::open_ordered(target, open);
-    case EventLog::carrier: break;
+    case Journal::results: return journal::open_journaled(open);
+    case Journal::order: return journal::open_ordered(target, open);
+    case Journal::carrier: break;
     }
     return open();
 }

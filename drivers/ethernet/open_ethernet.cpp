@@ -18,7 +18,7 @@ namespace hal::ethernet {
 namespace {
 
 using Driver = link::Driver<Opened, Options, Description>;
-using EventLog = Driver::EventLog;
+using Journal = Driver::Journal;
 
 constexpr Driver drivers[] = {
     {link::form_of(address_forms, "eth"), rawether::open, rawether::describe},
@@ -28,7 +28,7 @@ constexpr Driver drivers[] = {
      nullptr,
      nullptr,
      {},
-     EventLog::order},
+     Journal::order},
     {link::form_of(address_forms, "udp"), udp::open, udp::describe, nullptr, nullptr,
      "policy pacer priority cpu promiscuous txstamps speed forward noise mac sendqueue"},
     {link::form_of(address_forms, "replay"), replay::open, replay::describe},
@@ -112,9 +112,9 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
 Opened open_journaled(const Driver& driver, const std::string& target, const Options& options) {
     const auto open = [&] { return driver.open(target, options); };
     switch (driver.journal) {
-    case EventLog::results: return journal::open_journaled(open);
-    case EventLog::order: return journal::open_ordered(target, open);
-    case EventLog::carrier: break;
+    case Journal::results: return journal::open_journaled(open);
+    case Journal::order: return journal::open_ordered(target, open);
+    case Journal::carrier: break;
     }
     return open();
 }

@@ -41,11 +41,11 @@ struct Driver {
     /// common options it does not support, separated by blanks
     std::string_view without = {};
     /// how its links are in the journal of a machine
-    enum class EventLog : std::uint8_t {
+    enum class Journal : std::uint8_t {
         results,  ///< what they give their user
         order,  ///< the order of the calls: a bus in memory is executed again
         carrier,  ///< not at all: their frames travel on another link, which is in the journal
-    } journal = EventLog::results;
+    } journal = Journal::results;
 
     /// The prefix of its addresses.
     std::string_view name() const { return form.example.substr(0, form.example.find(':')); }

@@ -44,7 +44,7 @@ typedef struct hal_module_calls {
     /* Carries out a command as part of the transaction that loads the instance: newsig, delsig, linkps, unlinkp, addf, delf, alias, unalias,
      * setp, start, stop, or `lock` and its number. It sees what the instance has declared so far; start, stop and lock take effect with the
      * transaction. Returns 0, or a negative errno (EPERM: locked) after writing why. Until create returns. */
-    int (*command)(const hal_host *, const char *const *words, size_t count, char *why, size_t capacity);
+    int (*command)(const hal_host *, const char *const *words, size_t count, char *why, size_t room);
     /* Reads a value as the transaction leaves it, and whether the pin is in a signal or the signal has a writer. Returns false if there is no
      * such object. Until create returns. */
     bool (*value)(const hal_host *, int kind, const char *name, hal_type *type, hal_value *value, bool *linked);
