@@ -47,19 +47,19 @@ bool HomingSearch::begin(int method, const Plant& plant) noexcept {
     if (!supports(method)) return false;
     if (method >= 35) {
         found_ = true;
-        home_ = plant.position();
+        home_ = plant.place();
         return true;
     }
     if (method >= 33) {
         searching_index_ = index_ = true;
         direction_ = method == 33 ? -1 : 1;
-        edge_ = plant.position();
+        edge_ = plant.place();
         return true;
     }
     index_ = method <= 14;
     rule_ = rules[index_ ? method : method - 16];
     const auto r = range(plant, rule_.which);
-    if (r.holds(plant.position())) {
+    if (r.holds(plant.place())) {
         region_ = inside;
     } else if (rule_.first == 0) {
         region_ = rule_.edge == Edge::left ? left : right;
@@ -89,14 +89,14 @@ void HomingSearch::pass(double position, Region to, bool wanted, double speed, d
 
 void HomingSearch::track(const Plant& plant, double speed, double slow) noexcept {
     const auto r = range(plant, rule_.which);
-    const int direction = plant.position() > plant.before() ? 1 : -1;
+    const int direction = plant.place() > plant.before() ? 1 : -1;
     // In the order in which they are passed: in at one edge, out at the other.
     const bool forward = direction > 0;
     const Edge entry = forward ? Edge::left : Edge::right;
     const Edge exit = forward ? Edge::right : Edge::left;
     const Region beyond = forward ? right : left;
     const auto pass_edge = [&](Edge edge, Region to) {
-        const auto position = r.edge(plant.before(), plant.position(), edge == entry);
+        const auto position = r.edge(plant.before(), plant.place(), edge == entry);
         if (!position || found_ || searching_index_) return;
         pass(*position, to, edge == rule_.edge, speed, slow, direction);
     };
@@ -140,7 +140,7 @@ HomingSearch::Order HomingSearch::order(const Plant& plant) noexcept {
 
 HomingSearch::Order HomingSearch::search_index(const Plant& plant) const noexcept {
     // a full revolution without a pulse
-    const bool gone = std::abs(plant.position() - edge_) > 1.05 * plant.motor().resolution;
+    const bool gone = std::abs(plant.place() - edge_) > 1.05 * plant.motor().resolution;
     if (gone || blocked(plant, direction_)) {
         return {Act::failed, 0};
     }
@@ -157,7 +157,7 @@ int HomingSearch::next_direction() const noexcept {
 
 bool HomingSearch::blocked(const Plant& plant, int direction) noexcept {
     const Range limit = direction < 0 ? plant.negative_limit() : plant.positive_limit();
-    return limit.holds(plant.position());
+    return limit.holds(plant.place());
 }
 
 }  // namespace hal::cia402
