@@ -172,7 +172,16 @@ void ExecutionJournal::work() {
     while (!ends_) {
         wake_.wait_for(own, drain_every);
         drain();
+        report_failure();
     }
+}
+
+void ExecutionJournal::report_failure() {
+    if (!failed_) return;
+    const std::string why = reason();
+    if (why.empty()) return;
+    failed_(why);
+    failed_ = nullptr;
 }
 
 void ExecutionJournal::drain() {
@@ -239,6 +248,10 @@ bool ExecutionJournal::close() {
 
 std::string ExecutionJournal::problem() const {
     const std::scoped_lock own(mutex_);
+    return reason();
+}
+
+std::string ExecutionJournal::reason() const {
     if (!writer_.problem().empty()) return writer_.problem();
     if (writer_.error() != 0) return std::strerror(writer_.error());
     return "";

@@ -5,6 +5,7 @@
 
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -52,6 +53,12 @@ public:
     void opened(const std::string& instance, const std::string& component,
                 const OutsideWorld& outside) override;
 
+    /// Sets what is called once, in the journal's own thread, when nothing more can be written: with
+    /// the reason. [setup]
+    void on_failure(std::function<void(const std::string& reason)> call) {
+        const std::scoped_lock own(mutex_);
+        failed_ = std::move(call);
+    }
     /// Notes that the values of these names are recorded from now on, by who uses with_writer().
     void sampled(std::vector<std::string> names);
     /// Adds the text of a netlist or configuration, for people. [any]
@@ -91,12 +98,16 @@ private:
     void add(ExecutionEntry entry);
     void add(const SetupRecord& record);
     void work();
+    void report_failure();
     void drain();
     void encode(Thread& thread);
     void write_batch(Thread& thread);
     std::uint64_t unix_ns(std::int64_t monotonic_ns) const;
 
+    std::string reason() const;
+
     mutable std::mutex mutex_;  // of all below
+    std::function<void(const std::string& reason)> failed_;
     mcap::Writer writer_;
     const std::int64_t unix_offset_ns_;
     std::uint16_t entries_ = 0;

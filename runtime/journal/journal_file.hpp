@@ -31,6 +31,9 @@ public:
     /// Returns why there is no record after the last one although the thread went on: "" when the
     /// journal has all of its cycles.
     const std::string& gap() const { return gap_; }
+    /// Returns true when no batch of records follows the one that is read: in a journal that was cut
+    /// off, an edit or a value that these cycles depend on may be missing.
+    bool in_last_batch() const { return batch_ + 1 >= batches_.size(); }
 
 private:
     struct Batch {

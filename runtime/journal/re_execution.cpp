@@ -287,6 +287,21 @@ void ReExecution::continue_in_copy() {
     }
 }
 
+bool ReExecution::is_at_the_cut() const {
+    if (file_.complete()) return false;
+    return std::ranges::any_of(cursors_, [this](const auto& one) {
+        const JournaledThread* const thread = one.second.thread;
+        return thread && thread->name == newest_.thread && thread->in_last_batch();
+    });
+}
+
+bool ReExecution::breaks_off() const {
+    if (file_.complete()) return false;
+    return std::ranges::any_of(cursors_, [](const auto& one) {
+        return one.second.core && one.second.thread && !one.second.thread->record();
+    });
+}
+
 ReExecution::State ReExecution::end_of_journal() {
     for (const auto& [number, cursor] : cursors_) {
         if (!cursor.thread || !cursor.thread->record() || cursor.ended) continue;
@@ -360,6 +375,10 @@ bool ReExecution::make_edit(const ExecutionEntry& entry) {
         done = transaction.commit(diagnostics);
     }
     if (done || state_ != State::goes_on) return done;
+    if (breaks_off()) {
+        return fail(State::ends, "it breaks off before all threads take the edit " +
+                                     text_of(entry.commands));
+    }
     std::string why = "it is rejected";
     for (const Diagnostic& one : diagnostics.all()) {
         if (one.severity == Severity::error) {

@@ -77,6 +77,9 @@ public:
     void continue_in_copy();
     /// Returns what `differs` is about: other values, or another number of inputs.
     CycleInputs::Match match() const { return match_; }
+    /// Returns true when the newest cycle is among the last that a journal without an end has: what
+    /// it depends on may be missing.
+    bool is_at_the_cut() const;
     /// Returns the link that has sent other frames; "": none.
     const std::string& differing_link() const { return differing_link_; }
 
@@ -112,6 +115,8 @@ private:
         std::uint64_t ticket = 0;  // that it waits for
         std::optional<std::uint64_t> entered = {};  // ticket with which its function began
     };
+    /// A thread that exists has no further record in a journal without an end.
+    bool breaks_off() const;
     Cursor* next(bool& needs_edit, bool in_edit);
     Cursor* stalled_call();
     bool execute(Cursor& cursor);

@@ -3,6 +3,7 @@
 
 import contextlib
 import json
+import os
 import random
 import re
 import shutil
@@ -398,6 +399,38 @@ class ExactReplay(Case):
         again = self.run_journaled(MACHINE)
         error = self.finish(again)
         self.assertIn("the unfinished journal of an earlier run is now", error)
+
+    def test_a_journal_that_is_cut_off_among_edits_has_no_difference(self):
+        machine = self.run_journaled(MACHINE)
+        self.give(edits(300, 300))
+        self.wait_for_cycles(200)
+        self.finish(machine)
+        whole = (self.folder / "run.mcap").read_bytes()
+        chance = random.Random(5)
+        for _ in range(25):
+            at = chance.randrange(len(whole) // 3, len(whole) - 100)
+            (self.folder / "cut.mcap").write_bytes(whole[:at])
+            text = self.replay(name="cut.mcap")
+            self.assertNotIn("first difference", text)
+            self.assertNotIn("did not answer", text)
+
+    @unittest.skipUnless(os.geteuid() == 0, "mounts a file system")
+    def test_a_full_disk_is_reported_at_once(self):
+        small = self.folder / "small"
+        small.mkdir()
+        if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=200k", "none", small]).returncode:
+            self.skipTest("mounts are not allowed here")
+        self.addCleanup(subprocess.run, ["umount", small], check=False)
+        path = self.write("a.hal", MACHINE)
+        machine = self.start("run", path, "--journal", "small/run.mcap")
+        wait_until(lambda: os.statvfs(small).f_bavail < 4, "the disk is full")
+        self.wait_for_cycles(3000)
+        _, error = self.end(machine)
+        self.assertEqual(1, machine.returncode, error)
+        self.assertIn(
+            "hal run: cannot write 'small/run.mcap': No space left on device; the machine goes on without a journal\n",
+            error,
+        )
 
     def test_a_damaged_file_is_executed_up_to_the_damage(self):
         machine = self.run_journaled(MACHINE)

@@ -78,9 +78,14 @@ private:
             newest.thread, seconds(newest.time_ns));
         note_overlaps();
         const std::string difference = machine_.difference();
-        const bool differs = !difference.empty();
+        const bool is_cut = !difference.empty() && execution_.is_at_the_cut();
+        const bool differs = !difference.empty() && !is_cut;
         bool good = !differs;
-        if (differs) {
+        if (is_cut) {
+            text += fmt::format("the journal ends: it was cut off, and an edit or a value that cycle "
+                                "{} of thread '{}' depends on is missing; no difference before\n",
+                                newest.number, newest.thread);
+        } else if (differs) {
             text += difference;
         } else if (!machine_.change_problem().empty()) {
             good = false;

@@ -111,6 +111,11 @@ public:
     ExecutionSink& sink() override { return journal_; }
 
     int begin(HostedMachine& machine) override {
+        journal_.on_failure([this](const std::string& reason) {
+            write_all(2, fmt::format("{}: cannot write '{}': {}; the machine goes on without a "
+                                     "journal\n",
+                                     options_.program, options_.journal, reason));
+        });
         std::vector<std::string> files = options_.words;
         if (!options_.ini.empty()) {
             files.push_back(options_.ini);
