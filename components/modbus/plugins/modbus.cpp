@@ -361,7 +361,7 @@ Exchanges registers with the slaves of a Modbus line in the background. A config
 `spindle.modbus`:
 
     [bus]
-    link = serial:/dev/ttyUSB0
+    link = sim:spindle
     baud = 19200
 
     [slave 1 spindle]
@@ -374,12 +374,13 @@ Exchanges registers with the slaves of a Modbus line in the background. A config
     write pump = coil 3
     stop = coil 3 0
 
-The netlist:
+A real line is `link = serial:/dev/ttyUSB0`. The netlist:
 
     loadrt modbus config=spindle.modbus
     addf modbus.0.receive servo-thread
     addf modbus.0.transmit servo-thread
-    net speed spindle.0.speed-out => modbus.0.spindle.speed-cmd
+    net speed => modbus.0.spindle.speed-cmd
+    sets speed 12000
 
 A cycle only copies values. The telegrams are exchanged by another process, the guardian, when a slave has stop telegrams, else by a background thread. `age`
 is how old the values of a slave are. Set-points that have changed are sent first. A slave that does not answer is offline after three requests and then uses at

@@ -201,6 +201,19 @@ HAL_COMPONENT(ModbusNode, "modbus_node", "Emulated Modbus slaves and drives, for
 Emulates all slaves of a configuration on a line: their registers, and a motor behind each frequency converter. With the master on the same line in memory a
 machine runs in `hal sim`:
 
+`spindle.modbus`:
+
+    [bus]
+    link = serial:/dev/ttyUSB0
+    baud = 19200
+
+    [slave 1 spindle]
+    profile = delta-ms300
+    max-speed = 24000
+    max-frequency = 400
+
+The netlist puts both on a line in memory:
+
     loadrt modbus      config=spindle.modbus link=sim:spindle
     loadrt modbus_node config=spindle.modbus link=sim:spindle
     addf modbus.0.receive servo-thread
