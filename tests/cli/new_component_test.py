@@ -147,7 +147,7 @@ class NewMachine(Case):
 
     def test_it_runs_as_printed(self):
         self.create("mill", "--bus", "canopen")
-        self.start("run", "--ini", "mill/mill.ini", "mill/mill.hal")
+        self.start("run", "--ini", "mill/mill.ini", "mill/mill.hal", loaded=False)
         wait_until(lambda: self.shell("gets", "bus-ok").stdout == "TRUE\n", "the drives are there")
         for name, value in (("chain-closed", "TRUE"), ("reset", "TRUE"), ("x-target", "1")):
             self.assertEqual(0, self.shell("sets", name, value).returncode)
