@@ -257,13 +257,13 @@ TEST(Axis, Node_lost_is_a_failure_and_takes_another_edge) {
     p.command.enable = true;
     p.cycle(5000);
     EXPECT_FALSE(p.axis.fault()) << "it was never there: enable waits";
-    EXPECT_EQ(0, p.last.controlword);
+    EXPECT_EQ(command::quick_stop, p.last.controlword);
     p.drive.out.operational = true;
     ASSERT_TRUE(p.until([&] { return p.axis.enabled(); }));
     p.drive.out.operational = false;
     p.cycle();
     EXPECT_EQ("run: drive lost: node no longer operational", p.why());
-    EXPECT_EQ(0, p.last.controlword);
+    EXPECT_EQ(command::quick_stop, p.last.controlword);
     p.drive.out.operational = true;
     p.cycle(100);
     EXPECT_FALSE(p.axis.enabled());
