@@ -68,6 +68,7 @@ bool EmulatedSlave::set(std::string_view name, double value) {
 
 /// Stores a number in the registers of a value; numbers of 64 bits keep 53 of them.
 void EmulatedSlave::put(const Value& v, double number) {
+    if (std::isnan(number)) return;  // the register keeps its value
     if (v.mask != 0 && !is_bits(v.table)) {
         std::uint16_t& word = registers_[key(v.table, v.address)];
         const auto lowest = static_cast<std::uint16_t>(v.mask & (~v.mask + 1U));
@@ -90,7 +91,9 @@ void EmulatedSlave::put(const Value& v, double number) {
     } else if (v.type == bus::ValueType::f64) {
         bits = std::bit_cast<std::uint64_t>(counts);
     } else {
-        const double limit = std::ldexp(1.0, 16 * v.size() - (bus::is_signed(v.type) ? 1 : 0)) - 1;
+        constexpr double exact = 9007199254740992.0;  // 2^53: a double has all whole numbers below
+        const int width = 16 * static_cast<int>(v.size()) - (bus::is_signed(v.type) ? 1 : 0);
+        const double limit = std::min(std::ldexp(1.0, width) - 1, exact);
         const double low = bus::is_signed(v.type) ? -limit : 0.0;
         bits = static_cast<std::uint64_t>(
             static_cast<std::int64_t>(std::clamp(std::round(counts), low, limit)));
