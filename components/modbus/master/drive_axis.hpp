@@ -46,8 +46,9 @@ public:
 
     /// One cycle. A reversal stops the drive first.
     Outputs step(const Inputs& in, const Feedback& feedback, std::int64_t now_ns) noexcept {
-        const bool can_run = feedback.is_online && feedback.has_speed && !feedback.is_faulty;
-        if (!can_run) {
+        const bool lost_speed = had_speed_ && !feedback.has_speed;
+        had_speed_ = feedback.has_speed;
+        if (!feedback.is_online || feedback.is_faulty || lost_speed) {
             require_edge();
         } else if (in.run && !was_run_) {
             may_run_ = true;
@@ -56,7 +57,9 @@ public:
         if (std::isfinite(in.speed_rpm)) {
             speed_ = in.speed_rpm;
         }
-        choose_direction(in.run && may_run_ && speed_ != 0.0, feedback);
+        // an edge before the first reading of the speed waits for it
+        const bool may_run = may_run_ && feedback.has_speed;
+        choose_direction(in.run && may_run && speed_ != 0.0, feedback);
 
         Outputs out;
         out.command = direction_ | (in.reset ? std::uint32_t{drive_reset} : 0U);
@@ -100,6 +103,7 @@ private:
     const double max_speed_, tolerance_;
     const std::int64_t stall_ns_;
     bool may_run_ = false;
+    bool had_speed_ = false;
     bool was_run_ = true;  // a machine that starts with `run` TRUE waits for an edge
     bool turns_back_ = false;
     double speed_ = 0.0;

@@ -386,7 +386,7 @@ A cycle only copies values. The telegrams are exchanged by another process, the 
 is how old the values of a slave are. Set-points that have changed are sent first. A slave that does not answer is offline after three requests and then uses at
 most 5 % of the line.
 
-A drive starts with a rising edge of `run`, when its speed has been read. After a stop, a lost slave or an e-stop it needs another edge. The stop telegrams
+A drive that is online starts with a rising edge of `run`, once its speed has been read. After a stop, a lost slave or an e-stop it needs another edge. The stop telegrams
 are sent when `estop` is TRUE, when the thread is stopped or hangs, on `unloadrt`, and when the process ends, however that happens.
 
 `docs/modbus.md` has the keys of the configuration and the table of profiles. `hal modbus plan FILE` shows the telegrams; `hal modbus scan`, `read`
