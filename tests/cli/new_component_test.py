@@ -153,6 +153,13 @@ class NewMachine(Case):
             self.assertEqual(0, self.shell("sets", name, value).returncode)
         wait_until(lambda: self.value("x-there.out") == "TRUE", "x is there")
 
+    def test_options_of_a_machine_are_rejected_for_a_component(self):
+        for option in (("--axes", "3"), ("--bus", "none")):
+            self.assertEqual(
+                "hal new: --axes and --bus are of a machine; type: hal new component part, or hal new machine part with them\n",
+                self.bad("new", "component", "part", *option),
+            )
+
     def test_wrong_words(self):
         for words, message in (
             (("mill", "--bus", "profinet"), "unknown bus 'profinet'; type one of none, canopen, ethercat"),

@@ -269,6 +269,11 @@ std::string create(const NewOptions& options, const fs::path& folder,
 
 int new_component(const NewOptions& options, const fs::path& folder) {
     const std::string& name = options.words[1];
+    if (options.axes != 0 || !options.bus.empty()) {
+        return fail(options, fmt::format("--axes and --bus are of a machine; type: hal new component "
+                                         "{0}, or hal new machine {0} with them",
+                                         name));
+    }
     if (const std::string why = problem_of_component(name); !why.empty()) return fail(options, why);
     const std::string package = package_hint();
     const std::string hint = package.empty() ? "" : fmt::format(" HINTS \"{}\"", package);
@@ -293,15 +298,22 @@ int new_machine(const NewOptions& options, const fs::path& folder) {
     if (const std::string why = problem_of_spelling("machine", name); !why.empty()) {
         return fail(options, why);
     }
+    NewMachine machine{.name = name};
+    if (options.axes != 0) {
+        machine.axes = options.axes;
+    }
+    if (!options.bus.empty()) {
+        machine.bus = options.bus;
+    }
     const auto buses = machine_buses();
-    if (std::find(buses.begin(), buses.end(), options.bus) == buses.end()) {
+    if (std::find(buses.begin(), buses.end(), machine.bus) == buses.end()) {
         std::string names;
         for (const std::string_view bus : buses) {
             append_item(names, bus);
         }
         return fail(options, fmt::format("unknown bus '{}'; type one of {}", options.bus, names));
     }
-    const std::vector<NewFile> files = machine_files({name, options.axes, options.bus});
+    const std::vector<NewFile> files = machine_files(machine);
     if (const std::string why = create(options, folder, files); !why.empty()) {
         return fail(options, why);
     }

@@ -9,8 +9,8 @@ namespace hal::tools {
 
 struct NewOptions : Options {
     std::string folder;  ///< of the new component or machine; empty: its name
-    int axes = 3;
-    std::string bus = "none";
+    int axes = 0;      ///< 0: not given
+    std::string bus;   ///< empty: not given
 
     void declare(OptionSet& set) override {
         set.words("component|machine NAME", "its name: letters, digits, - and _");
