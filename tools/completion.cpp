@@ -220,9 +220,11 @@ std::string fish_quoted(std::string text) {
 /// `--for` is long, `-N` short.
 std::string fish_option(const std::string& command, const CompletionOption& option) {
     const bool is_long = option.name.starts_with("--");
-    return fmt::format("complete -c hal -n '__hal_after 2 {}' {} {}{} -d {}\n", command,
-                       is_long ? "-l" : "-s", option.name.substr(is_long ? 2 : 1),
-                       option.takes_value ? " -r" : "", fish_quoted(option.text));
+    const char* const kind = is_long ? "-l" : "-s";
+    const std::string name = option.name.substr(is_long ? 2 : 1);
+    const char* const value = option.takes_value ? " -r" : "";
+    return fmt::format("complete -c hal -n '__hal_after 2 {}' {} {}{} -d {}\n", command, kind,
+                       name, value, fish_quoted(option.text));
 }
 
 std::string for_fish(const std::vector<CompletionEntry>& entries) {

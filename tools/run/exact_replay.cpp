@@ -83,7 +83,8 @@ private:
         bool good = !differs;
         if (is_cut) {
             text += fmt::format("the journal ends: it was cut off, and an edit or a value that cycle "
-                                "{} of thread '{}' depends on is missing; no difference before\n",
+                                "{} of thread '{}' depends on may be missing; no difference "
+                                "before\n",
                                 newest.number, newest.thread);
         } else if (differs) {
             text += difference;

@@ -142,7 +142,12 @@ private:
                 max = std::max(max, sample.value);
             }
         }
-        const Axis axis = channel.bit ? Axis{0, 1, 1} : min > max ? Axis{} : axis_of(min, max, 4);
+        Axis axis;
+        if (channel.bit) {
+            axis = {0, 1, 1};
+        } else if (min <= max) {
+            axis = axis_of(min, max, 4);
+        }
         const auto y_of = [&](double value) {
             return y_ + height - (value - axis.min) / (axis.max - axis.min) * height;
         };
