@@ -38,6 +38,7 @@ kill -9 $drive
 is TRUE getp canopen.0.x.fault
 is FALSE gets x-active
 is TRUE getp x.fault
+until "$hal" shell show fault | grep -q "no heartbeat"; do sleep 0.1; done
 drive
 is TRUE getp canopen.0.x.operational
 "$hal" shell sets x-on FALSE
