@@ -276,6 +276,29 @@ behaviour(
     ),
 )
 behaviour(
+    "lincurve",
+    "out|out-io",
+    lambda v: any(
+        v["in"] == a == b
+        for a, b in zip(
+            v.all("x-val-00", "x-val-01", "x-val-02"), v.all("x-val-01", "x-val-02", "x-val-03")
+        )
+    ),
+    "`in` is exactly at two points of the same x",
+    "the second point's value",
+    "the value of the point that it was next to before",
+    "the same input gives the same output",
+    witness=(
+        "lincurve personality=4",
+        {"lincurve.0.in": [0.0, 1.0]},
+        {
+            "lincurve.0.x-val-00": -1.0,
+            "lincurve.0.x-val-03": 3.0,
+            "lincurve.0.y-val-02": 3.0,
+        },
+    ),
+)
+behaviour(
     "modmath",
     "up|down|on-target",
     lambda v: v.beyond(1e9) or v["max-num"] < v["min-num"],
