@@ -118,6 +118,52 @@ class Compile(harness.Case):
             done.stderr, "hal compile: no C++ compiler found; install one: sudo apt install g++\n"
         )
 
+    def test_a_violation_of_real_time_is_not_installed_without_a_word(self):
+        for body, call in (
+            ("row.push_back(in); out = row.back();", "malloc"),
+            ('out = open("/dev/null", 0);', "open"),
+            ("char c; out = getrandom(&c, 1, 0);", "getrandom"),
+        ):
+            with self.subTest(call):
+                head = "#include <fcntl.h>\n#include <sys/random.h>\n"
+                self.write("lag.cpp", head + LAG.replace("BODY", body))
+                done = self.compile("lag.cpp")
+                self.assertEqual(
+                    (
+                        1,
+                        f"hal compile: lag: function 'lag' calls {call} in a cycle\n"
+                        "hal compile: note: to install it all the same, type: hal compile --no-check-rt lag.cpp\n"
+                        "hal compile: 'lag.cpp' was not installed\n",
+                        "",
+                    ),
+                    (done.returncode, done.stderr, done.stdout),
+                )
+                done = self.compile("--no-check-rt", "lag.cpp")
+                self.assertEqual((0, ""), (done.returncode, done.stderr))
+
+    def test_what_may_open_a_device_is_checked_on_request_only(self):
+        start = LAG.replace("std::vector<double> row;", "void start() { out = 1; }")
+        self.write("lag.cpp", start.replace("BODY", "out = in;"))
+        done = self.compile("lag.cpp")
+        self.assertEqual(
+            (
+                0,
+                "hal compile: note: lag: real time was not checked, because it has start(), which may open a device; "
+                "type: hal compile --check-rt lag.cpp\n",
+            ),
+            (done.returncode, done.stderr),
+        )
+        done = self.compile("--check-rt", "lag.cpp")
+        self.assertEqual((0, ""), (done.returncode, done.stderr))
+
+    def test_check_rt_and_its_opposite_exclude_each_other(self):
+        self.write("lag.cpp", LAG.replace("BODY", "out = in;"))
+        done = self.compile("--check-rt", "--no-check-rt", "lag.cpp")
+        self.assertEqual(
+            (1, "hal compile: --check-rt and --no-check-rt exclude each other\n"),
+            (done.returncode, done.stderr),
+        )
+
     def test_check_rt_names_the_call(self):
         self.write("lag.cpp", LAG.replace("BODY", "row.push_back(in); out = row.back();"))
         done = self.compile("lag.cpp", "--check-rt")

@@ -55,6 +55,7 @@ struct BuiltPlugin {
     std::string function;  ///< the full name of the first function of the first instance
     /// why an instance without load arguments cannot be made; empty: it can
     std::string needs;
+    bool starts = false;  ///< it has start() or stop(), which may acquire something
     /// for the author, of what is allowed and seldom meant; empty: nothing
     std::string hint;
     /// of one that is not good: it is a component, and the problem is how it is written

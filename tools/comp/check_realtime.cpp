@@ -4,10 +4,10 @@
 // process that may crash or hang.
 #include "comp/check_realtime.hpp"
 
-#include <algorithm>
 #include <filesystem>
 #include <fmt/core.h>
 #include <sstream>
+#include <string_view>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -16,79 +16,92 @@
 
 namespace hal::tools {
 
-int check_realtime(const Options& options, const BuiltPlugin& built, Language language) {
-    std::string problem, source;
+namespace {
+
+/// Compiles the guard into `program`. Returns why that failed, "" when it did not.
+std::string compile_guard(Language language, const std::string& program) {
+    std::string problem;
     const std::string compiler = find_compiler(language, problem);
-    if (compiler.empty()) return fail(options, problem);
+    if (compiler.empty()) return problem;
+    std::string source;
     const std::vector<std::string> headers = sdk_includes();
     for (const std::string& folder : headers) {
-        if (std::error_code none;
-            std::filesystem::is_regular_file(folder + "/check/realtime.c", none)) {
+        std::error_code none;
+        if (std::filesystem::is_regular_file(folder + "/check/realtime.c", none)) {
             source = folder + "/check/realtime.c";
         }
     }
     if (source.empty()) {
-        return fail(options,
-                    "missing check/realtime.c beside Halcyon's headers; reinstall Halcyon");
+        return "missing check/realtime.c beside Halcyon's headers; reinstall Halcyon";
     }
-    const TemporaryFolder temporary;
-    if (!temporary.problem().empty()) return fail(options, temporary.problem());
     std::vector<std::string> words = split_words(compiler);
     words.insert(words.end(), {"-x", "c", "-std=gnu17", "-O2", "-fno-builtin", "-rdynamic"});
     for (const std::string& folder : headers) {
         words.insert(words.end(), {"-I", folder});
     }
-    words.insert(words.end(),
-                 {source, "-o", temporary.file("realtime"), "-ldl", "-lm", "-pthread"});
+    words.insert(words.end(), {source, "-o", program, "-ldl", "-lm", "-pthread"});
     std::string said;
-    if (run_program(words, said) != 0) {
-        write_all(STDERR_FILENO, said);
+    if (run_program(words, said) == 0) return "";
+    write_all(STDERR_FILENO, said);
+    return "the real-time check program does not compile";
+}
 
-        return fail(options, "the real-time check program does not compile");
+std::string after(const std::string& line, std::string_view prefix) {
+    return line.substr(prefix.size());
+}
+
+/// How a guard ended that named no violation; "" when it ended in order.
+std::string end_of_guard(int status) {
+    if (WIFSIGNALED(status)) {
+        return fmt::format("the check was terminated by signal {}", WTERMSIG(status));
     }
+    const int code = WEXITSTATUS(status);
+    return code == 0 ? "" : fmt::format("the check ended with status {}", code);
+}
 
-    std::vector<std::string> run{temporary.file("realtime"),
-                                 std::filesystem::absolute(built.path).string()};
+}  // namespace
+
+RealtimeReport check_realtime(const Options& options, const BuiltPlugin& built, Language language) {
+    constexpr std::string_view rejected = "rejected: ";
+    constexpr std::string_view start_fails = "start fails: ";
+    constexpr std::string_view outside = "outside: ";
+    RealtimeReport report;
+    const TemporaryFolder temporary;
+    report.unchecked = temporary.problem();
+    if (!report.unchecked.empty()) return report;
+    const std::string program = temporary.file("realtime");
+    report.unchecked = compile_guard(language, program);
+    if (!report.unchecked.empty()) return report;
+
+    std::vector<std::string> run{program, std::filesystem::absolute(built.path).string()};
     run.insert(run.end(), options.arguments.begin(), options.arguments.end());
-    std::string report;
-    const int status = run_program(run, report);
-    std::istringstream lines(report);
-    std::string line, rejected, start;
-    int found = 0;
-    for (; std::getline(lines, line);) {
-        if (line.starts_with("rejected: ")) {
-            rejected = line.substr(10);
-        } else if (line.starts_with("start fails: ")) {
-            start = line.substr(13);
-        } else if (line.starts_with("outside: ")) {
-            found += fail(options, fmt::format("{}: {}", built.name, line.substr(9)));
+    std::string printed;
+    const int status = run_program(run, printed);
+    std::istringstream lines(printed);
+    for (std::string line; std::getline(lines, line);) {
+        if (line.starts_with(rejected)) {
+            report.unchecked =
+                fmt::format("{} cannot be checked: its constructor fails: {}; load arguments go "
+                            "behind --",
+                            built.name, after(line, rejected));
+        } else if (line.starts_with(start_fails)) {
+            report.unchecked =
+                fmt::format("{}: start() failed, so its functions were not checked: {}", built.name,
+                            after(line, start_fails));
+        } else if (line.starts_with(outside)) {
+            report.violations.push_back(
+                fmt::format("{}: {}", built.name, after(line, outside)));
         } else if (line.starts_with("function '")) {
-            found += fail(options, fmt::format("{}: {}", built.name, line));
+            report.violations.push_back(fmt::format("{}: {}", built.name, line));
         } else if (line.ends_with("extreme values")) {
-            print(fmt::format("real time: {}, no violation\n", line));
+            report.summary = line;
         }
     }
-    if (!start.empty()) {
-        return fail(options,
-                    fmt::format("{}: start() failed, so its functions were not checked: {}",
-                                built.name, start));
+    if (!report.good()) return report;
+    if (const std::string end = end_of_guard(status); !end.empty()) {
+        report.unchecked = fmt::format("{} cannot be checked: {}", built.name, end);
     }
-    if (!rejected.empty()) {
-        return fail(
-            options,
-            fmt::format(
-                "{} cannot be checked: its constructor fails: {}; load arguments go behind --",
-                built.name, rejected));
-    }
-    if (found == 0 && !(WIFEXITED(status) && WEXITSTATUS(status) == 0)) {
-        return fail(options,
-                    WIFSIGNALED(status)
-                        ? fmt::format("{} cannot be checked: the check was terminated by signal {}",
-                                      built.name, WTERMSIG(status))
-                        : fmt::format("{} cannot be checked: the check ended with status {}",
-                                      built.name, WEXITSTATUS(status)));
-    }
-    return exit_code(found == 0);
+    return report;
 }
 
 }  // namespace hal::tools

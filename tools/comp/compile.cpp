@@ -125,6 +125,51 @@ void announce(const BuiltPlugin& built, bool program, bool elsewhere) {
     print(text + "\n");
 }
 
+void print_note(const CompileOptions& options, const std::string& note) {
+    write_all(STDERR_FILENO, fmt::format("{}: note: {}\n", options.program, note));
+}
+
+/// --check-rt: what cannot be checked fails.
+bool passes_check(const CompileOptions& options, const BuiltPlugin& built, Language language) {
+    const RealtimeReport report = check_realtime(options, built, language);
+    for (const std::string& violation : report.violations) {
+        fail(options, violation);
+    }
+    if (!report.unchecked.empty()) {
+        fail(options, report.unchecked);
+    }
+    if (!report.good()) return false;
+    print(fmt::format("real time: {}, no violation\n", report.summary));
+    return true;
+}
+
+/// Without options: checks what acquires nothing and needs no load arguments, prints violations
+/// only.
+bool passes_default_check(const CompileOptions& options, const BuiltPlugin& built,
+                          const PluginSource& source, const std::string& path) {
+    if (source.linuxcnc || options.classic || !built.needs.empty()) return true;
+    if (built.starts) {
+        print_note(options, fmt::format("{}: real time was not checked, because it has start(), "
+                                        "which may open a device; type: hal compile --check-rt {}",
+                                        built.name, path));
+        return true;
+    }
+    const RealtimeReport report = check_realtime(options, built, source.language);
+    for (const std::string& violation : report.violations) {
+        fail(options, violation);
+    }
+    if (!report.violations.empty()) {
+        print_note(options, fmt::format("to install it all the same, type: hal compile "
+                                        "--no-check-rt {}",
+                                        path));
+        return false;
+    }
+    if (!report.unchecked.empty()) {
+        print_note(options, "real time was not checked: " + report.unchecked);
+    }
+    return true;
+}
+
 }  // namespace
 
 int compile_file(const CompileOptions& options, const std::string& path) {
@@ -167,17 +212,18 @@ int compile_file(const CompileOptions& options, const std::string& path) {
             write_all(STDERR_FILENO, built.messages);
         }
     };
-    if (options.check_rt) {
+    if (!options.no_check_rt) {
         build.fit = [&](const BuiltPlugin& built) {
             print_messages(built);
-            return check_realtime(options, built, source.language) == 0;
+            return options.check_rt ? passes_check(options, built, source.language)
+                                    : passes_default_check(options, built, source, path);
         };
     }
     const BuiltPlugin built = build_plugin(source, build);
     print_messages(built);
     if (!built.good) return fail(options, built.problem);
     if (!built.hint.empty()) {
-        write_all(STDERR_FILENO, fmt::format("{}: note: {}\n", options.program, built.hint));
+        print_note(options, built.hint);
     }
     if (!options.classic) {
         announce(built, source.program, !options.output.empty());
@@ -186,6 +232,9 @@ int compile_file(const CompileOptions& options, const std::string& path) {
 }
 
 int run_compile(const CompileOptions& options) {
+    if (options.check_rt && options.no_check_rt) {
+        return fail(options, "--check-rt and --no-check-rt exclude each other");
+    }
     int worst = 0;
     for (const std::string& path : options.words) {
         worst = std::max(worst, compile_file(options, path));

@@ -10,7 +10,8 @@ namespace hal::tools {
 
 struct CompileOptions : Options {
     std::string output;  ///< the folder; empty: the user's
-    bool check_rt = false;
+    bool check_rt = false;     ///< also start() and what needs load arguments
+    bool no_check_rt = false;
     bool keep = false;
     /// halcompile: further words for the compiler
     std::vector<std::string> compile_args, link_args;
@@ -23,9 +24,10 @@ struct CompileOptions : Options {
                   ".c (LinuxCNC's hal.h)");
         set.value("-o,--output", output, "DIR",
                   "install here; default: ~/.local/share/halcyon/components");
-        set.flag(
-            "--check-rt", check_rt,
-            "run 1000 cycles with random and extreme values and report violations of real time");
+        set.flag("--check-rt", check_rt,
+                 "run 1000 cycles with random and extreme values and report violations of real "
+                 "time; default for .cpp files without start() and load arguments");
+        set.flag("--no-check-rt", no_check_rt, "install without that check");
         set.flag("--keep", keep,
                  "keep the C code generated from a .comp file in the current folder");
     }

@@ -141,6 +141,7 @@ public:
                    {"needs", ""}};
         const bool starts =
             plugin->component->abi_minor < 1 || (plugin->component->flags & HAL_COMPONENT_STARTS);
+        answer_["starts"] = starts;
         if (!construct(arguments) || !answer_["needs"].get<std::string>().empty() || starts) {
             return finish();
         }
@@ -344,6 +345,7 @@ bool try_plugin(const std::string& folder, const std::string& name, const Plugin
     built.function = word("function");
     built.needs = word("needs");
     built.hint = word("hint");
+    built.starts = answer.value("starts", false);
     built.pins = answer.value("pins", std::size_t{0});
     built.functions = answer.value("functions", std::size_t{0});
     return true;

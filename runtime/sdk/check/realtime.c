@@ -7,6 +7,7 @@
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <math.h>
 #include <poll.h>
 #include <pthread.h>
@@ -16,6 +17,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
+#include <sys/random.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
@@ -142,6 +145,37 @@ GUARDED(ssize_t, recv, (int file, void* to, size_t bytes, int flags), (file, to,
 GUARDED(ssize_t, send, (int file, const void* from, size_t bytes, int flags),
         (file, from, bytes, flags))
 GUARDED(int, close, (int file), (file))
+GUARDED(int, socket, (int family, int type, int protocol), (family, type, protocol))
+GUARDED(ssize_t, recvfrom,
+        (int file, void* to, size_t bytes, int flags, struct sockaddr* from, socklen_t* length),
+        (file, to, bytes, flags, from, length))
+GUARDED(ssize_t, sendto,
+        (int file, const void* from, size_t bytes, int flags, const struct sockaddr* to,
+         socklen_t length),
+        (file, from, bytes, flags, to, length))
+GUARDED(ssize_t, getrandom, (void* to, size_t bytes, unsigned flags), (to, bytes, flags))
+GUARDED(int, getentropy, (void* to, size_t bytes), (to, bytes))
+/* the arguments behind the declared ones are one word, where there is one */
+int open(const char* path, int flags, ...) {
+    static int (*real)(const char*, int, ...);
+    va_list arguments;
+    va_start(arguments, flags);
+    const unsigned mode = flags & O_CREAT ? va_arg(arguments, unsigned) : 0;
+    va_end(arguments);
+    check("open");
+    if (!real) real = (int (*)(const char*, int, ...))dlsym(RTLD_NEXT, "open");
+    return real(path, flags, mode);
+}
+int ioctl(int file, unsigned long request, ...) {
+    static int (*real)(int, unsigned long, ...);
+    va_list arguments;
+    va_start(arguments, request);
+    void* const argument = va_arg(arguments, void*);
+    va_end(arguments);
+    check("ioctl");
+    if (!real) real = (int (*)(int, unsigned long, ...))dlsym(RTLD_NEXT, "ioctl");
+    return real(file, request, argument);
+}
 GUARDED(FILE*, fopen, (const char* path, const char* mode), (path, mode))
 GUARDED(int, puts, (const char* text), (text))
 GUARDED(int, putchar, (int character), (character))
