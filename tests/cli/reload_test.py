@@ -77,6 +77,8 @@ HAL_COMPONENT(Part, "part", "Remembers")
 # Members that it names: counts of two functions, which may be in two threads, and what changes its type or is gone.
 RETAINED = """#include <vector>
 #include "hal/retained.hpp"
+struct Point { POINT };
+struct Place { double x = 0; std::int32_t n = 0; };
 struct Part : hal::Component {
     using Component::Component;
     hal::Function quick{*this, "quick", &Part::count_quick, "one step"};
@@ -86,11 +88,15 @@ struct Part : hal::Component {
     hal::Out<std::int64_t> calm_cycles{*this, calm, "calm-cycles", "so far"};
     hal::Out<std::int64_t> calm_sum{*this, calm, "calm-sum", "of all steps"};
     hal::Out<double> total{*this, quick, "total", "of what changes its type"};
+    hal::Out<double> swapped{*this, quick, "swapped", "of a struct whose members change places"};
+    hal::Out<double> kept{*this, quick, "kept", "of a struct that stays as it is"};
     void count_quick(hal::Cycle) noexcept {
         quick_cycles = quick_cycles + 1;
         rows_[1] += STEP;
         quick_sum = rows_[1];
         total = static_cast<double>(other_ += 1);
+        swapped = point_.x += 1;
+        kept = place_.x += 1;
     }
     void count_calm(hal::Cycle) noexcept {
         calm_cycles = calm_cycles + 1;
@@ -99,7 +105,9 @@ struct Part : hal::Component {
     OTHER other_ = 0;
     std::vector<std::int64_t> rows_ = std::vector<std::int64_t>(3);
     std::int64_t calm_ = 0;
-    hal::Retained retained_{*this, {{"other", other_}, GONE {"rows", rows_}, {"calm", calm_}}};
+    Point point_;
+    Place place_;
+    hal::Retained retained_{*this, {{"other", other_}, GONE {"rows", rows_}, {"calm", calm_}, {"point", point_}, {"place", place_}}};
 };
 HAL_COMPONENT(Part, "part", "Remembers")
 """
@@ -193,9 +201,11 @@ class Reload(Case):
             .replace("OTHER", "std::int32_t")
             .replace("ZERO", "7"),
             "retained1": RETAINED.replace("STEP", "1")
+            .replace("POINT", "double x = 0; std::int32_t n = 0;")
             .replace("OTHER", "double")
             .replace("GONE", '{"gone", rows_},'),
             "retained2": RETAINED.replace("STEP", "1000")
+            .replace("POINT", "std::int32_t n = 0; double x = 0;")
             .replace("OTHER", "float")
             .replace("GONE", ""),
             "owner1": OWNER.replace("VERSION", "1").replace("FAILS", "false"),
@@ -407,11 +417,12 @@ class Reload(Case):
             "m.hal",
             "loadrt threads name1=servo period1=1000000\nloadrt part names=p\naddf p.quick servo\nstart\nadvance 10 cycles\n"
             f"getp p.quick-sum\ngetp p.total\nloadusr -w cp {self.versions['retained2']} {self.plugins}/part.so\n"
-            "reload part\nadvance 3 cycles\ngetp p.quick-sum\ngetp p.total\ngetp p.quick-cycles\n",
+            "reload part\nadvance 3 cycles\ngetp p.quick-sum\ngetp p.total\ngetp p.quick-cycles\n"
+            "getp p.swapped\ngetp p.kept\n",
         )
         done = self.run_program("sim", path)
-        self.assertEqual("10\n10\n3010\n3\n13\n", done.stdout)
-        for name in ("other", "gone"):
+        self.assertEqual("10\n10\n3010\n3\n13\n3\n13\n", done.stdout)
+        for name in ("other", "gone", "point"):
             self.assertIn(
                 f"warning: variable '{name}' of 'p' is missing or has another type in the new version: its value is lost",
                 done.stderr,

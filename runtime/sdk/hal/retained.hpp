@@ -9,27 +9,16 @@
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
-#include <string_view>
 #include <type_traits>
 
 #include "hal/component.hpp"
 #include "hal/queue.hpp"
 #include "hal/retained.h"
+#include "hal/type_number.hpp"
 
 namespace hal {
 
 namespace detail {
-
-/// Returns a number that differs for types of different names. A struct that keeps its name and its
-/// size keeps its number: rename it when the meaning of its members changes.
-template <class T>
-constexpr std::uint64_t type_number() {
-    std::uint64_t hash = 14695981039346656037U;  // FNV-1a
-    for (const char c : std::string_view{__PRETTY_FUNCTION__}) {
-        hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
-    }
-    return hash;
-}
 
 /// A class declares `static constexpr bool retainable = true` when its bytes are its whole state:
 /// it contains no pointer and may be copied byte by byte while nobody uses it.
@@ -56,7 +45,6 @@ concept Elements = !Retainable<T> && requires(T& all) {
 };
 
 }  // namespace detail
-
 
 /// Names a variable for hal::Retained. It is trivially copyable, an atomic, or a class that declares
 /// itself `retainable`, and contains no pointer.
