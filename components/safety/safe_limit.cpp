@@ -139,12 +139,10 @@ struct SafeLimit : hal::Component {
             trip(powerless, bad_parameter);
         } else if (!measured) {
             trip(powerless, no_number);
-        } else if (stop_in) {
-            trip(braking_1, asked);
-        } else if (pressed && state_ != running && (may_return_ || !stops(found))) {
+        } else if (pressed && may_be_released(found)) {
             release(found);
-        } else if (stops(found)) {
-            trip(state_of(reaction(found)), found);
+        } else {
+            stop_for(found);
         }
         if (sound && measured) {
             follow_stop(dt);
@@ -253,6 +251,18 @@ private:
         }
     }
 
+    bool may_be_released(std::uint32_t found) const noexcept {
+        return state_ != running && !stop_in && (may_return_ || !stops(found));
+    }
+    /// Begins the stops that are due. A requested stop is no reason to tolerate a limit.
+    void stop_for(std::uint32_t found) noexcept {
+        if (stop_in) {
+            trip(braking_1, asked);
+        }
+        if (stops(found)) {
+            trip(state_of(reaction(found)), found);
+        }
+    }
     /// A stronger stop takes over from a weaker one; the first reason stays.
     void trip(std::uint32_t to, std::uint32_t why) noexcept {
         returning_ = none;
@@ -403,7 +413,7 @@ IEC 60204-1 (9.2.2, stop categories) and IEC 61800-5-2 (SLP, SLS, SLA with STO, 
 The reaction is in the same cycle (plus `filter-time`). A stop remains until a rising edge of `reset` after its cause no longer
 exists. The initial state is a stop: the first reset enables the power. Beyond a position limit a reset is accepted at standstill, and then the axis may move
 inwards only. A stop that takes longer than `stop-time`, a NaN value and an invalid parameter cause a stop 0; a stop or a fault of
-the runtime requires a reset. `stop-in` requests a stop 1. Link `power` to the drive's enable. This is software on one computer, not
+the runtime requires a reset. `stop-in` requests a stop 1, during which all limits remain monitored. Link `power` to the drive's enable. This is software on one computer, not
 a certified safety function.
 
 | reason | |
