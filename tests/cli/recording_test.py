@@ -58,6 +58,23 @@ class Simulated(Case):
         for row in rows[1:]:
             self.assertEqual(row[1], "1" if float(row[2]) > 0 else "0")
 
+    def test_every_cycle_of_slow_threads_is_in_the_table(self):
+        slow = "newthread slow 1000000000\nnewthread slower 3000000000\nloadrt siggen names=g,h\naddf g.update slow\naddf h.update slower\n"
+        self.sim(slow, "--cycles", "1000", "--record", "run.csv", "--values", "g.sine,h.sine")
+        self.assertEqual(1000, sum(row[1] != "" for row in self.rows()) - 1)
+        self.assertEqual(333, sum(row[2] != "" for row in self.rows()) - 1)
+
+    def test_many_values_of_a_fast_thread_need_little_memory(self):
+        self.sim(
+            "newthread fast 20000\nloadrt siggen names=g\nloadrt mux16 count=120\naddf g.update fast\n",
+            "--for",
+            "300ms",
+            "--record",
+            "run.mcap",
+            "--values",
+            "mux16.*",
+        )
+
     def test_the_same_netlist_gives_the_same_file(self):
         self.sim(NETLIST, "--for", "3s", "--record", "b.mcap", "--name", "x")
         self.sim(NETLIST, "--for", "3s", "--record", "c.mcap", "--name", "x")

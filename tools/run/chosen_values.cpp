@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 #include <fnmatch.h>
 #include <set>
+#include <utility>
 
 #include "text/suggest.hpp"
 
@@ -31,6 +32,21 @@ std::vector<std::string> chosen_values(const Model& model,
         }
     }
     return {all.begin(), all.end()};
+}
+
+std::vector<std::string> named_values(const Model& model,
+                                      const std::vector<std::string>& patterns) {
+    std::vector<std::string> names;
+    for (const std::string& one : patterns) {
+        if (model.find_pin(one) || model.find_signal(one)) {
+            names.push_back(one);
+            continue;
+        }
+        for (std::string& match : chosen_values(model, {one})) {
+            names.push_back(std::move(match));
+        }
+    }
+    return names;
 }
 
 std::string unknown_value(const Model& model, const std::vector<std::string>& patterns) {

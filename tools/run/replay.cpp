@@ -18,6 +18,7 @@
 #include "cli/output.hpp"
 #include "recording/mcap/playback_pin.hpp"
 #include "recording/mcap/recording.hpp"
+#include "run/chosen_values.hpp"
 #include "run/exact_replay.hpp"
 #include "run/hosted_machine.hpp"
 #include "run/journal_test.hpp"
@@ -212,7 +213,7 @@ public:
             if (!probe) continue;
             const auto lock = machine_.session.lock();
             for (const ProbeRows& rows :
-                 machine_.session.probes().take(*probe, std::size_t{1} << 28)) {
+                 machine_.session.probes().take(*probe, max_taken, Probes::Rest::taken)) {
                 compare(rows, wanted_ns);
             }
         }

@@ -51,7 +51,7 @@ public:
         thread_ = std::thread([this] {
             while (!ends_) {
                 std::this_thread::sleep_for(std::chrono::milliseconds(50));
-                take();
+                take(Probes::Rest::stays);
             }
         });
         return "";
@@ -60,17 +60,17 @@ public:
         if (!thread_.joinable()) return;
         ends_ = true;
         thread_.join();
-        take();
+        take(Probes::Rest::taken);
         const auto lock = session_.lock();
         session_.probes().detach(probe_);
     }
 
 private:
-    void take() {
+    void take(Probes::Rest rest) {
         std::vector<ProbeRows> batches;
         {
             const auto lock = session_.lock();
-            batches = session_.probes().take(*probe_, std::size_t{1} << 24);
+            batches = session_.probes().take(*probe_, std::size_t{1} << 24, rest);
         }
         journal_.with_writer([&](mcap::Writer&) {
             for (const ProbeRows& rows : batches) {

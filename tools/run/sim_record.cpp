@@ -31,6 +31,29 @@ int check_recording(const SimOptions& options) {
                : fail(options, fmt::format("cannot write '{}': {}", options.record, problem));
 }
 
+// the rows of a step are written before the next one
+constexpr std::int64_t step_ns = 100'000'000;
+constexpr std::uint64_t step_cycles = 100;
+
+/// Returns the time whose rows a probe keeps: that of two steps.
+std::int64_t buffered_ns(Session& session, const SimOptions& options) {
+    if (options.cycles == 0) return 2 * step_ns;
+    std::int64_t fastest_ns = step_ns / static_cast<std::int64_t>(step_cycles);
+    const auto threads = session.reports().threads();
+    if (!threads.empty()) {
+        fastest_ns = std::ranges::min(threads, {}, &ThreadReport::period_ns).period_ns;
+    }
+    return 2 * static_cast<std::int64_t>(step_cycles) * fastest_ns;
+}
+
+std::uint64_t lost_rows(const ProbeRows& batch) {
+    std::uint64_t lost = 0;
+    for (const ProbeRows::Part& part : batch.parts) {
+        lost += part.lost;
+    }
+    return lost;
+}
+
 int record_advance(const SimOptions& options, HostedMachine& machine) {
     Session& session = machine.session;
     std::shared_ptr<LiveProbe> probe;
@@ -44,7 +67,9 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
             !unknown.empty()) {
             return fail(options, "--values: " + unknown);
         }
-        probe = session.probes().attach({chosen_values(session.model(), patterns)}, problem);
+        probe = session.probes().attach({.names = chosen_values(session.model(), patterns),
+                                         .buffer_ns = buffered_ns(session, options)},
+                                        problem);
         if (!probe) return fail(options, "--record: " + problem);
         layout = Probes::layout(*probe);
         journal = session.event_log().begin();
@@ -57,10 +82,9 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
     }
     bool good = sink->error() == 0 && sink->layout(layout.groups);
     std::uint64_t rows = 0;
+    std::uint64_t lost = 0;
     std::int64_t left_ns = options.for_ns;
     std::uint64_t left_cycles = options.cycles;
-    constexpr std::int64_t step_ns = 100'000'000;
-    constexpr std::uint64_t step_cycles = 100;
     while (good && !machine.stop.requested() && (left_ns > 0 || left_cycles > 0)) {
         if (left_cycles > 0) {
             machine.advance(-1, std::min(step_cycles, left_cycles));
@@ -73,8 +97,9 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
         for (const LoggedEvent& entry : session.event_log().after(journal)) {
             good = good && sink->event({entry.time_ns, entry.kind, entry.text});
         }
-        for (const ProbeRows& batch : session.probes().take(*probe, std::size_t{1} << 28)) {
+        for (const ProbeRows& batch : session.probes().take(*probe, max_taken, Probes::Rest::taken)) {
             good = good && add_rows(*sink, batch, layout, rows);
+            lost += lost_rows(batch);
         }
     }
     {
@@ -83,6 +108,10 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
         session.event_log().end();
     }
     if (!sink->close() || !good) return fail(options, cannot_write(*sink, options.record));
+    if (lost > 0) {
+        return fail(options, fmt::format("'{}' is incomplete: {} did not fit the buffer",
+                                         options.record, counted(lost, "row")));
+    }
     if (!options.quiet) {
         write_all(2, fmt::format("{}: {} of {}\n", options.record, counted(rows, "row"),
                                  counted(Probes::columns(*probe).size(), "value")));

@@ -6,6 +6,8 @@
 #include <limits>
 #include <string_view>
 
+#include "run/chosen_values.hpp"
+
 namespace hal::tools {
 namespace {
 
@@ -42,7 +44,7 @@ void ValueCheck::begin(Session& session, const std::vector<std::string>& names) 
 bool ValueCheck::compare() {
     if (difference_) return false;
     if (!probe_) return true;
-    for (const ProbeRows& rows : session_->probes().take(*probe_, std::size_t{1} << 28)) {
+    for (const ProbeRows& rows : session_->probes().take(*probe_, max_taken, Probes::Rest::taken)) {
         compare(rows);
     }
     return !difference_;

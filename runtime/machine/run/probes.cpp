@@ -350,7 +350,7 @@ std::size_t move_rows(const LiveProbe& probe, RingGroup& group, std::int64_t unt
 
 }  // namespace
 
-std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t max) {
+std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t max, Rest rest) {
     std::vector<ProbeRows> results;
     const std::int64_t now_ns = state_.executor->now_ns();
     // Returns the time before which no row remains.
@@ -400,7 +400,9 @@ std::vector<ProbeRows> Probes::take(LiveProbe& probe, std::size_t max) {
         }
     }
     until_ns = std::max(until_ns == INT64_MAX ? now_ns : until_ns, probe.until_ns);
-    probe.until_ns = std::max(probe.until_ns, collect(probe.groups, rows, until_ns));
+    const bool is_end = rest == Rest::taken;
+    const std::int64_t reached_ns = collect(probe.groups, rows, is_end ? INT64_MAX : until_ns);
+    probe.until_ns = std::max(probe.until_ns, reached_ns == INT64_MAX ? now_ns : reached_ns);
     rows.until_ns = probe.until_ns;
     for (std::size_t i = 0; i < probe.groups.size(); ++i) {
         RingGroup& group = probe.groups[i];

@@ -76,9 +76,13 @@ public:
     static const ProbeLayout& layout(const LiveProbe& probe);
     /// Returns how many rows did not fit since the probe was attached.
     static std::uint64_t lost(const LiveProbe& probe);
+    /// What happens to rows after the newest cycle of the slowest thread, which may still add an
+    /// earlier row: they stay while threads run, and are taken when none does.
+    enum class Rest { stays, taken };
     /// Takes the rows that have come, at most so many bytes in each result. There is one result per
     /// layout in force since the last call.
-    std::vector<ProbeRows> take(LiveProbe& probe, std::size_t max_bytes = max_at_once);
+    std::vector<ProbeRows> take(LiveProbe& probe, std::size_t max_bytes = max_at_once,
+                                Rest rest = Rest::stays);
     static constexpr std::size_t max_at_once = std::size_t{1} << 18;
 
     /// For the compiler's result that threads are going to take: gives each plan its probes.
