@@ -194,9 +194,11 @@ class ExactReplay(Case):
         machine = self.run_journaled(MACHINE, "--values", "position")
         self.wait_for_cycles(300)
         self.finish(machine)
-        text = self.replay("--until", "0.1s", "--show", "position,sine,nowhere")
+        text = self.replay("--until", "0.1s", "--show", "position,sine,nowhere", status=1)
         self.assertRegex(text, r"\nstopped; no difference so far, \d+ values compared\n")
-        self.assertRegex(text, r"\nposition \S+\nsine \S+\nnowhere unknown\n$")
+        self.assertIn("--show: no pin, parameter or signal matches 'nowhere'", text)
+        text = self.replay("--until", "0.1s", "--show", "position,sine")
+        self.assertRegex(text, r"\nposition \S+\nsine \S+\n$")
         self.assertRegex(
             self.replay("--until", "120"), r"newest: cycle 120 of 'fast' at .*\nstopped"
         )
@@ -373,8 +375,22 @@ class ExactReplay(Case):
         for words, problem in [
             (["--as-test", "file/case"], "cannot create the folder 'file/case'"),
             (["--as-test", "b", "--shell"], "--as-test is for the journal as it is"),
+            (
+                ["--as-test", "case"],
+                "--as-test: 'case' exists already; name another folder, or remove it",
+            ),
+            (
+                ["--as-test", "b", "--show", "sine,efort"],
+                "--show: no pin, parameter or signal matches 'efort'; did you mean 'effort'?",
+            ),
+            (["--tolerance", "1e-3"], "--tolerance and --for are for a recording: with --exact"),
+            (["--for", "1s"], "--tolerance and --for are for a recording: with --exact"),
         ]:
             self.assertIn(problem, self.replay("--anyway", *words, status=1))
+        self.assertFalse((self.folder / "b").exists())
+        (self.folder / "empty").mkdir()
+        self.replay("--anyway", "--show", "e*", "--as-test", "empty")
+        self.assertRegex((self.folder / "empty" / "expected").read_text(), r"(?m)^effort \S+$")
 
     def test_an_end_before_the_goal_is_reported(self):
         machine = self.run_journaled(MACHINE)

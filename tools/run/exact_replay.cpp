@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cli/output.hpp"
+#include "run/chosen_values.hpp"
 #include "run/difference_inputs.hpp"
 #include "run/journal_test.hpp"
 #include "run/journaled_program.hpp"
@@ -43,7 +44,9 @@ public:
         const auto took = std::chrono::steady_clock::now() - begun;
         machine_.compare();
         int status = report(stopped, took);
-        show();
+        if (!show()) {
+            status = 1;
+        }
         if (!options_.as_test.empty() && status == 0) {
             status = write_journal_test(options_, file_, machine_);
         }
@@ -150,16 +153,23 @@ private:
         return fmt::format("{}, {} compared\n", where, counted(*compared, "value"));
     }
 
-    void show() {
-        const std::vector<std::string> names = names_in(options_.show);
+    /// Prints the values of --show. Returns false after a note when the machine has no such name.
+    bool show() {
+        const Model& model = machine_.session().model();
+        const std::vector<std::string> patterns = names_in(options_.show);
+        if (const std::string problem = unknown_value(model, patterns); !problem.empty()) {
+            note(options_, "--show: " + problem);
+            return false;
+        }
+        const std::vector<std::string> names = named_values(model, patterns);
         const auto readings = machine_.session().values().read(names);
         std::string text;
         for (std::size_t i = 0; i < names.size(); ++i) {
             const std::string value =
-                readings[i] ? format_value(readings[i]->type, readings[i]->value) : "unknown";
+                readings[i] ? format_value(readings[i]->type, readings[i]->value) : "(a port)";
             text += fmt::format("{} {}\n", names[i], value);
         }
-        print(text);
+        return print(text);
     }
 
     const ReplayOptions& options_;
@@ -189,6 +199,15 @@ int run_exact_replay(const ReplayOptions& options) {
     }
     if (!options.as_test.empty() && (!options.edits.empty() || options.shell)) {
         return fail(options, "--as-test is for the journal as it is: without --edit and --shell");
+    }
+    if (!options.as_test.empty() && is_occupied(options.as_test)) {
+        return fail(options, fmt::format("--as-test: '{}' exists already; name another folder, or "
+                                         "remove it",
+                                         options.as_test));
+    }
+    if (options.tolerance >= 0 || options.for_ns >= 0) {
+        return fail(options, "--tolerance and --for are for a recording: with --exact every bit is "
+                             "compared; to end earlier, type --until");
     }
     WhatIf change;
     if (const std::string problem = change.parse(options); !problem.empty()) {

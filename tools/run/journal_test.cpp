@@ -81,9 +81,10 @@ int write_journal_test(const ReplayOptions& options, const JournalFile& file,
     std::string problem =
         write_shortened(options.words[0], (folder / journal_name).string(), progress);
     if (!problem.empty()) return cannot(journal_name, problem);
-    std::vector<std::string> names = names_in(options.show);
+    const Model& model = machine.session().model();
+    std::vector<std::string> names = named_values(model, names_in(options.show));
     if (names.empty()) {
-        names = chosen_values(machine.session().model(), {});
+        names = chosen_values(model, {});
     }
     std::string expected;
     for (const std::string& name : names) {
@@ -97,6 +98,12 @@ int write_journal_test(const ReplayOptions& options, const JournalFile& file,
                       counted(machine.execution().cycles(), "cycle"),
                       counted(names.size(), "value"), options.as_test));
     return 0;
+}
+
+bool is_occupied(const std::string& path) {
+    std::error_code error;
+    const bool is_empty = fs::is_empty(path, error);
+    return !error && !(is_empty && fs::is_directory(path, error));
 }
 
 bool is_journal_test(const std::string& path) {

@@ -15,6 +15,10 @@ namespace hal::tools {
 int write_journal_test(const ReplayOptions& options, const JournalFile& file,
                        ReplayedMachine& machine);
 
+/// Returns true when something of this name exists that a test must not replace: anything but an
+/// empty folder. [setup]
+bool is_occupied(const std::string& path);
+
 /// Returns true for a folder that write_journal_test() has written. [setup]
 bool is_journal_test(const std::string& path);
 

@@ -292,11 +292,12 @@ int ReplayedMoment::execute(const std::string& line) {
         return 1;
     }
     if (!row->is_query() && !row->is_apart()) {
+        const bool can_be_tried = name == "setp" || name == "sets";
         print(
             fmt::format("'{}' is not possible: this is a moment of the past. To execute the "
-                        "journal with a change, type: hal replay --exact FILE --edit '{}' --at "
+                        "journal with another value, type: hal replay --exact FILE --edit '{}' --at "
                         "CYCLE\n",
-                        name, line));
+                        name, can_be_tried ? line : "setp NAME VALUE"));
         return 1;
     }
     ProcessOutput output;
