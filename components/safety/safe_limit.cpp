@@ -254,7 +254,7 @@ private:
     bool may_be_released(std::uint32_t found) const noexcept {
         return state_ != running && !stop_in && (may_return_ || !stops(found));
     }
-    /// Begins the stops that are due. A requested stop is no reason to tolerate a limit.
+    /// Begins the stops that are due. Limits remain monitored during a requested stop.
     void stop_for(std::uint32_t found) noexcept {
         if (stop_in) {
             trip(braking_1, asked);
