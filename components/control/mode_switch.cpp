@@ -47,16 +47,19 @@ struct ModeSwitch : hal::Component {
             } else if (changes) {
                 begin(out_ - value);
             } else {
+                if (transition != begun_) {
+                    begin(offset_);
+                }
                 approach(cycle.seconds());
             }
             if (clear) {
                 offset_ = 0.0;
             }
             source_ = wanted;
-            started_ = true;
             out_ = value + offset_;
         }
-        was_held_ = started_ && (hold || !usable);  // taken up again like another source
+        started_ = true;
+        was_held_ = hold || !usable;  // taken up again like another source
         bad_source = !known || !usable;
         out = out_;
         offset = offset_;
@@ -71,13 +74,14 @@ private:
     void begin(double gap) noexcept {
         offset_ = first_ =
             std::isfinite(gap) && transition != jump && transition <= keep_offset ? gap : 0.0;
-        gone_ = 0.0;
+        share_ = 0.0;
+        begun_ = transition;
     }
     void approach(double dt) noexcept {
         switch (transition) {
         case fade:
-            gone_ += dt;
-            offset_ = time > 0.0 && gone_ < time * (1 - 1e-9) ? first_ * weight(gone_ / time) : 0.0;
+            share_ += time > 0.0 ? dt / time : 1.0;
+            offset_ = share_ < 1 - 1e-9 ? first_ * weight(share_) : 0.0;
             break;
         case decay:
             offset_ *= time > 0.0 ? std::exp(-dt / time) : 0.0;
@@ -104,7 +108,8 @@ private:
     double out_ = 0.0;
     double offset_ = 0.0;
     double first_ = 0.0;
-    double gone_ = 0.0;
+    double share_ = 0.0;                // of a fade that is over
+    std::uint32_t begun_ = jump;        // the transition that first_ is of
     std::size_t source_ = 0;
     bool started_ = false;
     bool was_held_ = false;
@@ -112,7 +117,8 @@ private:
                             {{"out", out_},
                              {"offset", offset_},
                              {"first", first_},
-                             {"gone", gone_},
+                             {"share", share_},
+                             {"begun", begun_},
                              {"source", source_},
                              {"started", started_},
                              {"was-held", was_held_}}};
@@ -136,7 +142,8 @@ immediately; only the gap fades. If a source can track (an integrator, a traject
 there is no gap.
 
 While `select` is out of range, the last source remains in use. While the source is NaN or infinite, `out` keeps its value; the return to the source is a
-transition, as it is after `hold`. The first cycle has no transition. A `transition` above 4 is a jump.
+transition, as it is after `hold`. A source that is used in the first cycle is used without a transition. A `transition` above 4 is a jump.
+A `time`, `rate` or `transition` that changes meanwhile applies to the offset that is left.
 
     loadrt mode_switch names=effort-source inputs=2
     addf effort-source servo
