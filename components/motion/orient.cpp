@@ -24,7 +24,7 @@ struct Orient : hal::Component {
 
     void update(hal::Cycle) noexcept {
         if (enable_edge_.rises(enable)) {
-            choose();
+            has_target_ = choose();
             settled_cycles_ = 0;
         }
         if (!enable) {
@@ -32,29 +32,34 @@ struct Orient : hal::Component {
             return;
         }
         poserr = (position - command) * 360.0;
-        if (settled_cycles_ < required_cycles && std::fabs(poserr) < tolerance) {
+        if (has_target_ && settled_cycles_ < required_cycles && std::fabs(poserr) < tolerance) {
             ++settled_cycles_;
         }
         is_oriented = settled_cycles_ >= required_cycles;
     }
 
 private:
-    void choose() noexcept {
+    /// Sets the command. Returns false when there is no target.
+    bool choose() noexcept {
         const double target = angle / 360.0;
-        if (!std::isfinite(position + target)) return;
+        if (!std::isfinite(position + target)) return false;
         switch (mode) {
         case 0: command = std::floor(position + 0.5 - target) + target; break;
         case 1: command = std::ceil(position - target) + target; break;
         case 2: command = std::floor(position - target) + target; break;
         default: break;  // invalid mode: hold the last command
         }
+        return true;
     }
 
     static constexpr int required_cycles = 101;
     hal::RisingEdge enable_edge_;
+    bool has_target_ = false;
     int settled_cycles_ = 0;  // since the rising edge of enable, within the tolerance
     hal::Retained retained_{*this,
-                            {{"was-enabled", enable_edge_}, {"settled-cycles", settled_cycles_}}};
+                            {{"was-enabled", enable_edge_},
+                             {"has-target", has_target_},
+                             {"settled-cycles", settled_cycles_}}};
 };
 
 }  // namespace
@@ -73,7 +78,8 @@ In any other mode the command is held. `angle` may be any number of degrees; who
 `position` - `command` in degrees. `is-oriented` becomes TRUE in the 101st cycle in which it is within `tolerance` and remains TRUE until
 `enable` is FALSE, so that a spindle that passes the angle is not reported.
 
-**Differences from LinuxCNC:** if position or angle is NaN or infinite, the command is held (LinuxCNC: NaN).
+**Differences from LinuxCNC:** if position or angle is NaN or infinite at the edge of `enable`, the command is held, and `is-oriented` remains FALSE until the
+next edge (LinuxCNC: NaN).
 
     loadrt orient names=orient
     loadrt pid names=orient-pid
