@@ -346,8 +346,11 @@ private:
                static_cast<double>(std::max<std::int64_t>(1, ticks(step_length) + pause) * tick_ns);
     }
 
+    /// A command that is not a number brakes to a standstill.
     double limited(double wanted, std::int64_t tick_ns, double dt) noexcept {
-        if (!std::isfinite(wanted)) return 0.0;
+        if (!std::isfinite(wanted)) {
+            wanted = 0.0;
+        }
         double highest = highest_rate(tick_ns);
         if (const double asked = std::fabs(max_velocity * scale()); asked > 0.0) {
             highest = std::min(highest, asked);
@@ -472,7 +475,8 @@ in the servo thread, before and after the controller. The three may run on diffe
 
 `position-cmd` (ctrl_type=p) is followed as fast as `maxvel` and `maxaccel` allow without overshooting a constant
 command: v = √(2 a e + (a T/2)²) - a T/2 for a distance e, plus the speed of the command. `velocity-cmd` (ctrl_type=v) is
-followed within the same limits. With `maxaccel` the speed changes linearly from one update to the next, without jumps.
+followed within the same limits. With `maxaccel` the speed changes linearly from one update to the next, without jumps. A command that is NaN or infinite
+brakes to a standstill within it.
 There is at most one step per period of the fast thread; a step that must
 wait for one of the times below is delayed, never lost. A step occurs when the position passes the midpoint between two steps.
 
