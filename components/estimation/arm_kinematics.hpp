@@ -85,13 +85,18 @@ public:
     /// Damped least squares (Y. Nakamura, H. Hanafusa, *Inverse Kinematic Solutions with
     /// Singularity Robustness*, 1986):
     ///     step = J' (J J' + damping² I)^-1 residual
-    /// a fixed number of steps a cycle, from where the last cycle ended.
-    void update(Cycle) noexcept {
+    /// a fixed number of steps a cycle, from where the last cycle ended. No joint moves faster than
+    /// max-speed: all of them cover the same share of their way.
+    void update(Cycle cycle) noexcept {
         if (!read_inputs()) return;
         Matrix j;
         show(arm_.forward(measured_, j));
         if (follow) {
             solved_ = measured_;
+        }
+        if (!has_run_) {
+            given_ = solved_;
+            has_run_ = true;
         }
         const double weight = position_only ? 0.0 : 1.0;
         const double damp = std::fmax(std::fabs(damping), 1e-6);
@@ -103,6 +108,10 @@ public:
             }
             step(j, residual, damp);
         }
+        if (!finite(solved_)) {
+            solved_ = given_;
+        }
+        limit_step(cycle.seconds());
         compare(arm_.forward(solved_, j), weight, residual);
         double size = 0.0;
         for (Eigen::Index i = 0; i < 6; ++i) {
@@ -111,9 +120,7 @@ public:
         manipulability = measure(j, weight);
         error = size;
         solved = size <= tolerance;
-        if (!finite(solved_)) {
-            solved_ = measured_;
-        }
+        given_ = solved_;
         for (std::size_t i = 0; i < command.size(); ++i) {
             command[i] = solved_(static_cast<Eigen::Index>(i));
         }
@@ -130,7 +137,22 @@ private:
                "while TRUE, each solution starts at the measured joints"}),
           arm_(std::move(arm)) {
         solved_ = measured_;
-        Retained(*this, {{"solved", solved_}});
+        given_ = measured_;
+        Retained(*this, {{"solved", solved_}, {"given", given_}, {"has-run", has_run_}});
+    }
+
+    /// Shortens the way from the last commands so that no joint exceeds max-speed.
+    void limit_step(double dt) noexcept {
+        const double allowed = max_speed * dt;
+        double largest = 0.0;
+        for (Eigen::Index i = 0; i < solved_.size(); ++i) {
+            largest = std::fmax(largest, std::fabs(solved_(i) - given_(i)));
+        }
+        if (!(largest > allowed)) return;
+        const double share = std::fmax(allowed, 0.0) / largest;
+        for (Eigen::Index i = 0; i < solved_.size(); ++i) {
+            solved_(i) = given_(i) + share * (solved_(i) - given_(i));
+        }
     }
 
     /// Reads the argument `dh`. [setup]
@@ -288,6 +310,8 @@ private:
 
     Arm arm_;
     Vector solved_;
+    Vector given_;  // the last commands
+    bool has_run_ = false;
 
 public:
     In<bool> position_only{
@@ -300,6 +324,9 @@ public:
         "damping",
         "solver damping; a larger value is smoother near singularities but converges more slowly",
         {.initial = 0.01}};
+    Param<double> max_speed{*this, "max-speed",
+                            "highest speed of a command: rad/s, or m/s for a prismatic joint",
+                            {.initial = 10.0}};
     Param<double> tolerance{
         *this, "tolerance", "largest error (m, rad) at which solved is TRUE", {.initial = 1e-6}};
     Out<double> error{*this, "error", "largest component of the remaining error (m, rad)"};
