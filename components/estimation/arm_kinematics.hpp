@@ -141,7 +141,7 @@ private:
         Retained(*this, {{"solved", solved_}, {"given", given_}, {"has-run", has_run_}});
     }
 
-    /// Shortens the way from the last commands so that no joint exceeds max-speed.
+    /// Shortens the step of all joints alike so that none exceeds max-speed.
     void limit_step(double dt) noexcept {
         const double allowed = max_speed * dt;
         double largest = 0.0;
