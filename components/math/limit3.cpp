@@ -127,24 +127,22 @@ struct Limit3 : hal::Component {
         const double period = cycle.seconds();
         const double a = std::min(maxa * period * period, max_magnitude),
                      v = maxv > 0.0 ? std::min(maxv * period, max_magnitude) : 0.0;
-        const double w = look_at_input(v);
+        const double speed = look_at_input();
         if (load) {
-            carry();
+            carry(a, std::clamp(speed, -v, v));
         } else if (a > 1.0 / max_magnitude) {
-            approach(a, v, w);
+            approach(a, v, speed_to_meet(speed, v));
         } else {
             stand();
         }
-        carried_ = load;
         out = position_;
     }
 
 private:
-    // Reads in, min and max; a NaN input keeps the last value. Returns the speed at which to meet
-    // the input: the smaller of its last two, because a step or a jitter has a speed in one cycle
-    // and none or the opposite in the next. An input faster than maxv cannot be met and counts as
-    // stationary.
-    double look_at_input(double v) noexcept {
+    // Reads in, min and max; a NaN input keeps the last value. Returns the speed of the input: the
+    // smaller of its last two, because a step or a jitter has a speed in one cycle and none or the
+    // opposite in the next.
+    double look_at_input() noexcept {
         const double input = in;
         const double before = speed_in_;
         high_ = bounded(max);
@@ -153,19 +151,28 @@ private:
         if (!std::isnan(input)) {
             input_ = bounded(input);
         }
-        const double w = speed_in_ > 0.0 ? std::max(0.0, std::min(speed_in_, before))
-                                         : std::min(0.0, std::max(speed_in_, before));
+        return speed_in_ > 0.0 ? std::max(0.0, std::min(speed_in_, before))
+                               : std::min(0.0, std::max(speed_in_, before));
+    }
+
+    // An input faster than maxv cannot be met and counts as stationary.
+    double speed_to_meet(double w, double v) const noexcept {
         return std::abs(w) <= v * (1.0 + 1e-9) + 8.0 * rounding * std::abs(input_)
                    ? std::clamp(w, -v, v)
                    : 0.0;
     }
 
-    void carry() noexcept {
-        const double before = position_;
+    // Keeps the speed of the input for the cycle after load, as far as a stop from it fits between
+    // min and max. A step has no speed.
+    void carry(double a, double input_speed) noexcept {
         position_ = std::clamp(input_, low_now_, high_);
         rest_ = 0.0;
-        speed_ = carried_ ? position_ - before : 0.0;  // its initial jump does not count as speed
         arrived_ = true;
+        speed_ = 0.0;
+        if (position_ == input_ && a > 1.0 / max_magnitude) {
+            speed_ = std::clamp(input_speed, stopping_speed(low_now_ - position_, a, 1.0),
+                                stopping_speed(high_ - position_, a, 1.0));
+        }
     }
 
     void stand() noexcept {
@@ -233,7 +240,6 @@ private:
     double high_ = 0.0;
     double low_now_ = 0.0;  // max; the lower of min and max
     bool arrived_ = true;  // out is on its goal
-    bool carried_ = false;  // by load, in the last cycle
     hal::Retained retained_{*this,
                             {{"position", position_},
                              {"rest", rest_},
@@ -242,8 +248,7 @@ private:
                              {"speed-in", speed_in_},
                              {"high", high_},
                              {"low-now", low_now_},
-                             {"arrived", arrived_},
-                             {"carried", carried_}}};
+                             {"arrived", arrived_}}};
 };
 
 }  // namespace
@@ -265,7 +270,8 @@ positive, `out` does not move. If `min` is above `max`, `max` applies.
 (LinuxCNC halves the remaining distance in each of about 30 last cycles), respects `min` and `max` also with the default `maxv` and
 `maxa` (LinuxCNC exceeds them), leaves `min` and `max` together with the input (LinuxCNC a few cycles earlier,
 to match its speed), brakes towards an input that approaches faster than `maxv` (LinuxCNC reverses), and
-leaves `load` with the speed of the input and within `maxa` (LinuxCNC within `maxv` only).
+leaves `load` within `maxa`, with the speed of the input as far as `maxv`, and a stop within `min` and `max`, allow
+it (LinuxCNC within `maxv` only).
 
     loadrt limit3 names=jog
     addf jog servo

@@ -363,7 +363,7 @@ def limit3_rows():
         "load in motion",
         dict(maxv=12, maxa=200),
         {"in": sine(3, 1000), "load": [not on for on in flag(200, 2, 1)]},
-        "leaving load: ours keeps the input's speed, LinuxCNC's is within maxv at once",
+        "leaving load: ours keeps the input's speed up to maxv, LinuxCNC's is within maxv at once",
         N,
         0.18,
     )

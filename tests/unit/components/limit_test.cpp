@@ -337,6 +337,65 @@ TEST(Limit3, Leaves_load_with_the_speed_at_which_it_was_carried) {
     }
 }
 
+TEST(Limit3, A_step_of_the_input_under_load_is_not_taken_for_its_speed) {
+    for (const int loaded : {1, 2, 3}) {
+        Instance limit("limit3");
+        limit.set("maxv", 50.0);
+        limit.set("maxa", 400.0);
+        limit.set("load", true);
+        for (int cycle = 1; cycle < loaded; ++cycle) {
+            after(limit, 0.0);
+        }
+        EXPECT_EQ(after(limit, 10.0), 10.0);
+        limit.set("load", false);
+        for (int cycle = 0; cycle < 1000; ++cycle) {
+            ASSERT_EQ(after(limit, 10.0), 10.0) << loaded << " cycle " << cycle;
+        }
+    }
+}
+
+TEST(Limit3, The_speed_after_load_keeps_maxv_and_stops_before_min_and_max) {
+    // the input moves up or down by 50 per second under load and stops with it
+    for (const double maxv : {20.0, 50.0, 100.0}) {
+        for (const double direction : {-1.0, 1.0}) {
+            for (const double limit_at : {0.995, 1.1, 3.0, 100.0}) {
+                Instance limit("limit3");
+                limit.set("maxv", maxv);
+                limit.set("maxa", 400.0);
+                limit.set("min", direction < 0.0 ? -limit_at : -200.0);
+                limit.set("max", direction > 0.0 ? limit_at : 200.0);
+                limit.set("load", true);
+                double in = 0.0;
+                for (int cycle = 0; cycle < 20; ++cycle) {
+                    in += direction * 50e-3;
+                    after(limit, in);
+                }
+                limit.set("load", false);
+                double before = limit.get<double>("out");
+                for (int cycle = 0; cycle < 2000; ++cycle) {
+                    const double out = after(limit, in);
+                    ASSERT_LE(direction * out, limit_at + 1e-12) << maxv << " cycle " << cycle;
+                    ASSERT_LE(std::fabs(out - before), maxv * 1e-3 + 1e-12) << cycle;
+                    before = out;
+                }
+                EXPECT_EQ(before, std::clamp(in, -limit_at, limit_at));
+            }
+        }
+    }
+}
+
+TEST(Limit3, Load_without_acceleration_leaves_without_speed) {
+    Instance limit("limit3");
+    limit.set("maxa", 0.0);
+    limit.set("load", true);
+    for (int cycle = 0; cycle < 10; ++cycle) {
+        EXPECT_EQ(after(limit, 0.01 * cycle), 0.01 * cycle);
+    }
+    limit.set("load", false);
+    limit.set("maxa", 1.0);
+    EXPECT_NEAR(after(limit, 0.09), 0.09, 2e-6);
+}
+
 TEST(Limit3, Goes_on_to_the_last_good_target_while_the_input_is_not_a_number) {
     Instance limit("limit3");
     limit.set("maxa", 1.0);
