@@ -105,8 +105,8 @@ def samples(row, first, folder, tag):
     if done.returncode != 0 or not csv.exists():
         return (done.stdout.strip().splitlines() or ["no output"])[0]
     number = {"TRUE": 1.0, "FALSE": 0.0}
-    return [
-        [number.get(v) if v in number else float(v) for v in line.split(",")]
+    return [  # without the time
+        [number.get(v) if v in number else float(v) for v in line.split(",")[1:]]
         for line in csv.read_text().splitlines()[1:]
     ]
 
