@@ -20,6 +20,7 @@ public:
     struct Feedback {
         bool is_online = false;
         bool has_speed = false;  ///< the actual speed has been read
+        bool is_current = false;  ///< and that was not long ago
         double speed_rpm = 0.0;  ///< without sign
         bool has_running = false;  ///< `is_running` has been read
         bool is_running = false;
@@ -28,7 +29,8 @@ public:
     struct Outputs {
         std::uint32_t command = drive_stop;
         double speed_rpm = 0.0;  ///< without sign
-        bool at_speed = false;
+        bool at_speed =
+            false;  ///< it turns as the inputs command, which a stopped drive never does
         bool fault = false;
         bool stalled = false;
         bool running = false;
@@ -66,11 +68,11 @@ public:
         out.speed_rpm = direction_ == drive_stop ? 0.0 : std::fmin(std::fabs(speed_), max_speed_);
         out.fault = feedback.is_faulty;
         out.running = feedback.has_running ? feedback.is_running : feedback.speed_rpm > 0.0;
-        out.speed_feedback_rpm = turns_back_ ? -feedback.speed_rpm : feedback.speed_rpm;
+        out.speed_feedback_rpm = turns_back_ ? 0.0 - feedback.speed_rpm : feedback.speed_rpm;
+        const bool turns_as_commanded = direction_ != drive_stop && direction_ == wanted_;
         const double error = std::fabs(feedback.speed_rpm - out.speed_rpm);
-        const double allowed = tolerance_ * (out.speed_rpm > 0.0 ? out.speed_rpm : max_speed_);
-        const bool is_commanded = direction_ == wanted_;
-        out.at_speed = feedback.is_online && is_commanded && error <= allowed;
+        out.at_speed =
+            turns_as_commanded && feedback.is_current && error <= tolerance_ * out.speed_rpm;
         out.stalled = stalls(out.speed_rpm, feedback, now_ns);
         return out;
     }

@@ -25,7 +25,7 @@ struct DrivePins {
           speed_fb(c, receive, (slave + ".speed-fb").c_str(), "actual speed",
                    {.unit = "rpm", .safe = 0.0}),
           at_speed(c, receive, (slave + ".at-speed").c_str(),
-                   "the drive turns with the commanded speed", {.safe = false}),
+                   "run is TRUE, and the drive turns with the commanded speed", {.safe = false}),
           running(c, receive, (slave + ".running").c_str(), "the drive runs", {.safe = false}),
           fault(c, receive, (slave + ".fault").c_str(), "the drive has tripped or is offline"),
           load(c, receive, (slave + ".load").c_str(), "load of the drive; 0: not read",
@@ -209,6 +209,7 @@ private:
         case Purpose::speed:
             speed_ = n;
             speed_telegram_ = planned.telegram;
+            max_speed_age_ns_ = 1'000'000'000 + 3 * v.period_ns;
             return;
         case Purpose::load: load_ = n; return;
         case Purpose::running: running_ = n; return;
@@ -267,7 +268,10 @@ private:
     bool command(const Image& image, std::int64_t now_ns, bool may_run) noexcept {
         DriveAxis::Feedback feedback;
         feedback.is_online = is_online_ && may_run;
-        feedback.has_speed = speed_ != no_value && image.stamp(speed_telegram_) != 0;
+        const std::int64_t read_at_ns =
+            speed_ == no_value ? 0 : image.stamp(speed_telegram_).load(std::memory_order_relaxed);
+        feedback.has_speed = read_at_ns != 0;
+        feedback.is_current = feedback.has_speed && now_ns - read_at_ns <= max_speed_age_ns_;
         feedback.speed_rpm = number(image, speed_);
         feedback.has_running = running_ != no_value;
         feedback.is_running = bit(image, running_);
@@ -307,6 +311,7 @@ private:
     std::uint32_t running_ = no_value;
     std::uint32_t fault_ = no_value;
     std::uint32_t speed_telegram_ = 0;
+    std::int64_t max_speed_age_ns_ = 0;  // of which `at-speed` is still TRUE
     bool is_online_ = false;
     std::uint32_t activity_ = 0;
 };
