@@ -86,7 +86,8 @@ const bus::KeyTable<Slave>& slave_keys() {
         {"stop", "writes: `holding 0x2000 1, coil 3 0`", "that of the profile",
          "The stop telegrams, in their order; `none`: none."},
         {"stop-attempts", bus::number(&Slave::stop_attempts, 1, 1000), "`5`",
-         "How often a stop telegram is sent until the slave acknowledges it."},
+         "How often a stop telegram is sent, with nothing else on the line, until the slave "
+         "acknowledges it."},
         {"read NAME", "`TABLE ADDRESS [TYPE] [OPTION…]`", "",
          "A value that becomes an output pin."},
         {"write NAME", "`TABLE ADDRESS [TYPE] [OPTION…]`", "",

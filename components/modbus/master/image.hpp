@@ -56,6 +56,7 @@ struct SlaveImage {
     std::atomic<std::uint32_t> activity{0};  ///< counts what may change a pin of the slave
     std::atomic<std::uint32_t> online{0};
     std::atomic<std::uint32_t> stopped{0};  ///< the stop telegrams are acknowledged
+    std::atomic<std::uint32_t> stop_pending{0};  ///< they are requested and not acknowledged
     std::atomic<std::uint32_t> timeouts{0};
     std::atomic<std::uint32_t> errors{0};  ///< corrupt answers
     std::atomic<std::uint32_t> exceptions{0};

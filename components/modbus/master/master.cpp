@@ -18,6 +18,7 @@ constexpr std::int64_t verify_ns = 3'000 * millisecond;
 constexpr std::int64_t exception_pause_ns = 1'000 * millisecond;
 constexpr std::int64_t poll_ns = millisecond;  // of set-points and stop requests
 constexpr std::int64_t probe_share = 20;       // 1/20 of the line: 5 %
+constexpr std::int64_t stop_share = 4;         // 1/4
 
 Function read_function(Table table) noexcept {
     switch (table) {
@@ -107,11 +108,9 @@ void Master::stop(StopReason reason, std::int64_t now_ns) noexcept {
     stop_at_ns_ = now_ns;
     stop_turn_ = 0;
     image_.header().phase.store(static_cast<std::uint32_t>(Phase::stopping));
-    for (std::size_t n = 0; n < slaves_.size(); ++n) {
-        slaves_[n].stop_next = 0;
-        slaves_[n].stop_attempts = 0;
-        image_.slave(n).stopped.store(0, std::memory_order_relaxed);
-        touch(n);
+    for (std::uint32_t n = 0; n < slaves_.size(); ++n) {
+        slaves_[n].is_stop_reported = false;
+        set_stop(n, bus_.slaves[n].stop.empty() ? StopState::none : StopState::sending, now_ns);
     }
     if (has_job_ && job_.telegram != stop_job && !waits_) {
         end_of_job();
@@ -126,9 +125,10 @@ void Master::release() noexcept {
     for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
         telegrams_[n].is_sent = false;
     }
-    for (std::size_t n = 0; n < slaves_.size(); ++n) {
-        image_.slave(n).stopped.store(0, std::memory_order_relaxed);
-        touch(n);
+    for (std::uint32_t n = 0; n < slaves_.size(); ++n) {
+        if (slaves_[n].stop == StopState::acknowledged) {
+            set_stop(n, StopState::none, 0);
+        }
     }
 }
 
@@ -167,6 +167,9 @@ bool Master::follow_line(std::int64_t now_ns) noexcept {
     }
     for (TelegramState& state : telegrams_) {
         state.is_sent = false;
+    }
+    for (std::uint32_t n = 0; n < slaves_.size() && is_open; ++n) {
+        repeat_stop(n, now_ns);
     }
     return is_open;
 }
@@ -240,31 +243,19 @@ bool Master::accept(const Found& found, std::int64_t now_ns) noexcept {
 }
 
 void Master::succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept {
-    SlaveState& state = slaves_[job_.slave];
     waits_ = false;
     free_at_ns_ = now_ns + silence_ns_;
     ImageHeader& header = image_.header();
     header.telegrams.fetch_add(1, std::memory_order_relaxed);
     header.busy_ns.fetch_add(now_ns - sent_at_ns_ + silence_ns_, std::memory_order_relaxed);
-    answered(state, job_.slave);
+    answered(job_.slave, now_ns);
     if (++job_.next < job_.count) {
-        if (stopping_ && job_.telegram != stop_job) {
+        if (held_ && job_.telegram != stop_job) {
             end_of_job();  // the rest of a command must not come behind the stop
         }
         return;
     }
-    if (job_.telegram == stop_job) {
-        const Slave& slave = bus_.slaves[job_.slave];
-        state.stop_attempts = 0;
-        if (++state.stop_next == slave.stop.size()) {
-            image_.slave(job_.slave).stopped.store(1, std::memory_order_relaxed);
-            touch(job_.slave);
-            image_.tell({Event::stop_acknowledged, job_.slave, 0, now_ns - stop_at_ns_});
-        }
-        end_of_job();
-        finish_stop(now_ns);
-        return;
-    }
+    if (job_.telegram == stop_job) return acknowledge_stop_telegram(now_ns);
     const Telegram& t = plan_.telegrams[job_.telegram];
     TelegramState& own = telegrams_[job_.telegram];
     if (t.kind == Telegram::Kind::read) {
@@ -297,7 +288,8 @@ void Master::store(const Telegram& t, std::span<const std::uint8_t> data) noexce
     }
 }
 
-void Master::answered(SlaveState& state, std::uint32_t slave) noexcept {
+void Master::answered(std::uint32_t slave, std::int64_t now_ns) noexcept {
+    SlaveState& state = slaves_[slave];
     const bool returns = !state.is_known || state.is_offline;
     state.failures = 0;
     state.is_offline = false;
@@ -312,6 +304,7 @@ void Master::answered(SlaveState& state, std::uint32_t slave) noexcept {
             telegrams_[n].is_sent = false;
         }
     }
+    repeat_stop(slave, now_ns);
 }
 
 void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexcept {
@@ -327,7 +320,7 @@ void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexc
     if (is_answer) {
         own.exceptions.fetch_add(1, std::memory_order_relaxed);
         touch(job_.slave);
-        answered(state, job_.slave);
+        answered(job_.slave, now_ns);
         reject(code, now_ns);
         return;
     }
@@ -352,7 +345,7 @@ void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexc
         image_.tell({Event::slave_offline, job_.slave, 0, 0});
     }
     touch(job_.slave);
-    if (job_.telegram == stop_job) return fail_stop(now_ns);
+    if (job_.telegram == stop_job) return fail_stop(failure, now_ns);
     telegrams_[job_.telegram].due_ns =
         now_ns + (plan_.telegrams[job_.telegram].kind == Telegram::Kind::read
                       ? plan_.telegrams[job_.telegram].period_ns
@@ -364,7 +357,7 @@ void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexc
 void Master::reject(std::uint8_t code, std::int64_t now_ns) noexcept {
     if (job_.telegram == stop_job) {
         image_.tell({Event::exception, job_.slave, stop_job, code});
-        return fail_stop(now_ns);
+        return fail_stop(Failure::exception, now_ns);
     }
     is_verified_ = true;  // an exception is not an echo
     image_.tell({Event::exception, job_.slave, job_.telegram, code});
@@ -375,18 +368,86 @@ void Master::reject(std::uint8_t code, std::int64_t now_ns) noexcept {
     end_of_job();
 }
 
-void Master::fail_stop(std::int64_t now_ns) noexcept {
-    SlaveState& state = slaves_[job_.slave];
-    const Slave& slave = bus_.slaves[job_.slave];
-    end_of_job();
-    if (++state.stop_attempts < slave.stop_attempts) return;
+// --- The stop telegrams of a slave
+
+/// Begins with the first of them.
+void Master::set_stop(std::uint32_t slave, StopState to, std::int64_t now_ns) noexcept {
+    SlaveState& state = slaves_[slave];
+    state.stop = to;
+    state.stop_next = 0;
     state.stop_attempts = 0;
-    // the further telegrams of the list may still have an effect
-    if (++state.stop_next >= slave.stop.size()) {
-        image_.tell({Event::stop_unconfirmed, static_cast<std::uint32_t>(&state - slaves_.data()),
-                     0, now_ns - stop_at_ns_});
+    state.is_stop_partial = false;
+    state.stop_due_ns = now_ns;
+    SlaveImage& image = image_.slave(slave);
+    image.stopped.store(to == StopState::acknowledged ? 1 : 0, std::memory_order_relaxed);
+    image.stop_pending.store(state.has_pending_stop() ? 1 : 0, std::memory_order_relaxed);
+    touch(slave);
+}
+
+/// A slave that returns while the stop lasts may have been switched off and on: what it has
+/// acknowledged before does not count.
+void Master::repeat_stop(std::uint32_t slave, std::int64_t now_ns) noexcept {
+    SlaveState& state = slaves_[slave];
+    switch (state.stop) {
+    case StopState::none: break;
+    case StopState::sending:
+        state.is_stop_partial = state.is_stop_partial || state.stop_next != 0;
+        break;
+    case StopState::repeating:
+    case StopState::acknowledged: set_stop(slave, StopState::repeating, now_ns); break;
+    }
+}
+
+void Master::acknowledge_stop_telegram(std::int64_t now_ns) noexcept {
+    const std::uint32_t slave = job_.slave;
+    SlaveState& state = slaves_[slave];
+    const bool counts = state.has_pending_stop() && job_.stop_index == state.stop_next;
+    end_of_job();
+    if (!counts) return;  // of a stop before the last request
+    state.stop_attempts = 0;
+    if (++state.stop_next < bus_.slaves[slave].stop.size()) return;
+    if (state.is_stop_partial) {
+        report_unconfirmed(slave, now_ns);
+        set_stop(slave, StopState::repeating, now_ns + exception_pause_ns);
+    } else {
+        state.is_stop_reported = false;
+        set_stop(slave, held_ ? StopState::acknowledged : StopState::none, now_ns);
+        image_.tell({Event::stop_acknowledged, slave, 0, now_ns - stop_at_ns_});
     }
     finish_stop(now_ns);
+}
+
+void Master::fail_stop(Failure failure, std::int64_t now_ns) noexcept {
+    const std::uint32_t slave = job_.slave;
+    SlaveState& state = slaves_[slave];
+    end_of_job();
+    if (state.stop == StopState::sending) return use_attempt(slave, now_ns);
+    if (state.stop != StopState::repeating) return;
+    // after an exception the further telegrams of the list may still have an effect
+    const bool is_rejected = failure == Failure::exception;
+    state.is_stop_partial = true;
+    if (is_rejected && ++state.stop_next < bus_.slaves[slave].stop.size()) return;
+    report_unconfirmed(slave, now_ns);
+    set_stop(slave, StopState::repeating,
+             now_ns + (is_rejected ? exception_pause_ns : probe_pause_ns(slave)));
+}
+
+void Master::use_attempt(std::uint32_t slave, std::int64_t now_ns) noexcept {
+    SlaveState& state = slaves_[slave];
+    if (++state.stop_attempts < bus_.slaves[slave].stop_attempts) return;
+    state.stop_attempts = 0;
+    state.is_stop_partial = true;
+    // the further telegrams of the list may still have an effect
+    if (++state.stop_next < bus_.slaves[slave].stop.size()) return;
+    report_unconfirmed(slave, now_ns);
+    set_stop(slave, StopState::repeating, now_ns + probe_pause_ns(slave));
+    finish_stop(now_ns);
+}
+
+void Master::report_unconfirmed(std::uint32_t slave, std::int64_t now_ns) noexcept {
+    if (slaves_[slave].is_stop_reported) return;
+    slaves_[slave].is_stop_reported = true;
+    image_.tell({Event::stop_unconfirmed, slave, 0, now_ns - stop_at_ns_});
 }
 
 void Master::end_of_job() noexcept {
@@ -396,19 +457,16 @@ void Master::end_of_job() noexcept {
     job_.cells.clear();
 }
 
-/// Ends the stop when no slave has a stop telegram left, or the line is lost for a second.
+/// Ends Phase::stopping when each slave has acknowledged or its attempts are used up, or the line
+/// is lost for a second.
 void Master::finish_stop(std::int64_t now_ns) noexcept {
     if (!stopping_) return;
-    bool done = true;
-    for (std::size_t n = 0; n < slaves_.size(); ++n) {
-        done = done && slaves_[n].stop_next >= bus_.slaves[n].stop.size();
-    }
     const bool is_lost = !line_was_open_ && now_ns - stop_at_ns_ > 1'000 * millisecond;
-    if (!done && !is_lost) return;
-    for (std::uint32_t n = 0; n < slaves_.size() && !done; ++n) {
-        if (slaves_[n].stop_next < bus_.slaves[n].stop.size()) {
-            image_.tell({Event::stop_unconfirmed, n, 0, now_ns - stop_at_ns_});
-        }
+    for (std::uint32_t n = 0; n < slaves_.size(); ++n) {
+        if (slaves_[n].stop != StopState::sending) continue;
+        if (!is_lost) return;
+        report_unconfirmed(n, now_ns);
+        set_stop(n, StopState::repeating, now_ns);
     }
     stopping_ = false;
     image_.header().phase.store(static_cast<std::uint32_t>(Phase::stopped));
@@ -421,8 +479,16 @@ bool Master::may_write(std::int64_t now_ns) const noexcept {
            image_.header().outputs_valid.load(std::memory_order_acquire) != 0;
 }
 
+/// Returns whether a set-point may be sent to the slave of a telegram.
+bool Master::is_writable(std::uint32_t telegram) const noexcept {
+    const Telegram& t = plan_.telegrams[telegram];
+    const SlaveState& slave = slaves_[t.slave];
+    return t.kind != Telegram::Kind::read && !slave.is_offline && !slave.has_pending_stop();
+}
+
 bool Master::choose(std::int64_t now_ns) noexcept {
-    if (stopping_) return choose_stop(now_ns);
+    if (stopping_) return choose_stop();
+    if (choose_repeated_stop(now_ns)) return true;
     if (choose_set_point(now_ns)) {
         last_was_set_point_ = true;
         return true;
@@ -432,20 +498,37 @@ bool Master::choose(std::int64_t now_ns) noexcept {
 }
 
 /// One stop telegram of each slave in turn, so that a slave that is offline does not delay others.
-bool Master::choose_stop(std::int64_t) noexcept {
+bool Master::choose_stop() noexcept {
     const auto count = static_cast<std::uint32_t>(slaves_.size());
     for (std::uint32_t n = 0; n < count; ++n) {
         const std::uint32_t slave = (stop_turn_ + n) % count;
-        const auto& stops = bus_.slaves[slave].stop;
-        if (slaves_[slave].stop_next >= stops.size()) continue;
+        if (slaves_[slave].stop != StopState::sending) continue;
         stop_turn_ = slave + 1;
-        has_job_ = true;
-        job_.telegram = stop_job;
-        job_.slave = slave;
-        add_write(stops[slaves_[slave].stop_next]);
+        begin_stop(slave);
         return true;
     }
     return false;
+}
+
+/// A list that has begun goes on at once.
+bool Master::choose_repeated_stop(std::int64_t now_ns) noexcept {
+    for (std::uint32_t n = 0; n < slaves_.size(); ++n) {
+        const SlaveState& state = slaves_[n];
+        if (state.stop != StopState::repeating || state.is_offline) continue;
+        if (state.stop_next == 0 && now_ns < state.stop_due_ns) continue;
+        begin_stop(n);
+        return true;
+    }
+    return false;
+}
+
+void Master::begin_stop(std::uint32_t slave) noexcept {
+    end_of_job();
+    has_job_ = true;
+    job_.telegram = stop_job;
+    job_.slave = slave;
+    job_.stop_index = slaves_[slave].stop_next;
+    add_write(bus_.slaves[slave].stop[job_.stop_index]);
 }
 
 bool Master::choose_set_point(std::int64_t now_ns) noexcept {
@@ -462,9 +545,7 @@ bool Master::choose_set_point(std::int64_t now_ns) noexcept {
     // the one that was due first is first: no set-point starves another
     std::uint32_t best = UINT32_MAX;
     for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
-        const Telegram& t = plan_.telegrams[n];
-        if (t.kind == Telegram::Kind::read || slaves_[t.slave].is_offline) continue;
-        if (!has_changed(n)) continue;
+        if (!is_writable(n) || !has_changed(n)) continue;
         if (best == UINT32_MAX || telegrams_[n].due_ns < telegrams_[best].due_ns) {
             best = n;
         }
@@ -477,16 +558,39 @@ bool Master::choose_probe(std::int64_t now_ns) noexcept {
     const auto count = static_cast<std::uint32_t>(slaves_.size());
     for (std::uint32_t i = 0; i < count; ++i) {
         const std::uint32_t slave = (probe_next_ + i) % count;
-        if (!slaves_[slave].is_offline) continue;
-        for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
-            const Telegram& t = plan_.telegrams[n];
-            if (t.slave != slave || t.kind != Telegram::Kind::read || !begin(n, now_ns)) continue;
-            probe_next_ = slave + 1;
-            probe_at_ns_ = now_ns + probe_share * 2 * bus_.slaves[slave].timeout_ns;
+        if (!slaves_[slave].is_offline || !begin_probe(slave, now_ns)) continue;
+        probe_next_ = slave + 1;
+        probe_at_ns_ = now_ns + probe_pause_ns(slave);
+        return true;
+    }
+    return false;
+}
+
+/// A request to an offline slave: its stop telegrams, else a read, else what is written to it.
+bool Master::begin_probe(std::uint32_t slave, std::int64_t now_ns) noexcept {
+    if (slaves_[slave].stop == StopState::repeating) {
+        begin_stop(slave);
+        return true;
+    }
+    std::uint32_t write = UINT32_MAX;
+    for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
+        const Telegram& t = plan_.telegrams[n];
+        if (t.slave != slave) continue;
+        if (t.kind != Telegram::Kind::read) {
+            write = n;
+        } else if (begin(n, now_ns)) {
             return true;
         }
     }
-    return false;
+    if (write == UINT32_MAX || !may_write(now_ns)) return false;
+    telegrams_[write].is_sent = false;
+    return begin(write, now_ns);
+}
+
+/// The time after which the next request to an offline slave may follow one to this slave.
+std::int64_t Master::probe_pause_ns(std::uint32_t slave) const noexcept {
+    const bool stops = held_ && slaves_[slave].stop == StopState::repeating;
+    return (stops ? stop_share : probe_share) * 2 * bus_.slaves[slave].timeout_ns;
 }
 
 bool Master::choose_due(std::int64_t now_ns) noexcept {
@@ -494,7 +598,8 @@ bool Master::choose_due(std::int64_t now_ns) noexcept {
     for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
         const Telegram& t = plan_.telegrams[n];
         if (telegrams_[n].due_ns > now_ns || slaves_[t.slave].is_offline) continue;
-        if (t.kind != Telegram::Kind::read && !may_write(now_ns)) continue;
+        const bool is_read = t.kind == Telegram::Kind::read;
+        if (!is_read && !(is_writable(n) && may_write(now_ns))) continue;
         if (best == UINT32_MAX || telegrams_[n].due_ns < telegrams_[best].due_ns) {
             best = n;
         }
@@ -514,6 +619,11 @@ std::int64_t Master::next_due(std::int64_t now_ns) const noexcept {
             next = std::min(next, now_ns + poll_ns);
         } else if (!slaves_[t.slave].is_offline) {
             next = std::min(next, telegrams_[n].due_ns);
+        }
+    }
+    for (const SlaveState& state : slaves_) {
+        if (state.stop == StopState::repeating && !state.is_offline) {
+            next = std::min(next, state.stop_due_ns);
         }
     }
     return std::max(next, now_ns + 1);

@@ -6,10 +6,13 @@
 // Which telegram is next:
 //   1. stop telegrams, when a stop was requested: nothing else until they are acknowledged or their
 //      attempts are used up;
-//   2. set-points that have changed, so that one waits for at most the telegram that is on the line;
+//   2. the stop telegrams of a slave that did not acknowledge them, or returned while the stop
+//      lasts: nothing is written to it before. An offline slave gets them in place of 4;
+//   3. set-points that have changed, so that one waits for at most the telegram that is on the line;
 //      a read that is overdue for a whole period comes between two of them;
-//   3. a request to a slave that is offline, such that all of them use at most 5 % of the line;
-//   4. what is due, the earliest first.
+//   4. a request to a slave that is offline, such that all of them use at most 5 % of the line,
+//      25 % with stop telegrams while the stop lasts;
+//   5. what is due, the earliest first.
 #pragma once
 
 #include <array>
@@ -35,7 +38,8 @@ public:
     void stop(StopReason reason, std::int64_t now_ns) noexcept;
     /// Writes are allowed again. Everything is written anew.
     void release() noexcept;
-    /// Returns whether the stop telegrams of the last stop are acknowledged or given up.
+    /// Returns whether each stop telegram of the last stop is acknowledged or was sent as often as
+    /// its slave declares.
     bool is_stopped() const noexcept { return held_ && !stopping_; }
     bool is_held() const noexcept { return held_; }
 
@@ -43,13 +47,27 @@ private:
     static constexpr std::size_t max_requests = 10;
     static constexpr std::uint32_t stop_job = UINT32_MAX;
 
+    enum class StopState : std::uint8_t {
+        none,
+        sending,  ///< as often as the slave declares
+        repeating,  ///< those attempts are used up, or the slave returned: until acknowledged
+        acknowledged,  ///< until release()
+    };
     struct SlaveState {
         std::uint32_t failures = 0;  ///< in a row
         bool is_offline = false;
         bool is_known = false;  ///< an answer has arrived, or it was reported offline
         bool is_corrupt = false;  ///< reported
+        StopState stop = StopState::none;
         std::size_t stop_next = 0;  ///< the next stop telegram
         std::uint32_t stop_attempts = 0;
+        bool is_stop_partial = false;  ///< one before `stop_next` was not acknowledged
+        bool is_stop_reported = false;  ///< as not acknowledged
+        std::int64_t stop_due_ns = 0;  ///< when it is repeated
+
+        bool has_pending_stop() const noexcept {
+            return stop == StopState::sending || stop == StopState::repeating;
+        }
     };
     struct TelegramState {
         std::int64_t due_ns = 0;
@@ -60,6 +78,7 @@ private:
     struct Job {
         std::uint32_t telegram = 0;
         std::uint32_t slave = 0;
+        std::size_t stop_index = 0;  ///< of a stop telegram
         std::array<Pdu, max_requests> requests{};
         std::size_t count = 0;
         std::size_t next = 0;
@@ -81,9 +100,14 @@ private:
     void succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept;
     void store(const Telegram& t, std::span<const std::uint8_t> data) noexcept;
     void fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexcept;
-    void fail_stop(std::int64_t now_ns) noexcept;
+    void fail_stop(Failure failure, std::int64_t now_ns) noexcept;
+    void use_attempt(std::uint32_t slave, std::int64_t now_ns) noexcept;
+    void acknowledge_stop_telegram(std::int64_t now_ns) noexcept;
+    void set_stop(std::uint32_t slave, StopState to, std::int64_t now_ns) noexcept;
+    void repeat_stop(std::uint32_t slave, std::int64_t now_ns) noexcept;
+    void report_unconfirmed(std::uint32_t slave, std::int64_t now_ns) noexcept;
     void reject(std::uint8_t code, std::int64_t now_ns) noexcept;
-    void answered(SlaveState& state, std::uint32_t slave) noexcept;
+    void answered(std::uint32_t slave, std::int64_t now_ns) noexcept;
     void end_of_job() noexcept;
     /// The cycle looks at the slave again; behind the changes that it is to see.
     void touch(std::size_t slave) const noexcept {
@@ -92,13 +116,18 @@ private:
     }
 
     bool choose(std::int64_t now_ns) noexcept;
-    bool choose_stop(std::int64_t now_ns) noexcept;
+    bool choose_stop() noexcept;
+    bool choose_repeated_stop(std::int64_t now_ns) noexcept;
+    void begin_stop(std::uint32_t slave) noexcept;
     bool choose_set_point(std::int64_t now_ns) noexcept;
     bool choose_probe(std::int64_t now_ns) noexcept;
+    bool begin_probe(std::uint32_t slave, std::int64_t now_ns) noexcept;
+    std::int64_t probe_pause_ns(std::uint32_t slave) const noexcept;
     bool choose_due(std::int64_t now_ns) noexcept;
     bool begin(std::uint32_t telegram, std::int64_t now_ns) noexcept;
     bool has_changed(std::uint32_t telegram) const noexcept;
     bool may_write(std::int64_t now_ns) const noexcept;
+    bool is_writable(std::uint32_t telegram) const noexcept;
     std::int64_t next_due(std::int64_t now_ns) const noexcept;
     void send(std::int64_t now_ns) noexcept;
     void finish_stop(std::int64_t now_ns) noexcept;

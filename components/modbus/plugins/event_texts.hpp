@@ -24,7 +24,7 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
      "{link} is lost[; it is opened again as soon as possible]"},
     {Event::line_open, bus::Effect::ends, "{link} is open again"},
     {Event::stopping, bus::Effect::none, "sends the stop telegrams: {reason}"},
-    {Event::stop_acknowledged, bus::Effect::none,
+    {Event::stop_acknowledged, bus::Effect::ends,
      "{slave} acknowledged its stop telegrams after {time}"},
     {Event::stop_unconfirmed, bus::Effect::raises,
      "{slave} did not acknowledge its stop telegrams[; stop it by other means]"},

@@ -31,6 +31,7 @@ struct Modbus : hal::bus::BusComponent {
         for (std::size_t n = 0; n < bus.slaves.size(); ++n) {
             slaves_.emplace_back(*this, receive_, transmit_, bus, arguments_.plan, n, set_points_);
             faults_of_slaves_.emplace_back();
+            stop_faults_of_slaves_.emplace_back();
         }
     }
 
@@ -244,6 +245,8 @@ private:
         case Event::line_lost:
         case Event::line_open: return line_fault_;
         case Event::guardian_lost: return guardian_fault_;
+        case Event::stop_acknowledged:
+        case Event::stop_unconfirmed: return stop_faults_of_slaves_[record.slave];
         default: return faults_of_slaves_[record.slave];
         }
     }
@@ -314,8 +317,10 @@ private:
     hal::Emergency emergency_{*this, &Modbus::make_safe,
                               "sends the stop telegrams, and nothing else until the thread runs"};
 
-    hal::In<bool> estop{*this, transmit_, "estop",
-                        "TRUE: the stop telegrams are sent, and nothing is written"};
+    hal::In<bool> estop{
+        *this, transmit_, "estop",
+        "TRUE: the stop telegrams are sent until they are acknowledged, and nothing "
+        "else is written"};
     hal::Out<bool> online{*this, receive_, "online", "all slaves answer", {.safe = false}};
     hal::Out<bool> fault{*this, receive_, "fault",
                          "a slave is offline, or the line or the guardian is lost"};
@@ -329,7 +334,7 @@ private:
     std::unique_ptr<hal::Reporter<EventRecord>> reporter_;
     SetPointPins set_points_;
     std::deque<SlavePins> slaves_;
-    std::deque<hal::LastingFault> faults_of_slaves_;
+    std::deque<hal::LastingFault> faults_of_slaves_, stop_faults_of_slaves_;
     hal::LastingFault line_fault_, guardian_fault_;
     std::string previous_report_;
 
@@ -387,7 +392,7 @@ is how old the values of a slave are. Set-points that have changed are sent firs
 most 5 % of the line.
 
 A drive that is online starts with a rising edge of `run`, once its speed has been read. After a stop, a lost slave or an e-stop it needs another edge. The stop telegrams
-are sent when `estop` is TRUE, when the thread is stopped or hangs, on `unloadrt`, and when the process ends, however that happens.
+are sent when `estop` is TRUE, until they are acknowledged, when the thread is stopped or hangs, on `unloadrt`, and when the process ends, however that happens.
 
 `docs/modbus.md` has the keys of the configuration and the table of profiles. `hal modbus plan FILE` shows the telegrams; `hal modbus scan`, `read`
 and `write` talk to slaves by hand; `hal node modbus FILE` emulates the slaves of a file.

@@ -267,7 +267,9 @@ private:
 
     bool command(const Image& image, std::int64_t now_ns, bool may_run) noexcept {
         DriveAxis::Feedback feedback;
-        feedback.is_online = is_online_ && may_run;
+        SlaveImage& slave = image.slave(index_);
+        const bool is_stopping = slave.stop_pending.load(std::memory_order_relaxed) != 0;
+        feedback.is_online = is_online_ && may_run && !is_stopping;
         const std::int64_t read_at_ns =
             speed_ == no_value ? 0 : image.stamp(speed_telegram_).load(std::memory_order_relaxed);
         feedback.has_speed = read_at_ns != 0;
@@ -278,7 +280,6 @@ private:
         feedback.is_faulty = bit(image, fault_);
         const DriveAxis::Outputs out =
             axis_->step({drive_->run, drive_->speed_cmd, drive_->reset}, feedback, now_ns);
-        SlaveImage& slave = image.slave(index_);
         slave.speed.store(std::bit_cast<std::uint64_t>(out.speed_rpm), std::memory_order_relaxed);
         slave.command.store(out.command, std::memory_order_relaxed);
         shown_ = out;

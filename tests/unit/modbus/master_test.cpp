@@ -255,6 +255,182 @@ TEST(Master, Stop_of_one_slave_does_not_wait_for_another_that_is_dead) {
     EXPECT_EQ(w.image.slave(0).stopped.load(), 0U);
 }
 
+/// A slave with a set-point in register 51, of which register 50 is 7 when it is stopped.
+struct Stop : testing::Test {
+    void start() {
+        w.image.value(w.value("c")).store(9);
+        w.run(second);
+        ASSERT_EQ(get(51), 9);
+        set(50, 1);
+    }
+    void stop() {
+        w.image.header().stop_held.store(1);
+        w.image.stop(StopReason::estop);
+    }
+    void release() { w.image.header().stop_held.store(0); }
+    void fail(FaultKind kind) {
+        SlaveFault fault;
+        fault.kind = kind;
+        w.slaves->faults().push_back(fault);
+    }
+    void recover() { w.slaves->faults().clear(); }
+    int get(std::uint16_t address) {
+        return w.slaves->slaves()[0].get(Table::holding, address).value_or(-1);
+    }
+    void set(int address, double value) {
+        EXPECT_TRUE(w.slaves->slaves()[0].set("r" + std::to_string(address), value));
+    }
+    bool is_stopped() const { return w.image.slave(0).stopped.load() != 0; }
+    std::vector<Event> events() const {
+        std::vector<Event> all;
+        for (EventRecord record; w.image.pop(record);) {
+            all.push_back(record.event);
+        }
+        return all;
+    }
+
+    static constexpr const char* slave =
+        "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\ntimeout = 50ms\nread a = holding 0\n";
+    World w{std::string(slave) + "write c = holding 51\nstop = holding 50 7\n",
+            std::string(slave) + "read r50 = holding 50\nread r51 = holding 51\n"};
+};
+
+TEST_F(Stop, Is_repeated_until_a_slave_that_was_not_responding_acknowledges) {
+    start();
+    fail(FaultKind::silence);
+    stop();
+    w.run(4 * second);
+    EXPECT_FALSE(is_stopped());
+    events();
+    set(50, 1);  // whatever it has received before
+    recover();
+    w.run(second);
+    EXPECT_EQ(get(50), 7);
+    EXPECT_TRUE(is_stopped());
+    EXPECT_EQ(events(), (std::vector{Event::slave_online, Event::stop_acknowledged}));
+    set(50, 1);
+    w.run(5 * second);
+    EXPECT_EQ(get(50), 1) << "it was acknowledged once";
+}
+
+TEST_F(Stop, Is_repeated_until_a_slave_that_rejected_it_acknowledges) {
+    start();
+    fail(FaultKind::exception);
+    stop();
+    w.run(4 * second);
+    EXPECT_FALSE(is_stopped());
+    set(50, 1);
+    recover();
+    w.run(2 * second);
+    EXPECT_EQ(get(50), 7);
+    EXPECT_TRUE(is_stopped());
+    release();
+    w.run(second);
+    EXPECT_FALSE(is_stopped());
+    EXPECT_EQ(w.image.slave(0).stop_pending.load(), 0U);
+}
+
+TEST_F(Stop, Comes_before_the_set_points_also_when_the_cause_has_ended) {
+    start();
+    fail(FaultKind::silence);
+    stop();
+    w.run(2 * second);
+    release();
+    w.run(2 * second);
+    EXPECT_EQ(w.image.slave(0).stop_pending.load(), 1U);
+    set(50, 1);
+    set(51, 0);
+    recover();
+    for (int n = 0; n < 6000 && get(51) == 0; ++n) {
+        w.run(ms);
+    }
+    EXPECT_EQ(get(51), 9);
+    EXPECT_EQ(get(50), 7);
+    EXPECT_EQ(w.image.slave(0).stop_pending.load(), 0U);
+    EXPECT_FALSE(is_stopped()) << "it is written to again";
+}
+
+TEST_F(Stop, Is_sent_again_to_a_slave_that_returns_while_it_lasts) {
+    start();
+    stop();
+    w.run(second);
+    EXPECT_TRUE(is_stopped());
+    fail(FaultKind::silence);
+    w.run(2 * second);
+    set(50, 1);  // switched off and on
+    recover();
+    w.run(5 * second);
+    EXPECT_EQ(get(50), 7);
+    EXPECT_TRUE(is_stopped());
+}
+
+TEST_F(Stop, Is_not_repeated_to_a_slave_that_returns_later) {
+    start();
+    stop();
+    w.run(second);
+    release();
+    w.run(second);
+    fail(FaultKind::silence);
+    w.run(2 * second);
+    set(50, 1);
+    recover();
+    w.run(5 * second);
+    EXPECT_EQ(get(50), 1);
+    EXPECT_EQ(get(51), 9);
+}
+
+TEST(Master, Stop_with_a_rejected_telegram_is_not_acknowledged) {
+    const std::string bus = "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\nread a = holding 0\n";
+    World w(bus + "write c = holding 50\nstop = holding 500 1, holding 50 7\n",
+            bus + "write c = holding 50\n");
+    w.run(second);
+    w.image.header().stop_held.store(1);
+    w.image.stop(StopReason::estop);
+    w.run(3 * second);
+    EXPECT_EQ(w.slaves->slaves()[0].get(Table::holding, 50), 7) << "the further telegrams are sent";
+    EXPECT_EQ(w.image.slave(0).stopped.load(), 0U);
+    EXPECT_EQ(w.image.slave(0).stop_pending.load(), 1U);
+    const std::uint32_t before = w.image.slave(0).exceptions.load();
+    w.run(10 * second);
+    EXPECT_LE(w.image.slave(0).exceptions.load() - before, 12U);
+}
+
+TEST(Master, Stop_of_offline_slaves_leaves_three_quarters_of_the_line) {
+    World w(
+        "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 dead]\nwrite c = holding 50\n"
+        "stop = holding 50 7\n[slave 2 dead-too]\nwrite c = holding 50\nstop = holding 50 7\n"
+        "[slave 3 alive]\nread a = holding 0 every 50ms\n");
+    for (const int unit : {1, 2}) {
+        SlaveFault fault;
+        fault.unit = static_cast<std::uint8_t>(unit);
+        w.slaves->faults().push_back(fault);
+    }
+    w.run(2 * second);
+    w.image.header().stop_held.store(1);
+    w.image.stop(StopReason::estop);
+    w.run(4 * second);
+    const std::uint64_t before = w.image.header().telegrams.load();
+    const std::uint32_t timeouts = w.image.slave(0).timeouts.load();
+    w.run(20 * second);
+    EXPECT_GE(w.image.header().telegrams.load() - before, 300U);
+    EXPECT_GE(w.image.slave(0).timeouts.load() - timeouts, 10U);
+}
+
+TEST(Master, Slave_without_reads_returns) {
+    World w("[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\nwrite c = holding 50\n");
+    w.image.value(w.value("c")).store(9);
+    w.run(second);
+    EXPECT_EQ(w.image.slave(0).online.load(), 1U);
+    w.slaves->faults().push_back({});
+    w.run(10 * second);
+    EXPECT_EQ(w.image.slave(0).online.load(), 0U);
+    w.slaves->faults().clear();
+    w.image.value(w.value("c")).store(10);
+    w.run(10 * second);
+    EXPECT_EQ(w.image.slave(0).online.load(), 1U);
+    EXPECT_EQ(w.slaves->slaves()[0].get(Table::holding, 50), 10);
+}
+
 TEST(Master, Rejected_register_does_not_slow_down_the_others) {
     World w(
         "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\nmax-gap = 0\n"
