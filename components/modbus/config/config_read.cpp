@@ -75,7 +75,9 @@ const bus::KeyTable<Slave>& slave_keys() {
         {"every", bus::time(&Slave::period_ns, ms, 3600 * second), "`100ms`",
          "The period of values that are read, and of the drive."},
         {"lost", bus::number(&Slave::lost, 1, 100), "`3`",
-         "Failed requests in a row after which the slave is offline."},
+         "Failed requests in a row after which the slave is offline. A request that is rejected "
+         "this "
+         "often in a row is a fault."},
         {"max-registers", bus::number(&Slave::max_registers, 1, max_read_registers), "`125`",
          "The most registers in one telegram."},
         {"max-gap", bus::number(&Slave::max_gap, 0, 100), "`8`",

@@ -9,7 +9,7 @@ Image::Image(void* memory, const Bus& bus, const Plan& plan, bool fresh) {
     auto* const bytes = static_cast<std::byte*>(memory);
     const std::size_t slaves = bus.slaves.size();
     const std::size_t telegrams = plan.telegrams.size();
-    void* const at[] = {bytes, bytes + sizeof(ImageHeader), bytes + offset_stamps(slaves),
+    void* const at[] = {bytes, bytes + sizeof(ImageHeader), bytes + offset_telegrams(slaves),
                         bytes + offset_values(slaves, telegrams)};
     if (fresh) {
         new (at[0]) ImageHeader;
@@ -17,7 +17,7 @@ Image::Image(void* memory, const Bus& bus, const Plan& plan, bool fresh) {
             new (static_cast<SlaveImage*>(at[1]) + n) SlaveImage;
         }
         for (std::size_t n = 0; n < telegrams; ++n) {
-            new (static_cast<std::atomic<std::int64_t>*>(at[2]) + n) std::atomic<std::int64_t>(0);
+            new (static_cast<TelegramImage*>(at[2]) + n) TelegramImage;
         }
         for (std::size_t n = 0; n < plan.values.size(); ++n) {
             new (static_cast<std::atomic<std::uint64_t>*>(at[3]) + n) std::atomic<std::uint64_t>(0);
@@ -25,7 +25,7 @@ Image::Image(void* memory, const Bus& bus, const Plan& plan, bool fresh) {
     }
     header_ = static_cast<ImageHeader*>(at[0]);
     slaves_ = static_cast<SlaveImage*>(at[1]);
-    stamps_ = static_cast<std::atomic<std::int64_t>*>(at[2]);
+    telegrams_ = static_cast<TelegramImage*>(at[2]);
     values_ = static_cast<std::atomic<std::uint64_t>*>(at[3]);
 }
 

@@ -29,6 +29,8 @@ enum class Event : std::uint8_t {
     stop_unconfirmed,
     guardian_lost,
     previous_stop,  ///< value: what the guardian of the previous run did
+    slave_rejects,  ///< a telegram, as often in a row as a silent slave is asked
+    slave_accepts,  ///< all telegrams again
 };
 
 /// Why the drives are stopped.
@@ -63,6 +65,12 @@ struct SlaveImage {
     // written by the cycle
     std::atomic<std::uint32_t> command{0};  ///< DriveCommand
     std::atomic<std::uint64_t> speed{0};  ///< double, rpm
+};
+
+/// Written by the engine.
+struct TelegramImage {
+    std::atomic<std::int64_t> stamp{0};
+    std::atomic<std::uint32_t> rejected{0};
 };
 
 /// Command of a drive: direction, and bit 2 for a reset.
@@ -117,7 +125,11 @@ public:
     SlaveImage& slave(std::size_t n) const noexcept { return slaves_[n]; }
     /// When the last answer of a telegram arrived, in ns; 0: never.
     std::atomic<std::int64_t>& stamp(std::size_t telegram) const noexcept {
-        return stamps_[telegram];
+        return telegrams_[telegram].stamp;
+    }
+    /// Whether the slave rejects a telegram: what it reads is as old as that of an offline slave.
+    std::atomic<std::uint32_t>& rejected(std::size_t telegram) const noexcept {
+        return telegrams_[telegram].rejected;
     }
     /// The bits of a value: a double when it is scaled or a float, else a whole number.
     std::atomic<std::uint64_t>& value(std::size_t n) const noexcept { return values_[n]; }
@@ -148,16 +160,16 @@ public:
     }
 
 private:
-    static std::size_t offset_stamps(std::size_t slaves) {
+    static std::size_t offset_telegrams(std::size_t slaves) {
         return sizeof(ImageHeader) + slaves * sizeof(SlaveImage);
     }
     static std::size_t offset_values(std::size_t slaves, std::size_t telegrams) {
-        return offset_stamps(slaves) + telegrams * sizeof(std::atomic<std::int64_t>);
+        return offset_telegrams(slaves) + telegrams * sizeof(TelegramImage);
     }
 
     ImageHeader* header_ = nullptr;
     SlaveImage* slaves_ = nullptr;
-    std::atomic<std::int64_t>* stamps_ = nullptr;
+    TelegramImage* telegrams_ = nullptr;
     std::atomic<std::uint64_t>* values_ = nullptr;
 };
 

@@ -258,6 +258,7 @@ void Master::succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) no
     if (job_.telegram == stop_job) return acknowledge_stop_telegram(now_ns);
     const Telegram& t = plan_.telegrams[job_.telegram];
     TelegramState& own = telegrams_[job_.telegram];
+    clear_rejections(job_.telegram);
     if (t.kind == Telegram::Kind::read) {
         is_verified_ = true;
         store(t, data);
@@ -361,11 +362,37 @@ void Master::reject(std::uint8_t code, std::int64_t now_ns) noexcept {
     }
     is_verified_ = true;  // an exception is not an echo
     image_.tell({Event::exception, job_.slave, job_.telegram, code});
+    count_rejection(job_.telegram);
+    const Telegram& t = plan_.telegrams[job_.telegram];
     TelegramState& own = telegrams_[job_.telegram];
-    own.due_ns = now_ns + std::max(exception_pause_ns, plan_.telegrams[job_.telegram].period_ns);
+    const bool is_read = t.kind == Telegram::Kind::read;
+    const std::int64_t first_pause = is_read ? t.period_ns : bus_.slaves[t.slave].timeout_ns;
+    const bool is_rejected = image_.rejected(job_.telegram).load(std::memory_order_relaxed) != 0;
+    own.due_ns = now_ns + (is_rejected ? std::max(exception_pause_ns, t.period_ns) : first_pause);
     own.sent = job_.cells;  // is written again when it is due, not at once
-    own.is_sent = plan_.telegrams[job_.telegram].kind != Telegram::Kind::read;
+    own.is_sent = !is_read;
     end_of_job();
+}
+
+/// As many exceptions in a row as requests without an answer make a slave offline.
+void Master::count_rejection(std::uint32_t telegram) noexcept {
+    const std::uint32_t slave = plan_.telegrams[telegram].slave;
+    if (++telegrams_[telegram].rejections != bus_.slaves[slave].lost) return;
+    image_.rejected(telegram).store(1, std::memory_order_relaxed);
+    touch(slave);
+    if (slaves_[slave].rejected_telegrams++ == 0) {
+        image_.tell({Event::slave_rejects, slave, 0, 0});
+    }
+}
+
+void Master::clear_rejections(std::uint32_t telegram) noexcept {
+    telegrams_[telegram].rejections = 0;
+    if (image_.rejected(telegram).exchange(0, std::memory_order_relaxed) == 0) return;
+    const std::uint32_t slave = plan_.telegrams[telegram].slave;
+    touch(slave);
+    if (--slaves_[slave].rejected_telegrams == 0) {
+        image_.tell({Event::slave_accepts, slave, 0, 0});
+    }
 }
 
 // --- The stop telegrams of a slave

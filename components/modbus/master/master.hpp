@@ -58,6 +58,7 @@ private:
         bool is_offline = false;
         bool is_known = false;  ///< an answer has arrived, or it was reported offline
         bool is_corrupt = false;  ///< reported
+        std::uint32_t rejected_telegrams = 0;
         StopState stop = StopState::none;
         std::size_t stop_next = 0;  ///< the next stop telegram
         std::uint32_t stop_attempts = 0;
@@ -73,6 +74,7 @@ private:
         std::int64_t due_ns = 0;
         std::vector<std::uint64_t> sent;  ///< cells that the slave has acknowledged
         bool is_sent = false;  ///< `sent` is valid
+        std::uint32_t rejections = 0;  ///< in a row
     };
     /// The requests of a telegram, or a stop telegram, one after the other.
     struct Job {
@@ -107,6 +109,8 @@ private:
     void repeat_stop(std::uint32_t slave, std::int64_t now_ns) noexcept;
     void report_unconfirmed(std::uint32_t slave, std::int64_t now_ns) noexcept;
     void reject(std::uint8_t code, std::int64_t now_ns) noexcept;
+    void count_rejection(std::uint32_t telegram) noexcept;
+    void clear_rejections(std::uint32_t telegram) noexcept;
     void answered(std::uint32_t slave, std::int64_t now_ns) noexcept;
     void end_of_job() noexcept;
     /// The cycle looks at the slave again; behind the changes that it is to see.

@@ -32,6 +32,9 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
      "the guardian has ended; nothing is exchanged, and nothing stops the drives when this process "
      "ends[; type: unloadrt, loadrt]"},
     {Event::previous_stop, bus::Effect::none, "the guardian of the previous run: {report}"},
+    {Event::slave_rejects, bus::Effect::raises,
+     "{slave} rejects requests: their values are not read, or not written"},
+    {Event::slave_accepts, bus::Effect::ends, "{slave} accepts all requests again"},
 };
 static_assert(bus::in_order(event_rows));
 

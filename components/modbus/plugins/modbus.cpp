@@ -32,6 +32,7 @@ struct Modbus : hal::bus::BusComponent {
             slaves_.emplace_back(*this, receive_, transmit_, bus, arguments_.plan, n, set_points_);
             faults_of_slaves_.emplace_back();
             stop_faults_of_slaves_.emplace_back();
+            rejections_of_slaves_.emplace_back();
         }
     }
 
@@ -247,6 +248,8 @@ private:
         case Event::guardian_lost: return guardian_fault_;
         case Event::stop_acknowledged:
         case Event::stop_unconfirmed: return stop_faults_of_slaves_[record.slave];
+        case Event::slave_rejects:
+        case Event::slave_accepts: return rejections_of_slaves_[record.slave];
         default: return faults_of_slaves_[record.slave];
         }
     }
@@ -323,7 +326,8 @@ private:
         "else is written"};
     hal::Out<bool> online{*this, receive_, "online", "all slaves answer", {.safe = false}};
     hal::Out<bool> fault{*this, receive_, "fault",
-                         "a slave is offline, or the line or the guardian is lost"};
+                         "a slave is offline or rejects requests, or the line or the guardian is "
+                         "lost"};
     hal::Out<bool> guarded{*this, receive_, "guarded",
                            "a guardian sends the stop telegrams when this process ends"};
     hal::Out<double> load{*this, receive_, "load",
@@ -334,7 +338,7 @@ private:
     std::unique_ptr<hal::Reporter<EventRecord>> reporter_;
     SetPointPins set_points_;
     std::deque<SlavePins> slaves_;
-    std::deque<hal::LastingFault> faults_of_slaves_, stop_faults_of_slaves_;
+    std::deque<hal::LastingFault> faults_of_slaves_, stop_faults_of_slaves_, rejections_of_slaves_;
     hal::LastingFault line_fault_, guardian_fault_;
     std::string previous_report_;
 

@@ -27,7 +27,8 @@ struct DrivePins {
           at_speed(c, receive, (slave + ".at-speed").c_str(),
                    "run is TRUE, and the drive turns with the commanded speed", {.safe = false}),
           running(c, receive, (slave + ".running").c_str(), "the drive runs", {.safe = false}),
-          fault(c, receive, (slave + ".fault").c_str(), "the drive has tripped or is offline"),
+          fault(c, receive, (slave + ".fault").c_str(),
+                "the drive has tripped, is offline or rejects its telegrams"),
           load(c, receive, (slave + ".load").c_str(), "load of the drive; 0: not read",
                {.unit = "%"}),
           stalled(c, receive, (slave + ".stalled").c_str(), "commanded to turn, and does not",
@@ -118,6 +119,12 @@ public:
             }
             declare(c, receive, transmit, slave.name, planned, n, set_points);
         }
+        for (std::uint32_t n = 0; slave.drive && n < plan.telegrams.size(); ++n) {
+            if (plan.telegrams[n].slave == index &&
+                plan.telegrams[n].kind == Telegram::Kind::drive) {
+                drive_telegrams_.push_back(n);
+            }
+        }
         if (slave.drive) {
             drive_ = std::make_unique<DrivePins>(c, receive, transmit, slave.name);
             axis_.emplace(slave.drive->max_speed_rpm, slave.drive->tolerance,
@@ -159,12 +166,13 @@ public:
     /// Shows what the last command and the values mean. [realtime]
     void show_drive(const Image& image) noexcept {
         if (!drive_) return;
-        drive_->speed_fb = is_online_ ? shown_.speed_feedback_rpm : 0.0;
-        drive_->at_speed = is_online_ && shown_.at_speed;
-        drive_->running = is_online_ && shown_.running;
-        drive_->fault = !is_online_ || shown_.fault;
+        const bool works = is_online_ && !rejects_;
+        drive_->speed_fb = works ? shown_.speed_feedback_rpm : 0.0;
+        drive_->at_speed = works && shown_.at_speed;
+        drive_->running = works && shown_.running;
+        drive_->fault = !works || shown_.fault;
         drive_->stalled = shown_.stalled;
-        drive_->load = is_online_ ? number(image, load_) : 0.0;
+        drive_->load = works ? number(image, load_) : 0.0;
     }
 
 private:
@@ -204,6 +212,9 @@ private:
                  const std::string& slave, const PlannedValue& planned, std::uint32_t n,
                  SetPointPins& set_points) {
         const Value& v = *planned.value;
+        if (v.purpose != Purpose::pin) {
+            drive_telegrams_.push_back(planned.telegram);
+        }
         switch (v.purpose) {
         case Purpose::pin: break;
         case Purpose::speed:
@@ -244,12 +255,18 @@ private:
         exceptions_ = slave.exceptions.load(std::memory_order_relaxed);
         outputs_.each([&](auto& pin, const OutputData& data) {
             using T = std::remove_cvref_t<decltype(pin.get())>;
-            if (!is_online_ && data.has_safe) {
+            const bool is_lost =
+                !is_online_ || image.rejected(data.telegram).load(std::memory_order_relaxed) != 0;
+            if (is_lost && data.has_safe) {
                 pin = static_cast<T>(data.safe);
                 return;
             }
             if (image.stamp(data.telegram).load(std::memory_order_relaxed) == 0) return;
             pin = from_cell<T>(image.value(data.value).load(std::memory_order_relaxed));
+        });
+        rejects_ = std::any_of(drive_telegrams_.begin(), drive_telegrams_.end(),
+                               [&](std::uint32_t telegram) {
+            return image.rejected(telegram).load(std::memory_order_relaxed) != 0;
         });
         find_oldest(image);
     }
@@ -269,7 +286,7 @@ private:
         DriveAxis::Feedback feedback;
         SlaveImage& slave = image.slave(index_);
         const bool is_stopping = slave.stop_pending.load(std::memory_order_relaxed) != 0;
-        feedback.is_online = is_online_ && may_run && !is_stopping;
+        feedback.is_online = is_online_ && may_run && !is_stopping && !rejects_;
         const std::int64_t read_at_ns =
             speed_ == no_value ? 0 : image.stamp(speed_telegram_).load(std::memory_order_relaxed);
         feedback.has_speed = read_at_ns != 0;
@@ -305,6 +322,7 @@ private:
     hal::Out<bool> stopped_;
     hal::AnyOuts<OutputData> outputs_;
     std::vector<std::uint32_t> readings_;  // telegrams
+    std::vector<std::uint32_t> drive_telegrams_;
     std::optional<DriveAxis> axis_;
     DriveAxis::Outputs shown_;
     std::uint32_t speed_ = no_value;
@@ -314,6 +332,7 @@ private:
     std::uint32_t speed_telegram_ = 0;
     std::int64_t max_speed_age_ns_ = 0;  // of which `at-speed` is still TRUE
     bool is_online_ = false;
+    bool rejects_ = false;  // the telegrams of its drive
     std::uint32_t activity_ = 0;
 };
 

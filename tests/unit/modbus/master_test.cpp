@@ -441,7 +441,43 @@ TEST(Master, Rejected_register_does_not_slow_down_the_others) {
     EXPECT_EQ(w.number("good"), 5U);
     EXPECT_EQ(w.image.slave(0).online.load(), 1U);
     EXPECT_GE(w.image.slave(0).exceptions.load(), 3U);
-    EXPECT_LE(w.image.slave(0).exceptions.load(), 7U);
+    EXPECT_LE(w.image.slave(0).exceptions.load(), 8U);
+    EXPECT_EQ(w.image.rejected(0).load() + w.image.rejected(1).load(), 1U) << "the bad one";
+}
+
+TEST_F(Stop, Rejected_requests_are_reported_after_as_many_as_silence_until_they_are_accepted) {
+    start();
+    events();
+    fail(FaultKind::exception);
+    w.run(2 * second);
+    std::vector<Event> all = events();
+    EXPECT_EQ(std::count(all.begin(), all.end(), Event::slave_rejects), 1);
+    for (std::size_t n = 0; n < w.plan().telegrams.size(); ++n) {
+        EXPECT_EQ(w.image.rejected(n).load(), 1U) << n;
+    }
+    EXPECT_EQ(w.image.slave(0).online.load(), 1U);
+    recover();
+    w.run(2 * second);
+    all = events();
+    EXPECT_EQ(std::count(all.begin(), all.end(), Event::slave_accepts), 1);
+    for (std::size_t n = 0; n < w.plan().telegrams.size(); ++n) {
+        EXPECT_EQ(w.image.rejected(n).load(), 0U) << n;
+    }
+}
+
+TEST_F(Stop, A_request_that_is_rejected_once_is_repeated_and_not_a_fault) {
+    start();
+    events();
+    SlaveFault fault;
+    fault.kind = FaultKind::exception;
+    fault.every = 2;
+    w.slaves->faults().push_back(fault);
+    w.image.value(w.value("c")).store(11);
+    w.run(3 * second);
+    EXPECT_EQ(get(51), 11);
+    for (const Event event : events()) {
+        EXPECT_NE(event, Event::slave_rejects);
+    }
 }
 
 /// A two-wire adapter without receiver disable: what is sent is also received.
