@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <linux/serial.h>
 #include <stdlib.h>
+#include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <termios.h>
@@ -116,6 +117,15 @@ public:
     /// Opens the device. Returns the problem, or "".
     std::string open() {
         link::Descriptor fd(::open(device_.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+        is_in_use_ = !fd && errno == EBUSY;
+        // TIOCEXCL alone does not keep root out; the lock ends with the last copy of the descriptor
+        if (fd && flock(fd.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+            is_in_use_ = true;
+        }
+        if (is_in_use_) {
+            return "another program uses '" + device_ +
+                   "'; a line has one owner: stop the other machine or command";
+        }
         if (!fd) {
             return "cannot open '" + device_ + "': " + link::reason();
         }
@@ -129,6 +139,7 @@ public:
         fd_ = std::move(fd);
         return {};
     }
+    bool is_in_use() const noexcept { return is_in_use_; }
     bool is_open(std::int64_t now_ns) noexcept override {
         if (!fd_ && now_ns >= retry_at_) {
             retry_at_ = now_ns + reopen_ns;
@@ -147,6 +158,7 @@ private:
     }
 
     const std::string device_;
+    bool is_in_use_ = false;
     std::int64_t retry_at_ = 0;
 };
 
@@ -202,8 +214,9 @@ Description terminal(const char* driver, const std::string& target, const char* 
 
 Opened open(const std::string& target, const Options& options) {
     auto line = std::make_unique<SerialLine>(target, describe(target), options);
-    if (std::string problem = line->open(); !problem.empty()) return {nullptr, problem};
-    return {std::move(line), {}};
+    std::string problem = line->open();
+    if (problem.empty()) return {std::move(line), {}};
+    return {nullptr, std::move(problem), line->is_in_use()};
 }
 Description describe(const std::string& target) {
     return terminal("serial:", target, "serial line");

@@ -66,6 +66,7 @@ public:
 struct Opened {
     std::unique_ptr<Line> line;
     std::string problem;
+    bool is_in_use = false;  ///< the problem: another program has the line
     explicit operator bool() const noexcept { return line != nullptr; }
 };
 

@@ -247,6 +247,31 @@ class Guardian(Case):
         self.assertEqual("FALSE", self.value("modbus.0.spindle.online"))
         self.assertIn("guardian has ended", self.end(machine)[1])
 
+    def test_a_suspended_guardian_is_a_fault_and_continued(self):
+        machine = self.run_spindle()
+        guardian = self.children(machine.pid)[0]
+        os.kill(guardian, signal.SIGSTOP)
+        self.drive.registers[0x2103] = 0
+        self.comes("modbus.0.spindle.at-speed", "FALSE")
+        wait_until(lambda: self.value("modbus.0.guarded") == "TRUE", "it is continued")
+        wait_until(lambda: self.drive.registers[0x2000] == 1, "the drive needs another edge")
+        os.kill(guardian, signal.SIGSTOP)
+        out = self.end(machine)[1]  # continued for the stop telegrams
+        self.assertEqual(STOP, self.drive.writes[-1][1])
+        self.assertIn("the guardian stalls", out)
+        self.assertIn("the guardian runs again", out)
+
+    def test_a_line_in_use_is_not_opened(self):
+        machine = self.run_spindle()
+        self.assertIn(
+            "another program uses 'line'",
+            self.bad("modbus", "read", "serial:line?baud=115200", "1", "holding", "0x2103"),
+        )
+        self.assertIn("another program uses 'line'", self.bad("run", "--name", "two", "spindle.hal"))
+        self.assertEqual(RUN, self.drive.registers[0x2000])
+        self.assertEqual("0", self.value("modbus.0.spindle.timeouts"))
+        self.end(machine)
+
     @staticmethod
     def children(pid):
         found = []

@@ -157,8 +157,15 @@ bool GuardianProcess::has_ended_within(std::int64_t limit_ns) noexcept {
     return true;
 }
 
+void GuardianProcess::resume() const noexcept {
+    if (process_) {
+        syscall(SYS_pidfd_send_signal, process_.get(), SIGCONT, nullptr, 0);
+    }
+}
+
 bool GuardianProcess::end() noexcept {
     if (pid_ < 0) return true;
+    resume();
     image_.header().ending.store(1, std::memory_order_release);
     image_.stop(StopReason::unload);
     if (has_ended_within(end_ns)) return true;

@@ -46,8 +46,10 @@ public:
     /// Waits for its end, for at most `limit_ns`. Returns whether it has ended; called by a thread
     /// that may wait.
     bool has_ended_within(std::int64_t limit_ns) noexcept;
-    /// Requests the stop telegrams and the end, and waits for it. Returns false when it had to be
-    /// killed. [setup]
+    /// Continues a guardian that was suspended by a signal. [any]
+    void resume() const noexcept;
+    /// Continues it, requests the stop telegrams and the end, and waits for it. Returns false when
+    /// it had to be killed. [setup]
     bool end() noexcept;
 
 private:

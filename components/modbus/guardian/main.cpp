@@ -98,6 +98,7 @@ public:
         while (true) {
             const std::int64_t now = link::monotonic_ns();
             watch(now);
+            image_.header().turns.fetch_add(1, std::memory_order_relaxed);
             const std::int64_t next = master_.work(now);
             if (master_.is_stopped()) {
                 if (is_dead_ || image_.header().ending.load(std::memory_order_acquire) != 0) {
@@ -203,6 +204,17 @@ private:
     std::string text_;
 };
 
+/// The guardian of a machine that has just ended may still send its stop telegrams.
+line::Opened open_line(const char* address, const line::Options& options) {
+    const std::int64_t limit = link::monotonic_ns() + 2'000 * millisecond;
+    while (true) {
+        line::Opened opened = line::open(address, options);
+        if (opened || !opened.is_in_use || link::monotonic_ns() > limit) return opened;
+        const timespec pause = link::to_timespec(50 * millisecond);
+        nanosleep(&pause, nullptr);
+    }
+}
+
 /// Ends the start with a reason for the component.
 int reject(const Image& image, const std::string& problem) {
     ImageHeader& header = image.header();
@@ -237,7 +249,7 @@ int main(int argc, char** argv) {
                               guardian_memory_fd, 0);
     if (mapped == MAP_FAILED) return 1;
     const Image image(mapped, config.bus, plan, false);
-    auto opened = hal::line::open(argv[3], config.bus.line);
+    auto opened = open_line(argv[3], config.bus.line);
     if (!opened) return reject(image, opened.problem);
     be_resident();
     Guardian guardian(argv[1], argv[4], config.bus, plan, image, *opened.line, std::move(parent));

@@ -31,6 +31,9 @@ enum class Event : std::uint8_t {
     previous_stop,  ///< value: what the guardian of the previous run did
     slave_rejects,  ///< a telegram, as often in a row as a silent slave is asked
     slave_accepts,  ///< all telegrams again
+    guardian_stalls,
+    guardian_runs,  ///< again
+    guardian_killed,  ///< at the end of the component
 };
 
 /// Why the drives are stopped.
@@ -96,6 +99,7 @@ struct ImageHeader {
     std::atomic<std::uint32_t> ending{0};  ///< stop, then end
     // written by the engine
     std::atomic<std::uint32_t> phase{0};
+    std::atomic<std::uint64_t> turns{0};  ///< of the guardian; it waits for at most 5 ms in each
     std::atomic<std::uint32_t> event_head{0};
     std::atomic<std::uint32_t> events_lost{0};
     std::atomic<std::uint32_t> line_open{0};

@@ -35,6 +35,12 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
     {Event::slave_rejects, bus::Effect::raises,
      "{slave} rejects requests: their values are not read, or not written"},
     {Event::slave_accepts, bus::Effect::ends, "{slave} accepts all requests again"},
+    {Event::guardian_stalls, bus::Effect::raises,
+     "the guardian stalls; nothing is exchanged, and no stop telegram is sent[; stop the drives by "
+     "other means]"},
+    {Event::guardian_runs, bus::Effect::ends, "the guardian runs again"},
+    {Event::guardian_killed, bus::Effect::none,
+     "the guardian did not end within 15 s and was killed; stop the drives by other means"},
 };
 static_assert(bus::in_order(event_rows));
 

@@ -18,6 +18,7 @@ namespace {
 using namespace hal::modbus;
 
 constexpr std::int64_t millisecond = 1'000'000;
+constexpr std::int64_t stall_ns = 500 * millisecond;  // of the guardian, whose turns take 5 ms
 
 struct Modbus : hal::bus::BusComponent {
     explicit Modbus(const hal_host* host) : BusComponent(host, "modbus.0") {
@@ -52,6 +53,8 @@ struct Modbus : hal::bus::BusComponent {
         }
         begin_cycles();
         is_alive_.store(true);
+        guardian_stalls_.store(false);
+        guardian_silent_ns_ = 0;
         shown_ns_ = 0;
         reporter_->start();
         background_.start();
@@ -61,8 +64,8 @@ struct Modbus : hal::bus::BusComponent {
         if (local_) {
             stop_local();
         }
-        if (guardian_) {
-            guardian_->end();
+        if (guardian_ && !guardian_->end()) {
+            reporter_->tell({Event::guardian_killed, 0, 0, 0});
         }
         background_.stop();
         drain_events();
@@ -92,15 +95,13 @@ struct Modbus : hal::bus::BusComponent {
             image_.stop(StopReason::fault);
             header.outputs_valid.store(0, std::memory_order_release);
         }
-        const bool alive = is_alive_.load(std::memory_order_acquire);
         drain_events();
-        if (!alive && !guardian_fault_.lasts()) {
-            tell({Event::guardian_lost, 0, 0, 0});
-        }
+        const std::int64_t elapsed = now - shown_ns_;
+        watch_guardian(std::min(elapsed, 2 * cycle.period_ns()));
         // a thread that was stopped has written safe values to pins
-        const bool refresh = now - shown_ns_ > 3 * cycle.period_ns() / 2;
+        const bool refresh = elapsed > 3 * cycle.period_ns() / 2;
         shown_ns_ = now;
-        show(now, alive && !is_offline(turn), refresh);
+        show(now, exchanges() && !is_offline(turn), refresh);
     }
 
     void transmit(hal::Cycle cycle) noexcept {
@@ -108,7 +109,7 @@ struct Modbus : hal::bus::BusComponent {
         const std::int64_t now = cycle.start_ns();
         ImageHeader& header = image_.header();
         follow_estop();
-        const bool may_run = is_alive_.load(std::memory_order_relaxed) &&
+        const bool may_run = exchanges() &&
                              header.phase.load(std::memory_order_acquire) ==
                                  static_cast<std::uint32_t>(Phase::running) &&
                              header.stop_held.load(std::memory_order_relaxed) == 0;
@@ -129,6 +130,29 @@ struct Modbus : hal::bus::BusComponent {
     }
 
 private:
+    /// Returns whether the guardian, if there is one, exchanges telegrams. [realtime]
+    bool exchanges() const noexcept {
+        return is_alive_.load(std::memory_order_relaxed) &&
+               !guardian_stalls_.load(std::memory_order_relaxed);
+    }
+    /// `elapsed`: time since the last cycle, as far as this thread ran. [realtime]
+    void watch_guardian(std::int64_t elapsed_ns) noexcept {
+        if (!has_guardian_) return;
+        if (!is_alive_.load(std::memory_order_acquire)) {
+            if (!guardian_fault_.lasts()) {
+                tell({Event::guardian_lost, 0, 0, 0});
+            }
+            return;
+        }
+        const std::uint64_t turns = image_.header().turns.load(std::memory_order_relaxed);
+        guardian_silent_ns_ = turns == guardian_turns_ ? guardian_silent_ns_ + elapsed_ns : 0;
+        guardian_turns_ = turns;
+        const bool stalls = guardian_silent_ns_ > stall_ns;
+        if (guardian_stalls_.exchange(stalls, std::memory_order_relaxed) != stalls) {
+            tell({stalls ? Event::guardian_stalls : Event::guardian_runs, 0, 0, 0});
+        }
+    }
+
     static constexpr std::uint32_t bit_of(StopReason reason) {
         return std::uint32_t{1} << static_cast<std::uint32_t>(reason);
     }
@@ -205,6 +229,8 @@ private:
         } else if (guardian_ && is_alive_.load(std::memory_order_relaxed)) {
             if (guardian_->has_ended_within(may_wait ? 50 * millisecond : 0)) {
                 is_alive_.store(false, std::memory_order_release);
+            } else if (guardian_stalls_.load(std::memory_order_relaxed)) {
+                guardian_->resume();
             }
         } else if (may_wait) {
             const timespec pause{0, 50 * millisecond};
@@ -246,6 +272,8 @@ private:
         case Event::line_lost:
         case Event::line_open: return line_fault_;
         case Event::guardian_lost: return guardian_fault_;
+        case Event::guardian_stalls:
+        case Event::guardian_runs: return stall_fault_;
         case Event::stop_acknowledged:
         case Event::stop_unconfirmed: return stop_faults_of_slaves_[record.slave];
         case Event::slave_rejects:
@@ -339,7 +367,7 @@ private:
     SetPointPins set_points_;
     std::deque<SlavePins> slaves_;
     std::deque<hal::LastingFault> faults_of_slaves_, stop_faults_of_slaves_, rejections_of_slaves_;
-    hal::LastingFault line_fault_, guardian_fault_;
+    hal::LastingFault line_fault_, guardian_fault_, stall_fault_;
     std::string previous_report_;
 
     std::vector<std::byte> memory_;  // of the image of a local master
@@ -349,6 +377,9 @@ private:
     std::unique_ptr<GuardianProcess> guardian_;
     hal::Background background_{[this](std::int64_t now, bool may_wait) { turn(now, may_wait); }};
     std::atomic<bool> is_alive_{true};  // written by the background thread
+    std::atomic<bool> guardian_stalls_{false};  // written by the cycle
+    std::uint64_t guardian_turns_ = 0;
+    std::int64_t guardian_silent_ns_ = 0;
     bool is_virtual_ = false;
     bool has_guardian_ = false;
     bool was_estop_ = false;
