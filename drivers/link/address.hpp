@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <exception>
 #include <span>
 #include <string>
@@ -16,6 +17,10 @@ namespace hal::link {
 
 /// Returns the text in single quotes.
 inline std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
+
+/// A variable of the environment: while it is set, nothing is opened that other programs or devices
+/// see. `hal check --deterministic` sets it for its simulations.
+inline constexpr const char* links_inside = "HALCYON_LINKS_INSIDE";
 
 /// Prefix of the problem that `apply` below returns for an unknown key.
 inline constexpr std::string_view no_option = "unknown option ";
@@ -89,6 +94,14 @@ Opened open_address(std::string_view address, Options options,
     if (colon == address.npos || driver == drivers.end()) {
         return {nullptr, quoted(address) + " is not the address of " + std::string(kind) +
                              "; write " + address_forms(drivers)};
+    }
+
+    const bool is_carried =
+        driver->journal == Driver<Opened, Options, Description>::Journal::carrier;
+    if (driver->form.reach == Reach::bus && !is_carried && std::getenv(links_inside) != nullptr) {
+        return {nullptr, quoted(address) +
+                             " leads to other programs or devices, which a check "
+                             "must not operate; write sim:NAME"};
     }
 
     const auto target = address.substr(colon + 1);

@@ -57,6 +57,19 @@ class DeterministicCheck(Case):
         self.assertEqual(0, done.returncode, done.stdout + done.stderr)
         self.assertRegex(done.stdout, r"^two simulations are equal in \d{3,} values\n$")
 
+    def test_a_link_to_other_programs_is_not_opened(self):
+        text = (
+            "loadrt threads name1=servo period1=1000000\n"
+            "loadrt can_send link={} names=p id=0x10a fields=a:s32\naddf p.update servo\n"
+        )
+        netlist = self.write("a.hal", text.format("udp:127.0.0.1:43113"))
+        done = self.run_program("check", "--deterministic", "--for", "50ms", netlist)
+        self.assertEqual(1, done.returncode, done.stdout)
+        self.assertIn("'udp:127.0.0.1:43113' leads to other programs or devices", done.stderr)
+        netlist = self.write("a.hal", text.format("sim:inside"))
+        done = self.run_program("check", "--deterministic", "--for", "50ms", netlist)
+        self.assertEqual(0, done.returncode, done.stderr)
+
     def test_an_error_of_the_netlist_comes_first(self):
         netlist = self.write("a.hal", "loadrt nothing-like-this\n")
         done = self.run_program("check", "--deterministic", netlist)

@@ -165,6 +165,10 @@ class Modbus(Case):
         os.close(master)
         os.close(slave)
 
+    def test_a_simulation_does_not_open_a_real_line(self):
+        self.write("a.hal", "loadrt modbus config=bus.modbus link=tcp:127.0.0.1:1\n")
+        self.assertIn("'tcp:127.0.0.1:1' is a real line", self.bad("sim", "a.hal"))
+
     def spindle_is_stopped(self, node, link, number):
         """Runs the spindle on a line, ends the machine by a signal, and waits until the emulated drive stops."""
         self.node(node, "--verbose")

@@ -14,6 +14,7 @@
 #include "cli/other_program.hpp"
 #include "cli/output.hpp"
 #include "comp/toolchain.hpp"
+#include "link/address.hpp"
 #include "recording/mcap/recording.hpp"
 #include "run/offline.hpp"
 #include "text/numbers.hpp"
@@ -161,8 +162,10 @@ int simulate(const CheckOptions& options, const std::string& file, const char* f
         words.insert(words.end(), {"-i", options.ini});
     }
     ::setenv("MALLOC_PERTURB_", fill, 1);
+    ::setenv(link::links_inside, "1", 1);
     const Silence silence;
     const int status = run_tool(std::move(words));
+    ::unsetenv(link::links_inside);
     ::unsetenv("MALLOC_PERTURB_");
     return status;
 }

@@ -8,6 +8,7 @@
 #include "event_texts.hpp"
 #include "hal/background.hpp"
 #include "hal/reporter.hpp"
+#include "link/call_journal.hpp"
 #include "modbus/guardian/guardian_process.hpp"
 #include "modbus/master/local_master.hpp"
 #include "modbus_arguments.hpp"
@@ -44,6 +45,12 @@ struct Modbus : hal::bus::BusComponent {
         const auto* host = hal::extension<hal_background>(HAL_BACKGROUND);
         is_virtual_ = host != nullptr && host->is_virtual != 0;
         const hal::line::Description line = hal::line::describe(arguments_.bus.link);
+        if (is_virtual_ && !line.in_memory &&
+            hal::link::journal_mode() != hal::link::JournalMode::executes_again) {
+            throw std::runtime_error("'" + arguments_.bus.link +
+                                     "' is a real line, and a simulation has no time in which its "
+                                     "slaves could answer; write link=sim:NAME, or use hal run");
+        }
         has_guardian_ = !is_virtual_ && !line.in_memory && arguments_.bus.guardian &&
                         arguments_.bus.has_stops();
         if (has_guardian_) {
