@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "ethercat/config/state_pins.hpp"
+
 namespace hal::ethercat::config {
 
 using master::Type;
@@ -100,10 +102,15 @@ bool is_pin_of(const master::Slave& slave, const std::string& name) {
     return false;
 }
 
+bool is_state_pin(const std::string& name) {
+    return std::find(state_pin::all.begin(), state_pin::all.end(), name) != state_pin::all.end();
+}
+
 bool read_name(PinTarget& to, const Line& line) {
     const std::string& name = line.value.text;
     if (name.empty() || dashed(name) != name) return false;
-    if (name != to.entry.name && is_pin_of(to.in.slave, name)) {
+    const bool taken = is_pin_of(to.in.slave, name) || is_state_pin(name);
+    if (name != to.entry.name && taken) {
         to.in.report.error(Topic::slave, line.value.at, "duplicate pin name '" + name + "'",
                            "choose another one");
         return true;
@@ -166,9 +173,10 @@ void SlavePins::read() {
     });
 }
 
-/// Makes the names unique: an input that is also an output has the suffix -feedback.
+/// Makes the names unique: an input that is also an output, or a pin of the state of the slave, has
+/// the suffix -feedback.
 void SlavePins::name_pins() {
-    std::set<std::string> names;
+    std::set<std::string> names(state_pin::all.begin(), state_pin::all.end());
     for_each_entry([&](master::Entry& entry, bool output) {
         std::string name = entry.name;
         if (names.contains(name) && !output) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 
+#include "ethercat/config/state_pins.hpp"
 #include "ethercat/master/status.hpp"
 #include "ethercat/plugins/emergencies.hpp"
 #include "hal/component.hpp"
@@ -78,29 +79,39 @@ struct BusPins {
 
 /// Pins of one slave.
 struct SlavePins {
-    SlavePins(Component& c, const Function& f, const std::string& name)
-        : online(c, f, (name + ".online").c_str(), "the slave answers", {.safe = false}),
-          operational(c, f, (name + ".operational").c_str(),
+    /// `slave`: name of the slave.
+    SlavePins(Component& c, const Function& f, const std::string& slave)
+        : online(c, f, pin_name(slave, state_pin::online).c_str(), "the slave answers",
+                 {.safe = false}),
+          operational(c, f, pin_name(slave, state_pin::operational).c_str(),
                       "the slave is in OP and exchanges process data", {.safe = false}),
-          state(c, f, (name + ".state").c_str(),
+          state(c, f, pin_name(slave, state_pin::state).c_str(),
                 "1 INIT, 2 PRE-OP, 3 BOOT, 4 SAFE-OP, 8 OP, 0 unknown", {.safe = 0U}),
-          al_code(c, f, (name + ".al-status-code").c_str(),
+          al_code(c, f, pin_name(slave, state_pin::al_status_code).c_str(),
                   "AL status code of the slave (0134h), 0 again when it is started anew; the log "
                   "keeps each"),
-          dc_deviation(c, f, (name + ".dc-sync-diff").c_str(),
+          dc_deviation(c, f, pin_name(slave, state_pin::dc_deviation).c_str(),
                        "deviation of its clock; 4294967295: no data", {.unit = "ns"}),
-          losses(c, f, (name + ".losses").c_str(), "how often the slave was lost"),
-          crc_errors(c, f, (name + ".crc-errors").c_str(),
+          losses(c, f, pin_name(slave, state_pin::losses).c_str(), "how often the slave was lost"),
+          crc_errors(c, f, pin_name(slave, state_pin::crc_errors).c_str(),
                      "damaged frames that it received, all ports"),
           crc_errors_at{
-              {{c, f, (name + ".crc-errors.0").c_str(), "at port 0, from the master's side"},
-               {c, f, (name + ".crc-errors.1").c_str(), "at port 1"},
-               {c, f, (name + ".crc-errors.2").c_str(), "at port 2"},
-               {c, f, (name + ".crc-errors.3").c_str(), "at port 3"}}},
-          lost_links(c, f, (name + ".lost-links").c_str(), "lost links, all ports"),
-          emcy(c, f, (name + ".emcy").c_str(),
+              {{c, f, pin_name(slave, state_pin::crc_errors, ".0").c_str(),
+                "at port 0, from the master's side"},
+               {c, f, pin_name(slave, state_pin::crc_errors, ".1").c_str(), "at port 1"},
+               {c, f, pin_name(slave, state_pin::crc_errors, ".2").c_str(), "at port 2"},
+               {c, f, pin_name(slave, state_pin::crc_errors, ".3").c_str(), "at port 3"}}},
+          lost_links(c, f, pin_name(slave, state_pin::lost_links).c_str(), "lost links, all ports"),
+          emcy(c, f, pin_name(slave, state_pin::emergency).c_str(),
                "code of its newest emergency; 0: none, or the error is gone"),
-          emcy_count(c, f, (name + ".emcy-count").c_str(), "emergencies received") {}
+          emcy_count(c, f, pin_name(slave, state_pin::emergency_count).c_str(),
+                     "emergencies received") {}
+
+    /// Returns the name of a pin of a slave. [setup]
+    static std::string pin_name(const std::string& slave, const char* pin,
+                                const char* suffix = "") {
+        return slave + "." + pin + suffix;
+    }
 
     /// [realtime]
     void show(const master::SlaveStatus& s, const Emergencies::Heard& heard) noexcept {

@@ -301,6 +301,8 @@ TEST(EthercatConfig, Errors_name_the_place_and_what_to_write) {
     EXPECT_EQ(errors(a + "sdo 6060 = 200\n"),
               "m.ethercat:5:12: error: invalid value '200' of object 0x6060:0; write a number of "
               "-128..127, decimal or with 0x");
+    EXPECT_EQ(errors(a + "outputs = 6040\n6040.name = online\n"),
+              "m.ethercat:6:13: error: duplicate pin name 'online'; choose another one");
     EXPECT_EQ(errors(a + "607b.scale = 2\noutput = 6040\n"),
               "m.ethercat:5:1: error: no PDO of this slave has an object '607b'; the objects are: "
               "controlword, target-position, "
