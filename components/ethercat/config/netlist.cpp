@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Writes a netlist to start from: the master, an axis for each drive of CiA 402, and the pins that
 // are left.
+#include <algorithm>
+#include <map>
 #include <set>
 
 #include "bus/config/object_address.hpp"
@@ -13,22 +15,42 @@ namespace {
 using master::Entry;
 using master::Type;
 
-/// Pins that a drive on the bus and the component cia402 have under the same name.
-constexpr const char* drive_inputs[] = {"statusword",
-                                        "modes-of-operation-display",
-                                        "position-actual-value",
-                                        "velocity-actual-value",
-                                        "torque-actual-value",
-                                        "error-code",
-                                        "touch-probe-status",
-                                        "touch-probe-1-positive-edge",
-                                        "touch-probe-1-negative-edge",
-                                        "touch-probe-2-positive-edge",
-                                        "touch-probe-2-negative-edge"};
-constexpr const char* drive_outputs[] = {
-    "controlword",          "modes-of-operation",   "target-position",     "target-velocity",
-    "target-torque",        "velocity-offset",      "torque-offset",       "profile-velocity",
-    "profile-acceleration", "profile-deceleration", "touch-probe-function"};
+/// A pin that a drive on the bus and the component cia402 have under the same name.
+struct DrivePin {
+    const char* name;
+    std::string_view type;  ///< in the component
+    bool output;            ///< of the bus: the component writes it
+};
+
+constexpr DrivePin drive_pins[] = {
+    {"statusword", "u32", false},
+    {"modes-of-operation-display", "s32", false},
+    {"position-actual-value", "s32", false},
+    {"velocity-actual-value", "s32", false},
+    {"torque-actual-value", "s32", false},
+    {"error-code", "u32", false},
+    {"touch-probe-status", "u32", false},
+    {"touch-probe-1-positive-edge", "s32", false},
+    {"touch-probe-1-negative-edge", "s32", false},
+    {"touch-probe-2-positive-edge", "s32", false},
+    {"touch-probe-2-negative-edge", "s32", false},
+    {"controlword", "u32", true},
+    {"modes-of-operation", "s32", true},
+    {"target-position", "s32", true},
+    {"target-velocity", "s32", true},
+    {"target-torque", "s32", true},
+    {"velocity-offset", "s32", true},
+    {"torque-offset", "s32", true},
+    {"profile-velocity", "u32", true},
+    {"profile-acceleration", "u32", true},
+    {"profile-deceleration", "u32", true},
+    {"touch-probe-function", "u32", true},
+};
+
+const DrivePin& drive_pin(std::string_view name) {
+    return *std::find_if(std::begin(drive_pins), std::end(drive_pins),
+                         [name](const DrivePin& pin) { return pin.name == name; });
+}
 
 /// Calls `use(output, entry)` for each entry with a pin.
 template <class Use>
@@ -60,9 +82,9 @@ public:
           first_(number == 0),
           bus_("ethercat.0." + slave.name + "."),
           prefix_(axes > 1 ? "axis-" + std::to_string(number + 1) + "-" : "") {
-        for_each_pin(slave, [&](bool, const Entry& e) {
+        for_each_pin(slave, [&](bool output, const Entry& e) {
             if (!e.copied) {
-                mapped_.insert(e.name);
+                mapped_.insert({e.name, {pin_type(e), output}});
             }
         });
     }
@@ -93,24 +115,30 @@ public:
         }
         text += net(slave_ + "-operational", first_ ? bus_ + "operational" : "",
                     name_ + ".operational");
-        for (const char* pin : drive_inputs) {
-            if (has(pin)) {
-                text += net(name_ + "-" + pin, from_bus(pin, linked), name_ + "." + pin);
-            }
-        }
-        for (const char* pin : drive_outputs) {
-            if (has(pin)) {
-                text += net(name_ + "-" + pin, name_ + "." + pin, from_bus(pin, linked));
-            }
+        for (const DrivePin& pin : drive_pins) {
+            if (!has(pin)) continue;
+            const std::string signal = name_ + "-" + pin.name;
+            const std::string here = name_ + "." + pin.name;
+            const std::string there = bus_ + prefix_ + pin.name;
+            linked.insert(there);
+            text += pin.output ? net(signal, here, there) : net(signal, there, here);
         }
         return text + "setp " + name_ + ".enable FALSE           # TRUE switches the axis on\n\n";
     }
 
 private:
-    bool has(const char* pin) const { return mapped_.count(prefix_ + pin) != 0; }
-    std::string from_bus(const char* pin, std::set<std::string>& linked) const {
-        linked.insert(bus_ + prefix_ + pin);
-        return bus_ + prefix_ + pin;
+    /// Type and direction of a pin of the bus.
+    struct Mapped {
+        std::string_view type;
+        bool output;
+    };
+    bool has(std::string_view name) const { return has(drive_pin(name)); }
+    /// Returns whether the bus has a pin that can be linked with the one of the component: a
+    /// description may call objects of other types by these names.
+    bool has(const DrivePin& pin) const {
+        const auto found = mapped_.find(prefix_ + pin.name);
+        return found != mapped_.end() && found->second.type == pin.type &&
+               found->second.output == pin.output;
     }
     std::string net(const std::string& signal, const std::string& from,
                     const std::string& to) const {
@@ -121,7 +149,7 @@ private:
     std::string name_, slave_;
     bool first_;
     std::string bus_, prefix_;
-    std::set<std::string> mapped_;
+    std::map<std::string, Mapped> mapped_;  ///< by name
 };
 
 }  // namespace

@@ -239,11 +239,12 @@ std::vector<Idn> idns_of(const esi::Device& device) {
 }
 
 /// Adds the objects of PDOs that are missing in the dictionary of the description, and their right
-/// to be mapped.
+/// to be mapped. A description that names a mapping itself as an object of a PDO has no such
+/// object: these bits are a gap.
 void add_mapped(const std::vector<esi::Pdo>& pdos, bool output, Plan& plan) {
     for (const esi::Pdo& pdo : pdos) {
         for (const esi::Entry& e : pdo.entries) {
-            if (e.index == 0) continue;
+            if (e.index == 0 || is_mapping(e.index)) continue;
             PlannedObject& object = plan[e.index];
             if (object.entries.empty()) {
                 object.name = pdo.name.empty() ? e.name : pdo.name;

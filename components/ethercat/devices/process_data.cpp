@@ -69,7 +69,8 @@ void ProcessData::add(const DictionaryObject& pdo, std::uint16_t sample) noexcep
         const auto mapping = coe::Mapping::of(get<std::uint32_t>(dictionary_->data(e)));
         const auto* entry =
             mapping.index != 0 ? dictionary_->find(mapping.index, mapping.sub) : nullptr;
-        if (entry != nullptr && mapping.bits <= entry->bits && used_ < copies_.size()) {
+        const bool is_mapped = entry != nullptr && (entry->access & mappable()) != 0;
+        if (is_mapped && mapping.bits <= entry->bits && used_ < copies_.size()) {
             copies_[used_++] = {dictionary_->data(*entry), static_cast<std::uint32_t>(bits_),
                                 mapping, sample};
         }
@@ -145,8 +146,7 @@ coe::Abort ProcessData::check_mapping(const DictionaryObject& pdo,
     if (dictionary_->find(mapping.index) == nullptr) return coe::Abort::no_object;
     const auto* entry = dictionary_->find(mapping.index, mapping.sub);
     if (entry == nullptr) return coe::Abort::no_sub;
-    const std::uint16_t right = output_ ? coe::access::rx_mappable : coe::access::tx_mappable;
-    const bool fits = (entry->access & right) != 0 && entry->bits == mapping.bits;
+    const bool fits = (entry->access & mappable()) != 0 && entry->bits == mapping.bits;
     return fits ? coe::Abort::none : coe::Abort::not_mappable;
 }
 

@@ -76,6 +76,10 @@ private:
     coe::Abort check_length(std::size_t bits) const noexcept;
     std::size_t pdo_bits(const DictionaryObject& pdo, unsigned entries) const noexcept;
     bool is_pdo(std::uint16_t index) const noexcept;
+    /// Returns the right that an object needs to be in a PDO of this direction.
+    std::uint16_t mappable() const noexcept {
+        return output_ ? coe::access::rx_mappable : coe::access::tx_mappable;
+    }
 
     Dictionary* dictionary_ = nullptr;
     const SampledPdos* sampled_ = nullptr;

@@ -109,6 +109,7 @@ private:
         for (const Xml s : node.children("Sm")) {
             sync_manager(s, d);
         }
+        separate_mailboxes(node, d);
         pdos(node, "RxPdo", d.rx);
         pdos(node, "TxPdo", d.tx);
         correct_direction(node, d, d.tx, sii::SmType::outputs, sii::SmType::inputs);
@@ -257,6 +258,26 @@ private:
         o.min = std::clamp(context_.attribute<unsigned>(pdo, "OSMin", 1), 1U, std::max(o.max, 1U));
         o.index_increment = context_.attribute<std::uint16_t>(pdo, "OSIndexInc");
         return o;
+    }
+    /// A mailbox that reaches into the other one ends where that begins, if its least size allows.
+    void separate_mailboxes(const Xml& node, Device& d) {
+        const auto find = [&](sii::SmType type) {
+            return std::find_if(d.sync_managers.begin(), d.sync_managers.end(),
+                                [type](const SyncManager& s) { return s.type == type; });
+        };
+        auto first = find(sii::SmType::mailbox_out);
+        auto second = find(sii::SmType::mailbox_in);
+        if (first == d.sync_managers.end() || second == d.sync_managers.end()) return;
+        if (first->start > second->start) {
+            std::swap(first, second);
+        }
+        const unsigned distance = second->start - first->start;
+        if (distance >= first->default_size || distance < std::max<unsigned>(first->min_size, 8))
+            return;
+        context_.warn(node, "the mailbox of " + std::to_string(first->default_size) +
+                                " bytes reaches into the other one; it is read with " +
+                                std::to_string(distance) + " bytes");
+        first->default_size = static_cast<std::uint16_t>(distance);
     }
     /// A sync manager with the PDOs of the other direction than its name has that of its PDOs.
     void correct_direction(const Xml& node, Device& d, const std::vector<Pdo>& pdos,

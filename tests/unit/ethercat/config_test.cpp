@@ -120,6 +120,37 @@ TEST(EthercatConfig, Objects_of_a_drive_have_the_sign_of_CiA_402) {
     EXPECT_EQ(types(""), (std::vector{Type::u32, Type::u32, Type::real32})) << "not a drive";
 }
 
+TEST(EthercatConfig, Generated_netlist_links_pins_of_equal_types_only) {
+    const auto description = [](const std::string&, std::string& bytes) {
+        const auto entry = [](unsigned sub, const std::string& name, const std::string& type) {
+            return "<Entry><Index>#x1600</Index><SubIndex>" + std::to_string(sub) +
+                   "</SubIndex><BitLen>32</BitLen><Name>" + name + "</Name><DataType>" + type +
+                   "</DataType></Entry>";
+        };
+        bytes =
+            "<EtherCATInfo><Vendor><Id>1</Id></Vendor><Descriptions><Devices><Device>"
+            "<Type ProductCode='1'>D</Type><Profile><ProfileNo>402</ProfileNo></Profile>"
+            "<Sm StartAddress='#x1100' ControlByte='#x24'>Outputs</Sm>"
+            "<Sm StartAddress='#x1200' ControlByte='#x20'>Inputs</Sm>"
+            "<RxPdo Sm='0' Fixed='1'><Index>#x1600</Index>" +
+            entry(1, "Controlword", "UDINT") + entry(2, "Target position", "UDINT") +
+            entry(3, "Target velocity", "DINT") + entry(4, "Torque actual value", "DINT") +
+            "</RxPdo><TxPdo Sm='1' Fixed='1'><Index>#x1a00</Index>" +
+            entry(5, "Statusword", "UDINT") +
+            "</TxPdo></Device></Devices></Descriptions></EtherCATInfo>";
+        return true;
+    };
+    const Reading r = read("[bus]\n[slave 0 d]\nesi = d.xml\n", "d.ethercat", description);
+    const std::string text = netlist(r.buses.at(0), "d.ethercat", "");
+    const auto has = [&](const std::string& part) { return text.find(part) != text.npos; };
+    EXPECT_TRUE(has("=> ethercat.0.d.controlword\n"));
+    EXPECT_TRUE(has("=> d.statusword\n"));
+    EXPECT_TRUE(has("=> ethercat.0.d.target-velocity\n"));
+    EXPECT_TRUE(has("#   in  u32   ethercat.0.d.target-position ")) << "the component's pin is s32";
+    EXPECT_TRUE(has("#   in  s32   ethercat.0.d.torque-actual-value "))
+        << "the component reads this value, the slave too";
+}
+
 TEST(EthercatConfig, Drive_without_a_description_has_the_objects_of_its_profile) {
     const Bus bus = good(
         "[bus]\n[slave 0 a]\ndevice = cia402\naxes = 2\nproduct = 0x10\nvendor = 1\nrevision = "

@@ -107,6 +107,17 @@ TEST_F(EsiDevice, A_complete_write_longer_than_the_object_is_accepted) {
     EXPECT_FALSE(answer->is(coe::command::abort)) << std::hex << answer->value;
 }
 
+TEST_F(EsiDevice, A_mapping_that_is_named_as_an_object_of_its_PDO_keeps_its_value) {
+    start("esi", described(mailbox_managers + pdo("RxPdo", 2, "1600", "1600") +
+                           pdo("TxPdo", 3, "1a00", "6000") +
+                           "<Sm StartAddress='#x1100' ControlByte='#x24' Enable='1'>Outputs</Sm>"
+                           "<Sm StartAddress='#x1180' ControlByte='#x20' Enable='1'>Inputs</Sm>"
+                           "<Mailbox><CoE/></Mailbox>"));
+    to_op({0xff});
+    EXPECT_EQ(upload(0x1600, 0), 1U);
+    EXPECT_EQ(upload(0x1600, 1), 0x16000108U);
+}
+
 TEST_F(EsiDevice, Every_device_with_CoE_has_both_assignments) {
     start("esi", described(mailbox_managers + pdo("TxPdo", 2, "1a00", "6000") +
                            "<Sm StartAddress='#x1100' ControlByte='#x20' Enable='1'>Inputs</Sm>"

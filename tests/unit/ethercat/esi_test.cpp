@@ -162,6 +162,29 @@ TEST(Esi, A_sync_manager_has_the_direction_of_its_PDOs) {
               "sync manager 1 is named Outputs, but has TxPDOs; it is read as Inputs");
 }
 
+TEST(Esi, Mailboxes_that_overlap_are_read_with_the_space_between_them) {
+    const auto mailboxes = [](const std::string& min, const std::string& in) {
+        return read(
+            "<EtherCATInfo><Descriptions><Devices><Device><Type ProductCode='1'>BOX</Type>"
+            "<Sm StartAddress='#x1000' DefaultSize='1024' MinSize='" +
+            min + "'>MBoxOut</Sm><Sm StartAddress='" + in +
+            "' DefaultSize='1024'>MBoxIn</Sm></Device></Devices></Descriptions>"
+            "</EtherCATInfo>");
+    };
+    const auto size = [](const File& file, std::size_t manager) {
+        return file.devices.at(0).sync_managers.at(manager).default_size;
+    };
+    const File overlapping = mailboxes("64", "#x1200");
+    EXPECT_EQ(size(overlapping, 0), 512U);
+    EXPECT_EQ(size(overlapping, 1), 1024U);
+    ASSERT_EQ(overlapping.messages.size(), 1U);
+    EXPECT_EQ(overlapping.messages[0].sentence,
+              "the mailbox of 1024 bytes reaches into the other one; it is read with 512 bytes");
+    EXPECT_EQ(size(mailboxes("64", "#x0e00"), 1), 512U) << "the other one is first";
+    EXPECT_EQ(size(mailboxes("768", "#x1200"), 0), 1024U) << "its least size does not allow it";
+    EXPECT_TRUE(mailboxes("64", "#x1400").messages.empty()) << "side by side";
+}
+
 TEST(Esi, A_number_with_two_prefixes_is_hexadecimal) {
     const File file = read(
         "<EtherCATInfo><Descriptions><Devices><Device><Type ProductCode='#x0x12'>BOX</Type>"
