@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""esi_corpus.py [--sample N] [--reasons] FOLDER: generates a configuration and a netlist for each
-device of the device descriptions (ESI) below a folder, runs them in memory, and counts the
-devices that reach OP. Prints each other device with its reason. No file of vendors is in the
-tree: clone public repositories with ESI files into a folder outside of it. HAL_BIN names the
-program, else build/release."""
+"""esi_corpus.py [--revisions] [--sample N [--seed N]] [--reasons] FOLDER: generates a configuration
+and a netlist for each type of device of the device descriptions (ESI) below a folder, or for each
+of its revisions, runs them in memory, and counts the devices that reach OP. Prints each other
+device with its reason. No file of vendors is in the tree: clone public repositories with ESI files
+into a folder outside of it. HAL_BIN names the program, else build/release."""
+
 import argparse
 import collections
 import os
@@ -64,6 +65,48 @@ def devices_of(path):
     return selectors
 
 
+DEVICE = re.compile(rb"<Device(?=[\s>])[^>]*>|</Device>")
+
+
+def device_spans(data):
+    """Where the devices of a file begin and end; a device within a device is a part of it."""
+    spans, depth, start = [], 0, 0
+    for tag in DEVICE.finditer(data):
+        if tag.group().endswith(b"/>"):
+            continue
+        if not tag.group().startswith(b"</"):
+            start = tag.start() if depth == 0 else start
+            depth += 1
+        elif depth > 0:
+            depth -= 1
+            if depth == 0:
+                spans.append((start, tag.end()))
+    return spans
+
+
+def without_comments(path):
+    return re.sub(rb"<!--.*?-->", b"", path.read_bytes(), flags=re.S)
+
+
+def revisions_of(path):
+    """The numbers of the devices of a file, each of which is one revision of a type."""
+    return range(len(device_spans(without_comments(path))))
+
+
+def run_revision(path, number):
+    """Runs one revision from a file that describes no other device: its reason as of run()."""
+    data = without_comments(path)
+    spans = device_spans(data)
+    rest = [
+        data[end:start] for end, start in zip([0] + [s[1] for s in spans], [s[0] for s in spans])
+    ]
+    alone = b"".join(rest) + data[slice(*spans[number])] + data[spans[-1][1] :]
+    with tempfile.TemporaryDirectory(prefix="hal-esi-") as folder:
+        file = Path(folder) / "device.xml"
+        file.write_bytes(alone)
+        return run(file, None)
+
+
 def hal(folder, *words):
     done = subprocess.run(
         [HAL, *words], cwd=folder, capture_output=True, text=True, errors="replace", timeout=120
@@ -82,9 +125,11 @@ def last_cause(text):
 
 
 def run(path, order):
-    """The reason why a device does not reach OP; None: it does."""
+    """The reason why a device does not reach OP; None: it does. Without an order code, the device
+    is the only one of the file."""
     with tempfile.TemporaryDirectory(prefix="hal-esi-") as folder:
-        quoted = "'" + f"{path}:{order}".replace("'", "''") + "'"
+        selector = str(path) if order is None else f"{path}:{order}"
+        quoted = "'" + selector.replace("'", "''") + "'"
         code, text = hal(folder, "ethercat", "config", "--esi", quoted, "one")
         if code != 0:
             return "config: " + text.strip().splitlines()[-1]
@@ -106,24 +151,30 @@ def kind_of(reason):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--sample", type=int, help="run so many devices, chosen by a fixed seed")
+    parser.add_argument("--revisions", action="store_true", help="run each revision of a type")
+    parser.add_argument("--sample", type=int, help="run so many devices, chosen by the seed")
+    parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--reasons", action="store_true", help="print the kinds of reasons only")
     options = parser.parse_args()
-    files = {path: devices_of(path) for path in sorted(options.folder.rglob("*.[xX][mM][lL]"))}
+    paths = sorted(options.folder.resolve().rglob("*.[xX][mM][lL]"))
+    files = {path: devices_of(path) for path in paths}
     files = {path: devices for path, devices in files.items() if devices}
+    if options.revisions:
+        files = {path: revisions_of(path) for path in files}
     every = [(path, order) for path, devices in files.items() for order in devices]
     if options.sample is not None and options.sample < len(every):
-        every = sorted(random.Random(1).sample(every, options.sample))
+        every = sorted(random.Random(options.seed).sample(every, options.sample))
     good = 0
     kinds = collections.Counter()
     for path, order in every:
-        reason = run(path, order)
+        reason = run_revision(path, order) if options.revisions else run(path, order)
         if reason is None:
             good += 1
             continue
         kinds[kind_of(reason)] += 1
         if not options.reasons:
-            print(f"{path.name}: {order}: {reason}", flush=True)
+            device = f"device {order + 1}" if options.revisions else order
+            print(f"{path.name}: {device}: {reason}", flush=True)
     for kind, count in kinds.most_common():
         print(f"{count:5}  {kind}")
     if not every:
