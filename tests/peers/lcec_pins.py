@@ -12,6 +12,7 @@ names, with type and direction. Compared are
 
 Prints counts, each difference, and the types that we do not have. The exit status is 0 without a
 difference."""
+
 import argparse
 import re
 import subprocess
@@ -43,8 +44,13 @@ OPTIONAL = {
         form: "of the EL7201-9014"
         for form in ("input-0", "input-0-not", "input-1", "input-1-not", "input-sto")
     },
+    "lcec_ax5805.c": {
+        form: "with one axis" for form in ("fsoe-master-crc", "fsoe-slave-crc", "fsoe-in-sto")
+    },
     "lcec_rtec.c": {form: "not with two axes" for form in ("status-code", "alarm-code", "voltage")},
 }
+# pins that lcec declares as inputs, and writes: they are outputs here
+WRITTEN_INPUTS = re.compile(r"srv-(status|torque-fb-pct|diag)")
 # classes whose pins depend on the device
 CLASSES = {
     "lcec_class_ain.c",
@@ -75,6 +81,18 @@ def descriptors(text):
     return found
 
 
+def included_classes(folder, text):
+    """The classes that a source includes, and those that they include."""
+    found, left = set(), [text]
+    while left:
+        for name in re.findall(r'#include "(lcec_class_\w+)\.h"', left.pop()):
+            file = folder / (name + ".c")
+            if name not in found and file.exists():
+                found.add(name)
+                left.append(file.read_text(errors="replace"))
+    return sorted(found)
+
+
 def drive_pins(source):
     """The pins of the class for drives of CiA 402, which lcec names by macros."""
     text = (source / "devices" / "lcec_class_cia402_opt.h").read_text()
@@ -94,7 +112,7 @@ def drive_pins(source):
 def pattern(name):
     return re.compile(
         "^"
-        + re.sub(r"%d", r"[0-9]+", re.sub(r"%s", r"[\\w.-]+?", re.escape(name).replace(r"\%", "%")))
+        + re.sub(r"%d", r"[0-9]+", re.sub(r"%s", r"[\\w.-]*?", re.escape(name).replace(r"\%", "%")))
         + "$"
     )
 
@@ -123,10 +141,9 @@ class Upstream:
                     else own_vendors.get(value, 0)
                 )
             classes = set()
-            for name in re.findall(r'#include "(lcec_class_\w+)\.h"', both):
+            for name in included_classes(source / "devices", both):
                 file = source / "devices" / (name + ".c")
-                if file.exists():
-                    classes |= descriptors(without_comments(file.read_text(errors="replace")))
+                classes |= descriptors(without_comments(file.read_text(errors="replace")))
                 if name == "lcec_class_cia402":
                     classes |= drive_pins(source)
                     for part in ("lcec_class_din.c", "lcec_class_dout.c"):
@@ -224,7 +241,7 @@ def main():
     upstream = Upstream(options.source)
     ours = our_devices(options.hal)
     pins = our_pins(Path(options.hal).resolve(), ours)
-    differences, compared, matched = [], 0, 0
+    differences, compared, matched, written = [], 0, 0, 0
     for name, identity in ours.items():
         if name not in upstream.types:
             differences.append(f"{name}: lcec has no such type")
@@ -236,6 +253,9 @@ def main():
         known = [(pattern(form), kind, direction) for form, kind, direction in own | classes]
         for pin, (kind, direction) in pins[name].items():
             compared += 1
+            if driver.startswith("lcec_ax5") and WRITTEN_INPUTS.search(pin):
+                written += 1
+                direction = {"out": "in"}.get(direction, direction)
             if any(form.match(pin) and (kind, direction) == (k, d) for form, k, d in known):
                 matched += 1
             else:
@@ -252,6 +272,7 @@ def main():
     missing = sorted(set(upstream.types) - set(ours))
     print(f"lcec: {len(upstream.types)} types in {len(upstream.drivers)} drivers; here {len(ours)}")
     print(f"pins: {compared} compared, {matched} equal in name, type and direction")
+    print(f"pins that lcec declares as inputs but writes, here outputs: {written}")
     print(f"differences: {len(differences)}")
     for difference in differences:
         print("  " + difference)

@@ -53,6 +53,8 @@ struct FsoeFrame {
     unsigned slave_bytes = 0;  ///< of a channel, from the terminal
     unsigned master_bytes = 0;  ///< of a channel, to the terminal
     unsigned channels = 0;  ///< 0: not a safe terminal
+    std::uint16_t slave_object = 0x6000;  ///< of the frame from the terminal, sub-index 1 first
+    std::uint16_t master_object = 0x7000;  ///< of the frame to the terminal
     /// Returns the bytes of a frame with so many bytes of data in each channel.
     unsigned size(unsigned data_bytes) const { return 1 + channels * (data_bytes + 2) + 2; }
 };

@@ -174,6 +174,7 @@ private:
         if (device_) {
             s.identity.vendor = s.identity.vendor != 0 ? s.identity.vendor : device_->vendor;
             s.identity.product = s.identity.product != 0 ? s.identity.product : device_->product;
+            count_as_neighbour(node, s.position);
         }
         configure_ = flag(node, "configPdos", false);
         if (const std::string unit = node.attribute("syncUnit").value();
@@ -219,6 +220,21 @@ private:
         }
         bus_->setup.slaves.push_back(std::move(s));
         bus_->slaves.push_back(std::move(info_));
+    }
+
+    /// Gives an option card the number of axes of its drive, the slave before it.
+    void count_as_neighbour(const Xml& node, std::uint16_t position) {
+        std::optional<LcecDevice> before;
+        for (const Xml& other : node.parent().children("slave")) {
+            if (other.attribute("idx").as_int(-1) == int{position} - 1) {
+                before = find_lcec_device(other.attribute("type").value());
+            }
+        }
+        if (!config::count_as_neighbour(*device_, before ? &*before : nullptr)) {
+            error(Topic::slave, node,
+                  info_.type + " is an option of a drive, which must be the slave before it",
+                  "write its drive as idx=\"" + std::to_string(int{position} - 1) + "\"");
+        }
     }
 
     void unknown_type(const Xml& node, const std::string& slave) {

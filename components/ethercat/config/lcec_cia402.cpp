@@ -259,7 +259,7 @@ private:
         modes.kind = "drive-modes";
         modes.name = prefix(axis);
         modes.name.pop_back();
-        modes.settings["index"] = of_axis(0x6502, axis);
+        modes.objects["object"] = {of_axis(0x6502, axis), 0, 0, 0};
         info_.channels.push_back(std::move(modes));
         for (const Feature& f : features) {
             if (!has(f, axis)) continue;
@@ -268,10 +268,8 @@ private:
                 Channel pin;
                 pin.kind = "object-pin";
                 pin.name = prefix(axis) + f.pin;
-                pin.settings = {{"index", object.index},
-                                {"sub", object.sub},
-                                {"bits", f.bits},
-                                {"signed", f.is_signed ? 1 : 0}};
+                pin.objects["object"] = object;
+                pin.settings = {{"bits", f.bits}, {"signed", f.is_signed ? 1 : 0}};
                 add_pin(pin.name, object.index, object.sub);
                 info_.channels.push_back(std::move(pin));
             }

@@ -596,10 +596,8 @@ shape dc-motor-2
   2* like dc-motor-inputs
   2* counter enc-# $counter
   2* aout srv-# val=7020+10:21 enable=7020+10:01 motor=1
-  object-value srv-0-sel-info1 index=0x8022 sub=0x11 bits=8
-  object-value srv-0-sel-info2 index=0x8022 sub=0x19 bits=8
-  object-value srv-1-sel-info1 index=0x8032 sub=0x11 bits=8
-  object-value srv-1-sel-info2 index=0x8032 sub=0x19 bits=8
+  2* object-value srv-#-sel-info1 object=8022+10:11 bits=8
+  2* object-value srv-#-sel-info2 object=8022+10:19 bits=8
 devices dc-motor-2 00000002
   EL7342          1CAE3052
 
@@ -959,23 +957,185 @@ shape power-distribution
       6000+10:0f/1 6000+10:10/1
   pdo 1a04 f607:01/1=warning-temp f607:02/1=error-temp f607:03/1=warning-us f607:04/1=error-us
       f607:05/1=warning-up f607:06/1=error-up f607:07/1 /4 f607:0c/1 /2 f607:0f/1 f607:10/1
-  object-pin chan-1-current-limit-type index=32768 sub=17 bits=16 signed=1
-  object-pin chan-1-current-limit-us index=32768 sub=18 bits=16 per-unit=1000
-  object-pin chan-1-current-limit-up index=32768 sub=19 bits=16 per-unit=1000
-  object-pin chan-2-current-limit-type index=32784 sub=17 bits=16 signed=1
-  object-pin chan-2-current-limit-us index=32784 sub=18 bits=16 per-unit=1000
-  object-pin chan-2-current-limit-up index=32784 sub=19 bits=16 per-unit=1000
-  object-pin chan-3-current-limit-type index=32800 sub=17 bits=16 signed=1
-  object-pin chan-3-current-limit-us index=32800 sub=18 bits=16 per-unit=1000
-  object-pin chan-3-current-limit-up index=32800 sub=19 bits=16 per-unit=1000
-  object-pin chan-4-current-limit-type index=32816 sub=17 bits=16 signed=1
-  object-pin chan-4-current-limit-us index=32816 sub=18 bits=16 per-unit=1000
-  object-pin chan-4-current-limit-up index=32816 sub=19 bits=16 per-unit=1000
+  4* object-pin chan-##-current-limit-type object=8000+10:11 bits=16 signed=1
+  4* object-pin chan-##-current-limit-us object=8000+10:12 bits=16 per-unit=1000
+  4* object-pin chan-##-current-limit-up object=8000+10:13 bits=16 per-unit=1000
 devices power-distribution 00000002
   EP9214          23FE4052
 
-unsupported AX5101 AX5103 AX5106 AX5112 AX5118 AX5203 AX5206 AX5805 EasyIO EL1918_LOGIC
-unsupported EL2564 EL6090 EL9576 EpoCAT Ph3LM2RM StMDS5k
+shape brake-chopper
+  sm 3 in
+  pdo 1a00 6000:01/1=power-ok 6000:02/1=overload 6000:03/1 6000:04/1 6000:05/1 6000:06/1 /8
+      6000:0f/2 6000:11/32 6000:13/32s 6000:14/8
+devices brake-chopper 00000002
+  EL9576          25683052
+
+shape led-outputs
+  sm 2 out assign
+  N* pdo 1600+1 7000+10:11/16
+  sm 3 in assign
+  N* pdo 1a00+2 /5 6000+10:06/1=warning-# 6000+10:07/1=error-# /8 6000+10:10/1
+  N* pwm-output # val=7000+10:11
+  N* object-value gamma-# object=8000+10:24 real=1
+  N* object-value ramp-time-# object=8000+10:25 real=1
+  object-value frequency object=f819:11
+  object-param master-gain object=f819:12 bits=16 signed=1 initial=32767 min=0 max=32767
+devices led-outputs 00000002
+  EL2564          0A043052 4
+
+shape display
+  sm 2 out write
+  pdo 1600 7000:11/16=value-1 7000:12/16=value-2
+  4* pdo 1601+1 7010+10:01/1=ch#.timer-start 7010+10:02/1=ch#.timer-reset /5
+      7010+10:08/1=ch#.counter-clock 7010+10:09/1=ch#.counter-reset /7
+  sm 3 in write
+  pdo 1a00 /2 6000:03/1=keyboard.button-up 6000:04/1=keyboard.button-down
+      6000:05/1=keyboard.button-left 6000:06/1=keyboard.button-right 6000:07/1=keyboard.button-enter
+      /8 6000:10/1=keyboard.button-toggle
+  4* pdo 1a01+1 /14 6010+10:0f/2 6010+10:11/32=ch#.timer 6010+10:12/32=ch#.counter
+  pdo 1a05 /14 f600:0f/2 f600:11/32=operating-time
+  number operating-time-hour val=f600:11 unsigned=1 divisor=3600
+devices display 00000002
+  EL6090          17CA3052
+
+shape soe-drive-inputs
+  pdo 0010+1000 0087:01+1/16 0033:01+1/32s 0054:01+1/16s
+  [enableFB2=1] entries 0035:01+1/32s
+  [enableDiag=1] entries 0186:01+1/32
+values soe-drive drive=# status=0087:01+1 control=0086:01+1 target=0018:01+1 position=0033:01+1
+      torque=0054:01+1
+shape soe-drive-axis
+  [enableFB2=0] soe-drive % $soe-drive
+  [enableFB2=1] soe-drive % $soe-drive position2=0035:01+1
+  [enableDiag=1] number %srv-diag val=0186:01+1 unsigned=1
+shape soe-drive-process-data
+  option enableFB2 0 1
+  option enableDiag 0 1
+  sm 2 out
+  N* pdo 0018+1000 0086:01+1/16 0018:01+1/32s
+  sm 3 in
+  N* like soe-drive-inputs
+shape soe-drive
+  like soe-drive-process-data
+  like soe-drive-axis
+devices soe-drive 00000002
+  AX5101          13ED6012 1
+  AX5103          13EF6012 1
+  AX5106          13F26012 1
+  AX5112          13F86012 1
+  AX5118          13FE6012 1
+
+shape soe-drive-2
+  like soe-drive-process-data
+  N* like soe-drive-axis ch#.
+devices soe-drive-2 00000002
+  AX5203          14536012 2
+  AX5206          14566012 2
+
+values drive-safety-outputs e700:01/8 6640:00/1 6650:01/1 6670:01/1 6668:01/1 6680:01/1 66d0:00/1
+      66d1:00/1 6632:00/1 /8 e700:03/16
+values drive-safety-inputs e600:01/8 6640:00/1 66e0:01/1 66e0:02/1 6668:01/1 6680:01/1 66d0:00/1
+      66d1:00/1 6632:00/1 /8 e600:03/16
+shape drive-safety-card
+  follows soe-drive soe-drive-2
+  fsoe 2 2 N e600 e700
+  sm 2 out
+  pdo 1600 $drive-safety-outputs
+  [N=2] entries 6e40:00/1 6e50:01/1 6e70:01/1 6e68:01/1 6e80:01/1 6ed0:00/1 6ed1:00/1 6e32:00/1 /8
+      e700:04/16
+  entries e700:02/16
+  N* pdo 1601+1 2050+800:00/32s 2051+800:00/32s
+  sm 3 in
+  pdo 1a00 $drive-safety-inputs
+  [N=2] entries 6e40:00/1 6ee0:01/1 6ee0:02/1 6e68:01/1 6e80:01/1 6ed0:00/1 6ed1:00/1 6e32:00/1 /8
+      e600:04/16
+  entries e600:02/16
+  N* pdo 1a01+1 6611+800:00/32s 6613+800:00/32s
+  number fsoe-master-cmd val=e700:01 unsigned=1
+  number fsoe-master-connid val=e700:02 unsigned=1
+  number fsoe-slave-cmd val=e600:01 unsigned=1
+  number fsoe-slave-connid val=e600:02 unsigned=1
+  [N=1] number fsoe-master-crc val=e700:03 unsigned=1
+  [N=1] number fsoe-slave-crc val=e600:03 unsigned=1
+  [N=1] flag fsoe-in-sto val=6640:00
+  [N=2] 2* number fsoe-master-crc-# val=e700:03+1 unsigned=1
+  [N=2] 2* number fsoe-slave-crc-# val=e600:03+1 unsigned=1
+  [N=2] 2* flag fsoe-in-sto-# val=6640+800:00
+devices drive-safety-card 00000002
+  AX5805          16AD6012 1
+
+shape mixed-io-box
+  sm 0 out
+  pdo 1600 2*7000:01+1/16s
+  pdo 1601 8*7001:01+1/1
+  pdo 1602 8*7002:01+1/1
+  sm 1 in
+  pdo 1a00 4*6000:01+1/16s
+  pdo 1a01 8*6001:01+1/1
+  pdo 1a02 8*6002:01+1/1
+  pdo 1a03 6003:01/1 6003:02/1 /6
+  8* din din-# in=6001:01+1
+  8* din din-#+8 in=6002:01+1
+  8* dout dout-# out=7001:01+1
+  8* dout dout-#+8 out=7002:01+1
+  4* ain ain-# val=6000:01+1
+  2* aout aout-# val=7000:01+1
+devices mixed-io-box 0000079A
+  EasyIO          0DEBACCA
+
+values pulse-axis count=6001:01+1 flag=6006:01+1 frequency=7001:01+1 direction=7003:01+1
+      hold=7004:01+1 select=7004:06
+shape pulse-axes
+  sm 0 out unwatched
+  pdo 1600 7000:01/16s
+  pdo 1601 5*7001:01+1/32
+  pdo 1602 5*7002:01+1/1=axis#-enable5V /3
+  pdo 1603 5*7003:01+1/1 /3
+  pdo 1604 7*7004:01+1/1 /1
+  pdo 1605 5*7005:01+1/1 /3
+  pdo 1606 5*7006:01+1/1=axis#-enable24V 7006:06/1=dout-inverter-enable 2*7006:07+1/1=dout-#
+  sm 1 in
+  pdo 1a00 2*6000:01+1/16
+  pdo 1a01 5*6001:01+1/16
+  pdo 1a02 5*6002:01+1/16
+  pdo 1a06 5*6006:01+1/1 /3
+  pdo 1a04 5*6004:01+1/1=axis#-home /3
+  pdo 1a03 5*6003:01+1/1=axis#-drvok 6003:06/1=din-inverter-drvok /2
+  pdo 1a05 5*6005:01+1/1 /3
+  pdo 1a07 4*6007:01+1/1=din-# 6007:05/1=probe /3
+  5* pulse-axis axis# $pulse-axis
+  inverter-voltage inverter val=7000:01
+  2* scaled adc#-value val=6000:01+1 unsigned=1
+devices pulse-axes 0000079A
+  EpoCAT          04DECADE
+
+values speed-drive state=28c8:00 speed=2864:00 torque=2802:00 speed-state=26c8:00 position=2809:00
+      control=20b4:00 set-point=26e6:00 torque-limit=24e6:00
+shape speed-drive
+  option isMultiturn 0 1
+  option extEnc none 0 1 2 3 4 5 6 7 8
+  sm 2 out write
+  pdo 1600 20b4:00/8 26e6:00/16s 24e6:00/16s
+  sm 3 in write
+  pdo 1a00 28c8:00/8 2864:00/16s 2802:00/16s 26c8:00/16
+  pdo 1a01 2809:00/32
+  [extEnc=0,1,2] entries 289a:00/32
+  [extEnc=3,4,5] entries 289b:00/32
+  [extEnc=6,7,8] entries 289c:00/32
+  [isMultiturn=1] set - bits=32
+  [extEnc=0,3,6] set - external-turn=1048576
+  [extEnc=1] set - external-bits=16 external-turn=65536
+  [extEnc=2] set - external-bits=16
+  [extEnc=4,7] set - external-turn=4294967296
+  [extEnc=5,8] set - external-bits=16 external-shift=16
+  [extEnc=none] speed-drive - $speed-drive
+  [extEnc=0,1,2] speed-drive - $speed-drive external=289a:00
+  [extEnc=3,4,5] speed-drive - $speed-drive external=289b:00
+  [extEnc=6,7,8] speed-drive - $speed-drive external=289c:00
+devices speed-drive 000000B9
+  StMDS5k         00001388
+
+unsupported EL1918_LOGIC Ph3LM2RM
 )";
 // clang-format on
 

@@ -48,7 +48,10 @@ private:
         return std::all_of(line.conditions.begin(), line.conditions.end(),
                            [&](const std::string& condition) {
             const std::size_t equals = condition.find('=');
-            return same_word(option(condition.substr(0, equals)), condition.substr(equals + 1));
+            const std::string value = option(condition.substr(0, equals));
+            const Words accepted = split(condition.substr(equals + 1), ',');
+            return std::any_of(accepted.begin(), accepted.end(),
+                               [&](const std::string& word) { return same_word(word, value); });
         });
     }
 
@@ -71,12 +74,25 @@ private:
         } else if (keyword == "cia402") {
             drive(words);
         } else if (keyword == "fsoe") {
-            info_.fsoe = {count_of(device_, words[1]), count_of(device_, words[2]),
-                          count_of(device_, words[3])};
+            safety_frame(words);
+        } else if (keyword == "set") {
+            apply_effects(words[1] == "-" ? "" : with_step(words[1]), words, 2);
+        } else if (keyword == "follows") {
+            return;  // count_as_neighbour() has read it
         } else if (keyword == "fsoe-logic") {
             info_.fsoe_logic = true;
         } else {
             channel(words);
+        }
+    }
+
+    /// `fsoe SLAVE-BYTES MASTER-BYTES CHANNELS [SLAVE-OBJECT MASTER-OBJECT]`
+    void safety_frame(const Words& words) {
+        info_.fsoe = {count_of(device_, words[1]), count_of(device_, words[2]),
+                      count_of(device_, words[3])};
+        if (words.size() > 5) {
+            info_.fsoe.slave_object = static_cast<std::uint16_t>(hexadecimal(words[4]));
+            info_.fsoe.master_object = static_cast<std::uint16_t>(hexadecimal(words[5]));
         }
     }
 
@@ -106,18 +122,25 @@ private:
         }
         options_[name] = value;
     }
+    /// Returns the value of an option, or of N.
     std::string option(const std::string& name) const {
+        if (name == "N") return std::to_string(device_.count);
         const auto at = options_.find(name);
         return at == options_.end() ? std::string() : at->second;
     }
 
-    /// `sm NUMBER in|out [write]`: with `write` the assignment and the mapping are written.
+    /// `sm NUMBER in|out [write|assign|unwatched]...`: with `write` the assignment and the mapping
+    /// are written, with `assign` the assignment only; `unwatched` outputs have no watchdog.
     void sync_manager(const Words& words) {
         master::SyncManager sm;
         sm.number = static_cast<std::uint8_t>(std::atoi(words[1].c_str()));
         sm.output = words[2] == "out";
-        writes_ = words.size() > 3;
-        sm.write_assignment = writes_;
+        const auto has = [&](const char* word) {
+            return std::find(words.begin() + 3, words.end(), word) != words.end();
+        };
+        writes_ = has("write");
+        sm.write_assignment = writes_ || has("assign");
+        sm.watchdog = !has("unwatched");
         slave_.sync_managers.push_back(std::move(sm));
     }
 
@@ -203,7 +226,7 @@ private:
                 made.objects[key] = address(value, step_);
             } else {
                 made.settings[key] =
-                    value == "N" ? device_.count : std::strtod(value.c_str(), nullptr);
+                    value == "N" ? device_.count : std::strtod(with_step(value).c_str(), nullptr);
             }
         }
         for (const auto& [name, settings] : effects_) {
@@ -278,7 +301,7 @@ private:
             known.push_back(word);
             if (same_word(word, given->second)) {
                 const Words parts = split(value.substr(value.find('=') + 1), ';');
-                apply_effects(target, parts);
+                apply_effects(target, parts, 1);
                 return write(words[2], std::atoll(parts[0].c_str()));
             }
         }
@@ -303,9 +326,9 @@ private:
         write(object, std::llround(*value * factor));
     }
     /// `scale=0.1` replaces a setting of a channel, `scale*=0.1` multiplies it.
-    void apply_effects(const std::string& channel, const Words& parts) {
+    void apply_effects(const std::string& channel, const Words& parts, std::size_t first) {
         auto& settings = effects_[channel];
-        for (std::size_t i = 1; i < parts.size(); ++i) {
+        for (std::size_t i = first; i < parts.size(); ++i) {
             const std::size_t equals = parts[i].find('=');
             const bool multiplies = parts[i][equals - 1] == '*';
             const std::string key = parts[i].substr(0, multiplies ? equals - 1 : equals);
@@ -376,6 +399,18 @@ std::optional<LcecDevice> find_lcec_device(std::string_view name) {
         if (device.name == name) return device;
     }
     return std::nullopt;
+}
+
+bool count_as_neighbour(LcecDevice& device, const LcecDevice* before) {
+    for (const TableLine& line : table().lines_of(device)) {
+        if (line.words[0] != "follows") continue;
+        const auto shapes = line.words.begin() + 1;
+        const bool fits = before != nullptr &&
+                          std::find(shapes, line.words.end(), before->shape) != line.words.end();
+        if (!fits) return false;
+        device.count = before->count;
+    }
+    return true;
 }
 
 std::vector<std::string> lcec_device_names() {

@@ -24,6 +24,9 @@ struct LcecDevice {
 
 /// Returns the device with this name; names are compared exactly.
 std::optional<LcecDevice> find_lcec_device(std::string_view name);
+/// Gives a device that belongs to the one before it on the bus the count of that one. Returns false
+/// if `before` is null or of another kind.
+bool count_as_neighbour(LcecDevice&, const LcecDevice* before);
 /// Returns all names, in the order of the table.
 std::vector<std::string> lcec_device_names();
 /// Returns the names of the devices of lcec that this table has no process data for.

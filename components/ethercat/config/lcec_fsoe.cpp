@@ -99,8 +99,10 @@ private:
                                          frame.slave_bytes, frame.channels));
         inputs.pdos.push_back(frame_pdo(static_cast<std::uint16_t>(0x1a00 + connection), from_logic,
                                         frame.master_bytes, frame.channels));
-        frames_.push_back({terminal, 0x6000, logic_, to_logic, frame.size(frame.slave_bytes)});
-        frames_.push_back({logic_, from_logic, terminal, 0x7000, frame.size(frame.master_bytes)});
+        frames_.push_back(
+            {terminal, frame.slave_object, logic_, to_logic, frame.size(frame.slave_bytes)});
+        frames_.push_back(
+            {logic_, from_logic, terminal, frame.master_object, frame.size(frame.master_bytes)});
         const std::string name = "fsoe-" + std::to_string(connection) + "-";
         for (const auto& [role, index] :
              {std::pair{"master", from_logic}, std::pair{"slave", to_logic}}) {

@@ -52,16 +52,24 @@ unsigned count_of(const LcecDevice& device, const std::string& text) {
 }
 
 std::string with_step(const std::string& text, unsigned step) {
+    constexpr std::string_view digits = "0123456789";
     std::string out;
     for (std::size_t i = 0; i < text.size(); ++i) {
         if (text[i] != '#') {
             out += text[i];
-        } else if (i + 1 < text.size() && text[i + 1] == '#') {
-            out += std::to_string(step + 1);
-            ++i;
-        } else {
-            out += std::to_string(step);
+            continue;
         }
+        const std::string_view rest = std::string_view(text).substr(i + 1);
+        unsigned first = 0;
+        if (rest.starts_with('#')) {
+            first = 1;
+            ++i;
+        } else if (rest.starts_with('+')) {
+            const std::size_t end = std::min(rest.find_first_not_of(digits, 1), rest.size());
+            first = static_cast<unsigned>(std::atoi(std::string(rest.substr(1, end - 1)).c_str()));
+            i += end;
+        }
+        out += std::to_string(step + first);
     }
     return out;
 }

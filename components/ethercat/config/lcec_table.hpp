@@ -59,7 +59,7 @@ TableWords split(std::string_view text, char separator);
 std::uint32_t hexadecimal(const std::string& text);
 /// Returns a number of repetitions: `8`, or `N`, which is the device's.
 unsigned count_of(const LcecDevice&, const std::string& text);
-/// Replaces `##` with the number of a step from 1, and `#` with that from 0.
+/// Replaces `##` with the number of a step from 1, `#+8` with that from 8, and `#` with that from 0.
 std::string with_step(const std::string& text, unsigned step);
 
 }  // namespace hal::ethercat::config

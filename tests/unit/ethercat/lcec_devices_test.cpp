@@ -2,6 +2,7 @@
 // The table of lcec's devices, and the channels that it names.
 #include "ethercat/config/lcec_devices.hpp"
 
+#include <bit>
 #include <map>
 #include <set>
 
@@ -350,12 +351,21 @@ struct ObjectMailbox {
         std::uint32_t number;
     };
     std::map<std::uint32_t, Value> values;  ///< by index << 8 | sub-index
+    std::map<std::uint32_t, tests::Bytes> idns;  ///< of SoE: by drive << 16 | IDN
+    std::uint32_t written = 0;  ///< the last value that was downloaded
 
     ObjectMailbox() {
         slave.on_request = [this](const MailboxMessage& m) {
+            if (m.type == MailboxType::soe) return reply_idn(*soe::read(m.payload));
             const auto sdo = coe::read_sdo(m.payload);
-            const Value value = values.at(sdo->index << 8 | sdo->sub);
             tests::Bytes reply(coe::sdo_bytes);
+            if (sdo->is(coe::command::download)) {
+                written = sdo->value;
+                coe::write_sdo(reply.data(), coe::Service::sdo_response,
+                               {coe::command::download_response, sdo->index, sdo->sub, 0});
+                return slave.reply(MailboxType::coe, reply);
+            }
+            const Value value = values.at(sdo->index << 8 | sdo->sub);
             coe::write_sdo(reply.data(), coe::Service::sdo_response,
                            {coe::expedited_command(coe::command::upload_response, value.bytes),
                             sdo->index, sdo->sub, value.number});
@@ -363,6 +373,14 @@ struct ObjectMailbox {
         };
     }
     ~ObjectMailbox() { server.stop(); }
+    void reply_idn(const soe::Header& h) {
+        tests::Bytes reply(4);
+        soe::write(reply.data(),
+                   {soe::Opcode::read_response, false, false, h.drive, h.elements, h.idn});
+        const tests::Bytes& value = idns.at(static_cast<std::uint32_t>(h.drive << 16 | h.idn));
+        reply.insert(reply.end(), value.begin(), value.end());
+        slave.reply(MailboxType::soe, reply);
+    }
     void step() {
         server.step(slave.now_ns);
         slave.step(server.channel(0));
@@ -410,6 +428,188 @@ TEST(LcecDevices, Frequency_output_scales_by_the_frequency_of_the_terminal) {
     EXPECT_DOUBLE_EQ(bench.pin<double>("stp-pos-fb"), 0.005);
     EXPECT_TRUE(bench.pin<bool>("stp-ramp-active") && bench.pin<bool>("stp-in-z"));
     EXPECT_TRUE(bench.pin<bool>("stp-in-t-not") && !bench.pin<bool>("stp-in-t"));
+}
+
+TEST(LcecDevices, Led_outputs_are_scaled_and_their_gain_is_written_when_it_changes) {
+    ObjectMailbox objects;
+    const auto real = [](float value) { return std::bit_cast<std::uint32_t>(value); };
+    objects.values = {{0xf81911, {4, 5000}}, {0xf81912, {2, 32767}}};
+    for (std::uint32_t n = 0; n < 4; ++n) {
+        objects.values[0x800024 + (n << 12)] = {4, real(2.5F)};
+        objects.values[0x800025 + (n << 12)] = {4, real(0.25F)};
+    }
+    Bench bench("EL2564");
+    bench.mailbox = &objects.port;
+    bench.pin<double>("pwm-1") = 60;
+    bench.pin<double>("offset-1") = 20;
+    bench.write();
+    EXPECT_EQ(bench.field(0x7010, 0x11).read(bench.image()), 0U) << "not enabled";
+    bench.pin<bool>("enable-1") = true;
+    bench.write();
+    EXPECT_EQ(bench.field(0x7010, 0x11).read(bench.image()), 32767U) << "60 * 0.5 + 20 percent";
+    bench.pin<double>("pwm-1") = 1e6;
+    bench.write();
+    EXPECT_EQ(bench.field(0x7010, 0x11).read(bench.image()), 65535U);
+    bench.set(0x6010, 7, 1);
+    EXPECT_EQ(bench.slave.sync_managers.at(1).pdos.at(1).entries.at(2).name, "error-1");
+    const auto run = [&](auto until) {
+        for (int cycle = 0; cycle < 3000 && !until(); ++cycle) {
+            objects.step();
+            bench.read();
+            bench.write();
+        }
+        return until();
+    };
+    EXPECT_TRUE(run([&] { return bench.pin<std::uint32_t>("frequency") == 5000U; }));
+    EXPECT_DOUBLE_EQ(bench.pin<double>("ramp-time-3"), 0.25);
+    EXPECT_DOUBLE_EQ(bench.pin<double>("gamma-0"), 2.5);
+    EXPECT_EQ(objects.written, 0U) << "the gain is that of the terminal";
+    bench.pin<std::int32_t>("master-gain") = 1000;
+    EXPECT_TRUE(run([&] { return (objects.written & 0xffffU) == 1000; }));
+}
+
+TEST(LcecDevices, Drive_of_SoE_follows_its_enable_pins_in_its_units) {
+    ObjectMailbox objects;
+    objects.idns = {{79, {0, 0, 0x10, 0}}, {45, {1, 0}}, {46, {0xfc, 0xff}}};  // 10^-4 rpm
+    for (const std::uint32_t number : {79U, 45U, 46U}) {
+        objects.idns[1U << 16 | number] = objects.idns.at(number);
+    }
+    Bench bench("AX5203", {{"enableFB2", "true"}, {"enableDiag", "1"}});
+    ASSERT_TRUE(bench.problems.empty());
+    bench.mailbox = &objects.port;
+    bench.pin<bool>("ch1.srv-enable") = true;
+    bench.pin<double>("ch1.srv-velo-cmd") = 2;
+    bench.write();
+    EXPECT_EQ(bench.get(0x0018, 2), 0) << "the unit of the velocity is unknown";
+    EXPECT_EQ(bench.field(0x0086, 2).read(bench.image()), 0xe000U);
+    bench.write();
+    EXPECT_EQ(bench.field(0x0086, 2).read(bench.image()), 0xe400U) << "the synchronisation bit";
+    EXPECT_EQ(bench.field(0x0086, 1).read(bench.image()), 0x0400U) << "the other axis";
+    bench.pin<bool>("ch1.srv-halt") = true;
+    bench.pin<bool>("ch1.srv-drive-off") = true;
+    bench.write();
+    EXPECT_EQ(bench.field(0x0086, 2).read(bench.image()), 0x4000U);
+    for (int cycle = 0; cycle < 3000 && bench.pin<double>("ch1.srv-vel-scale") == 0; ++cycle) {
+        objects.step();
+        bench.read();
+    }
+    EXPECT_DOUBLE_EQ(bench.pin<double>("ch1.srv-vel-scale"), 1e-4);
+    EXPECT_EQ(bench.pin<std::uint32_t>("ch1.srv-pos-resolution"), 0x100000U);
+    bench.write();
+    EXPECT_NEAR(static_cast<double>(bench.get(0x0018, 2)), 1'200'000, 1) << "2 turns/s: 120 rpm";
+    bench.set(0x0087, 2, 0xc008);
+    bench.set(0x0033, 2, 0x80000);
+    bench.set(0x0035, 2, 17);
+    bench.set(0x0054, 2, 255);
+    bench.set(0x0186, 2, 0xf4a5);
+    bench.read();
+    EXPECT_TRUE(bench.pin<bool>("ch1.srv-enabled"));
+    EXPECT_FALSE(bench.pin<bool>("ch1.srv-fault") || bench.pin<bool>("ch1.srv-halted"));
+    EXPECT_TRUE(bench.pin<bool>("ch0.srv-fault")) << "not ready";
+    EXPECT_DOUBLE_EQ(bench.pin<double>("ch1.srv-torque-fb-pct"), 25.5);
+    EXPECT_EQ(bench.pin<std::uint32_t>("ch1.srv-diag"), 0xf4a5U);
+    EXPECT_DOUBLE_EQ(bench.pin<double>("ch1.enc-pos-abs"), 0.5);
+    EXPECT_DOUBLE_EQ(bench.pin<double>("ch1.enc-fb2-pos-abs"), 17.0);
+    bench.set(0x0087, 2, 0xe000);
+    bench.read();
+    EXPECT_TRUE(bench.pin<bool>("ch1.srv-fault") && bench.pin<bool>("ch1.srv-halted"));
+    bench.read(false);
+    EXPECT_TRUE(bench.pin<bool>("ch1.srv-fault"));
+    EXPECT_FALSE(bench.pin<bool>("ch1.srv-enabled"));
+    EXPECT_EQ(Bench("AX5101").host.declared().at("x.srv-velo-cmd"), "in float");
+}
+
+TEST(LcecDevices, Axis_of_pulses_counts_16_bits_and_begins_at_the_index) {
+    Bench bench("EpoCAT");
+    EXPECT_FALSE(bench.slave.sync_managers.at(0).watchdog);
+    bench.pin<double>("axis2-enc-scale") = 0.5;
+    bench.set(0x6001, 3, 0xfffe);
+    bench.read();
+    EXPECT_EQ(bench.pin<std::int32_t>("axis2-raw-count"), -2);
+    bench.set(0x6001, 3, 2);
+    bench.read();
+    EXPECT_EQ(bench.pin<std::int32_t>("axis2-raw-count"), 2) << "the 16 bits have wrapped";
+    EXPECT_DOUBLE_EQ(bench.pin<double>("axis2-enc-pos"), 1.0);
+    bench.pin<double>("axis2-set-position") = 10;
+    bench.pin<bool>("axis2-update-position") = true;
+    bench.read();
+    bench.set(0x6001, 3, 3);
+    bench.read();
+    EXPECT_EQ(bench.pin<std::int32_t>("axis2-raw-count"), 21) << "set once";
+    bench.pin<bool>("axis2-index-enable") = true;
+    bench.pin<double>("axis2-dac-value") = -3;
+    bench.write();
+    EXPECT_EQ(bench.field(0x7004, 3).read(bench.image()), 0U) << "waits for the index";
+    EXPECT_EQ(bench.field(0x7004, 2).read(bench.image()), 1U) << "another axis";
+    EXPECT_EQ(bench.field(0x7004, 6).read(bench.image()), 1U);
+    EXPECT_EQ(bench.get(0x7001, 3), 6000);
+    EXPECT_EQ(bench.field(0x7003, 3).read(bench.image()), 1U);
+    bench.set(0x6006, 3, 1);
+    bench.read();
+    EXPECT_FALSE(bench.pin<bool>("axis2-index-enable"));
+    EXPECT_DOUBLE_EQ(bench.pin<double>("axis2-enc-pos"), 0.0);
+    bench.pin<double>("inverter-dac-value") = 5;
+    bench.set(0x6000, 2, 40'000);
+    bench.write();
+    bench.read();
+    EXPECT_EQ(bench.get(0x7000, 1), 16383);
+    EXPECT_DOUBLE_EQ(bench.pin<double>("adc1-value"), 40'000.0);
+}
+
+TEST(LcecDevices, Speed_drive_scales_by_the_limits_of_the_drive) {
+    ObjectMailbox objects;
+    objects.values = {{0x221200, {4, 250}}, {0x240100, {4, 3000}}, {0x260200, {4, 2000}}};
+    Bench bench("StMDS5k", {{"isMultiturn", "1"}, {"extEnc", "8"}});
+    ASSERT_TRUE(bench.problems.empty());
+    EXPECT_EQ(bench.pin<std::uint32_t>("enc-raw-bits"), 32U);
+    EXPECT_EQ(bench.pin<std::uint32_t>("extenc-raw-bits"), 16U);
+    bench.mailbox = &objects.port;
+    bench.pin<bool>("srv-enable") = true;
+    bench.pin<double>("srv-vel-cmd") = 25;
+    bench.pin<double>("srv-torque-lim") = 5;
+    bench.write();
+    EXPECT_EQ(bench.get(0x26e6, 0), 0) << "the limits of the drive are unknown";
+    EXPECT_EQ(bench.get(0x24e6, 0), 32767) << "200 %";
+    for (int cycle = 0; cycle < 3000 && bench.pin<double>("srv-max-rpm-sp") == 0; ++cycle) {
+        objects.step();
+        bench.read();
+    }
+    bench.set(0x28c8, 0, 0x81);
+    bench.set(0x26c8, 0, 2);
+    bench.set(0x2864, 0, 16384);
+    bench.set(0x2802, 0, 4096);
+    bench.set(0x2809, 0, 0x800000);
+    bench.set(0x289c, 0, 0x70000);
+    bench.read();
+    bench.write();
+    EXPECT_DOUBLE_EQ(bench.pin<double>("srv-vel-rpm"), 1500.0);
+    EXPECT_EQ(bench.get(0x26e6, 0), 12287) << "75 % of 2000 rpm";
+    EXPECT_EQ(bench.field(0x20b4, 0).read(bench.image()), 1U) << "the toggle bit is inverted";
+    EXPECT_TRUE(bench.pin<bool>("srv-ready") && bench.pin<bool>("srv-at-speed"));
+    EXPECT_NEAR(bench.pin<double>("srv-vel-fb-rpm"), 3000.0, 0.2);
+    EXPECT_NEAR(bench.pin<double>("srv-torque-fb"), 2.5, 1e-3) << "of 2.5 Nm";
+    EXPECT_DOUBLE_EQ(bench.pin<double>("enc-pos-abs"), 0.5);
+    EXPECT_DOUBLE_EQ(bench.pin<double>("extenc-pos-abs"), 7.0);
+    bench.pin<double>("srv-vel-cmd") = -1000;
+    bench.write();
+    EXPECT_DOUBLE_EQ(bench.pin<double>("srv-vel-rpm"), -3000.0);
+    bench.read(false);
+    EXPECT_TRUE(bench.pin<bool>("srv-error") && !bench.pin<bool>("srv-ready"));
+    Bench plain("StMDS5k");
+    EXPECT_EQ(plain.pin<std::uint32_t>("enc-raw-bits"), 24U);
+    EXPECT_EQ(plain.host.declared().count("x.extenc-pos"), 0U);
+    EXPECT_EQ(plain.host.declared().at("x.extenc-scale"), "param float");
+}
+
+TEST(LcecDevices, Mixed_terminals_have_their_numbers_and_times) {
+    Bench box("EasyIO");
+    box.set(0x6002, 8, 1);
+    box.read();
+    EXPECT_TRUE(box.pin<bool>("din-15") && !box.pin<bool>("din-7"));
+    Bench display("EL6090");
+    display.set(0xf600, 0x11, 7300);
+    display.read();
+    EXPECT_EQ(display.pin<std::uint32_t>("operating-time-hour"), 2U);
 }
 
 TEST(LcecDevices, Power_distribution_has_its_current_limits_in_amperes) {
@@ -476,6 +676,39 @@ TEST(LcecDevices, Safety_frames_are_copied_between_the_logic_and_its_terminals) 
               "c.xml:2:2: error: fsoeSlaveIdx '9': no slave has this idx; correct the modParam");
 }
 
+TEST(LcecDevices, Safety_card_has_the_axes_of_the_drive_before_it) {
+    const auto machine = [](const std::string& drive) {
+        return config::read(
+            "<masters><master idx=\"0\" appTimePeriod=\"1000000\">\n"
+            "<slave idx=\"0\" type=\"EL6900\" name=\"logic\"><modParam name=\"fsoeSlaveIdx\" "
+            "value=\"2\"/></slave>\n<slave idx=\"2\" type=\"AX5805\" name=\"card\"/>\n"
+            "<slave idx=\"1\" type=\"" +
+                drive + "\" name=\"drive\"/></master></masters>",
+            "c.xml");
+    };
+    const auto outputs = [](const config::Reading& r) {
+        std::size_t bits = 0;
+        for (const auto& pdo : r.buses.at(0).setup.slaves.at(1).sync_managers.at(0).pdos) {
+            for (const auto& entry : pdo.entries) {
+                bits += entry.bits;
+            }
+        }
+        return bits / 8;
+    };
+    const config::Reading two = machine("AX5203");
+    ASSERT_TRUE(two.good()) << config::to_string(two, "c.xml");
+    EXPECT_EQ(outputs(two), 27U) << "DefaultSize of the card";
+    ASSERT_EQ(two.buses[0].copies.size(), 2U);
+    EXPECT_EQ(two.buses[0].copies[0].from.slave, 1U);
+    EXPECT_EQ(two.buses[0].copies[0].bits, 88U) << "two channels of two bytes";
+    const config::Reading one = machine("AX5106");
+    ASSERT_TRUE(one.good());
+    EXPECT_EQ(outputs(one), 15U);
+    EXPECT_EQ(config::to_string(machine("EL1008"), "c.xml"),
+              "c.xml:3:2: error: AX5805 is an option of a drive, which must be the slave before "
+              "it; write its drive as idx=\"1\"");
+}
+
 TEST(LcecDevices, Numbers_that_lcec_reads_in_part_are_read_with_a_warning) {
     const config::Reading r = config::read(
         "<masters><master idx=\"0\">\n<slave idx=\"0\" type=\"EL1008\"><sdoConfig idx=\"6093h\" "
@@ -502,8 +735,8 @@ TEST(LcecDevices, Unknown_types_are_named_with_what_to_write) {
     EXPECT_EQ(errors("EL1018ZZZ"),
               "c.xml:2:2: error: unknown slave type 'EL1018ZZZ'; write type=\"generic\" with vid, "
               "pid and the PDOs of the device; `hal check --assume lcec.0.0` checks the rest");
-    EXPECT_EQ(errors("EL6090"),
-              "c.xml:2:2: error: lcec's driver 'EL6090' is not supported; write type=\"generic\" "
+    EXPECT_EQ(errors("Ph3LM2RM"),
+              "c.xml:2:2: error: lcec's driver 'Ph3LM2RM' is not supported; write type=\"generic\" "
               "with vid, pid and the PDOs of the device; `hal check --assume lcec.0.0` checks the "
               "rest");
     EXPECT_EQ(errors("EL1008", "<modParam name=\"x\" value=\"1\"/>"),

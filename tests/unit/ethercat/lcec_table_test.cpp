@@ -51,6 +51,13 @@ TEST(LcecTable, Values_replace_their_name_as_words_and_as_bits) {
                                          "0: pdo 1a00 6000:01/8{red=1,green=2} 6000:02/8"}));
 }
 
+TEST(LcecTable, Names_count_from_0_from_1_or_from_a_number) {
+    EXPECT_EQ(with_step("din-#", 3), "din-3");
+    EXPECT_EQ(with_step("ch##x", 3), "ch4x");
+    EXPECT_EQ(with_step("din-#+8", 3), "din-11");
+    EXPECT_EQ(with_step("#+8-#", 0), "8-0");
+}
+
 TEST(LcecTable, A_shape_like_another_has_its_lines_with_a_text_and_the_step) {
     const LcecTable table(
         "shape axis\n"

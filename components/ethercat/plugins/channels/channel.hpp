@@ -93,6 +93,11 @@ public:
         return slave_ + "." + channel.name + (joined ? "" : "-") + suffix;
     }
 
+    /// Returns the full name of a pin whose number is the name of the channel: SLAVE.PREFIX-CHANNEL.
+    std::string numbered_pin(const std::string& prefix) const {
+        return slave_ + "." + prefix + "-" + channel.name;
+    }
+
     hal::Component& component;
     const hal::Function& reads;
     const hal::Function& writes;

@@ -7,11 +7,11 @@
 
 namespace hal::ethercat {
 
-/// The modes that a drive of CiA 402 supports (6502h), as NAME-supported-modes and a bit for each.
+/// The modes that a drive of CiA 402 supports (its `object`, 6502h), as NAME-supported-modes and a bit for each.
 class DriveModes final : public Channel {
 public:
     explicit DriveModes(const ChannelPlan& plan)
-        : object_(static_cast<std::uint16_t>(plan.channel.setting("index", 0x6502)), 0, 32, false),
+        : object_(plan),
           modes_(plan.component, plan.reads, plan.pin("supported-modes").c_str(),
                  "supported modes, 6502h") {
         for (const Mode& mode : known_modes) {

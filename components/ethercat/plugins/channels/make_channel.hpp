@@ -14,14 +14,20 @@
 #include "ethercat/plugins/channels/flag.hpp"
 #include "ethercat/plugins/channels/frequency_output.hpp"
 #include "ethercat/plugins/channels/inverter.hpp"
+#include "ethercat/plugins/channels/inverter_voltage.hpp"
 #include "ethercat/plugins/channels/motor_reset.hpp"
 #include "ethercat/plugins/channels/number.hpp"
+#include "ethercat/plugins/channels/object_param.hpp"
 #include "ethercat/plugins/channels/object_pin.hpp"
 #include "ethercat/plugins/channels/object_value.hpp"
 #include "ethercat/plugins/channels/position_drive.hpp"
 #include "ethercat/plugins/channels/power_values.hpp"
+#include "ethercat/plugins/channels/pulse_axis.hpp"
 #include "ethercat/plugins/channels/pulse_train.hpp"
+#include "ethercat/plugins/channels/pwm_output.hpp"
 #include "ethercat/plugins/channels/scaled_value.hpp"
+#include "ethercat/plugins/channels/soe_drive.hpp"
+#include "ethercat/plugins/channels/speed_drive.hpp"
 #include "ethercat/plugins/channels/stepper_drive.hpp"
 #include "ethercat/plugins/channels/velocity_drive.hpp"
 
@@ -60,6 +66,12 @@ inline std::unique_ptr<Channel> make_channel(const ChannelPlan& plan) {
         {"motor-reset", of(std::type_identity<MotorReset>())},
         {"pulse-train", of(std::type_identity<PulseTrain>())},
         {"frequency-output", of(std::type_identity<FrequencyOutput>())},
+        {"pwm-output", of(std::type_identity<PwmOutput>())},
+        {"object-param", of(std::type_identity<ObjectParam>())},
+        {"pulse-axis", of(std::type_identity<PulseAxis>())},
+        {"inverter-voltage", of(std::type_identity<InverterVoltage>())},
+        {"soe-drive", of(std::type_identity<SoeDrive>())},
+        {"speed-drive", of(std::type_identity<SpeedDrive>())},
     };
     for (const Kind& kind : kinds) {
         if (plan.channel.kind == kind.name) return kind.make(plan);

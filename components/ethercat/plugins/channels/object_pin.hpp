@@ -15,10 +15,7 @@ namespace hal::ethercat {
 class ObjectPin final : public Channel {
 public:
     explicit ObjectPin(const ChannelPlan& plan)
-        : object_(static_cast<std::uint16_t>(plan.channel.setting("index", 0)),
-                  static_cast<std::uint8_t>(plan.channel.setting("sub", 0)),
-                  static_cast<unsigned>(plan.channel.setting("bits", 32)),
-                  plan.channel.setting("signed", 0) != 0),
+        : object_(plan),
           per_unit_(plan.channel.setting("per-unit", 0)),
           max_(std::exp2(plan.channel.setting("bits", 32)) - 1) {
         constexpr const char* about = "written by SDO when it changes";

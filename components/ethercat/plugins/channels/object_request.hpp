@@ -14,11 +14,22 @@ namespace hal::ethercat {
 /// afterwards. The requests are served beside the process data; nothing waits for them.
 class ObjectRequest {
 public:
-    ObjectRequest(std::uint16_t index, std::uint8_t sub, unsigned bits, bool is_signed)
-        : bits_(bits), is_signed_(is_signed) {
+    /// How the value is read and written: by CoE, or by SoE with the number of a parameter (IDN) as
+    /// `index` and the number of the drive as `sub`.
+    enum class Protocol : std::uint8_t { coe, soe };
+
+    ObjectRequest(std::uint16_t index, std::uint8_t sub, unsigned bits, bool is_signed,
+                  Protocol protocol = Protocol::coe)
+        : bits_(bits), is_signed_(is_signed), protocol_(protocol) {
         request_.index = index;
         request_.sub = sub;
     }
+    /// The object with the role `object` of a channel, with the bits of its settings.
+    explicit ObjectRequest(const ChannelPlan& plan)
+        : ObjectRequest(plan.channel.objects.at("object").index,
+                        plan.channel.objects.at("object").sub,
+                        static_cast<unsigned>(plan.channel.setting("bits", 32)),
+                        plan.channel.setting("signed", 0) != 0) {}
 
     /// Call once per cycle. [realtime]
     void step(const SlaveImage& image) noexcept {
@@ -28,7 +39,8 @@ public:
         switch (state_) {
         case State::unknown:
             if (image.reachable && waits_ns_ <= 0) {
-                begin(image, master::MailboxRequest::Kind::sdo_upload, State::reading);
+                begin(image, protocol_ == Protocol::soe ? Kind::soe_read : Kind::sdo_upload,
+                      State::reading);
             }
             break;
         case State::reading:
@@ -44,7 +56,8 @@ public:
         if (state_ != State::known || !image.reachable || waits_ns_ > 0) return;
         std::memcpy(data_.data(), &value, data_.size());
         wanted_ = value;
-        begin(image, master::MailboxRequest::Kind::sdo_download, State::writing);
+        begin(image, protocol_ == Protocol::soe ? Kind::soe_write : Kind::sdo_download,
+              State::writing);
     }
     /// Forgets the object: the master starts again. [setup]
     void restart() noexcept {
@@ -54,10 +67,11 @@ public:
     }
 
 private:
+    using Kind = master::MailboxRequest::Kind;
     enum class State : std::uint8_t { unknown, reading, known, writing };
     static constexpr std::int64_t retry_ns = 1'000'000'000;
 
-    void begin(const SlaveImage& image, master::MailboxRequest::Kind kind, State state) noexcept {
+    void begin(const SlaveImage& image, Kind kind, State state) noexcept {
         if (image.mailbox == nullptr) return;
         request_.kind = kind;
         request_.slave = image.slave;
@@ -89,6 +103,7 @@ private:
 
     const unsigned bits_;
     const bool is_signed_;
+    const Protocol protocol_;
     master::MailboxRequest request_;
     std::array<std::uint8_t, 8> data_{};
     std::int64_t value_ = 0;
