@@ -140,34 +140,16 @@ devices digital-4-4-from-4 00000002
   EP2318          090E4052
   EP2328          09184052
 
-shape digital-8-4
-  sm 0 out
-  4* pdo 1600+1 7000+10:01/1
-  sm 1 in
-  8* pdo 1a00+1 6000+10:01/1
-  8* din din-# in=6000+10:01
-  4* dout dout-# out=7000+10:01
-devices digital-8-4 00000002
-  EK1818          071A2C52
-
-shape digital-4-8
-  sm 0 out
-  8* pdo 1600+1 7000+10:01/1
-  sm 1 in
-  4* pdo 1a00+1 6000+10:01/1
-  4* din din-# in=6000+10:01
-  8* dout dout-# out=7000+10:01
-devices digital-4-8 00000002
-  EK1828          07242C52
-
 shape digital-in-and-out
   sm 0 out
-  N* pdo 1600+1 7000+10:01/1
+  M* pdo 1600+1 7000+10:01/1
   sm 1 in
   N* pdo 1a00+1 6000+10:01/1
   N* din din-# in=6000+10:01
-  N* dout dout-# out=7000+10:01
+  M* dout dout-# out=7000+10:01
 devices digital-in-and-out 00000002
+  EK1818          071A2C52 8 4
+  EK1828          07242C52 4 8
   EP2338          09224052 8
   EP2339          09234052 16
   EP2349          092D4052 16
@@ -213,7 +195,7 @@ values analog-errors under=6000+10:01 over=6000+10:02 error=6000+10:07
 shape analog-inputs
   sm 3 in
   N* pdo 1a00+2 $analog-status /7 6000+10:0f/1 6000+10:10/1 6000+10:11/16s
-  N* ain ain-# val=6000+10:11 $analog-errors
+  M* ain ain-# val=6000+10:11 $analog-errors
 devices analog-inputs 00000002
   EL3001          0BB93052 1
   EL3002          0BBA3052 2
@@ -221,6 +203,7 @@ devices analog-inputs 00000002
   EL3008          0BC03052 8
   EL3011          0BC33052 1
   EL3012          0BC43052 2
+  EL3014          0BC63052 4 3
   EL3021          0BCD3052 1
   EL3022          0BCE3052 2
   EL3024          0BD03052 4
@@ -237,13 +220,6 @@ devices analog-inputs 00000002
   EL3064          0BF83052 4
   EL3068          0BFC3052 8
   EJ3004          0BBC2852 4
-
-shape analog-inputs-3-of-4
-  sm 3 in
-  4* pdo 1a00+2 $analog-status /7 6000+10:0f/1 6000+10:10/1 6000+10:11/16s
-  3* ain ain-# val=6000+10:11 $analog-errors
-devices analog-inputs-3-of-4 00000002
-  EL3014          0BC63052
 
 shape analog-inputs-16-bit
   sm 3 in

@@ -409,6 +409,7 @@ bool count_as_neighbour(LcecDevice& device, const LcecDevice* before) {
                           std::find(shapes, line.words.end(), before->shape) != line.words.end();
         if (!fits) return false;
         device.count = before->count;
+        device.second_count = before->second_count;
     }
     return true;
 }

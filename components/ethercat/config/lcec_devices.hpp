@@ -19,6 +19,7 @@ struct LcecDevice {
     std::uint32_t product = 0;
     std::string shape;   ///< the lines of the table that describe it, shared by similar devices
     unsigned count = 0;  ///< channels; N in the lines of the shape
+    unsigned second_count = 0;  ///< M in the lines of the shape: of a second kind, else as N
     std::vector<std::pair<std::string, std::string>> options;  ///< defaults other than the shape's
 };
 

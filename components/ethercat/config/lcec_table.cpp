@@ -48,7 +48,8 @@ std::uint32_t hexadecimal(const std::string& text) {
 }
 
 unsigned count_of(const LcecDevice& device, const std::string& text) {
-    return text == "N" ? device.count : static_cast<unsigned>(std::atoi(text.c_str()));
+    if (text == "N") return device.count;
+    return text == "M" ? device.second_count : static_cast<unsigned>(std::atoi(text.c_str()));
 }
 
 std::string with_step(const std::string& text, unsigned step) {
@@ -107,7 +108,7 @@ void LcecTable::read(const TableWords& words) {
     }
 }
 
-/// Reads `NAME[,NAME...] PRODUCT [N] [OPTION=VALUE]...`.
+/// Reads `NAME[,NAME...] PRODUCT [N [M]] [OPTION=VALUE]...`.
 void LcecTable::read_row(const TableWords& words) {
     LcecDevice device;
     device.vendor = section_.vendor;
@@ -116,7 +117,8 @@ void LcecTable::read_row(const TableWords& words) {
     for (std::size_t i = 2; i < words.size(); ++i) {
         const std::size_t equals = words[i].find('=');
         if (equals == std::string::npos) {
-            device.count = count_of(device, words[i]);
+            device.second_count = count_of(device, words[i]);
+            device.count = device.count == 0 ? device.second_count : device.count;
         } else {
             device.options.emplace_back(words[i].substr(0, equals), words[i].substr(equals + 1));
         }

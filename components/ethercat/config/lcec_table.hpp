@@ -57,7 +57,7 @@ private:
 TableWords split(std::string_view text, char separator);
 /// Returns the value of hexadecimal digits; 0 for other text.
 std::uint32_t hexadecimal(const std::string& text);
-/// Returns a number of repetitions: `8`, or `N`, which is the device's.
+/// Returns a number of repetitions: `8`, or `N` or `M`, which are the device's.
 unsigned count_of(const LcecDevice&, const std::string& text);
 /// Replaces `##` with the number of a step from 1, `#+8` with that from 8, and `#` with that from 0.
 std::string with_step(const std::string& text, unsigned step);

@@ -51,6 +51,18 @@ TEST(LcecTable, Values_replace_their_name_as_words_and_as_bits) {
                                          "0: pdo 1a00 6000:01/8{red=1,green=2} 6000:02/8"}));
 }
 
+TEST(LcecTable, Second_count_is_that_of_the_row_or_the_first) {
+    const LcecTable table(
+        "shape io\n"
+        "  N* in #\n"
+        "  M* out #\n"
+        "devices io 00000002\n"
+        "  A 00000001 1 2\n"
+        "  B 00000002 1\n");
+    EXPECT_EQ(lines_of(table, 0), (Lines{"0: in #", "0: out #", "1: out #"}));
+    EXPECT_EQ(lines_of(table, 1), (Lines{"0: in #", "0: out #"}));
+}
+
 TEST(LcecTable, Names_count_from_0_from_1_or_from_a_number) {
     EXPECT_EQ(with_step("din-#", 3), "din-3");
     EXPECT_EQ(with_step("ch##x", 3), "ch4x");
