@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # packages: ethercat
 """hal doctor --interface: findings, the round trip over a veth pair, and settings that are restored however the program ends."""
+
 import ctypes
 import fcntl
 import json
@@ -116,6 +117,41 @@ class DoctorInterface(Case):
         program = self.hold()
         program.kill()
         program.wait(TIMEOUT)
+        self.restored()
+
+    def sysfs(self):
+        """The folder of m0 in sysfs, which shows the interfaces of the network it was mounted in."""
+        folder = Path("/sys/class/net/m0")
+        if not folder.exists():
+            mounted = subprocess.run(
+                ["mount", "-t", "sysfs", "sysfs", "/sys"], capture_output=True, text=True
+            )
+            if mounted.returncode != 0:
+                self.skipTest("sysfs cannot be mounted here: " + mounted.stderr.strip())
+            self.addCleanup(subprocess.run, ["umount", "/sys"], check=True)
+        return folder
+
+    def test_postponed_frames_are_changed_and_restored_after_SIGKILL(self):
+        files = {"gro_flush_timeout": "20000", "napi_defer_hard_irqs": "2"}
+        folder = self.sysfs()
+        for name, value in files.items():
+            if not (folder / name).exists():
+                self.skipTest(f"this kernel has no {name}")
+            (folder / name).write_text(value)
+            self.addCleanup((folder / name).write_text, "0")
+
+        def present():
+            return {name: (folder / name).read_text().strip() for name in files}
+
+        self.assertEqual(files, present())
+        text = self.good("doctor", "--interface", "m0", "--seconds", "0")
+        self.assertIn(f"try: echo 0 | sudo tee {folder}/gro_flush_timeout\n", text)
+        self.assertEqual(files, present())
+        program = self.hold()
+        self.assertEqual({name: "0" for name in files}, present())
+        program.kill()
+        program.wait(TIMEOUT)
+        wait_until(lambda: present() == files, "the files are restored")
         self.restored()
 
     def test_settings_are_restored_when_the_observer_was_killed(self):
