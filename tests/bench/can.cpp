@@ -136,7 +136,7 @@ struct Measured {
     /// no stack at either side, our master, our device, no wire, Python's master
     Figures reference, master, slave, memory, foreign;
     int rounds = 0;
-    bool python = false;  ///< foreign was measured
+    std::string python;  ///< foreign was measured with it
 };
 
 Measured measure(const Options& options, const Rig& rig) {
@@ -152,7 +152,7 @@ Measured measure(const Options& options, const Rig& rig) {
     const std::string script = files.file("master.py", python_master);
     Measured all;
     all.rounds = options.quick ? 2 : 5;
-    all.python = run({.arguments = {"python3", "-c", "import can, canopen"}}).status == 0;
+    all.python = find_python("can, canopen");
     for (int n = 0; n < all.rounds; ++n) {
         all.reference.read(pair(neutral_slave, neutral_master));
         all.master.read(pair(neutral_slave, our_master));
@@ -171,8 +171,8 @@ Measured measure(const Options& options, const Rig& rig) {
             figures->read(text);
         }
         all.memory.read(run({.arguments = {rig.ours(), "memory", part}, .everywhere = true}).out);
-        if (all.python) {
-            all.foreign.read(pair(neutral_slave, rig.program({"python3", script, name,
+        if (!all.python.empty()) {
+            all.foreign.read(pair(neutral_slave, rig.program({all.python, script, name,
                                                               options.quick ? "500" : "2000"})));
         }
     }
@@ -234,10 +234,10 @@ void tell_without_wire(const Measured& all, Report& report) {
 }
 
 void tell_beside_python(const Measured& all, Report& report) {
-    if (!all.python) {
+    if (all.python.empty()) {
         return report.note(
-            "the Python package canopen is not installed: python3 -m pip install canopen "
-            "python-can");
+            "no Python with the packages canopen and python-can; ./hal test installs them, "
+            "HALCYON_PYTHON names one");
     }
     for (const auto& [figure, what] : {std::pair{"exp_up", "expedited upload, /s"},
                                        {"exp_up_cpu", "its CPU, us"},

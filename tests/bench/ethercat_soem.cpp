@@ -12,12 +12,7 @@ namespace {
 
 /// A program of SOEM by its Python package: the same drives with the PDOs they have by default, the
 /// time of the reference clock in each frame.
-constexpr const char* soem_program = R"(import json, sys, time
-try:
-    import pysoem
-except ImportError:
-    print("missing", flush=True)
-    sys.exit()
+constexpr const char* soem_program = R"(import sys, time, pysoem
 master = pysoem.Master()
 master.open(sys.argv[1])
 began = time.perf_counter()
@@ -65,13 +60,14 @@ Soem without(const char* why) {
 Soem soem(const Options& options, const std::string& here, const std::string& there,
           const std::string& line) {
     const int last = options.cpu, other = last > 0 ? last - 1 : last;
-    const std::string python = find_program("python3");
+    const std::string python = find_python("pysoem");
     const std::string chrt = find_program("chrt");
 
     const std::string taskset = find_program("taskset");
-    if (python.empty() || chrt.empty() || taskset.empty()) {
-        return without("python3, chrt or taskset is missing");
+    if (python.empty()) {
+        return without("no Python with pysoem; ./hal test installs it, HALCYON_PYTHON names one");
     }
+    if (chrt.empty() || taskset.empty()) return without("chrt or taskset is missing");
     Slaves slaves(there, line);
     slaves.start(Slaves::Mode::emulated, other);
     const TemporaryFolder folder;
@@ -82,10 +78,7 @@ Soem soem(const Options& options, const std::string& here, const std::string& th
                  true},
                 true);
     const auto first = child.line(60'000);
-    if (!first || *first == "missing") {
-        return without(first ? "pysoem is not installed (pip install pysoem)"
-                             : "it did not bring them to OP");
-    }
+    if (!first) return without("it did not bring them to OP");
     Soem result;
     if (double ms = 0; std::sscanf(first->c_str(), "ready %lf", &ms) == 1) {
         result.start_ms = ms;

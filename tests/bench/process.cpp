@@ -124,6 +124,20 @@ Finished run(const Start& start, double max_ms) {
     return finished;
 }
 
+std::string find_python(const std::string& packages) {
+    const auto has_them = [&](const std::string& python) {
+        return run({.arguments = {python, "-c", "import " + packages}}).status == 0;
+    };
+    if (const char* const named = std::getenv("HALCYON_PYTHON")) {
+        return has_them(named) ? named : "";
+    }
+    for (const std::string& python :
+         {find_program("python3"), std::string(HALCYON_SOURCE "/build/peers/bin/python")}) {
+        if (!python.empty() && has_them(python)) return python;
+    }
+    return "";
+}
+
 Child::Child(const Start& start, bool talk) {
     if (!talk) {
         pid_ = spawn(start, -1, -1);

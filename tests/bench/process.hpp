@@ -53,6 +53,10 @@ private:
     std::string read_;
 };
 
+/// A Python with these packages, as in "can, canopen": the one that HALCYON_PYTHON names, else
+/// python3, else the one in build/peers, where `./hal test` installs them; empty when it has not.
+std::string find_python(const std::string& packages);
+
 /// A folder below the system's temporary one that everybody may enter, removed with its owner.
 class TemporaryFolder {
 public:
