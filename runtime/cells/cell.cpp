@@ -133,6 +133,9 @@ Span Cell::place(std::size_t node, Span span) {
 
 void Cell::report(Diagnostics& found, Output& output) const {
     if (!found.all().empty() && options_.level != Level::nothing) {
+        if (options_.observer) {
+            options_.observer->reported(found, texts_);
+        }
         output.err(render(found, texts_, options_.color));
     }
 }

@@ -16,6 +16,9 @@ namespace hal {
 
 void print_diagnostics(const Diagnostics& diagnostics, const Shell& shell, Output& output) {
     if (diagnostics.all().empty() || shell.options.level == Level::nothing) return;
+    if (shell.options.observer) {
+        shell.options.observer->reported(diagnostics, shell.session().sources);
+    }
     output.err(render(diagnostics, shell.session().sources, shell.options.color));
 }
 

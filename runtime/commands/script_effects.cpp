@@ -164,6 +164,9 @@ void ScriptEffects::report(Diagnostics& found, const ScriptOutcome& outcome) {
         }
     }
     if (!shown.all().empty()) {
+        if (options.observer) {
+            options.observer->reported(shown, state_.session.sources);
+        }
         output_.err(render_shown(shown, outcome));
     } else if (options.level >= Level::results && outcome.edits > 0 && outcome.took_effect) {
         output_.err(counted(outcome.edits, "edit") + " took effect\n");

@@ -89,6 +89,9 @@ ParsedText ScriptTexts::parse(std::uint32_t source) {
     if (files <= 1 && is_file(source)) {
         keep_part(source, parsed);
     }
+    if (shell_.options.observer) {
+        shell_.options.observer->parsed(session.sources, source, parsed.commands);
+    }
     return parsed;
 }
 

@@ -18,8 +18,10 @@
 
 namespace hal {
 
+class Diagnostics;
 class Ini;
 class Session;
+class Sources;
 struct Command;
 
 /// Where the text of commands goes.
@@ -52,6 +54,18 @@ public:
     bool is_process() const override { return true; }
 };
 
+/// Receives what a shell reads and reports as data: for editors. Called with the session's lock
+/// held. [setup]
+class ShellObserver {
+public:
+    virtual ~ShellObserver() = default;
+    /// A text was parsed; of a netlist for several machines, these are the commands of one.
+    virtual void parsed(const Sources& sources, std::uint32_t source,
+                        const std::vector<Command>& commands) = 0;
+    /// These diagnostics are printed, the similar names in them included.
+    virtual void reported(const Diagnostics& diagnostics, const Sources& sources) = 0;
+};
+
 /// Verbosity: `-Q`, `-q` (the default), `-v`, `-V`.
 enum class Level { nothing, errors, results, debug };
 
@@ -71,6 +85,7 @@ struct ShellOptions {
     std::string node = {};
     /// what relative paths of source, save, loadusr are relative to; empty: the process's own
     std::string directory = {};
+    ShellObserver* observer = nullptr;  ///< outlives the shell; nullptr: none
 };
 
 /// Which commands of a netlist run: LinuxCNC's TWOPASS does the loads of all files before anything

@@ -13,6 +13,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "hal/abi.h"
+
+/// Defined by `hal lsp` only: passes the text that an editor has of the file at `path`, which takes
+/// precedence over what is on the disk, to `take`. Returns false for a file that no editor has open.
+/// [setup]
+extern "C" HAL_EXPORT __attribute__((weak)) bool hal_editor_text(
+    const char* path, void (*take)(void* bytes, const char* text, std::size_t size), void* bytes);
+
 namespace hal {
 
 /// What kind of file it is, in words; empty for a regular file. [any]
@@ -34,6 +42,10 @@ inline bool names_descriptor(std::string_view path) {
 /// `descriptors`, a file that was opened for this process (/dev/fd/N) may be a pipe, too. [setup]
 inline bool read_regular_file(const std::string& path, std::size_t max_bytes, std::string& bytes,
                               bool descriptors = false) {
+    const auto take = [](void* taken, const char* text, std::size_t size) {
+        static_cast<std::string*>(taken)->assign(text, size);
+    };
+    if (hal_editor_text != nullptr && hal_editor_text(path.c_str(), take, &bytes)) return true;
     const bool any = descriptors && names_descriptor(path);
     const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | (any ? 0 : O_NONBLOCK));
     struct stat about{};
