@@ -41,6 +41,7 @@
 #include "inspect/tdma_status.hpp"
 #include "inspect/top.hpp"
 #include "linuxcnc/linuxcnc.hpp"
+#include "lsp/lsp.hpp"
 #include "manual.hpp"
 #include "panel/panel.hpp"
 #include "record/plot.hpp"
@@ -125,6 +126,9 @@ constexpr Subcommand table[] = {
         "command a running instance: one command, a file of commands, or interactively", true),
     check_command(),
     command<FmtOptions, IN_CORE(run_fmt)>("fmt", "FILE…", "format netlists"),
+    command<LspOptions, IN_TOOLS(run_lsp)>(
+        "lsp", "[--ini FILE] [--name NAME]",
+        "serve an editor: diagnostics, completion, hover, rename (Language Server Protocol)"),
     command<GraphOptions, IN_TOOLS(run_graph)>(
         "graph", "FILE… [-o OUT] [--cluster KIND] [--around NAME [--depth N]]", "draw netlists"),
     command<DocOptions, IN_TOOLS(run_doc)>("doc", "[COMPONENT…] [--all --output DIR]",

@@ -43,6 +43,7 @@ ROWS = {
         "tools/comp",
         "tools/bus",
         "tools/panel",
+        "tools/lsp",
     ],  # the table of subcommands
     "tools/cli": ["runtime/control"],
     "tools/run": ["tools/record", "tools/tcl", "runtime/cells", "runtime/journal"],
@@ -68,6 +69,7 @@ ROWS = {
         "components/modbus/device",
     ],  # hal can, ethercat, node, tdma
     "tools/panel": ["tools/cli"],
+    "tools/lsp": ["tools/run", "tools/doc", "tools/panel"],
     "tools/python": ["runtime/control"],
     "drivers/link": [],
     "drivers/discipline": ["drivers/link", "runtime/sdk"],
@@ -293,6 +295,7 @@ SINGLE = {
         "tools/inspect",
         "tools/comp",
         "tools/panel",
+        "tools/lsp",
     ]
 }  # headers that belong to no folder
 # The table of addresses: the first text of each row is one.

@@ -23,6 +23,7 @@ TABLE_OF_COMMANDS = "tools/commands.cpp"  # includes the options of each command
 INCLUDED_BY_THE_CORE = {
     "runtime/linuxcnc/binary/elf_value.hpp",
     "runtime/linuxcnc/binary/module_host.hpp",
+    "tools/panel/panel_layout.hpp",  # where the package is built
 }
 
 

@@ -24,6 +24,7 @@ public:
             found_.error(code_, at, std::move(sentence), "", std::move(help));
         }
     }
+    const Diagnostics& found() const { return found_; }
     /// Returns all of them as they are printed, in the order of their places.
     std::string text(bool colours) const { return render(found_, sources_, colours); }
 

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "text/diagnostic.hpp"
+
 namespace hal::tools {
 
 struct PanelPin {
@@ -38,6 +40,8 @@ PanelLayout read_panel_file(const std::string& path, const std::string& componen
                             std::string& errors);
 /// The same for a text. `name` is the file in messages.
 PanelLayout read_panel_text(const std::string& text, const std::string& name, std::string& errors);
+/// Returns the errors of a `.panel` text: each span is of source 1.
+Diagnostics check_panel_text(const std::string& text);
 PanelLayout read_pyvcp(const std::string& text, const std::string& name, std::string& errors);
 
 }  // namespace hal::tools

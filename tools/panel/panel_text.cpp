@@ -2,7 +2,6 @@
 // The language of .panel files: a line per widget, `row`, `column` and `frame` up to `end`.
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <fmt/core.h>
 #include <map>
 #include <memory>
@@ -92,8 +91,7 @@ std::optional<double> number_of(std::string_view text) {
 
 class Reader {
 public:
-    /// Errors are appended to `printed` as they are printed.
-    PanelLayout read(const std::string& whole, const std::string& name, std::string& printed) {
+    PanelLayout read(const std::string& whole, const std::string& name) {
         source_ = errors_.add_file(name, whole);
         layout_.root = {{"widget", "vbox"}, {"children", Json::array()}};
         open_.push_back(&layout_.root);
@@ -109,9 +107,9 @@ public:
         if (open_.size() > 1) {
             error(opened_.back(), "this container has no end", "add a line: end");
         }
-        printed += errors_.text(colours(STDERR_FILENO));
         return std::move(layout_);
     }
+    const PanelErrors& errors() const { return errors_; }
 
 private:
     void error(const text::Span& at, const std::string& sentence, const std::string& help = "") {
@@ -426,33 +424,16 @@ void Reader::widget(const Kind& kind, const std::vector<Word>& words) {
 
 PanelLayout read_panel_text(const std::string& text, const std::string& name, std::string& errors) {
     Reader reader;
-    PanelLayout layout = reader.read(text, name, errors);
+    PanelLayout layout = reader.read(text, name);
+    errors += reader.errors().text(colours(STDERR_FILENO));
     reader.assemble(layout.root);
     return layout;
 }
 
-PanelLayout read_panel_file(const std::string& path, const std::string& component,
-                            std::string& errors) {
-    std::string text;
-    if (!read_file(path, text)) {
-        errors += fmt::format("cannot read '{}': {}\n", path, text);
-        return {};
-    }
-    const std::size_t begin = text.find_first_not_of(" \t\r\n");
-    const bool xml = begin != std::string::npos &&
-                     (text[begin] == '<' || static_cast<unsigned char>(text[begin]) == 0xEF);
-    PanelLayout layout = xml ? read_pyvcp(text, path, errors) : read_panel_text(text, path, errors);
-    if (!component.empty()) {
-        layout.component = component;
-    } else if (layout.component.empty()) {
-        layout.component = xml ? "pyvcp" : std::filesystem::path(path).stem().string();
-    }
-    if (!good_instance_name(layout.component)) {
-        errors +=
-            fmt::format("'{}' is not a valid name of a component; choose one: --component NAME\n",
-                        layout.component);
-    }
-    return layout;
+Diagnostics check_panel_text(const std::string& text) {
+    Reader reader;
+    reader.read(text, "panel");
+    return reader.errors().found();
 }
 
 }  // namespace hal::tools
