@@ -90,8 +90,12 @@ std::string CheckedNetlist::path_of(const Sources& sources, std::uint32_t source
     const std::string& name = sources.get(source).name;
     if (name.starts_with('<')) return "";
     if (name == root_.path) return name;
-    const std::string path = canonical_path(resolve_path(name, directory_));
-    return is_file(path) ? path : "";
+    const auto [known, fresh] = paths_.try_emplace(name);
+    if (fresh) {
+        const std::string path = canonical_path(resolve_path(name, directory_));
+        known->second = is_file(path) ? path : "";
+    }
+    return known->second;
 }
 
 const TextDocument& CheckedNetlist::document(Session& session, std::uint32_t source) const {

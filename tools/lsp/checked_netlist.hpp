@@ -86,6 +86,7 @@ private:
     std::set<std::string> files_;
     std::vector<Text> texts_;
     mutable std::map<DocumentKey, TextDocument> documents_;
+    mutable std::map<std::string, std::string> paths_;  // by the name of a source
     bool good_ = false;
 };
 

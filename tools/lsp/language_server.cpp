@@ -31,6 +31,21 @@ const LanguageServer::Request LanguageServer::requests[] = {
     {"shutdown", &LanguageServer::shutdown},
 };
 
+const LanguageServer::Feature LanguageServer::features[] = {
+    {"textDocument/completion", &LanguageFeatures::completion},
+    {"textDocument/hover", &LanguageFeatures::hover},
+    {"textDocument/definition", &LanguageFeatures::definition},
+    {"textDocument/references", &LanguageFeatures::references},
+    {"textDocument/documentHighlight", &LanguageFeatures::highlights},
+    {"textDocument/documentSymbol", &LanguageFeatures::symbols},
+    {"textDocument/prepareRename", &LanguageFeatures::prepare_rename},
+    {"textDocument/rename", &LanguageFeatures::rename},
+    {"textDocument/codeAction", &LanguageFeatures::code_actions},
+    {"textDocument/semanticTokens/full", &LanguageFeatures::all_tokens},
+    {"textDocument/semanticTokens/range", &LanguageFeatures::tokens_of_range},
+    {"textDocument/formatting", &LanguageFeatures::formatting},
+};
+
 const LanguageServer::Notification LanguageServer::notifications[] = {
     {"initialized", &LanguageServer::ignore},
     {"exit", &LanguageServer::end},
@@ -85,23 +100,34 @@ void LanguageServer::handle_message(const Json& message) {
 }
 
 void LanguageServer::answer(const Json& id, const std::string& method, const Json& params) {
-    const auto* const row = std::find_if(std::begin(requests), std::end(requests),
-                                         [&](const Request& one) { return method == one.method; });
-    if (row == std::end(requests)) {
-        return send_error(id, ErrorCode::method_not_found, "unsupported method '" + method + "'");
-    }
-    if (state_ == State::created && method != "initialize") {
-        return send_error(id, ErrorCode::server_not_initialized, "the first request is initialize");
-    }
-    if (shut_down_ || (state_ == State::initialized && method == "initialize")) {
-        return send_error(id, ErrorCode::invalid_request,
-                          "'" + method + "' is not allowed in this state");
-    }
     try {
-        send({{"jsonrpc", "2.0"}, {"id", id}, {"result", (this->*row->answer)(params)}});
+        send({{"jsonrpc", "2.0"}, {"id", id}, {"result", result_of(method, params)}});
     } catch (const RequestError& error) {
         send_error(id, error.code, error.what());
     }
+}
+
+LanguageServer::Json LanguageServer::result_of(const std::string& method, const Json& params) {
+    const auto is_method = [&](const auto& row) { return method == row.method; };
+    const auto* const request = std::find_if(std::begin(requests), std::end(requests), is_method);
+    const auto* const feature = std::find_if(std::begin(features), std::end(features), is_method);
+    if (request == std::end(requests) && feature == std::end(features)) {
+        throw RequestError(ErrorCode::method_not_found, "unsupported method '" + method + "'");
+    }
+    const bool is_initialize = method == "initialize";
+    if (state_ == State::created && !is_initialize) {
+        throw RequestError(ErrorCode::server_not_initialized, "the first request is initialize");
+    }
+    if (shut_down_ || (state_ == State::initialized && is_initialize)) {
+        throw RequestError(ErrorCode::invalid_request,
+                           "'" + method + "' is not allowed in this state");
+    }
+    if (request != std::end(requests)) return (this->*request->answer)(params);
+    // the diagnostics of the newest text do not wait for the answer
+    if (unpublished_ && workspace_.netlist_of(features_.path_of(params))) {
+        publish();
+    }
+    return (features_.*feature->answer)(params);
 }
 
 void LanguageServer::send(const Json& message) { send_(dumped(message)); }
@@ -116,9 +142,12 @@ void LanguageServer::notify(const char* method, Json params) {
     send({{"jsonrpc", "2.0"}, {"method", method}, {"params", std::move(params)}});
 }
 
-int LanguageServer::idle_ms() const { return unpublished_ || workspace_.has_work() ? 0 : -1; }
+int LanguageServer::idle_ms() const {
+    return unpublished_ || workspace_.has_work() || workspace_.has_garbage() ? 0 : -1;
+}
 
 void LanguageServer::work() {
+    if (!unpublished_ && !workspace_.has_work()) return workspace_.clean_up();
     workspace_.work();
     publish();
 }
@@ -159,13 +188,12 @@ void LanguageServer::publish() {
 LanguageServer::Json LanguageServer::initialize(const Json& params) {
     state_ = State::initialized;
     configured({{"settings", protocol::member(params, "initializationOptions")}});
+    Json capabilities = LanguageFeatures::capabilities();
+    capabilities["positionEncoding"] = "utf-16";
+    capabilities["textDocumentSync"] = {
+        {"openClose", true}, {"change", incremental_sync}, {"save", {{"includeText", false}}}};
     return {{"serverInfo", {{"name", "hal lsp"}, {"version", paths::version}}},
-            {"capabilities",
-             {{"positionEncoding", "utf-16"},
-              {"textDocumentSync",
-               {{"openClose", true},
-                {"change", incremental_sync},
-                {"save", {{"includeText", false}}}}}}}};
+            {"capabilities", std::move(capabilities)}};
 }
 
 LanguageServer::Json LanguageServer::shutdown(const Json&) {

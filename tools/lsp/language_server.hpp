@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "lsp/language_features.hpp"
 #include "lsp/protocol.hpp"
 #include "lsp/workspace.hpp"
 
@@ -45,15 +46,21 @@ private:
         const char* method;
         Json (LanguageServer::*answer)(const Json& params);
     };
+    struct Feature {
+        const char* method;
+        Json (LanguageFeatures::*answer)(const Json& params);
+    };
     struct Notification {
         const char* method;
         void (LanguageServer::*handle)(const Json& params);
     };
     static const Request requests[];
+    static const Feature features[];
     static const Notification notifications[];
 
     void handle_message(const Json& message);
     void answer(const Json& id, const std::string& method, const Json& params);
+    Json result_of(const std::string& method, const Json& params);
     void send(const Json& message);
     void send_error(const Json& id, protocol::ErrorCode code, const std::string& text);
     void notify(const char* method, Json params);
@@ -75,6 +82,7 @@ private:
     bool shut_down_ = false;
     bool unpublished_ = false;  // a document has changed since publish()
     Workspace workspace_;
+    LanguageFeatures features_{workspace_};
     std::map<std::string, std::string> published_;  // by URI: the last message
 };
 

@@ -215,8 +215,8 @@ void Workspace::work() {
 }
 
 void Workspace::load(const NetlistRoot& root, Netlist& netlist) {
-    netlist.tolerant.reset();
-    netlist.checked.reset();  // its memory is used again
+    replaced_.push_back(
+        {std::move(netlist.checked), std::move(netlist.tolerant), std::move(netlist.index), false});
     netlist.checked = std::make_unique<CheckedNetlist>(root);
     netlist.changed = false;
     update_roots();
@@ -259,6 +259,16 @@ CheckedNetlist* Workspace::model_of(const std::string& path) {
         netlist.tolerant = without_errors(*checked);
     }
     return netlist.tolerant.get();
+}
+
+const NetlistIndex* Workspace::index_of(const std::string& path) {
+    const CheckedNetlist* const model = model_of(path);
+    if (!model) return nullptr;
+    Netlist& netlist = netlists_.at(model->root());
+    if (!netlist.index) {
+        netlist.index = std::make_unique<NetlistIndex>(*netlist.checked, *model);
+    }
+    return netlist.index.get();
 }
 
 std::unique_ptr<CheckedNetlist> Workspace::without_errors(const CheckedNetlist& checked) const {

@@ -12,6 +12,7 @@
 
 #include "lsp/checked_netlist.hpp"
 #include "lsp/file_diagnostic.hpp"
+#include "lsp/netlist_index.hpp"
 #include "lsp/text_document.hpp"
 
 namespace hal::tools {
@@ -51,8 +52,11 @@ public:
 
     /// True while a netlist has changed since it was loaded.
     bool has_work() const;
-    /// Loads one such netlist.
+    /// Loads one such netlist. What it replaces is kept until clean_up(), because freeing the model
+    /// of a large netlist takes as long as half of loading it.
     void work();
+    bool has_garbage() const { return !replaced_.empty(); }
+    void clean_up() { replaced_.clear(); }
     /// Returns the diagnostics of all netlists by path. Each open document has an entry.
     std::map<std::string, std::vector<FileDiagnostic>> diagnostics() const;
 
@@ -60,11 +64,14 @@ public:
     CheckedNetlist* netlist_of(const std::string& path);
     /// Returns a netlist with the models of the document, as far as its lines have no errors.
     CheckedNetlist* model_of(const std::string& path);
+    /// Returns where the netlist of a document mentions its names; nullptr: it has none.
+    const NetlistIndex* index_of(const std::string& path);
 
 private:
     struct Netlist {
         std::unique_ptr<CheckedNetlist> checked;  // nullptr: not loaded yet
         std::unique_ptr<CheckedNetlist> tolerant;  // without the lines that have errors
+        std::unique_ptr<NetlistIndex> index;
         bool changed = true;
     };
 
@@ -79,6 +86,7 @@ private:
     std::map<std::string, NetlistRoot> static_roots_;  // by path: of find_root()
     std::map<std::string, NetlistRoot> roots_;  // by path
     std::map<NetlistRoot, Netlist> netlists_;
+    std::vector<Netlist> replaced_;
     std::string ini_;
     std::vector<std::string> assumed_;
     std::string last_changed_;

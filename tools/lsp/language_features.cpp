@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: MIT
+#include "lsp/language_features.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include "commands/files.hpp"
+#include "lsp/completion_items.hpp"
+#include "lsp/hover_text.hpp"
+#include "lsp/outline.hpp"
+#include "lsp/quick_fixes.hpp"
+#include "lsp/semantic_tokens.hpp"
+#include "netlist/line.hpp"
+#include "netlist/netlist.hpp"
+
+namespace hal::tools {
+
+using protocol::ErrorCode;
+using protocol::Json;
+using protocol::RequestError;
+
+namespace {
+
+bool is_netlist(const std::string& path) {
+    return path.ends_with(".hal") || !path.starts_with('/');
+}
+
+bool overlap(const TextRange& a, const TextRange& b) {
+    return a.begin <= b.end && b.begin <= a.end;
+}
+
+/// Returns one edit that replaces the lines which differ; nothing when none does.
+std::optional<TextEdit> difference(const TextDocument& before, const TextDocument& after) {
+    if (before.text() == after.text()) return std::nullopt;
+    const std::uint32_t lines = std::min(before.line_count(), after.line_count());
+    std::uint32_t first = 0;
+    while (first < lines && before.line(first) == after.line(first)) {
+        ++first;
+    }
+    std::uint32_t same_end = 0;
+    while (same_end < lines - first && before.line(before.line_count() - 1 - same_end) ==
+                                           after.line(after.line_count() - 1 - same_end)) {
+        ++same_end;
+    }
+    const std::size_t begin = before.line_start(first);
+    const std::size_t end = std::max(begin, before.line_start(before.line_count() - same_end));
+    const std::size_t new_begin = after.line_start(first);
+    const std::size_t new_end =
+        std::max(new_begin, after.line_start(after.line_count() - same_end));
+    return TextEdit{before.range(begin, end), after.text().substr(new_begin, new_end - new_begin)};
+}
+
+}  // namespace
+
+Json LanguageFeatures::capabilities() {
+    return {
+        {"completionProvider", {{"triggerCharacters", {" ", ".", "["}}}},
+        {"hoverProvider", true},
+        {"definitionProvider", true},
+        {"referencesProvider", true},
+        {"documentHighlightProvider", true},
+        {"documentSymbolProvider", true},
+        {"renameProvider", {{"prepareProvider", true}}},
+        {"codeActionProvider", {{"codeActionKinds", {"quickfix"}}}},
+        {"semanticTokensProvider",
+         {{"legend", semantic_legend()}, {"full", true}, {"range", true}}},
+        {"documentFormattingProvider", true},
+    };
+}
+
+const OpenDocument& LanguageFeatures::document_of(const Json& params) const {
+    const OpenDocument* const document =
+        std::as_const(workspace_).find(protocol::text_at(params, "textDocument/uri"));
+    if (!document) throw RequestError(ErrorCode::invalid_params, "the document is not open");
+    return *document;
+}
+
+std::string LanguageFeatures::path_of(const Json& params) const {
+    const OpenDocument* const document =
+        std::as_const(workspace_).find(protocol::text_at(params, "textDocument/uri"));
+    return document ? document->path : "";
+}
+
+std::optional<NamedThing> LanguageFeatures::thing_at(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    const std::size_t offset = document.text.offset(protocol::position_at(params, "position"));
+    const NetlistIndex* const index = workspace_.index_of(document.path);
+    return index ? index->at(document.path, offset) : std::nullopt;
+}
+
+Json LanguageFeatures::completion(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    const TextPosition at = protocol::position_at(params, "position");
+    CheckedNetlist* const model =
+        is_netlist(document.path) ? workspace_.model_of(document.path) : nullptr;
+    if (!model) return {{"isIncomplete", false}, {"items", Json::array()}};
+    return complete_netlist(*model, document.text, at);
+}
+
+Json LanguageFeatures::hover(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    const auto thing = thing_at(params);
+    if (!thing) return nullptr;
+    const std::string text = hover_text(*workspace_.index_of(document.path),
+                                        *workspace_.model_of(document.path), *thing);
+    if (text.empty()) return nullptr;
+    return {{"contents", {{"kind", "markdown"}, {"value", text}}},
+            {"range", protocol::to_json(document.text.range(thing->begin, thing->end))}};
+}
+
+Json LanguageFeatures::location(const Occurrence& mention) const {
+    const TextDocument text = workspace_.text_of(mention.path);
+    return {{"uri", workspace_.uri_of(mention.path)},
+            {"range", protocol::to_json(text.range(mention.begin, mention.end))}};
+}
+
+/// Returns the beginning of the file that a word names.
+Json LanguageFeatures::file_location(const OpenDocument& document, const NamedThing& thing) const {
+    std::string path;
+    std::string text;
+    std::string ignored;
+    const std::string folder = folder_of(document.path);
+    if (!read_netlist(thing.name, folder, path, text, ignored)) return Json::array();
+    return {{"uri", workspace_.uri_of(canonical_path(path))},
+            {"range", protocol::to_json(TextRange{})}};
+}
+
+/// Returns where the INI file has the value of a [SECTION]KEY under the cursor.
+Json LanguageFeatures::ini_location(const OpenDocument& document, std::size_t offset) {
+    const CheckedNetlist* const netlist = workspace_.netlist_of(document.path);
+    if (!netlist) return nullptr;
+    const std::string_view text = document.text.text();
+    const std::size_t line = document.text.line_start(document.text.position(offset).line);
+    for (std::size_t at = text.find('[', line); at <= offset; at = text.find('[', at + 1)) {
+        const Reference reference = reference_at(text, at);
+        const bool contains = at + reference.length >= offset;
+        if (reference.kind != Reference::key || !contains) continue;
+        Session& session = *netlist->sessions().front();
+        const Ini::Entry* const entry = session.ini.find(reference.section, reference.name);
+        if (!entry || !entry->at.known()) return nullptr;
+        const TextDocument& ini = netlist->document(session, entry->at.source);
+        return {{"uri", workspace_.uri_of(netlist->path_of(session.sources, entry->at.source))},
+                {"range", protocol::to_json(ini.range(entry->at.begin, entry->at.end))}};
+    }
+    return nullptr;
+}
+
+Json LanguageFeatures::definition(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    const std::size_t offset = document.text.offset(protocol::position_at(params, "position"));
+    if (Json at = ini_location(document, offset); !at.is_null()) return at;
+    const auto thing = thing_at(params);
+    if (!thing) return nullptr;
+    if (thing->kind == NameKind::file) return file_location(document, *thing);
+    Json found = Json::array();
+    for (const Occurrence& made : workspace_.index_of(document.path)->definitions(*thing)) {
+        if (!made.path.empty()) {
+            found.push_back(location(made));
+        }
+    }
+    return found;
+}
+
+Json LanguageFeatures::references(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    const auto thing = thing_at(params);
+    if (!thing) return Json::array();
+    const Json& with_definitions = protocol::member(params, "context/includeDeclaration");
+    const bool all = !with_definitions.is_boolean() || with_definitions.get<bool>();
+    Json found = Json::array();
+    for (const Occurrence& one : workspace_.index_of(document.path)->mentions(*thing)) {
+        if (!one.path.empty() && (all || !one.defines)) {
+            found.push_back(location(one));
+        }
+    }
+    return found;
+}
+
+Json LanguageFeatures::highlights(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    const auto thing = thing_at(params);
+    Json found = Json::array();
+    if (!thing) return found;
+    for (const Occurrence& one : workspace_.index_of(document.path)->mentions(*thing)) {
+        if (one.path == document.path) {
+            found.push_back(
+                {{"range", protocol::to_json(document.text.range(one.begin, one.end))}});
+        }
+    }
+    return found;
+}
+
+Json LanguageFeatures::symbols(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    const NetlistIndex* const index = workspace_.index_of(document.path);
+    return index ? outline(*index, document.text, document.path) : Json::array();
+}
+
+Json LanguageFeatures::prepare_rename(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    const auto thing = thing_at(params);
+    if (!thing) return nullptr;
+    check_renaming(*workspace_.index_of(document.path), *thing);
+    return {{"range", protocol::to_json(document.text.range(thing->begin, thing->end))},
+            {"placeholder", thing->name}};
+}
+
+Json LanguageFeatures::edits_to_json(const FileEdits& edits) const {
+    Json changes = Json::object();
+    for (const auto& [path, all] : edits) {
+        Json& of_file = changes[workspace_.uri_of(path)] = Json::array();
+        for (const TextEdit& edit : all) {
+            of_file.push_back({{"range", protocol::to_json(edit.range)}, {"newText", edit.text}});
+        }
+    }
+    return {{"changes", std::move(changes)}};
+}
+
+Json LanguageFeatures::rename(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    const auto thing = thing_at(params);
+    if (!thing) throw RequestError(ErrorCode::request_failed, "there is no name under the cursor");
+    return edits_to_json(hal::tools::rename(workspace_, *workspace_.netlist_of(document.path),
+                                            *workspace_.index_of(document.path), *thing,
+                                            protocol::text_at(params, "newName")));
+}
+
+Json LanguageFeatures::code_actions(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    const TextRange range = protocol::range_at(params, "range");
+    const auto uri_of = [this](const std::string& path) { return workspace_.uri_of(path); };
+    const auto all = workspace_.diagnostics();
+    Json actions = Json::array();
+    for (const FileDiagnostic& one : all.at(document.path)) {
+        if (!overlap(one.range, range)) continue;
+        const std::vector<QuickFix> fixes = quick_fixes(one, document.text);
+        for (const QuickFix& fix : fixes) {
+            actions.push_back(
+                {{"title", fix.title},
+                 {"kind", "quickfix"},
+                 {"isPreferred", fixes.size() == 1},
+                 {"diagnostics", {protocol::to_json(one, uri_of)}},
+                 {"edit", edits_to_json({{document.path, {{fix.range, fix.text}}}})}});
+        }
+    }
+    return actions;
+}
+
+Json LanguageFeatures::all_tokens(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    const NetlistIndex* const index = workspace_.index_of(document.path);
+    if (!index || !is_netlist(document.path)) return {{"data", Json::array()}};
+    return semantic_tokens(*index, document.text, document.path,
+                           document.text.range(0, document.text.text().size()));
+}
+
+Json LanguageFeatures::tokens_of_range(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    const TextRange range = protocol::range_at(params, "range");
+    const NetlistIndex* const index = workspace_.index_of(document.path);
+    if (!index || !is_netlist(document.path)) return {{"data", Json::array()}};
+    return semantic_tokens(*index, document.text, document.path, range);
+}
+
+/// As `hal fmt`: a text with a syntax error is left as it is.
+Json LanguageFeatures::formatting(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    if (!is_netlist(document.path)) return Json::array();
+    Sources sources;
+    Diagnostics diagnostics;
+    const std::uint32_t source = sources.add(document.path, document.text.text());
+    std::string formatted = format(sources, source, diagnostics);
+    if (diagnostics.failed()) {
+        throw RequestError(ErrorCode::request_failed,
+                           "not formatted: " + diagnostics.all().front().message);
+    }
+    const auto edit = difference(document.text, TextDocument(std::move(formatted)));
+    if (!edit) return Json::array();
+    return Json::array({{{"range", protocol::to_json(edit->range)}, {"newText", edit->text}}});
+}
+
+}  // namespace hal::tools
