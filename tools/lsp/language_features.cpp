@@ -3,9 +3,13 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fmt/format.h>
+#include <map>
+#include <set>
 #include <utility>
 
 #include "commands/files.hpp"
+#include "lsp/applied_changes.hpp"
 #include "lsp/completion_items.hpp"
 #include "lsp/hover_text.hpp"
 #include "lsp/outline.hpp"
@@ -21,6 +25,8 @@ using protocol::Json;
 using protocol::RequestError;
 
 namespace {
+
+constexpr const char* apply_command = "halcyon.apply";
 
 bool is_netlist(const std::string& path) {
     return path.ends_with(".hal") || !path.starts_with('/');
@@ -66,6 +72,8 @@ Json LanguageFeatures::capabilities() {
         {"semanticTokensProvider",
          {{"legend", semantic_legend()}, {"full", true}, {"range", true}}},
         {"documentFormattingProvider", true},
+        {"inlayHintProvider", true},
+        {"executeCommandProvider", {{"commands", {apply_command}}}},
     };
 }
 
@@ -102,8 +110,15 @@ Json LanguageFeatures::hover(const Json& params) {
     const OpenDocument& document = document_of(params);
     const auto thing = thing_at(params);
     if (!thing) return nullptr;
-    const std::string text = hover_text(*workspace_.index_of(document.path),
-                                        *workspace_.model_of(document.path), *thing);
+    std::string text = hover_text(*workspace_.index_of(document.path),
+                                  *workspace_.model_of(document.path), *thing);
+    if (thing->kind == NameKind::pin || thing->kind == NameKind::signal) {
+        const auto values = machine_.values({thing->name});
+        if (const auto value = values.find(thing->name); value != values.end()) {
+            text += fmt::format("\nvalue in the machine `{}`: **{}**\n", machine_.instance(),
+                                value->second);
+        }
+    }
     if (text.empty()) return nullptr;
     return {{"contents", {{"kind", "markdown"}, {"value", text}}},
             {"range", protocol::to_json(document.text.range(thing->begin, thing->end))}};
@@ -278,6 +293,144 @@ Json LanguageFeatures::formatting(const Json& params) {
     const auto edit = difference(document.text, TextDocument(std::move(formatted)));
     if (!edit) return Json::array();
     return Json::array({{{"range", protocol::to_json(edit->range)}, {"newText", edit->text}}});
+}
+
+namespace {
+
+/// A hint behind a place of a text.
+Json hint(TextPosition at, const std::string& label, const std::string& tooltip) {
+    return {{"position", protocol::to_json(at)},
+            {"label", label},
+            {"tooltip", tooltip},
+            {"paddingLeft", true}};
+}
+
+/// Returns the mentions of pins and signals in a range; of a net line only the signal, whose value
+/// its pins have.
+std::vector<const Occurrence*> mentions_with_values(const std::vector<Occurrence>& all,
+                                                    const TextDocument& text, TextRange range) {
+    const std::size_t begin = text.offset(range.begin);
+    const std::size_t end = text.offset(range.end);
+    std::vector<const Occurrence*> found;
+    std::set<std::uint32_t> lines_with_signal;
+    for (const Occurrence& one : all) {
+        const bool has_value = one.kind == NameKind::pin || one.kind == NameKind::signal;
+        if (!has_value || !one.verbatim || one.end < begin || one.begin > end) continue;
+        const std::uint32_t line = text.position(one.begin).line;
+        if (one.kind == NameKind::signal) {
+            lines_with_signal.insert(line);
+        } else if (lines_with_signal.contains(line)) {
+            continue;
+        }
+        found.push_back(&one);
+    }
+    return found;
+}
+
+/// Returns where a text mentions what a fault is about: a function rather than an instance, an
+/// instance rather than the thread.
+const Occurrence* subject_of(const LiveMachine::Fault& fault, const std::vector<Occurrence>& all) {
+    constexpr NameKind kinds[] = {NameKind::function, NameKind::instance, NameKind::thread};
+    for (const NameKind kind : kinds) {
+        for (const Occurrence& one : all) {
+            const bool is_thread = kind == NameKind::thread && one.name == fault.thread;
+            const bool named = fault.sentence.find(one.name) != std::string::npos;
+            if (one.kind == kind && (named || is_thread)) return &one;
+        }
+    }
+    return nullptr;
+}
+
+}  // namespace
+
+void LanguageFeatures::add_faults(const OpenDocument& document, const NetlistIndex& index,
+                                  Json& all) {
+    const std::vector<Occurrence>& mentions = index.in_text(document.path);
+    std::set<std::uint32_t> lines;
+    for (const LiveMachine::Fault& fault : machine_.faults()) {
+        const Occurrence* const subject = subject_of(fault, mentions);
+        if (!subject) continue;
+        const std::uint32_t line = document.text.position(subject->begin).line;
+        if (!lines.insert(line).second) continue;  // the newest
+        const std::size_t end = document.text.line_start(line) + document.text.line(line).size();
+        all.push_back(hint(document.text.position(end), "fault: " + fault.sentence,
+                           "fault of the machine " + machine_.instance()));
+    }
+}
+
+Json LanguageFeatures::hints(const Json& params) {
+    const OpenDocument& document = document_of(params);
+    const TextRange range = protocol::range_at(params, "range");
+    Json all = Json::array();
+    if (!machine_.connect()) return all;
+    const NetlistIndex* const index = workspace_.index_of(document.path);
+    if (!index) return all;
+    const auto mentions = mentions_with_values(index->in_text(document.path), document.text, range);
+    std::vector<std::string> names;
+    for (const Occurrence* const one : mentions) {
+        names.push_back(one->name);
+    }
+    const std::map<std::string, std::string> values = machine_.values(names);
+    for (const Occurrence* const one : mentions) {
+        const auto value = values.find(one->name);
+        if (value == values.end()) continue;
+        all.push_back(hint(document.text.position(one->end), "= " + value->second,
+                           "value in the machine " + machine_.instance()));
+    }
+    add_faults(document, *index, all);
+    return all;
+}
+
+Json LanguageFeatures::inlay_hints(const Json& params) {
+    hint_params_ = params;
+    hints_ = hints(params);
+    return hints_;
+}
+
+bool LanguageFeatures::hints_have_changed() {
+    if (hint_params_.is_null()) return false;
+    if (path_of(hint_params_).empty()) {
+        hint_params_ = nullptr;
+        return false;
+    }
+    Json now = hints(hint_params_);
+    if (now == hints_) return false;
+    hints_ = std::move(now);
+    return true;
+}
+
+/// The command "halcyon.apply" [URI]: sends the changed lines of a document to the machine. Returns
+/// {"applied":…,"message":…}.
+Json LanguageFeatures::execute_command(const Json& params) {
+    const Json& arguments = protocol::member(params, "arguments");
+    const bool has_uri = arguments.is_array() && !arguments.empty() && arguments[0].is_string();
+    OpenDocument* const document =
+        has_uri ? workspace_.find(arguments[0].get<std::string>()) : nullptr;
+    if (protocol::text_at(params, "command") != apply_command || !document) {
+        throw RequestError(ErrorCode::invalid_params,
+                           std::string("write ") + apply_command + " with the URI of a document");
+    }
+    const CheckedNetlist* const netlist = workspace_.netlist_of(document->path);
+    if (!netlist) throw RequestError(ErrorCode::request_failed, "the document is not a netlist");
+    const Ini& ini = netlist->sessions().front()->ini;
+    const NetlistChanges changes =
+        netlist_changes(document->saved.text(), document->text.text(), ini);
+    std::string message;
+    for (const std::string& reason : changes.not_sent) {
+        message += reason + "\n";
+    }
+    if (changes.removed.empty() && changes.changed.empty()) {
+        return {{"applied", false}, {"message", message + "no line has changed"}};
+    }
+    const LiveMachine::Applied applied =
+        machine_.apply({{"<removed lines>", changes.removed}, {document->path, changes.changed}},
+                       ini, folder_of(document->path));
+    if (!applied.good) return {{"applied", false}, {"message", message + applied.text}};
+    document->saved = document->text;
+    return {{"applied", true},
+            {"message",
+             message + applied.text +
+                 fmt::format("the changes took effect in the machine '{}'", machine_.instance())}};
 }
 
 }  // namespace hal::tools

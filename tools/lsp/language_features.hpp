@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "lsp/live_machine.hpp"
 #include "lsp/netlist_index.hpp"
 #include "lsp/protocol.hpp"
 #include "lsp/renaming.hpp"
@@ -19,8 +20,9 @@ class LanguageFeatures {
 public:
     using Json = protocol::Json;
 
-    /// The workspace must outlive it.
-    explicit LanguageFeatures(Workspace& workspace) : workspace_(workspace) {}
+    /// Both must outlive it.
+    LanguageFeatures(Workspace& workspace, LiveMachine& machine)
+        : workspace_(workspace), machine_(machine) {}
 
     /// Returns what `initialize` states about these requests.
     static Json capabilities();
@@ -39,6 +41,12 @@ public:
     Json all_tokens(const Json& params);
     Json tokens_of_range(const Json& params);
     Json formatting(const Json& params);
+    Json inlay_hints(const Json& params);
+    Json execute_command(const Json& params);
+    /// Returns true when the hints of the last request would differ now.
+    bool hints_have_changed();
+    /// Returns true while hints were requested and a machine is connected.
+    bool has_hints() const { return !hint_params_.is_null() && !machine_.instance().empty(); }
 
 private:
     const OpenDocument& document_of(const Json& params) const;
@@ -49,7 +57,13 @@ private:
     Json file_location(const OpenDocument& document, const NamedThing& thing) const;
     Json ini_location(const OpenDocument& document, std::size_t offset);
 
+    Json hints(const Json& params);
+    void add_faults(const OpenDocument& document, const NetlistIndex& index, Json& all);
+
     Workspace& workspace_;
+    LiveMachine& machine_;
+    Json hint_params_;  // of the last request
+    Json hints_;        // its answer
 };
 
 }  // namespace hal::tools

@@ -16,6 +16,7 @@ using protocol::text_at;
 namespace {
 
 constexpr int incremental_sync = 2;  // TextDocumentSyncKind.Incremental
+constexpr int refresh_ms = 100;  // values beside the lines are not older
 constexpr std::size_t max_diagnostics = 1000;  // of one file
 
 /// Returns the text of a message; what is not valid UTF-8, because a file on the disk is not, is
@@ -29,6 +30,7 @@ std::string dumped(const protocol::Json& message) {
 const LanguageServer::Request LanguageServer::requests[] = {
     {"initialize", &LanguageServer::initialize},
     {"shutdown", &LanguageServer::shutdown},
+    {"workspace/executeCommand", &LanguageServer::execute_command},
 };
 
 const LanguageServer::Feature LanguageServer::features[] = {
@@ -44,6 +46,7 @@ const LanguageServer::Feature LanguageServer::features[] = {
     {"textDocument/semanticTokens/full", &LanguageFeatures::all_tokens},
     {"textDocument/semanticTokens/range", &LanguageFeatures::tokens_of_range},
     {"textDocument/formatting", &LanguageFeatures::formatting},
+    {"textDocument/inlayHint", &LanguageFeatures::inlay_hints},
 };
 
 const LanguageServer::Notification LanguageServer::notifications[] = {
@@ -63,6 +66,7 @@ LanguageServer::LanguageServer(Settings settings, Send send)
         workspace_.set_ini(settings_.ini);
     }
     workspace_.set_assumed(settings_.assumed);
+    machine_.set_name(settings_.machine);
 }
 
 void LanguageServer::handle(std::string_view body) {
@@ -143,13 +147,37 @@ void LanguageServer::notify(const char* method, Json params) {
 }
 
 int LanguageServer::idle_ms() const {
-    return unpublished_ || workspace_.has_work() || workspace_.has_garbage() ? 0 : -1;
+    if (unpublished_ || workspace_.has_work() || workspace_.has_garbage()) return 0;
+    return can_refresh_hints_ && features_.has_hints() ? refresh_ms : -1;
 }
 
 void LanguageServer::work() {
-    if (!unpublished_ && !workspace_.has_work()) return workspace_.clean_up();
-    workspace_.work();
-    publish();
+    if (unpublished_ || workspace_.has_work()) {
+        workspace_.work();
+        publish();
+    } else if (workspace_.has_garbage()) {
+        workspace_.clean_up();
+    } else {
+        refresh_hints();
+    }
+}
+
+/// Asks the client to request the values beside the lines again, when they have changed.
+void LanguageServer::refresh_hints() {
+    if (!can_refresh_hints_ || !features_.hints_have_changed()) return;
+    send({{"jsonrpc", "2.0"},
+          {"id", "refresh-" + std::to_string(++refreshes_)},
+          {"method", "workspace/inlayHint/refresh"}});
+}
+
+/// Runs a command and shows its result to the user.
+LanguageServer::Json LanguageServer::execute_command(const Json& params) {
+    constexpr int error = 1;  // MessageType of Language Server Protocol 3.17
+    constexpr int info = 3;
+    Json result = features_.execute_command(params);
+    notify("window/showMessage", {{"type", result["applied"].get<bool>() ? info : error},
+                                  {"message", result["message"]}});
+    return result;
 }
 
 /// Sends the diagnostics of each file for which they have changed.
@@ -187,6 +215,9 @@ void LanguageServer::publish() {
 
 LanguageServer::Json LanguageServer::initialize(const Json& params) {
     state_ = State::initialized;
+    const Json& refresh =
+        protocol::member(params, "capabilities/workspace/inlayHint/refreshSupport");
+    can_refresh_hints_ = refresh.is_boolean() && refresh.get<bool>();
     configured({{"settings", protocol::member(params, "initializationOptions")}});
     Json capabilities = LanguageFeatures::capabilities();
     capabilities["positionEncoding"] = "utf-16";
@@ -260,7 +291,7 @@ void LanguageServer::configured(const Json& params) {
     }
     const Json& machine = protocol::member(own, "machine");
     if (machine.is_string()) {
-        settings_.machine = machine.get<std::string>();
+        machine_.set_name(machine.get<std::string>());
     }
 }
 

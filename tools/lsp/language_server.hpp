@@ -65,9 +65,11 @@ private:
     void send_error(const Json& id, protocol::ErrorCode code, const std::string& text);
     void notify(const char* method, Json params);
     void publish();
+    void refresh_hints();
 
     Json initialize(const Json& params);
     Json shutdown(const Json& params);
+    Json execute_command(const Json& params);
     void ignore(const Json& params);
     void end(const Json& params);
     void opened(const Json& params);
@@ -82,7 +84,10 @@ private:
     bool shut_down_ = false;
     bool unpublished_ = false;  // a document has changed since publish()
     Workspace workspace_;
-    LanguageFeatures features_{workspace_};
+    LiveMachine machine_;
+    LanguageFeatures features_{workspace_, machine_};
+    bool can_refresh_hints_ = false;
+    std::int64_t refreshes_ = 0;  // requests of this server
     std::map<std::string, std::string> published_;  // by URI: the last message
 };
 
