@@ -45,18 +45,19 @@ struct Modbus : hal::bus::BusComponent {
         const auto* host = hal::extension<hal_background>(HAL_BACKGROUND);
         is_virtual_ = host != nullptr && host->is_virtual != 0;
         const hal::line::Description line = hal::line::describe(arguments_.bus.link);
-        if (is_virtual_ && !line.in_memory &&
-            hal::link::journal_mode() != hal::link::JournalMode::executes_again) {
+        const bool replays = hal::link::journal_mode() == hal::link::JournalMode::executes_again;
+        if (is_virtual_ && !line.in_memory && !replays) {
             throw std::runtime_error("'" + arguments_.bus.link +
                                      "' is a real line, and a simulation has no time in which its "
                                      "slaves could answer; write link=sim:NAME, or use hal run");
         }
         has_guardian_ = !is_virtual_ && !line.in_memory && arguments_.bus.guardian &&
                         arguments_.bus.has_stops();
-        if (has_guardian_) {
+        if (has_guardian_ && !replays) {
             start_guardian();
         } else {
-            start_local();
+            // the values of a line are not in a journal, and replaying one opens no real line
+            start_local(replays ? "sim:replay" : arguments_.bus.link);
         }
         begin_cycles();
         is_alive_.store(true);
@@ -144,7 +145,7 @@ private:
     }
     /// `elapsed`: time since the last cycle, as far as this thread ran. [realtime]
     void watch_guardian(std::int64_t elapsed_ns) noexcept {
-        if (!has_guardian_) return;
+        if (!guardian_) return;
         if (!is_alive_.load(std::memory_order_acquire)) {
             if (!guardian_fault_.lasts()) {
                 tell({Event::guardian_lost, 0, 0, 0});
@@ -199,8 +200,8 @@ private:
         }
     }
 
-    void start_local() {
-        auto opened = hal::line::open(arguments_.bus.link, arguments_.bus.line);
+    void start_local(const std::string& link) {
+        auto opened = hal::line::open(link, arguments_.bus.line);
         if (!opened) throw std::runtime_error(opened.problem);
         const std::size_t size = Image::size_of(arguments_.bus, arguments_.plan);
         if (memory_.empty()) {
