@@ -29,6 +29,9 @@ Function read_function(Table table) noexcept {
     }
 }
 
+/// Exceptions of a gateway that did not reach the slave.
+bool is_of_gateway(std::uint8_t code) noexcept { return code == 10 || code == 11; }
+
 /// The registers of a value in the data of an answer; 16 bits are one register, the first bit the
 /// least significant.
 Registers registers_at(const PlannedValue& p, std::span<const std::uint8_t> data) noexcept {
@@ -63,6 +66,40 @@ Master::Master(const Bus& bus, const Plan& plan, Image image)
         max_cells = std::max(max_cells, cells_of(n));
     }
     job_.cells.reserve(max_cells);
+    for (std::uint32_t n = 0; n < slaves_.size(); ++n) {
+        make_sync(n);
+    }
+    has_reads_ = std::any_of(plan.telegrams.begin(), plan.telegrams.end(),
+                             [](const Telegram& t) { return t.kind == Telegram::Kind::read; });
+}
+
+/// Fewer registers than a telegram reads, if no other telegram reads as many; else more, which the
+/// slave may reject.
+void Master::make_sync(std::uint32_t slave) {
+    const Telegram* longest = nullptr;
+    const auto is_read = [&](const Telegram& t) {
+        return t.slave == slave && t.kind == Telegram::Kind::read && t.table != Table::huanyang;
+    };
+    for (const Telegram& t : plan_.telegrams) {
+        if (is_read(t) && (longest == nullptr || t.count > longest->count)) {
+            longest = &t;
+        }
+    }
+    if (longest == nullptr) return;
+    // bits come in bytes: counts of the same number of bytes have the same answers
+    const std::uint16_t unit = is_bits(longest->table) ? 8 : 1;
+    const auto units = [&](const Telegram& t) { return (t.count + unit - 1) / unit; };
+    std::uint16_t count = 1;
+    while (std::any_of(plan_.telegrams.begin(), plan_.telegrams.end(), [&](const Telegram& t) {
+        return is_read(t) && t.table == longest->table && units(t) == count;
+    })) {
+        ++count;
+    }
+    slaves_[slave].is_sync_valid = count <= units(*longest);
+    slaves_[slave].needs_sync = count > units(*longest);  // to know whether it answers
+    const auto bits_or_registers = static_cast<std::uint16_t>((count - 1) * unit + 1);
+    slaves_[slave].sync =
+        read_request(read_function(longest->table), longest->address, bits_or_registers);
 }
 
 void Master::attach(line::Line& line, std::int64_t now_ns) {
@@ -72,10 +109,8 @@ void Master::attach(line::Line& line, std::int64_t now_ns) {
     silence_ns_ = serial ? silence_ns(bus_.line) : 0;
     quiet_ns_ = std::max(burst_ns, 2 * silence_ns_);
     free_at_ns_ = now_ns + silence_ns_;
-    const bool has_reads =
-        std::any_of(plan_.telegrams.begin(), plan_.telegrams.end(),
-                    [](const Telegram& t) { return t.kind == Telegram::Kind::read; });
-    is_verified_ = framing_ == Framing::tcp || !has_reads;
+    is_echo_known_ = framing_ == Framing::tcp;
+    is_verified_ = framing_ == Framing::tcp;
     write_from_ns_ = now_ns + verify_ns;
     for (TelegramState& state : telegrams_) {
         state.due_ns = now_ns;
@@ -168,6 +203,8 @@ bool Master::follow_line(std::int64_t now_ns) noexcept {
     for (TelegramState& state : telegrams_) {
         state.is_sent = false;
     }
+    has_echo_ = false;  // it may be another adapter
+    is_echo_known_ = framing_ == Framing::tcp;
     for (std::uint32_t n = 0; n < slaves_.size() && is_open; ++n) {
         repeat_stop(n, now_ns);
     }
@@ -236,7 +273,13 @@ bool Master::accept(const Found& found, std::int64_t now_ns) noexcept {
     const Answer answer = decode(job_.requests[job_.next], found.pdu, slave.is_huanyang());
     switch (answer.verdict) {
     case Verdict::foreign: return false;
-    case Verdict::exception: fail(Failure::exception, answer.code, now_ns); return true;
+    case Verdict::exception:
+        if (is_sync() && !is_of_gateway(answer.code)) {
+            succeed({}, now_ns);
+        } else {
+            fail(Failure::exception, answer.code, now_ns);
+        }
+        return true;
     case Verdict::good: succeed(answer.data, now_ns); return true;
     }
     return false;
@@ -249,8 +292,13 @@ void Master::succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) no
     header.telegrams.fetch_add(1, std::memory_order_relaxed);
     header.busy_ns.fetch_add(now_ns - sent_at_ns_ + silence_ns_, std::memory_order_relaxed);
     answered(job_.slave, now_ns);
+    if (job_.telegram == echo_job) return end_echo_job();
+    if (is_sync()) {
+        slaves_[job_.slave].needs_sync = false;
+        slaves_[job_.slave].is_sync_valid = true;
+    }
     if (++job_.next < job_.count) {
-        if (held_ && job_.telegram != stop_job) {
+        if (held_ && writes_set_points()) {
             end_of_job();  // the rest of a command must not come behind the stop
         }
         return;
@@ -260,6 +308,7 @@ void Master::succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) no
     TelegramState& own = telegrams_[job_.telegram];
     clear_rejections(job_.telegram);
     if (t.kind == Telegram::Kind::read) {
+        is_echo_known_ = true;
         is_verified_ = true;
         store(t, data);
     } else {
@@ -316,8 +365,15 @@ void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexc
     buffer_.clear();
     image_.header().busy_ns.fetch_add(now_ns - sent_at_ns_, std::memory_order_relaxed);
     free_at_ns_ = now_ns + silence_ns_;
-    // 10 and 11: a gateway did not reach the slave
-    const bool is_answer = failure == Failure::exception && code != 10 && code != 11;
+    const bool is_answer = failure == Failure::exception && !is_of_gateway(code);
+    if (job_.telegram == echo_job) {
+        if (is_answer) {
+            answered(job_.slave, now_ns);
+        } else if (framing_ == Framing::rtu) {
+            free_at_ns_ = now_ns + slave.timeout_ns;
+        }
+        return end_echo_job();
+    }
     if (is_answer) {
         own.exceptions.fetch_add(1, std::memory_order_relaxed);
         touch(job_.slave);
@@ -336,6 +392,7 @@ void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexc
         if (framing_ == Framing::rtu) {
             // a late answer would be that of the next request: nothing in RTU distinguishes them
             free_at_ns_ = now_ns + slave.timeout_ns;
+            note_timeout();
         }
     }
     ++state.failures;
@@ -354,6 +411,46 @@ void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexc
     end_of_job();
 }
 
+/// Returns whether a job must not go on while a stop lasts.
+bool Master::writes_set_points() const noexcept {
+    return job_.telegram < telegrams_.size() &&
+           plan_.telegrams[job_.telegram].kind != Telegram::Kind::read;
+}
+
+/// The answer to the request on the line, an RTU line, may still come.
+void Master::note_timeout() noexcept {
+    if (job_.telegram >= telegrams_.size() || writes_set_points()) return;
+    SlaveState& state = slaves_[job_.slave];
+    if (state.sync.size == 0) return;
+    is_echo_known_ = true;
+    // one that the slave may not answer at all is sent once
+    state.needs_sync = !is_sync() || state.is_sync_valid;
+}
+
+/// A read of what is written, whose answer does not matter, on a line without other reads or before
+/// them: an adapter that echoes is known by it. Returns false on a line of Huanyang drives, whose
+/// answers may equal their requests.
+bool Master::begin_echo_job() noexcept {
+    for (const Telegram& t : plan_.telegrams) {
+        if (t.table == Table::huanyang || t.kind == Telegram::Kind::drive) continue;
+        end_of_job();
+        has_job_ = true;
+        job_.telegram = echo_job;
+        job_.slave = t.slave;
+        job_.add(read_request(read_function(t.table), t.address, t.count));
+        return true;
+    }
+    end_echo_job();
+    return false;
+}
+
+/// Without an echo and without an answer there is no echo.
+void Master::end_echo_job() noexcept {
+    is_echo_known_ = true;
+    is_verified_ = is_verified_ || !has_reads_;
+    end_of_job();
+}
+
 /// An exception: the slave is there and does not do what was asked.
 void Master::reject(std::uint8_t code, std::int64_t now_ns) noexcept {
     if (job_.telegram == stop_job) {
@@ -361,6 +458,7 @@ void Master::reject(std::uint8_t code, std::int64_t now_ns) noexcept {
         return fail_stop(Failure::exception, now_ns);
     }
     is_verified_ = true;  // an exception is not an echo
+    is_echo_known_ = true;
     image_.tell({Event::exception, job_.slave, job_.telegram, code});
     count_rejection(job_.telegram);
     const Telegram& t = plan_.telegrams[job_.telegram];
@@ -479,6 +577,7 @@ void Master::report_unconfirmed(std::uint32_t slave, std::int64_t now_ns) noexce
 
 void Master::end_of_job() noexcept {
     has_job_ = false;
+    job_.begins_with_sync = false;
     job_.count = 0;
     job_.next = 0;
     job_.cells.clear();
@@ -514,6 +613,8 @@ bool Master::is_writable(std::uint32_t telegram) const noexcept {
 }
 
 bool Master::choose(std::int64_t now_ns) noexcept {
+    const bool needs_echo_job = !is_echo_known_ && (held_ || !has_reads_);
+    if (needs_echo_job && begin_echo_job()) return true;
     if (stopping_) return choose_stop();
     if (choose_repeated_stop(now_ns)) return true;
     if (choose_set_point(now_ns)) {
@@ -668,7 +769,13 @@ bool Master::begin(std::uint32_t telegram, std::int64_t now_ns) noexcept {
     }
     bool has_requests = true;
     switch (t.kind) {
-    case Telegram::Kind::read: make_read(t); break;
+    case Telegram::Kind::read:
+        if (framing_ == Framing::rtu && slaves_[t.slave].needs_sync) {
+            job_.add(slaves_[t.slave].sync);
+            job_.begins_with_sync = true;
+        }
+        make_read(t);
+        break;
     case Telegram::Kind::write: has_requests = make_write(t); break;
     case Telegram::Kind::drive: make_drive(t); break;
     }

@@ -46,6 +46,7 @@ public:
 private:
     static constexpr std::size_t max_requests = 10;
     static constexpr std::uint32_t stop_job = UINT32_MAX;
+    static constexpr std::uint32_t echo_job = UINT32_MAX - 1;  ///< a read that shows an echo
 
     enum class StopState : std::uint8_t {
         none,
@@ -59,6 +60,11 @@ private:
         bool is_known = false;  ///< an answer has arrived, or it was reported offline
         bool is_corrupt = false;  ///< reported
         std::uint32_t rejected_telegrams = 0;
+        /// A read that no answer to another read of the slave can answer. It comes first after a
+        /// timeout on RTU: a slave answers in order, so that its answer is behind all late ones.
+        Pdu sync;
+        bool is_sync_valid = false;  ///< the slave has the registers, or has answered it
+        bool needs_sync = false;
         StopState stop = StopState::none;
         std::size_t stop_next = 0;  ///< the next stop telegram
         std::uint32_t stop_attempts = 0;
@@ -81,6 +87,7 @@ private:
         std::uint32_t telegram = 0;
         std::uint32_t slave = 0;
         std::size_t stop_index = 0;  ///< of a stop telegram
+        bool begins_with_sync = false;
         std::array<Pdu, max_requests> requests{};
         std::size_t count = 0;
         std::size_t next = 0;
@@ -118,6 +125,13 @@ private:
         image_.slave(slave).activity.fetch_add(1, std::memory_order_release);
         image_.header().activity.fetch_add(1, std::memory_order_release);
     }
+
+    void make_sync(std::uint32_t slave);
+    bool is_sync() const noexcept { return job_.begins_with_sync && job_.next == 0; }
+    bool writes_set_points() const noexcept;
+    void note_timeout() noexcept;
+    bool begin_echo_job() noexcept;
+    void end_echo_job() noexcept;
 
     bool choose(std::int64_t now_ns) noexcept;
     bool choose_stop() noexcept;
@@ -164,6 +178,8 @@ private:
     bool waits_ = false;  // for an answer
     bool line_was_open_ = false;
     bool line_reported_ = false;
+    bool has_reads_ = false;  // by which an echo is known
+    bool is_echo_known_ = false;  // a read was answered, echoed or timed out
     bool has_echo_ = false;
     bool echo_is_due_ = false;  // the answer to a write has the same bytes
     bool is_verified_ = false;  // a read was answered: an echo is known

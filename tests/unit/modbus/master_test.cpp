@@ -206,6 +206,119 @@ TEST(Master, Late_answer_is_never_the_value_of_another_request) {
     EXPECT_GT(w.image.slave(0).timeouts.load(), 100U);
 }
 
+/// A line on which one answer comes late.
+class LateLine final : public line::Line {
+public:
+    explicit LateLine(std::unique_ptr<line::Line> line) : line_(std::move(line)) {}
+    const line::Description& description() const noexcept override { return line_->description(); }
+    bool is_open(std::int64_t now) noexcept override { return line_->is_open(now); }
+    bool send(std::span<const std::uint8_t> bytes, std::int64_t now) noexcept override {
+        return line_->send(bytes, now);
+    }
+    std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t now) noexcept override {
+        std::array<std::uint8_t, 256> part;
+        const std::size_t received = line_->receive(part, now);
+        held_.insert(held_.end(), part.begin(),
+                     part.begin() + static_cast<std::ptrdiff_t>(received));
+        if (now < until) return 0;
+        const std::size_t count = std::min(bytes.size(), held_.size());
+        std::copy_n(held_.begin(), count, bytes.begin());
+        held_.erase(held_.begin(), held_.begin() + static_cast<std::ptrdiff_t>(count));
+        return count;
+    }
+    std::int64_t sent_until_ns() const noexcept override { return line_->sent_until_ns(); }
+
+    std::int64_t until = 0;  // nothing arrives
+
+private:
+    std::unique_ptr<line::Line> line_;
+    std::vector<std::uint8_t> held_;
+};
+
+/// Reads six values of one shape, each its address, while answers are late, by up to `late_ns`.
+void expect_own_values(const std::string& reads, std::int64_t late_ns) {
+    LateLine* late = nullptr;
+    World w(
+        "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\ntimeout = 50ms\nlost = 20\nmax-gap = 0\n" +
+            reads,
+        {}, [&](std::unique_ptr<line::Line> line) {
+        auto made = std::make_unique<LateLine>(std::move(line));
+        late = made.get();
+        return made;
+    });
+    for (const int address : {10, 20, 30, 40}) {
+        w.slaves->slaves()[0].set("v" + std::to_string(address), address);
+    }
+    w.run(500 * ms);
+    for (int round = 0; round < 20; ++round) {
+        late->until = w.now + late_ns;
+        for (int n = 0; n < 100; ++n) {
+            w.run(10 * ms);
+            for (const int address : {10, 20, 30, 40}) {
+                ASSERT_EQ(w.number("v" + std::to_string(address)), static_cast<unsigned>(address))
+                    << late_ns << " round " << round;
+            }
+        }
+    }
+    EXPECT_GT(w.image.slave(0).timeouts.load(), 5U);
+    EXPECT_EQ(w.image.slave(0).online.load(), 1U);
+}
+
+TEST(Master, Answer_later_than_two_timeouts_is_never_the_value_of_another_request) {
+    const std::string one =
+        "read v10 = holding 10\nread v20 = holding 20\nread v30 = holding 30\n"
+        "read v40 = holding 40\n";
+    const std::string two =
+        "read v10 = holding 10 u32\nread v20 = holding 20 u32\nread v30 = holding 30 u32\n"
+        "read v40 = holding 40 u32\n";
+    for (const std::int64_t late : {120 * ms, 135 * ms, 180 * ms, 260 * ms, 400 * ms}) {
+        expect_own_values(one, late);
+        expect_own_values(two, late);
+    }
+}
+
+/// A slave that does not answer a request for more than one register.
+class IgnoringLine final : public line::Line {
+public:
+    explicit IgnoringLine(std::unique_ptr<line::Line> line) : line_(std::move(line)) {}
+    const line::Description& description() const noexcept override { return line_->description(); }
+    bool is_open(std::int64_t now) noexcept override { return line_->is_open(now); }
+    bool send(std::span<const std::uint8_t> bytes, std::int64_t now) noexcept override {
+        if (bytes[1] == 3 && bytes[5] > 1) return true;
+        return line_->send(bytes, now);
+    }
+    std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t now) noexcept override {
+        return line_->receive(bytes, now);
+    }
+    std::int64_t sent_until_ns() const noexcept override { return line_->sent_until_ns(); }
+
+private:
+    std::unique_ptr<line::Line> line_;
+};
+
+TEST(Master, Slave_that_ignores_unknown_registers_stays_online_after_a_timeout) {
+    // after a timeout two registers are read, and the slave has one
+    World w(
+        "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\ntimeout = 20ms\n"
+        "read a = holding 0 every 50ms\n",
+        {}, [](std::unique_ptr<line::Line> line) {
+        return std::make_unique<IgnoringLine>(std::move(line));
+    });
+    w.slaves->slaves()[0].set("a", 5);
+    w.run(500 * ms);
+    EXPECT_EQ(w.number("a"), 5U);
+    const std::uint32_t before = w.image.slave(0).timeouts.load();
+    EXPECT_LE(before, 1U) << "it is asked once";
+    SlaveFault fault;
+    fault.every = 20;
+    w.slaves->faults().push_back(fault);
+    for (int n = 0; n < 1000; ++n) {
+        w.run(10 * ms);
+        ASSERT_EQ(w.image.slave(0).online.load(), 1U);
+    }
+    EXPECT_GT(w.image.slave(0).timeouts.load(), 5U);
+}
+
 TEST(Master, Corrupted_answer_is_never_a_value) {
     World w(
         "[bus]\nlink = sim:x\nbaud = 115200\n[slave 1 s]\ntimeout = 20ms\nlost = 100\n"
@@ -529,6 +642,36 @@ TEST(Master, Echo_of_a_request_is_not_its_answer) {
     w.run(3 * second);
     EXPECT_EQ(w.image.slave(0).stopped.load(), 1U);
     EXPECT_EQ(w.image.slave(1).stopped.load(), 0U);
+}
+
+TEST(Master, Echo_of_a_write_is_not_its_answer_on_a_line_without_reads) {
+    const auto echoing = [](std::unique_ptr<line::Line> line) {
+        return std::make_unique<EchoLine>(std::move(line));
+    };
+    const std::string bus = "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\n";
+    for (const bool stops_first : {false, true}) {
+        for (const bool is_alive : {false, true}) {
+            World w(bus + "write c = holding 50\nstop = holding 50 7\n", {}, echoing);
+            if (!is_alive) {
+                w.slaves->faults().push_back({});
+            }
+            const auto stop = [&] {
+                w.image.header().stop_held.store(1);
+                w.image.stop(StopReason::estop);
+            };
+            if (stops_first) {
+                stop();
+            }
+            w.image.value(w.value("c")).store(9);
+            w.run(5 * second);
+            EXPECT_EQ(w.image.slave(0).online.load() != 0, is_alive) << stops_first;
+            if (!stops_first) {
+                stop();
+                w.run(3 * second);
+            }
+            EXPECT_EQ(w.image.slave(0).stopped.load() != 0, is_alive) << stops_first;
+        }
+    }
 }
 
 TEST(Master, Slave_that_is_not_on_the_line_is_offline) {
