@@ -23,6 +23,7 @@ void FirmwareMailbox::start(const sii::Mailboxes& mailboxes) noexcept {
     counter_ = 0;
     repeat_ = false;
     resend_newest_ = false;
+    has_parts_ = false;
     running_ = true;
     for (auto& service : services_) {
         service->reset();
@@ -38,12 +39,15 @@ void FirmwareMailbox::run(esc::Pdi& pdi, State state, std::int64_t now_ns) noexc
     send(pdi, now_ns);
 }
 
-/// Queues the next part of a long answer.
+/// Queues the next part of a long answer. A request begins it; when no protocol has a part, there is
+/// none until the next request.
 void FirmwareMailbox::pump() noexcept {
+    if (!has_parts_) return;
     for (auto& service : services_) {
         if (!outbox_.empty()) return;
         service->pump(outbox_);
     }
+    has_parts_ = !outbox_.empty();
 }
 
 bool FirmwareMailbox::send(const coe::Emergency& emergency) noexcept {
@@ -86,6 +90,7 @@ void FirmwareMailbox::answer(std::span<const std::uint8_t> request, State state,
     for (auto& service : services_) {
         const bool available = state != State::boot || service->in_boot();
         if (service->type() == message->type && available) {
+            has_parts_ = true;
             return service->take(*message, state, outbox_);
         }
     }

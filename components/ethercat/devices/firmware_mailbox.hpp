@@ -59,6 +59,7 @@ private:
     bool running_ = false;
     bool repeat_ = false;         ///< repeat request of the master, as last seen
     bool resend_newest_ = false;  ///< as soon as the mailbox is empty
+    bool has_parts_ = false;      ///< a protocol may have another part of an answer
 };
 
 }  // namespace hal::ethercat::devices
