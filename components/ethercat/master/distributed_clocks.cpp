@@ -13,9 +13,12 @@ namespace {
 
 constexpr std::int64_t synchronise_timeout_ns = 5'000 * millisecond;
 
-constexpr std::int64_t sync_start_ns = 100 * millisecond;
+// How far ahead SYNC0 starts: the two writes take a cycle each, and some are repeated. When they took
+// longer, the start is repeated with twice the time.
+constexpr std::int64_t sync_start_ns = 20 * millisecond;
 constexpr std::int64_t sync_start_cycles = 10;
-constexpr std::uint32_t usual_hop_ns = 700;       ///< a slave and a short cable
+constexpr unsigned sync_start_attempts = 5;
+constexpr std::uint32_t usual_hop_ns = 700;  ///< a slave and a short cable
 constexpr std::uint16_t receive_time_bytes = 32;  ///< 0900h to 091Fh
 
 Task<void> read_times(Channel& c, Device& d) noexcept {
@@ -296,17 +299,21 @@ Task<bool> start_sync_signals(Channel& c, Bus& bus, Device& d) noexcept {
     const auto grid = static_cast<std::int64_t>(step);
     // of any length: it begins soon
     const auto shift = static_cast<std::uint64_t>((dc.sync0_shift_ns % grid + grid) % grid);
-    // Each write takes a cycle, and some are repeated: the start must still be in the future when
-    // the unit is activated.
-    const std::int64_t ahead = std::max(sync_start_ns, sync_start_cycles * bus.setup.cycle_ns);
-    const std::uint64_t start =
-        (bus.dc_now() + static_cast<std::uint64_t>(ahead)) / step * step + step + shift;
-    d.sync_begins_ns = c.now_ns() + static_cast<std::int64_t>(start - bus.dc_now());
-    a = co_await write(c, d.slave, registers::dc_start_time, start);
-    if (a.wkc != 1) co_return false;
-    a = co_await write(c, d.slave, registers::dc_activation,
-                       static_cast<std::uint8_t>(dc.assign_activate >> 8));
-    co_return a.wkc == 1;
+    const std::int64_t least = std::max(sync_start_ns, sync_start_cycles * bus.setup.cycle_ns);
+    for (unsigned attempt = 0; attempt < sync_start_attempts; ++attempt) {
+        const auto ahead = static_cast<std::uint64_t>(least << attempt);
+        const std::uint64_t start = (bus.dc_now() + ahead) / step * step + step + shift;
+        d.sync_begins_ns = c.now_ns() + static_cast<std::int64_t>(start - bus.dc_now());
+        a = co_await write(c, d.slave, registers::dc_start_time, start);
+        if (a.wkc != 1) co_return false;
+        a = co_await write(c, d.slave, registers::dc_activation,
+                           static_cast<std::uint8_t>(dc.assign_activate >> 8));
+        if (a.wkc != 1) co_return false;
+        // A unit that is activated after its start time waits until its counter has wrapped.
+        if (c.now_ns() < d.sync_begins_ns) co_return true;
+        co_await write<std::uint8_t>(c, d.slave, registers::dc_activation, 0);
+    }
+    co_return false;
 }
 
 void take_clock(Bus& bus) noexcept {

@@ -117,6 +117,21 @@ TEST(EthercatClocks, Sync_signals_begin_in_the_future_at_any_cycle) {
     }
 }
 
+TEST(EthercatClocks, Sync_signals_start_when_the_start_time_has_passed_before_the_activation) {
+    World w;
+    w.add(0x100);
+    w.begin(with_clocks(1));
+    const auto is_start_written = [&] {
+        return get<std::uint64_t>(w.line.controller(0).memory(registers::dc_start_time)) != 0;
+    };
+    ASSERT_TRUE(w.until(is_start_written));
+    w.now_ns += 100'000'000;  // the host was suspended
+    ASSERT_TRUE(w.operational(500)) << w.log.text();
+    w.run(20);
+    EXPECT_GT(w.line.controller(0).sync().pulses, 5U);
+    EXPECT_EQ(w.log.count(Event::start_up_failed), 0U) << w.log.text();
+}
+
 TEST(EthercatClocks, A_clock_that_leaves_the_window_in_OP_is_reported_once) {
     World w;
     for (unsigned n = 0; n < 2; ++n) {
