@@ -31,16 +31,6 @@ constexpr std::uint32_t units_of_size(std::size_t bytes) {
 
 }  // namespace
 
-std::uint32_t utf16_units(std::string_view text) {
-    std::uint32_t units = 0;
-    while (!text.empty()) {
-        const std::size_t size = character_size(text);
-        units += units_of_size(size);
-        text.remove_prefix(size);
-    }
-    return units;
-}
-
 TextDocument::TextDocument(std::string text) : text_(std::move(text)) { find_lines(); }
 
 void TextDocument::find_lines() {
@@ -84,8 +74,17 @@ TextPosition TextDocument::position(std::size_t offset) const {
     offset = std::min(offset, text_.size());
     const auto next = std::upper_bound(line_starts_.begin(), line_starts_.end(), offset);
     const auto line = static_cast<std::uint32_t>(next - line_starts_.begin() - 1);
-    const std::size_t begin = line_starts_[line];
-    return {line, utf16_units(std::string_view(text_).substr(begin, offset - begin))};
+    std::string_view rest = this->line(line);
+    std::size_t at = line_starts_[line];
+    std::uint32_t units = 0;
+    while (!rest.empty()) {
+        const std::size_t size = character_size(rest);
+        if (at + size > offset) break;
+        at += size;
+        units += units_of_size(size);
+        rest.remove_prefix(size);
+    }
+    return {line, units};
 }
 
 void TextDocument::replace(TextRange range, std::string_view text) {

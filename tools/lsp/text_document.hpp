@@ -39,7 +39,8 @@ public:
     std::size_t line_start(std::uint32_t number) const;
     /// Returns the byte offset of a position.
     std::size_t offset(TextPosition at) const;
-    /// Returns the position of a byte offset; one behind the end counts as the end.
+    /// Returns the position of a byte offset. One within a character counts as its beginning, one
+    /// within the end of a line or behind the text as the end of the line.
     TextPosition position(std::size_t offset) const;
     TextRange range(std::size_t begin, std::size_t end) const {
         return {position(begin), position(end)};
@@ -52,9 +53,5 @@ private:
     std::string text_;
     std::vector<std::size_t> line_starts_;
 };
-
-/// Returns the number of UTF-16 code units of a text in UTF-8; each byte that is not valid UTF-8
-/// counts as one.
-std::uint32_t utf16_units(std::string_view text);
 
 }  // namespace hal::tools
