@@ -13,7 +13,7 @@ write_basic_package_version_file("${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cma
 set(HALCYON_PACKAGE_FILES cmake/HalcyonConfig.cmake cmake/HalcyonComponent.cmake cmake/HalcyonTest.cmake cmake/plugin.map)
 install(FILES ${HALCYON_PACKAGE_FILES} "${PROJECT_BINARY_DIR}/HalcyonConfigVersion.cmake" DESTINATION "${HALCYON_PACKAGE_DIR}")
 
-foreach(library IN ITEMS text link cia301 cia402 can_timing bus_config canopen tdma scocan modbus)
+foreach(library IN ITEMS text link cia301 cia402 can_timing bus_config canopen tdma scocan modbus mesa)
     if(TARGET halcyon_${library})
         add_dependencies(installed halcyon_${library})
     endif()

@@ -168,6 +168,8 @@ ROWS = {
         "components/bus/component",
         "components/bus/events",
     ],
+    "components/mesa/lbp16": [],
+    "components/mesa/hostmot2": ["components/mesa/lbp16"],
     "components/fieldbus/can_timing": ["drivers/link"],
     "components/fieldbus/segment": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/fieldbus/scocan/table": [

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+#include "module.hpp"
+
+#include <algorithm>
+
+namespace hal::mesa {
+
+namespace {
+
+constexpr std::uint8_t version_0[] = {0};
+constexpr std::uint8_t encoder_versions[] = {2, 3, 0x83};
+constexpr std::uint8_t muxed_versions[] = {2, 3, 4, 0x84};
+constexpr std::uint8_t stepgen_versions[] = {0, 1, 2, 0x42, 0xc2};
+constexpr std::uint8_t pwm_versions[] = {0, 1};
+constexpr std::uint8_t packet_uart_versions[] = {0, 1, 2, 3};
+
+// As hostmot2 of LinuxCNC accepts them. What it does not check is 0 here.
+constexpr ModuleKind kinds[] = {
+    {Tag::watchdog, "watchdog", version_0, 3, 4, 0},
+    {Tag::ioport, "ioport", version_0, 5, 4, 0x1f},
+    {Tag::encoder, "encoder", encoder_versions, 5, 4, 0x3},
+    {Tag::stepgen, "stepgen", stepgen_versions, 10, 4, 0x1ff},
+    {Tag::pwm, "pwmgen", pwm_versions, 5, 4, 0x3},
+    {Tag::muxed_encoder, "muxed encoder", muxed_versions, 5, 4, 0x3},
+    {Tag::three_phase_pwm, "three-phase PWM", version_0, 4, 4, 0x3},
+    {Tag::uart_transmit, "UART transmit", version_0, 4, 0x10, 0xf},
+    {Tag::uart_receive, "UART receive", version_0, 4, 0x10, 0xf},
+    {Tag::packet_uart_transmit, "packet UART transmit", packet_uart_versions, 4, 4, 0xf},
+    {Tag::packet_uart_receive, "packet UART receive", packet_uart_versions, 4, 4, 0xf},
+    {Tag::dpll, "dpll", version_0, 7, 4, 0},
+    {Tag::inmux, "inmux", {}, 0, 0, 0},
+    {Tag::inm, "inm", {}, 0, 0, 0},
+    {Tag::outm, "outm", {}, 0, 0, 0},
+    {Tag::led, "led", version_0, 1, 4, 0},
+    {Tag::smart_serial, "sserial", version_0, 6, 0x40, 0x3c},
+    {Tag::wide_smart_serial, "sserial", version_0, 10, 0x40, 0x3fc},
+    {Tag::ssr, "ssr", {}, 0, 0, 0},
+};
+
+}  // namespace
+
+std::array<std::uint8_t, ModuleDescriptor::size> ModuleDescriptor::encode() const noexcept {
+    std::array<std::uint8_t, size> bytes{};
+    bytes[0] = static_cast<std::uint8_t>(tag);
+    bytes[1] = version;
+    bytes[2] = static_cast<std::uint8_t>(clock);
+    bytes[3] = instances;
+    store(bytes.data() + 4, base);
+    bytes[6] = registers;
+    bytes[7] = strides;
+    store(bytes.data() + 8, per_instance);
+    return bytes;
+}
+
+std::optional<ModuleDescriptor> ModuleDescriptor::decode(
+    std::span<const std::uint8_t> bytes) noexcept {
+    if (bytes.size() < size) return {};
+    ModuleDescriptor module;
+    module.tag = static_cast<Tag>(bytes[0]);
+    module.version = bytes[1];
+    module.clock = static_cast<ClockTag>(bytes[2]);
+    module.instances = bytes[3];
+    module.base = load<std::uint16_t>(bytes.data() + 4);
+    module.registers = bytes[6];
+    module.strides = bytes[7];
+    module.per_instance = load<std::uint32_t>(bytes.data() + 8);
+    return module;
+}
+
+ModuleAddresses::ModuleAddresses(const ModuleDescriptor& module, const Idrom& idrom) noexcept
+    : base(module.base),
+      register_stride(static_cast<std::uint16_t>(idrom.register_strides[module.strides & 1U])),
+      instance_stride(
+          static_cast<std::uint16_t>(idrom.instance_strides[module.strides >> 4 & 1U])) {}
+
+const ModuleKind* kind_of(Tag tag) noexcept {
+    const auto found =
+        std::find_if(std::begin(kinds), std::end(kinds),
+                     [&](const ModuleKind& kind) { return kind.tag == tag; });
+    return found == std::end(kinds) ? nullptr : found;
+}
+
+std::string_view name_of(Tag tag) noexcept {
+    const ModuleKind* kind = kind_of(tag);
+    return kind == nullptr ? "?" : kind->name;
+}
+
+ModuleFault fault_of(const ModuleDescriptor& module, const ModuleKind& kind,
+                     const Idrom& idrom) noexcept {
+    const bool known_version =
+        kind.versions.empty() ||
+        std::find(kind.versions.begin(), kind.versions.end(), module.version) !=
+            kind.versions.end();
+    if (!known_version) return ModuleFault::version;
+    if (kind.registers != 0) {
+        const ModuleAddresses addresses(module, idrom);
+        if (module.registers != kind.registers) return ModuleFault::registers;
+        if (addresses.instance_stride != kind.instance_stride) {
+            return ModuleFault::instance_stride;
+        }
+        if (module.per_instance != kind.per_instance) return ModuleFault::per_instance;
+    }
+    const std::uint64_t last_register = module.registers == 0 ? 0 : module.registers - 1U;
+    const std::uint64_t last_instance = module.instances == 0 ? 0 : module.instances - 1U;
+    const std::uint64_t last = module.base +
+                               last_register * idrom.register_strides[module.strides & 1U] +
+                               last_instance * idrom.instance_strides[module.strides >> 4 & 1U];
+    return last + 4 > 0x10000 ? ModuleFault::outside : ModuleFault::none;
+}
+
+}  // namespace hal::mesa
