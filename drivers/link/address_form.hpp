@@ -70,3 +70,13 @@ inline constexpr link::AddressForm address_forms[] = {
 };
 
 }  // namespace hal::line
+
+namespace hal::datagram {
+
+/// How the addresses of devices that answer datagrams are written.
+inline constexpr link::AddressForm address_forms[] = {
+    {"eth:10.10.10.10", "a card on the network"},
+    {"sim:NAME", "a card in memory", link::Reach::process},
+};
+
+}  // namespace hal::datagram

@@ -84,6 +84,7 @@ ROWS = {
         "runtime/text",
     ],
     "drivers/line": ["drivers/link", "runtime/text"],
+    "drivers/datagram": ["drivers/link", "runtime/text"],
     "drivers/ethernet": ["drivers/capture", "drivers/netlink", "runtime/sdk", "runtime/text"],
     "components/logic": ["components"],
     "components/math": ["components"],

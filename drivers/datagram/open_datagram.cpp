@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// The table from the address of a device that answers datagrams to its driver.
+#include <charconv>
+
+#include "datagram/journaled_datagram.hpp"
+#include "datagram/sim_datagram.hpp"
+#include "datagram/udp_datagram.hpp"
+#include "link/address.hpp"
+
+namespace hal::datagram {
+
+namespace {
+
+using Driver = link::Driver<Opened, Options, Description>;
+
+constexpr Driver datagram_drivers[] = {
+    {link::form_of(address_forms, "eth"), udp::open, udp::describe},
+    {link::form_of(address_forms, "sim"), sim::open, sim::describe, nullptr, nullptr, "spin",
+     Driver::Journal::order},
+};
+
+/// Applies an option. Returns the problem, or "".
+std::string apply_datagram_option(std::string_view key, std::string_view value, bool,
+                                  Options& options) {
+    if (key != "spin") {
+        return std::string(link::no_option) + link::quoted(key) + "; the option is spin";
+    }
+    constexpr std::int64_t max_us = 10'000;
+    std::int64_t us = -1;
+    const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), us);
+    const std::string_view unit(end, static_cast<std::size_t>(value.data() + value.size() - end));
+    if (error != std::errc() || unit != "us" || us < 0 || us > max_us) {
+        return "invalid spin " + link::quoted(value) + "; write a duration 0us..10000us";
+    }
+    options.spin_ns = us * 1000;
+    return {};
+}
+
+Opened open_with(const Driver& driver, const std::string& target, const Options& options) {
+    const auto open = [&] { return driver.open(target, options); };
+    return driver.journal == Driver::Journal::results ? journal::open_journaled(open) : open();
+}
+
+}  // namespace
+
+Opened open(std::string_view address, const Options& given) {
+    return link::open_address<Opened, Options, Description>(
+        address, given, datagram_drivers, apply_datagram_option, "a card", open_with);
+}
+
+Description describe(std::string_view address) {
+    return link::describe_address<Opened, Options, Description>(address, datagram_drivers);
+}
+
+Attached attach(std::string_view address, Server& server) {
+    const Description description = describe(address);
+    if (!description.in_memory) {
+        return {nullptr,
+                link::quoted(address) + " is not the address of a card in memory; write sim:NAME"};
+    }
+    Attached attached =
+        sim::attach(description.address.substr(description.address.find(':') + 1), server);
+    if (!attached) {
+        attached.problem = std::string(address) + ": " + attached.problem;
+    }
+    return attached;
+}
+
+}  // namespace hal::datagram
