@@ -171,6 +171,12 @@ ROWS = {
     ],
     "components/mesa/lbp16": [],
     "components/mesa/hostmot2": ["components/mesa/lbp16"],
+    "components/mesa/card": [
+        "components/mesa/hostmot2",
+        "components/bus/config",
+        "runtime/text",
+        "drivers/link",
+    ],
     "components/fieldbus/can_timing": ["drivers/link"],
     "components/fieldbus/segment": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/fieldbus/scocan/table": [

@@ -49,7 +49,8 @@ void same_again(std::span<const std::uint8_t> bytes) {
     require(value.has_value() == (bytes.size() >= T::size), "only too few bytes are rejected");
     if (!value) return;
     const auto again = value->encode();
-    require(std::equal(again.begin(), again.end(), bytes.begin()), "encoding is the inverse of decoding");
+    require(std::equal(again.begin(), again.end(), bytes.begin()),
+            "encoding is the inverse of decoding");
 }
 
 }  // namespace
@@ -67,7 +68,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         }
     }
     if (const auto area = Information::decode(bytes)) {
-        require(Information::decode(area->encode()) == area, "an information area is decoded to itself");
+        require(Information::decode(area->encode()) == area,
+                "an information area is decoded to itself");
         require(area->name_text().size() <= 8, "its name is in its field");
     }
     if (size >= 4) {

@@ -66,7 +66,7 @@ PwmRate pwm_rate(double hz, std::uint32_t clock_hz) noexcept {
 }
 
 double pwm_hz(const PwmRate& rate, std::uint32_t clock_hz) noexcept {
-    return double{clock_hz} * rate.rate / 65536.0 / (1U << rate.bits);
+    return static_cast<double>(clock_hz) * rate.rate / 65536.0 / (1U << rate.bits);
 }
 
 std::uint32_t pdm_rate(double pulses_per_s, std::uint32_t clock_hz) noexcept {

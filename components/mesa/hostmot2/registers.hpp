@@ -76,8 +76,8 @@ inline constexpr unsigned data = 0;  ///< bit 31 is CR01, 30 CR02, …
 }
 
 namespace dpll {
-/// `control_0`: bits 24..31 prescale, 0..23 limit. `control_1`: 0..7 the size of the DDS, read only,
-/// 16..31 time constant. `sync`: reading it is the event, and returns the phase error.
+/// `control_0`: bits 24..31 prescale, 0..23 limit. `control_1`: 0..7 the size of the DDS, read
+/// only, 16..31 time constant. `sync`: reading it is the event, and returns the phase error.
 inline constexpr unsigned base_rate = 0, phase_preset = 1, control_0 = 2, control_1 = 3,
                           timers_1_2 = 4, timers_3_4 = 5, sync = 6;
 }  // namespace dpll

@@ -55,8 +55,8 @@ struct Command {
     friend constexpr bool operator==(const Command&, const Command&) = default;
 };
 
-/// Returns the first word of a command: bit 15 write, 14 address, 13 information area, 12..10 space,
-/// 9..8 unit, 7 address advances, 6..0 count. [any]
+/// Returns the first word of a command: bit 15 write, 14 address, 13 information area, 12..10
+/// space, 9..8 unit, 7 address advances, 6..0 count. [any]
 constexpr std::uint16_t word_of(const Command& command) noexcept {
     unsigned word = command.count & 0x7fU;
     word |= command.is_write ? 0x8000U : 0U;
@@ -80,8 +80,8 @@ constexpr Command command_of(std::uint16_t word) noexcept {
     return command;
 }
 
-/// A request that is being put together, and where the data of its reads is in the reply. It is made
-/// once; a cycle stores new numbers at the offsets of its writes. Not shared by threads.
+/// A request that is being put together, and where the data of its reads is in the reply. It is
+/// made once; a cycle stores new numbers at the offsets of its writes. Not shared by threads.
 class Request {
 public:
     /// Appends a read of `count` units, in several commands where one cannot have so many. Returns
