@@ -365,6 +365,19 @@ inline constexpr CodePage code_pages[] = {
      "Formulas have + - * / ^, brackets, pi, sin cos tan asin acos atan atan2 sqrt exp log abs "
      "tanh min max. `hal doc ekf` has an "
      "example."},
+    {"mesa-line",
+     "A line of the configuration of an emulated Mesa card is invalid at its position: an unknown "
+     "section or key, or a key without a value.\n\n"
+     "The sections are [card], [motor NAME], [switch NAME], [spindle NAME], [input NAME], [output "
+     "NAME], [type NAME] and [defaults]. docs/mesa.md lists their keys."},
+    {"mesa-plant",
+     "The parts of an emulated Mesa card and its machine do not fit: a module or terminal that "
+     "the card does not have, a switch without a motor, a name that is given twice, two "
+     "parts with one encoder.\n\n"
+     "`hal explain mesa-line` lists the sections, docs/mesa.md what each card has."},
+    {"mesa-value",
+     "A value of the configuration of an emulated Mesa card is invalid: a type of card, a number, "
+     "a time, a terminal. The help line shows the valid values."},
     {"modbus-line",
      "A line of a Modbus configuration is invalid at its position: an unknown section, key or "
      "option, or a value without one.\n\n"

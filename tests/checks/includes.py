@@ -177,6 +177,10 @@ ROWS = {
         "runtime/text",
         "drivers/link",
     ],
+    "components/mesa/plugins": [
+        "components/mesa/card",
+        "runtime/sdk",
+    ],
     "components/fieldbus/can_timing": ["drivers/link"],
     "components/fieldbus/segment": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/fieldbus/scocan/table": [

@@ -31,6 +31,7 @@ inline const std::map<std::string, std::string> component_arguments{
     {"dds_subscribe", "topic=rt/pins fields=f:float,b:bit,i:s32,u:u32,l:s64,k:u64 domain=230"},
     {"ethercat", "config=tests/rt/drive.ethercat"},
     {"lcec", "config=tests/rt/ethercat-conf.xml link=sim:rt/lcec"},
+    {"mesa_card", "config=tests/rt/card.mesa"},
     {"modbus", "config=tests/rt/bus.modbus"},
     {"modbus_node", "config=tests/rt/bus.modbus link=sim:rt-modbus-node"},
     {"scocan", "link=sim:rt-scocan node=n" SCOCAN_TABLE},

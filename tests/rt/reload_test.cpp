@@ -29,6 +29,7 @@ const std::map<std::string, const char*> exceptions{
     {"ethercat", "a network, which is started again"},
     {"ethercat_segment", "a network, which is started again"},
     {"lcec", "a network, which is started again"},
+    {"mesa_card", "a network, which is started again"},
     {"modbus", "a network, which is started again"},
     {"modbus_node", "a network, which is started again"},
     {"cia402", "the drive, which a reload stops"},
