@@ -44,7 +44,7 @@ function read_program(path,    line) {
 
 # Names the bus tools for a program and its first word that are in them, as `hal can`.
 function emit_bus(program, word) {
-    if (program ~ /(^|\/)hal$/ && word ~ /^(can|canopen|node|ethercat|scocan)$/) emit("bus")
+    if (program ~ /(^|\/)hal$/ && word ~ /^(can|canopen|node|ethercat|scocan|modbus|mesa)$/) emit("bus")
 }
 
 # Whether a command loads components, or prints their pages.

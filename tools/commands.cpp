@@ -24,6 +24,7 @@
 #include "bus/ethercat/ethercat_line.hpp"
 #include "bus/ethercat/options.hpp"
 #include "bus/node/kinds.hpp"
+#include "bus/mesa/options.hpp"
 #include "bus/modbus/options.hpp"
 #include "bus/scocan/plan.hpp"
 #include "bus/tdma/plan.hpp"
@@ -322,6 +323,19 @@ constexpr Subcommand table[] = {
         "write registers or coils of a Modbus slave"),
     command<ModbusMonitorOptions, OF_MODBUS(run_modbus_monitor)>(
         "modbus monitor", "LINE [--for TIME]", "print the frames on a serial line"),
+    command<MesaScanOptions, OF_MESA(run_mesa_scan)>(
+        "mesa scan", "[HOST | NETWORK/BITS]… [--timeout TIME]", "find Mesa Ethernet cards"),
+    command<MesaCardOptions, OF_MESA(run_mesa_info)>(
+        "mesa info", "HOST [--json]", "print what a Mesa card has: firmware, ports, modules"),
+    command<MesaCardOptions, OF_MESA(run_mesa_pins)>(
+        "mesa pins", "HOST [--json]", "list the pins of a Mesa card and their modules"),
+    command<MesaAccessOptions, OF_MESA(run_mesa_read)>(
+        "mesa read", "HOST ADDRESS [COUNT] [--space N]", "read registers of a Mesa card"),
+    command<MesaAccessOptions, OF_MESA(run_mesa_write)>(
+        "mesa write", "HOST ADDRESS VALUE… [--space N]", "write registers of a Mesa card"),
+    command<MesaDoctorOptions, OF_MESA(run_mesa_doctor)>(
+        "mesa doctor", "HOST [--count N] [--every TIME] [--json]",
+        "measure lost packets and round trips on the way to a Mesa card"),
     command<ScocanPlanOptions, OF_SCOCAN(run_scocan_plan)>(
         "scocan plan", "FILE [--mode MODE] [--json | --svg FILE]",
         "print the slots of a CAN bus as a timeline, its load and the worst-case latency of each "
@@ -366,6 +380,9 @@ constexpr Subcommand table[] = {
     command<ModbusNodeOptions, OF_MODBUS(run_node_modbus)>(
         "node modbus", "FILE [--link ADDRESS] [--fault FAULT] [--for TIME]",
         "emulate the slaves and drives of a Modbus line on a pseudo terminal or a TCP port"),
+    command<MesaNodeOptions, OF_MESA(run_node_mesa)>(
+        "node mesa", "FILE [--address HOST] [--fault FAULT] [--loss SHARE] [--for TIME]",
+        "emulate a Mesa Ethernet card and the machine behind it"),
     command<Options, OF_CANOPEN(run_node_faults)>(
         "node faults", "", "list the faults that simulated devices can inject"),
     command<TopOptions, IN_TOOLS(run_top)>(

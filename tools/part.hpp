@@ -17,6 +17,7 @@ inline constexpr char ethercat[] = "ethercat";
 inline constexpr char scocan[] = "scocan";
 inline constexpr char tdma[] = "tdma";
 inline constexpr char modbus[] = "modbus";
+inline constexpr char mesa[] = "mesa";
 inline constexpr char linuxcnc[] = "linuxcnc";
 inline constexpr char panel[] = "panel";
 }  // namespace package
@@ -67,6 +68,11 @@ struct In {
 #define OF_MODBUS(run) In<Part::bus, run, package::modbus>
 #else
 #define OF_MODBUS(run) In<Part::bus, nullptr, package::modbus>
+#endif
+#if defined(HALCYON_BUS_PROGRAM) && HALCYON_PACKAGE_MESA
+#define OF_MESA(run) In<Part::bus, run, package::mesa>
+#else
+#define OF_MESA(run) In<Part::bus, nullptr, package::mesa>
 #endif
 #if defined(HALCYON_TOOLS_PROGRAM) && HALCYON_PACKAGE_LINUXCNC
 #define OF_LINUXCNC(run) In<Part::tools, run, package::linuxcnc>

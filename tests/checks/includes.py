@@ -67,6 +67,7 @@ ROWS = {
         "components/ethercat/devices",
         "components/ethercat/config",
         "components/modbus/device",
+        "components/mesa/card",
     ],  # hal can, ethercat, node, tdma
     "tools/panel": ["tools/cli"],
     "tools/lsp": ["tools/run", "tools/doc", "tools/panel"],

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+// `hal mesa doctor`: losses and round trips on the way to a card.
+#include <ifaddrs.h>
+#include <arpa/inet.h>
+
+#include <algorithm>
+#include <cstring>
+#include <fmt/core.h>
+
+#include "bus/json_text.hpp"
+#include "bus/mesa/card_identity.hpp"
+#include "bus/mesa/options.hpp"
+#include "cli/output.hpp"
+#include "cli/signals.hpp"
+#include "link/system.hpp"
+#include "mesa/lbp16/spaces.hpp"
+
+namespace hal::tools {
+
+using namespace mesa;
+
+namespace {
+
+/// The registers that a cycle reads and the counter of packets, as large as those of a driver.
+Request cycle_request() {
+    Request request;
+    request.read(Space::hostmot2, cookie_address, Unit::u32, 15);
+    request.read(Space::status, status::received_packets, Unit::u16, 1);
+    return request;
+}
+
+struct Trips {
+    std::vector<std::int64_t> ns;  ///< of requests that were answered, sorted
+    int sent = 0;
+    int lost_requests = 0;  ///< the card did not count them
+    int lost_replies = 0;
+
+    std::int64_t at(double share) const {
+        const auto n = static_cast<std::size_t>(share * static_cast<double>(ns.size() - 1) + 0.5);
+        return ns[n];
+    }
+};
+
+/// Sends requests at a steady rate. The card's counter of packets shows in which direction the
+/// missing ones were lost.
+Trips measure(CardClient& card, const MesaDoctorOptions& options) {
+    const Request request = cycle_request();
+    StopRequest stop;
+    Trips trips;
+    int missing = 0;
+    std::uint16_t counter = 0;
+    bool has_counter = false;
+    std::int64_t due_ns = link::monotonic_ns();
+    for (; trips.sent < options.count && !stop.requested(); ++trips.sent) {
+        const std::int64_t begin_ns = link::monotonic_ns();
+        const auto reply = card.ask(request, 1);
+        if (!reply) {
+            ++missing;
+        } else {
+            trips.ns.push_back(link::monotonic_ns() - begin_ns);
+            const auto now = load<std::uint16_t>(reply->data() + reply->size() - 2);
+            const int counted = static_cast<std::uint16_t>(now - counter) - 1;
+            if (has_counter && missing > 0) {
+                trips.lost_replies += std::clamp(counted, 0, missing);
+                trips.lost_requests += missing - std::clamp(counted, 0, missing);
+            } else if (missing > 0) {
+                trips.lost_requests += missing;
+            }
+            missing = 0;
+            counter = now;
+            has_counter = true;
+        }
+        due_ns = std::max(due_ns + options.period_ns, link::monotonic_ns());
+        const timespec until = link::to_timespec(due_ns);
+        clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+    }
+    trips.lost_requests += missing;
+    std::ranges::sort(trips.ns);
+    return trips;
+}
+
+/// A bar for each duration, in steps of a factor of two.
+std::string histogram(const Trips& trips) {
+    std::string text;
+    std::size_t begin = 0;
+    for (std::int64_t limit_ns = 16'000; begin < trips.ns.size(); limit_ns *= 2) {
+        const auto end = static_cast<std::size_t>(
+            std::ranges::upper_bound(trips.ns, limit_ns) - trips.ns.begin());
+        const std::size_t count = end - begin;
+        if (count > 0) {
+            const std::size_t length = std::max<std::size_t>(1, count * 50 / trips.ns.size());
+            text += fmt::format("{:>10} us  {:>7}  {}\n",
+                                fmt::format("<= {}", limit_ns / 1000), count,
+                                std::string(length, '#'));
+        }
+        begin = end;
+    }
+    return text;
+}
+
+/// The network interface through which a host is reached; "": unknown.
+std::string interface_to(const std::string& host) {
+    const link::Descriptor socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_port = htons(udp_port);
+    const std::string name = host.substr(0, host.find(':'));
+    if (inet_pton(AF_INET, name.c_str(), &to.sin_addr) != 1) return {};
+    sockaddr_in own{};
+    socklen_t size = sizeof own;
+    if (::connect(socket.get(), reinterpret_cast<sockaddr*>(&to), sizeof to) != 0 ||
+        getsockname(socket.get(), reinterpret_cast<sockaddr*>(&own), &size) != 0) {
+        return {};
+    }
+    ifaddrs* all = nullptr;
+    if (getifaddrs(&all) != 0) return {};
+    std::string found;
+    for (const ifaddrs* i = all; i != nullptr; i = i->ifa_next) {
+        if (i->ifa_addr == nullptr || i->ifa_addr->sa_family != AF_INET) continue;
+        sockaddr_in of{};
+        std::memcpy(&of, i->ifa_addr, sizeof of);
+        if (of.sin_addr.s_addr == own.sin_addr.s_addr) {
+            found = i->ifa_name;
+        }
+    }
+    freeifaddrs(all);
+    return found;
+}
+
+double us(std::int64_t ns) { return static_cast<double>(ns) / 1e3; }
+
+std::string report_text(const std::string& host, const CardIdentity& card, const Trips& trips) {
+    const int lost = trips.lost_requests + trips.lost_replies;
+    std::string text = fmt::format(
+        "{} at {}\n{} of {} requests answered; lost: {} requests, {} replies ({:.2f} %)\n",
+        card.name, host, trips.ns.size(), trips.sent, trips.lost_requests, trips.lost_replies,
+        100.0 * lost / std::max(1, trips.sent));
+    if (!trips.ns.empty()) {
+        text += fmt::format(
+            "round trip: 50 % within {:.0f} us, 99 % within {:.0f} us, longest {:.0f} us\n\n{}",
+            us(trips.at(0.5)), us(trips.at(0.99)), us(trips.ns.back()), histogram(trips));
+    }
+    const std::string interface = interface_to(host);
+    if (!interface.empty() && interface != "lo") {
+        text += fmt::format("\nsettings of the interface that delay packets; type: hal doctor "
+                            "--interface {}\n",
+                            interface);
+    }
+    return text;
+}
+
+std::string report_json(const std::string& host, const CardIdentity& card, const Trips& trips) {
+    const bool has_trips = !trips.ns.empty();
+    return fmt::format(
+        R"({{"host":{},"name":{},"sent":{},"answered":{},"lost_requests":{},"lost_replies":{},"p50_ns":{},"p99_ns":{},"max_ns":{},"interface":{}}})"
+        "\n",
+        json_text(host), json_text(card.name), trips.sent, trips.ns.size(), trips.lost_requests,
+        trips.lost_replies, has_trips ? fmt::to_string(trips.at(0.5)) : "null",
+        has_trips ? fmt::to_string(trips.at(0.99)) : "null",
+        has_trips ? fmt::to_string(trips.ns.back()) : "null", json_text(interface_to(host)));
+}
+
+}  // namespace
+
+int run_mesa_doctor(const MesaDoctorOptions& options) {
+    if (options.count < 1 || options.count > 10'000'000) {
+        return fail(options, "invalid --count; write 1..10000000");
+    }
+    CardClient card;
+    CardIdentity identity;
+    std::string problem = card.open(options.words[0], options.timeout_ns);
+    if (problem.empty()) {
+        problem = read_name(card, identity);
+    }
+    if (!problem.empty()) return fail(options, problem);
+    const Trips trips = measure(card, options);
+    const std::string& host = options.words[0];
+    return exit_code(print(options.json ? report_json(host, identity, trips)
+                                        : report_text(host, identity, trips)));
+}
+
+}  // namespace hal::tools
