@@ -52,6 +52,11 @@ Description describe(std::string_view address) {
     return link::describe_address<Opened, Options, Description>(address, datagram_drivers);
 }
 
+std::string address_of(std::string_view host_or_address) {
+    const bool is_address = !describe(host_or_address).transport.empty();
+    return (is_address ? "" : "eth:") + std::string(host_or_address);
+}
+
 Attached attach(std::string_view address, Server& server) {
     const Description description = describe(address);
     if (!description.in_memory) {

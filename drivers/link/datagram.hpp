@@ -71,6 +71,8 @@ struct Opened {
 Opened open(std::string_view address, const Options& options = {});
 /// Describes what open() would return, without opening it. [setup]
 Description describe(std::string_view address);
+/// Returns an address as it is, and of a host, `10.10.10.10`, its address. [setup]
+std::string address_of(std::string_view host_or_address);
 
 /// Where a server in memory puts its answers.
 class Replies {

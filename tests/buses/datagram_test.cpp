@@ -124,6 +124,12 @@ TEST(DatagramPort, Open_names_what_is_wrong_in_an_address) {
               "eth:127.0.0.1:1?speed=2: unknown option 'speed'; the option is spin");
 }
 
+TEST(DatagramPort, AddressOf_completes_the_name_of_a_host) {
+    EXPECT_EQ(datagram::address_of("10.10.10.10"), "eth:10.10.10.10");
+    EXPECT_EQ(datagram::address_of("10.10.10.10:1"), "eth:10.10.10.10:1");
+    EXPECT_EQ(datagram::address_of("sim:mill"), "sim:mill");
+}
+
 /// A socket on the loopback interface.
 class Peer {
 public:
