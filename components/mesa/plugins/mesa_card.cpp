@@ -75,6 +75,7 @@ struct MesaCard : hal::Component {
         load();
         if (loaded_) {
             machine_.emplace(*this, config_);
+            make_card();
         }
     }
 
@@ -111,24 +112,12 @@ struct MesaCard : hal::Component {
 
     void start() {
         if (!loaded_) throw std::runtime_error("missing configuration: write config=FILE.mesa");
-        card_ = std::make_unique<EmulatedCard>(config_, mac);
-        server_ = std::make_unique<CardServer>(*card_);
-        for (std::size_t n = 0; n < hal::mesa::card_fault_kinds; ++n) {
-            CardFault fault;
-            fault.kind = static_cast<CardFaultKind>(n);
-            fault.is_active = false;
-            fault.every = fault.kind == CardFaultKind::swap ? 2 : 1;
-            server_->faults().push_back(fault);
-        }
+        if (attachment_) return;
         auto attached = hal::datagram::attach(config_.address, *server_);
         if (!attached) throw std::runtime_error(attached.problem);
         attachment_ = std::move(attached.attachment);
     }
-    void stop() noexcept {
-        attachment_.reset();
-        server_.reset();
-        card_.reset();
-    }
+    void stop() noexcept { attachment_.reset(); }
 
     void update(hal::Cycle cycle) noexcept {
         now_ns_ = cycle.start_ns();
@@ -141,6 +130,21 @@ struct MesaCard : hal::Component {
 
 private:
     static constexpr std::array<std::uint8_t, 6> mac{0x02, 0, 0, 0, 0, 1};
+
+    /// Drivers ask the card what it has while they are loaded, so it answers from here on. During a
+    /// reload the instance before it still does: then it answers from start() on. [setup]
+    void make_card() {
+        card_ = std::make_unique<EmulatedCard>(config_, mac);
+        server_ = std::make_unique<CardServer>(*card_);
+        for (std::size_t n = 0; n < hal::mesa::card_fault_kinds; ++n) {
+            CardFault fault;
+            fault.kind = static_cast<CardFaultKind>(n);
+            fault.is_active = false;
+            fault.every = fault.kind == CardFaultKind::swap ? 2 : 1;
+            server_->faults().push_back(fault);
+        }
+        attachment_ = hal::datagram::attach(config_.address, *server_).attachment;
+    }
 
     /// Reads the configuration and reports what is wrong in it. [setup]
     void load() {
