@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: MIT
 // LBP16 and HostMot2: any bytes are read as a request, as descriptors and as records, or rejected;
-// what was decoded is encoded to the same bytes.
+// what was decoded is encoded to the same bytes. An emulated card executes any requests, and any
+// configuration is read, or rejected with a position.
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <string_view>
 
+#include "components/mesa/card/card_server.hpp"
 #include "components/mesa/hostmot2/idrom.hpp"
 #include "components/mesa/hostmot2/module.hpp"
 #include "components/mesa/hostmot2/pin.hpp"
@@ -53,11 +57,54 @@ void same_again(std::span<const std::uint8_t> bytes) {
             "encoding is the inverse of decoding");
 }
 
+/// Counts the replies and what is in them.
+struct Inbox final : hal::datagram::Replies {
+    void send(std::span<const std::uint8_t> bytes, std::int64_t) noexcept override {
+        require(bytes.size() <= hal::datagram::max_size, "a reply fits a datagram");
+        size += bytes.size();
+    }
+    std::size_t size = 0;
+};
+
+/// A card executes the request again and again while its time passes.
+void serve(const CardConfig& config, std::span<const std::uint8_t> bytes) {
+    EmulatedCard card(config, {});
+    CardServer server(card);
+    Inbox inbox;
+    const std::span request = bytes.first(std::min(bytes.size(), max_datagram));
+    for (std::int64_t now = 0; now < 5'000'000; now += 1'000'000) {
+        server.serve(request, now, inbox);
+    }
+    require(card.requests() == 5, "each request is counted");
+}
+
+/// A configuration, and the request on the card that it describes.
+void read_configuration(std::string_view text, std::span<const std::uint8_t> bytes) {
+    const CardReadResult result = read_card(text, "fuzz.mesa");
+    for (const auto& message : result.messages) {
+        require(message.at.offset + message.at.length <= text.size() + 1,
+                "a message is in the file");
+    }
+    if (result.good()) {
+        serve(result.card, bytes);
+    }
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     const std::span bytes(data, size);
+    const std::string_view text(reinterpret_cast<const char*>(data), size);
     read_request(bytes);
+    for (const CardModel& model : card_models()) {
+        CardConfig config;
+        config.model = &model;
+        config.remotes = model.default_remotes;
+        serve(config, bytes);
+    }
+    read_configuration(text, bytes);
+    CardFault fault;
+    parse_card_fault(text.substr(0, 100), fault);
     same_again<ModuleDescriptor>(bytes);
     if (const auto rom = Idrom::decode(bytes)) {
         fault_of(*rom, usual_idrom_address);
