@@ -75,17 +75,16 @@ public:
         pollfd p{socket_.get(), POLLIN, 0};
         const std::int64_t due_ns = next_due_ns() - link::monotonic_ns();
         constexpr std::int64_t max_wait_ns = 1'000'000'000;
-        const timespec limit = link::to_timespec(
-            std::clamp<std::int64_t>(std::min(wait_ns, due_ns), 0, max_wait_ns));
+        const timespec limit =
+            link::to_timespec(std::clamp<std::int64_t>(std::min(wait_ns, due_ns), 0, max_wait_ns));
         ppoll(&p, 1, &limit, nullptr);
         std::array<std::uint8_t, max_size> buffer;
         constexpr int batch = 64;  // then what is due is sent
         for (int n = 0; n < batch; ++n) {
             sockaddr_in from{};
             socklen_t size = sizeof from;
-            const auto length =
-                ::recvfrom(socket_.get(), buffer.data(), buffer.size(), MSG_DONTWAIT,
-                           reinterpret_cast<sockaddr*>(&from), &size);
+            const auto length = ::recvfrom(socket_.get(), buffer.data(), buffer.size(),
+                                           MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from), &size);
             if (length <= 0) break;
             Outbox outbox(*this, from);
             server.serve(std::span(buffer).first(static_cast<std::size_t>(length)),

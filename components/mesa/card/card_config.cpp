@@ -23,11 +23,11 @@ using text::Word;
 constexpr std::int64_t ms = 1'000'000;
 
 constexpr bus::SectionKind section_kinds[] = {{"card", "[card]", bus::SectionUse::once},
-                                      {"motor", "[motor NAME]", bus::SectionUse::named},
-                                      {"switch", "[switch NAME]", bus::SectionUse::named},
-                                      {"spindle", "[spindle NAME]", bus::SectionUse::named},
-                                      {"input", "[input NAME]", bus::SectionUse::named},
-                                      {"output", "[output NAME]", bus::SectionUse::named}};
+                                              {"motor", "[motor NAME]", bus::SectionUse::named},
+                                              {"switch", "[switch NAME]", bus::SectionUse::named},
+                                              {"spindle", "[spindle NAME]", bus::SectionUse::named},
+                                              {"input", "[input NAME]", bus::SectionUse::named},
+                                              {"output", "[output NAME]", bus::SectionUse::named}};
 
 constexpr const char* terminal_form =
     "gpio 17, inm 3, ssr 0, outm 4, or remote CHANNEL NUMBER as in remote 0 5";
@@ -165,8 +165,8 @@ bool parse_drive(SpindleConfig& to, const Entry& entry) {
     const auto number = parse_natural(words[1].text);
     if (!number || *number > 7) return false;
     to.number = static_cast<unsigned>(*number);
-    to.drive = same_word(words[0].text, "pwm") ? SpindleConfig::Drive::pwm
-                                               : SpindleConfig::Drive::remote;
+    to.drive =
+        same_word(words[0].text, "pwm") ? SpindleConfig::Drive::pwm : SpindleConfig::Drive::remote;
     return same_word(words[0].text, "pwm") || same_word(words[0].text, "remote");
 }
 
@@ -188,10 +188,9 @@ const bus::KeyTable<SpindleConfig>& spindle_keys() {
 const bus::KeyTable<WireConfig>& wire_keys() {
     static const bus::KeyTable<WireConfig> table{{
         {"terminal",
-         bus::own(terminal_form, "`gpio N`, `inm N`, `ssr N`, `outm N`, `remote CHANNEL N`",
-                  [](WireConfig& to, const Entry& entry) {
-        return parse_terminal(to.terminal, entry);
-    }),
+         bus::own(
+             terminal_form, "`gpio N`, `inm N`, `ssr N`, `outm N`, `remote CHANNEL N`",
+             [](WireConfig& to, const Entry& entry) { return parse_terminal(to.terminal, entry); }),
          "", "The input or output that it is connected to."},
         {"initial", bus::flag(&WireConfig::initial), "`no`",
          "The level of an input until it is set."},
@@ -303,11 +302,21 @@ private:
     template <class Visit>
     void visit_names(Visit visit) const {
         const CardConfig& card = out_.card;
-        for (const auto& part : card.motors) visit(part.name, part.at);
-        for (const auto& part : card.switches) visit(part.name, part.at);
-        for (const auto& part : card.spindles) visit(part.name, part.at);
-        for (const auto& part : card.inputs) visit(part.name, part.at);
-        for (const auto& part : card.outputs) visit(part.name, part.at);
+        for (const auto& part : card.motors) {
+            visit(part.name, part.at);
+        }
+        for (const auto& part : card.switches) {
+            visit(part.name, part.at);
+        }
+        for (const auto& part : card.spindles) {
+            visit(part.name, part.at);
+        }
+        for (const auto& part : card.inputs) {
+            visit(part.name, part.at);
+        }
+        for (const auto& part : card.outputs) {
+            visit(part.name, part.at);
+        }
     }
 
     void check_names() {
@@ -400,8 +409,9 @@ private:
             if (!encoder) return;
             const auto [found, is_new] = users.emplace(*encoder, name);
             if (!is_new) {
-                error(at, "encoder " + std::to_string(*encoder) + " is already that of " +
-                              quoted(found->second),
+                error(at,
+                      "encoder " + std::to_string(*encoder) + " is already that of " +
+                          quoted(found->second),
                       "give each encoder one motor or spindle");
             }
         };

@@ -42,9 +42,7 @@ struct CardFault {
         return is_active && since_ns >= from_ns && since_ns < until_ns;
     }
     /// Counts a request or a reply. Returns whether the fault meets it. [realtime]
-    bool hits(std::int64_t since_ns) noexcept {
-        return lasts(since_ns) && ++matches % every == 0;
-    }
+    bool hits(std::int64_t since_ns) noexcept { return lasts(since_ns) && ++matches % every == 0; }
 };
 /// Parses `delay:every=50:delay=2ms:from=1s:for=2s`. Returns the problem, or "". [setup]
 std::string parse_card_fault(std::string_view text, CardFault& fault);

@@ -23,8 +23,8 @@ constexpr ModuleDescriptor stepgen_module(std::uint8_t count) {
 constexpr ModuleDescriptor encoder_module(std::uint8_t count) {
     return {Tag::encoder, 2, ClockTag::low, count, 0x3000, 5, 0, 0x3};
 }
-constexpr ModuleDescriptor serial_module{Tag::smart_serial, 0, ClockTag::low, 1,
-                                         0x5b00,            6, 0x10,          0x3c};
+constexpr ModuleDescriptor serial_module{
+    Tag::smart_serial, 0, ClockTag::low, 1, 0x5b00, 6, 0x10, 0x3c};
 constexpr ModuleDescriptor dpll_module{Tag::dpll, 0, ClockTag::low, 1, 0x7000, 7, 0, 0};
 constexpr ModuleDescriptor led_module{Tag::led, 0, ClockTag::low, 1, 0x0200, 1, 0, 0};
 constexpr ModuleDescriptor pwm_module{Tag::pwm, 0, ClockTag::high, 1, 0x4100, 5, 0, 0x3};
@@ -38,7 +38,7 @@ constexpr ModuleDescriptor modules_7i76e[] = {dpll_module,       watchdog_module
                                               encoder_module(1), serial_module,   stepgen_module(5),
                                               led_module};
 constexpr ModuleDescriptor modules_7i96s[] = {
-    dpll_module,   watchdog_module,   ports_module(3), inm_module, ssr_module, outm_module,
+    dpll_module,   watchdog_module,   ports_module(3), inm_module, ssr_module,       outm_module,
     serial_module, stepgen_module(5), pwm_module,      led_module, encoder_module(1)};
 
 constexpr std::uint32_t pin(Tag module, unsigned unit, unsigned number, bool is_output) {

@@ -100,8 +100,8 @@ void EmulatedCard::fill_rom() {
 /// The descriptor of a pin: that of the model, unless its module is missing in this firmware.
 PinDescriptor EmulatedCard::descriptor(std::size_t pin) const noexcept {
     const PinDescriptor whole = PinDescriptor::decode(model_.descriptors[pin]);
-    const bool is_counted = whole.module == Tag::stepgen || whole.module == Tag::encoder ||
-                            whole.module == Tag::pwm;
+    const bool is_counted =
+        whole.module == Tag::stepgen || whole.module == Tag::encoder || whole.module == Tag::pwm;
     if (is_counted && whole.unit >= config_.instances(whole.module)) return PinDescriptor{};
     return whole;
 }
@@ -311,8 +311,7 @@ bool EmulatedCard::is_driven_by_module(std::size_t pin) const noexcept {
 bool EmulatedCard::module_level(const PinDescriptor& pin) const noexcept {
     switch (pin.module) {
     case Tag::stepgen:
-        return pin.number == pin_number::stepgen::direction &&
-               generators_[pin.unit].dds.rate() < 0;
+        return pin.number == pin_number::stepgen::direction && generators_[pin.unit].dds.rate() < 0;
     case Tag::pwm:
         if (pin.number == pin_number::pwm::not_enable) return bit(pwm_enables_, pin.unit) == 0;
         if (pin.number == pin_number::pwm::direction) {
@@ -680,8 +679,8 @@ void EmulatedCard::read_information(Space which, std::span<std::uint8_t> reply) 
     area.is_writable = row.is_writable;
     area.kind = row.kind;
     area.units = row.units;
-    area.range = static_cast<std::uint16_t>(
-        which == Space::hostmot2 ? std::size_t{0xffff} : space(which).size());
+    area.range = static_cast<std::uint16_t>(which == Space::hostmot2 ? std::size_t{0xffff}
+                                                                     : space(which).size());
     area.pointer = last_address_[static_cast<std::size_t>(which)];
     std::ranges::copy(row.name, area.name.begin());
     const auto bytes = area.encode();

@@ -8,9 +8,7 @@ namespace hal::mesa {
 
 namespace {
 
-std::int64_t rounded(double value) {
-    return std::llround(std::clamp(value, -4e18, 4e18));
-}
+std::int64_t rounded(double value) { return std::llround(std::clamp(value, -4e18, 4e18)); }
 
 }  // namespace
 
@@ -30,8 +28,8 @@ Plant::Plant(const CardConfig& config) : config_(config), spindles_(config.spind
         const MotorConfig& motor = config.motors[n];
         const std::int64_t one = rounded(motor.min * motor.scale);
         const std::int64_t other = rounded(motor.max * motor.scale);
-        motors_.push_back({rounded(motor.start * motor.scale), std::min(one, other),
-                           std::max(one, other), 0});
+        motors_.push_back(
+            {rounded(motor.start * motor.scale), std::min(one, other), std::max(one, other), 0});
         if (motor.encoder) {
             add(false, n, *motor.encoder, motor.encoder_scale, motor.index_every);
         }

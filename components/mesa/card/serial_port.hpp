@@ -41,7 +41,7 @@ private:
         std::unique_ptr<Remote7i76> remote;
         State state = State::stopped;
         std::uint32_t request = 0;  ///< written to CS
-        std::uint32_t status = 0;   ///< read from CS
+        std::uint32_t status = 0;  ///< read from CS
         std::array<std::uint32_t, user_registers> in{}, out{};
     };
 

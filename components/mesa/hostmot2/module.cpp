@@ -74,9 +74,8 @@ ModuleAddresses::ModuleAddresses(const ModuleDescriptor& module, const Idrom& id
           static_cast<std::uint16_t>(idrom.instance_strides[module.strides >> 4 & 1U])) {}
 
 const ModuleKind* kind_of(Tag tag) noexcept {
-    const auto found =
-        std::find_if(std::begin(kinds), std::end(kinds),
-                     [&](const ModuleKind& kind) { return kind.tag == tag; });
+    const auto found = std::find_if(std::begin(kinds), std::end(kinds),
+                                    [&](const ModuleKind& kind) { return kind.tag == tag; });
     return found == std::end(kinds) ? nullptr : found;
 }
 
@@ -88,9 +87,8 @@ std::string_view name_of(Tag tag) noexcept {
 ModuleFault fault_of(const ModuleDescriptor& module, const ModuleKind& kind,
                      const Idrom& idrom) noexcept {
     const bool known_version =
-        kind.versions.empty() ||
-        std::find(kind.versions.begin(), kind.versions.end(), module.version) !=
-            kind.versions.end();
+        kind.versions.empty() || std::find(kind.versions.begin(), kind.versions.end(),
+                                           module.version) != kind.versions.end();
     if (!known_version) return ModuleFault::version;
     if (kind.registers != 0) {
         const ModuleAddresses addresses(module, idrom);

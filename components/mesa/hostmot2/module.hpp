@@ -82,8 +82,8 @@ struct ModuleKind {
     Tag tag;
     std::string_view name;  ///< "stepgen", as in the config string of a driver
     std::span<const std::uint8_t> versions;  ///< empty: any
-    std::uint8_t registers;                  ///< 0: any
-    std::uint16_t instance_stride;           ///< 0: any
+    std::uint8_t registers;  ///< 0: any
+    std::uint16_t instance_stride;  ///< 0: any
     std::uint32_t per_instance;
 };
 /// Returns nothing for an unknown module. [any]

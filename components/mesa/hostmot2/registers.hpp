@@ -19,7 +19,7 @@ inline constexpr std::uint32_t bite_now = 1;
 namespace ioport {
 /// Bit n of each is pin n of the port. `direction` 1: output; `source` 1: of the module.
 inline constexpr unsigned data = 0, direction = 1, source = 2, open_drain = 3, invert = 4;
-}
+}  // namespace ioport
 
 namespace stepgen {
 inline constexpr unsigned rate = 0, accumulator = 1, mode = 2, direction_setup = 3,

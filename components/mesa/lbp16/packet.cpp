@@ -37,10 +37,8 @@ std::optional<std::size_t> Request::read(Space space, std::uint16_t address, Uni
 
 std::optional<std::size_t> Request::read_information(Space space) noexcept {
     const std::size_t offset = reply_size_;
-    const Command command{.information = true,
-                          .space = space,
-                          .unit = Unit::u16,
-                          .count = Information::size / 2};
+    const Command command{
+        .information = true, .space = space, .unit = Unit::u16, .count = Information::size / 2};
     if (size_ + command.head_size() > max_datagram) return {};
     if (offset + command.data_size() > max_datagram) return {};
     put(command);

@@ -29,7 +29,7 @@ enum class Space : std::uint8_t {
     timers = 4,  ///< from LBP16 version 3; has scratch registers
     unused = 5,
     status = 6,  ///< counters and errors of the communication
-    card = 7,    ///< name and versions
+    card = 7,  ///< name and versions
 };
 
 /// Width of the units of a command; the value is the binary logarithm of the bytes.

@@ -275,8 +275,9 @@ TEST(EmulatedCard, Timer_latches_the_accumulator_before_the_read) {
 }
 
 TEST(EmulatedCard, Pwm_drives_the_spindle_whose_encoder_turns) {
-    Bench bench("[card]\ntype = 7i96s\n[spindle s]\ndrive = pwm 0\nmax-speed = 6000\n"
-                "time-constant = 50ms\nencoder = 0\nedges = 400\n");
+    Bench bench(
+        "[card]\ntype = 7i96s\n[spindle s]\ndrive = pwm 0\nmax-speed = 6000\n"
+        "time-constant = 50ms\nencoder = 0\nedges = 400\n");
     bench.enable_pins();
     bench.card->write(0x4200, 3);
     bench.card->write(0x4100, pwm_value(-0.5, 12));
@@ -292,8 +293,9 @@ TEST(EmulatedCard, Pwm_drives_the_spindle_whose_encoder_turns) {
 }
 
 TEST(EmulatedCard, Isolated_terminals_of_a_7i96s_are_read_and_driven) {
-    Bench bench("[card]\ntype = 7i96s\n[input button]\nterminal = inm 3\n"
-                "[output coolant]\nterminal = ssr 1\n[output lamp]\nterminal = outm 4\n");
+    Bench bench(
+        "[card]\ntype = 7i96s\n[input button]\nterminal = inm 3\n"
+        "[output coolant]\nterminal = ssr 1\n[output lamp]\nterminal = outm 4\n");
     EXPECT_EQ(bench.card->read(0x8700), 0U);
     EXPECT_EQ(bench.card->read(0x8500) & 0x1f, 10U) << "eleven inputs";
     bench.card->set_input(0, true);

@@ -25,13 +25,14 @@ std::string parse_target(const MesaAccessOptions& options, Target& target) {
     if (options.words.size() < 2) return "missing argument; write HOST ADDRESS";
     if (options.space < 0 || options.space > 7) return "invalid --space; write 0..7";
     target.space = static_cast<Space>(options.space);
-    target.unit = target.space == Space::hostmot2 || target.space == Space::flash ? Unit::u32
-                                                                                 : Unit::u16;
+    target.unit =
+        target.space == Space::hostmot2 || target.space == Space::flash ? Unit::u32 : Unit::u16;
     const auto address = parse_natural(options.words[1]);
     const std::size_t width = bytes_of(target.unit);
     if (!address || *address > 0xffff || *address % width != 0) {
-        return fmt::format("invalid address '{}'; write a multiple of {} up to 0xFFFF, as in 0x1000",
-                           options.words[1], width);
+        return fmt::format(
+            "invalid address '{}'; write a multiple of {} up to 0xFFFF, as in 0x1000",
+            options.words[1], width);
     }
     target.address = static_cast<std::uint16_t>(*address);
     return {};

@@ -69,8 +69,10 @@ std::optional<std::vector<std::uint8_t>> CardClient::read(Space space, std::uint
 std::string CardClient::silence() const {
     const std::string& remark = port_->description().remark;
     if (!remark.empty()) return host_ + " does not answer: " + remark;
-    return host_ + " does not answer; check power, cable and the jumpers of its address, and type: "
-                   "ping " + host_.substr(0, host_.find(':'));
+    return host_ +
+           " does not answer; check power, cable and the jumpers of its address, and type: "
+           "ping " +
+           host_.substr(0, host_.find(':'));
 }
 
 }  // namespace hal::tools

@@ -39,9 +39,10 @@ std::string read_idrom(CardClient& card, CardIdentity& to) {
     if (!head) return card.silence();
     const auto cookie = load<std::uint32_t>(head->data());
     if (cookie != hostmot2_cookie) {
-        return fmt::format("the cookie at 0x0100 is 0x{:08X}, not 0x{:08X}: the firmware is not "
-                           "HostMot2",
-                           cookie, hostmot2_cookie);
+        return fmt::format(
+            "the cookie at 0x0100 is 0x{:08X}, not 0x{:08X}: the firmware is not "
+            "HostMot2",
+            cookie, hostmot2_cookie);
     }
     const std::string name = text_in(std::span(*head).subspan(4, 8));
     if (name != firmware_name) return "the firmware is '" + name + "', not HOSTMOT2";

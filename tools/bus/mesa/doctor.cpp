@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // `hal mesa doctor`: losses and round trips on the way to a card.
-#include <ifaddrs.h>
 #include <arpa/inet.h>
+#include <ifaddrs.h>
 
 #include <algorithm>
 #include <cstring>
@@ -84,14 +84,13 @@ std::string histogram(const Trips& trips) {
     std::string text;
     std::size_t begin = 0;
     for (std::int64_t limit_ns = 16'000; begin < trips.ns.size(); limit_ns *= 2) {
-        const auto end = static_cast<std::size_t>(
-            std::ranges::upper_bound(trips.ns, limit_ns) - trips.ns.begin());
+        const auto end = static_cast<std::size_t>(std::ranges::upper_bound(trips.ns, limit_ns) -
+                                                  trips.ns.begin());
         const std::size_t count = end - begin;
         if (count > 0) {
             const std::size_t length = std::max<std::size_t>(1, count * 50 / trips.ns.size());
-            text += fmt::format("{:>10} us  {:>7}  {}\n",
-                                fmt::format("<= {}", limit_ns / 1000), count,
-                                std::string(length, '#'));
+            text += fmt::format("{:>10} us  {:>7}  {}\n", fmt::format("<= {}", limit_ns / 1000),
+                                count, std::string(length, '#'));
         }
         begin = end;
     }
@@ -142,9 +141,10 @@ std::string report_text(const std::string& host, const CardIdentity& card, const
     }
     const std::string interface = interface_to(host);
     if (!interface.empty() && interface != "lo") {
-        text += fmt::format("\nsettings of the interface that delay packets; type: hal doctor "
-                            "--interface {}\n",
-                            interface);
+        text += fmt::format(
+            "\nsettings of the interface that delay packets; type: hal doctor "
+            "--interface {}\n",
+            interface);
     }
     return text;
 }

@@ -93,8 +93,8 @@ std::string info_text(const std::string& host, const CardIdentity& card) {
         card.name, host, mac_text(card.mac), card.lbp_version, card.firmware_version,
         card.idrom.type, card.idrom_address, card.board, card.idrom.ports, card.idrom.port_width,
         clock_text(card.idrom.clock_low_hz), clock_text(card.idrom.clock_high_hz));
-    text += fmt::format("received packets {}, errors {}\n", card.received_packets,
-                        card.parse_errors);
+    text +=
+        fmt::format("received packets {}, errors {}\n", card.received_packets, card.parse_errors);
     if (board == nullptr) {
         text += "unknown card: hm2_eth has no names for its pins\n";
     } else {
@@ -113,9 +113,9 @@ std::string info_text(const std::string& host, const CardIdentity& card) {
         const std::string name = kind == nullptr
                                      ? fmt::format("0x{:02X}", static_cast<unsigned>(module.tag))
                                      : std::string(kind->name);
-        std::string line = fmt::format("{:22}  {:>5}  {:>7}  {:>9}  0x{:04X}  {}", name,
-                                       module.instances, module.version, module.registers,
-                                       module.base, remark);
+        std::string line =
+            fmt::format("{:22}  {:>5}  {:>7}  {:>9}  0x{:04X}  {}", name, module.instances,
+                        module.version, module.registers, module.base, remark);
         line.erase(line.find_last_not_of(' ') + 1);
         text += line + "\n";
     }
@@ -206,11 +206,11 @@ int run_mesa_scan(const MesaScanOptions& options) {
         if (!print(fmt::format("{}  {}\n", host, what))) return 1;
     }
     if (!found.empty()) return 0;
-    return fail(options, fmt::format("no card answers at {}; an interface of this computer needs "
-                                     "an address in the subnet of the card",
-                                     hosts.size() == 1
-                                         ? hosts[0]
-                                         : fmt::format("{} addresses", hosts.size())));
+    return fail(
+        options,
+        fmt::format("no card answers at {}; an interface of this computer needs "
+                    "an address in the subnet of the card",
+                    hosts.size() == 1 ? hosts[0] : fmt::format("{} addresses", hosts.size())));
 }
 
 int run_mesa_info(const MesaCardOptions& options) {
