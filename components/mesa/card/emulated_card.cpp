@@ -106,6 +106,12 @@ PinDescriptor EmulatedCard::descriptor(std::size_t pin) const noexcept {
     return whole;
 }
 
+/// Whether a smart-serial channel has a pin to send.
+bool EmulatedCard::has_channel(unsigned channel) const noexcept {
+    const unsigned number = pin_number::smart_serial::first_transmit + channel;
+    return find_output(Tag::smart_serial, 0, number) != no_pin;
+}
+
 std::size_t EmulatedCard::find_output(Tag tag, unsigned unit, unsigned number) const noexcept {
     for (std::size_t pin = 0; pin < outside_.size(); ++pin) {
         const PinDescriptor is = descriptor(pin);
@@ -115,6 +121,11 @@ std::size_t EmulatedCard::find_output(Tag tag, unsigned unit, unsigned number) c
 }
 
 void EmulatedCard::find_pins() {
+    unsigned channels = 0;
+    while (channels < smart_serial::max_channels && has_channel(channels)) {
+        ++channels;
+    }
+    serial_.set_channels(channels);
     for (unsigned unit = 0; unit < config_.instances(Tag::stepgen); ++unit) {
         Generator& generator = generators_[unit];
         generator.step_pin = find_output(Tag::stepgen, unit, pin_number::stepgen::step);

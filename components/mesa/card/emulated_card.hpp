@@ -113,6 +113,7 @@ private:
     bool module_level(const PinDescriptor& pin) const noexcept;
     bool outside_level(std::size_t pin) const noexcept;
     bool has_terminal_level(const Terminal& terminal) const noexcept;
+    bool has_channel(unsigned channel) const noexcept;
     std::size_t find_output(Tag tag, unsigned unit, unsigned number) const noexcept;
     double pwm_command(unsigned unit) const noexcept;
 

@@ -29,6 +29,10 @@ SerialPort::LocalMemory SerialPort::usual_local() noexcept {
     return bytes;
 }
 
+void SerialPort::set_channels(unsigned count) noexcept {
+    local_[smart_serial::local::channels] = static_cast<std::uint8_t>(count);
+}
+
 void SerialPort::connect(unsigned channel, std::uint32_t serial_number) {
     channels_[channel].remote = std::make_unique<Remote7i76>(serial_number);
 }

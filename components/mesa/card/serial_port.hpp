@@ -18,6 +18,8 @@ class SerialPort {
 public:
     static constexpr std::int64_t exchange_ns = 100'000;
 
+    /// Sets how many channels have pins. [setup]
+    void set_channels(unsigned count) noexcept;
     /// Connects a device to a channel. [setup]
     void connect(unsigned channel, std::uint32_t serial_number);
     Remote7i76* remote(unsigned channel) noexcept { return channels_[channel].remote.get(); }

@@ -25,7 +25,7 @@ inline constexpr std::uint32_t reset = 0x4000, clear = 0x0001, read_local = 0x20
 }
 /// Local bytes of a port.
 namespace local {
-inline constexpr std::uint32_t version = 3, channel_offset = 4, channel_stride = 5;
+inline constexpr std::uint32_t version = 3, channel_offset = 4, channel_stride = 5, channels = 7;
 inline constexpr std::uint8_t usual_version = 43, not_ready = 0xaa;
 }  // namespace local
 

@@ -67,6 +67,8 @@ TEST_F(Serial, Version_and_baud_rate_are_local_bytes) {
     order(port::reset);
     order(port::read_local | local::version);
     EXPECT_EQ(read(data), 43U);
+    order(port::read_local | local::channels);
+    EXPECT_EQ(read(data), 2U);
     order(port::read_local | local::channel_offset);
     const std::uint32_t offset = read(data);
     std::uint32_t baud = 0;
