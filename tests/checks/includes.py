@@ -172,6 +172,7 @@ ROWS = {
     ],
     "components/mesa/lbp16": [],
     "components/mesa/hostmot2": ["components/mesa/lbp16"],
+    "components/mesa/driver": ["components/mesa/hostmot2", "runtime/text", "drivers/link"],
     "components/mesa/card": [
         "components/mesa/hostmot2",
         "components/bus/config",

@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: MIT
+#include "card_image.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdio>
+
+#include "mesa/hostmot2/boards.hpp"
+#include "mesa/lbp16/spaces.hpp"
+
+namespace hal::mesa {
+
+namespace {
+
+std::string hex(std::uint32_t value, int digits) {
+    char text[16];
+    std::snprintf(text, sizeof text, "0x%0*X", digits, value);
+    return text;
+}
+
+/// Returns the characters up to the first that is not printable, for messages.
+std::string printable(std::string_view text) {
+    std::string result;
+    for (const char c : text) {
+        if (std::isprint(static_cast<unsigned char>(c)) == 0) break;
+        result += c;
+    }
+    return result;
+}
+
+std::string name_of_card(const std::string& card) {
+    if (const Board* board = board_of(card)) return std::string(board->name);
+    std::string name;
+    for (const char c : card) {
+        if (std::isalnum(static_cast<unsigned char>(c)) == 0) break;
+        name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+    return name.empty() ? "card" : name;
+}
+
+std::vector<std::uint8_t> read_bytes(SetupLink& link, std::uint16_t address, std::size_t size) {
+    Request request;
+    request.read(Space::hostmot2, address, Unit::u32, size / 4);
+    const auto bytes = link.exchange(request);
+    return {bytes.begin(), bytes.end()};
+}
+
+std::string sentence_of(IdromFault fault, const Idrom& idrom) {
+    switch (fault) {
+    case IdromFault::none: return {};
+    case IdromFault::type:
+        return "unknown firmware: IDROM type " + std::to_string(idrom.type) +
+               "; the driver supports 2 and 3";
+    case IdromFault::width:
+        return "unknown firmware: " + std::to_string(idrom.ports) + " ports of " +
+               std::to_string(idrom.port_width) + " pins, but " + std::to_string(idrom.width) +
+               " pins in all";
+    case IdromFault::no_pins: return "unknown firmware: it has no pins";
+    case IdromFault::many_pins:
+        return "unknown firmware: " + std::to_string(idrom.width) +
+               " pins; the driver supports up to " + std::to_string(max_pins);
+    case IdromFault::clock:
+        return "unknown firmware: clocks of " + std::to_string(idrom.clock_low_hz) + " and " +
+               std::to_string(idrom.clock_high_hz) + " Hz; at least 1 MHz is expected";
+    case IdromFault::descriptors:
+        return "unknown firmware: its tables of modules and pins are outside of the registers";
+    }
+    return {};
+}
+
+std::string versions_of(const ModuleKind& kind) {
+    std::string text;
+    for (const std::uint8_t version : kind.versions) {
+        text += (text.empty() ? "" : ", ") + std::to_string(version);
+    }
+    return text;
+}
+
+std::string sentence_of(ModuleFault fault, const CardModule& module, const ModuleKind& kind) {
+    const std::string name = "module " + std::string(kind.name) + " of the firmware";
+    const ModuleDescriptor& d = module.descriptor;
+    switch (fault) {
+    case ModuleFault::none: return {};
+    case ModuleFault::version:
+        return name + " has version " + std::to_string(d.version) + "; the driver supports " +
+               versions_of(kind);
+    case ModuleFault::registers:
+        return name + " has " + std::to_string(d.registers) + " registers; the driver supports " +
+               std::to_string(kind.registers);
+    case ModuleFault::instance_stride:
+        return name + " has an instance stride of " + hex(module.addresses.instance_stride, 2) +
+               "; the driver supports " + hex(kind.instance_stride, 2);
+    case ModuleFault::per_instance:
+        return name + " has the register map " + hex(d.per_instance, 4) + "; the driver supports " +
+               hex(kind.per_instance, 4);
+    case ModuleFault::outside: return name + " has registers outside of the 64 KiB of the card";
+    }
+    return {};
+}
+
+[[noreturn]] void reject(const CardImage& image, const std::string& sentence) {
+    const std::string who =
+        image.card.empty() ? image.address : image.address + " (" + image.card + ")";
+    throw CardError(who + ": " + sentence);
+}
+
+void read_identity(SetupLink& link, CardImage& image) {
+    const auto name = link.read16(Space::card, card::name, 8);
+    image.card = printable(text_of({reinterpret_cast<const char*>(name.data()), name.size()}));
+    image.name = name_of_card(image.card);
+    image.lbp_version = load<std::uint16_t>(link.read16(Space::card, card::lbp_version, 1).data());
+}
+
+std::uint16_t read_firmware(SetupLink& link, const CardImage& image) {
+    const std::vector<std::uint8_t> head = read_bytes(link, cookie_address, 16);
+    const auto cookie = load<std::uint32_t>(head.data());
+    if (cookie != hostmot2_cookie) {
+        reject(image, "wrong cookie " + hex(cookie, 8) + " in place of " + hex(hostmot2_cookie, 8) +
+                          ": no HostMot2 firmware is running on this device");
+    }
+    const std::string_view name(reinterpret_cast<const char*>(head.data()) + 4, 8);
+    if (name != firmware_name) {
+        reject(image, "unknown firmware '" + printable(name) + "'; the driver supports " +
+                          std::string(firmware_name));
+    }
+    return load<std::uint16_t>(head.data() + 12);
+}
+
+void read_modules(SetupLink& link, CardImage& image, std::uint16_t at) {
+    for (std::size_t n = 0; n < max_modules; ++n) {
+        const auto address = static_cast<std::uint16_t>(at + n * ModuleDescriptor::size);
+        const auto descriptor =
+            ModuleDescriptor::decode(read_bytes(link, address, ModuleDescriptor::size));
+        if (!descriptor || descriptor->tag == Tag::none) return;
+        CardModule module;
+        module.descriptor = *descriptor;
+        module.addresses = ModuleAddresses(*descriptor, image.idrom);
+        module.clock_hz = clock_hz(*descriptor, image.idrom);
+        if (const ModuleKind* kind = kind_of(descriptor->tag)) {
+            const ModuleFault fault = fault_of(*descriptor, *kind, image.idrom);
+            if (fault != ModuleFault::none) {
+                reject(image, sentence_of(fault, module, *kind));
+            }
+        }
+        image.modules.push_back(module);
+    }
+}
+
+void read_pins(SetupLink& link, CardImage& image, std::uint16_t at) {
+    constexpr std::size_t at_once = 64;
+    for (std::size_t n = 0; n < image.idrom.width; n += at_once) {
+        const std::size_t count = std::min<std::size_t>(at_once, image.idrom.width - n);
+        const auto bytes = read_bytes(link, static_cast<std::uint16_t>(at + n * 4), count * 4);
+        for (std::size_t i = 0; i < count; ++i) {
+            const auto pin = PinDescriptor::decode(load<std::uint32_t>(bytes.data() + i * 4));
+            if (pin.primary != Tag::ioport) {
+                reject(image, "unknown firmware: pin " + std::to_string(n + i) +
+                                  " is not an I/O pin (tag " +
+                                  hex(static_cast<std::uint8_t>(pin.primary), 2) + ")");
+            }
+            image.pins.push_back({pin, true});
+        }
+    }
+}
+
+/// Returns the channel of a pin of smart serial.
+unsigned serial_channel(const PinDescriptor& pin) noexcept {
+    namespace number = pin_number::smart_serial;
+    return (pin.number - 1U) % (number::first_enable - number::first_transmit);
+}
+
+bool is_serial(Tag tag) noexcept {
+    return tag == Tag::smart_serial || tag == Tag::wide_smart_serial;
+}
+
+bool is_used(const CardImage& image, const ConfigString& config, const PinDescriptor& pin) {
+    if (pin.module == Tag::mux_select) {
+        const CardModule* const muxed = image.find(Tag::muxed_encoder);
+        return muxed != nullptr && muxed->used > 0;
+    }
+    const CardModule* const module = image.find(pin.module);
+    if (module == nullptr || module->used == 0) return false;
+    if (is_serial(pin.module)) {
+        if (pin.unit >= module->used) return false;
+        return (image.serial_channels(config, pin.unit) >> serial_channel(pin) & 1U) != 0;
+    }
+    if (pin.unit == PinDescriptor::all_units) return true;
+    if (pin.module == Tag::ssr || pin.module == Tag::outm || pin.module == Tag::inm ||
+        pin.module == Tag::inmux) {
+        return pin.unit < module->used;
+    }
+    if (pin.module == Tag::stepgen && pin.number > config.stepgen_width() &&
+        pin.number <= pin_number::stepgen::last_table) {
+        return false;
+    }
+    return pin.unit < module->used;
+}
+
+CardModule example_module(Tag tag, std::uint8_t version, std::uint8_t instances,
+                          std::uint16_t base) {
+    CardModule module;
+    module.descriptor.tag = tag;
+    module.descriptor.version = version;
+    module.descriptor.instances = instances;
+    module.descriptor.base = base;
+    module.addresses.base = base;
+    module.addresses.register_stride = 0x100;
+    module.addresses.instance_stride = 4;
+    module.clock_hz = tag == Tag::pwm ? 200'000'000 : 100'000'000;
+    return module;
+}
+
+}  // namespace
+
+const CardModule* CardImage::find(Tag tag) const noexcept {
+    const auto found = std::ranges::find(modules, tag, &CardModule::tag);
+    return found == modules.end() ? nullptr : &*found;
+}
+CardModule* CardImage::find(Tag tag) noexcept {
+    const auto found = std::ranges::find(modules, tag, &CardModule::tag);
+    return found == modules.end() ? nullptr : &*found;
+}
+
+std::uint32_t CardImage::serial_channels(const ConfigString& config, unsigned port) const noexcept {
+    std::uint32_t present = 0;
+    for (const CardPin& pin : pins) {
+        if (is_serial(pin.descriptor.module) && pin.descriptor.unit == port) {
+            present |= 1U << serial_channel(pin.descriptor);
+        }
+    }
+    for (unsigned channel = 0; channel < ConfigString::max_channels; ++channel) {
+        if (config.serial_mode(port, channel) < 0) {
+            present &= ~(1U << channel);
+        }
+    }
+    return present;
+}
+
+CardImage probe(SetupLink& link) {
+    CardImage image;
+    image.address = link.address();
+    read_identity(link, image);
+    const std::uint16_t at = read_firmware(link, image);
+    if (at % 4 != 0) {
+        reject(image, "unknown firmware: its IDROM is at " + hex(at, 4));
+    }
+    const auto idrom = Idrom::decode(read_bytes(link, at, Idrom::size));
+    if (!idrom) {
+        reject(image, "unknown firmware: its IDROM is too short");
+    }
+    image.idrom = *idrom;
+    if (const IdromFault fault = fault_of(*idrom, at); fault != IdromFault::none) {
+        reject(image, sentence_of(fault, *idrom));
+    }
+    read_modules(link, image, static_cast<std::uint16_t>(at + idrom->modules));
+    read_pins(link, image, static_cast<std::uint16_t>(at + idrom->pins));
+    if (image.find(Tag::ioport) == nullptr || image.find(Tag::watchdog) == nullptr) {
+        reject(image, "unknown firmware: it has no I/O ports or no watchdog");
+    }
+    return image;
+}
+
+std::string apply(const ConfigString& config, CardImage& image) {
+    for (CardModule& module : image.modules) {
+        const std::string_view item = ConfigString::item_of(module.tag());
+        const int asked = item.empty() ? ConfigString::all : config.count(module.tag());
+        // the instances of these are counted in outputs, of which each module has many
+        const unsigned present = module.tag() == Tag::led ? 4U : module.descriptor.instances;
+        if (asked > static_cast<int>(present)) {
+            return image.address + " (" + image.card + "): config asks for " + std::string(item) +
+                   "=" + std::to_string(asked) + ", but the firmware has " +
+                   std::to_string(present) + "; without " + std::string(item) +
+                   " all of them are used";
+        }
+        module.used = asked == ConfigString::all ? present : static_cast<unsigned>(asked);
+    }
+    for (const Tag tag : {Tag::encoder, Tag::stepgen, Tag::pwm, Tag::ssr, Tag::inm, Tag::inmux,
+                          Tag::outm, Tag::dpll, Tag::led}) {
+        const bool is_muxed = tag == Tag::encoder && image.find(Tag::muxed_encoder) != nullptr;
+        if (is_muxed || image.find(tag) != nullptr || config.count(tag) <= 0) continue;
+        return image.address + " (" + image.card + "): config asks for " +
+               std::string(ConfigString::item_of(tag)) + "=" + std::to_string(config.count(tag)) +
+               ", but the firmware does not have this module";
+    }
+    for (CardPin& pin : image.pins) {
+        pin.is_gpio = !is_used(image, config, pin.descriptor);
+    }
+    return {};
+}
+
+CardImage example_card() {
+    CardImage image;
+    image.address = "sim:card";
+    image.card = "7I76E-16";
+    image.name = "7i76e";
+    image.lbp_version = 3;
+    image.idrom.ports = 3;
+    image.idrom.port_width = 17;
+    image.idrom.width = 51;
+    image.modules = {
+        example_module(Tag::ioport, 0, 3, 0x1000),   example_module(Tag::stepgen, 2, 5, 0x2000),
+        example_module(Tag::encoder, 3, 1, 0x3000),  example_module(Tag::pwm, 0, 1, 0x4100),
+        example_module(Tag::watchdog, 0, 1, 0x0c00), example_module(Tag::dpll, 0, 1, 0x7000),
+        example_module(Tag::led, 0, 1, 0x0200),
+    };
+    image.pins.resize(image.idrom.width);
+    for (std::uint8_t unit = 0; unit < 5; ++unit) {
+        namespace number = pin_number::stepgen;
+        image.pins[unit * 2U].descriptor = {number::direction, true, Tag::stepgen, unit};
+        image.pins[unit * 2U + 1].descriptor = {number::step, true, Tag::stepgen, unit};
+    }
+    image.pins[14].descriptor = {pin_number::encoder::index, false, Tag::encoder, 0};
+    image.pins[15].descriptor = {pin_number::encoder::b, false, Tag::encoder, 0};
+    image.pins[16].descriptor = {pin_number::encoder::a, false, Tag::encoder, 0};
+    return image;
+}
+
+}  // namespace hal::mesa

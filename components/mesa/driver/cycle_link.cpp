@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MIT
+#include "cycle_link.hpp"
+
+#include <algorithm>
+
+#include "mesa/lbp16/spaces.hpp"
+
+namespace hal::mesa {
+
+namespace {
+
+/// Counts are two units of 16 bits, the low one first.
+bool put_count(Request& request, std::uint16_t address, std::uint32_t count) noexcept {
+    std::array<std::uint8_t, 4> data;
+    store(data.data(), count);
+    return request.write(Space::timers, address, Unit::u16, data).has_value();
+}
+
+}  // namespace
+
+CycleLink::CycleLink(datagram::Port& port, ReadLayout layout, std::uint16_t session)
+    : port_(port), layout_(std::move(layout)), session_(session) {
+    if (!append_reads(reads_)) {
+        throw CardError(
+            "the modules in use need more than the 1400 bytes of a datagram in each cycle; use "
+            "fewer of them in config=");
+    }
+    reply_size_ = reads_.reply_size();
+    counts_offset_ = reply_size_ - 8;
+}
+
+bool CycleLink::append_reads(Request& request) noexcept {
+    return layout_.append_to(request) &&
+           request.read(Space::status, status::received_packets, Unit::u16).has_value() &&
+           put_count(request, timers::read_count, number(read_count_)) &&
+           request.read(Space::timers, timers::scratch, Unit::u16, 4).has_value();
+}
+
+void CycleLink::request(std::int64_t now_ns) noexcept {
+    if (is_requested_) return;
+    note_request(now_ns, false);
+    reads_.clear();
+    append_reads(reads_);
+    port_.send(reads_.bytes(), now_ns);
+}
+
+void CycleLink::note_request(std::int64_t now_ns, bool is_joined) noexcept {
+    ++read_count_;
+    is_requested_ = true;
+    is_joined_ = is_joined;
+    requested_ns_ = now_ns;
+    expected_write_count_ = write_count_;
+    ++counts_.requests;
+}
+
+Answer CycleLink::receive(std::int64_t now_ns, std::int64_t limit_ns) noexcept {
+    if (!is_requested_) {
+        drain(now_ns);
+        return Answer::unrequested;
+    }
+    is_requested_ = false;
+    const std::int64_t passed_ns = std::max<std::int64_t>(now_ns - requested_ns_, 0);
+    const std::int64_t wait_ns = std::max(limit_ns - passed_ns, min_wait_ns);
+    // an unexpected datagram ends a wait, but not the waiting
+    for (int tries = 0; tries < 3; ++tries) {
+        if (drain(now_ns)) return Answer::fresh;
+        if (!port_.wait(wait_ns)) break;
+    }
+    if (drain(now_ns)) return Answer::fresh;
+    ++counts_.lost;
+    return Answer::missing;
+}
+
+bool CycleLink::drain(std::int64_t now_ns) noexcept {
+    for (unsigned n = 0; n < max_datagrams; ++n) {
+        const std::size_t size = port_.receive(buffers_[1 - newest_], now_ns);
+        if (size == 0) return false;
+        if (accept(size)) return true;
+        ++counts_.unexpected;
+    }
+    return false;
+}
+
+bool CycleLink::accept(std::size_t size) noexcept {
+    const std::uint8_t* const bytes = buffers_[1 - newest_].data();
+    if (size != reply_size_) return false;
+    if (load<std::uint32_t>(bytes + counts_offset_) != number(read_count_)) return false;
+    newest_ = 1 - newest_;
+    note_counts();
+    return true;
+}
+
+void CycleLink::note_counts() noexcept {
+    const std::uint8_t* const bytes = buffers_[newest_].data();
+    const auto count = load<std::uint32_t>(bytes + counts_offset_ + 4);
+    const bool is_foreign = count != 0 && count >> 16 != session_;
+    has_foreign_writes_ = is_foreign && count != card_write_count_;
+    const bool is_expected = count == number(expected_write_count_);
+    writes_arrived_ = is_joined_ || is_expected;
+    if (!is_expected && !is_foreign && count != 0) {
+        ++counts_.lost_writes;
+    }
+    card_write_count_ = count;
+}
+
+/// Returns whether the reads are in the datagram of the writes.
+bool CycleLink::begin_send(std::int64_t now_ns, bool requests, std::size_t late_size) noexcept {
+    const std::size_t size = writes_.size() + reads_.size() + late_size + count_size;
+    if (!requests || is_requested_ || size > max_datagram) return false;
+    note_request(now_ns, true);
+    append_reads(writes_);
+    return true;
+}
+
+void CycleLink::end_send(std::int64_t now_ns, bool requests) noexcept {
+    // behind the reads, which so show a count that another master has written
+    put_count(writes_, timers::write_count, number(++write_count_));
+    port_.send(writes_.bytes(), now_ns);
+    if (requests) {
+        request(now_ns);
+    }
+}
+
+void CycleLink::send_unnumbered(std::int64_t now_ns) noexcept {
+    port_.send(writes_.bytes(), now_ns);
+}
+
+}  // namespace hal::mesa
