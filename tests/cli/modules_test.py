@@ -3,6 +3,7 @@
 # packages: linuxcnc
 """LinuxCNC's compiled modules: what a module may do, and what goes wrong with one. The modules are in modules/, compiled here; LinuxCNC is
 not needed (tests/peers/linuxcnc_modules_test.py runs its own)."""
+
 import re
 import signal
 import subprocess
@@ -21,9 +22,7 @@ class Modules(ModuleCase):
 
     def test_a_module_computes_with_pins_parameters_and_arguments(self):
         self.build("gain")
-        out = self.sim(
-            THREAD
-            + """loadrt gain count=2 offset=0x10 steps=1,3
+        out = self.sim(THREAD + """loadrt gain count=2 offset=0x10 steps=1,3
 addf gain.0 t
 addf gain.1 t
 net x gain.0.out => gain.1.in
@@ -41,8 +40,7 @@ setp gain.0.gain 4
 advance 1 cycles
 getp gain.1.cycles
 gets x
-"""
-        )
+""")
         self.assertEqual(("", "2\n19\n54\nTRUE\n4\n12\n0\n22\n"), (out.stderr, out.stdout))
 
     def test_memory_by_key_belongs_to_one_machine(self):
@@ -78,8 +76,7 @@ gets x
 
     def test_modules_call_each_other_and_make_threads(self):
         self.build("planner", "follow")
-        out = self.sim(
-            """loadrt planner
+        out = self.sim("""loadrt planner
 loadrt follow period=2000000
 loadrt --native sum2 names=sum
 net step sum.out => planner.scale
@@ -92,16 +89,14 @@ advance 3 cycles
 getp follow.position
 gets seen
 show thread
-"""
-        )
+""")
         self.assertEqual("", out.stderr)
         self.assertEqual(["1.5", "1.5"], out.stdout.split()[:2])
         self.assertRegex(out.stdout, r"2000000 .*follow-thread|follow-thread.*2000000")
 
     def test_a_module_can_be_loaded_again_with_its_first_values(self):
         self.build("planner", "follow")
-        out = self.sim(
-            """loadrt planner
+        out = self.sim("""loadrt planner
 loadrt follow
 setp planner.scale 1
 addf follow follow-thread
@@ -118,8 +113,7 @@ start
 advance 1 cycles
 getp follow.position
 getp planner.scale
-"""
-        )
+""")
         self.assertEqual(("", ["3", "0", "0"]), (out.stderr, re.findall(r"(?m)^\d+$", out.stdout)))
         self.assertIn(
             "it is still loaded: an unload in the same transaction takes effect at its end",
@@ -128,8 +122,7 @@ getp planner.scale
 
     def test_the_thread_of_a_module_outlives_it_and_is_used_again(self):
         self.build("planner", "follow")
-        out = self.sim(
-            """loadrt planner
+        out = self.sim("""loadrt planner
 loadrt follow
 addf follow follow-thread
 start
@@ -142,8 +135,7 @@ addf follow follow-thread
 setp planner.scale 2
 advance 2 cycles
 getp follow.position
-"""
-        )
+""")
         self.assertEqual(("", "4\n4\n"), (out.stderr, out.stdout))
 
     def test_what_save_prints_loads_again(self):
@@ -301,6 +293,14 @@ getp follow.position
                 "sim", "--quiet", self.write("m.hal", "loadrt --native sum2\ngetp sum2.0.in0\n")
             ),
         )
+
+    def test_a_driver_of_linuxcnc_comes_first_where_it_is_installed(self):
+        """Other modules of LinuxCNC use its hostmot2."""
+        text = "loadrt hostmot2\ngetp gain.0.gain\n"
+        self.assertIn("unknown pin or parameter 'gain.0.gain'", self.error(text))
+        self.build("hostmot2", source="gain")
+        self.assertEqual("2\n", self.good("sim", "--quiet", self.write("m.hal", text)))
+        self.good("sim", "--quiet", self.write("m.hal", "loadrt --native hostmot2\n"))
 
     def test_linuxcncs_modules_come_first_where_the_environment_says_so(self):
         self.build("sum2", source="gain")

@@ -114,6 +114,13 @@ std::string left_out_for(const std::string& name, const std::vector<std::string>
     return {};
 }
 
+/// Components under the names of drivers of LinuxCNC. Other modules of LinuxCNC need its own ones
+/// (hm2_pci needs hostmot2), so these are loaded where LinuxCNC is not installed, or with --native.
+bool yields_to_module(std::string_view name) {
+    constexpr std::string_view names[] = {"hm2_eth", "hostmot2"};
+    return std::ranges::find(names, name) != std::end(names) && !find_module(name).empty();
+}
+
 void report_missing_module(std::string_view name, Span at, Diagnostics& diagnostics) {
     std::error_code none;
     const bool installed = fs::is_directory(module_folder(), none);
@@ -217,14 +224,16 @@ std::optional<Plugin> Plugins::open(std::string_view name, Span at,
 std::optional<Plugin> open_component(const Plugins& plugins, std::string_view name, Origin origin,
                                      Span at, Diagnostics& diagnostics) {
     const std::vector<std::string>& path = plugins.path();
-    std::string found = origin == Origin::linuxcnc ? "" : plugins.find(name);
+    const bool prefers_module =
+        origin == Origin::linuxcnc || (origin == Origin::any && yields_to_module(name));
+    std::string found = prefers_module ? "" : plugins.find(name);
     const std::string module = origin == Origin::native || !found.empty() ? "" : find_module(name);
     if (origin == Origin::linuxcnc && module.empty()) {
         report_missing_module(name, at, diagnostics);
         return std::nullopt;
     }
     if (!module.empty() &&
-        (origin == Origin::linuxcnc || !listed_components(path).contains(underlined(name)))) {
+        (prefers_module || !listed_components(path).contains(underlined(name)))) {
         return open_module(module, at, diagnostics);
     }
     const bool unbuilt = found.empty() && listed_components(path).contains(underlined(name));
