@@ -37,3 +37,4 @@ foreach(file IN LISTS HALCYON_PACKAGE_FILES ITEMS "${PROJECT_BINARY_DIR}/Halcyon
     configure_file("${file}" "${package}/${name}" COPYONLY)
 endforeach()
 install(FILES tools/wireshark/halcyon.lua DESTINATION "${CMAKE_INSTALL_DATADIR}/halcyon/wireshark")
+install(DIRECTORY tools/lsp/vscode tools/lsp/kate DESTINATION "${CMAKE_INSTALL_DATADIR}/halcyon/editors" PATTERN node_modules EXCLUDE)

@@ -105,7 +105,7 @@ class Live(Case):
         self.assertEqual("23", self.in_machine("total"))
         again = self.apply(text)
         self.assertEqual((False, "no line has changed"), (again["applied"], again["message"]))
-        # removed lines are rolled back
+        # removed lines are reverted
         answer = self.apply(text.replace("net sum-of-all other.out\n", ""))
         self.assertTrue(answer["applied"], answer)
         self.assertEqual(1, self.shell("gets", "sum-of-all", instance="cell").returncode)

@@ -20,7 +20,7 @@ struct NetlistChanges {
     std::vector<std::string> not_sent;
 };
 
-/// Compares two texts of a netlist. A line that only moves does not count as a change. `ini` is for [SECTION]KEY. [setup]
+/// Compares two texts of a netlist. Lines that only move are equal. `ini` is for [SECTION]KEY. [setup]
 NetlistChanges netlist_changes(const std::string& before, const std::string& after, const Ini& ini);
 
 }  // namespace hal::tools
