@@ -180,7 +180,10 @@ ROWS = {
         "drivers/link",
     ],
     "components/mesa/plugins": [
+        "components/mesa/driver",
         "components/mesa/card",
+        "components/bus/component",
+        "components/bus/events",
         "runtime/sdk",
     ],
     "components/fieldbus/can_timing": ["drivers/link"],

@@ -41,7 +41,7 @@ GIVEN = {
     "weighted-sum": "wsum_sizes=2,4",
 }
 # Files or hardware of their own.
-LEFT_OUT = {"ethercat", "goals", "lcec", "mesa-card", "modbus", "modbus-node"}
+LEFT_OUT = {"ethercat", "goals", "hm2-eth", "lcec", "mesa", "mesa-card", "modbus", "modbus-node"}
 
 
 def random_edits(seed):

@@ -31,6 +31,8 @@ inline const std::map<std::string, std::string> component_arguments{
     {"dds_subscribe", "topic=rt/pins fields=f:float,b:bit,i:s32,u:u32,l:s64,k:u64 domain=230"},
     {"ethercat", "config=tests/rt/drive.ethercat"},
     {"lcec", "config=tests/rt/ethercat-conf.xml link=sim:rt/lcec"},
+    {"hm2_eth", "board_ip=sim:rt-hm2-eth"},
+    {"mesa", "board=sim:rt-mesa config=\"enable_raw\""},
     {"mesa_card", "config=tests/rt/card.mesa"},
     {"modbus", "config=tests/rt/bus.modbus"},
     {"modbus_node", "config=tests/rt/bus.modbus link=sim:rt-modbus-node"},
@@ -40,6 +42,12 @@ inline const std::map<std::string, std::string> component_arguments{
     {"scocan_sync", "link=sim:rt-scocan node=clock" SCOCAN_TABLE},
     {"segment_record", "link=sim:rt/recorder file=/dev/null"},
     {"tdma", "link=sim:rt/master station=master schedule=\"master:; cycle 2000; slot 0 100\""},
+};
+
+// What has to be loaded before: drivers ask their device what it has.
+inline const std::map<std::string, std::string> component_devices{
+    {"hm2_eth", "loadrt mesa_card names=rt-hm2-eth config=tests/rt/card.mesa link=sim:rt-hm2-eth"},
+    {"mesa", "loadrt mesa_card names=rt-mesa config=tests/rt/card.mesa link=sim:rt-mesa"},
 };
 
 inline std::vector<std::string> all_components() {
@@ -56,8 +64,9 @@ inline std::vector<std::string> all_components() {
 /// Returns the line that loads a component.
 inline std::string load(const std::string& name) {
     const auto given = component_arguments.find(name);
-    return "loadrt " + name + (given == component_arguments.end() ? "" : " " + given->second) +
-           "\n";
+    const auto device = component_devices.find(name);
+    return (device == component_devices.end() ? "" : device->second + "\n") + "loadrt " + name +
+           (given == component_arguments.end() ? "" : " " + given->second) + "\n";
 }
 
 // Ordinary values mostly, and now and then one from the edge of the type.

@@ -294,21 +294,19 @@ CardImage example_card() {
     image.card = "7I76E-16";
     image.name = "7i76e";
     image.lbp_version = 3;
-    image.idrom.ports = 3;
+    // one port and one instance of each, for short texts
+    image.idrom.ports = 1;
     image.idrom.port_width = 17;
-    image.idrom.width = 51;
+    image.idrom.width = 17;
     image.modules = {
-        example_module(Tag::ioport, 0, 3, 0x1000),   example_module(Tag::stepgen, 2, 5, 0x2000),
+        example_module(Tag::ioport, 0, 1, 0x1000),   example_module(Tag::stepgen, 2, 1, 0x2000),
         example_module(Tag::encoder, 3, 1, 0x3000),  example_module(Tag::pwm, 0, 1, 0x4100),
         example_module(Tag::watchdog, 0, 1, 0x0c00), example_module(Tag::dpll, 0, 1, 0x7000),
         example_module(Tag::led, 0, 1, 0x0200),
     };
     image.pins.resize(image.idrom.width);
-    for (std::uint8_t unit = 0; unit < 5; ++unit) {
-        namespace number = pin_number::stepgen;
-        image.pins[unit * 2U].descriptor = {number::direction, true, Tag::stepgen, unit};
-        image.pins[unit * 2U + 1].descriptor = {number::step, true, Tag::stepgen, unit};
-    }
+    image.pins[0].descriptor = {pin_number::stepgen::direction, true, Tag::stepgen, 0};
+    image.pins[1].descriptor = {pin_number::stepgen::step, true, Tag::stepgen, 0};
     image.pins[14].descriptor = {pin_number::encoder::index, false, Tag::encoder, 0};
     image.pins[15].descriptor = {pin_number::encoder::b, false, Tag::encoder, 0};
     image.pins[16].descriptor = {pin_number::encoder::a, false, Tag::encoder, 0};

@@ -52,7 +52,7 @@ CardImage probe(SetupLink& link);
 /// Marks what is used. Returns the problem, or "": the config asks for more than there is.
 std::string apply(const ConfigString& config, CardImage& image);
 
-/// Returns a 7I76E, for texts about the component without a card.
+/// Returns a small 7I76E, for texts about the component without a card.
 CardImage example_card();
 
 }  // namespace hal::mesa

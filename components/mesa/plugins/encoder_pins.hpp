@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: MIT
+// Encoders, also multiplexed ones.
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "mesa/driver/edge_velocity.hpp"
+#include "mesa/driver/position_counter.hpp"
+#include "mesa/hostmot2/formulas.hpp"
+#include "mesa/hostmot2/registers.hpp"
+#include "module_pins.hpp"
+
+namespace hal::mesa {
+
+/// One encoder. The index is latched by the card: `index-enable` writes two bits of its control
+/// register, "latch on index" and "just once". The card clears the first at the event, and the
+/// second stays, so a reading shows without a doubt which of these is the case, also when datagrams
+/// were lost in between:
+///
+///   latch  once
+///   0      0      not armed: the write has not arrived
+///   1      1      armed
+///   0      1      the index has been seen; its count is in the upper half
+class Encoder {
+public:
+    Encoder(const PinOwner& o, unsigned unit, const CardModule& module)
+        : control_address_(module.addresses.at(encoder::control, unit)),
+          count_(o.component, o.read, named(unit, "count"), "counts since the last reset"),
+          rawcounts_(o.component, o.read, named(unit, "rawcounts"), "counts since the start"),
+          rawlatch_(o.component, o.read, named(unit, "rawlatch"),
+                    "rawcounts at the last index or probe event"),
+          count_latched_(o.component, o.read, named(unit, "count-latched"),
+                         "count at the last index or probe event"),
+          position_(o.component, o.read, named(unit, "position"), "position, count / scale"),
+          position_latched_(o.component, o.read, named(unit, "position-latched"),
+                            "position at the last index or probe event"),
+          position_interpolated_(o.component, o.read, named(unit, "position-interpolated"),
+                                 "position, interpolated between counts by the velocity"),
+          velocity_(o.component, o.read, named(unit, "velocity"), "velocity, units/s",
+                    {.safe = 0.0}),
+          velocity_rpm_(o.component, o.read, named(unit, "velocity-rpm"), "velocity, units/min",
+                        {.safe = 0.0}),
+          quad_error_(o.component, o.read, named(unit, "quad-error"),
+                      "A and B have changed at the same time"),
+          input_a_(o.component, o.read, named(unit, "input-a"), "level of A"),
+          input_b_(o.component, o.read, named(unit, "input-b"), "level of B"),
+          input_index_(o.component, o.read, named(unit, "input-index"), "level of the index"),
+          reset_(o.component, o.read, named(unit, "reset"), "TRUE: count and position are 0"),
+          no_clear_on_index_(o.component, o.read, named(unit, "no_clear_on_index"),
+                             "TRUE: the index is latched, and the count goes on"),
+          quad_error_enable_(o.component, o.read, named(unit, "quad-error-enable"),
+                             "TRUE: quad-error is shown"),
+          index_enable_(o.component, named(unit, "index-enable"),
+                        "TRUE: the next index makes the count 0 and this FALSE"),
+          scale_(o.component, named(unit, "scale"), "counts per unit", {.initial = 1.0}),
+          index_invert_(o.component, named(unit, "index-invert"),
+                        "TRUE: the rising edge of the index counts"),
+          index_mask_(o.component, named(unit, "index-mask"),
+                      "TRUE: the index counts only while the mask input is TRUE"),
+          index_mask_invert_(o.component, named(unit, "index-mask-invert"),
+                             "TRUE: only while it is FALSE"),
+          counter_mode_(o.component, named(unit, "counter-mode"),
+                        "FALSE: quadrature; TRUE: step on A, direction on B"),
+          filter_(o.component, named(unit, "filter"),
+                  "TRUE: a level counts after 15 samples; FALSE: after 3", {.initial = true}),
+          vel_timeout_(o.component, named(unit, "vel-timeout"),
+                       "time without a count until the velocity is 0",
+                       {.initial = 0.5, .unit = "s"}) {}
+
+    /// `count`: count and time of its edge; `control`: control and latch. [realtime] read
+    void receive(std::uint32_t count, std::uint32_t control, std::uint16_t now_ticks,
+                 double ticks_hz, const Reading& reading) noexcept {
+        const auto value = static_cast<std::int16_t>(count & 0xffffU);
+        const auto edge_ticks = static_cast<std::uint16_t>(count >> 16);
+        const std::int64_t before = counter_.position();
+        if (!counter_.is_known() || reading.has_lost_power) {
+            counter_.rebase(value);
+            speed_.restart(now_ticks);
+        }
+        const double in_gap = speed_.velocity() * reading.gap_s;
+        counter_.update(value, std::llround(in_gap));
+        if (reading.is_after_gap) {
+            may_have_lost_ = reading.has_lost_power || std::abs(in_gap) > max_known;
+            speed_.restart(now_ticks);
+        } else {
+            speed_.update({counter_.position() - before, edge_ticks, now_ticks}, ticks_hz,
+                          vel_timeout_);
+        }
+        read_control(control);
+        follow_index(value, static_cast<std::int16_t>(control >> 16));
+        show();
+    }
+    /// Returns true once after a gap in which it may have lost counts. [realtime] read
+    bool take_loss() noexcept { return std::exchange(may_have_lost_, false); }
+    /// [realtime] write
+    void transmit(Outgoing& out, const Writing&) noexcept {
+        if (!is_read_) return;  // what is to be written depends on what is there
+        const std::uint32_t wanted = settings();
+        const bool is_armed = (control_ & encoder::just_once) != 0;
+        const bool differs = (control_ & setting_bits) != wanted;
+        is_read_ = false;
+        if (!is_armed) {
+            is_done_ = false;
+        }
+        // after an event, the bits are cleared before they are set again
+        const bool arms = index_enable_ && !is_done_;
+        if (arms != is_armed || (differs && !is_armed)) {
+            const std::uint32_t arm = encoder::latch_on_index | encoder::just_once;
+            out.put(control_address_, wanted | (arms ? arm : 0));
+        }
+    }
+
+private:
+    /// counts that may pass in a gap without a doubt about wraps of the register
+    static constexpr double max_known = 8192.0;
+    static constexpr std::uint32_t setting_bits = encoder::index_polarity | encoder::mask_polarity |
+                                                  encoder::use_mask | encoder::count_up_down |
+                                                  encoder::filter_15;
+
+    static const char* named(unsigned unit, const char* name) {
+        static thread_local std::string text;
+        text = pin_name("encoder", unit, name);
+        return text.c_str();
+    }
+    std::uint32_t settings() const noexcept {
+        std::uint32_t bits = filter_ ? encoder::filter_15 : 0;
+        bits |= counter_mode_ ? encoder::count_up_down : 0;
+        bits |= index_invert_ ? encoder::index_polarity : 0;
+        bits |= index_mask_ ? encoder::use_mask : 0;
+        bits |= index_mask_invert_ ? encoder::mask_polarity : 0;
+        return bits;
+    }
+    void read_control(std::uint32_t control) noexcept {
+        control_ = control & 0xffffU;
+        is_read_ = true;
+        input_a_ = (control & encoder::input_a) != 0;
+        input_b_ = (control & encoder::input_b) != 0;
+        input_index_ = (control & encoder::input_index) != 0;
+        quad_error_ = quad_error_enable_ && (control & encoder::quadrature_error) != 0;
+    }
+    void follow_index(std::int16_t value, std::int16_t latch) noexcept {
+        const bool is_seen =
+            (control_ & encoder::just_once) != 0 && (control_ & encoder::latch_on_index) == 0;
+        if (!is_seen || is_done_ || !index_enable_) return;
+        is_done_ = true;
+        // the latch is from less than half of the range ago
+        const auto since = static_cast<std::int16_t>(static_cast<std::uint16_t>(value) -
+                                                     static_cast<std::uint16_t>(latch));
+        const std::int64_t raw = counter_.position() - since;
+        rawlatch_ = static_cast<std::int32_t>(raw);
+        latched_ = raw - zero_;
+        if (!no_clear_on_index_) {
+            zero_ = raw;
+        }
+        index_enable_ = false;
+    }
+    void show() noexcept {
+        if (reset_) {
+            zero_ = counter_.position();
+        }
+        const double by = scale_ == 0.0 || !std::isfinite(scale_) ? 1.0 : scale_.get();
+        const std::int64_t count = counter_.position() - zero_;
+        const double velocity = speed_.velocity() / by;
+        rawcounts_ = static_cast<std::int32_t>(counter_.position());
+        count_ = static_cast<std::int32_t>(count);
+        count_latched_ = static_cast<std::int32_t>(latched_);
+        position_ = static_cast<double>(count) / by;
+        position_latched_ = static_cast<double>(latched_) / by;
+        position_interpolated_ = (static_cast<double>(count) + speed_.interpolated()) / by;
+        velocity_ = velocity;
+        velocity_rpm_ = velocity * 60.0;
+    }
+
+    const std::uint16_t control_address_;
+    PositionCounter<std::int16_t> counter_;
+    EdgeVelocity speed_;
+    std::int64_t zero_ = 0;
+    std::int64_t latched_ = 0;
+    std::uint32_t control_ = 0;
+    bool is_read_ = false;
+    bool may_have_lost_ = false;
+    bool is_done_ = false;  ///< the event that the register shows has been handled
+
+    hal::Out<std::int32_t> count_, rawcounts_, rawlatch_, count_latched_;
+    hal::Out<double> position_, position_latched_, position_interpolated_, velocity_, velocity_rpm_;
+    hal::Out<bool> quad_error_, input_a_, input_b_, input_index_;
+    hal::In<bool> reset_, no_clear_on_index_, quad_error_enable_;
+    hal::Io<bool> index_enable_;
+    hal::Param<double> scale_;
+    hal::Param<bool> index_invert_, index_mask_, index_mask_invert_, counter_mode_, filter_;
+    hal::Param<double> vel_timeout_;
+};
+
+class EncoderPins final : public ModulePins {
+public:
+    EncoderPins(const PinOwner& o, const CardModule& module, bool has_dpll)
+        : addresses_(module.addresses),
+          clock_hz_(module.clock_hz),
+          divider_(module.addresses.at(encoder::timestamp_divider)),
+          filter_(module.addresses.at(encoder::filter)),
+          dpll_timer_(module.addresses.at(encoder::dpll_timer)),
+          hires_(o.component, o.write, "encoder.hires-timestamp",
+                 "TRUE: times of edges in 0.1 us, for periods up to 6 ms; FALSE: in 0.5 us") {
+        const bool is_muxed = module.tag() == Tag::muxed_encoder;
+        for (unsigned unit = 0; unit < module.used; ++unit) {
+            units_.push_back(std::make_unique<Encoder>(o, unit, module));
+        }
+        frequency_ = std::make_unique<hal::In<std::uint32_t>>(
+            o.component, o.write,
+            is_muxed ? "encoder.muxed-sample-frequency" : "encoder.sample-frequency",
+            "samples per second of A, B and index",
+            hal::PinOptions<std::uint32_t>{.initial = is_muxed ? 8'000'000U : 25'000'000U,
+                                           .unit = "Hz"});
+        if (is_muxed) {
+            skew_ = std::make_unique<hal::In<double>>(o.component, o.write, "encoder.muxed-skew",
+                                                      "delay of the samples behind the multiplexer",
+                                                      hal::PinOptions<double>{.unit = "ns"});
+        }
+        if (has_dpll) {
+            timer_ = std::make_unique<hal::Param<std::int32_t>>(
+                o.component, "encoder.timer-number",
+                "timer of the DPLL that latches counts, 0..4; -1: none",
+                hal::PinOptions<std::int32_t>{.initial = -1});
+        }
+    }
+
+    void plan(ReadLayout& layout) override {
+        if (units_.empty()) return;
+        // the time first: an edge in between must not seem to be in the future
+        now_ = layout.add(addresses_.at(encoder::timestamp));
+        counts_ = layout.add_instances(addresses_, encoder::count, units_.size());
+        controls_ = layout.add_instances(addresses_, encoder::control, units_.size());
+    }
+    void receive(const Reply& reply, const Reading& reading) noexcept override {
+        const auto now = static_cast<std::uint16_t>(reply.at(now_));
+        const double hz = timestamp_hz(divider(), clock_hz_);
+        for (std::size_t n = 0; n < units_.size(); ++n) {
+            units_[n]->receive(reply.word(counts_, n), reply.word(controls_, n), now, hz, reading);
+        }
+    }
+    void transmit(Outgoing& out, const Writing& writing) noexcept override {
+        if (units_.empty()) return;
+        out.put(divider_, divider());
+        std::uint32_t filter = encoder_filter(*frequency_, clock_hz_);
+        if (skew_) {
+            const double clocks = *skew_ * 1e-9 * clock_hz_;
+            filter |= static_cast<std::uint32_t>(clocks > 0.0 ? std::min(clocks, 15.0) : 0.0) << 28;
+        }
+        out.put(filter_, filter);
+        if (timer_) {
+            const std::int32_t timer = *timer_;
+            const bool is_on = timer >= 0 && timer <= 4;
+            out.put(dpll_timer_, is_on ? stepgen::dpll_select(static_cast<unsigned>(timer)) : 0);
+        }
+        for (const auto& unit : units_) {
+            unit->transmit(out, writing);
+        }
+    }
+
+    /// Calls `report(unit)` for each one that may have lost counts in a gap. [realtime]
+    template <class Report>
+    void take_losses(Report&& report) noexcept {
+        for (std::size_t n = 0; n < units_.size(); ++n) {
+            if (units_[n]->take_loss()) {
+                report(n);
+            }
+        }
+    }
+
+private:
+    std::uint32_t divider() const noexcept {
+        return timestamp_divider(hires_ ? 10e6 : 2e6, clock_hz_);
+    }
+
+    const ModuleAddresses addresses_;
+    const std::uint32_t clock_hz_;
+    Setting divider_, filter_, dpll_timer_;
+    std::vector<std::unique_ptr<Encoder>> units_;
+    hal::In<bool> hires_;
+    std::unique_ptr<hal::In<std::uint32_t>> frequency_;
+    std::unique_ptr<hal::In<double>> skew_;
+    std::unique_ptr<hal::Param<std::int32_t>> timer_;
+    std::size_t now_ = 0;
+    std::size_t counts_ = 0;
+    std::size_t controls_ = 0;
+};
+
+}  // namespace hal::mesa

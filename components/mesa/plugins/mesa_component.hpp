@@ -1,0 +1,521 @@
+// SPDX-License-Identifier: MIT
+// The driver of a Mesa card as a component, under the names of LinuxCNC's hm2_eth.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "bus/component/bus_component.hpp"
+#include "dpll_pins.hpp"
+#include "encoder_pins.hpp"
+#include "event_texts.hpp"
+#include "hal/reporter.hpp"
+#include "input_pins.hpp"
+#include "loaded_card.hpp"
+#include "mesa/driver/card_monitor.hpp"
+#include "mesa/driver/cycle_link.hpp"
+#include "output_pins.hpp"
+#include "port_pins.hpp"
+#include "pwm_pins.hpp"
+#include "serial_pins.hpp"
+#include "stepgen_pins.hpp"
+
+namespace hal::mesa {
+
+/// `names` is the MesaNames of the component.
+template <const MesaNames& names>
+struct MesaComponent : LoadedCard, hal::bus::BusComponent {
+    explicit MesaComponent(const hal_host* host)
+        : LoadedCard(host, names), BusComponent(host, "hm2_card.0", "read", "write") {
+        declare_modules();
+        std::vector<std::string> remotes;
+        for (const RemotePort& port : remote_ports_) {
+            for (const Remote& remote : port.remotes) {
+                remotes.push_back("the device " + remote.name());
+                remote_faults_.emplace_back();
+            }
+        }
+        texts_ = std::make_unique<EventTexts>(image_.address + " (" + image_.card + ")",
+                                              std::move(remotes), image_.pins.size());
+        reporter_ = std::make_unique<hal::Reporter<EventRecord>>(
+            name_, [this](const EventRecord& record) { return texts_->line(record); }, 256,
+            &EventTexts::subject);
+    }
+
+    void start() {
+        if (port_ == nullptr) {
+            throw std::runtime_error(std::string("missing card; type: loadrt ") + names.example);
+        }
+        SetupLink setup(*port_);
+        check_alone(setup);
+        if (leads_) {
+            if (dpll_ == nullptr) {
+                throw std::runtime_error("clock=card: the firmware of the card has no DPLL");
+            }
+            clock_.claim();
+        }
+        link_ = std::make_unique<CycleLink>(*port_, layout_, session());
+        monitor_.restart();
+        rewrites_ = true;
+        was_lost_ = false;
+        begin_cycles();
+        reporter_->start();
+    }
+    void stop() noexcept {
+        if (link_) {
+            send_stop(datagram::unclocked);
+        }
+        link_.reset();
+        reporter_->stop();
+    }
+
+    void read_request(hal::Cycle cycle) noexcept {
+        requested_by_function_ = true;
+        if (link_) {
+            link_->request(cycle.start_ns());
+        }
+    }
+
+    void read(hal::Cycle cycle) noexcept {
+        if (!link_) return;
+        const std::int64_t now = cycle.start_ns();
+        const hal::bus::Turn turn = receive_turn(cycle);
+        if (begins_anew(turn)) {
+            monitor_.restart();
+            link_->restart();
+            rewrites_ = true;
+            is_after_gap_ = true;
+        }
+        if (turn == hal::bus::Turn::leaves) {
+            send_stop(now);
+        }
+        if (is_offline(turn)) {
+            show_offline();
+            return;
+        }
+        link_->request(now);
+        const Answer answer = link_->receive(now, wait_limit(cycle));
+        const bool is_fresh = answer == Answer::fresh;
+        const CardEvent event = monitor_.step(report(is_fresh), hold_cycles_, cycle.period_ns());
+        handle(event);
+        if (is_fresh) {
+            receive(cycle, now);
+        } else {
+            ++missing_cycles_;
+            rewrites_ = true;  // whether the writes of the same datagram have arrived is unknown
+            for (const auto& module : modules_) {
+                module->miss(cycle.seconds());
+            }
+        }
+        follow_remotes();
+        acknowledge();
+        show(is_fresh);
+        if (leads_ && is_fresh) {
+            follow_reference(static_cast<std::int64_t>(dpll_->error_us() * 1000.0),
+                             cycle.period_ns());
+        }
+    }
+
+    void write(hal::Cycle cycle) noexcept {
+        if (!link_ || !functions_.transmit(cycle)) return;
+        const std::int64_t now = cycle.start_ns();
+        const bool requests = !std::exchange(requested_by_function_, false);
+        const CardState state = monitor_.state();
+        if (state == CardState::lost || state == CardState::contended) {
+            if (requests) {
+                link_->request(now);
+            }
+            return;
+        }
+        const Writing writing{cycle.seconds(), monitor_.drives_outputs()};
+        Outgoing out(link_->begin_write(), std::exchange(rewrites_, false));
+        write_watchdog(out);
+        for (const auto& module : modules_) {
+            module->transmit(out, writing);
+        }
+        ports_->transmit(out, writing);
+        link_->send_write(now, requests, serial_ ? serial_->write_size() : 0,
+                          [&](Request& request) {
+            if (serial_) {
+                Outgoing late(request, false);
+                serial_->transmit_late(late, writing);
+            }
+        });
+    }
+
+    void make_safe(hal::Cycle) noexcept {
+        if (!link_) return;
+        send_stop(datagram::unclocked);
+        interrupt();
+    }
+
+private:
+    // --- Declaration
+
+    template <class Pins, class... Arguments>
+    Pins* add(Arguments&&... arguments) {
+        auto pins = std::make_unique<Pins>(std::forward<Arguments>(arguments)...);
+        Pins* const added = pins.get();
+        modules_.push_back(std::move(pins));
+        return added;
+    }
+    /// In the order of the reads: the levels of the pins and the sync event of the DPLL first.
+    void declare_modules() {
+        const PinOwner owner{*this, read_, write_};
+        const CardModule& ports = *image_.find(Tag::ioport);
+        ports_ = std::make_unique<PortPins>(owner, image_, ports);
+        const CardModule* const dpll = image_.find(Tag::dpll);
+        const bool has_dpll = dpll != nullptr && dpll->used > 0;
+        if (has_dpll) {
+            dpll_ = add<DpllPins>(owner, *dpll, leads_);
+        }
+        for (const CardModule& module : image_.modules) {
+            declare_module(owner, module, has_dpll);
+        }
+        if (!remote_ports_.empty()) {
+            serial_ = add<SerialPins>(owner, remote_ports_);
+        }
+        if (config_.enable_raw()) {
+            add<RawPins>(owner);
+        }
+        const CardModule& watchdog = *image_.find(Tag::watchdog);
+        ports_->plan(layout_);
+        watchdog_status_ = layout_.add(watchdog.addresses.at(watchdog::status));
+        watchdog_timeout_ = layout_.add(watchdog.addresses.at(watchdog::timeout));
+        for (const auto& module : modules_) {
+            module->plan(layout_);
+        }
+        watchdog_ = watchdog.addresses;
+        watchdog_clock_hz_ = watchdog.clock_hz;
+        timeout_ = Setting(watchdog_.at(watchdog::timeout));
+    }
+    void declare_module(const PinOwner& owner, const CardModule& module, bool has_dpll) {
+        if (module.used == 0) return;
+        switch (module.tag()) {
+        case Tag::stepgen: stepgens_ = add<StepgenPins>(owner, module, has_dpll); break;
+        case Tag::encoder:
+        case Tag::muxed_encoder: encoders_ = add<EncoderPins>(owner, module, has_dpll); break;
+        case Tag::pwm: add<PwmPins>(owner, module); break;
+        case Tag::ssr: add<SsrPins>(owner, image_, module); break;
+        case Tag::outm: add<OutmPins>(owner, image_, module); break;
+        case Tag::led: add<LedPins>(owner, module); break;
+        case Tag::inm: add<InputPins>(owner, module, inm_widths_); break;
+        case Tag::inmux: add<InputPins>(owner, module, inmux_widths_); break;
+        default: break;
+        }
+    }
+    /// Another master of the same card has another one.
+    std::uint16_t session() const {
+        std::uint64_t bits = std::hash<std::string>()(name_);
+        if (!port_->description().in_memory) {
+            bits ^= static_cast<std::uint64_t>(hal::monotonic_ns());
+        }
+        bits *= 0x9E3779B97F4A7C15;
+        return static_cast<std::uint16_t>(bits >> 48 | 1U);
+    }
+
+    // --- Reading
+
+    std::int64_t wait_limit(hal::Cycle cycle) const noexcept {
+        // a lost card costs as little time as possible
+        if (monitor_.state() == CardState::lost) return 0;
+        const std::int64_t value = packet_read_timeout_;
+        if (value <= 0) return cycle.period_ns() * 80 / 100;
+        return value < 100 ? cycle.period_ns() * value / 100 : value;
+    }
+    CardReport report(bool is_fresh) const noexcept {
+        CardReport report;
+        report.is_fresh = is_fresh;
+        if (!is_fresh) return report;
+        const Reply reply = link_->reply();
+        report.writes_arrived = link_->writes_arrived();
+        report.has_foreign_writes = link_->has_foreign_writes();
+        report.is_reset = link_->is_reset() && reply.at(watchdog_timeout_) != sent_timeout_;
+        report.has_bitten = (reply.at(watchdog_status_) & watchdog::has_bitten) != 0;
+        return report;
+    }
+    void handle(CardEvent event) noexcept {
+        switch (event) {
+        case CardEvent::none: break;
+        case CardEvent::online: tell({Event::online}); break;
+        case CardEvent::lost:
+            tell({Event::lost, 0, monitor_.missing()});
+            losses_ = losses_ + 1;
+            was_lost_ = true;
+            hold_positions();
+            send_stop(datagram::unclocked);
+            break;
+        case CardEvent::returned: come_back({Event::returned}, monitor_.was_off(), false); break;
+        case CardEvent::was_reset:
+            resets_ = resets_ + 1;
+            if (!was_lost_) {
+                hold_positions();
+            }
+            come_back({Event::was_reset}, true, true);
+            break;
+        case CardEvent::bitten:
+            tell({Event::bitten});
+            has_bit_ = true;
+            lose_positions();
+            break;
+        case CardEvent::contended: tell({Event::contended}); break;
+        }
+    }
+    void hold_positions() noexcept {
+        if (stepgens_ != nullptr) {
+            stepgens_->hold();
+        }
+    }
+    void lose_positions() noexcept {
+        if (stepgens_ == nullptr) return;
+        stepgens_->was_off([this](std::size_t unit) {
+            tell({Event::position_lost, static_cast<std::uint32_t>(unit)});
+        });
+    }
+    void come_back(const EventRecord& record, bool was_off, bool has_lost_power) noexcept {
+        tell(record);
+        rewrites_ = true;
+        was_lost_ = false;
+        is_after_gap_ = true;
+        has_lost_power_ = has_lost_power;
+        is_after_reset_ = was_off;
+        if (was_off) {
+            lose_positions();
+        }
+    }
+    void receive(hal::Cycle cycle, std::int64_t now) noexcept {
+        Reading reading;
+        reading.period_s = cycle.seconds();
+        reading.age_s = static_cast<double>(link_->age_ns(now)) * 1e-9;
+        reading.writes_arrived = link_->writes_arrived();
+        reading.is_after_gap = std::exchange(is_after_gap_, false);
+        reading.gap_s = cycle.seconds() * std::exchange(missing_cycles_, 0U);
+        reading.has_bitten = (link_->reply().at(watchdog_status_) & watchdog::has_bitten) != 0;
+        reading.has_lost_power = std::exchange(has_lost_power_, false);
+        reading.is_after_reset = std::exchange(is_after_reset_, false);
+        const Reply reply = link_->reply();
+        ports_->receive(reply, reading);
+        for (const auto& module : modules_) {
+            module->receive(reply, reading);
+        }
+        tell_losses();
+        if (link_->counts().lost_writes != lost_writes_.get()) {
+            rewrites_ = true;
+        }
+    }
+    void tell_losses() noexcept {
+        if (encoders_ != nullptr) {
+            encoders_->take_losses([this](std::size_t unit) {
+                tell({Event::encoder_gap, static_cast<std::uint32_t>(unit)});
+            });
+        }
+        if (stepgens_ != nullptr) {
+            stepgens_->take_run_on([this](std::size_t unit) {
+                tell({Event::position_lost, static_cast<std::uint32_t>(unit)});
+            });
+        }
+    }
+    void acknowledge() noexcept {
+        if (monitor_.state() == CardState::bitten && !has_bit_) {
+            monitor_.acknowledge();
+            rewrites_ = true;
+        }
+        if (stepgens_ != nullptr && position_fault_.lasts() && stepgens_->positions_are_valid()) {
+            tell({Event::positions_valid});
+        }
+    }
+    void follow_remotes() noexcept {
+        if (serial_ == nullptr) return;
+        for (const auto& port : serial_->ports()) {
+            if (monitor_.state() == CardState::lost) {
+                port->show_offline();
+            }
+            for (const auto& remote : port->remotes()) {
+                const bool is_lost =
+                    port->is_running() && !remote->is_online() && monitor_.drives_outputs();
+                const bool lasts = remote_faults_[remote->number()].lasts();
+                if (is_lost && !lasts) {
+                    tell({Event::remote_lost, remote->number()});
+                } else if (lasts && remote->is_online()) {
+                    tell({Event::remote_online, remote->number()});
+                }
+            }
+        }
+    }
+    void show_offline() noexcept {
+        online_ = false;
+        packet_error_ = false;
+        if (serial_ != nullptr) {
+            for (const auto& port : serial_->ports()) {
+                port->show_offline();
+            }
+        }
+    }
+    void show(bool is_fresh) noexcept {
+        const LinkCounts& counts = link_->counts();
+        const bool is_error = !is_fresh || counts.lost_writes != lost_writes_.get();
+        const std::int32_t limit = std::max(packet_error_limit_.get(), 0);
+        const std::int32_t change = is_error ? std::max(packet_error_increment_.get(), 1)
+                                             : -std::max(packet_error_decrement_.get(), 0);
+        packet_error_ = is_error;
+        packet_error_level_ = std::clamp(packet_error_level_ + change, 0, limit);
+        packet_error_exceeded_ = packet_error_level_ == limit;
+        if (is_error) {
+            packet_error_total_ = packet_error_total_ + 1;
+        }
+        online_ = monitor_.state() == CardState::online;
+        fault_ = link_fault_.lasts() || position_fault_.lasts() || has_remote_fault();
+        requests_ = counts.requests;
+        lost_requests_ = counts.lost;
+        lost_writes_ = counts.lost_writes;
+        unexpected_ = counts.unexpected;
+        positions_valid_ = stepgens_ == nullptr || stepgens_->positions_are_valid();
+    }
+    bool has_remote_fault() const noexcept {
+        return std::ranges::any_of(remote_faults_,
+                                   [](const hal::LastingFault& f) { return f.lasts(); });
+    }
+
+    // --- Writing
+
+    void write_watchdog(Outgoing& out) noexcept {
+        sent_timeout_ = watchdog_timeout(timeout_ns_, watchdog_clock_hz_);
+        if (monitor_.state() == CardState::configuring) {
+            out.put(watchdog_.at(watchdog::status), 0);
+        }
+        out.put(timeout_, sent_timeout_);
+        out.put(watchdog_.at(watchdog::reset), watchdog::reload);
+    }
+    /// Everything off, and the watchdog bites at once: what the card has to do when nobody is
+    /// there. Also in a crash handler.
+    void send_stop(std::int64_t now) noexcept {
+        Outgoing out(link_->begin_write(), false);
+        for (const auto& module : modules_) {
+            module->stop(out);
+        }
+        ports_->stop(out);
+        out.put(watchdog_.at(watchdog::timeout), watchdog::bite_now);
+        link_->send_unnumbered(now);
+        rewrites_ = true;
+    }
+
+    // --- Events
+
+    void tell(const EventRecord& record) noexcept {
+        reporter_->tell(record);
+        hal::LastingFault& condition = fault_of(record);
+        const auto& row = event_rows[static_cast<std::size_t>(record.event)];
+        if (row.effect == hal::bus::Effect::ends) {
+            end(condition);
+        } else if (const auto* text = texts_->fault(record)) {
+            begin(condition, text->text, text->detail(record.value));
+        }
+    }
+    hal::LastingFault& fault_of(const EventRecord& record) noexcept {
+        switch (record.event) {
+        case Event::position_lost:
+        case Event::positions_valid: return position_fault_;
+        case Event::remote_lost:
+        case Event::remote_online: return remote_faults_[record.unit];
+        default: return link_fault_;
+        }
+    }
+
+    hal::Function read_{*this,
+                        "read",
+                        &MesaComponent::read,
+                        "shows what the card has; first in the thread",
+                        {.required = true}};
+    hal::Function read_request_{*this, "read-request", &MesaComponent::read_request,
+                                "sends the request of read earlier than read; without it, write "
+                                "sends it"};
+    hal::Function write_{*this,
+                         "write",
+                         &MesaComponent::write,
+                         "sends commands to the card; last in the thread",
+                         {.required = true}};
+    hal::Emergency emergency_{*this, &MesaComponent::make_safe, "stops all outputs of the card"};
+
+    hal::Out<bool> online_{
+        *this, read_, "online", "the card answers and is configured", {.safe = false}};
+    hal::Out<bool> fault_{*this, read_, "fault",
+                          "the card or a remote device is lost, the watchdog has bitten, another "
+                          "master writes, or a position is lost"};
+    hal::Out<bool> positions_valid_{*this,
+                                    read_,
+                                    "positions-valid",
+                                    "no step generator has lost its position",
+                                    {.initial = true, .safe = false}};
+    hal::Out<std::uint64_t> requests_{*this, read_, "requests", "requests to the card"};
+    hal::Out<std::uint64_t> lost_requests_{*this, read_, "lost-requests",
+                                           "requests without an answer in time"};
+    hal::Out<std::uint64_t> lost_writes_{*this, read_, "lost-writes",
+                                         "answers that show that writes before them are lost"};
+    hal::Out<std::uint64_t> unexpected_{*this, read_, "unexpected",
+                                        "late and duplicate answers, which were not used"};
+    hal::Out<std::uint32_t> losses_{*this, read_, "losses", "how often the card was lost"};
+    hal::Out<std::uint32_t> resets_{*this, read_, "resets", "how often it was reset"};
+    hal::Param<std::uint32_t> hold_cycles_{
+        *this,
+        "hold-cycles",
+        "cycles without an answer in which step generators go on at their last rates; with one "
+        "more the card is lost",
+        {.initial = 4}};
+
+    // hm2_eth
+    hal::Param<bool> io_error_{*this, "io_error", "not used: the driver recovers without a reset"};
+    hal::Out<bool> packet_error_{*this, read_, "packet-error", "this cycle has lost a datagram"};
+    hal::Out<std::int32_t> packet_error_level_{*this, read_, "packet-error-level", "recent errors"};
+    hal::Out<bool> packet_error_exceeded_{*this, read_, "packet-error-exceeded",
+                                          "packet-error-level is at its limit"};
+    hal::Io<std::int32_t> packet_error_total_{*this, "packet-error-total",
+                                              "cycles that have lost a datagram"};
+    hal::Param<std::int32_t> packet_read_timeout_{
+        *this,
+        "packet-read-timeout",
+        "longest wait for an answer: 1..99: percent of the period, from 100: ns; 0: 80 percent. At "
+        "least 100 us",
+        {.initial = 80}};
+    hal::Param<std::int32_t> packet_error_limit_{
+        *this, "packet-error-limit", "limit of packet-error-level", {.initial = 10}};
+    hal::Param<std::int32_t> packet_error_increment_{
+        *this, "packet-error-increment", "added by an error", {.initial = 2}};
+    hal::Param<std::int32_t> packet_error_decrement_{
+        *this, "packet-error-decrement", "subtracted in other cycles", {.initial = 1}};
+    hal::Io<bool> has_bit_{*this, "watchdog.has_bit",
+                           "TRUE: the watchdog has bitten; set it to FALSE to go on"};
+    hal::Param<std::uint32_t> timeout_ns_{*this,
+                                          "watchdog.timeout_ns",
+                                          "time without a write until the watchdog bites",
+                                          {.initial = 5'000'000, .unit = "ns"}};
+
+    std::vector<std::unique_ptr<ModulePins>> modules_;
+    std::unique_ptr<PortPins> ports_;
+    StepgenPins* stepgens_ = nullptr;  // these four are in `modules_`
+    EncoderPins* encoders_ = nullptr;
+    DpllPins* dpll_ = nullptr;
+    SerialPins* serial_ = nullptr;
+    ReadLayout layout_;
+    ModuleAddresses watchdog_;
+    std::uint32_t watchdog_clock_hz_ = 0;
+    std::size_t watchdog_status_ = 0;
+    std::size_t watchdog_timeout_ = 0;
+    Setting timeout_;
+    std::uint32_t sent_timeout_ = 0;
+
+    std::unique_ptr<CycleLink> link_;
+    CardMonitor monitor_;
+    std::unique_ptr<EventTexts> texts_;
+    std::unique_ptr<hal::Reporter<EventRecord>> reporter_;
+    hal::LastingFault link_fault_, position_fault_;
+    std::vector<hal::LastingFault> remote_faults_;
+    unsigned missing_cycles_ = 0;  // before the next answer
+    bool rewrites_ = true;         // all settings are written
+    bool requested_by_function_ = false;
+    bool was_lost_ = false;
+    bool is_after_gap_ = false;  // these three are for the next answer
+    bool has_lost_power_ = false;
+    bool is_after_reset_ = false;
+};
+
+}  // namespace hal::mesa

@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: MIT
+// Step generators.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "mesa/driver/position_counter.hpp"
+#include "mesa/driver/step_control.hpp"
+#include "mesa/hostmot2/formulas.hpp"
+#include "mesa/hostmot2/registers.hpp"
+#include "module_pins.hpp"
+
+namespace hal::mesa {
+
+/// One step generator. The card turns the last rate into steps until it gets another one, so between
+/// two readings the position is known as well:
+///
+///     position now = accumulator of the reading + rate x time since the reading
+///
+/// `position_` is that of the newest reading and `moved_` the second term, both in 1/65536 step.
+class Stepgen {
+public:
+    Stepgen(const PinOwner& o, unsigned unit, const CardModule& module)
+        : clock_hz_(module.clock_hz),
+          rate_address_(module.addresses.at(stepgen::rate, unit)),
+          mode_(module.addresses.at(stepgen::mode, unit)),
+          length_(module.addresses.at(stepgen::pulse_length, unit)),
+          space_(module.addresses.at(stepgen::pulse_space, unit)),
+          setup_(module.addresses.at(stepgen::direction_setup, unit)),
+          hold_(module.addresses.at(stepgen::direction_hold, unit)),
+          position_cmd_(o.component, o.write, named(unit, "position-cmd"),
+                        "commanded position, with control-type 0"),
+          velocity_cmd_(o.component, o.write, named(unit, "velocity-cmd"),
+                        "commanded velocity, with control-type 1"),
+          enable_(o.component, o.write, named(unit, "enable"), "TRUE: steps are made"),
+          control_type_(o.component, o.write, named(unit, "control-type"),
+                        "FALSE: follows position-cmd; TRUE: velocity-cmd"),
+          position_reset_(o.component, o.read, named(unit, "position-reset"),
+                          "TRUE: the position is 0"),
+          counts_(o.component, o.read, named(unit, "counts"), "position in steps"),
+          position_fb_(o.component, o.read, named(unit, "position-fb"),
+                       "position, with fractions of steps"),
+          velocity_fb_(o.component, o.read, named(unit, "velocity-fb"), "velocity", {.safe = 0.0}),
+          position_valid_(o.component, o.read, named(unit, "position-valid"),
+                          "FALSE: steps were made that the motor may not have followed; TRUE again "
+                          "after enable was FALSE",
+                          {.initial = true, .safe = false}),
+          position_scale_(o.component, named(unit, "position-scale"), "steps per unit",
+                          {.initial = 1.0}),
+          maxvel_(o.component, named(unit, "maxvel"),
+                  "maximum velocity, units/s; 0: what the times of the pulses allow"),
+          maxaccel_(o.component, named(unit, "maxaccel"),
+                    "maximum acceleration, units/s2; 0: not limited", {.initial = 1.0}),
+          steplen_(o.component, named(unit, "steplen"), "length of a pulse",
+                   {.initial = slowest_ns(), .unit = "ns"}),
+          stepspace_(o.component, named(unit, "stepspace"), "minimum time between pulses",
+                     {.initial = slowest_ns(), .unit = "ns"}),
+          dirsetup_(o.component, named(unit, "dirsetup"),
+                    "time from a change of direction to a pulse",
+                    {.initial = slowest_ns(), .unit = "ns"}),
+          dirhold_(o.component, named(unit, "dirhold"),
+                   "time from a pulse to a change of direction",
+                   {.initial = slowest_ns(), .unit = "ns"}),
+          step_type_(o.component, named(unit, "step_type"),
+                     "0: step and direction, 1: up and down, 2: quadrature"),
+          dbg_pos_minus_prev_cmd_(o.component, o.write, named(unit, "dbg_pos_minus_prev_cmd"),
+                                  "position error of the control loop"),
+          dbg_ff_vel_(o.component, o.write, named(unit, "dbg_ff_vel"), "velocity of position-cmd"),
+          dbg_vel_error_(o.component, o.write, named(unit, "dbg_vel_error"),
+                         "velocity less that of position-cmd"),
+          dbg_s_to_match_(o.component, o.write, named(unit, "dbg_s_to_match"),
+                          "time until the velocities match", {.unit = "s"}),
+          dbg_err_at_match_(o.component, o.write, named(unit, "dbg_err_at_match"),
+                            "position error when the velocities match"),
+          dbg_step_rate_(o.component, o.write, named(unit, "dbg_step_rate"), "rate",
+                         {.unit = "steps/s"}) {}
+
+    /// [realtime] read
+    void receive(std::uint32_t accumulator, const Reading& reading) noexcept {
+        moved_ += rate_per_s() * reading.period_s;
+        const double since_reading = rate_per_s() * reading.age_s;
+        const auto value = static_cast<std::int32_t>(accumulator);
+        if (reading.is_after_reset) {
+            // the accumulator has run on, or begins at 0: the motor did not follow it
+            counter_.rebase(value);
+            lost_ += held_moved_;
+            moved_ = 0.0;
+            rate_ = 0;
+        } else {
+            const std::int64_t expected = std::llround(moved_ - since_reading);
+            const std::int64_t before = counter_.position();
+            const bool is_known = counter_.is_known();
+            const std::int64_t beyond = counter_.update(value, expected) - before - expected;
+            moved_ = since_reading;
+            if (is_known && reading.is_after_gap && reading.has_bitten && rate_ == 0) {
+                check_stop(beyond);
+            }
+        }
+        show(reading.period_s);
+    }
+    /// [realtime] read
+    void miss(double period_s) noexcept {
+        moved_ += rate_per_s() * period_s;
+        show(period_s);
+    }
+    /// The card is lost: from here on its motor stops at an unknown time. [realtime] read
+    void hold() noexcept {
+        held_moved_ = moved_;
+        held_rate_ = rate_;
+    }
+    /// The outputs of the card were off while it had a rate: the motor did not follow. Returns
+    /// whether the position is lost by that. [realtime] read
+    bool was_off() noexcept {
+        if (rate_ == 0 && held_rate_ == 0) return false;
+        held_rate_ = 0;
+        needs_edge_ = true;
+        return true;
+    }
+    /// Returns true once after the generator has run on while its outputs were off. [realtime] read
+    bool take_run_on() noexcept { return std::exchange(has_run_on_, false); }
+
+    /// [realtime] write
+    void transmit(Outgoing& out, const Writing& writing) noexcept {
+        if (!enable_) {
+            needs_edge_ = false;
+        }
+        const bool runs = writing.outputs_on && enable_ && !needs_edge_;
+        if (runs) {
+            command(writing.period_s);
+        } else {
+            rate_ = 0;
+            control_.hold(position_cmd_);
+        }
+        out.put(length_, step_time(steplen_, clock_hz_));
+        out.put(space_, step_time(stepspace_, clock_hz_));
+        out.put(setup_, step_time(dirsetup_, clock_hz_));
+        out.put(hold_, step_time(dirhold_, clock_hz_));
+        out.put(mode_, std::min<std::uint32_t>(step_type_, 2));
+        out.put(rate_address_, static_cast<std::uint32_t>(rate_));
+        dbg_step_rate_ = steps_per_s(rate_, clock_hz_);
+    }
+    /// [realtime]
+    void stop(Outgoing& out) noexcept {
+        rate_ = 0;
+        out.put(rate_address_, 0);
+    }
+    bool is_valid() const noexcept { return !needs_edge_; }
+
+private:
+    static constexpr std::uint32_t slowest_ns() { return 163'830; }  // 3FFFh at 100 MHz
+
+    /// Valid until the next call.
+    static const char* named(unsigned unit, const char* name) {
+        static thread_local std::string text;
+        text = pin_name("stepgen", unit, name);
+        return text.c_str();
+    }
+
+    double scale() const noexcept {
+        const double value = position_scale_;
+        return value == 0.0 || !std::isfinite(value) ? 1.0 : value;
+    }
+    /// Returns the rate in 1/65536 steps per second.
+    double rate_per_s() const noexcept {
+        return steps_per_s(rate_, clock_hz_) * accumulator_per_step;
+    }
+    double position() const noexcept {
+        const double whole = static_cast<double>(counter_.position() - zero_);
+        return (whole + lost_ + moved_) / accumulator_per_step / scale();
+    }
+    double max_velocity() const noexcept {
+        const double clocks =
+            step_time(steplen_, clock_hz_) + step_time(stepspace_, clock_hz_) + 2.0;
+        const double hardware = clock_hz_ / clocks / std::abs(scale());
+        const double wanted = std::abs(maxvel_.get());
+        return wanted > 0.0 && wanted < hardware ? wanted : hardware;
+    }
+
+    /// The rate 0 has not arrived when the outputs were switched off: the motor has stopped, and the
+    /// accumulator has not.
+    void check_stop(std::int64_t beyond) noexcept {
+        constexpr std::int64_t tolerated = 2 * 65536;
+        if (std::abs(beyond) <= tolerated) return;
+        lost_ -= static_cast<double>(beyond);
+        has_run_on_ = needs_edge_ = true;
+    }
+
+    void command(double period_s) noexcept {
+        const double at = position();
+        const StepControl::Limits limits{max_velocity(), std::abs(maxaccel_.get())};
+        const double before = control_.velocity();
+        dbg_pos_minus_prev_cmd_ = at - control_.command();
+        const double velocity = control_type_
+                                    ? control_.follow_velocity(velocity_cmd_, at, period_s, limits)
+                                    : control_.follow_position(position_cmd_, at, period_s, limits);
+        rate_ = step_rate(velocity * scale(), clock_hz_);
+        control_.set_velocity(steps_per_s(rate_, clock_hz_) / scale());
+        const double error = before - control_.feed_forward();
+        dbg_ff_vel_ = control_.feed_forward();
+        dbg_vel_error_ = error;
+        dbg_s_to_match_ = limits.acceleration > 0.0 ? std::abs(error) / limits.acceleration : 0.0;
+        dbg_err_at_match_ = control_.error_at_match();
+    }
+
+    void show(double) noexcept {
+        if (position_reset_) {
+            zero_ = counter_.position();
+            lost_ = 0.0;
+        }
+        const double steps = position() * scale();
+        counts_ = static_cast<std::int32_t>(static_cast<std::int64_t>(std::floor(steps)));
+        position_fb_ = steps / scale();
+        velocity_fb_ = steps_per_s(rate_, clock_hz_) / scale();
+        position_valid_ = !needs_edge_;
+    }
+
+    const std::uint32_t clock_hz_;
+    const std::uint16_t rate_address_;
+    Setting mode_, length_, space_, setup_, hold_;
+    PositionCounter<std::int32_t> counter_;
+    StepControl control_;
+    double moved_ = 0.0;
+    double held_moved_ = 0.0;  ///< when the card was lost
+    double lost_ = 0.0;  ///< positions before resets of the card
+    std::int64_t zero_ = 0;
+    std::int32_t rate_ = 0;  ///< in the card
+    std::int32_t held_rate_ = 0;  ///< when the card was lost
+    bool needs_edge_ = false;
+    bool has_run_on_ = false;
+
+    hal::In<double> position_cmd_, velocity_cmd_;
+    hal::In<bool> enable_, control_type_, position_reset_;
+    hal::Out<std::int32_t> counts_;
+    hal::Out<double> position_fb_, velocity_fb_;
+    hal::Out<bool> position_valid_;
+    hal::Param<double> position_scale_, maxvel_, maxaccel_;
+    hal::Param<std::uint32_t> steplen_, stepspace_, dirsetup_, dirhold_, step_type_;
+    hal::Out<double> dbg_pos_minus_prev_cmd_, dbg_ff_vel_, dbg_vel_error_, dbg_s_to_match_,
+        dbg_err_at_match_, dbg_step_rate_;
+};
+
+class StepgenPins final : public ModulePins {
+public:
+    StepgenPins(const PinOwner& o, const CardModule& module, bool has_dpll)
+        : addresses_(module.addresses),
+          master_rate_(module.addresses.at(stepgen::master_rate)),
+          dpll_timer_(module.addresses.at(stepgen::dpll_timer)) {
+        for (unsigned unit = 0; unit < module.used; ++unit) {
+            units_.push_back(std::make_unique<Stepgen>(o, unit, module));
+        }
+        if (has_dpll) {
+            timer_ = std::make_unique<hal::Param<std::int32_t>>(
+                o.component, "stepgen.timer-number",
+                "timer of the DPLL that latches positions, 0..4; -1: none",
+                hal::PinOptions<std::int32_t>{.initial = -1});
+        }
+    }
+
+    void plan(ReadLayout& layout) override {
+        if (!units_.empty()) {
+            accumulators_ = layout.add_instances(addresses_, stepgen::accumulator, units_.size());
+        }
+    }
+    void receive(const Reply& reply, const Reading& reading) noexcept override {
+        for (std::size_t n = 0; n < units_.size(); ++n) {
+            units_[n]->receive(reply.word(accumulators_, n), reading);
+        }
+    }
+    void miss(double period_s) noexcept override {
+        for (const auto& unit : units_) {
+            unit->miss(period_s);
+        }
+    }
+    void transmit(Outgoing& out, const Writing& writing) noexcept override {
+        if (units_.empty()) return;
+        out.put(master_rate_, stepgen::all_masters);
+        if (timer_) {
+            const std::int32_t timer = *timer_;
+            const bool is_on = timer >= 0 && timer <= 4;
+            out.put(dpll_timer_, is_on ? stepgen::dpll_select(static_cast<unsigned>(timer)) : 0);
+        }
+        for (const auto& unit : units_) {
+            unit->transmit(out, writing);
+        }
+    }
+    void stop(Outgoing& out) noexcept override {
+        for (const auto& unit : units_) {
+            unit->stop(out);
+        }
+    }
+    /// Calls `report(unit)` for each one whose position is lost. [realtime]
+    template <class Report>
+    void was_off(Report&& report) noexcept {
+        for (std::size_t n = 0; n < units_.size(); ++n) {
+            if (units_[n]->was_off()) {
+                report(n);
+            }
+        }
+    }
+    /// The same for each one that has run on while its outputs were off. [realtime]
+    template <class Report>
+    void take_run_on(Report&& report) noexcept {
+        for (std::size_t n = 0; n < units_.size(); ++n) {
+            if (units_[n]->take_run_on()) {
+                report(n);
+            }
+        }
+    }
+    void hold() noexcept {
+        for (const auto& unit : units_) {
+            unit->hold();
+        }
+    }
+    bool positions_are_valid() const noexcept {
+        return std::ranges::all_of(units_, [](const auto& unit) { return unit->is_valid(); });
+    }
+
+private:
+    const ModuleAddresses addresses_;
+    std::vector<std::unique_ptr<Stepgen>> units_;
+    Setting master_rate_, dpll_timer_;
+    std::unique_ptr<hal::Param<std::int32_t>> timer_;
+    std::size_t accumulators_ = 0;
+};
+
+}  // namespace hal::mesa
