@@ -96,7 +96,9 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
         link_->request(now);
         const Answer answer = link_->receive(now, wait_limit(cycle));
         const bool is_fresh = answer == Answer::fresh;
+        const CardState before = monitor_.state();
         const CardEvent event = monitor_.step(report(is_fresh), hold_cycles_, cycle.period_ns());
+        rewrites_ = rewrites_ || (monitor_.state() != before && !monitor_.drives_outputs());
         handle(event);
         if (is_fresh) {
             receive(cycle, now);
@@ -237,7 +239,10 @@ private:
     void handle(CardEvent event) noexcept {
         switch (event) {
         case CardEvent::none: break;
-        case CardEvent::online: tell({Event::online}); break;
+        case CardEvent::online:
+            tell({Event::online});
+            has_bit_ = false;
+            break;
         case CardEvent::lost:
             tell({Event::lost, 0, monitor_.missing()});
             losses_ = losses_ + 1;
@@ -299,7 +304,8 @@ private:
             module->receive(reply, reading);
         }
         tell_losses();
-        if (link_->counts().lost_writes != lost_writes_.get()) {
+        const bool is_changed = reply.at(watchdog_timeout_) != sent_timeout_;
+        if (is_changed || link_->counts().lost_writes != lost_writes_.get()) {
             rewrites_ = true;
         }
     }
