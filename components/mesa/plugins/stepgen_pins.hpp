@@ -115,8 +115,9 @@ public:
     /// The outputs of the card were off while it had a rate: the motor did not follow. Returns
     /// whether the position is lost by that. [realtime] read
     bool was_off() noexcept {
-        if (rate_ == 0 && held_rate_ == 0) return false;
+        const bool has_moved = is_moving(rate_) || is_moving(held_rate_);
         held_rate_ = 0;
+        if (!has_moved) return false;
         needs_edge_ = true;
         return true;
     }
@@ -160,6 +161,11 @@ private:
         return text.c_str();
     }
 
+    /// A generator that stands corrects its position with fractions of a step per second, so hardly
+    /// anything is unknown after the time until the watchdog bites.
+    bool is_moving(std::int32_t rate) const noexcept {
+        return std::abs(steps_per_s(rate, clock_hz_)) > 1.0;
+    }
     double scale() const noexcept {
         const double value = position_scale_;
         return value == 0.0 || !std::isfinite(value) ? 1.0 : value;
