@@ -245,7 +245,23 @@ class Guardian(Case):
         self.comes("modbus.0.fault", "TRUE")
         self.assertEqual("FALSE", self.value("modbus.0.guarded"))
         self.assertEqual("FALSE", self.value("modbus.0.spindle.online"))
-        self.assertIn("guardian has ended", self.end(machine)[1])
+        self.comes("modbus.0.spindle.stopped", "TRUE")
+        self.assertEqual(STOP, self.drive.writes[-1][1])
+        out = self.end(machine)[1]
+        self.assertIn("guardian has ended", out)
+        self.assertIn("acknowledged its stop telegrams", out)
+
+    def test_a_killed_guardian_of_a_machine_that_ends_then(self):
+        machine = self.run_spindle()
+        self.drive.answers = False
+        os.kill(self.children(machine.pid)[0], signal.SIGKILL)
+        wait_until(lambda: self.drive.registers[0x2000] == 1, "the stop telegram was sent")
+        self.comes("modbus.0.fault", "TRUE")
+        wait_until(lambda: not self.children(machine.pid), "the other guardian has given up")
+        self.drive.answers = True
+        self.drive.registers[0x2000] = RUN
+        self.assertIn("acknowledged its stop telegrams", self.end(machine)[1])
+        self.assertEqual(STOP, self.drive.writes[-1][1])
 
     def test_a_suspended_guardian_is_a_fault_and_continued(self):
         machine = self.run_spindle()

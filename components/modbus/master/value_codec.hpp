@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "modbus/config/bus_config.hpp"
@@ -110,8 +111,8 @@ inline bool encode_value(const Value& v, std::uint64_t cell, Registers& out) {
         if (!std::isfinite(real)) return false;
     }
     if (v.type == bus::ValueType::f32) {
-        const auto narrow = static_cast<float>(real);
-        if (!std::isfinite(narrow)) return false;
+        constexpr double limit = std::numeric_limits<float>::max();
+        const auto narrow = static_cast<float>(std::clamp(real, -limit, limit));
         out = split(std::bit_cast<std::uint32_t>(narrow), count, v.order);
         return true;
     }

@@ -29,8 +29,9 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
     {Event::stop_unconfirmed, bus::Effect::raises,
      "{slave} did not acknowledge its stop telegrams[; stop it by other means]"},
     {Event::guardian_lost, bus::Effect::raises,
-     "the guardian has ended; nothing is exchanged, and nothing stops the drives when this process "
-     "ends[; type: unloadrt, loadrt]"},
+     "the guardian has ended; another one sends the stop telegrams, and nothing else is "
+     "exchanged[; "
+     "type: unloadrt, loadrt]"},
     {Event::previous_stop, bus::Effect::none, "the guardian of the previous run: {report}"},
     {Event::slave_rejects, bus::Effect::raises,
      "{slave} rejects requests: their values are not read, or not written"},

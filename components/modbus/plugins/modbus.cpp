@@ -61,6 +61,7 @@ struct Modbus : hal::bus::BusComponent {
         }
         begin_cycles();
         is_alive_.store(true);
+        is_stopped_by_another_ = false;
         guardian_stalls_.store(false);
         guardian_silent_ns_ = 0;
         shown_ns_ = 0;
@@ -72,10 +73,8 @@ struct Modbus : hal::bus::BusComponent {
         if (local_) {
             stop_local();
         }
-        if (guardian_ && !guardian_->end()) {
-            reporter_->tell({Event::guardian_killed, 0, 0, 0});
-        }
         background_.stop();
+        end_guardian();
         drain_events();
         if (reporter_) {
             reporter_->stop();
@@ -200,6 +199,44 @@ private:
         }
     }
 
+    void end_guardian() noexcept {
+        if (!guardian_) return;
+        if (!guardian_->end()) {
+            reporter_->tell({Event::guardian_killed, 0, 0, 0});
+            stop_drives();
+        } else if (!is_alive_.load() && !is_stopped_by_another_) {
+            stop_drives();
+        }
+    }
+
+    /// The guardian has ended, and the drives go on: another one sends the stop telegrams, and
+    /// ends. Not real time; no other thread tells events meanwhile.
+    void stop_drives() noexcept {
+        const std::int64_t since = hal::link::monotonic_ns();
+        GuardianProcess another;
+        bool has_started = false;
+        try {
+            has_started = another
+                              .start({guardian_program(), name_, arguments_.config.get(),
+                                      arguments_.bus.link, ""},
+                                     arguments_.text, arguments_.bus, arguments_.plan)
+                              .empty();
+        } catch (...) {  // out of memory
+        }
+        another.end();
+        is_stopped_by_another_ = true;
+        for (std::uint32_t n = 0; n < arguments_.bus.slaves.size(); ++n) {
+            if (arguments_.bus.slaves[n].stop.empty()) continue;
+            const bool stopped = has_started && another.image().slave(n).stopped.load() != 0;
+            is_stopped_by_another_ = is_stopped_by_another_ && stopped;
+            image_.slave(n).stopped.store(stopped ? 1 : 0, std::memory_order_relaxed);
+            image_.slave(n).activity.fetch_add(1, std::memory_order_release);
+            image_.header().activity.fetch_add(1, std::memory_order_release);
+            image_.tell({stopped ? Event::stop_acknowledged : Event::stop_unconfirmed, n, 0,
+                         hal::link::monotonic_ns() - since});
+        }
+    }
+
     void start_local(const std::string& link) {
         auto opened = hal::line::open(link, arguments_.bus.line);
         if (!opened) throw std::runtime_error(opened.problem);
@@ -237,6 +274,7 @@ private:
         } else if (guardian_ && is_alive_.load(std::memory_order_relaxed)) {
             if (guardian_->has_ended_within(may_wait ? 50 * millisecond : 0)) {
                 is_alive_.store(false, std::memory_order_release);
+                stop_drives();
             } else if (guardian_stalls_.load(std::memory_order_relaxed)) {
                 guardian_->resume();
             }
@@ -386,6 +424,7 @@ private:
     hal::Background background_{[this](std::int64_t now, bool may_wait) { turn(now, may_wait); }};
     std::atomic<bool> is_alive_{true};  // written by the background thread
     std::atomic<bool> guardian_stalls_{false};  // written by the cycle
+    bool is_stopped_by_another_ = false;  // guardian; of the background thread
     std::uint64_t guardian_turns_ = 0;
     std::int64_t guardian_silent_ns_ = 0;
     bool is_virtual_ = false;

@@ -122,6 +122,12 @@ TEST(Codec, Values_are_limited_and_not_finite_ones_rejected) {
     for (const double value : {std::nan(""), HUGE_VAL}) {
         EXPECT_FALSE(encode_value(v, std::bit_cast<std::uint64_t>(value), r));
     }
+
+    v.type = bus::ValueType::f32;
+    v.scaled = false;
+    EXPECT_TRUE(encode_value(v, std::bit_cast<std::uint64_t>(-1e39), r));
+    const double limit = std::numeric_limits<float>::max();
+    EXPECT_EQ(decode_value(v, r, 0), std::bit_cast<std::uint64_t>(-limit));
 }
 
 }  // namespace
