@@ -11,6 +11,9 @@ namespace {
 
 constexpr std::uint8_t sm_full = 0x08;
 constexpr std::uint8_t sm_repeat = 0x02;
+// A mailbox of up to this size is read at once after a request, until that was in vain: most replies
+// are there by the next cycle. Of others, the state is read first.
+constexpr std::size_t max_eager_bytes = 256;
 // answers with WKC 0 in a row after which a slave counts as not on the bus
 constexpr unsigned max_absent = 4;
 constexpr std::uint16_t status_of(unsigned n) {
@@ -101,6 +104,7 @@ Task<MailboxResult> SlaveMailbox::receive(Channel& channel, BusSlave& slave,
                                           std::int64_t until_ns) noexcept {
     if (!slave.area().usable()) co_return refused();
     unsigned absent = 0;
+    bool first = slave.area().in_size <= max_eager_bytes;
     for (;;) {
         if (interrupted_) co_return failed(MailboxResult::Outcome::timed_out);
         Full full = Full::lost;
@@ -115,6 +119,8 @@ Task<MailboxResult> SlaveMailbox::receive(Channel& channel, BusSlave& slave,
             if (full == Full::no) {
                 co_await channel.sleep(1);  // until the next cycle
             }
+        } else if (std::exchange(first, false) && eager_) {
+            full = Full::yes;
         } else {
             full = co_await is_full(channel, slave, 1);
         }
@@ -122,6 +128,7 @@ Task<MailboxResult> SlaveMailbox::receive(Channel& channel, BusSlave& slave,
             absent = 0;
             const bool got = co_await read(channel, slave, until_ns);
             if (got) co_return succeeded(reply_.payload.size());
+            eager_ = false;
         }
         absent = full == Full::absent ? absent + 1 : 0;
         if (absent >= max_absent) co_return failed(MailboxResult::Outcome::lost);

@@ -134,6 +134,7 @@ public:
         repeats_counter_ = false;
         last_counter_ = 0;
         lost_reads_ = 0;
+        eager_ = true;
     }
 
 private:
@@ -160,6 +161,7 @@ private:
     std::uint64_t last_sum_ = 0;
     std::uint8_t last_counter_ = 0;
     std::uint8_t lost_reads_ = 0;
+    bool eager_ = true;  ///< no read of a reply was in vain
     // the slave counts its messages
     bool advances_ = false;
     // it sends different messages with the same counter: not to be relied on
