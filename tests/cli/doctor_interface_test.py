@@ -207,9 +207,25 @@ class DoctorInterface(Case):
             self.bad("doctor", "--interface", "m0", "--hold"),
         )
         self.assertEqual(
-            "hal doctor: --cpu, --try and --hold apply to --interface NAME\n",
+            "hal doctor: --cpu, --udp, --try and --hold apply to --interface NAME\n",
             self.bad("doctor", "--try"),
         )
+        self.assertIn(
+            "cannot be combined with --udp",
+            self.bad("doctor", "--interface", "m0", "--udp", "--try"),
+        )
+
+    def test_card_that_is_reached_by_ip_needs_an_address(self):
+        subprocess.run(["ip", "addr", "add", "10.77.0.1/24", "dev", "m0"], check=True)
+        try:
+            raw = self.good("doctor", "--interface", "m0", "--seconds", "0")
+            self.assertIn("try: sudo ip addr flush dev m0", raw)
+            udp = self.good("doctor", "--interface", "m0", "--udp")
+            self.assertIn("good  other traffic   an IP address, which the card needs", udp)
+            self.assertNotIn("ip addr flush", udp)
+            self.assertNotIn("round trip", udp)
+        finally:
+            subprocess.run(["ip", "addr", "flush", "dev", "m0"], check=True)
 
 
 if __name__ == "__main__":

@@ -343,8 +343,8 @@ int run_doctor(const DoctorOptions& options) {
         return fail(options, "--yes applies to --fix: it carries out commands without asking");
     }
     if (!options.interface.empty()) return run_interface_doctor(options);
-    if (options.trial || options.hold || options.cpu >= 0) {
-        return fail(options, "--cpu, --try and --hold apply to --interface NAME");
+    if (options.trial || options.hold || options.udp || options.cpu >= 0) {
+        return fail(options, "--cpu, --udp, --try and --hold apply to --interface NAME");
     }
     nlohmann::ordered_json report;
     std::vector<Finding> findings;

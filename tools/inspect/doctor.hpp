@@ -14,6 +14,7 @@ struct DoctorOptions : Options {
     bool yes = false;
     std::string interface{};  ///< examine this network interface instead of the machine
     int cpu = -1;             ///< of the thread that uses the interface; -1: the isolated ones
+    bool udp = false;         ///< the interface leads to a card that is reached by IP
     bool trial = false;
     bool hold = false;
 
@@ -30,6 +31,9 @@ struct DoctorOptions : Options {
         set.value("--cpu", cpu, "N",
                   "with --interface: CPU of the thread that uses it (default: the isolated ones)")
             .in(0, 4095);
+        set.flag("--udp", udp,
+                 "with --interface: for a card that is reached by IP, such as Mesa's: an IP address "
+                 "belongs there, and no frame is sent");
         set.flag("--try", trial, "with --interface: change each setting, measure, and restore all");
         set.flag("--hold", hold, "with --try: keep the changes until Ctrl-C");
     }

@@ -58,6 +58,7 @@ bool may_change_settings() {
 ExaminedInterface examined(const DoctorOptions& options) {
     ExaminedInterface interface{options.interface};
     interface.has_address = has_ip_address(options.interface);
+    interface.is_udp = options.udp;
     if (options.cpu >= 0) {
         interface.cpus = {options.cpu};
     } else {
@@ -185,6 +186,9 @@ int run_interface_doctor(const DoctorOptions& options) {
                                          options.interface, names_of_interfaces()));
     }
     if (options.hold && !options.trial) return fail(options, "--hold applies to --try");
+    if (options.udp && options.trial) {
+        return fail(options, "--try measures raw frames; it cannot be combined with --udp");
+    }
     const std::vector<InterfaceSetting> settings = examine(examined(options));
     std::vector<Finding> findings;
     nlohmann::ordered_json report{{"interface", options.interface}};
@@ -197,7 +201,7 @@ int run_interface_doctor(const DoctorOptions& options) {
     int status = 0;
     if (options.trial) {
         status = run_trial(options, settings, report);
-    } else if (options.seconds > 0.0) {
+    } else if (options.seconds > 0.0 && !options.udp) {
         status = run_measurement(options, report);
     }
     const bool printed = !options.json || print(report.dump(2) + "\n");

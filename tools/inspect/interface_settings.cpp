@@ -136,6 +136,10 @@ Finding other_traffic(const ExaminedInterface& interface) {
         return {Verdict::good, "other traffic",
                 "no IP address: the interface is for the bus alone"};
     }
+    if (interface.is_udp) {
+        return {Verdict::good, "other traffic",
+                "an IP address, which the card needs; keep other programs off this network"};
+    }
     return {Verdict::fair, "other traffic",
             "an IP address: frames of other programs delay those of the bus, 123 us each at 100 "
             "Mbit/s",

@@ -23,6 +23,7 @@ struct ExaminedInterface {
     std::string name;
     std::vector<int> cpus{};   ///< of the threads that use it; empty: unknown
     bool has_address = false;  ///< other programs send on it by IP
+    bool is_udp = false;       ///< what uses it sends by IP itself
 };
 
 /// Examines everything that delays frames: the driver and its bus, the link, and each setting that

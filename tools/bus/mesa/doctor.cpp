@@ -10,6 +10,7 @@
 #include "bus/json_text.hpp"
 #include "bus/mesa/card_identity.hpp"
 #include "bus/mesa/options.hpp"
+#include "cli/other_program.hpp"
 #include "cli/output.hpp"
 #include "cli/signals.hpp"
 #include "link/system.hpp"
@@ -139,13 +140,6 @@ std::string report_text(const std::string& host, const CardIdentity& card, const
             "round trip: 50 % within {:.0f} us, 99 % within {:.0f} us, longest {:.0f} us\n\n{}",
             us(trips.at(0.5)), us(trips.at(0.99)), us(trips.ns.back()), histogram(trips));
     }
-    const std::string interface = interface_to(host);
-    if (!interface.empty() && interface != "lo") {
-        text += fmt::format(
-            "\nsettings of the interface that delay packets; type: hal doctor "
-            "--interface {}\n",
-            interface);
-    }
     return text;
 }
 
@@ -175,8 +169,12 @@ int run_mesa_doctor(const MesaDoctorOptions& options) {
     if (!problem.empty()) return fail(options, problem);
     const Trips trips = measure(card, options);
     const std::string& host = options.words[0];
-    return exit_code(print(options.json ? report_json(host, identity, trips)
-                                        : report_text(host, identity, trips)));
+    if (options.json) return exit_code(print(report_json(host, identity, trips)));
+    if (!print(report_text(host, identity, trips))) return 1;
+    const std::string interface = interface_to(host);
+    if (interface.empty() || interface == "lo") return 0;
+    if (!print(fmt::format("\nwhat delays packets on {}:\n", interface))) return 1;
+    return run_tool({"doctor", "--udp", "--interface", interface});
 }
 
 }  // namespace hal::tools
