@@ -96,7 +96,7 @@ endfunction()
 # commands of `hal can` are in the core.
 function(halcyon_packages_of_commands variable)
     set(found "")
-    string(REPLACE "hal node ethercat " "hal ethercat " lines "${ARGN}")
+    string(REGEX REPLACE "hal node (ethercat|modbus|mesa) " "hal \\1 " lines "${ARGN}")
     foreach(package IN LISTS HALCYON_PACKAGES)
         if(lines MATCHES "hal ${package} ")
             list(APPEND found ${package})
