@@ -46,31 +46,42 @@ void StepGenerator::pass(std::int64_t clocks) noexcept {
     busy_ = std::max<std::int64_t>(0, busy_ - clocks);
 }
 
+/// How far the accumulator is behind the last whole number, in its direction.
+std::uint64_t StepGenerator::beyond() const noexcept {
+    const std::uint64_t fraction = position_ % one_step;
+    return rate_ > 0 ? fraction : one_step - 1 - fraction;
+}
+
+/// The clocks behind a step when each step waits for the one before: a step in each `pulse` clocks.
+/// How far the accumulator is behind a step changes by -2^32 modulo the rate.
+std::int64_t StepGenerator::run_waiting(std::int64_t clocks, std::int64_t pulse) noexcept {
+    const std::uint64_t rate = magnitude_of(rate_);
+    const std::int64_t steps = clocks / pulse;
+    const std::uint64_t before = beyond();
+    const std::uint64_t moved = static_cast<std::uint64_t>(steps) % rate * (one_step % rate) % rate;
+    const std::uint64_t after = (before % rate + rate - moved) % rate;
+    position_ += static_cast<std::uint64_t>(steps * direction_) * one_step;
+    position_ += rate_ > 0 ? after - before : before - after;
+    busy_ = pulse;
+    clocks -= steps * pulse;
+    const std::int64_t moves = std::min(clocks, clocks_to_step() - 1);
+    pass(moves);
+    busy_ = std::max<std::int64_t>(0, busy_ - (clocks - moves));
+    return steps * direction_;
+}
+
 /// The clocks behind a step. Returns the further steps.
-std::int64_t StepGenerator::run_free(std::int64_t clocks) noexcept {
+std::int64_t StepGenerator::run(std::int64_t clocks) noexcept {
     const std::int64_t pulse = pulse_clocks();
     const std::uint64_t rate = magnitude_of(rate_);
-    std::int64_t steps = 0;
-    if (rate * static_cast<std::uint64_t>(pulse) > one_step) {
-        // each step waits for the one before it
-        steps = clocks / pulse;
-        position_ += static_cast<std::uint64_t>(steps * direction_) * one_step;
-        busy_ = pulse;
-        clocks -= steps * pulse;
-        const std::int64_t until_step = clocks_to_step() - 1;
-        pass(std::min(clocks, until_step));
-        busy_ = std::max<std::int64_t>(0, busy_ - std::max<std::int64_t>(0, clocks - until_step));
-        return steps * direction_;
-    }
+    if (rate * static_cast<std::uint64_t>(pulse) > one_step) return run_waiting(clocks, pulse);
     const auto before = static_cast<std::uint32_t>(position_ / one_step);
     pass(clocks);
-    steps = static_cast<std::int32_t>(static_cast<std::uint32_t>(position_ / one_step) - before);
+    const std::int32_t steps =
+        static_cast<std::int32_t>(static_cast<std::uint32_t>(position_ / one_step) - before);
     if (steps == 0) return 0;
-    // the newest step left when the accumulator passed the last whole number
-    const std::uint64_t fraction = position_ % one_step;
-    const std::uint64_t beyond = rate_ > 0 ? fraction : one_step - 1 - fraction;
-    const auto since = static_cast<std::int64_t>(beyond / rate);
-    busy_ = std::max<std::int64_t>(0, pulse - since);
+    const auto since_newest = static_cast<std::int64_t>(beyond() / rate);
+    busy_ = std::max<std::int64_t>(0, pulse - since_newest);
     return steps;
 }
 
@@ -89,7 +100,7 @@ std::int64_t StepGenerator::advance(std::int64_t clocks) noexcept {
     }
     pass(due);
     busy_ = pulse_clocks();
-    return direction_ + run_free(clocks - leaves);
+    return direction_ + run(clocks - leaves);
 }
 
 }  // namespace hal::mesa

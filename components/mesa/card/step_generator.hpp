@@ -33,7 +33,9 @@ private:
     std::int64_t pulse_clocks() const noexcept;
     std::int64_t clocks_to_step() const noexcept;
     void pass(std::int64_t clocks) noexcept;
-    std::int64_t run_free(std::int64_t clocks) noexcept;
+    std::uint64_t beyond() const noexcept;
+    std::int64_t run_waiting(std::int64_t clocks, std::int64_t pulse) noexcept;
+    std::int64_t run(std::int64_t clocks) noexcept;
 
     std::uint64_t position_ = 0;  ///< steps in units of 2^-32; only 48 bits are visible
     std::int32_t rate_ = 0;       ///< added in each clock
