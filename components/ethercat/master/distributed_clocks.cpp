@@ -15,7 +15,7 @@ constexpr std::int64_t synchronise_timeout_ns = 5'000 * millisecond;
 
 // How far ahead SYNC0 starts: the two writes take a cycle each, and some are repeated. When they took
 // longer, the start is repeated with twice the time.
-constexpr std::int64_t sync_start_ns = 20 * millisecond;
+constexpr std::int64_t sync_start_ns = 10 * millisecond;
 constexpr std::int64_t sync_start_cycles = 10;
 constexpr unsigned sync_start_attempts = 5;
 constexpr std::uint32_t usual_hop_ns = 700;  ///< a slave and a short cable

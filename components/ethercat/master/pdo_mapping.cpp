@@ -110,17 +110,19 @@ Task<SdoResult> write_complete(Channel& c, Bus& bus, Device& d, std::uint16_t in
     co_return r;
 }
 
-/// Writes a list: count 0, the values, the count.
+/// Writes a list: count 0 unless it is `cleared`, the values, the count.
 template <class T, class Want>
 Task<bool> write_list(Channel& c, Bus& bus, Device& d, std::uint16_t index, std::size_t count,
-                      Want want) noexcept {
+                      Want want, bool cleared) noexcept {
     SdoResult r;
     if (d.slave.complete_access && (d.slave.coe_details & 0x20) != 0) {
         r = co_await write_complete<T>(c, bus, d, index, count, want);
         if (r) co_return true;
     }
-    r = co_await write_value<std::uint8_t>(c, bus, d, index, 0, 0);
-    if (!r) co_return false;
+    if (!cleared) {
+        r = co_await write_value<std::uint8_t>(c, bus, d, index, 0, 0);
+        if (!r) co_return false;
+    }
     for (std::size_t n = 0; n < count; ++n) {
         r = co_await write_value(c, bus, d, index, static_cast<unsigned>(n + 1),
                                  static_cast<T>(want(n)));
@@ -138,7 +140,7 @@ Task<bool> write_mappings(Channel& c, Bus& bus, Device& d, const SyncManager& sm
         const Pdo& pdo = sm.pdos[n];
         const auto want = [&pdo](std::size_t entry) { return pdo.mapping(entry); };
         const bool ok =
-            co_await write_list<std::uint32_t>(c, bus, d, pdo.index, pdo.mapped(), want);
+            co_await write_list<std::uint32_t>(c, bus, d, pdo.index, pdo.mapped(), want, false);
         if (!ok) co_return false;
         const Compared now = co_await compare_mapping(c, bus, d, pdo, true);
         if (now != Compared::same) co_return false;
@@ -163,8 +165,9 @@ Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm,
             differing |= std::uint64_t{1} << n;
         }
     }
-    bool assign = false;
-    if (sm.write_assignment) {
+    // the assignment is written in any case when it is cleared before a mapping
+    bool assign = differing != 0 && sm.assignment_first;
+    if (sm.write_assignment && !assign) {
         const Compared now = co_await compare_assignment(c, bus, d, sm, false);
         if (now == Compared::failed) co_return false;
         assign = now == Compared::differs;
@@ -183,7 +186,8 @@ Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm,
     if (!ok) co_return false;
     if (!assign && !sm.assignment_first) co_return true;
     const auto want = [&sm](std::size_t n) { return sm.pdos[n].index; };
-    ok = co_await write_list<std::uint16_t>(c, bus, d, object, sm.pdos.size(), want);
+    ok = co_await write_list<std::uint16_t>(c, bus, d, object, sm.pdos.size(), want,
+                                            sm.assignment_first);
     if (!ok) co_return false;
     const Compared now = co_await compare_assignment(c, bus, d, sm, true);
     co_return now == Compared::same;
