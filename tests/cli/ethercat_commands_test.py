@@ -108,18 +108,18 @@ class Slaves(Ethercat):
 
     def test_a_type_of_lcec_that_is_not_supported_can_be_assumed(self):
         (self.folder / "ethercat-conf.xml").write_text(
-            '<masters><master idx="0" appTimePeriod="1000000">\n<slave idx="0" type="EL6090" name="x"/>'
+            '<masters><master idx="0" appTimePeriod="1000000">\n<slave idx="0" type="Ph3LM2RM" name="x"/>'
             '<slave idx="1" type="EL1008" name="y"/></master></masters>'
         )
         (self.folder / "unknown.hal").write_text(
             "loadrt lcec\nnet a lcec.0.x.keyboard\nnet b lcec.0.y.din-0\nnet c lcec.0.y.din-77\n"
         )
         said = self.bad("check", "unknown.hal")
-        self.assertIn("error: lcec's driver 'EL6090' is not supported [ethercat-slave]\n", said)
+        self.assertIn("error: lcec's driver 'Ph3LM2RM' is not supported [ethercat-slave]\n", said)
         self.assertIn("`hal check --assume lcec.0.x` checks the rest\n", said)
         said = self.bad("check", "--assume", "lcec.0.x", "unknown.hal")
         self.assertIn(
-            "warning: lcec's driver 'EL6090' is not supported: slave 'x' has no pins", said
+            "warning: lcec's driver 'Ph3LM2RM' is not supported: slave 'x' has no pins", said
         )
         self.assertIn("1 line depends on 'lcec.0.x', which is assumed to exist", said)
         self.assertIn("error: unknown pin 'lcec.0.y.din-77' [no-such-pin]\n", said)
