@@ -30,7 +30,7 @@ double PhaseLoop::turns_per_clock() const noexcept {
 
 /// Turns until the timer expires: more than 0.
 double PhaseLoop::distance_to(unsigned timer) const noexcept {
-    const double distance = in_turn(timers_[timer] / timer_turn - phase_);
+    const double distance = in_turn(-timers_[timer] / timer_turn - phase_);
     return distance > 1e-12 ? distance : 1.0;
 }
 

@@ -266,7 +266,7 @@ TEST(EmulatedCard, Timer_latches_the_accumulator_before_the_read) {
     const DpllRate rate = dpll_rate(1000.0, 42, clock_hz);
     bench.card->write(0x7200, rate.prescale << 24);
     bench.card->write(0x7000, rate.base);
-    bench.card->write(0x7400, dpll_timer(100.0, 1000.0));
+    bench.card->write(0x7400, dpll_timer(-100.0, 1000.0));
     bench.card->write(0x7100, 0);
     bench.card->write(0x2a00, stepgen::dpll_select(1));
     bench.set_rate(0, 100'000.0);
