@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <vector>
 
@@ -78,6 +79,14 @@ public:
         }
     }
     double error_us() const noexcept { return error_us_; }
+    /// Returns how long before the reading a timer has latched, s; 0 for -1 (none) and 0. One that
+    /// latches after the reading has done so in the period before. [realtime]
+    double latched_before_s(std::int32_t timer, double period_s) const noexcept {
+        if (timer < 1 || timer > 4) return 0.0;
+        const double after_s = *timer_us_[static_cast<std::size_t>(timer - 1)] * 1e-6;
+        if (!(std::abs(after_s) <= period_s)) return 0.0;
+        return after_s > 0.0 ? period_s - after_s : -after_s;
+    }
 
 private:
     static constexpr unsigned preset_cycles = 100;

@@ -113,7 +113,8 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
         acknowledge();
         show(is_fresh);
         if (leads_ && is_fresh) {
-            follow_reference(static_cast<std::int64_t>(dpll_->error_us() * 1000.0),
+            // a reading that is late in the period of the card has to be earlier
+            follow_reference(static_cast<std::int64_t>(-1000.0 * dpll_->error_us()),
                              cycle.period_ns());
         }
     }
@@ -194,7 +195,7 @@ private:
     void declare_module(const PinOwner& owner, const CardModule& module, bool has_dpll) {
         if (module.used == 0) return;
         switch (module.tag()) {
-        case Tag::stepgen: stepgens_ = add<StepgenPins>(owner, module, has_dpll); break;
+        case Tag::stepgen: stepgens_ = add<StepgenPins>(owner, module, dpll_); break;
         case Tag::encoder:
         case Tag::muxed_encoder: encoders_ = add<EncoderPins>(owner, module, has_dpll); break;
         case Tag::pwm: add<PwmPins>(owner, module); break;

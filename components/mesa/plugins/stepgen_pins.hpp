@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "dpll_pins.hpp"
 #include "mesa/driver/position_counter.hpp"
 #include "mesa/driver/step_control.hpp"
 #include "mesa/hostmot2/formulas.hpp"
@@ -251,14 +252,16 @@ private:
 
 class StepgenPins final : public ModulePins {
 public:
-    StepgenPins(const PinOwner& o, const CardModule& module, bool has_dpll)
+    /// `dpll` is nullptr without one, and outlives it.
+    StepgenPins(const PinOwner& o, const CardModule& module, const DpllPins* dpll)
         : addresses_(module.addresses),
+          dpll_(dpll),
           master_rate_(module.addresses.at(stepgen::master_rate)),
           dpll_timer_(module.addresses.at(stepgen::dpll_timer)) {
         for (unsigned unit = 0; unit < module.used; ++unit) {
             units_.push_back(std::make_unique<Stepgen>(o, unit, module));
         }
-        if (has_dpll) {
+        if (dpll_ != nullptr) {
             timer_ = std::make_unique<hal::Param<std::int32_t>>(
                 o.component, "stepgen.timer-number",
                 "timer of the DPLL that latches positions, 0..4; -1: none",
@@ -272,8 +275,12 @@ public:
         }
     }
     void receive(const Reply& reply, const Reading& reading) noexcept override {
+        Reading own = reading;
+        if (timer_) {
+            own.age_s += dpll_->latched_before_s(*timer_, reading.period_s);
+        }
         for (std::size_t n = 0; n < units_.size(); ++n) {
-            units_[n]->receive(reply.word(accumulators_, n), reading);
+            units_[n]->receive(reply.word(accumulators_, n), own);
         }
     }
     void miss(double period_s) noexcept override {
@@ -327,6 +334,7 @@ public:
 
 private:
     const ModuleAddresses addresses_;
+    const DpllPins* const dpll_;
     std::vector<std::unique_ptr<Stepgen>> units_;
     Setting master_rate_, dpll_timer_;
     std::unique_ptr<hal::Param<std::int32_t>> timer_;
