@@ -6,6 +6,7 @@ The indented lines of a component's text that are commands are its example. They
 threads they name; every component must have an example. A line `NAME.ENDING`: before indented lines makes them a file beside the example.
 Prints which have none and which fail.
 """
+
 import os
 import re
 import subprocess
@@ -68,6 +69,9 @@ def run(hal, *words, folder=None):
     )
 
 
+FILE = re.compile(r"^`([\w.-]+)`:\n\n((?:    .*\n|\n(?=    ))+)", re.MULTILINE)
+
+
 def example_of(text):
     """The commands among the indented lines, continued ones too."""
     lines, goes_on = [], False
@@ -84,7 +88,7 @@ def example_of(text):
 
 def files_of(text):
     """Name to content of the files that the text shows."""
-    shown = re.findall(r"^`([\w.-]+)`:\n\n((?:    .*\n|\n(?=    ))+)", text, re.MULTILINE)
+    shown = FILE.findall(text)
     return {name: re.sub(r"^    ", "", content, flags=re.MULTILINE) for name, content in shown}
 
 
@@ -124,10 +128,11 @@ def check(hal, name):
     if manual.returncode != 0:
         return manual.stderr.strip()
     text = manual.stdout.partition("\n## Description\n")[2]
-    lines = example_of(text)
+    lines = example_of(FILE.sub("", text))
     if not lines:
         return "it has no example"
-    loaded = [line.split()[1].replace("-", "_") for line in lines if line.startswith("loadrt")]
+    loads = [line.replace(" --native", "") for line in lines if line.startswith("loadrt")]
+    loaded = [line.split()[1].replace("-", "_") for line in loads]
     family = name.replace("-", "_").split("_")[0]  # conv_bit_float and its kind share a text
     if not any(
         one == name.replace("-", "_") or family == "conv" and one.startswith("conv_")
