@@ -4,9 +4,11 @@
 
 import signal
 import subprocess
+import sys
 import unittest
 
 from harness import HAL, TIMEOUT, Case, free_port, wait_until
+from own_network import own_network
 
 CARD = """[card]
 type = 7i92
@@ -131,6 +133,24 @@ class MesaDriver(Case):
             error,
         )
 
+    def test_a_card_in_another_subnet(self):
+        for command in (
+            "ip link add lan0 type veth peer name lan1",
+            "ip address add 192.168.7.5/24 dev lan0",
+            "ip link set lan0 up",
+            "ip link set lan1 up",
+            "ip route add default via 192.168.7.1",
+        ):
+            subprocess.run(command.split(), check=True)
+        self.addCleanup(subprocess.run, "ip link delete lan0".split(), check=True)
+        error = self.bad("check", self.write("m.hal", "loadrt mesa board=eth:10.10.10.10\n"))
+        self.assertIn(
+            "eth:10.10.10.10: no answer from a card (3 requests, 20 ms each); 10.10.10.10 is in "
+            "another subnet than 192.168.7.5/24 of lan0; give the interface of the card an address "
+            "in the subnet of the card",
+            error,
+        )
+
     def test_outputs_are_off_when_the_machine_ends(self):
         self.node()
         machine = self.start("run", self.netlist)
@@ -143,4 +163,7 @@ class MesaDriver(Case):
 
 
 if __name__ == "__main__":
+    if not own_network():
+        print("no network namespaces: skipped")
+        sys.exit(77)
     unittest.main()

@@ -14,9 +14,21 @@ using Mesa = hal::mesa::MesaComponent<mesa_names>;
 
 HAL_COMPONENT(Mesa, "mesa", "Mesa Ethernet cards (7I92, 7I96S, 7I76E, 7I95, 7I97), HostMot2", R"(
 Drives a Mesa card with HostMot2 firmware over Ethernet, with the pins, parameters and functions of LinuxCNC's hm2_eth. It needs no privileges and changes no
-firewall. The instance is named after the card, `hm2_7i76e.0`. Its pins depend on the firmware and on `config=`:
+firewall. The instance is named after the card, `hm2_7i76e.0`. Its pins depend on the firmware and on `config=`. With an emulated card:
 
-    loadrt mesa_card link=sim:mill
+`mill.mesa`:
+
+    [card]
+    type = 7i76e
+    address = sim:mill
+
+    [motor x]
+    stepgen = 0
+    scale = 400
+
+The netlist:
+
+    loadrt mesa_card config=mill.mesa
     loadrt mesa board=sim:mill config="num_stepgens=3 num_encoders=1"
     addf hm2_7i76e.0.read servo-thread
     addf hm2_7i76e.0.write servo-thread
