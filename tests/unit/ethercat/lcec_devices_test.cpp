@@ -642,6 +642,15 @@ TEST(LcecDevices, Servo_terminal_has_target_0_until_its_resolution_is_known) {
     EXPECT_TRUE(bench.pin<bool>("fault")) << "the reset has failed for 100 ms";
 }
 
+TEST(LcecDevices, Servo_terminal_that_is_not_operational_is_not_at_speed) {
+    Bench bench("EL7211");
+    bench.pin<double>("at-speed-window") = 1;
+    bench.read();
+    EXPECT_TRUE(bench.pin<bool>("at-speed"));
+    bench.read(false);
+    EXPECT_FALSE(bench.pin<bool>("at-speed"));
+}
+
 TEST(LcecDevices, Safety_frames_are_copied_between_the_logic_and_its_terminals) {
     const std::string text =
         "<masters><master idx=\"0\">\n<slave idx=\"1\" type=\"EL6900\" name=\"logic\">"

@@ -46,7 +46,8 @@ public:
                    "actual speed, absolute", {.unit = "rpm"}),
           velocity_raw_(plan.component, plan.reads, plan.pin("velo-fb-raw").c_str(),
                         "actual velocity of the slave"),
-          at_speed_(plan, "at-speed", "velo-fb is within at-speed-window of velo-cmd"),
+          at_speed_(plan, "at-speed",
+                    "velo-fb is within at-speed-window of velo-cmd, and the drive is operational"),
           scale_(plan.component, plan.reads, plan.pin("scale").c_str(),
                  "turns of one unit of the position", {.initial = 1.0}),
           velocity_resolution_(plan.component, plan.reads, plan.pin("vel-resolution").c_str(),
@@ -73,7 +74,10 @@ public:
         limit_.pin = bit(11);
         enabled_.pin = bit(0) && bit(1) && bit(2);
         status_fault_.pin = bit(3) || !image.operational;
-        if (!image.operational) return;
+        if (!image.operational) {
+            at_speed_.pin = false;  // the velocity is that of before
+            return;
+        }
         show_fault(image.period_ns);
         const auto raw = static_cast<std::int32_t>(velocity_field_.read_signed(image));
         const double scale = usable_scale(scale_);
