@@ -281,6 +281,9 @@ private:
         target.drive.profile = profile->name;
         drive_keys().apply(keys, target, key_report_);
         adopt(*profile, target.drive);
+        if (keys.find("speed") == nullptr) {
+            check_frequency(*profile, target.drive.max_frequency_hz);
+        }
         override_writes(keys, target.drive);
         override_readings(keys);
         check_registers(*profile, target.drive);
@@ -327,6 +330,15 @@ private:
         add_reading(Purpose::load, p.load, p.load.scale);
         add_reading(Purpose::running, p.running, 1);
         add_reading(Purpose::fault, p.fault, 1);
+    }
+
+    /// A set-point has 16 bits.
+    void check_frequency(const Profile& p, double max_frequency_hz) {
+        if (max_frequency_hz * p.counts_per_hz < 65535.5) return;
+        char highest[48];
+        std::snprintf(highest, sizeof highest, "write at most %g", 65535.0 / p.counts_per_hz);
+        error(Topic::slave, slave_->at,
+              "max-frequency does not fit into the set-point of the profile", highest);
     }
 
     void add_reading(Purpose purpose, const Reading& r, double scale) {
@@ -534,7 +546,12 @@ private:
         if (!read_type(w, next, v)) return;
         const std::int64_t own_period = slave_->period_ns != 0 ? slave_->period_ns : read_period;
         v.period_ns = is_output ? write_period : own_period;
+        std::set<std::string> options;
         for (; next < w.size(); ++next) {
+            if (!options.insert(lower(w[next].text)).second) {
+                return error(Topic::line, w[next].at, "duplicate option " + quoted(w[next].text),
+                             "delete one of them", "duplicate");
+            }
             if (!read_option(w, next, v)) return;
         }
         if (v.address + v.size() > 0x10000) {
@@ -669,7 +686,12 @@ private:
         static const std::set<std::string_view> of_drives = {"speed-cmd", "run",      "reset",
                                                              "speed-fb",  "at-speed", "fault",
                                                              "load",      "stalled",  "running"};
-        std::set<std::string_view> seen;
+        std::set<std::string, std::less<>> seen;
+        for (const Value& v : slave_->values) {
+            if (v.has_age) {
+                seen.insert(v.name + "-age");
+            }
+        }
         for (const Value& v : slave_->values) {
             if (v.purpose != Purpose::pin) continue;
             if (reserved.contains(v.name) || (slave_->drive && of_drives.contains(v.name))) {
