@@ -70,6 +70,15 @@ class DeterministicCheck(Case):
         done = self.run_program("check", "--deterministic", "--for", "50ms", netlist)
         self.assertEqual(0, done.returncode, done.stderr)
 
+    def test_a_machine_of_thousands_of_values(self):
+        netlist = self.write(
+            "a.hal",
+            "loadrt threads name1=servo period1=100000\nloadrt sum2 count=400\n"
+            + "".join(f"addf sum2.{n} servo\n" for n in range(400)),
+        )
+        done = self.run_program("check", "--deterministic", "--for", "100ms", netlist)
+        self.assertEqual(0, done.returncode, done.stderr)
+
     def test_an_error_of_the_netlist_comes_first(self):
         netlist = self.write("a.hal", "loadrt nothing-like-this\n")
         done = self.run_program("check", "--deterministic", netlist)
