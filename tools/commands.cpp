@@ -12,6 +12,7 @@
 #include "bus/canopen/eds_check.hpp"
 #include "bus/canopen/flash.hpp"
 #include "bus/canopen/gateway.hpp"
+#include "bus/canopen/keys.hpp"
 #include "bus/canopen/lss.hpp"
 #include "bus/canopen/nmt.hpp"
 #include "bus/canopen/nodes.hpp"
@@ -22,11 +23,15 @@
 #include "bus/canopen/scan.hpp"
 #include "bus/canopen/sdo_command.hpp"
 #include "bus/ethercat/ethercat_line.hpp"
+#include "bus/ethercat/keys.hpp"
 #include "bus/ethercat/options.hpp"
-#include "bus/node/kinds.hpp"
 #include "bus/mesa/options.hpp"
+#include "bus/modbus/keys.hpp"
 #include "bus/modbus/options.hpp"
+#include "bus/node/kinds.hpp"
+#include "bus/scocan/keys.hpp"
 #include "bus/scocan/plan.hpp"
+#include "bus/tdma/keys.hpp"
 #include "bus/tdma/plan.hpp"
 #include "comp/compile.hpp"
 #include "comp/new.hpp"
@@ -231,6 +236,8 @@ constexpr Subcommand table[] = {
         "operate a drive: on, off, go, speed, stop, home, …, or an interactive shell", true),
     command<EdsCheckOptions, OF_CANOPEN(run_can_eds_check)>(
         "can eds check", "FILE…", "check a device description and summarise it"),
+    command<Options, OF_CANOPEN(run_canopen_keys)>(
+        "canopen keys", "", "list the keys of the configuration of a network"),
     command<CanopenCheckOptions, OF_CANOPEN(run_canopen_check)>(
         "canopen check", "FILE…", "check a network configuration and list its pins"),
     command<CanopenPlanOptions, OF_CANOPEN(run_canopen_plan)>(
@@ -299,6 +306,8 @@ constexpr Subcommand table[] = {
     command<EthercatDumpOptions, OF_ETHERCAT(run_ethercat_dump)>(
         "ethercat dump", "ADDRESS|FILE [--filter WORD] [--for TIME] [--count N] [--json]",
         "print the datagrams of a bus or of a capture in words"),
+    command<Options, OF_ETHERCAT(run_ethercat_keys)>("ethercat keys", "",
+                                                     "list the keys of the configuration of a bus"),
     command<EthercatCheckOptions, OF_ETHERCAT(run_ethercat_check)>(
         "ethercat check", "FILE… [--json]", "check the configuration of a bus and list its pins"),
     command<EthercatPlanOptions, OF_ETHERCAT(run_ethercat_plan)>(
@@ -307,6 +316,8 @@ constexpr Subcommand table[] = {
     command<EthercatLcecOptions, OF_ETHERCAT(run_ethercat_lcec_conf)>(
         "ethercat lcec-conf", "FILE [--name NAME]",
         "check the configuration of the component lcec, for loadusr (lcec_conf)"),
+    command<Options, OF_MODBUS(run_modbus_keys)>("modbus keys", "",
+                                                 "list the keys of the configuration of a line"),
     command<ModbusCheckOptions, OF_MODBUS(run_modbus_check)>(
         "modbus check", "FILE…", "check the configuration of a Modbus line"),
     command<ModbusPlanOptions, OF_MODBUS(run_modbus_plan)>(
@@ -336,10 +347,14 @@ constexpr Subcommand table[] = {
     command<MesaDoctorOptions, OF_MESA(run_mesa_doctor)>(
         "mesa doctor", "HOST [--count N] [--every TIME] [--json]",
         "measure lost packets and round trips on the way to a Mesa card"),
+    command<Options, OF_SCOCAN(run_scocan_keys)>("scocan keys", "",
+                                                 "list the keys of the slot table of a bus"),
     command<ScocanPlanOptions, OF_SCOCAN(run_scocan_plan)>(
         "scocan plan", "FILE [--mode MODE] [--json | --svg FILE]",
         "print the slots of a CAN bus as a timeline, its load and the worst-case latency of each "
         "message"),
+    command<Options, OF_TDMA(run_tdma_keys)>("tdma keys", "",
+                                             "list the keys of the schedule of a segment"),
     command<TdmaPlanOptions, OF_TDMA(run_tdma_plan)>(
         "tdma plan", "FILE [--json | --svg FILE]",
         "print the slots of an Ethernet segment as a timeline, its load and its input-to-output "

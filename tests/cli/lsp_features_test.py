@@ -4,7 +4,7 @@
 import unittest
 from pathlib import Path
 
-from harness import Case
+from harness import Case, needs_package, packages_left_out
 from lsp_client import Client, path_of
 
 NETLIST = """# a machine
@@ -87,6 +87,46 @@ class Completion(Lsp):
         self.client.change(name, text + "setp \\\n  pid.1.Ig")
         answer = self.client.at(name, text.count("\n") + 1, 10, "completion")
         self.assertIn("pid.1.Igain", [one["label"] for one in answer["items"]])
+
+
+class Keys(Lsp):
+    """Keys of the configurations of buses."""
+
+    def labels(self, name, line, column):
+        return [one["label"] for one in self.client.at(name, line, column, "completion")["items"]]
+
+    @needs_package("canopen")
+    def test_keys_of_the_section(self):
+        text = "[bus]\nbi\n[node 5 x]\nheart\nbi\n\n[\nlink = \n"
+        name = self.client.open(self.write("x.canopen", text))
+        self.assertEqual(["bitrate"], self.labels(name, 1, 2))
+        self.assertIn("heartbeat", self.labels(name, 3, 5))
+        self.assertEqual([], self.labels(name, 4, 2))
+        self.assertIn("tpdoN", self.labels(name, 5, 0))
+        self.assertEqual(["[bus]", "[node ID NAME]"], self.labels(name, 6, 1))
+        self.assertEqual([], self.labels(name, 7, 7))
+        hover = self.client.at(name, 1, 1, "hover")
+        self.assertIsNone(hover)
+        self.client.change(name, text.replace("bi\n[", "bitrate = 1M\n["))
+        about = self.client.at(name, 1, 3, "hover")["contents"]["value"]
+        self.assertIn("bit rate", about)
+        self.assertIn("5k..1M", about)
+        self.assertIsNone(self.client.at(name, 1, 12, "hover"))
+
+    def test_keys_of_every_bus(self):
+        for ending, text, wanted in (
+            ("ethercat", "[bus]\ncy\n", "cycle"),
+            ("modbus", "[bus]\nlin\n", "link"),
+            ("tdma", "cyc\n", "cycle"),
+            ("scocan", "bitr\n", "bitrate"),
+        ):
+            with self.subTest(ending):
+                if ending in packages_left_out():
+                    continue
+                name = self.client.open(self.write(f"y.{ending}", text))
+                line = text.count("\n") - 1
+                self.assertIn(wanted, self.labels(name, line, len(text.splitlines()[line])))
+                self.assertIn(f"`{wanted}`", self.good(ending, "keys"))
 
 
 class Hover(Lsp):

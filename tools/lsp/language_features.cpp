@@ -100,6 +100,9 @@ std::optional<NamedThing> LanguageFeatures::thing_at(const Json& params) {
 Json LanguageFeatures::completion(const Json& params) {
     const OpenDocument& document = document_of(params);
     const TextPosition at = protocol::position_at(params, "position");
+    if (const ConfigurationKind* const kind = configuration_kind(document.path)) {
+        return keys_.complete(*kind, document.text, at);
+    }
     CheckedNetlist* const model =
         is_netlist(document.path) ? workspace_.model_of(document.path) : nullptr;
     if (!model) return {{"isIncomplete", false}, {"items", Json::array()}};
@@ -108,6 +111,12 @@ Json LanguageFeatures::completion(const Json& params) {
 
 Json LanguageFeatures::hover(const Json& params) {
     const OpenDocument& document = document_of(params);
+    if (const ConfigurationKind* const kind = configuration_kind(document.path)) {
+        const TextPosition at = protocol::position_at(params, "position");
+        const std::string about = keys_.hover(*kind, document.text, at);
+        if (about.empty()) return nullptr;
+        return {{"contents", {{"kind", "markdown"}, {"value", about}}}};
+    }
     const auto thing = thing_at(params);
     if (!thing) return nullptr;
     std::string text = hover_text(*workspace_.index_of(document.path),

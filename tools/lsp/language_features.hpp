@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "lsp/configuration_keys.hpp"
 #include "lsp/live_machine.hpp"
 #include "lsp/netlist_index.hpp"
 #include "lsp/protocol.hpp"
@@ -62,6 +63,7 @@ private:
 
     Workspace& workspace_;
     LiveMachine& machine_;
+    ConfigurationKeys keys_;
     Json hint_params_;  // of the last request
     Json hints_;        // its answer
 };
