@@ -99,7 +99,8 @@ struct MotionProfile : hal::Component {
         *this, "quick-jerk", "jerk of a quick stop; 0: no limit", {.unit = "1/s^3"}};
     hal::In<bool> load{
         *this, "load",
-        "TRUE sets the position to load-position, at standstill, and discards all set-points"};
+        "TRUE sets the position to load-position and the velocity to 0 at once, also in motion, "
+        "and discards all set-points"};
     hal::In<double> load_position{*this, "load-position", "position to load"};
 
     hal::Ins<double> row_position{*this, "row-##-position", rows,
@@ -428,7 +429,7 @@ microseconds; the cost of other cycles is negligible.
 * **mode 3** brings the speed to `target-velocity`.
 
 `halt` brakes and keeps the set-points; `stop` and `quick-stop` brake and discard the set-point, the queue and the table, as does a change of
-mode. In modes 0 and 3 the motion resumes when they end. `load` sets the position at standstill (to the feedback, while
+mode. In modes 0 and 3 the motion resumes when they end. `load` sets the position, with velocity 0 at once (to the feedback, while
 the drive is off).
 
 While `target` is NaN its last valid value applies (in mode 1 the set-point is rejected). A limit that is negative or NaN, or
