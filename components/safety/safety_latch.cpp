@@ -23,7 +23,11 @@ struct SafetyLatch : hal::Component {
         *this, "threshold", "a count above this is an error", {.initial = 100}};
     hal::In<std::int32_t> min{*this, "min", "smallest count", {.initial = 0}};
     hal::In<std::int32_t> max{*this, "max", "largest count", {.initial = 1000}};
-    hal::In<bool> enable{*this, "enable", "FALSE copies error-in to error-out", {.initial = true}};
+    hal::In<bool> enable{
+        *this,
+        "enable",
+        "FALSE copies error-in to error-out, and clears the count and a latched error",
+        {.initial = true}};
     hal::Out<std::int32_t> count{*this, "count", "current count"};
     hal::Out<bool> error_out{*this, "error-out", "TRUE: error", {.safe = true}};
     hal::Out<bool> ok_out{
