@@ -104,6 +104,9 @@ std::string sentence_of(ModuleFault fault, const CardModule& module, const Modul
     throw CardError(who + ": " + sentence);
 }
 
+/// The registers of I/O ports and of the enables of PWM have a bit for each pin or instance.
+constexpr unsigned max_bits = 32;
+
 void read_identity(SetupLink& link, CardImage& image) {
     const auto name = link.read16(Space::card, card::name, 8);
     image.card = printable(text_of({reinterpret_cast<const char*>(name.data()), name.size()}));
@@ -140,6 +143,11 @@ void read_modules(SetupLink& link, CardImage& image, std::uint16_t at) {
             const ModuleFault fault = fault_of(*descriptor, *kind, image.idrom);
             if (fault != ModuleFault::none) {
                 reject(image, sentence_of(fault, module, *kind));
+            }
+            if (descriptor->instances > max_bits) {
+                reject(image, "module " + std::string(kind->name) + " of the firmware has " +
+                                  std::to_string(descriptor->instances) +
+                                  " instances; the driver supports up to 32");
             }
         }
         image.modules.push_back(module);
@@ -252,10 +260,19 @@ CardImage probe(SetupLink& link) {
     if (const IdromFault fault = fault_of(*idrom, at); fault != IdromFault::none) {
         reject(image, sentence_of(fault, *idrom));
     }
+    if (idrom->port_width > max_bits) {
+        reject(image, "unknown firmware: ports of " + std::to_string(idrom->port_width) +
+                          " pins; the driver supports up to 32");
+    }
     read_modules(link, image, static_cast<std::uint16_t>(at + idrom->modules));
     read_pins(link, image, static_cast<std::uint16_t>(at + idrom->pins));
-    if (image.find(Tag::ioport) == nullptr || image.find(Tag::watchdog) == nullptr) {
+    const CardModule* const ports = image.find(Tag::ioport);
+    if (ports == nullptr || image.find(Tag::watchdog) == nullptr) {
         reject(image, "unknown firmware: it has no I/O ports or no watchdog");
+    }
+    if (ports->descriptor.instances != idrom->ports) {
+        reject(image, "unknown firmware: " + std::to_string(idrom->ports) + " ports, but " +
+                          std::to_string(ports->descriptor.instances) + " of their modules");
     }
     return image;
 }

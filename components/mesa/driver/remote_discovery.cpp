@@ -15,6 +15,7 @@ namespace {
 namespace ss = smart_serial;
 
 constexpr std::size_t max_records = 64;
+constexpr unsigned max_field_bits = 64;
 constexpr std::size_t max_record_size = 14 + 2 * 49;
 /// Time of a port for a reset and for the start of its channels.
 constexpr int slow_polls = 8000;
@@ -129,7 +130,9 @@ std::optional<ss::Record> read_record(PortSession& port, unsigned channel, std::
         bytes.push_back(port.byte(channel, static_cast<std::uint16_t>(address + n)));
         if (n == 0 && bytes[0] == ss::ModeRecord::mark) return {};
         if (n == 0 && bytes[0] != ss::Record::mark) break;
-        if (auto record = ss::decode_record(bytes)) return record;
+        auto record = ss::decode_record(bytes);
+        if (record && record->bits > max_field_bits) break;
+        if (record) return record;
     }
     port.fail("the device on channel " + std::to_string(channel) +
               " describes itself in an unknown form");

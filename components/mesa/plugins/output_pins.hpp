@@ -21,7 +21,8 @@ public:
         for (const CardPin& pin : image.pins) {
             const PinDescriptor& d = pin.descriptor;
             const bool is_internal = tag == Tag::ssr && d.number == pin_number::ssr::reference;
-            if (d.module != tag || d.unit != unit || is_internal || d.number == 0) continue;
+            if (d.module != tag || d.unit != unit || is_internal) continue;
+            if (d.number == 0 || d.number > 32) continue;
             numbers.push_back(d.number - 1U);
         }
         std::ranges::sort(numbers);

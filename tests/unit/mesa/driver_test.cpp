@@ -144,6 +144,47 @@ TEST_F(ProbeTest, Names_what_is_wrong_with_a_firmware) {
               "sim:card (7I76E-16): unknown firmware: it has no I/O ports or no watchdog");
 }
 
+TEST_F(ProbeTest, Rejects_more_pins_and_instances_than_a_register_has_bits) {
+    card.idrom.ports = 1;
+    card.idrom.port_width = 51;
+    card.store_tables();
+    EXPECT_EQ(probe_problem(),
+              "sim:card (7I76E-16): unknown firmware: ports of 51 pins; the driver supports up to "
+              "32");
+    card.idrom.ports = 3;
+    card.idrom.port_width = 17;
+    card.modules[2].instances = 33;
+    card.store_tables();
+    EXPECT_EQ(probe_problem(),
+              "sim:card (7I76E-16): module stepgen of the firmware has 33 instances; the driver "
+              "supports up to 32");
+    card.modules[2].instances = 3;
+    card.modules[0].instances = 2;
+    card.store_tables();
+    EXPECT_EQ(probe_problem(),
+              "sim:card (7I76E-16): unknown firmware: 3 ports, but 2 of their modules");
+}
+
+/// Bytes at random behind a valid head: the probe ends, with a card or with a sentence.
+TEST_F(ProbeTest, Survives_any_contents_of_the_registers) {
+    std::uint32_t random = 12345;
+    const auto next = [&] {
+        random = random * 1664525U + 1013904223U;
+        return random >> 8;
+    };
+    int rejected = 0;
+    for (int n = 0; n < 500; ++n) {
+        card.store_tables();
+        for (std::uint32_t i = next() % 8; i < 8; ++i) {
+            card.put(Space::hostmot2, 0x0400 + next() % 0x300, static_cast<std::uint8_t>(next()));
+        }
+        const std::string problem = probe_problem();
+        rejected += problem.empty() ? 0 : 1;
+        EXPECT_TRUE(problem.empty() || problem.starts_with("sim:card (7I76E-16): ")) << problem;
+    }
+    EXPECT_GT(rejected, 50);
+}
+
 TEST_F(ProbeTest, Apply_compares_the_config_with_the_card) {
     SetupLink link(*opened.port);
     CardImage image = probe(link);
