@@ -39,7 +39,6 @@ public:
         setting.sent_ = value;
         is_complete_ = is_complete_ && setting.is_sent_;
     }
-    bool rewrites() const noexcept { return rewrites_; }
     /// False: something did not fit.
     bool is_complete() const noexcept { return is_complete_; }
 

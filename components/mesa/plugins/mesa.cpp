@@ -39,8 +39,8 @@ A real card is `board=eth:10.10.10.10`, and the emulated one is left out. An exi
 `loadrt --native hm2_eth board_ip=10.10.10.10 config="…"` load this driver, `loadrt --linuxcnc hm2_eth` that of LinuxCNC.
 
 `write` sends commands and the request for the next cycle in one datagram, and `read` takes the answer one cycle later, without waiting. Positions of step
-generators are advanced to the present by the rates that the card has. With `read-request` in the thread, values are read in the same cycle: put it first, other
-functions behind it, then `read`.
+generators are advanced to the present by the rates that the card has. With `read-request` in the same thread, values are read in the same cycle: put it
+first, other functions behind it, then `read`.
 
 A lost datagram costs the data of one cycle and is counted in `lost-requests`; step generators go on at their last rates. After more than `hold-cycles` cycles
 without an answer the card is lost: `online` is FALSE, a fault is recorded, and the card switches its outputs off by its own watchdog. A card that answers again is

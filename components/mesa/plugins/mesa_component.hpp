@@ -2,6 +2,8 @@
 // The driver of a Mesa card as a component, under the names of LinuxCNC's hm2_eth.
 #pragma once
 
+#include <atomic>
+#include <bit>
 #include <memory>
 #include <vector>
 
@@ -69,16 +71,17 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
         reporter_->stop();
     }
 
+    /// Does nothing in another thread than that of read: a card belongs to one thread.
     void read_request(hal::Cycle cycle) noexcept {
+        if (!link_ || reader_.load(std::memory_order_relaxed) != thread_of(cycle)) return;
         requested_by_function_ = true;
-        if (link_) {
-            link_->request(cycle.start_ns());
-        }
+        link_->request(cycle.start_ns());
     }
 
     void read(hal::Cycle cycle) noexcept {
         if (!link_) return;
         const std::int64_t now = cycle.start_ns();
+        reader_.store(thread_of(cycle), std::memory_order_relaxed);
         const hal::bus::Turn turn = receive_turn(cycle);
         if (begins_anew(turn)) {
             monitor_.restart();
@@ -219,6 +222,10 @@ private:
 
     // --- Reading
 
+    /// The host gives all functions of a thread the same hal_cycle, and each thread another one.
+    static const void* thread_of(hal::Cycle cycle) noexcept {
+        return std::bit_cast<const hal_cycle*>(cycle);
+    }
     std::int64_t wait_limit(hal::Cycle cycle) const noexcept {
         // a lost card costs as little time as possible
         if (monitor_.state() == CardState::lost) return 0;
@@ -293,7 +300,6 @@ private:
         Reading reading;
         reading.period_s = cycle.seconds();
         reading.age_s = static_cast<double>(link_->age_ns(now)) * 1e-9;
-        reading.writes_arrived = link_->writes_arrived();
         reading.is_after_gap = std::exchange(is_after_gap_, false);
         reading.gap_s = cycle.seconds() * std::exchange(missing_cycles_, 0U);
         reading.has_bitten = (link_->reply().at(watchdog_status_) & watchdog::has_bitten) != 0;
@@ -517,7 +523,8 @@ private:
     hal::LastingFault link_fault_, position_fault_;
     std::vector<hal::LastingFault> remote_faults_;
     unsigned missing_cycles_ = 0;  // before the next answer
-    bool rewrites_ = true;         // all settings are written
+    bool rewrites_ = true;  // all settings are written
+    std::atomic<const void*> reader_{nullptr};  // the thread of read; written by it
     bool requested_by_function_ = false;
     bool was_lost_ = false;
     bool is_after_gap_ = false;  // these three are for the next answer

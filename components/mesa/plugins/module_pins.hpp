@@ -23,7 +23,6 @@ struct PinOwner {
 struct Reading {
     double period_s = 0.0;
     double age_s = 0.0;  ///< of the answer, until now
-    bool writes_arrived = false;
     bool is_after_gap = false;  ///< the card was lost, or the thread stopped, before this answer
     double gap_s = 0.0;  ///< how long the card was lost
     bool has_bitten = false;  ///< its outputs are off

@@ -101,12 +101,12 @@ public:
                 check_stop(beyond);
             }
         }
-        show(reading.period_s);
+        show();
     }
     /// [realtime] read
     void miss(double period_s) noexcept {
         moved_ += rate_per_s() * period_s;
-        show(period_s);
+        show();
     }
     /// The card is lost: from here on its motor stops at an unknown time. [realtime] read
     void hold() noexcept {
@@ -213,7 +213,7 @@ private:
         dbg_err_at_match_ = control_.error_at_match();
     }
 
-    void show(double) noexcept {
+    void show() noexcept {
         if (position_reset_) {
             zero_ = counter_.position();
             lost_ = 0.0;
