@@ -210,7 +210,7 @@ private:
     }
 
     /// The guardian has ended, and the drives go on: another one sends the stop telegrams, and
-    /// ends. Not real time; no other thread tells events meanwhile.
+    /// ends. Not real time; no other thread reports events meanwhile.
     void stop_drives() noexcept {
         const std::int64_t since = hal::link::monotonic_ns();
         GuardianProcess another;
