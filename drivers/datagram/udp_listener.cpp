@@ -67,6 +67,8 @@ public:
             }
             return "cannot listen at " + address_ + ": " + link::reason();
         }
+        const int on = 1;  // without it the time of a datagram is that at which it is handled
+        ::setsockopt(socket_.get(), SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
         mac_ = mac_of(at.sin_addr.s_addr);
         return {};
     }
@@ -80,15 +82,13 @@ public:
         ppoll(&p, 1, &limit, nullptr);
         std::array<std::uint8_t, max_size> buffer;
         constexpr int batch = 64;  // then what is due is sent
+        const std::int64_t to_monotonic_ns = link::real_to_monotonic_ns();
         for (int n = 0; n < batch; ++n) {
-            sockaddr_in from{};
-            socklen_t size = sizeof from;
-            const auto length = ::recvfrom(socket_.get(), buffer.data(), buffer.size(),
-                                           MSG_DONTWAIT, reinterpret_cast<sockaddr*>(&from), &size);
-            if (length <= 0) break;
-            Outbox outbox(*this, from);
-            server.serve(std::span(buffer).first(static_cast<std::size_t>(length)),
-                         link::monotonic_ns(), outbox);
+            Arrival arrival;
+            const std::size_t length = receive(buffer, arrival);
+            if (length == 0) break;
+            Outbox outbox(*this, arrival.from);
+            server.serve(std::span(buffer).first(length), arrival.at_ns + to_monotonic_ns, outbox);
         }
         send_due(link::monotonic_ns());
     }
@@ -101,6 +101,31 @@ private:
         std::int64_t at_ns = 0;
         std::vector<std::uint8_t> bytes;
     };
+    struct Arrival {
+        sockaddr_in from{};
+        std::int64_t at_ns = 0;  ///< CLOCK_REALTIME, when the kernel received it
+    };
+    /// Copies the oldest datagram. Returns its size; 0: there is none.
+    std::size_t receive(std::span<std::uint8_t> to, Arrival& arrival) noexcept {
+        iovec part{to.data(), to.size()};
+        alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(timespec))> control{};
+        msghdr message{};
+        message.msg_name = &arrival.from;
+        message.msg_namelen = sizeof arrival.from;
+        message.msg_iov = &part;
+        message.msg_iovlen = 1;
+        message.msg_control = control.data();
+        message.msg_controllen = control.size();
+        const auto length = ::recvmsg(socket_.get(), &message, MSG_DONTWAIT);
+        arrival.at_ns = link::clock_ns(CLOCK_REALTIME);
+        const cmsghdr* const stamp = CMSG_FIRSTHDR(&message);
+        if (stamp != nullptr && stamp->cmsg_type == SCM_TIMESTAMPNS) {
+            timespec time{};
+            std::memcpy(&time, CMSG_DATA(stamp), sizeof time);
+            arrival.at_ns = time.tv_sec * 1'000'000'000LL + time.tv_nsec;
+        }
+        return length > 0 ? static_cast<std::size_t>(length) : 0;
+    }
     /// Answers to one request.
     class Outbox final : public Replies {
     public:

@@ -23,7 +23,8 @@ public:
     Listener& operator=(const Listener&) = delete;
 
     /// Waits for datagrams, at most for `wait_ns`, lets the server handle them, and sends the
-    /// answers that are due. Times are those of CLOCK_MONOTONIC.
+    /// answers that are due. Times are those of CLOCK_MONOTONIC: of a datagram when the kernel
+    /// received it, so that a device in a process that is scheduled late has the time of its wire.
     virtual void serve(Server& server, std::int64_t wait_ns) = 0;
     /// Hardware address of the interface that has the IP address; zeros: it has none.
     virtual const std::array<std::uint8_t, 6>& mac() const noexcept = 0;

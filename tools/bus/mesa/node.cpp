@@ -139,9 +139,9 @@ int run_node_mesa(const MesaNodeOptions& options) {
     while (!stop.requested()) {
         const std::int64_t now_ns = link::monotonic_ns();
         if (options.for_ns >= 0 && now_ns - begin_ns >= options.for_ns) break;
-        server.advance(now_ns);
-        if (options.verbose && !report.print_changes(card, now_ns - begin_ns)) break;
         opened.listener->serve(server, turn_ns);
+        server.advance(now_ns);  // what arrived before has been handled
+        if (options.verbose && !report.print_changes(card, now_ns - begin_ns)) break;
     }
     print(fmt::format("mesa: {} requests, {} bites of the watchdog, {} datagrams lost\n",
                       card.requests(), card.bites(), server.lost()));
