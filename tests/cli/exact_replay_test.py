@@ -481,6 +481,8 @@ class ExactReplay(Case):
         self.assertIn(
             "need --exact", self.bad("replay", "run.mcap", self.folder / "a.hal", "--until", "3")
         )
+        for words in (["--tolerance", "1"], ["--for", "1s"]):
+            self.assertIn("compares all bits", self.bad("replay", "--exact", "run.mcap", *words))
 
     def test_another_plugin_is_rejected(self):
         own = self.folder / "plugins"

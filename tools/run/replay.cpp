@@ -484,6 +484,12 @@ private:
 }  // namespace
 
 int run_replay(const ReplayOptions& options) {
+    if (options.exact && (options.tolerance >= 0 || options.for_ns >= 0)) {
+        return fail(
+            options,
+            "--exact compares all bits of the whole journal: use --until MOMENT in place of "
+            "--for, and no --tolerance");
+    }
     if (options.exact) return run_exact_replay(options);
     if (options.words.size() == 1 && is_journal_test(options.words[0])) {
         return run_journal_test(options);
