@@ -112,6 +112,11 @@ void read_identity(SetupLink& link, CardImage& image) {
     image.card = printable(text_of({reinterpret_cast<const char*>(name.data()), name.size()}));
     image.name = name_of_card(image.card);
     image.lbp_version = load<std::uint16_t>(link.read16(Space::card, card::lbp_version, 1).data());
+    // the numbers of requests are in scratch registers of the space of timers
+    if (image.lbp_version < 3) {
+        reject(image, "LBP16 version " + std::to_string(image.lbp_version) +
+                          "; the driver needs version 3; to write another firmware: mesaflash");
+    }
 }
 
 std::uint16_t read_firmware(SetupLink& link, const CardImage& image) {

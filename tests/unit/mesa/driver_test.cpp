@@ -138,6 +138,11 @@ TEST_F(ProbeTest, Names_what_is_wrong_with_a_firmware) {
     EXPECT_EQ(probe_problem(),
               "sim:card (7I76E-16): module stepgen of the firmware has 4 registers; the driver "
               "supports 10");
+    card.put(Space::card, card::lbp_version, std::uint16_t{2});
+    EXPECT_EQ(probe_problem(),
+              "sim:card (7I76E-16): LBP16 version 2; the driver needs version 3; to write another "
+              "firmware: mesaflash");
+    card.put(Space::card, card::lbp_version, std::uint16_t{3});
     card.modules = {card.modules[0]};
     card.store_tables();
     EXPECT_EQ(probe_problem(),
