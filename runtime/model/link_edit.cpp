@@ -11,7 +11,7 @@ namespace hal {
 namespace {
 
 template <class T>
-std::vector<std::string> names(const Index<T>& index) {
+std::vector<std::string> names(const NameTable<T>& index) {
     std::vector<std::string> all;
     all.reserve(index.size());
     for (const auto& [name, object] : index) {

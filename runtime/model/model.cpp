@@ -10,12 +10,6 @@ namespace hal {
 namespace {
 
 template <class T>
-T* find(const Index<T>& index, std::string_view name) {
-    const auto at = index.find(name);
-    return at == index.end() ? nullptr : at->second;
-}
-
-template <class T>
 std::vector<const T*> sorted(std::vector<const T*> all) {
     std::sort(all.begin(), all.end(),
               [](const T* a, const T* b) { return natural_less(a->name, b->name); });
@@ -28,14 +22,14 @@ struct Model::Texts {
     std::unordered_set<std::string> all;
 };
 
-Pin* Model::find_pin(std::string_view name) const { return find(pin, name); }
-Signal* Model::find_signal(std::string_view name) const { return find(signal, name); }
-LoadedFunction* Model::find_function(std::string_view name) const { return find(function, name); }
-Thread* Model::find_thread(std::string_view name) const { return find(thread, name); }
-Instance* Model::find_instance(std::string_view name) const { return find(instance, name); }
+Pin* Model::find_pin(std::string_view name) const { return pin.find(name); }
+Signal* Model::find_signal(std::string_view name) const { return signal.find(name); }
+LoadedFunction* Model::find_function(std::string_view name) const { return function.find(name); }
+Thread* Model::find_thread(std::string_view name) const { return thread.find(name); }
+Instance* Model::find_instance(std::string_view name) const { return instance.find(name); }
 
 LoadedComponent* Model::find_component(std::string_view name) const {
-    if (LoadedComponent* const exact = find(component, name)) return exact;
+    if (LoadedComponent* const exact = component.find(name)) return exact;
     const auto same = [](char a, char b) {
         return a == b || (a == '-' && b == '_') || (a == '_' && b == '-');
     };

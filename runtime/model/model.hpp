@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "base/types.hpp"
+#include "model/name_table.hpp"
 #include "plan/plan.hpp"
 #include "text/source.hpp"
 
@@ -232,10 +233,6 @@ struct Thread {
     Span made;
 };
 
-/// Name to object; keys view the object's own name, which never changes.
-template <class T>
-using Index = std::unordered_map<std::string_view, T*>;
-
 /// What an edit notes about objects of the model. Who reads the model looks it up by a pointer to
 /// const.
 struct AddressHash {
@@ -251,12 +248,12 @@ struct Model {
     std::vector<std::unique_ptr<LoadedComponent>> components;
     std::vector<std::unique_ptr<Signal>> signals;  ///< unordered: erased by swapping with the last
     std::vector<std::unique_ptr<Thread>> threads;  ///< fastest first
-    Index<LoadedComponent> component;
-    Index<Instance> instance;
-    Index<Pin> pin;  ///< by name and by alias
-    Index<Signal> signal;
-    Index<LoadedFunction> function;
-    Index<Thread> thread;
+    NameTable<LoadedComponent> component;
+    NameTable<Instance> instance;
+    NameTable<Pin> pin;  ///< by name and by alias
+    NameTable<Signal> signal;
+    NameTable<LoadedFunction> function;
+    NameTable<Thread> thread;
 
     Pin* find_pin(std::string_view name) const;
     Signal* find_signal(std::string_view name) const;

@@ -7,7 +7,7 @@ namespace hal {
 namespace {
 
 template <class T>
-std::shared_ptr<const NameIndex> indexed(const Index<T>& names, const std::stop_token& stop) {
+std::shared_ptr<const NameIndex> indexed(const NameTable<T>& names, const std::stop_token& stop) {
     auto index = std::make_shared<NameIndex>();
     for (const auto& [name, object] : names) {
         if (stop.stop_requested()) return nullptr;
