@@ -129,7 +129,8 @@ const OpenDocument* Workspace::find(const std::string& uri) const {
 }
 
 OpenDocument* Workspace::find(const std::string& uri) {
-    return const_cast<OpenDocument*>(std::as_const(*this).find(uri));
+    const auto path = path_by_uri_.find(uri);
+    return path == path_by_uri_.end() ? nullptr : &documents_.at(path->second);
 }
 
 std::string Workspace::uri_of(const std::string& path) const {
