@@ -255,6 +255,14 @@ BANS = {
         "components/modbus/master",
     ): "master and device never include each other",
     (
+        "components/mesa/driver",
+        "components/mesa/card",
+    ): "driver and emulated card share only lbp16/ and hostmot2/",
+    (
+        "components/mesa/card",
+        "components/mesa/driver",
+    ): "driver and emulated card share only lbp16/ and hostmot2/",
+    (
         "components/canopen/master",
         "components/canopen/device",
     ): "master and device never include each other",
