@@ -117,12 +117,23 @@ public:
     SimPort(std::shared_ptr<Place> place, Description description)
         : place_(std::move(place)), description_(std::move(description)) {}
 
+    /// Outside of a cycle it tries longer, but not for ever: that may be in a crash handler, in the
+    /// thread that has the server.
     bool send(std::span<const std::uint8_t> bytes, std::int64_t now_ns) noexcept override {
         if (bytes.empty() || bytes.size() > max_size) return false;
-        const Hold hold(*place_, now_ns == unclocked);
-        if (!hold.is_held() || place_->server == nullptr) return false;
-        place_->server->serve(bytes, now_ns, replies_);
-        return true;
+        const int tries = now_ns == unclocked ? 1000 : 1;
+        for (int n = 0; n < tries; ++n) {
+            const Hold hold(*place_, false);
+            if (hold.is_held()) {
+                if (place_->server == nullptr) return false;
+                place_->server->serve(bytes, now_ns, replies_);
+                return true;
+            }
+            if (tries > 1) {
+                sched_yield();
+            }
+        }
+        return false;
     }
     std::size_t receive(std::span<std::uint8_t> to, std::int64_t now_ns) noexcept override {
         return replies_.pop(to, now_ns);

@@ -100,6 +100,25 @@ TEST(DatagramPort, SimPort_sends_nothing_without_a_card) {
     EXPECT_FALSE(opened.port->send(Bytes{1}, 0));
 }
 
+/// Sends to itself while it serves, as a crash handler may.
+struct Recursive : datagram::Server {
+    void serve(std::span<const std::uint8_t> request, std::int64_t,
+               datagram::Replies&) noexcept override {
+        is_sent = port->send(request, datagram::unclocked);
+    }
+    datagram::Port* port = nullptr;
+    bool is_sent = true;
+};
+
+TEST(DatagramPort, SimPort_gives_up_when_its_server_is_in_use) {
+    Recursive server;
+    const auto attached = datagram::attach("sim:recursive", server);
+    const auto opened = datagram::open("sim:recursive");
+    server.port = opened.port.get();
+    EXPECT_TRUE(opened.port->send(Bytes{1}, 0));
+    EXPECT_FALSE(server.is_sent);
+}
+
 TEST(DatagramPort, Attach_rejects_a_name_that_has_a_card) {
     Echo echo;
     const auto first = datagram::attach("sim:a-card", echo);

@@ -102,7 +102,7 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
         const CardState before = monitor_.state();
         const CardEvent event = monitor_.step(report(is_fresh), hold_cycles_, cycle.period_ns());
         rewrites_ = rewrites_ || (monitor_.state() != before && !monitor_.drives_outputs());
-        handle(event);
+        handle(event, now);
         if (is_fresh) {
             receive(cycle, now);
         } else {
@@ -244,7 +244,7 @@ private:
         report.has_bitten = (reply.at(watchdog_status_) & watchdog::has_bitten) != 0;
         return report;
     }
-    void handle(CardEvent event) noexcept {
+    void handle(CardEvent event, std::int64_t now) noexcept {
         switch (event) {
         case CardEvent::none: break;
         case CardEvent::online:
@@ -256,7 +256,7 @@ private:
             losses_ = losses_ + 1;
             was_lost_ = true;
             hold_positions();
-            send_stop(datagram::unclocked);
+            send_stop(now);
             break;
         case CardEvent::returned: come_back({Event::returned}, monitor_.was_off(), false); break;
         case CardEvent::was_reset:
