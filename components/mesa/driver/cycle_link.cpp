@@ -121,8 +121,4 @@ void CycleLink::end_send(std::int64_t now_ns, bool requests) noexcept {
     }
 }
 
-void CycleLink::send_unnumbered(std::int64_t now_ns) noexcept {
-    port_.send(writes_.bytes(), now_ns);
-}
-
 }  // namespace hal::mesa

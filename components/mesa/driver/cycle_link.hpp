@@ -67,8 +67,6 @@ public:
         late(writes_);
         end_send(now_ns, requests && !joins);
     }
-    /// Sends the writes without a number: to a card that is not in use.
-    void send_unnumbered(std::int64_t now_ns) noexcept;
 
     /// Returns whether the newest answer shows that the writes before its reads have arrived.
     bool writes_arrived() const noexcept { return writes_arrived_; }

@@ -56,6 +56,7 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
             }
             clock_.claim();
         }
+        build_stop();
         link_ = std::make_unique<CycleLink>(*port_, layout_, session());
         monitor_.restart();
         rewrites_ = true;
@@ -86,11 +87,12 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
         if (begins_anew(turn)) {
             monitor_.restart();
             link_->restart();
-            rewrites_ = true;
             is_after_gap_ = true;
+            note_stop();
         }
         if (turn == hal::bus::Turn::leaves) {
             send_stop(now);
+            note_stop();
         }
         if (is_offline(turn)) {
             show_offline();
@@ -257,6 +259,7 @@ private:
             was_lost_ = true;
             hold_positions();
             send_stop(now);
+            note_stop();
             break;
         case CardEvent::returned: come_back({Event::returned}, monitor_.was_off(), false); break;
         case CardEvent::was_reset:
@@ -400,15 +403,23 @@ private:
         out.put(watchdog_.at(watchdog::reset), watchdog::reload);
     }
     /// Everything off, and the watchdog bites at once: what the card has to do when nobody is
-    /// there. Also in a crash handler.
-    void send_stop(std::int64_t now) noexcept {
-        Outgoing out(link_->begin_write(), false);
+    /// there. Built in advance, because it is sent in a crash handler as well.
+    void build_stop() {
+        stop_.clear();
+        Outgoing out(stop_, true);
         for (const auto& module : modules_) {
             module->stop(out);
         }
         ports_->stop(out);
         out.put(watchdog_.at(watchdog::timeout), watchdog::bite_now);
-        link_->send_unnumbered(now);
+    }
+    /// [any]
+    void send_stop(std::int64_t now) noexcept { port_->send(stop_.bytes(), now); }
+    /// The card has stopped: in the thread of read.
+    void note_stop() noexcept {
+        for (const auto& module : modules_) {
+            module->has_stopped();
+        }
         rewrites_ = true;
     }
 
@@ -515,6 +526,7 @@ private:
     std::size_t watchdog_timeout_ = 0;
     Setting timeout_;
     std::uint32_t sent_timeout_ = 0;
+    Request stop_;
 
     std::unique_ptr<CycleLink> link_;
     CardMonitor monitor_;

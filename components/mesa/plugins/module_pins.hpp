@@ -52,8 +52,10 @@ public:
     virtual void miss(double /*period_s*/) noexcept {}
     /// [realtime] write
     virtual void transmit(Outgoing&, const Writing&) noexcept {}
-    /// Writes what stops all movement, once: to a card that is left alone from then on. [realtime]
-    virtual void stop(Outgoing&) noexcept {}
+    /// Writes what stops all movement, once: to a card that is left alone from then on. [setup]
+    virtual void stop(Outgoing&) const {}
+    /// That has been sent. [realtime] read
+    virtual void has_stopped() noexcept {}
 };
 
 /// Returns "PREFIX.NN.NAME". [setup]

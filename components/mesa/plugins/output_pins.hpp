@@ -72,7 +72,7 @@ public:
             out.put(unit->rate, is_on ? ssr_rate(unit->rate_hz, clock_hz_) | ssr::rate_enable : 0);
         }
     }
-    void stop(Outgoing& out) noexcept override {
+    void stop(Outgoing& out) const override {
         for (const auto& unit : units_) {
             out.put(unit->data.address(), 0);
             out.put(unit->rate.address(), 0);
@@ -108,7 +108,7 @@ public:
             out.put(unit->data, writing.outputs_on ? unit->bits.bits() : 0);
         }
     }
-    void stop(Outgoing& out) noexcept override {
+    void stop(Outgoing& out) const override {
         for (const auto& unit : units_) {
             out.put(unit->data.address(), 0);
         }

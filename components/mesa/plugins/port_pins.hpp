@@ -106,7 +106,7 @@ public:
             out.put(r.direction, bits.direction);
         }
     }
-    void stop(Outgoing& out) noexcept override {
+    void stop(Outgoing& out) const override {
         for (const Registers& r : registers_) {
             out.put(r.direction.address(), 0);
             out.put(r.open_drain.address(), 0);

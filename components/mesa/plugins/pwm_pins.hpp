@@ -40,8 +40,8 @@ public:
         out.put(value_address_, is_on ? pwm_value(duty(), used_bits) : 0);
         return is_on;
     }
-    /// [realtime]
-    void stop(Outgoing& out) noexcept { out.put(value_address_, 0); }
+    /// [setup]
+    void stop(Outgoing& out) const { out.put(value_address_, 0); }
 
 private:
     static const char* named(unsigned unit, const char* name) {
@@ -107,7 +107,7 @@ public:
         }
         out.put(enables_, enables);
     }
-    void stop(Outgoing& out) noexcept override {
+    void stop(Outgoing& out) const override {
         for (const auto& unit : units_) {
             unit->stop(out);
         }

@@ -378,10 +378,8 @@ public:
         case Phase::starting: break;
         }
     }
-    void stop(Outgoing& out) noexcept {
-        out.put(command_, smart_serial::port::stop_all);
-        phase_ = Phase::stop;
-    }
+    void stop(Outgoing& out) const { out.put(command_, smart_serial::port::stop_all); }
+    void has_stopped() noexcept { phase_ = Phase::stop; }
     void show_offline() noexcept {
         for (const auto& remote : remotes_) {
             remote->show_offline();
@@ -476,9 +474,14 @@ public:
             port->transmit(out, writing);
         }
     }
-    void stop(Outgoing& out) noexcept override {
+    void stop(Outgoing& out) const override {
         for (const auto& port : ports_) {
             port->stop(out);
+        }
+    }
+    void has_stopped() noexcept override {
+        for (const auto& port : ports_) {
+            port->has_stopped();
         }
     }
     std::size_t write_size() const noexcept {

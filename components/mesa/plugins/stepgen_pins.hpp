@@ -98,9 +98,10 @@ public:
             const std::int64_t beyond = counter_.update(value, expected) - before - expected;
             moved_ = since_reading;
             if (is_known && reading.is_after_gap && reading.has_bitten && rate_ == 0) {
-                check_stop(beyond);
+                check_stop(beyond, reading.period_s);
             }
         }
+        stopped_rate_ = 0;
         show();
     }
     /// [realtime] read
@@ -116,7 +117,8 @@ public:
     /// The outputs of the card were off while it had a rate: the motor did not follow. Returns
     /// whether the position is lost by that. [realtime] read
     bool was_off() noexcept {
-        const bool has_moved = is_moving(rate_) || is_moving(held_rate_);
+        const bool has_moved =
+            is_moving(rate_) || is_moving(held_rate_) || is_moving(stopped_rate_);
         held_rate_ = 0;
         if (!has_moved) return false;
         needs_edge_ = true;
@@ -145,10 +147,12 @@ public:
         out.put(rate_address_, static_cast<std::uint32_t>(rate_));
         dbg_step_rate_ = steps_per_s(rate_, clock_hz_);
     }
-    /// [realtime]
-    void stop(Outgoing& out) noexcept {
+    /// [setup]
+    void stop(Outgoing& out) const { out.put(rate_address_, 0); }
+    /// [realtime] read
+    void has_stopped() noexcept {
+        stopped_rate_ = rate_ != 0 ? rate_ : stopped_rate_;
         rate_ = 0;
-        out.put(rate_address_, 0);
     }
     bool is_valid() const noexcept { return !needs_edge_; }
 
@@ -187,11 +191,13 @@ private:
         return wanted > 0.0 && wanted < hardware ? wanted : hardware;
     }
 
-    /// The rate 0 has not arrived when the outputs were switched off: the motor has stopped, and the
-    /// accumulator has not.
-    void check_stop(std::int64_t beyond) noexcept {
-        constexpr std::int64_t tolerated = 2 * 65536;
-        if (std::abs(beyond) <= tolerated) return;
+    /// Where the outputs were switched off and the rate 0 has not arrived, the motor has stopped, and
+    /// the accumulator has not. When it stopped is known to some cycles.
+    void check_stop(std::int64_t beyond, double period_s) noexcept {
+        const double per_cycle =
+            steps_per_s(stopped_rate_, clock_hz_) * accumulator_per_step * period_s;
+        const double tolerated = 2.0 * accumulator_per_step + 4.0 * std::abs(per_cycle);
+        if (std::abs(static_cast<double>(beyond)) <= tolerated) return;
         lost_ -= static_cast<double>(beyond);
         has_run_on_ = needs_edge_ = true;
     }
@@ -236,6 +242,7 @@ private:
     std::int64_t zero_ = 0;
     std::int32_t rate_ = 0;  ///< in the card
     std::int32_t held_rate_ = 0;  ///< when the card was lost
+    std::int32_t stopped_rate_ = 0;  ///< when everything was stopped, until an answer confirms it
     bool needs_edge_ = false;
     bool has_run_on_ = false;
 
@@ -300,9 +307,14 @@ public:
             unit->transmit(out, writing);
         }
     }
-    void stop(Outgoing& out) noexcept override {
+    void stop(Outgoing& out) const override {
         for (const auto& unit : units_) {
             unit->stop(out);
+        }
+    }
+    void has_stopped() noexcept override {
+        for (const auto& unit : units_) {
+            unit->has_stopped();
         }
     }
     /// Calls `report(unit)` for each one whose position is lost. [realtime]
