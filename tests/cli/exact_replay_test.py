@@ -383,8 +383,6 @@ class ExactReplay(Case):
                 ["--as-test", "b", "--show", "sine,efort"],
                 "--show: no pin, parameter or signal matches 'efort'; did you mean 'effort'?",
             ),
-            (["--tolerance", "1e-3"], "--tolerance and --for are for a recording: with --exact"),
-            (["--for", "1s"], "--tolerance and --for are for a recording: with --exact"),
         ]:
             self.assertIn(problem, self.replay("--anyway", *words, status=1))
         self.assertFalse((self.folder / "b").exists())

@@ -205,10 +205,6 @@ int run_exact_replay(const ReplayOptions& options) {
                                          "remove it",
                                          options.as_test));
     }
-    if (options.tolerance >= 0 || options.for_ns >= 0) {
-        return fail(options, "--tolerance and --for are for a recording: with --exact every bit is "
-                             "compared; to end earlier, type --until");
-    }
     WhatIf change;
     if (const std::string problem = change.parse(options); !problem.empty()) {
         return fail(options, problem);
