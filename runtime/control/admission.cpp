@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include <sys/eventfd.h>
@@ -11,6 +12,7 @@
 #include <unistd.h>
 
 #include "commands/shell.hpp"
+#include "control/client_group.hpp"
 
 namespace hal {
 namespace {
@@ -185,8 +187,10 @@ void Admission::accept_clients() {
 void Admission::add_client(int fd) {
     ucred peer{};
     socklen_t size = sizeof peer;
-    if (getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0 ||
-        (peer.uid != geteuid() && peer.uid != 0)) {
+    const bool is_known = getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0;
+    const bool is_own = is_known && (peer.uid == geteuid() || peer.uid == 0);
+    const std::optional<gid_t> group = endpoint_.group();
+    if (!is_own && !(is_known && group && is_peer_in_group(fd, *group))) {
         ++refused;
         clients_.log("rejected a client of user " + std::to_string(peer.uid));
         close(fd);

@@ -169,7 +169,7 @@ std::unique_ptr<Client> Client::connect(std::string_view instance, std::string& 
     std::unique_ptr<Client> client(new Client);
     State& s = *client->state_;
     s.instance = instance;
-    const std::string path = socket_path(instance);
+    const std::string path = found_socket(instance);
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     if (!good_instance_name(instance) || path.size() >= sizeof address.sun_path) {
@@ -181,7 +181,12 @@ std::unique_ptr<Client> Client::connect(std::string_view instance, std::string& 
     if (s.fd < 0 ||
         ::connect(s.fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
         const int error = errno;
-        if (error == EACCES || error == EPERM) {
+        const std::string group = group_without_user(instance);
+        if (!group.empty()) {
+            problem = "instance '" + s.instance + "' is shared with the group '" + group +
+                      "', which you are not in; type: sudo adduser $USER " + group +
+                      ", then log in again";
+        } else if (error == EACCES || error == EPERM) {
             problem = "instance '" + s.instance + "' belongs to another user";
         } else {
             const auto running = running_instances();

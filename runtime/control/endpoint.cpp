@@ -14,33 +14,13 @@
 #include <unistd.h>
 
 #include "base/own_descriptors.hpp"
+#include "control/client_group.hpp"
 #include "machine/processes/address.hpp"
 
 namespace hal {
 namespace {
 
 std::string system_reason() { return std::strerror(errno); }
-
-/// Makes the folder if needed. It must be ours and closed to others: the socket in it gives full
-/// control of the machine.
-bool private_folder(const std::string& folder, Diagnostics& diagnostics) {
-    struct stat about{};
-    if (mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
-        diagnostics.error("no-socket", {},
-                          "the folder of the control sockets '" + folder +
-                              "' cannot be created: " + system_reason(),
-                          "", "set XDG_RUNTIME_DIR to a folder of your own");
-        return false;
-    }
-    if (lstat(folder.c_str(), &about) == 0 && S_ISDIR(about.st_mode) && about.st_uid == geteuid()) {
-        if ((about.st_mode & 0077) == 0 || chmod(folder.c_str(), 0700) == 0) return true;
-    }
-    diagnostics.error("no-socket", {},
-                      "the folder of the control sockets '" + folder +
-                          "' belongs to another user or is accessible to others",
-                      "", "remove it, or set XDG_RUNTIME_DIR to a folder of your own");
-    return false;
-}
 
 /// Locks a file that others may have locked for a moment, to see whether an instance runs.
 bool lock_unless_held(int file) {
@@ -62,11 +42,19 @@ std::string content_of(int file) {
 
 }  // namespace
 
-bool Endpoint::open(std::string_view name, Diagnostics& diagnostics) {
+bool Endpoint::open(std::string_view name, const std::string& group, Diagnostics& diagnostics) {
     if (!good_instance_name(name)) {
         diagnostics.error("no-socket", {},
                           "'" + std::string(name) + "' is not a valid instance name", "",
                           "use up to 64 letters, digits, -, _ and ., without a leading dot");
+        return false;
+    }
+    if (!group.empty()) {
+        group_ = group_number(group);
+    }
+    if (!group.empty() && !group_) {
+        diagnostics.error("no-socket", {}, "unknown group '" + group + "'", "",
+                          "create it: sudo groupadd --system " + group);
         return false;
     }
     path_ = socket_path(name);
@@ -75,11 +63,44 @@ bool Endpoint::open(std::string_view name, Diagnostics& diagnostics) {
                           "", "set XDG_RUNTIME_DIR to a shorter path");
         return false;
     }
-    if (private_folder(socket_folder(), diagnostics)) {
+    if (prepare_folder(socket_folder(), diagnostics)) {
         running_instances();  // removes what killed instances left behind
         if (take_lock(name, diagnostics) && listen_at(diagnostics)) return true;
     }
     close_all();
+    return false;
+}
+
+/// Makes the folder if needed. It must be ours, and nobody else may write to it: a socket in it gives
+/// full control of a machine.
+bool Endpoint::prepare_folder(const std::string& folder, Diagnostics& diagnostics) {
+    if (mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
+        diagnostics.error("no-socket", {},
+                          "the folder of the control sockets '" + folder +
+                              "' cannot be created: " + system_reason(),
+                          "", "set XDG_RUNTIME_DIR to a folder of your own");
+        return false;
+    }
+    struct stat about{};
+    const bool is_ours = lstat(folder.c_str(), &about) == 0 && S_ISDIR(about.st_mode) &&
+                         about.st_uid == geteuid();
+    if (is_ours && group_) {
+        if (chown(folder.c_str(), uid_t(-1), *group_) == 0 && chmod(folder.c_str(), 0750) == 0) {
+            return true;
+        }
+        diagnostics.error("no-socket", {},
+                          "the folder of the control sockets '" + folder +
+                              "' cannot be given to the group: " + system_reason(),
+                          "", "only a member of the group can share an instance with it");
+        return false;
+    }
+    // the group may enter it where another instance of this user is shared
+    const bool is_closed = (about.st_mode & 0027) == 0;
+    if (is_ours && (is_closed || chmod(folder.c_str(), 0700) == 0)) return true;
+    diagnostics.error("no-socket", {},
+                      "the folder of the control sockets '" + folder +
+                          "' belongs to another user or is accessible to others",
+                      "", "remove it, or set XDG_RUNTIME_DIR to a folder of your own");
     return false;
 }
 
@@ -115,6 +136,10 @@ bool Endpoint::take_lock(std::string_view name, Diagnostics& diagnostics) {
         close(lock_);
     }
     lock_file_ = file;
+    if (!give_to_group(lock_, 0640)) {
+        diagnostics.error("no-socket", {}, "'" + file + "' cannot be shared: " + system_reason());
+        return false;
+    }
     list_descriptor(lock_, "the lock of the instance name");
     const std::string pid = lock_content(getpid());
     if (ftruncate(lock_, 0) != 0 || pwrite(lock_, pid.data(), pid.size(), 0) < 0) {
@@ -122,6 +147,16 @@ bool Endpoint::take_lock(std::string_view name, Diagnostics& diagnostics) {
         return false;
     }
     return true;
+}
+
+bool Endpoint::give_to_group(int file, mode_t mode) const {
+    if (!group_) return true;
+    return fchown(file, uid_t(-1), *group_) == 0 && fchmod(file, mode) == 0;
+}
+
+bool Endpoint::share_socket() const {
+    if (!group_) return true;
+    return chown(path_.c_str(), uid_t(-1), *group_) == 0 && chmod(path_.c_str(), 0660) == 0;
 }
 
 bool Endpoint::listen_at(Diagnostics& diagnostics) {
@@ -134,7 +169,7 @@ bool Endpoint::listen_at(Diagnostics& diagnostics) {
     // open to others.
     if (socket_ >= 0 && fchmod(socket_, 0600) == 0 &&
         bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
-        listen(socket_, 64) == 0) {
+        share_socket() && listen(socket_, 64) == 0) {
         list_descriptor(socket_, "the control socket");
         return true;
     }

@@ -26,6 +26,8 @@ struct ServerOptions {
     std::size_t queue = std::size_t{1} << 20;
     /// a client with a full queue that reads nothing for this time is disconnected
     int stall_ms = 10000;
+    /// members of this group may connect, too; empty: only the user of the process, and root
+    std::string group;
     std::size_t max_clients = 256;
     /// connections beyond these, for short commands: an operator always gets in
     std::size_t reserved = 8;

@@ -22,7 +22,7 @@ ControlLink::~ControlLink() {
 
 bool ControlLink::retry() {
     if (wsi_) return true;
-    const std::string path = socket_path(instance_);
+    const std::string path = found_socket(instance_);
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     if (path.size() >= sizeof address.sun_path) return false;

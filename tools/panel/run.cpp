@@ -104,7 +104,7 @@ int run_panel(const PanelOptions& options) {
     if (!options.words.empty()) {
         server.load(std::move(layout));
     }
-    if (!std::filesystem::exists(socket_path(instance))) {
+    if (!std::filesystem::exists(found_socket(instance))) {
         write_all(STDERR_FILENO, fmt::format("hal panel: no instance '{}' is running yet; the page "
                                              "shows it as soon as it runs\n",
                                              instance));

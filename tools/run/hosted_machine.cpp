@@ -178,6 +178,7 @@ bool HostedMachine::serve(bool needed) {
         return false;
     }
     ServerOptions how;
+    how.group = options_.group;
     how.stop = [this] {
         stop.request();
         shell.cancel();

@@ -11,6 +11,7 @@ namespace hal::tools {
 
 struct NetlistOptions : ExecutionOptions {
     std::string part;                 ///< --node: the node to load
+    std::string group;                ///< --group: may control the instance, too
     std::int64_t max_gap_ns = 0;
     std::int64_t max_gap_realtime_ns = 0;  ///< `hal linuxcnc`: of SessionOptions
     /// sim --cycle-limit: of one cycle, in wall time; 0: not given

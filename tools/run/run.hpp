@@ -30,6 +30,8 @@ struct RunOptions : NetlistOptions {
         set.for_how_long(for_ns, "stop after 10s, 250ms, 2min …; default: run until Ctrl-C");
         set.value("-N,--name", name, "NAME",
                   "name of this instance, when several run on one machine (default: default)");
+        set.value("--group", group, "GROUP",
+                  "let the members of this group control the instance, too");
         declare_netlists(set);
         set.value("--watchdog", watchdog, "DEVICE",
                   "write to this device (/dev/watchdog) while every thread makes progress");

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include <fcntl.h>
+#include <grp.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -17,6 +18,28 @@ namespace hal {
 namespace {
 
 constexpr std::string_view lock_ending = ".lock";
+constexpr const char* services = "/run/halcyon";  // a folder for each, made by systemd
+
+std::string service_folder(std::string_view name) {
+    return std::string(services) + "/" + std::string(name) + "/halcyon";
+}
+
+std::string lock_in(const std::string& folder, std::string_view name) {
+    return folder + "/" + std::string(name) + std::string(lock_ending);
+}
+
+std::string socket_in(const std::string& folder, std::string_view name) {
+    return folder + "/" + std::string(name) + ".sock";
+}
+
+/// The folder of a running instance: this user's, else that of a service; this user's when there is
+/// neither.
+std::string folder_of(std::string_view name) {
+    std::string own = socket_folder();
+    if (!good_instance_name(name) || access(lock_in(own, name).c_str(), F_OK) == 0) return own;
+    std::string shared = service_folder(name);
+    return access(lock_in(shared, name).c_str(), F_OK) == 0 ? shared : own;
+}
 
 /// True when no living process holds the lock of this file.
 bool is_free(int file) {
@@ -101,8 +124,23 @@ std::string socket_folder() {
     return "/tmp/halcyon-" + std::to_string(getuid());
 }
 
-std::string socket_path(std::string_view name) {
-    return socket_folder() + "/" + std::string(name) + ".sock";
+std::string socket_path(std::string_view name) { return socket_in(socket_folder(), name); }
+
+std::string found_socket(std::string_view name) { return socket_in(folder_of(name), name); }
+
+std::string group_without_user(std::string_view name) {
+    if (!good_instance_name(name)) return "";
+    const std::string folder = service_folder(name);
+    struct stat about{};
+    if (stat(folder.c_str(), &about) != 0 || access(folder.c_str(), X_OK) == 0) return "";
+    if ((about.st_mode & 0050) != 0050) return "";
+    std::vector<char> text(std::size_t{1} << 16);
+    group entry{};
+    group* found = nullptr;
+    if (getgrgid_r(about.st_gid, &entry, text.data(), text.size(), &found) == 0 && found) {
+        return found->gr_name;
+    }
+    return std::to_string(about.st_gid);
 }
 
 std::string lock_content(std::int64_t pid) { return std::to_string(pid) + "\n"; }
@@ -114,7 +152,7 @@ InstanceWitness::~InstanceWitness() {
 }
 
 void InstanceWitness::watch(std::string_view name, std::int64_t pid) {
-    file_ = open(lock_path(name).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+    file_ = open(lock_in(folder_of(name), name).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
     content_ = lock_content(pid);
 }
 
@@ -132,9 +170,7 @@ InstanceEnd InstanceWitness::end() const {
     return InstanceEnd::running;
 }
 
-std::string lock_path(std::string_view name) {
-    return socket_folder() + "/" + std::string(name) + std::string(lock_ending);
-}
+std::string lock_path(std::string_view name) { return lock_in(socket_folder(), name); }
 
 std::vector<std::string> running_instances() {
     std::vector<std::string> names;
@@ -149,7 +185,15 @@ std::vector<std::string> running_instances() {
             remove_left_behind(name);
         }
     }
+    for (const auto& path : folder_entries(services)) {
+        const std::string name = path.filename().string();
+        if (held(lock_in(service_folder(name), name))) {
+            names.push_back(name);
+        }
+    }
     std::sort(names.begin(), names.end());
+    // the folder of a service may be that of this process, too
+    names.erase(std::unique(names.begin(), names.end()), names.end());
     return names;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Where the control socket of an instance is: $XDG_RUNTIME_DIR/halcyon/NAME.sock, else
-// /tmp/halcyon-UID/NAME.sock.
+// /tmp/halcyon-UID/NAME.sock; of the service halcyon@NAME: /run/halcyon/NAME/halcyon/NAME.sock.
 #pragma once
 
 #include <cstdint>
@@ -14,9 +14,15 @@ namespace hal {
 /// a dot.
 bool good_instance_name(std::string_view name);
 
-/// The folder of the control sockets, without a final slash. It need not exist.
+/// The folder of this user's control sockets, without a final slash. It need not exist.
 std::string socket_folder();
 std::string socket_path(std::string_view name);
+/// The socket that a client connects to: this user's, else that of a service which shares it with a
+/// group of this user; socket_path() when there is neither.
+std::string found_socket(std::string_view name);
+/// The group that a service of this name shares its socket with; empty: there is none, or this user
+/// is in it.
+std::string group_without_user(std::string_view name);
 /// The file beside the socket that a running instance keeps locked; it contains the process id.
 std::string lock_path(std::string_view name);
 
@@ -46,8 +52,8 @@ private:
 /// before it closes its connections.
 std::string lock_content(std::int64_t pid);
 
-/// Names of the instances that run now and belong to this user, sorted. Removes what killed
-/// instances left behind.
+/// Names of the instances that run now and belong to this user or are shared with it, sorted.
+/// Removes what killed instances of this user left behind.
 std::vector<std::string> running_instances();
 
 /// The instance that a tool uses when its user asked for `wanted` (may be empty): that one; else
