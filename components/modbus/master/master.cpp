@@ -18,7 +18,9 @@ constexpr std::int64_t verify_ns = 3'000 * millisecond;
 constexpr std::int64_t exception_pause_ns = 1'000 * millisecond;
 constexpr std::int64_t poll_ns = millisecond;  // of set-points and stop requests
 constexpr std::int64_t probe_share = 20;       // 1/20 of the line: 5 %
-constexpr std::int64_t stop_share = 4;         // 1/4
+constexpr std::int64_t urgent_share = 4;       // 1/4
+// a slave that was just lost may not have received a command, as the stop of a drive
+constexpr std::int64_t fresh_loss_ns = 5'000 * millisecond;
 
 Function read_function(Table table) noexcept {
     switch (table) {
@@ -399,6 +401,8 @@ void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexc
     if (!state.is_offline && state.failures >= slave.lost) {
         state.is_offline = true;
         state.is_known = true;
+        state.offline_since_ns = now_ns;
+        probe_at_ns_ = std::min(probe_at_ns_, now_ns + probe_pause_ns(job_.slave, now_ns));
         own.online.store(0, std::memory_order_relaxed);
         image_.tell({Event::slave_offline, job_.slave, 0, 0});
     }
@@ -554,7 +558,7 @@ void Master::fail_stop(Failure failure, std::int64_t now_ns) noexcept {
     if (is_rejected && ++state.stop_next < bus_.slaves[slave].stop.size()) return;
     report_unconfirmed(slave, now_ns);
     set_stop(slave, StopState::repeating,
-             now_ns + (is_rejected ? exception_pause_ns : probe_pause_ns(slave)));
+             now_ns + (is_rejected ? exception_pause_ns : probe_pause_ns(slave, now_ns)));
 }
 
 void Master::use_attempt(std::uint32_t slave, std::int64_t now_ns) noexcept {
@@ -565,7 +569,7 @@ void Master::use_attempt(std::uint32_t slave, std::int64_t now_ns) noexcept {
     // the further telegrams of the list may still have an effect
     if (++state.stop_next < bus_.slaves[slave].stop.size()) return;
     report_unconfirmed(slave, now_ns);
-    set_stop(slave, StopState::repeating, now_ns + probe_pause_ns(slave));
+    set_stop(slave, StopState::repeating, now_ns + probe_pause_ns(slave, now_ns));
     finish_stop(now_ns);
 }
 
@@ -688,7 +692,7 @@ bool Master::choose_probe(std::int64_t now_ns) noexcept {
         const std::uint32_t slave = (probe_next_ + i) % count;
         if (!slaves_[slave].is_offline || !begin_probe(slave, now_ns)) continue;
         probe_next_ = slave + 1;
-        probe_at_ns_ = now_ns + probe_pause_ns(slave);
+        probe_at_ns_ = now_ns + probe_pause_ns(slave, now_ns);
         return true;
     }
     return false;
@@ -716,9 +720,11 @@ bool Master::begin_probe(std::uint32_t slave, std::int64_t now_ns) noexcept {
 }
 
 /// The time after which the next request to an offline slave may follow one to this slave.
-std::int64_t Master::probe_pause_ns(std::uint32_t slave) const noexcept {
-    const bool stops = held_ && slaves_[slave].stop == StopState::repeating;
-    return (stops ? stop_share : probe_share) * 2 * bus_.slaves[slave].timeout_ns;
+std::int64_t Master::probe_pause_ns(std::uint32_t slave, std::int64_t now_ns) const noexcept {
+    const SlaveState& state = slaves_[slave];
+    const bool stops = held_ && state.stop == StopState::repeating;
+    const bool is_urgent = stops || now_ns < state.offline_since_ns + fresh_loss_ns;
+    return (is_urgent ? urgent_share : probe_share) * 2 * bus_.slaves[slave].timeout_ns;
 }
 
 bool Master::choose_due(std::int64_t now_ns) noexcept {

@@ -11,7 +11,7 @@
 //   3. set-points that have changed, so that one waits for at most the telegram that is on the line;
 //      a read that is overdue for a whole period comes between two of them;
 //   4. a request to a slave that is offline, such that all of them use at most 5 % of the line,
-//      25 % with stop telegrams while the stop lasts;
+//      25 % with stop telegrams while the stop lasts, and for 5 s after one was lost;
 //   5. what is due, the earliest first.
 #pragma once
 
@@ -57,6 +57,7 @@ private:
     struct SlaveState {
         std::uint32_t failures = 0;  ///< in a row
         bool is_offline = false;
+        std::int64_t offline_since_ns = 0;
         bool is_known = false;  ///< an answer has arrived, or it was reported offline
         bool is_corrupt = false;  ///< reported
         std::uint32_t rejected_telegrams = 0;
@@ -140,7 +141,7 @@ private:
     bool choose_set_point(std::int64_t now_ns) noexcept;
     bool choose_probe(std::int64_t now_ns) noexcept;
     bool begin_probe(std::uint32_t slave, std::int64_t now_ns) noexcept;
-    std::int64_t probe_pause_ns(std::uint32_t slave) const noexcept;
+    std::int64_t probe_pause_ns(std::uint32_t slave, std::int64_t now_ns) const noexcept;
     bool choose_due(std::int64_t now_ns) noexcept;
     bool begin(std::uint32_t telegram, std::int64_t now_ns) noexcept;
     bool has_changed(std::uint32_t telegram) const noexcept;

@@ -529,6 +529,27 @@ TEST(Master, Stop_of_offline_slaves_leaves_three_quarters_of_the_line) {
     EXPECT_GE(w.image.slave(0).timeouts.load() - timeouts, 10U);
 }
 
+TEST(Master, Stop_of_a_drive_during_a_short_disturbance_arrives_within_a_second) {
+    World w(
+        "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\nprofile = delta-ms300\nlost = 1\n"
+        "every = 50ms\n");
+    w.image.slave(0).speed.store(std::bit_cast<std::uint64_t>(12000.0));
+    w.image.slave(0).command.store(drive_forward);
+    w.run(5 * second);
+    EXPECT_EQ(w.slaves->slaves()[0].get(Table::holding, 0x2000), 0x12);
+    for (int n = 0; n < 10; ++n) {
+        w.slaves->faults().push_back({});
+        w.run(150 * ms);
+        ASSERT_EQ(w.image.slave(0).online.load(), 0U);
+        w.image.slave(0).command.store(drive_stop);
+        w.slaves->faults().clear();
+        w.run(second);
+        EXPECT_EQ(w.slaves->slaves()[0].get(Table::holding, 0x2000), 0x01) << n;
+        w.image.slave(0).command.store(drive_forward);
+        w.run(n * 777 * ms);
+    }
+}
+
 TEST(Master, Slave_without_reads_returns) {
     World w("[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\nwrite c = holding 50\n");
     w.image.value(w.value("c")).store(9);
