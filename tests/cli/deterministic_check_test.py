@@ -5,7 +5,7 @@ import re
 import unittest
 from pathlib import Path
 
-from harness import SANITIZED, Case
+from harness import SANITIZED, Case, needs_package
 
 KINDS = ["address", "clock", "time", "memory", "thread", "process", "hash", "random"]
 SEEDS = (
@@ -69,6 +69,17 @@ class DeterministicCheck(Case):
         netlist = self.write("a.hal", text.format("sim:inside"))
         done = self.run_program("check", "--deterministic", "--for", "50ms", netlist)
         self.assertEqual(0, done.returncode, done.stderr)
+
+    @needs_package("dds")
+    def test_dds_is_not_opened(self):
+        netlist = self.write(
+            "a.hal",
+            "loadrt threads name1=servo period1=1000000\n"
+            "loadrt dds_publish topic=check/a fields=a:float domain=230\naddf dds-publish.0 servo\n",
+        )
+        done = self.run_program("check", "--deterministic", "--for", "50ms", netlist)
+        self.assertEqual(1, done.returncode, done.stdout)
+        self.assertIn("DDS leads to other programs", done.stderr)
 
     def test_a_machine_of_thousands_of_values(self):
         netlist = self.write(
