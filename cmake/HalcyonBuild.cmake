@@ -160,7 +160,10 @@ if(HALCYON_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
 endif()
 find_program(HALCYON_MOLD mold)
 if(HALCYON_MOLD AND NOT CMAKE_CROSSCOMPILING)  # a cross compiler looks for one of its own name
-    add_link_options(-fuse-ld=mold)
+    # mold 1.10 lets the read-only-after-relocation area of a program with thread-local variables begin in
+    # the last bytes of the page before it, when the code ends there: such a program cannot be started.
+    # With code in pages of its own it never does.
+    add_link_options(-fuse-ld=mold -Wl,-z,separate-code)
 endif()
 
 # halcyon_in_programs(VARIABLE LIBRARY [OTHER...]): how to link a shared library, with those it needs itself: programs take it from its archive where
