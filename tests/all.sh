@@ -32,7 +32,7 @@ need gtest/gtest.h=libgtest-dev python3=python3 git=git python3-config=python3-d
     /usr/include/opencv4/opencv2/aruco.hpp=libopencv-contrib-dev yaml-cpp/yaml.h=libyaml-cpp-dev \
     linux.uml=user-mode-linux busybox=busybox-static ip=iproute2 candump=can-utils socat=socat \
     fastdds/dds/domain/DomainParticipant.hpp=libfastrtps-dev fast-discovery-server=fastdds-tools openssl=openssl tshark=tshark dot=graphviz rsvg-convert=librsvg2-bin \
-    zsh=zsh fish=fish man=man-db
+    zsh=zsh fish=fish man=man-db nvim=neovim
 
 # The independent CANopen implementation that tests/peers talks to, pinned there, in a Python environment of its own.
 peers() {
