@@ -31,19 +31,24 @@ int check_recording(const SimOptions& options) {
                : fail(options, fmt::format("cannot write '{}': {}", options.record, problem));
 }
 
-// the rows of a step are written before the next one
-constexpr std::int64_t step_ns = 100'000'000;
-constexpr std::uint64_t step_cycles = 100;
+/// How far the simulation goes until its rows are written: 100 cycles of the fastest thread, and not
+/// further than 100 ms. A step of few rows needs little memory for thousands of values.
+struct Step {
+    std::uint64_t cycles = 100;
+    std::int64_t ns = 100'000'000;
+    std::int64_t buffered_ns = 200'000'000;  ///< the rows that a probe keeps: of two steps
+};
 
-/// Returns the time whose rows a probe keeps: that of two steps.
-std::int64_t buffered_ns(Session& session, const SimOptions& options) {
-    if (options.cycles == 0) return 2 * step_ns;
-    std::int64_t fastest_ns = step_ns / static_cast<std::int64_t>(step_cycles);
+Step step_of(Session& session, const SimOptions& options) {
+    Step step;
     const auto threads = session.reports().threads();
-    if (!threads.empty()) {
-        fastest_ns = std::ranges::min(threads, {}, &ThreadReport::period_ns).period_ns;
-    }
-    return 2 * static_cast<std::int64_t>(step_cycles) * fastest_ns;
+    if (threads.empty()) return step;
+    const std::int64_t period_ns =
+        std::ranges::min(threads, {}, &ThreadReport::period_ns).period_ns;
+    const std::int64_t cycles_ns = static_cast<std::int64_t>(step.cycles) * period_ns;
+    step.ns = std::min(step.ns, cycles_ns);
+    step.buffered_ns = 2 * (options.cycles > 0 ? cycles_ns : step.ns);
+    return step;
 }
 
 std::uint64_t lost_rows(const ProbeRows& batch) {
@@ -59,6 +64,7 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
     std::shared_ptr<LiveProbe> probe;
     ProbeLayout layout;
     EventLog::Position journal;
+    Step step;
     std::string problem;
     {
         const auto lock = session.lock();
@@ -67,8 +73,9 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
             !unknown.empty()) {
             return fail(options, "--values: " + unknown);
         }
+        step = step_of(session, options);
         probe = session.probes().attach({.names = chosen_values(session.model(), patterns),
-                                         .buffer_ns = buffered_ns(session, options)},
+                                         .buffer_ns = step.buffered_ns},
                                         problem);
         if (!probe) return fail(options, "--record: " + problem);
         layout = Probes::layout(*probe);
@@ -87,12 +94,12 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
     std::uint64_t left_cycles = options.cycles;
     while (good && !machine.stop.requested() && (left_ns > 0 || left_cycles > 0)) {
         if (left_cycles > 0) {
-            machine.advance(-1, std::min(step_cycles, left_cycles));
+            machine.advance(-1, std::min(step.cycles, left_cycles));
         } else {
-            machine.advance(std::min(step_ns, left_ns), 0);
+            machine.advance(std::min(step.ns, left_ns), 0);
         }
-        left_cycles -= std::min(step_cycles, left_cycles);
-        left_ns -= step_ns;
+        left_cycles -= std::min(step.cycles, left_cycles);
+        left_ns -= step.ns;
         const auto lock = session.lock();
         for (const LoggedEvent& entry : session.event_log().after(journal)) {
             good = good && sink->event({entry.time_ns, entry.kind, entry.text});
