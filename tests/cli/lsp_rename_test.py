@@ -167,7 +167,7 @@ class RandomRenames(Lsp):
                 continue
             before = self.lines(self.saved(path))
             names = {}
-            for line, column in rng.sample(places, min(12, len(places))):
+            for line, column in rng.sample(places, min(16, len(places))):
                 new = f"renamed{done}"
                 prepared = client.ask_whole(
                     "textDocument/prepareRename",
