@@ -38,6 +38,7 @@ NOT_ALONE = {
         f"linuxcnc-ethernet/{name}.hal"
         for name in ("canopen", "ethercat", "machine", "memory", "slots", "wire")
     ),
+    "mesa-mill/machine.hal",
     "yair/pc.hal",
     "yair/pc-alone.hal",
     "yair/robot.hal",
