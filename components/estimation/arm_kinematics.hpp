@@ -8,6 +8,7 @@
 
 #include "estimation/kinematics.hpp"
 #include "estimation/matrices.hpp"
+#include "hal/limit.hpp"
 #include "hal/retained.hpp"
 
 namespace hal::estimation {
@@ -324,9 +325,9 @@ public:
         "damping",
         "solver damping; a larger value is smoother near singularities but converges more slowly",
         {.initial = 0.01}};
-    Param<double> max_speed{*this, "max-speed",
-                            "highest speed of a command: rad/s, or m/s for a prismatic joint",
-                            {.initial = 10.0}};
+    LimitParam max_speed{*this, "max-speed",
+                         "highest speed of a command: rad/s, or m/s for a prismatic joint",
+                         {.initial = 10.0}};
     Param<double> tolerance{
         *this, "tolerance", "largest error (m, rad) at which solved is TRUE", {.initial = 1e-6}};
     Out<double> error{*this, "error", "largest component of the remaining error (m, rad)"};

@@ -75,6 +75,7 @@ TEST(All_components, run_together_on_a_real_thread_while_it_is_edited) {
     Machine machine(Clock::real);
     std::string text = "newthread t 2000000\nnewthread u 4000000\n";
     for (const std::string& name : all_components()) {
+        if (name == "hm2_eth") continue;  // mesa under another name, with the same instances
         text += load(name);
     }
     machine.must(text + "loadrt test-counter names=a,b\nloadrt test-two names=w\n");

@@ -37,7 +37,10 @@ TEST_P(Manual, Is_complete) {
     EXPECT_EQ(instance.component().name, GetParam()) << "the file and the component share a name";
     EXPECT_FALSE(std::string(instance.component().summary).empty());
     EXPECT_GE(std::string(instance.component().doc).size(), 40u) << "a component without a manual";
-    EXPECT_FALSE(instance.functions().empty()) << "nothing to add to a thread";
+    // LinuxCNC's driver of the firmware, whose functions are those of the drivers of the cards
+    if (GetParam() != "hostmot2") {
+        EXPECT_FALSE(instance.functions().empty()) << "nothing to add to a thread";
+    }
     for (const auto& pin : instance.pins()) {
         EXPECT_FALSE(pin.doc.empty()) << pin.name;
         EXPECT_EQ(pin.name.find(' '), std::string::npos) << pin.name;
