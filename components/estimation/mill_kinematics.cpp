@@ -7,6 +7,9 @@ X Y Z move the tool. The table rotates the workpiece by C about z, on a trunnion
 0 to 4 are X Y Z A C. Targets are the position of the tool tip and the direction of the tool in the workpiece's frame. Of the two solutions the one nearer to
 the last C is chosen, and C takes the shorter way round. With the tool upright C does not move.
 
+Near the upright C has to turn far for a small change of the direction. A and C move at most with `max-speed`: meanwhile the tool lags behind the direction, `solved` is
+FALSE, and X Y Z keep the tip at its place on the workpiece.
+
 If an input is NaN or infinite, all outputs keep their values and `solved` becomes FALSE.
 
     loadrt mill_kinematics names=mill

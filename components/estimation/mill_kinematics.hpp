@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 
 #include "estimation/kinematics.hpp"
+#include "hal/limit.hpp"
 #include "hal/retained.hpp"
 
 namespace hal::estimation {
@@ -20,11 +21,16 @@ public:
                       "position of axis # of X Y Z A C that reaches the target: m, rad",
                       "without effect"}) {
         solved_ = measured_;
-        Retained(*this, {{"solved", solved_}});
+        Retained(*this, {{"solved", solved_}, {"has-run", has_run_}});
     }
 
-    void update(Cycle) noexcept {
+    /// A and C move at most with max-speed; X Y Z keep the tip where it belongs meanwhile.
+    void update(Cycle cycle) noexcept {
         if (!read_inputs()) return;
+        if (!has_run_) {
+            solved_ = measured_;
+            has_run_ = true;
+        }
         const Eigen::Vector3d pivot(pivot_x, pivot_y, pivot_z);
         const Eigen::Matrix3d now = table(measured_(3), measured_(4));
         const Eigen::Vector3d tip(measured_(0) - pivot(0), measured_(1) - pivot(1),
@@ -46,6 +52,7 @@ public:
         const bool direction = size > 1e-9;
         // Rx(a) Rz(c) (i j k) = z: c turns the direction into the plane of y and z, a lifts it
         const double side = std::hypot(i, j);
+        bool reached = true;
         if (direction && side > 1e-9 * size) {
             double c = std::atan2(i, j);
             double a = std::atan2(side, k);
@@ -54,10 +61,11 @@ public:
                 c += pi;
                 a = -a;
             }
-            solved_(4) += std::remainder(c - solved_(4), 2.0 * pi);  // the shorter way round
-            solved_(3) = a;
+            const double shorter = std::remainder(c - solved_(4), 2.0 * pi);
+            reached = turn(a - solved_(3), shorter, cycle.seconds());
         } else if (direction) {
-            solved_(3) = k > 0.0 ? 0.0 : pi;  // upright: any C is a solution, so it does not move
+            // upright: any C is a solution, so it does not move
+            reached = turn((k > 0.0 ? 0.0 : pi) - solved_(3), 0.0, cycle.seconds());
         }
         const Eigen::Matrix3d wanted = table(solved_(3), solved_(4));
         for (Eigen::Index r = 0; r < 3; ++r) {
@@ -68,7 +76,7 @@ public:
             solved_(r) = at;
         }
         manipulability = direction ? side / size : 0.0;
-        solved = direction && finite(solved_);
+        solved = direction && reached && finite(solved_);
         if (!finite(solved_)) {
             solved_ = measured_;
         }
@@ -78,6 +86,17 @@ public:
     }
 
 private:
+    /// Turns A and C by these angles, both by the same share where max-speed is too low. Returns
+    /// false then.
+    bool turn(double a, double c, double dt) noexcept {
+        const double allowed = std::fmax(max_speed * dt, 0.0);
+        const double largest = std::fmax(std::fabs(a), std::fabs(c));
+        const double share = largest > allowed ? allowed / largest : 1.0;
+        solved_(3) += share * a;
+        solved_(4) += share * c;
+        return share == 1.0;
+    }
+
     /// Returns the rotation from the workpiece to the machine: Rx(a) Rz(c).
     static Eigen::Matrix3d table(double a, double c) noexcept {
         Eigen::Matrix3d r;
@@ -87,6 +106,7 @@ private:
     }
 
     Vector solved_;
+    bool has_run_ = false;
 
 public:
     Param<double> pivot_x{*this, "pivot-x", "x of the intersection of A and C", {.unit = "m"}};
@@ -94,6 +114,8 @@ public:
     Param<double> pivot_z{*this, "pivot-z", "z of the intersection of A and C", {.unit = "m"}};
     Param<double> tool_length{
         *this, "tool-length", "distance from the spindle nose to the tool tip", {.unit = "m"}};
+    LimitParam max_speed{
+        *this, "max-speed", "highest speed of A and C", {.initial = 10.0, .unit = "rad/s"}};
     Out<double> manipulability{
         *this, "manipulability",
         "sine of the target's tilt: 0 at the singularity, where the tool is upright"};
