@@ -101,6 +101,7 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
         link_->request(now);
         const Answer answer = link_->receive(now, wait_limit(cycle));
         const bool is_fresh = answer == Answer::fresh;
+        is_fresh_ = is_fresh;
         const CardState before = monitor_.state();
         const CardEvent event = monitor_.step(report(is_fresh), hold_cycles_, cycle.period_ns());
         rewrites_ = rewrites_ || (monitor_.state() != before && !monitor_.drives_outputs());
@@ -109,6 +110,7 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
             receive(cycle, now);
         } else {
             ++missing_cycles_;
+            ports_->miss(cycle.seconds());
             rewrites_ = true;  // whether the writes of the same datagram have arrived is unknown
             for (const auto& module : modules_) {
                 module->miss(cycle.seconds());
@@ -135,7 +137,7 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
             }
             return;
         }
-        const Writing writing{cycle.seconds(), monitor_.drives_outputs()};
+        const Writing writing = writing_of(cycle);
         Outgoing out(link_->begin_write(), std::exchange(rewrites_, false));
         write_watchdog(out);
         for (const auto& module : modules_) {
@@ -246,6 +248,19 @@ private:
         report.has_bitten = (reply.at(watchdog_status_) & watchdog::has_bitten) != 0;
         return report;
     }
+    /// Pins become outputs only behind an answer that is younger than the timeout of the watchdog
+    /// and shows no bite: a datagram that follows lost ones could end a bite that nobody has seen.
+    Writing writing_of(hal::Cycle cycle) const noexcept {
+        Writing writing;
+        writing.period_s = cycle.seconds();
+        writing.outputs_on = monitor_.drives_outputs();
+        writing.may_set_outputs =
+            writing.outputs_on && is_fresh_ &&
+            (link_->reply().at(watchdog_status_) & watchdog::has_bitten) == 0 &&
+            link_->age_ns(cycle.start_ns()) < std::int64_t{timeout_ns_};
+        writing.may_move = writing.outputs_on && ports_->modules_are_released();
+        return writing;
+    }
     void handle(CardEvent event, std::int64_t now) noexcept {
         switch (event) {
         case CardEvent::none: break;
@@ -308,6 +323,7 @@ private:
         reading.has_bitten = (link_->reply().at(watchdog_status_) & watchdog::has_bitten) != 0;
         reading.has_lost_power = std::exchange(has_lost_power_, false);
         reading.is_after_reset = std::exchange(is_after_reset_, false);
+        reading.writes_arrived = link_->writes_arrived();
         const Reply reply = link_->reply();
         ports_->receive(reply, reading);
         for (const auto& module : modules_) {
@@ -420,6 +436,7 @@ private:
         for (const auto& module : modules_) {
             module->has_stopped();
         }
+        ports_->has_stopped();
         rewrites_ = true;
     }
 
@@ -538,6 +555,7 @@ private:
     bool rewrites_ = true;  // all settings are written
     std::atomic<const void*> reader_{nullptr};  // the thread of read; written by it
     bool requested_by_function_ = false;
+    bool is_fresh_ = false;  // the answer of this cycle
     bool was_lost_ = false;
     bool is_after_gap_ = false;  // these three are for the next answer
     bool has_lost_power_ = false;

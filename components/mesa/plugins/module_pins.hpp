@@ -28,12 +28,15 @@ struct Reading {
     bool has_bitten = false;  ///< its outputs are off
     bool has_lost_power = false;  ///< all registers begin anew
     bool is_after_reset = false;  ///< outputs were off: step generators do not continue
+    bool writes_arrived = false;  ///< it shows that the card has the newest writes
 };
 
 /// What a cycle writes.
 struct Writing {
     double period_s = 0.0;
     bool outputs_on = false;  ///< false: everything is off
+    bool may_set_outputs = false;  ///< the newest answer shows that the watchdog has not bitten
+    bool may_move = false;  ///< an answer has confirmed that the pins of modules are outputs
 };
 
 /// Declared in the constructor of the component, then used by its functions.

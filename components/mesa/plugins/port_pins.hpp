@@ -79,16 +79,35 @@ public:
         }
         for (unsigned port = 0; port < ports_; ++port) {
             registers_.emplace_back(addresses_, port);
+            registers_.back().module_outputs = bits_of(port).source;
         }
     }
 
     void plan(ReadLayout& layout) override {
         levels_ = layout.add_instances(addresses_, ioport::data, ports_);
     }
-    void receive(const Reply& reply, const Reading&) noexcept override {
+    void receive(const Reply& reply, const Reading& reading) noexcept override {
+        for (Registers& r : registers_) {
+            r.open_drain.receive(reading.writes_arrived);
+            r.direction.receive(reading.writes_arrived);
+        }
         for (std::size_t n = 0; n < pins_.size(); ++n) {
             pins_[n]->show((reply.word(levels_, n / width_) >> n % width_ & 1U) != 0);
         }
+    }
+    void miss(double) noexcept override {
+        for (Registers& r : registers_) {
+            r.open_drain.miss();
+            r.direction.miss();
+        }
+    }
+    /// Returns whether the card has the pins of modules as outputs, as an answer has shown.
+    /// [realtime]
+    bool modules_are_released() const noexcept {
+        for (unsigned port = 0; port < ports_; ++port) {
+            if ((registers_[port].module_outputs & ~registers_[port].direction.confirmed()) != 0) return false;
+        }
+        return true;
     }
     /// The direction is the last, so that an output begins with its level.
     void transmit(Outgoing& out, const Writing& writing) noexcept override {
@@ -102,14 +121,20 @@ public:
             out.put(r.data, bits.data);
             out.put(r.source, bits.source);
             out.put(r.invert, bits.invert);
-            out.put(r.open_drain, bits.open_drain);
-            out.put(r.direction, bits.direction);
+            r.open_drain.transmit(out, bits.open_drain, writing.may_set_outputs);
+            r.direction.transmit(out, bits.direction, writing.may_set_outputs);
         }
     }
     void stop(Outgoing& out) const override {
         for (const Registers& r : registers_) {
             out.put(r.direction.address(), 0);
             out.put(r.open_drain.address(), 0);
+        }
+    }
+    void has_stopped() noexcept override {
+        for (Registers& r : registers_) {
+            r.open_drain.forget();
+            r.direction.forget();
         }
     }
 
@@ -120,11 +145,13 @@ private:
     struct Registers {
         Registers(const ModuleAddresses& a, unsigned port)
             : data(a.at(ioport::data, port)),
-              direction(a.at(ioport::direction, port)),
               source(a.at(ioport::source, port)),
-              open_drain(a.at(ioport::open_drain, port)),
-              invert(a.at(ioport::invert, port)) {}
-        Setting data, direction, source, open_drain, invert;
+              invert(a.at(ioport::invert, port)),
+              direction(a.at(ioport::direction, port)),
+              open_drain(a.at(ioport::open_drain, port)) {}
+        Setting data, source, invert;
+        PinSwitch direction, open_drain;
+        std::uint32_t module_outputs = 0;  ///< bit per pin
     };
 
     Bits bits_of(unsigned port) const noexcept {

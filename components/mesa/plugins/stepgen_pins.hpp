@@ -132,7 +132,7 @@ public:
         if (!enable_) {
             needs_edge_ = false;
         }
-        const bool runs = writing.outputs_on && enable_ && !needs_edge_;
+        const bool runs = writing.may_move && enable_ && !needs_edge_;
         if (runs) {
             command(writing.period_s);
         } else {
