@@ -99,11 +99,13 @@ private:
     }
     CardEvent come_back(const CardReport& report) noexcept {
         was_off_ = report.is_reset || report.has_bitten;
+        is_marked_ = !report.is_reset;
         configure();
         return report.is_reset ? CardEvent::was_reset : CardEvent::returned;
     }
     CardEvent lose_power() noexcept {
         was_off_ = true;
+        is_marked_ = false;
         configure();
         return CardEvent::was_reset;
     }
@@ -117,6 +119,8 @@ private:
     /// The settings are in the card when the writes before the newest request have arrived, and the
     /// card shows neither an old bite nor the registers of a start.
     CardEvent confirm(const CardReport& report) noexcept {
+        if (report.is_reset && is_marked_) return lose_power();
+        is_marked_ = !report.is_reset;
         const bool is_confirmed =
             has_written_ && report.writes_arrived && !report.is_reset && !report.has_bitten;
         if (is_confirmed) {
@@ -146,6 +150,7 @@ private:
     unsigned missing_ = 0;
     std::int64_t foreign_ns_ = 0;
     bool has_written_ = false;  // in this configuration
+    bool is_marked_ = false;  // the card has shown that it is not in the state of a start
     bool was_off_ = false;
 };
 

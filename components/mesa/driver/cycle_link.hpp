@@ -73,8 +73,6 @@ public:
     /// Returns whether the newest answer has another write count of another master than the one
     /// before.
     bool has_foreign_writes() const noexcept { return has_foreign_writes_; }
-    /// Returns whether the newest answer has a write count of 0: the card has been reset.
-    bool is_reset() const noexcept { return card_write_count_ == 0; }
     /// Returns how old the newest answer is at `now_ns`, from the cycle of its request, ns.
     std::int64_t age_ns(std::int64_t now_ns) const noexcept { return now_ns - requested_ns_; }
     const LinkCounts& counts() const noexcept { return counts_; }

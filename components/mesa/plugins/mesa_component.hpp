@@ -110,6 +110,7 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
             receive(cycle, now);
         } else {
             ++missing_cycles_;
+            may_have_reset_ = may_have_reset_ || std::exchange(hides_reset_, false);
             ports_->miss(cycle.seconds());
             rewrites_ = true;  // whether the writes of the same datagram have arrived is unknown
             for (const auto& module : modules_) {
@@ -197,7 +198,6 @@ private:
         }
         watchdog_ = watchdog.addresses;
         watchdog_clock_hz_ = watchdog.clock_hz;
-        timeout_ = Setting(watchdog_.at(watchdog::timeout));
     }
     void declare_module(const PinOwner& owner, const CardModule& module, bool has_dpll) {
         if (module.used == 0) return;
@@ -242,9 +242,10 @@ private:
         report.is_fresh = is_fresh;
         if (!is_fresh) return report;
         const Reply reply = link_->reply();
-        report.writes_arrived = link_->writes_arrived();
+        report.writes_arrived =
+            link_->writes_arrived() && reply.at(watchdog_timeout_) == sent_timeout_;
         report.has_foreign_writes = link_->has_foreign_writes();
-        report.is_reset = link_->is_reset() && reply.at(watchdog_timeout_) != sent_timeout_;
+        report.is_reset = (reply.at(watchdog_timeout_) & watchdog::off) != 0;
         report.has_bitten = (reply.at(watchdog_status_) & watchdog::has_bitten) != 0;
         return report;
     }
@@ -322,7 +323,10 @@ private:
         reading.gap_s = cycle.seconds() * std::exchange(missing_cycles_, 0U);
         reading.has_bitten = (link_->reply().at(watchdog_status_) & watchdog::has_bitten) != 0;
         reading.has_lost_power = std::exchange(has_lost_power_, false);
-        reading.is_after_reset = std::exchange(is_after_reset_, false);
+        // no step generator has a rate before the timeout is confirmed
+        const bool may_have_reset = std::exchange(may_have_reset_, false);
+        reading.has_lost_power = reading.has_lost_power || may_have_reset;
+        reading.is_after_reset = std::exchange(is_after_reset_, false) || may_have_reset;
         reading.writes_arrived = link_->writes_arrived();
         const Reply reply = link_->reply();
         ports_->receive(reply, reading);
@@ -330,8 +334,7 @@ private:
             module->receive(reply, reading);
         }
         tell_losses();
-        const bool is_changed = reply.at(watchdog_timeout_) != sent_timeout_;
-        if (is_changed || link_->counts().lost_writes != lost_writes_.get()) {
+        if (link_->counts().lost_writes != lost_writes_.get()) {
             rewrites_ = true;
         }
     }
@@ -410,12 +413,20 @@ private:
 
     // --- Writing
 
+    /// A card that was reset is recognised by its timeout, which is then off. So that is written only
+    /// behind an answer that shows another value, and never on suspicion.
     void write_watchdog(Outgoing& out) noexcept {
         sent_timeout_ = watchdog_timeout(timeout_ns_, watchdog_clock_hz_);
-        if (monitor_.state() == CardState::configuring) {
+        const bool is_configuring = monitor_.state() == CardState::configuring;
+        if (is_configuring) {
             out.put(watchdog_.at(watchdog::status), 0);
         }
-        out.put(timeout_, sent_timeout_);
+        const bool writes_timeout =
+            is_fresh_ && link_->reply().at(watchdog_timeout_) != sent_timeout_;
+        hides_reset_ = writes_timeout && is_configuring;
+        if (writes_timeout) {
+            out.put(watchdog_.at(watchdog::timeout), sent_timeout_);
+        }
         out.put(watchdog_.at(watchdog::reset), watchdog::reload);
     }
     /// Everything off, and the watchdog bites at once: what the card has to do when nobody is
@@ -541,7 +552,6 @@ private:
     std::uint32_t watchdog_clock_hz_ = 0;
     std::size_t watchdog_status_ = 0;
     std::size_t watchdog_timeout_ = 0;
-    Setting timeout_;
     std::uint32_t sent_timeout_ = 0;
     Request stop_;
 
@@ -556,6 +566,8 @@ private:
     std::atomic<const void*> reader_{nullptr};  // the thread of read; written by it
     bool requested_by_function_ = false;
     bool is_fresh_ = false;  // the answer of this cycle
+    bool hides_reset_ = false;  // the newest datagram has the timeout that shows a reset
+    bool may_have_reset_ = false;  // such a datagram had no answer
     bool was_lost_ = false;
     bool is_after_gap_ = false;  // these three are for the next answer
     bool has_lost_power_ = false;

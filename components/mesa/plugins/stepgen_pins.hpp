@@ -88,7 +88,7 @@ public:
         if (reading.is_after_reset) {
             // the accumulator has run on, or begins at 0: the motor did not follow it
             counter_.rebase(value);
-            lost_ += held_moved_;
+            lost_ += std::exchange(held_moved_, 0.0);
             moved_ = 0.0;
             rate_ = 0;
         } else {
@@ -97,6 +97,7 @@ public:
             const bool is_known = counter_.is_known();
             const std::int64_t beyond = counter_.update(value, expected) - before - expected;
             moved_ = since_reading;
+            held_moved_ = 0.0;
             if (is_known && reading.is_after_gap && reading.has_bitten && rate_ == 0) {
                 check_stop(beyond, reading.period_s);
             }

@@ -235,11 +235,9 @@ TEST_F(CycleTest, One_datagram_writes_and_requests) {
     EXPECT_EQ(next(), Answer::fresh);
     EXPECT_EQ(link->reply().at(value), 5U);
     EXPECT_TRUE(link->writes_arrived());
-    EXPECT_TRUE(link->is_reset());  // no write count before the first write
     EXPECT_EQ(link->age_ns(now), 1'000'000);
     write(6);
     EXPECT_EQ(next(), Answer::fresh);
-    EXPECT_FALSE(link->is_reset());
     EXPECT_EQ(link->counts().requests, 2U);
     EXPECT_EQ(link->counts().lost, 0U);
 }
@@ -467,9 +465,8 @@ struct MonitorTest : testing::Test {
 };
 
 TEST_F(MonitorTest, Is_online_when_its_settings_have_arrived) {
-    EXPECT_EQ(good(), CardEvent::none);
-    EXPECT_FALSE(monitor.drives_outputs());
     EXPECT_EQ(with(true, false), CardEvent::none);
+    EXPECT_FALSE(monitor.drives_outputs());
     EXPECT_EQ(with(false, true), CardEvent::none);
     EXPECT_EQ(good(), CardEvent::online);
     EXPECT_TRUE(monitor.drives_outputs());
@@ -511,6 +508,15 @@ TEST_F(MonitorTest, Recognises_a_card_that_was_reset_between_two_answers) {
     go_online();
     EXPECT_EQ(with(true, false), CardEvent::was_reset);
     EXPECT_EQ(monitor.state(), CardState::configuring);
+}
+
+TEST_F(MonitorTest, Recognises_a_reset_while_it_configures) {
+    EXPECT_EQ(with(true, false), CardEvent::none);  // a card that was just switched on
+    EXPECT_EQ(with(true, false), CardEvent::none);
+    EXPECT_EQ(with(false, true), CardEvent::none);
+    EXPECT_EQ(with(true, false), CardEvent::was_reset);
+    EXPECT_EQ(with(true, false), CardEvent::none);
+    EXPECT_EQ(good(), CardEvent::online);
 }
 
 TEST_F(MonitorTest, Keeps_outputs_off_after_a_bite_until_it_is_acknowledged) {
