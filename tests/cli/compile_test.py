@@ -123,9 +123,10 @@ class Compile(harness.Case):
             ("row.push_back(in); out = row.back();", "malloc"),
             ('out = open("/dev/null", 0);', "open"),
             ("char c; out = getrandom(&c, 1, 0);", "getrandom"),
+            ("out = munmap(mmap(nullptr, 1, 0, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0), 1);", "mmap"),
         ):
             with self.subTest(call):
-                head = "#include <fcntl.h>\n#include <sys/random.h>\n"
+                head = "#include <fcntl.h>\n#include <sys/mman.h>\n#include <sys/random.h>\n"
                 self.write("lag.cpp", head + LAG.replace("BODY", body))
                 done = self.compile("lag.cpp")
                 self.assertEqual(
@@ -140,6 +141,15 @@ class Compile(harness.Case):
                 )
                 done = self.compile("--no-check-rt", "lag.cpp")
                 self.assertEqual((0, ""), (done.returncode, done.stderr))
+
+    def test_a_function_that_never_returns_for_nan_is_found(self):
+        body = "volatile bool on = true; while (std::isnan(in) && on) {} out = in;"
+        self.write("lag.cpp", "#include <cmath>\n" + LAG.replace("BODY", body))
+        done = self.compile("lag.cpp")
+        self.assertEqual(1, done.returncode, done.stdout)
+        self.assertIn(
+            "hal compile: lag: function 'lag' does not return: it ran for ten seconds\n", done.stderr
+        )
 
     def test_what_may_open_a_device_is_checked_on_request_only(self):
         start = LAG.replace("std::vector<double> row;", "void start() { out = 1; }")

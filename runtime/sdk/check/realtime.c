@@ -11,6 +11,7 @@
 #include <math.h>
 #include <poll.h>
 #include <pthread.h>
+#include <sched.h>
 #include <semaphore.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -18,6 +19,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
+#include <sys/mman.h>
 #include <sys/random.h>
 #include <sys/socket.h>
 #include <time.h>
@@ -145,6 +147,21 @@ GUARDED(ssize_t, recv, (int file, void* to, size_t bytes, int flags), (file, to,
 GUARDED(ssize_t, send, (int file, const void* from, size_t bytes, int flags),
         (file, from, bytes, flags))
 GUARDED(int, close, (int file), (file))
+GUARDED(void*, mmap,
+        (void* address, size_t bytes, int protection, int flags, int file, off_t offset),
+        (address, bytes, protection, flags, file, offset))
+GUARDED(int, munmap, (void* address, size_t bytes), (address, bytes))
+GUARDED(int, mprotect, (void* address, size_t bytes, int protection), (address, bytes, protection))
+GUARDED(int, madvise, (void* address, size_t bytes, int advice), (address, bytes, advice))
+GUARDED(int, mlock, (const void* address, size_t bytes), (address, bytes))
+GUARDED(int, munlock, (const void* address, size_t bytes), (address, bytes))
+GUARDED(int, sched_setaffinity, (pid_t process, size_t bytes, const cpu_set_t* cpus),
+        (process, bytes, cpus))
+GUARDED(int, sched_setscheduler,
+        (pid_t process, int policy, const struct sched_param* parameters),
+        (process, policy, parameters))
+GUARDED(int, pthread_setaffinity_np, (pthread_t thread, size_t bytes, const cpu_set_t* cpus),
+        (thread, bytes, cpus))
 GUARDED(int, socket, (int family, int type, int protocol), (family, type, protocol))
 GUARDED(ssize_t, recvfrom,
         (int file, void* to, size_t bytes, int flags, struct sockaddr* from, socklen_t* length),
@@ -218,6 +235,7 @@ static struct {
     hal_pin* memory;
     hal_type type;
     hal_dir dir;
+    unsigned turn;
 } pins[max];
 static struct {
     char name[160];
@@ -297,7 +315,8 @@ static uint64_t random_bits(void) {
     return state;
 }
 
-static hal_value some_value(hal_type type, bool extreme) {
+/* `turn`: counts the extreme values of a pin, so that each of them occurs */
+static hal_value some_value(hal_type type, bool extreme, unsigned turn) {
     static const double edges[] = {0.0,    -0.0,     -1.0,      1e300, -1e300,
                                    1e-310, INFINITY, -INFINITY, NAN};
     const uint64_t bits = random_bits() >> 11;
@@ -306,7 +325,7 @@ static hal_value some_value(hal_type type, bool extreme) {
     if (extreme) {
         switch (type) {
         case HAL_TYPE_BIT: value.bit = odd; break;
-        case HAL_TYPE_FLOAT: value.real = edges[bits % (sizeof edges / sizeof *edges)]; break;
+        case HAL_TYPE_FLOAT: value.real = edges[turn % (sizeof edges / sizeof *edges)]; break;
         case HAL_TYPE_S32: value.s32 = odd ? INT32_MIN : INT32_MAX; break;
         case HAL_TYPE_U32: value.u32 = odd ? 0 : UINT32_MAX; break;
         case HAL_TYPE_S64: value.s64 = odd ? INT64_MIN : INT64_MAX; break;
@@ -370,8 +389,9 @@ static int run_function(int f) {
         for (int p = 0; p < pin_count; ++p) {
             if (pins[p].type != HAL_TYPE_PORT && pins[p].dir != HAL_DIR_OUT &&
                 random_bits() % 4 == 0) {
+                const bool extreme = i >= cycles / 2 && random_bits() % 4 == 0;
                 *pins[p].memory->slot =
-                    some_value(pins[p].type, i >= cycles / 2 && random_bits() % 4 == 0);
+                    some_value(pins[p].type, extreme, extreme ? pins[p].turn++ : 0);
             }
         }
         const int64_t begin = now_ns();
