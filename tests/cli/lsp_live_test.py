@@ -22,8 +22,12 @@ net total adder.out => other.in0
 class Live(Case):
     def setUp(self):
         super().setUp()
-        ini = self.write("values.ini", "[X]\nHIGH = 3\nMORE = 40\n")
         self.file = self.write("m.hal", NETLIST)
+        self.setUpMachine()
+
+    def setUpMachine(self):
+        """Starts the machine of the file, and an editor that has it open."""
+        ini = self.write("values.ini", "[X]\nHIGH = 3\nMORE = 40\n")
         self.machine = self.start("run", "--ini", ini, "--name", "cell", "m.hal", instance="cell")
         self.client = Client(self.environment, self.folder, "--ini", ini, initialize=False)
         self.addCleanup(self.client.kill)
@@ -122,6 +126,77 @@ class Live(Case):
         answer = self.apply(NETLIST + "stop\n")
         self.assertFalse(answer["applied"])
         self.assertIn("line 8: 'stop' acts at once", answer["message"])
+
+    def order(self):
+        """The functions of the running machine in their order."""
+        saved = self.shell("save", instance="cell").stdout
+        return [line.split()[1] for line in saved.splitlines() if line.startswith("addf ")]
+
+    def test_the_order_of_functions_is_applied(self):
+        lines = NETLIST.splitlines(keepends=True)
+        swapped = "".join(lines[:2] + [lines[3], lines[2]] + lines[4:])
+        answer = self.apply(swapped)
+        self.assertTrue(answer["applied"], answer)
+        self.assertEqual(["other", "adder"], self.order())
+        self.assertEqual("no line has changed", self.apply(swapped)["message"])
+        # a new function in front, and one by its position
+        inserted = swapped.replace(
+            "addf other servo\n",
+            "loadrt sum2 names=first,second\naddf first servo\naddf other servo\n"
+            "addf second servo 2\n",
+        )
+        answer = self.apply(inserted)
+        self.assertTrue(answer["applied"], answer)
+        self.assertEqual(["first", "second", "other", "adder"], self.order())
+        answer = self.apply(swapped)
+        self.assertTrue(answer["applied"], answer)
+        self.assertIn("'loadrt sum2 names=first,second' was removed", answer["message"])
+        self.assertEqual(["other", "adder"], self.order())
+        again = self.apply(swapped)["message"]
+        self.assertIn("not sent before: 'loadrt sum2 names=first,second' was removed", again)
+
+    def test_an_order_that_another_file_takes_part_in_is_named(self):
+        self.write("more.hal", "loadrt sum2 names=more\naddf more servo\n")
+        before = NETLIST + "source more.hal\n"
+        self.end(self.machine)
+        self.client.kill()
+        self.write("m.hal", before)
+        self.setUpMachine()
+        moved = "source more.hal\n".join(NETLIST.split("addf adder servo\n", 1))
+        moved = moved.replace("addf other servo\n", "addf adder servo\naddf other servo\n")
+        answer = self.apply(moved)
+        self.assertFalse(answer["applied"], answer)
+        self.assertIn("the new order of functions in thread 'servo'", answer["message"])
+        self.assertEqual(["adder", "other", "more"], self.order())
+
+    def test_an_automatic_order_is_named(self):
+        before = NETLIST.replace("addf other servo\n", "addf --auto servo other\n")
+        self.end(self.machine)
+        self.client.kill()
+        self.write("m.hal", before)
+        self.setUpMachine()
+        answer = self.apply(before + "net more other.out\n")
+        self.assertTrue(answer["applied"], answer)
+        self.assertIn("line 4: 'addf --auto servo other' chooses an order", answer["message"])
+
+    def test_the_last_of_two_values_is_applied(self):
+        twice = NETLIST + "setp adder.in0 7\n"
+        self.assertTrue(self.apply(twice)["applied"])
+        self.assertEqual("7", self.in_machine("adder.in0"))
+        answer = self.apply(twice.replace("adder.in0 2", "adder.in0 20"))
+        self.assertEqual("7", self.in_machine("adder.in0"), answer)
+        answer = self.apply(NETLIST)
+        self.assertTrue(answer["applied"], answer)
+        self.assertEqual("2", self.in_machine("adder.in0"))
+
+    def test_moved_components_are_named_and_comments_are_not_sent(self):
+        loads = "loadrt and2\nloadrt or2\n"
+        self.assertTrue(self.apply(NETLIST + loads)["applied"])
+        answer = self.apply(NETLIST + "loadrt or2\nloadrt and2\n")
+        self.assertFalse(answer["applied"])
+        self.assertIn("has another position among the other commands", answer["message"])
+        answer = self.apply(NETLIST.replace("addf other servo", "addf other  servo # 2") + loads)
+        self.assertEqual((False, "no line has changed"), (answer["applied"], answer["message"]))
 
     def test_without_a_machine_nothing_is_sent(self):
         self.end(self.machine)

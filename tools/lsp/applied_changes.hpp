@@ -15,12 +15,13 @@ struct NetlistChanges {
     std::string removed;
     /// the new text with its changed lines only, each at its number
     std::string changed;
-    std::size_t lines = 0;  ///< that changed, the removed ones included
-    /// removed or changed lines that cannot be sent, each with the reason
+    /// what takes effect with the next start only, each with the reason: lines that cannot be
+    /// sent, or that have moved, and what removed lines made
     std::vector<std::string> not_sent;
 };
 
-/// Compares two texts of a netlist. Lines that only move are equal. `ini` is for [SECTION]KEY. [setup]
+/// Compares two texts of a netlist. A function, or a last value, whose line only moved is sent
+/// again where the order of lines matters. `ini` is for [SECTION]KEY. [setup]
 NetlistChanges netlist_changes(const std::string& before, const std::string& after, const Ini& ini);
 
 }  // namespace hal::tools

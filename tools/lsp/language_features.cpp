@@ -429,13 +429,19 @@ Json LanguageFeatures::execute_command(const Json& params) {
         message += reason + "\n";
     }
     if (changes.removed.empty() && changes.changed.empty()) {
-        return {{"applied", false}, {"message", message + "no line has changed"}};
+        for (const std::string& reason : document->not_sent) {
+            message += "not sent before: " + reason + "\n";
+        }
+        message += message.empty() ? "no line has changed" : "no other line has changed";
+        return {{"applied", false}, {"message", message}};
     }
     const LiveMachine::Applied applied =
         machine_.apply({{"<removed lines>", changes.removed}, {document->path, changes.changed}},
                        ini, folder_of(document->path));
     if (!applied.good) return {{"applied", false}, {"message", message + applied.text}};
     document->saved = document->text;
+    document->not_sent.insert(document->not_sent.end(), changes.not_sent.begin(),
+                              changes.not_sent.end());
     return {{"applied", true},
             {"message",
              message + applied.text +

@@ -24,6 +24,7 @@ struct OpenDocument {
     std::int64_t version = 0;
     TextDocument text;
     TextDocument saved;  ///< as it was when it was opened, or last applied to a machine
+    std::vector<std::string> not_sent = {};  ///< what was not applied then; it waits for a start
 };
 
 /// [setup]
