@@ -45,7 +45,7 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
      "another master writes to {card}[; stop it: a card has one master]",
      "; nothing is written until it has stopped for 1 s"},
     {Event::position_lost, bus::Effect::raises,
-     "stepgen {unit} has lost its position: its outputs were off while it made steps[; home the "
+     "stepgen {unit} has lost its position: its motor may not have followed its steps[; home the "
      "axis; it moves again after enable was FALSE]",
      "; it stands until enable was FALSE"},
     {Event::positions_valid, bus::Effect::ends, "all step generators are released again"},

@@ -290,7 +290,10 @@ private:
             has_bit_ = true;
             lose_positions();
             break;
-        case CardEvent::contended: tell({Event::contended}); break;
+        case CardEvent::contended:
+            tell({Event::contended});
+            give_up_positions();
+            break;
         }
     }
     void hold_positions() noexcept {
@@ -301,6 +304,12 @@ private:
     void lose_positions() noexcept {
         if (stepgens_ == nullptr) return;
         stepgens_->was_off([this](std::size_t unit) {
+            tell({Event::position_lost, static_cast<std::uint32_t>(unit)});
+        });
+    }
+    void give_up_positions() noexcept {
+        if (stepgens_ == nullptr) return;
+        stepgens_->were_taken([this](std::size_t unit) {
             tell({Event::position_lost, static_cast<std::uint32_t>(unit)});
         });
     }
@@ -355,7 +364,7 @@ private:
             monitor_.acknowledge();
             rewrites_ = true;
         }
-        if (stepgens_ != nullptr && position_fault_.lasts() && stepgens_->positions_are_valid()) {
+        if (stepgens_ != nullptr && position_fault_.lasts() && stepgens_->are_released()) {
             tell({Event::positions_valid});
         }
     }
@@ -492,7 +501,7 @@ private:
         *this, read_, "online", "the card answers and is configured", {.safe = false}};
     hal::Out<bool> fault_{*this, read_, "fault",
                           "the card or a remote device is lost, the watchdog has bitten, another "
-                          "master writes, or a position is lost"};
+                          "master writes, or a step generator that has lost its position stands"};
     hal::Out<bool> positions_valid_{*this,
                                     read_,
                                     "positions-valid",

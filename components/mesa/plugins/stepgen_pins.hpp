@@ -48,7 +48,7 @@ public:
           velocity_fb_(o.component, o.read, named(unit, "velocity-fb"), "velocity", {.safe = 0.0}),
           position_valid_(o.component, o.read, named(unit, "position-valid"),
                           "FALSE: steps were made that the motor may not have followed; TRUE again "
-                          "after enable was FALSE",
+                          "when enable becomes TRUE after it was FALSE",
                           {.initial = true, .safe = false}),
           position_scale_(o.component, named(unit, "position-scale"), "steps per unit",
                           {.initial = 1.0}),
@@ -82,6 +82,9 @@ public:
 
     /// [realtime] read
     void receive(std::uint32_t accumulator, const Reading& reading) noexcept {
+        if (reading.writes_arrived) {
+            possible_rate_ = rate_;
+        }
         moved_ += rate_per_s() * reading.period_s;
         const double since_reading = rate_per_s() * reading.age_s;
         const auto value = static_cast<std::int32_t>(accumulator);
@@ -113,17 +116,17 @@ public:
     /// The card is lost: from here on its motor stops at an unknown time. [realtime] read
     void hold() noexcept {
         held_moved_ = moved_;
-        held_rate_ = rate_;
     }
-    /// The outputs of the card were off while it had a rate: the motor did not follow. Returns
-    /// whether the position is lost by that. [realtime] read
+    /// The outputs of the card were off while it may have had a rate: the motor did not follow. Returns
+    /// whether the position, which was valid, is lost by that. [realtime] read
     bool was_off() noexcept {
-        const bool has_moved =
-            is_moving(rate_) || is_moving(held_rate_) || is_moving(stopped_rate_);
-        held_rate_ = 0;
-        if (!has_moved) return false;
-        needs_edge_ = true;
-        return true;
+        return is_moving(possible_rate_) && lose_position();
+    }
+    /// Another master has the card: its rates are unknown. Returns whether the position was valid.
+    /// [realtime] read
+    bool was_taken() noexcept {
+        has_stopped();
+        return lose_position();
     }
     /// Returns true once after the generator has run on while its outputs were off. [realtime] read
     bool take_run_on() noexcept { return std::exchange(has_run_on_, false); }
@@ -132,6 +135,8 @@ public:
     void transmit(Outgoing& out, const Writing& writing) noexcept {
         if (!enable_) {
             needs_edge_ = false;
+        } else if (!needs_edge_) {
+            is_lost_ = false;
         }
         const bool runs = writing.may_move && enable_ && !needs_edge_;
         if (runs) {
@@ -146,6 +151,9 @@ public:
         out.put(hold_, step_time(dirhold_, clock_hz_));
         out.put(mode_, std::min<std::uint32_t>(step_type_, 2));
         out.put(rate_address_, static_cast<std::uint32_t>(rate_));
+        if (std::abs(std::int64_t{rate_}) > std::abs(std::int64_t{possible_rate_})) {
+            possible_rate_ = rate_;
+        }
         dbg_step_rate_ = steps_per_s(rate_, clock_hz_);
     }
     /// [setup]
@@ -155,7 +163,9 @@ public:
         stopped_rate_ = rate_ != 0 ? rate_ : stopped_rate_;
         rate_ = 0;
     }
-    bool is_valid() const noexcept { return !needs_edge_; }
+    bool is_valid() const noexcept { return !is_lost_; }
+    /// Returns whether it follows its enable again after it has lost its position. [realtime] read
+    bool is_released() const noexcept { return !needs_edge_; }
 
 private:
     static constexpr std::uint32_t slowest_ns() { return 163'830; }  // 3FFFh at 100 MHz
@@ -200,7 +210,13 @@ private:
         const double tolerated = 2.0 * accumulator_per_step + 4.0 * std::abs(per_cycle);
         if (std::abs(static_cast<double>(beyond)) <= tolerated) return;
         lost_ -= static_cast<double>(beyond);
-        has_run_on_ = needs_edge_ = true;
+        has_run_on_ = true;
+        lose_position();
+    }
+    /// Returns whether that is new.
+    bool lose_position() noexcept {
+        is_lost_ = true;
+        return !std::exchange(needs_edge_, true);
     }
 
     void command(double period_s) noexcept {
@@ -229,7 +245,7 @@ private:
         counts_ = static_cast<std::int32_t>(static_cast<std::int64_t>(std::floor(steps)));
         position_fb_ = steps / scale();
         velocity_fb_ = steps_per_s(rate_, clock_hz_) / scale();
-        position_valid_ = !needs_edge_;
+        position_valid_ = !is_lost_;
     }
 
     const std::uint32_t clock_hz_;
@@ -242,9 +258,10 @@ private:
     double lost_ = 0.0;  ///< positions before resets of the card
     std::int64_t zero_ = 0;
     std::int32_t rate_ = 0;  ///< in the card
-    std::int32_t held_rate_ = 0;  ///< when the card was lost
+    std::int32_t possible_rate_ = 0;  ///< the greatest one that the card may have
     std::int32_t stopped_rate_ = 0;  ///< when everything was stopped, until an answer confirms it
-    bool needs_edge_ = false;
+    bool needs_edge_ = false;  ///< it stands until its enable is FALSE
+    bool is_lost_ = false;  ///< until it is enabled again behind that
     bool has_run_on_ = false;
 
     hal::In<double> position_cmd_, velocity_cmd_;
@@ -336,6 +353,15 @@ public:
             }
         }
     }
+    /// Another master has the card. Calls `report(unit)` as was_off() does. [realtime]
+    template <class Report>
+    void were_taken(Report&& report) noexcept {
+        for (std::size_t n = 0; n < units_.size(); ++n) {
+            if (units_[n]->was_taken()) {
+                report(n);
+            }
+        }
+    }
     void hold() noexcept {
         for (const auto& unit : units_) {
             unit->hold();
@@ -343,6 +369,9 @@ public:
     }
     bool positions_are_valid() const noexcept {
         return std::ranges::all_of(units_, [](const auto& unit) { return unit->is_valid(); });
+    }
+    bool are_released() const noexcept {
+        return std::ranges::all_of(units_, [](const auto& unit) { return unit->is_released(); });
     }
 
 private:

@@ -24,7 +24,7 @@ TEST(EventTexts, Name_the_card_the_unit_and_the_reaction) {
               "the device 7i76.0.1 does not answer; check its cable and its field power");
     ASSERT_NE(texts.fault({Event::position_lost, 2, 0}), nullptr);
     EXPECT_EQ(texts.fault({Event::position_lost, 2, 0})->text,
-              "stepgen 02 has lost its position: its outputs were off while it made steps; it "
+              "stepgen 02 has lost its position: its motor may not have followed its steps; it "
               "stands until enable was FALSE");
     EXPECT_EQ(texts.fault({Event::online, 0, 0}), nullptr);
 }
