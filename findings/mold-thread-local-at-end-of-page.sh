@@ -3,7 +3,7 @@
 # mold 1.10.1 (Debian 12): a program with a small thread-local variable cannot be started when its code happens to end in the last bytes of a page.
 #
 # mold puts .tbss behind the code, at the begin of the area that is read-only after relocation. When the code ends a few bytes before the end of a page,
-# and what follows is aligned to more than that, the area begins in a page that no segment has. The linker reports nothing; the dynamic loader says "cannot
+# and what follows is aligned to more than that, the area begins in a page that no segment has. The linker reports nothing; the dynamic loader prints "cannot
 # apply additional memory protection after relocation: Cannot allocate memory", with status 127. The script links one program with code of every length
 # modulo a page, in steps of 4 bytes. GNU ld starts all of them, and so does mold with -z separate-code, which gives the code pages of its own.
 # Consequence: a change of a few bytes anywhere makes a program unusable; link with -Wl,-z,separate-code where mold is that old.
