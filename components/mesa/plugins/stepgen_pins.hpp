@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "dpll_pins.hpp"
+#include "hal/limit.hpp"
 #include "mesa/driver/position_counter.hpp"
 #include "mesa/driver/step_control.hpp"
 #include "mesa/hostmot2/formulas.hpp"
@@ -269,7 +270,8 @@ private:
     hal::Out<std::int32_t> counts_;
     hal::Out<double> position_fb_, velocity_fb_;
     hal::Out<bool> position_valid_;
-    hal::Param<double> position_scale_, maxvel_, maxaccel_;
+    hal::Param<double> position_scale_;
+    hal::OptionalLimitParam maxvel_, maxaccel_;
     hal::Param<std::uint32_t> steplen_, stepspace_, dirsetup_, dirhold_, step_type_;
     hal::Out<double> dbg_pos_minus_prev_cmd_, dbg_ff_vel_, dbg_vel_error_, dbg_s_to_match_,
         dbg_err_at_match_, dbg_step_rate_;

@@ -496,6 +496,7 @@ const std::map<std::string, std::string> others{
     {"hm2_eth.*", "another name of mesa"},
     {"kinematics.*", "the deprecated name of arm_kinematics"},
     {"limit_axis.*", "the limits that it gives are held: catalogue_test.cpp"},
+    {"mesa.*", "step generators of a card; LimitPin in the component"},
     {"motion_profile.max-deceleration", "rejected with the others of its set"},
     {"ohmic.thcad-max-volt-freq", "a scale"},
     {"pxmc_axis.max-acceleration", "rejected with the others of its set"},
