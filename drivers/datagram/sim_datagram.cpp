@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "link/bus_key.hpp"
 #include "link/call_order.hpp"
 
 namespace hal::datagram::sim {
@@ -169,10 +170,12 @@ std::shared_ptr<Place> place_named(const std::string& name) {
     static std::mutex mutex;
     static std::map<std::string, std::weak_ptr<Place>> all;
     const std::lock_guard lock(mutex);
-    std::shared_ptr<Place> place = all[name].lock();
+    std::weak_ptr<Place>& known = all[link::bus_key(name)];
+    std::shared_ptr<Place> place = known.lock();
     if (!place) {
         place = std::make_shared<Place>(name);
-        all[name] = place;
+        known = place;
+        std::erase_if(all, [](const auto& entry) { return entry.second.expired(); });
     }
     return place;
 }

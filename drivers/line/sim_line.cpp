@@ -10,6 +10,8 @@
 #include <mutex>
 #include <vector>
 
+#include "link/bus_key.hpp"
+
 namespace hal::line::sim {
 
 namespace {
@@ -102,10 +104,12 @@ std::shared_ptr<Segment> segment_named(const std::string& name) {
     static std::mutex mutex;
     static std::map<std::string, std::weak_ptr<Segment>> all;
     const std::lock_guard lock(mutex);
-    std::shared_ptr<Segment> segment = all[name].lock();
+    std::weak_ptr<Segment>& known = all[link::bus_key(name)];
+    std::shared_ptr<Segment> segment = known.lock();
     if (!segment) {
         segment = std::make_shared<Segment>();
-        all[name] = segment;
+        known = segment;
+        std::erase_if(all, [](const auto& entry) { return entry.second.expired(); });
     }
     return segment;
 }

@@ -5,12 +5,15 @@
 #include <filesystem>
 
 #include "commands/files.hpp"
+#include "link/bus_key.hpp"
 #include "lsp/editor_texts.hpp"
 #include "run/offline.hpp"
 
 namespace hal::tools {
 
 namespace {
+
+std::uint64_t load_number = 0;  // of the newest load
 
 /// Takes no text: the observer has received what was printed.
 class NoOutput final : public Output {
@@ -30,6 +33,7 @@ bool is_file(const std::string& path) {
 CheckedNetlist::CheckedNetlist(NetlistRoot root)
     : root_(std::move(root)), directory_(folder_of(root_.path)) {
     EditorTexts::Recorder recorder;
+    ++load_number;
     load();
     files_ = std::move(recorder.paths);
     files_.insert(root_.path);
@@ -161,3 +165,5 @@ void CheckedNetlist::add(const Diagnostic& diagnostic, const Sources& sources) {
 }
 
 }  // namespace hal::tools
+
+std::uint64_t hal_load_number() { return hal::tools::load_number; }

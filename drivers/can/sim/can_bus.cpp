@@ -6,6 +6,8 @@
 #include <mutex>
 #include <thread>
 
+#include "link/bus_key.hpp"
+
 namespace hal::can::simbus {
 
 namespace {
@@ -43,7 +45,7 @@ std::shared_ptr<Bus> Bus::find(const std::string& name, const Options& options,
                                std::string& problem) {
     Registry& all = registry();
     const std::lock_guard lock(all.mutex);
-    auto& known = all.buses[name];
+    auto& known = all.buses[link::bus_key(name)];
     if (auto bus = known.lock()) {
         const auto wanted = options.bit_rate == unlimited ? 0 : options.bit_rate;
         if (options.bit_rate != 0 && wanted != bus->bit_rate) {

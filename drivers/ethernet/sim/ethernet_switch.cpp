@@ -7,6 +7,8 @@
 #include <mutex>
 #include <thread>
 
+#include "link/bus_key.hpp"
+
 namespace hal::ethernet::simbus {
 
 namespace {
@@ -57,7 +59,7 @@ std::shared_ptr<Switch> Switch::find(const std::string& name, const Options& opt
                                      std::string& problem) {
     Registry& all = registry();
     const std::lock_guard lock(all.mutex);
-    auto& known = all.segments[name];
+    auto& known = all.segments[link::bus_key(name)];
     if (auto segment = known.lock()) {
         if (options.speed != 0 && options.speed != segment->speed) {
             problem = "the segment already runs at " + std::to_string(segment->speed) +

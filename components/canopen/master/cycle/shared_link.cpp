@@ -6,6 +6,8 @@
 #include <mutex>
 #include <thread>
 
+#include "link/bus_key.hpp"
+
 namespace hal::canopen {
 
 class SharedBus {
@@ -70,14 +72,16 @@ std::unique_ptr<SharedLink> SharedLink::open(const std::string& address,
     static std::mutex mutex;
     static std::map<std::string, std::weak_ptr<SharedBus>> all;
     const std::lock_guard lock(mutex);
-    auto bus = all[address].lock();
+    std::weak_ptr<SharedBus>& known = all[link::bus_key(address)];
+    auto bus = known.lock();
     if (!bus) {
         auto opened = can::open(address, options);
         if (!opened) {
             problem = opened.problem;
             return nullptr;
         }
-        all[address] = bus = std::make_shared<SharedBus>(std::move(opened.link));
+        known = bus = std::make_shared<SharedBus>(std::move(opened.link));
+        std::erase_if(all, [](const auto& entry) { return entry.second.expired(); });
     }
     if (bus->count >= SharedBus::max) {
         problem = address + " has " + std::to_string(SharedBus::max) + " masters already";
