@@ -179,6 +179,12 @@ class Live(Case):
         self.assertTrue(answer["applied"], answer)
         self.assertIn("line 4: 'addf --auto servo other' chooses an order", answer["message"])
 
+    def test_a_text_that_does_not_load_is_named(self):
+        """The machine accepts the changed line alone; a start would not."""
+        answer = self.apply(NETLIST.replace("loadrt sum2 names=adder,other\n", "") + "loadrt or2\n")
+        self.assertTrue(answer["applied"], answer)
+        self.assertIn("m.hal has 6 errors and cannot be started again", answer["message"])
+
     def test_the_last_of_two_values_is_applied(self):
         twice = NETLIST + "setp adder.in0 7\n"
         self.assertTrue(self.apply(twice)["applied"])

@@ -350,6 +350,15 @@ const Occurrence* subject_of(const LiveMachine::Fault& fault, const std::vector<
     return nullptr;
 }
 
+/// Returns a line about the errors of a netlist that does not load; empty: it loads.
+std::string load_errors(const CheckedNetlist& netlist) {
+    const auto count =
+        std::ranges::count(netlist.diagnostics(), Severity::error, &FileDiagnostic::severity);
+    if (netlist.good() || count == 0) return "";
+    return fmt::format("{} has {} and cannot be started again as it is\n", netlist.root().path,
+                       count == 1 ? "an error" : fmt::format("{} errors", count));
+}
+
 }  // namespace
 
 void LanguageFeatures::add_faults(const OpenDocument& document, const NetlistIndex& index,
@@ -424,7 +433,7 @@ Json LanguageFeatures::execute_command(const Json& params) {
     const Ini& ini = netlist->sessions().front()->ini;
     const NetlistChanges changes =
         netlist_changes(document->saved.text(), document->text.text(), ini);
-    std::string message;
+    std::string message = load_errors(*netlist);
     for (const std::string& reason : changes.not_sent) {
         message += reason + "\n";
     }
@@ -432,7 +441,8 @@ Json LanguageFeatures::execute_command(const Json& params) {
         for (const std::string& reason : document->not_sent) {
             message += "not sent before: " + reason + "\n";
         }
-        message += message.empty() ? "no line has changed" : "no other line has changed";
+        const bool has_reason = !changes.not_sent.empty() || !document->not_sent.empty();
+        message += has_reason ? "no other line has changed" : "no line has changed";
         return {{"applied", false}, {"message", message}};
     }
     const LiveMachine::Applied applied =
