@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "hal/retained.hpp"
 #include "mesa/driver/edge_velocity.hpp"
 #include "mesa/driver/position_counter.hpp"
 #include "mesa/hostmot2/formulas.hpp"
@@ -68,7 +69,11 @@ public:
                   "TRUE: a level counts after 15 samples; FALSE: after 3", {.initial = true}),
           vel_timeout_(o.component, named(unit, "vel-timeout"),
                        "time without a count until the velocity is 0",
-                       {.initial = 0.5, .unit = "s"}) {}
+                       {.initial = 0.5, .unit = "s"}) {
+        // one at a time: a name lasts until the next one
+        hal::Retained(o.component, {{named(unit, "counter"), counter_}});
+        hal::Retained(o.component, {{named(unit, "zero"), zero_}});
+    }
 
     /// `count`: count and time of its edge; `control`: control and latch. [realtime] read
     void receive(std::uint32_t count, std::uint32_t control, std::uint16_t now_ticks,

@@ -10,6 +10,7 @@
 
 #include "dpll_pins.hpp"
 #include "hal/limit.hpp"
+#include "hal/retained.hpp"
 #include "mesa/driver/position_counter.hpp"
 #include "mesa/driver/step_control.hpp"
 #include "mesa/hostmot2/formulas.hpp"
@@ -79,10 +80,21 @@ public:
           dbg_err_at_match_(o.component, o.write, named(unit, "dbg_err_at_match"),
                             "position error when the velocities match"),
           dbg_step_rate_(o.component, o.write, named(unit, "dbg_step_rate"), "rate",
-                         {.unit = "steps/s"}) {}
+                         {.unit = "steps/s"}) {
+        // one at a time: a name lasts until the next one
+        hal::Retained(o.component, {{named(unit, "counter"), counter_}});
+        hal::Retained(o.component, {{named(unit, "zero"), zero_}});
+        hal::Retained(o.component, {{named(unit, "lost"), lost_}});
+        hal::Retained(o.component, {{named(unit, "has-run"), has_run_}});
+    }
 
     /// [realtime] read
     void receive(std::uint32_t accumulator, const Reading& reading) noexcept {
+        if (!has_begun_ && has_run_) {
+            lose_position();  // a reload: whether the motor stood meanwhile is unknown
+        }
+        has_begun_ = true;
+        has_run_ = true;
         if (reading.writes_arrived) {
             possible_rate_ = rate_;
         }
@@ -264,6 +276,8 @@ private:
     bool needs_edge_ = false;  ///< it stands until its enable is FALSE
     bool is_lost_ = false;  ///< until it is enabled again behind that
     bool has_run_on_ = false;
+    bool has_begun_ = false;
+    bool has_run_ = false;  ///< also in the version before a reload
 
     hal::In<double> position_cmd_, velocity_cmd_;
     hal::In<bool> enable_, control_type_, position_reset_;
