@@ -31,7 +31,7 @@ struct RunOptions : NetlistOptions {
         set.value("-N,--name", name, "NAME",
                   "name of this instance, when several run on one machine (default: default)");
         set.value("--group", group, "GROUP",
-                  "let the members of this group control the instance, too");
+                  "let the members of this group control the instance, and run programs by it, too");
         declare_netlists(set);
         set.value("--watchdog", watchdog, "DEVICE",
                   "write to this device (/dev/watchdog) while every thread makes progress");
