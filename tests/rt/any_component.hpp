@@ -61,11 +61,13 @@ inline std::vector<std::string> all_components() {
     return names;
 }
 
-/// Returns the line that loads a component.
+/// Returns the line that loads a component: ours, also where LinuxCNC's of the same name precedes it.
 inline std::string load(const std::string& name) {
     const auto given = component_arguments.find(name);
     const auto device = component_devices.find(name);
-    return (device == component_devices.end() ? "" : device->second + "\n") + "loadrt " + name +
+    const bool has_precedent = name == "hm2_eth" || name == "hostmot2";
+    return (device == component_devices.end() ? "" : device->second + "\n") + "loadrt " +
+           (has_precedent ? "--native " : "") + name +
            (given == component_arguments.end() ? "" : " " + given->second) + "\n";
 }
 
