@@ -300,7 +300,9 @@ getp follow.position
         self.assertIn("unknown pin or parameter 'gain.0.gain'", self.error(text))
         self.build("hostmot2", source="gain")
         self.assertEqual("2\n", self.good("sim", "--quiet", self.write("m.hal", text)))
-        self.good("sim", "--quiet", self.write("m.hal", "loadrt --native hostmot2\n"))
+        ours = "loadrt --native hostmot2\nreload hostmot2\n"
+        self.good("sim", "--quiet", self.write("m.hal", ours))
+        self.assertIn("unknown pin or parameter 'gain.0.gain'", self.error(ours + "getp gain.0.gain\n"))
 
     def test_linuxcncs_modules_come_first_where_the_environment_says_so(self):
         self.build("sum2", source="gain")

@@ -413,7 +413,9 @@ void edits::reload(Elaboration& on, Args args) {
             "", "unloadrt " + component->name + ", then loadrt again");
         return;
     }
-    auto plugin = on.plugins.open(name.text, name.span, on.diagnostics);
+    // a component of ours is not replaced by a module of its name
+    auto plugin =
+        open_component(on.plugins, name.text, Origin::native, name.span, on.diagnostics);
     if (!plugin) return;
     if (std::string_view(plugin->component->name) != component->name) {
         on.diagnostics.error(
