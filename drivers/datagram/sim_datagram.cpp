@@ -75,7 +75,7 @@ public:
         unused->arrives_ns = at_ns;
         unused->number = ++sent_;
     }
-    /// Copies the datagram that has arrived first. Returns its size; 0: there is none.
+    /// Copies the datagram that has arrived first. Returns its size; 0: none has arrived.
     std::size_t pop(std::span<std::uint8_t> to, std::int64_t now_ns) noexcept {
         Datagram* const datagram = first_due(now_ns);
         if (datagram == nullptr) return 0;

@@ -105,7 +105,7 @@ private:
         sockaddr_in from{};
         std::int64_t at_ns = 0;  ///< CLOCK_REALTIME, when the kernel received it
     };
-    /// Copies the oldest datagram. Returns its size; 0: there is none.
+    /// Copies the oldest datagram. Returns its size; 0: none has arrived.
     std::size_t receive(std::span<std::uint8_t> to, Arrival& arrival) noexcept {
         iovec part{to.data(), to.size()};
         alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(timespec))> control{};

@@ -51,7 +51,7 @@ public:
     /// Sends a datagram of 1..max_size bytes. Returns false when it was not sent. [realtime]
     virtual bool send(std::span<const std::uint8_t> bytes, std::int64_t now_ns) noexcept = 0;
     /// Copies the oldest datagram that has arrived; what does not fit is cut off. Returns its size;
-    /// 0: there is none. [realtime]
+    /// 0: none has arrived. [realtime]
     virtual std::size_t receive(std::span<std::uint8_t> to, std::int64_t now_ns) noexcept = 0;
     /// Waits until a datagram has arrived or for `limit_ns`: spins for Options::spin_ns, then
     /// sleeps. Returns whether one has arrived. Does not wait on a port in memory, where time does

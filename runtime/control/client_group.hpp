@@ -9,7 +9,7 @@
 
 namespace hal {
 
-/// Returns the number of a group of this computer; nothing when there is none. [setup]
+/// Returns the number of a group of this computer; nothing for an unknown name. [setup]
 std::optional<gid_t> group_number(const std::string& name);
 
 /// Returns true when the process at the other end of a connected socket was in the group when it

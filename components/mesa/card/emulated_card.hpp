@@ -29,7 +29,7 @@ public:
 
     /// Lets time pass up to `now_ns`; the first call sets the time. Earlier times are ignored.
     void advance(std::int64_t now_ns) noexcept;
-    /// Executes a request and returns the size of the reply; 0: there is none.
+    /// Executes a request and returns the size of the reply; 0: no reply.
     std::size_t execute(std::span<const std::uint8_t> request,
                         std::span<std::uint8_t> reply) noexcept;
     /// A register of 32 bits.

@@ -28,7 +28,7 @@ public:
     };
 
     /// Parses a string such as "num_encoders=1 num_stepgens=3 sserial_port_0=00xxxxxx". Returns the
-    /// first problem; its text is empty when there is none. [setup]
+    /// first problem; its text is empty without a problem. [setup]
     Problem parse(std::string_view text);
 
     /// Returns how many instances of a module are asked for; `all`: as many as there are. [setup]

@@ -109,7 +109,7 @@ public:
 
     std::span<const std::uint8_t> bytes() const noexcept { return {bytes_.data(), size_}; }
     std::size_t size() const noexcept { return size_; }
-    /// Length of the reply; 0: there is none.
+    /// Length of the reply; 0: no reply.
     std::size_t reply_size() const noexcept { return reply_size_; }
     bool empty() const noexcept { return size_ == 0; }
     void clear() noexcept {

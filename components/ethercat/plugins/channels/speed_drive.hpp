@@ -160,8 +160,15 @@ private:
         torque_magnitude_ = std::fabs(torque_);
     }
     std::uint8_t control() const noexcept {
-        const unsigned word = (enable_ ? 1U : 0U) | (reset_ ? 2U : 0U) | (fast_ramp_ ? 4U : 0U) |
-                              (brake_ ? 0x40U : 0U) | (toggle_ ? 0U : 0x80U);
+        unsigned word = 0;
+        const auto set = [&word](bool value, unsigned bit) {
+            word |= value ? bit : 0U;
+        };
+        set(enable_, 0x01);
+        set(reset_, 0x02);
+        set(fast_ramp_, 0x04);
+        set(brake_, 0x40);
+        set(!toggle_, 0x80);
         return static_cast<std::uint8_t>(word);
     }
 
