@@ -299,7 +299,7 @@ class ExactReplay(Case):
         text = self.replay("--edit", "setp pid.x.Pgain 9", *at)
         self.assertRegex(
             text,
-            r"\nedited after cycle \d+ of 'fast' at 0\.3\d+ s\n"
+            r"\nedited after cycle \d+ of '\w+' at 0\.3\d+ s\n"
             r"first value that differs: 'effort' \('pid\.x' of pid, function "
             r"'pid\.x\.do-pid-calcs'\) in cycle \d+ of thread 'servo': \S+ instead of \S+, and "
             r"\d+ further values of the same cycle\n"

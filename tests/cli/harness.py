@@ -115,6 +115,17 @@ def free_port(kind=socket.SOCK_DGRAM):
         return probe.getsockname()[1]
 
 
+def suspend(process):
+    """Stops all threads of a process (SIGSTOP), and waits until none of them runs."""
+
+    def state(task):
+        return (task / "stat").read_text().rpartition(")")[2].split()[0]
+
+    os.kill(process, signal.SIGSTOP)
+    tasks = Path(f"/proc/{process}/task")
+    wait_until(lambda: all(state(task) == "T" for task in tasks.iterdir()), "the stop")
+
+
 def wait_until(predicate, what):
     """Asks again and again until `predicate` answers something true, which is returned."""
     deadline = time.monotonic() + TIMEOUT

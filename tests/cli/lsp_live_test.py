@@ -6,7 +6,7 @@ import signal
 import time
 import unittest
 
-from harness import Case, wait_until
+from harness import Case, suspend, wait_until
 from lsp_client import Client
 
 NETLIST = """loadrt threads name1=servo period1=1000000
@@ -90,7 +90,7 @@ class Live(Case):
 
     def test_a_machine_that_does_not_answer_does_not_stop_the_editor(self):
         self.hints()
-        os.kill(self.machine.pid, signal.SIGSTOP)
+        suspend(self.machine.pid)
         try:
             begun = time.monotonic()
             self.assertEqual(set(), self.hints())
