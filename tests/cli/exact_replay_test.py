@@ -4,6 +4,7 @@
 import contextlib
 import json
 import os
+import pathlib
 import random
 import re
 import shutil
@@ -245,6 +246,26 @@ class ExactReplay(Case):
         begin, _ = self.shell_in_the_past(["step back 99999", "step 3", "goto 0s", "step back 9"])
         self.assertEqual("before the first cycle", begin[0])
         self.assertEqual("before the first cycle", begin[3])
+
+    def test_a_process_that_is_copied_has_one_thread(self):
+        # a copy has the locks of the other threads, and nobody releases them
+        machine = self.run_journaled(MACHINE)
+        self.wait_for_cycles(200)
+        self.finish(machine)
+        shell = self.start(
+            "replay", "--exact", "run.mcap", "--shell", loaded=False, stdin=subprocess.PIPE
+        )
+
+        def descendants(process):
+            listed = pathlib.Path(f"/proc/{process}/task").glob("*/children")
+            children = [int(child) for one in listed for child in one.read_text().split()]
+            return children + [below for child in children for below in descendants(child)]
+
+        wait_until(lambda: len(descendants(shell.pid)) == 2, "the re-execution and its first copy")
+        for process in descendants(shell.pid):
+            self.assertEqual(1, len(os.listdir(f"/proc/{process}/task")))
+        shell.communicate("quit\n", timeout=TIMEOUT)
+        self.assertEqual(0, shell.returncode)
 
     def test_reverse_finds_where_a_condition_began(self):
         machine = self.run_journaled(MACHINE)

@@ -58,18 +58,27 @@ std::string end_description(int status) {
                 : fmt::format("was terminated by signal {}", status - 128);
 }
 
-StopRequest::StopRequest() {
+StopRequest::StopRequest(Handles what) {
+    event_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    if (event_ < 0) {
+        throw std::system_error(errno, std::generic_category(), "cannot wait for a request");
+    }
+    list_descriptor(event_, "the request to stop");
+    if (what == Handles::signals) {
+        begin();
+    }
+}
+
+void StopRequest::begin() {
     ignore_unexpected();
     const sigset_t set = ending_signals();
     ::pthread_sigmask(SIG_BLOCK, &set, nullptr);
-    event_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     done_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     caught_ = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     signals_ = ::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
-    if (event_ < 0 || done_ < 0 || signals_ < 0 || caught_ < 0) {
+    if (done_ < 0 || signals_ < 0 || caught_ < 0) {
         throw std::system_error(errno, std::generic_category(), "cannot wait for signals");
     }
-    list_descriptor(event_, "the request to stop");
     list_descriptor(done_, "the end of the signal thread");
     list_descriptor(signals_, "the signals");
     list_descriptor(caught_, "the signals of unblocked threads");

@@ -21,7 +21,10 @@ std::string end_description(int status);
 /// thread: then a handler requests the end.
 class StopRequest {
 public:
-    StopRequest();
+    /// nothing: only request() ends the run, and no thread is started
+    enum class Handles { signals, nothing };
+
+    explicit StopRequest(Handles what = Handles::signals);
     ~StopRequest();
     StopRequest(const StopRequest&) = delete;
 
@@ -46,6 +49,7 @@ public:
     void release();
 
 private:
+    void begin();
     void serve();
     void receive_signals();
     void receive_signal(int number);

@@ -121,12 +121,10 @@ std::string own_name(const NetlistOptions& options) {
 HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& name,
                              bool virtual_clock, Execution execution)
     : observer_(start_observer(name, virtual_clock)),
+      stop(execution.is_copied ? StopRequest::Handles::nothing : StopRequest::Handles::signals),
       session(session_options(options, name, virtual_clock, observer_.get(), execution)),
       shell(session, shell_options(options)),
-      options_(options),
-      descriptor_watch_([this] { halt_ticket_ = session.threads().halt(); }, [this] {
-          return session.threads().halted(halt_ticket_) != ThreadControl::Halt::pending;
-      }) {
+      options_(options) {
     export_variables(options, name);
     // a machine that is stopped from the terminal would leave its outputs as they are
     if (!virtual_clock) {
@@ -137,8 +135,18 @@ HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& n
     shell.run_scripts_with([this](const std::string& path,
                                   const std::vector<std::string>& arguments, Pass pass,
                                   Output&) { return run_script(path, arguments, pass); });
+    if (!execution.is_copied) {
+        begin_watching(virtual_clock);
+    }
+}
+
+void HostedMachine::begin_watching(bool virtual_clock) {
+    setup_guard_.emplace();
+    descriptor_watch_.emplace([this] { halt_ticket_ = session.threads().halt(); }, [this] {
+        return session.threads().halted(halt_ticket_) != ThreadControl::Halt::pending;
+    });
     if (virtual_clock) {
-        cycle_guard_.begin(options.cycle_limit_ns);
+        cycle_guard_.begin(options_.cycle_limit_ns);
     }
     stop.when_signalled([this, virtual_clock] {
         shell.cancel();
@@ -147,7 +155,7 @@ HostedMachine::HostedMachine(const NetlistOptions& options, const std::string& n
         }
         if (!stop.requested()) return;
         end_now();
-        setup_guard_.end_soon();
+        setup_guard_->end_soon();
     });
 }
 

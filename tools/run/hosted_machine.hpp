@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,10 @@ namespace hal::tools {
 struct Execution {
     ExecutionSink* sink = nullptr;  ///< gets the journal
     CycleSchedule* schedule = nullptr;  ///< has the cycles to be executed again
+    /// The process is copied by fork(), which copies the calling thread and locks that others hold:
+    /// the machine starts no thread. It handles no signal, and nobody watches its calls, cycles and
+    /// descriptors.
+    bool is_copied = false;
 };
 
 class HostedMachine {
@@ -72,6 +77,7 @@ public:
     std::string ini_path;  ///< absolute: $EMC_INIFILE of scripts; set by load() and `hal linuxcnc`
 
 private:
+    void begin_watching(bool virtual_clock);
     void end_now();
 
     const NetlistOptions& options_;
@@ -79,9 +85,9 @@ private:
     ProcessOutput output_;
     std::unique_ptr<Server> server_;
     CycleGuard cycle_guard_;
-    SetupGuard setup_guard_;
+    std::optional<SetupGuard> setup_guard_;
     std::uint64_t halt_ticket_ = 0;  // of descriptor_watch_
-    DescriptorWatch descriptor_watch_;
+    std::optional<DescriptorWatch> descriptor_watch_;
 };
 
 /// For netlists and the programs they start: $1 $2 … and NAME=VALUE from behind `--`,

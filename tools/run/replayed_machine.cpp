@@ -34,14 +34,14 @@ const ReplayOptions& without_netlists(const ReplayOptions& options, ReplayOption
 }  // namespace
 
 ReplayedMachine::ReplayedMachine(const ReplayOptions& options, JournalFile& file, Compare compare,
-                                 WhatIf change)
+                                 WhatIf change, bool is_copied)
     : options_(options),
       file_(file),
       with_values_(compare == Compare::values),
       fastest_(fastest_thread(file)),
       execution_(file),
       machine_(without_netlists(options, machine_options_), fmt::format("replay-{}", ::getpid()),
-               true, {.schedule = &execution_}),
+               true, {.schedule = &execution_, .is_copied = is_copied}),
       change_(std::move(change)) {
     execution_.attach(
         machine_.session,

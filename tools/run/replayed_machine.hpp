@@ -23,9 +23,9 @@ public:
     enum class Compare : std::uint8_t { values, checksums };
 
     /// Both outlive it. With Compare::values, the values that were recorded with the journal are
-    /// compared, too.
+    /// compared, too. `is_copied`: see Execution.
     ReplayedMachine(const ReplayOptions& options, JournalFile& file, Compare compare,
-                    WhatIf change = {});
+                    WhatIf change = {}, bool is_copied = false);
 
     Session& session() { return machine_.session; }
     HostedMachine& host() { return machine_; }

@@ -29,7 +29,7 @@ ReplayedMoment::ReplayedMoment(const ReplayOptions& options, JournalFile& file, 
     : options_(options),
       frames_(frames),
       socket_(socket),
-      machine_(options, file, ReplayedMachine::Compare::values, change),
+      machine_(options, file, ReplayedMachine::Compare::values, change, true),
       spacing_(min_spacing) {}
 
 void ReplayedMoment::serve() {
