@@ -7,7 +7,7 @@ The two wheels are `track` apart. Joints are the measured wheel speeds, left the
 the turning speed, and the commands are the wheel speeds for them. `diff_drive` does the same from wheel angles, with a named pin
 for each value and with limits of speed and acceleration.
 
-If an input is NaN or infinite, all outputs keep their values and `solved` becomes FALSE.
+If an input or `track` is NaN, infinite or above 1e9, all outputs keep their values and `solved` becomes FALSE.
 
     loadrt drive_kinematics names=base
     addf base.update servo

@@ -21,7 +21,7 @@ public:
                       "while TRUE, the odometry is reset to 0", 0.0}) {}
 
     void update(Cycle cycle) noexcept {
-        if (!read_inputs()) return;
+        if (!read_inputs({track})) return;
         const double dt = cycle.seconds(), width = track > 0.0 ? track.get() : 1.0,
                      v = 0.5 * (measured_(0) + measured_(1)),
                      w = (measured_(1) - measured_(0)) / width;

@@ -3,8 +3,10 @@
 // their inputs.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <initializer_list>
 #include <numbers>
 #include <optional>
 
@@ -35,17 +37,13 @@ protected:
         measured_ = Vector::Zero(static_cast<Eigen::Index>(joints));
     }
 
-    /// Copies the joints to `measured_`. False, with `solved` FALSE, when an input is not finite or
-    /// exceeds 1e9. [realtime]
-    bool read_inputs() noexcept {
-        bool valid = true;
-        // false for NaN, too
-        for (const auto& pin : joint) {
-            valid = valid && std::fabs(pin.get()) < 1e9;
-        }
-        for (const auto& pin : target) {
-            valid = valid && std::fabs(pin.get()) < 1e9;
-        }
+    /// Copies the joints to `measured_`. False, with `solved` FALSE, when an input or one of the
+    /// machine's `dimensions` is not finite or exceeds 1e9. [realtime]
+    bool read_inputs(std::initializer_list<double> dimensions = {}) noexcept {
+        const auto is_valid = [](double value) { return std::fabs(value) < 1e9; };  // not for NaN
+        const bool valid = std::ranges::all_of(joint, is_valid) &&
+                           std::ranges::all_of(target, is_valid) &&
+                           std::ranges::all_of(dimensions, is_valid);
         if (!valid) {
             bad_inputs = bad_inputs + 1;
             solved = false;
@@ -66,7 +64,8 @@ public:
     Out<bool> solved{*this, "solved", "TRUE while the commands reach the target"};
     Out<std::uint32_t> bad_inputs{
         *this, "bad-inputs",
-        "cycles with an input that is NaN, infinite or above 1e9; the outputs keep their values"};
+        "cycles with an input or a dimension that is NaN, infinite or above 1e9; the outputs keep "
+        "their values"};
 };
 
 }  // namespace hal::estimation

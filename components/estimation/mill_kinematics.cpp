@@ -10,7 +10,7 @@ the last C is chosen, and C takes the shorter way round. With the tool upright C
 Near the upright C has to turn far for a small change of the direction. A and C move at most with `max-speed`: meanwhile the tool lags behind the direction, `solved` is
 FALSE, and X Y Z keep the tip at its place on the workpiece.
 
-If an input is NaN or infinite, all outputs keep their values and `solved` becomes FALSE.
+If an input, the tool length or the pivot is NaN, infinite or above 1e9, all outputs keep their values and `solved` becomes FALSE.
 
     loadrt mill_kinematics names=mill
     addf mill.update servo

@@ -26,7 +26,7 @@ public:
 
     /// A and C move at most with max-speed; X Y Z keep the tip where it belongs meanwhile.
     void update(Cycle cycle) noexcept {
-        if (!read_inputs()) return;
+        if (!read_inputs({pivot_x, pivot_y, pivot_z, tool_length})) return;
         if (!has_run_) {
             solved_ = measured_;
             has_run_ = true;
@@ -76,10 +76,7 @@ public:
             solved_(r) = at;
         }
         manipulability = direction ? side / size : 0.0;
-        solved = direction && reached && finite(solved_);
-        if (!finite(solved_)) {
-            solved_ = measured_;
-        }
+        solved = direction && reached;
         for (std::size_t n = 0; n < 5; ++n) {
             command[n] = solved_(static_cast<Eigen::Index>(n));
         }
