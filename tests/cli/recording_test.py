@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Recordings of values: hal record FILE NAMES, hal sim --record, hal plot, hal replay, and the flight recorder."""
+
 import collections
 import csv
 import os
@@ -226,6 +227,39 @@ setp io.fault-emcy-storm 1
         (self.folder / "later.csv").write_text("".join([rows[0], *rows[25:]]))
         out = self.good("replay", "later.csv", "control.hal")
         self.assertNotIn("no row at the same time", out)
+
+    def test_a_replay_of_two_threads_of_equal_period_is_equal(self):
+        threads = "newthread one 1000000\nnewthread two 1000000\n"
+        plant = (
+            "loadrt integ names=early,late\nnet command early.in late.in\nnet first early.out\n"
+            "net second late.out\naddf early one\naddf late two\n"
+        )
+        source = (
+            "loadrt siggen names=target\nnet command target.sine\naddf target.update two\n"
+            "net other target.cosine\n"
+        )
+        self.write("whole.hal", threads + source + plant)
+        self.write("plant.hal", threads + plant)
+        for ending in "csv", "mcap":
+            # the thread of `command` computes a value of the netlist, or the other thread does
+            for values in "command,first,second", "command,first":
+                run = f"run.{ending}"
+                self.good(
+                    "sim", "whole.hal", "-q", "--for", "1s", "--record", run, "--values", values
+                )
+                out = self.good("replay", run, "plant.hal", "--tolerance", "1e-9")
+                self.assertIn("first   equal" if "second" in values else "first  equal", out)
+        self.good(
+            "sim", "whole.hal", "-q", "--for", "1s", "--record", "run.csv", "--values", "command"
+        )
+        guess = self.run_program("replay", "run.csv", "plant.hal")
+        self.assertIn(
+            "the recording does not name the thread of 'command', and several have the period of "
+            "its rows; it is played in 'one'. To choose another thread, type: --thread NAME",
+            guess.stderr,
+        )
+        chosen = self.run_program("replay", "run.csv", "plant.hal", "--thread", "two")
+        self.assertEqual(chosen.stderr, "")
 
     def test_what_is_missing_of_a_recording_is_reported(self):
         threads = "loadrt threads name1=servo period1=1000000\n"

@@ -347,27 +347,94 @@ private:
         return text;
     }
 
-    /// The thread that recorded a table: the one that an .mcap names, or the only one with the
-    /// period of the rows; otherwise the fastest one. A value must be played in its thread: others
-    /// get it as late as they did in the machine.
-    const Thread& thread_of(const Model& model, const mcap::Table& table) const {
-        if (!options_.thread.empty()) return *model.find_thread(options_.thread);
+    /// Returns the thread that an .mcap names; nullptr: the file does not name one, or the netlist
+    /// does not have it.
+    const Thread* named_thread(const Model& model, const mcap::Table& table) const {
+        if (!options_.thread.empty()) return model.find_thread(options_.thread);
         const std::string topic = table.topic.starts_with("/hal/") ? table.topic.substr(5) : "";
-        const Thread* const named = model.find_thread(table.thread.empty() ? topic : table.thread);
-        if (named) return *named;
-        const std::int64_t period_ns = median_period_ns(table);
-        const auto same = [period_ns](const auto& thread) {
-            return thread->options.period_ns == period_ns;
-        };
-        const auto found = std::ranges::find_if(model.threads, same);
-        const bool one = std::ranges::count_if(model.threads, same) == 1;
-        return one ? **found : *model.threads.front();
+        return model.find_thread(table.thread.empty() ? topic : table.thread);
     }
+
+    /// Returns the thread in which the netlist computes a value of the table; nullptr for none.
+    const Thread* computing_thread(const Model& model, const mcap::Table& table) const {
+        for (const mcap::Column& column : table.columns) {
+            const Pin* const pin = model.find_pin(column.name);
+            const Signal* const signal = pin ? pin->signal : model.find_signal(column.name);
+            const Pin* const source = signal ? signal->writer : pin;
+            if (!source || (source->dir != HAL_DIR_OUT)) continue;
+            if (const Thread* const thread = hal::thread_of(*source)) return thread;
+        }
+        return nullptr;
+    }
+
+    static std::vector<const Thread*> threads_of_period(const Model& model,
+                                                        std::int64_t period_ns) {
+        std::vector<const Thread*> found;
+        for (const auto& thread : model.threads) {
+            if (thread->options.period_ns == period_ns) {
+                found.push_back(thread.get());
+            }
+        }
+        return found;
+    }
+
+    /// Assigns each table the thread that recorded it, because others get a value as late as they
+    /// did in the machine. A .csv names no thread: it is the one with the period of the rows; of
+    /// several, the one that computes a value of the table, or that is left for it.
+    void assign_threads(const Model& model) {
+        std::vector<const mcap::Table*> open;
+        for (const mcap::Table& table : recording_.tables) {
+            const Thread* thread = named_thread(model, table);
+            const auto same = threads_of_period(model, median_period_ns(table));
+            if (!thread && same.size() == 1) {
+                thread = same.front();
+            }
+            if (!thread) {
+                const Thread* const computing = computing_thread(model, table);
+                const bool is_one =
+                    same.empty() || std::ranges::find(same, computing) != same.end();
+                thread = is_one ? computing : nullptr;
+            }
+            if (thread) {
+                threads_[&table] = thread;
+            } else {
+                open.push_back(&table);
+            }
+        }
+        for (const mcap::Table* const table : open) {
+            threads_[table] = &remaining_thread(model, *table);
+        }
+    }
+
+    /// Returns the thread of the table's period that recorded no other table; reports when it is a
+    /// guess. Without a thread of the period, the fastest one.
+    const Thread& remaining_thread(const Model& model, const mcap::Table& table) const {
+        auto same = threads_of_period(model, median_period_ns(table));
+        if (same.empty()) return *model.threads.front();
+        const Thread* const first = same.front();
+        std::erase_if(same, [this](const Thread* thread) {
+            return std::ranges::any_of(threads_,
+                                       [&](const auto& one) { return one.second == thread; });
+        });
+        if (same.size() == 1) return *same.front();
+        const Thread& chosen = same.empty() ? *first : *same.front();
+        write_all(
+            STDERR_FILENO,
+            fmt::format("{}: the recording does not name the thread of '{}', and several have "
+                        "the period of its rows; it is played in '{}'. To choose another "
+                        "thread, type: --thread NAME; an .mcap names it\n",
+                        options_.program, table.columns.front().name, chosen.name));
+        return chosen;
+    }
+
+    /// Returns the thread that recorded a table.
+    const Thread& thread_of(const mcap::Table& table) const { return *threads_.at(&table); }
 
     /// Assigns a player to each thread that recorded something.
     void assign_players(const Model& model) {
+        assign_threads(model);
         for (const mcap::Table& table : recording_.tables) {
-            const Thread& thread = thread_of(model, table);
+            const Thread& thread = thread_of(table);
             const std::string name =
                 players_.empty() ? player : fmt::format("{}-{}", player, thread.name);
             players_.try_emplace(thread.name, Player{name, thread.options.period_ns, &table});
@@ -404,8 +471,8 @@ private:
         const Signal* const signal = pin ? pin->signal : model.find_signal(column.name);
         // times are never the same
         if ((!pin && !signal) || (pin && (pin->of_thread || pin->function))) return;
-        const std::string source = fmt::format(
-            "{}.{}", players_.at(thread_of(model, table).name).name, playback_pin(column.name));
+        const std::string source = fmt::format("{}.{}", players_.at(thread_of(table).name).name,
+                                               playback_pin(column.name));
         const bool parameter = pin && pin->dir == HAL_DIR_PARAM;
         if (signal && !signal->writer && signal->ios == 0) {
             if (driven_.insert(signal->name).second) {
@@ -476,6 +543,7 @@ private:
     std::set<std::string> driven_, seen_;
     std::vector<Compared> compared_;
     ProbeLayout layout_;
+    std::map<const mcap::Table*, const Thread*> threads_;  // that recorded the tables
     std::map<std::string, Player> players_;  // by the name of their thread
     std::int64_t origin_ns_ = 0;  // of the machine's clock, at the first row
     std::int64_t replayed_ns_ = 0;
