@@ -166,7 +166,7 @@ void Core::cycle(std::int64_t grid_ns, std::int64_t due_ns, std::int64_t woke_ns
         limiter_.flush(measure_ ? woke_ns : due_ns,
                        [this](const FaultEvent& e) noexcept { faults_.push(e); });
         output();
-        if (probes_) {
+        if (probes_ && (ran || !rows_end_.load(std::memory_order_relaxed))) {
             sample_probes();
         }
         if (inputs_) {

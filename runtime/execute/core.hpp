@@ -139,6 +139,8 @@ public:
     bool withdraw(plan::ProbeSet* probes) {
         return probe_inbox_.compare_exchange_strong(probes, nullptr, std::memory_order_acq_rel);
     }
+    /// From now on a cycle in which no function runs gives no row: the machine ends. [any]
+    void end_rows() noexcept { rows_end_.store(true, std::memory_order_relaxed); }
     std::uint64_t probes_taken() const { return probes_taken_.load(std::memory_order_acquire); }
     /// Queues a batch of writes, all of which take effect in the same cycle. Returns false and
     /// queues none if the queue is full.
@@ -280,6 +282,7 @@ private:
     // written by the session, emptied by the thread
     std::atomic<plan::ProbeSet*> probe_inbox_{nullptr};
     std::atomic<std::uint64_t> probes_taken_{0};  // written by the thread
+    std::atomic<bool> rows_end_{false};  // written by who ends the machine
     // written by the session, emptied by the thread
     std::atomic<Observation*> observation_{nullptr};
     // set by the thread and the supervisor, cleared by the session

@@ -40,7 +40,15 @@ Runner& Executor::runner(const Core& core) const {
     std::abort();
 }
 
+void Executor::end_rows() {
+    const std::scoped_lock own(runners_mutex_);
+    for (const auto& runner : runners_) {
+        runner->core.end_rows();
+    }
+}
+
 std::uint64_t Executor::halt() {
+    end_rows();
     stop();
     const std::scoped_lock own(runners_mutex_);
     const std::uint64_t ticket = ++halt_tickets_;

@@ -52,8 +52,10 @@ public:
     void start() { running_.store(true, std::memory_order_release); }
     void stop() { running_.store(false, std::memory_order_release); }
     bool running() const { return running_.load(std::memory_order_acquire); }
-    /// Does the same as stop(), from any thread, and wakes slow threads. Returns a ticket for
-    /// halted(). [any]
+    /// Ends the rows of probes: cycles without functions give none, because the machine ends. [any]
+    void end_rows();
+    /// Does the same as end_rows() and stop(), from any thread, and wakes slow threads. Returns a
+    /// ticket for halted(). [any]
     std::uint64_t halt();
     enum class Halt { pending, done, hung };
     /// Returns whether the outputs of all threads have had their safe values since halt() returned

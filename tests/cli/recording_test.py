@@ -11,7 +11,7 @@ import signal
 import subprocess
 import unittest
 
-from harness import HAL, SERVO, Case, needs_package, wait_until
+from harness import HAL, SERVO, TIMEOUT, Case, needs_package, wait_until
 
 NETLIST = """loadrt threads name1=servo period1=1000000
 loadrt siggen names=wave
@@ -544,6 +544,17 @@ class Live(Case):
         """What the recording's events are, by the picture: titles of its marks."""
         self.good("plot", name, "sine")
         return (self.folder / name.replace(".mcap", ".svg")).read_bytes()
+
+    def test_a_machine_that_ends_repeats_no_row(self):
+        process = self.recorder("run.csv", "wave.sawtooth", "servo.missed")
+        recorded = self.folder / "run.csv"
+        wait_until(lambda: recorded.exists() and recorded.stat().st_size > 0, "rows are written")
+        self.end(self.machine, signal.SIGINT)
+        process.communicate(timeout=TIMEOUT)
+        with open(self.folder / "run.csv", newline="") as file:
+            values = [row[1] for row in list(csv.reader(file))[1:]]
+        repeated = [after for before, after in zip(values, values[1:]) if before == after]
+        self.assertEqual(repeated, [], "each cycle that ran computes another value")
 
     def test_every_nth_cycle_and_rotation(self):
         out = self.good(

@@ -176,6 +176,7 @@ void RunningModel::shut_down() {
     s.life = SessionState::Life::shut;
     s.transaction.abandon();
     if (s.options.check_only) return destroy_instances(s.model);
+    s.executor->end_rows();  // the cycles that follow compute nothing
     threads_.stop();
     // a function that hangs may still use its instance: leave everything as it is, and a watchdog
     // to its time-out
