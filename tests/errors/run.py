@@ -71,7 +71,7 @@ def check(hal, test, known):
         return ["no diagnostic code has this name; see: hal explain"]
     command = ["hal", "check", f"{test}.hal"]
     if (HERE / f"{test}.cmd").exists():
-        command = shlex.split((HERE / f"{test}.cmd").read_text())
+        command = shlex.split((HERE / f"{test}.cmd").read_text(), comments=True)
     if (HERE / f"{test}.sh").exists():
         command = ["sh", "-eu", f"{test}.sh"]
     got, status = run(hal, command)
