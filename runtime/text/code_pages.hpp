@@ -587,8 +587,9 @@ inline constexpr CodePage code_pages[] = {
     {"scocan-slots",
      "The SCoCAN table cannot work: a slot is too short for its frame, is used twice in the same "
      "cycle, an identifier has two senders, there is no "
-     "SYNC node, or the guard time is shorter than the clocks require. The message contains the "
-     "calculation, the help line the remedy.\n\n"
+     "SYNC node, or the guard time is shorter than the clocks require. `hal scocan plan` also "
+     "reports a message that can miss its deadline. The message contains the calculation, the help "
+     "line the remedy.\n\n"
      "`hal scocan plan FILE` shows a valid table as a timeline."},
     {"scocan-value",
      "A value of a SCoCAN table is invalid: a time, a number, a name, an identifier. The help line "

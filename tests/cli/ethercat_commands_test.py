@@ -89,10 +89,8 @@ class Slaves(Ethercat):
             "[bus]\n[slave 0 x]\nvendor = 1\noutputs = none\ninputs = none\naoe 2001 port = 05\naoe 2001 = x\n"
         )
         said = self.bad("ethercat", "check", "aoe.ethercat")
-        self.assertIn(
-            "aoe.ethercat:6:1: error: invalid aoe '2001 port'; write aoe 8000:1 1001 = 01 00\n",
-            said,
-        )
+        self.assertIn("aoe.ethercat:6:1: error: invalid aoe '2001 port' [ethercat-value]\n", said)
+        self.assertIn("= help: write aoe 8000:1 1001 = 01 00\n", said)
         self.assertIn("aoe.ethercat:7:", said)
         (self.folder / "ethercat-conf.xml").write_text('<masters><master idx="0"/></masters>')
         (self.folder / "no-link.hal").write_text("loadrt lcec\n")

@@ -83,8 +83,8 @@ std::string pins_json(const config::Bus& bus) {
         text += fmt::format(
             R"({}{{"name":{},"type":"{}","direction":"{}","owner":{},"index":{},"sub":{}}})",
             text.empty() ? "" : ",", json_string(slave + "." + entry.pin_name()),
-            config::pin_type(entry), output && !entry.copied ? "in" : "out", json_string(slave), entry.index,
-            entry.sub);
+            config::pin_type(entry), output && !entry.copied ? "in" : "out", json_string(slave),
+            entry.index, entry.sub);
     });
     return text;
 }
@@ -98,16 +98,9 @@ bool read_bus_file(const Options& options, const std::string& path, config::Read
         return false;
     }
     reading = config::read(text, path);
-    if (const std::string messages = config::to_string(reading, path); !messages.empty()) {
-        write_all(2, messages.back() == '\n' ? messages : messages + "\n");
-    }
-    for (const config::Message& m : reading.messages) {
-        if (m.severity == Severity::warning) {
-            write_all(2, fmt::format("{}:{}:{}: warning: {}{}{}\n", path, m.at.line, m.at.column,
-                                     m.sentence, m.help.empty() ? "" : "; ", m.help));
-        }
-    }
-    return reading.good();
+    return print_findings(path, text, reading.messages, [](const config::Message& m) {
+        return Code::named(config::code_of(m.topic)).value_or(Code("ethercat-line"));
+    });
 }
 
 int run_ethercat_pdos(const EthercatOptions& options) {

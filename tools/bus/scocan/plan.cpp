@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <fmt/core.h>
 #include <optional>
-#include <unistd.h>
 #include <utility>
 
 #include "bus/scocan/plan_picture.hpp"
@@ -279,14 +278,14 @@ int run_scocan_plan(const ScocanPlanOptions& options) {
         return 1;
     }
     if (p.fits) return 0;
-    std::string late;
+    std::vector<Report> late;
     for (const Latency& l : p.latencies) {
         if (l.in_time) continue;
         const auto [why, help] = reason(t, l);
-        late += fmt::format("{}:{}: {}{}\n  = help: {}\n", file, t.messages[l.message].at.line,
-                            arithmetic(t, l), why, help);
+        late.push_back({Severity::error, Topic::slots, t.messages[l.message].at,
+                        "late message " + arithmetic(t, l) + why, help});
     }
-    write_all(STDERR_FILENO, late);
+    print_findings(file, text, late, code);
     return 1;
 }
 

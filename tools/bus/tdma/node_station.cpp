@@ -11,6 +11,7 @@
 #include <fmt/core.h>
 #include <thread>
 
+#include "bus/timeline/plan_output.hpp"
 #include "link/system.hpp"
 
 namespace hal::tools {
@@ -72,7 +73,12 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link,
         return fmt::format("cannot read '{}': {}", options.tdma, text);
     }
     const auto reading = by_rtcfg ? tdma::config::Reading{} : tdma::config::read(text);
-    if (!reading.good()) return tdma::config::to_string(reading, options.tdma);
+    const auto code = [](const tdma::config::Message& m) {
+        return Code::named(tdma::config::code_of(m.topic)).value_or(Code("tdma-line"));
+    };
+    if (!print_findings(options.tdma, text, reading.messages, code)) {
+        return fmt::format("invalid schedule '{}'; see the errors above", options.tdma);
+    }
 
     ethernet::Options how;
     how.types = {tdma::Station::types.begin(), tdma::Station::types.end()};

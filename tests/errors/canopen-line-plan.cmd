@@ -1,0 +1,2 @@
+# packages: canopen
+hal canopen plan canopen-line.canopen

@@ -1,0 +1,2 @@
+# packages: canopen
+hal canopen check canopen-value.canopen

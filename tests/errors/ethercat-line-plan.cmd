@@ -1,0 +1,2 @@
+# packages: ethercat
+hal ethercat plan ethercat-line.ethercat

@@ -1,0 +1,2 @@
+# packages: ethercat
+hal ethercat check ethercat-value.ethercat

@@ -1,0 +1,2 @@
+# packages: modbus
+hal modbus check modbus-value.modbus

@@ -1,0 +1,2 @@
+# packages: scocan
+hal scocan plan scocan-slots-deadline.scocan

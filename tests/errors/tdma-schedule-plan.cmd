@@ -1,0 +1,2 @@
+# packages: tdma
+hal tdma plan tdma-schedule.tdma
