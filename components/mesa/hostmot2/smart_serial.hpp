@@ -19,10 +19,16 @@ inline constexpr unsigned max_channels = 8;
 
 /// Values of the command register, which reads as 0 when the command is done.
 namespace port {
-inline constexpr std::uint32_t reset = 0x4000, clear = 0x0001, read_local = 0x2000,
-                               write_local = 0xa000, stop_all = 0x0800, start = 0x0900,
-                               start_setup = 0x0f00, do_it = 0x1000, ignored = 0x80000000;
-}
+inline constexpr std::uint32_t reset = 0x4000;
+inline constexpr std::uint32_t clear = 0x0001;
+inline constexpr std::uint32_t read_local = 0x2000;
+inline constexpr std::uint32_t write_local = 0xa000;
+inline constexpr std::uint32_t stop_all = 0x0800;
+inline constexpr std::uint32_t start = 0x0900;
+inline constexpr std::uint32_t start_setup = 0x0f00;
+inline constexpr std::uint32_t do_it = 0x1000;
+inline constexpr std::uint32_t ignored = 0x80000000;
+}  // namespace port
 /// Local bytes of a port.
 namespace local {
 inline constexpr std::uint32_t version = 3, channel_offset = 4, channel_stride = 5, channels = 7;

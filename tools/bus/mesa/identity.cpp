@@ -39,7 +39,9 @@ std::string add_hosts(const std::string& text, std::vector<std::string>& hosts) 
     }
     const std::uint32_t size = 1U << (32 - *bits);
     const std::uint32_t first = ntohl(address.s_addr) & ~(size - 1);
-    for (std::uint32_t n = size > 2 ? 1 : 0; n < (size > 2 ? size - 1 : size); ++n) {
+    // of more than two addresses, the first is the network's own and the last that of broadcasts
+    const std::uint32_t reserved = size > 2 ? 1 : 0;
+    for (std::uint32_t n = reserved; n < size - reserved; ++n) {
         char host[INET_ADDRSTRLEN] = {};
         const in_addr one{htonl(first + n)};
         inet_ntop(AF_INET, &one, host, sizeof host);

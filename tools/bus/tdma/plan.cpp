@@ -168,8 +168,9 @@ int run_tdma_plan(const TdmaPlanOptions& options) {
     if (!options.svg.empty()) {
         return write_picture(options, options.svg, options.json, timeline_of(reading.schedule, p));
     }
-    return print(options.json ? json_text(reading.schedule, p) : text_of(reading.schedule, p)) ? 0
-                                                                                               : 1;
+    const bool is_printed =
+        print(options.json ? json_text(reading.schedule, p) : text_of(reading.schedule, p));
+    return is_printed ? 0 : 1;
 }
 
 }  // namespace hal::tools

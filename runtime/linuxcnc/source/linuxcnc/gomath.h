@@ -444,9 +444,9 @@ static inline int go_mat_quat_convert(const go_mat* m, go_quat* to) {
 
 /* Angles: rotations about an axis of the frame so far, in turn. */
 static inline go_quat __go_about(int axis, go_real angle) {
-    const go_real sine = sin(angle / 2.0);
-    return (go_quat){cos(angle / 2.0), axis == 0 ? sine : 0.0, axis == 1 ? sine : 0.0,
-                     axis == 2 ? sine : 0.0};
+    go_real sines[3] = {0.0, 0.0, 0.0};
+    sines[axis] = sin(angle / 2.0);
+    return (go_quat){cos(angle / 2.0), sines[0], sines[1], sines[2]};
 }
 static inline int __go_in_turn(int a, go_real first, int b, go_real second, int c, go_real third,
                                go_quat* to) {

@@ -163,7 +163,9 @@ static inline int go_link_joint_set(const go_link* link, go_real joint, go_link*
     case GO_LINK_DH: *(turns ? &to->u.dh.theta : &to->u.dh.d) = joint; return GO_RESULT_OK;
     case GO_LINK_PK: to->u.pk.d = joint; return turns ? GO_RESULT_ERROR : GO_RESULT_OK;
     case GO_LINK_PP: {
-        const go_pose moved = {{0, 0, turns ? 0.0 : joint}, __go_about(2, turns ? joint : 0.0)};
+        const go_real distance = turns ? 0.0 : joint;
+        const go_real angle = turns ? joint : 0.0;
+        const go_pose moved = {{0, 0, distance}, __go_about(2, angle)};
         return go_pose_pose_mult(&link->u.pp.pose, &moved, &to->u.pp.pose);
     }
     default: return GO_RESULT_IMPL_ERROR;

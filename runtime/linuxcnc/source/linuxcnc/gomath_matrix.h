@@ -22,8 +22,10 @@ typedef struct {
     } space
 #define go_matrix_init(m, space, row_count, col_count)                                          \
     do {                                                                                        \
-        for (go_integer __row = 0; __row < (row_count); ++__row)                                \
-            space.el[__row] = space.stg[__row], space.elcpy[__row] = space.stgcpy[__row];       \
+        for (go_integer __row = 0; __row < (row_count); ++__row) {                              \
+            space.el[__row] = space.stg[__row];                                                 \
+            space.elcpy[__row] = space.stgcpy[__row];                                           \
+        }                                                                                       \
         m = (go_matrix){(row_count), (col_count), space.el, space.elcpy, space.v, space.index}; \
     } while (0)
 
@@ -201,7 +203,8 @@ static inline int go_matrix_inv(const go_matrix* a, go_matrix* to) {
         for (int i = 0; i < n; ++i) {                                                         \
             for (int j = 0; j < n; ++j)                                                       \
                 copy[i][j] = a[i][j];                                                         \
-            rows[i] = copy[i], result[i] = to[i];                                             \
+            rows[i] = copy[i];                                                                \
+            result[i] = to[i];                                                                \
         }                                                                                     \
         return __go_invert(n, rows, result);                                                  \
     }                                                                                         \

@@ -271,8 +271,12 @@ static inline int pmQuatScalDiv(const PmQuaternion* q, double by, PmQuaternion* 
 }
 static inline int pmAxisAngleQuatConvert(PmAxis axis, double angle, PmQuaternion* to) {
     const double sine = sin(angle / 2.0);
-    const PmQuaternion q = {cos(angle / 2.0), axis == PM_X ? sine : 0.0, axis == PM_Y ? sine : 0.0,
-                            axis == PM_Z ? sine : 0.0};
+    PmQuaternion q = {cos(angle / 2.0), 0.0, 0.0, 0.0};
+    switch (axis) {
+    case PM_X: q.x = sine; break;
+    case PM_Y: q.y = sine; break;
+    case PM_Z: q.z = sine; break;
+    }
     return pmQuatNorm(&q, to);
 }
 static inline int pmQuatAxisAngleMult(const PmQuaternion* q, PmAxis axis, double angle,
