@@ -111,22 +111,12 @@ std::string apply(std::string_view key, std::string_view value, bool has_value, 
            "receivequeue";
 }
 
-/// Opens a link as the journal of the calling program has it.
-Opened open_journaled(const Driver& driver, const std::string& target, const Options& options) {
-    const auto open = [&] { return driver.open(target, options); };
-    switch (driver.journal) {
-    case Journal::results: return journal::open_journaled(open);
-    case Journal::order: return journal::open_ordered(target, open);
-    case Journal::carrier: break;
-    }
-    return open();
-}
-
 }  // namespace
 
 Opened open(std::string_view address, const Options& given) {
-    return link::open_address<Opened, Options, Description>(address, given, drivers, apply,
-                                                            "a CAN bus", open_journaled);
+    return link::open_address<Opened, Options, Description>(
+        address, given, drivers, apply, "a CAN bus",
+        {journal::open_journaled, journal::open_ordered});
 }
 
 Description describe(std::string_view address) {

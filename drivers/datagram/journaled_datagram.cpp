@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "link/call_journal.hpp"
+#include "link/journaled_open.hpp"
 
 namespace hal::datagram::journal {
 
@@ -73,29 +74,15 @@ private:
 }  // namespace
 
 Opened open_journaled(const std::function<Opened()>& open) {
-    const link::JournalMode mode = link::journal_mode();
-    if (mode == link::JournalMode::none) return open();
-    Opened opened;
-    if (mode == link::JournalMode::records) {
-        const link::OpeningLink opening;
-        opened = open();
-    }
-    JournaledCall call;
-    bool is_open = opened.port != nullptr;
-    call.number(is_open);
-    if (!is_open) {
-        call.text(opened.problem);
-        if (opened.problem.empty()) {
-            opened.problem = "the journal does not have this port";
+    const auto wrap = [](JournaledCall& call, std::unique_ptr<Port> inner) {
+        Description description;
+        if (inner) {
+            description = inner->description();
         }
-        return {nullptr, std::move(opened.problem)};
-    }
-    Description description;
-    if (opened.port) {
-        description = opened.port->description();
-    }
-    exchange(call, description);
-    return {std::make_unique<JournaledPort>(std::move(opened.port), std::move(description)), {}};
+        exchange(call, description);
+        return std::make_unique<JournaledPort>(std::move(inner), std::move(description));
+    };
+    return link::open_journaled(open, "port", wrap);
 }
 
 }  // namespace hal::datagram::journal

@@ -36,16 +36,12 @@ std::string apply_datagram_option(std::string_view key, std::string_view value, 
     return {};
 }
 
-Opened open_with(const Driver& driver, const std::string& target, const Options& options) {
-    const auto open = [&] { return driver.open(target, options); };
-    return driver.journal == Driver::Journal::results ? journal::open_journaled(open) : open();
-}
-
 }  // namespace
 
 Opened open(std::string_view address, const Options& given) {
-    return link::open_address<Opened, Options, Description>(
-        address, given, datagram_drivers, apply_datagram_option, "a card", open_with);
+    return link::open_address<Opened, Options, Description>(address, given, datagram_drivers,
+                                                            apply_datagram_option, "a card",
+                                                            {journal::open_journaled, nullptr});
 }
 
 Description describe(std::string_view address) {

@@ -44,10 +44,8 @@ std::string apply_line_option(std::string_view key, std::string_view value, bool
 
 // A line is used by a helper thread, whose values the journal of a machine does not have.
 Opened open(std::string_view address, const Options& given) {
-    const auto open_driver = [](const auto& driver, const std::string& target,
-                                const Options& options) { return driver.open(target, options); };
     return link::open_address<Opened, Options, Description>(
-        address, given, line_drivers, apply_line_option, "a line", open_driver);
+        address, given, line_drivers, apply_line_option, "a line", {nullptr, nullptr});
 }
 
 Description describe(std::string_view address) {

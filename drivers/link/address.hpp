@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <exception>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -80,18 +81,91 @@ std::string address_forms(std::span<const Driver<Opened, Options, Description>> 
     return text;
 }
 
+/// An address `DRIVER:PLACE?OPTIONS` behind its colon.
+struct Target {
+    explicit Target(std::string_view text)
+        : place(text.substr(0, text.find('?'))),
+          options(text.substr(std::min(place.size() + 1, text.size()))) {}
+
+    std::string_view place;
+    std::string_view options;  ///< `key=value&key&key=value`
+};
+
+/// One option of an address, `key` or `key=value`.
+struct AddressOption {
+    std::string_view text;
+    std::string_view key;
+    std::string_view value;  ///< empty without `=`
+    bool has_value = false;
+
+    /// Removes the first option from `options`, which is not empty, and returns it.
+    static AddressOption pop(std::string_view& options) {
+        const std::string_view text = options.substr(0, options.find('&'));
+        options.remove_prefix(std::min(text.size() + 1, options.size()));
+        const std::size_t equals = std::min(text.find('='), text.size());
+        const bool has_value = equals < text.size();
+        return {text, text.substr(0, equals), text.substr(equals + has_value), has_value};
+    }
+};
+
+/// Returns the driver that an address names; nullptr: none of them.
+template <class Driver>
+const Driver* driver_of(std::string_view address, std::span<const Driver> drivers) {
+    const auto colon = address.find(':');
+    if (colon == address.npos) return nullptr;
+    const auto found = std::find_if(drivers.begin(), drivers.end(), [&](const Driver& driver) {
+        return driver.name() == address.substr(0, colon);
+    });
+    return found == drivers.end() ? nullptr : &*found;
+}
+
+/// Splits what stands behind `DRIVER:` into what the driver itself parses, which is the place with
+/// the driver's own options, and the common options, each of which `apply(option)` receives.
+/// `apply` returns a problem, which ends it, or "".
+template <class Driver, class Apply>
+std::string split_target(const Driver& driver, std::string_view text, std::string& own,
+                         Apply apply) {
+    Target target(text);
+    own = target.place;
+    const char* separator = "?";
+    while (!target.options.empty()) {
+        const AddressOption option = AddressOption::pop(target.options);
+        if (driver.is_own_option != nullptr && driver.is_own_option(option.key)) {
+            own.append(std::exchange(separator, "&")).append(option.text);
+            continue;
+        }
+        std::string problem = apply(option);
+        if (!problem.empty()) return problem;
+    }
+    return {};
+}
+
+/// How the links of a driver become journaled ones, per kind of bus. `order` may be nullptr.
+template <class Opened>
+struct JournaledOpen {
+    Opened (*results)(const std::function<Opened()>& open);
+    Opened (*order)(std::string_view target, const std::function<Opened()>& open);
+
+    /// Opens a link with the driver, as the journal of the calling program has its links.
+    template <class Options, class Description>
+    Opened operator()(const Driver<Opened, Options, Description>& driver, const std::string& target,
+                      const Options& options) const {
+        using Journal = typename Driver<Opened, Options, Description>::Journal;
+        const auto open = [&] { return driver.open(target, options); };
+        if (driver.journal == Journal::results && results != nullptr) return results(open);
+        if (driver.journal == Journal::order && order != nullptr) return order(target, open);
+        return open();
+    }
+};
+
 /// Opens an address with the driver that it names. `apply(key, value, has_value, options)` applies
 /// an option and returns the problem, or ""; `kind` completes "'x' is not the address of ".
-/// `open(driver, target, options)` calls the driver.
-template <class Opened, class Options, class Description, class Apply, class Open>
+template <class Opened, class Options, class Description, class Apply>
 Opened open_address(std::string_view address, Options options,
                     std::span<const Driver<Opened, Options, Description>> drivers, Apply apply,
-                    std::string_view kind, Open open) {
-    const auto colon = address.find(':');
-    const auto driver = std::find_if(drivers.begin(), drivers.end(), [&](const auto& d) {
-        return d.name() == address.substr(0, colon);
-    });
-    if (colon == address.npos || driver == drivers.end()) {
+                    std::string_view kind, const JournaledOpen<Opened>& open) {
+    const auto* const driver = driver_of(address, drivers);
+    if (driver == nullptr) {
         return {nullptr, quoted(address) + " is not the address of " + std::string(kind) +
                              "; write " + address_forms(drivers)};
     }
@@ -104,71 +178,47 @@ Opened open_address(std::string_view address, Options options,
                              "must not operate; write sim:NAME"};
     }
 
-    const auto target = address.substr(colon + 1);
-    const auto question = std::min(target.find('?'), target.size());
-    auto rest = target.substr(std::min(question + 1, target.size()));
-    std::string where(target.substr(0, question));
-    const char* separator = "?";
-    while (!rest.empty()) {
-        const auto end = std::min(rest.find('&'), rest.size());
-        const auto item = rest.substr(0, end);
-        rest.remove_prefix(std::min(end + 1, rest.size()));
-        const auto equals = std::min(item.find('='), item.size());
-        const auto key = item.substr(0, equals);
-        const bool has_value = equals < item.size();
-        if (driver->is_own_option != nullptr && driver->is_own_option(key)) {
-            where.append(std::exchange(separator, "&")).append(item);
-            continue;
-        }
-        std::string problem = apply(key, has_value ? item.substr(equals + 1) : std::string_view{},
-                                    has_value, options);
+    const std::string name(driver->name());
+    const auto apply_common = [&](const AddressOption& option) {
+        std::string problem = apply(option.key, option.value, option.has_value, options);
         if (problem.starts_with(no_option) && driver->own_options != nullptr) {
-            problem += ", and for " + std::string(driver->name()) + ": " + driver->own_options();
+            problem += ", and for " + name + ": " + driver->own_options();
         }
-        if (problem.empty() && driver->ignores(key)) {
-            problem = std::string(driver->name()) + " does not support the option " + quoted(key) +
-                      "; remove it";
+        if (problem.empty() && driver->ignores(option.key)) {
+            problem = name + " does not support the option " + quoted(option.key) + "; remove it";
         }
-        if (!problem.empty()) {
-            return {nullptr, std::string(address) + ": " + problem};
-        }
-    }
+        return problem;
+    };
+    const auto problem_of = [&](const std::string& problem) {
+        return std::string(address) + ": " + problem;
+    };
+    std::string target;
+    const std::string problem =
+        split_target(*driver, address.substr(name.size() + 1), target, apply_common);
+    if (!problem.empty()) return {nullptr, problem_of(problem)};
     try {
-        auto opened = open(*driver, where, options);
+        auto opened = open(*driver, target, options);
         if (!opened) {
-            opened.problem = std::string(address) + ": " + opened.problem;
+            opened.problem = problem_of(opened.problem);
         }
         return opened;
     } catch (const std::exception& e) {
-        return {nullptr, std::string(address) + ": " + e.what()};
+        return {nullptr, problem_of(e.what())};
     }
 }
 
-/// Describes what the driver would open, without opening it. The driver's own options stay behind
-/// the place.
+/// Describes what the driver would open, without opening it.
 template <class Opened, class Options, class Description>
 Description describe_address(std::string_view address,
                              std::span<const Driver<Opened, Options, Description>> drivers) {
-    const auto colon = address.find(':');
-    const auto driver = std::find_if(drivers.begin(), drivers.end(), [&](const auto& d) {
-        return d.name() == address.substr(0, colon);
-    });
-    if (colon == address.npos || driver == drivers.end()) {
+    const auto* const driver = driver_of(address, drivers);
+    if (driver == nullptr) {
         return Description{.address = std::string(address), .transport = {}};
     }
-    const auto target = address.substr(colon + 1);
-    const auto question = std::min(target.find('?'), target.size());
-    std::string where(target.substr(0, question));
-    const char* separator = "?";
-    for (auto rest = target.substr(std::min(question + 1, target.size())); !rest.empty();) {
-        const auto item = rest.substr(0, rest.find('&'));
-        rest.remove_prefix(std::min(item.size() + 1, rest.size()));
-        if (driver->is_own_option != nullptr &&
-            driver->is_own_option(item.substr(0, item.find('=')))) {
-            where.append(std::exchange(separator, "&")).append(item);
-        }
-    }
-    return driver->describe(where);
+    std::string target;
+    split_target(*driver, address.substr(driver->name().size() + 1), target,
+                 [](const AddressOption&) { return std::string(); });
+    return driver->describe(target);
 }
 
 }  // namespace hal::link

@@ -10,6 +10,7 @@
 #include <iterator>
 
 #include "cane.hpp"
+#include "link/address.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::can::cane {
@@ -144,28 +145,22 @@ bool is_own_option(std::string_view key) {
 }
 
 std::string parse(std::string_view target, Settings& s, bool reads_key) {
-    const auto question = std::min(target.find('?'), target.size());
-    s.segment = target.substr(0, question);
+    link::Target split(target);
+    s.segment = split.place;
     if (s.segment.empty()) {
         return "missing interface; write cane:enp3s0, or cane:sim:bus0 for a segment in memory";
     }
     if (s.segment.find(':') == std::string::npos) {
         s.segment.insert(0, "eth:");
     }
-    auto rest = target.substr(std::min(question + 1, target.size()));
-    while (!rest.empty()) {
-        const auto end = std::min(rest.find('&'), rest.size());
-        const auto item = rest.substr(0, end);
-        rest.remove_prefix(std::min(end + 1, rest.size()));
-        const auto equals = std::min(item.find('='), item.size());
-        const auto key = item.substr(0, equals);
-
-        const auto value = item.substr(std::min(equals + 1, item.size()));
-        if (is_in(segment_keys, key)) {
-            s.segment_options += (s.segment_options.empty() ? '?' : '&') + std::string(item);
-        } else if (auto problem = apply(key, value, s, reads_key); !problem.empty()) {
-            return problem;
+    while (!split.options.empty()) {
+        const auto option = link::AddressOption::pop(split.options);
+        if (is_in(segment_keys, option.key)) {
+            s.segment_options += (s.segment_options.empty() ? '?' : '&') + std::string(option.text);
+            continue;
         }
+        std::string problem = apply(option.key, option.value, s, reads_key);
+        if (!problem.empty()) return problem;
     }
     if (s.key && s.format == Format::single) {
         return "key= signs packed frames only; remove format=single";

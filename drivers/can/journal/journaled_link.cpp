@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "link/call_journal.hpp"
+#include "link/journaled_open.hpp"
 
 namespace hal::can::journal {
 
@@ -242,34 +243,19 @@ private:
 }  // namespace
 
 Opened open_journaled(const std::function<Opened()>& open) {
-    const link::JournalMode mode = link::journal_mode();
-    if (mode == link::JournalMode::none) return open();
-    Opened opened;
-    if (mode == link::JournalMode::records) {
-        const link::OpeningLink opening;
-        opened = open();
-    }
-    JournaledCall call;
-    bool is_open = opened.link != nullptr;
-    call.number(is_open);
-    if (!is_open) {
-        call.text(opened.problem);
-        if (opened.problem.empty()) {
-            opened.problem = "the journal does not have this link";
+    const auto wrap = [](JournaledCall& call, std::unique_ptr<Link> inner) {
+        Description description;
+        std::int64_t closing_ns = 0;
+        if (inner) {
+            description = inner->description();
+            closing_ns = inner->closing_ns();
         }
-        return {nullptr, std::move(opened.problem)};
-    }
-    Description description;
-    std::int64_t closing_ns = 0;
-    if (opened.link) {
-        description = opened.link->description();
-        closing_ns = opened.link->closing_ns();
-    }
-    exchange(call, description);
-    call.time(closing_ns, 0);
-    return {
-        std::make_unique<JournaledLink>(std::move(opened.link), std::move(description), closing_ns),
-        {}};
+        exchange(call, description);
+        call.time(closing_ns, 0);
+        return std::make_unique<JournaledLink>(std::move(inner), std::move(description),
+                                               closing_ns);
+    };
+    return link::open_journaled(open, "link", wrap);
 }
 
 }  // namespace hal::can::journal

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "link/call_journal.hpp"
+#include "link/journaled_open.hpp"
 
 namespace hal::ethernet::journal {
 
@@ -126,34 +127,18 @@ private:
 }  // namespace
 
 Opened open_journaled(const std::function<Opened()>& open) {
-    const link::JournalMode mode = link::journal_mode();
-    if (mode == link::JournalMode::none) return open();
-    Opened opened;
-    if (mode == link::JournalMode::records) {
-        const link::OpeningLink opening;
-        opened = open();
-    }
-    JournaledCall call;
-    bool is_open = opened.port != nullptr;
-    call.number(is_open);
-    if (!is_open) {
-        call.text(opened.problem);
-        if (opened.problem.empty()) {
-            opened.problem = "the journal does not have this port";
+    const auto wrap = [](JournaledCall& call, std::unique_ptr<Port> inner) {
+        Description description;
+        Address address{};
+        if (inner) {
+            description = inner->description();
+            address = inner->address();
         }
-        return {nullptr, std::move(opened.problem)};
-    }
-    Description description;
-    Address address{};
-    if (opened.port) {
-        description = opened.port->description();
-        address = opened.port->address();
-    }
-    exchange(call, description);
-    call.bytes(address.data(), address.size());
-    return {
-        std::make_unique<JournaledPort>(std::move(opened.port), std::move(description), address),
-        {}};
+        exchange(call, description);
+        call.bytes(address.data(), address.size());
+        return std::make_unique<JournaledPort>(std::move(inner), std::move(description), address);
+    };
+    return link::open_journaled(open, "port", wrap);
 }
 
 }  // namespace hal::ethernet::journal
