@@ -102,7 +102,7 @@ ROWS = {
     "components/dds": ["components", "components/dds/links"],
     "components/dds/links": [],  # what cells gives the components, as data
     "components": ["runtime/sdk", "runtime/text"],
-    "components/bus/component": ["runtime/sdk", "drivers/link"],
+    "components/bus/component": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/bus/config": ["runtime/text"],
     "components/bus/events": [],
     "components/cia301": [],

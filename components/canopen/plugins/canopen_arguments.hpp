@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "bus/component/message_report.hpp"
 #include "canopen/master/config/bus_schedule.hpp"
 #include "canopen/master/config/config_lines.hpp"
 #include "canopen/master/config/master_config.hpp"
@@ -78,7 +79,7 @@ struct ConfigurationArguments {
                     path);
                 std::move(more.begin(), more.end(), std::back_inserter(reading.messages));
             }
-            report(texts, reading, path, text);
+            hal::bus::report(texts, reading.messages, path, text);
         } else if (texts.offered()) {
             throw std::invalid_argument(
                 "missing configuration; type: loadrt canopen config=FILE.canopen; or for a single "
@@ -144,23 +145,6 @@ private:
                 "masternodeid", "masternodeid=" + std::to_string(static_cast<unsigned>(own_id)) +
                                     ": the configuration sets this with node-id in [bus]; remove "
                                     "masternodeid= or config=");
-        }
-    }
-
-    static void report(const hal::Texts& texts, const config::Reading& reading,
-                       const std::string& path, const std::string& text) {
-        if (!texts.offered() && !reading.good()) {
-            throw std::invalid_argument(config::to_string(reading, path));
-        }
-        texts.begin(path, text);
-        for (const config::Message& m : reading.messages) {
-            if (m.severity != config::Severity::note) {  // notes are for `hal canopen check`
-                texts.report(static_cast<hal_severity>(m.severity), config::code_of(m.topic),
-                             m.at.offset, m.at.offset + m.at.length, m.sentence, m.label, m.help);
-            }
-        }
-        if (!reading.good()) {
-            hal::Texts::fail();
         }
     }
 };

@@ -8,6 +8,7 @@
 
 #include <unistd.h>
 
+#include "bus/component/message_report.hpp"
 #include "ethercat/config/config.hpp"
 #include "ethercat/config/igh_conf.hpp"
 #include "ethercat/config/lcec_handover.hpp"
@@ -94,7 +95,7 @@ struct EthercatArguments {
             const auto* const assumed = hal::extension<hal_assumed>(HAL_ASSUMED);
             return assumed != nullptr && assumed->is_assumed(hal::detail::creating, slave.c_str());
         });
-        report(texts, reading, path, text);
+        hal::bus::report(texts, reading.messages, path, text);
         const auto wanted =
             number >= 0 ? static_cast<std::size_t>(number) : own_master(reading.buses.size());
         if (wanted >= reading.buses.size()) {
@@ -183,22 +184,6 @@ private:
         }
         bus.link = std::move(found.link);
         bus.backup = std::move(found.backup);
-    }
-    static void report(const hal::Texts& texts, const config::Reading& reading,
-                       const std::string& path, const std::string& text) {
-        if (!texts.offered() && !reading.good()) {
-            throw std::invalid_argument(config::to_string(reading, path));
-        }
-        texts.begin(path, text);
-        for (const config::Message& m : reading.messages) {
-            if (m.severity != hal::Severity::note) {
-                texts.report(static_cast<hal_severity>(m.severity), config::code_of(m.topic),
-                             m.at.offset, m.at.offset + m.at.length, m.sentence, m.label, m.help);
-            }
-        }
-        if (!reading.good()) {
-            hal::Texts::fail();
-        }
     }
 };
 

@@ -4,6 +4,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "bus/component/message_report.hpp"
 #include "hal/component.hpp"
 #include "hal/edge.hpp"
 #include "hal/texts.hpp"
@@ -157,17 +158,7 @@ private:
         const std::string path = texts.find(file_.get());
         const std::string text = texts.read("config", file_.get());
         CardReadResult result = read_card(text, file_.get());
-        if (!texts.offered() && !result.good()) {
-            throw std::invalid_argument(hal::text::errors_text(result.messages, path));
-        }
-        texts.begin(path, text);
-        for (const auto& m : result.messages) {
-            texts.report(static_cast<hal_severity>(m.severity), code_of(m.topic), m.at.offset,
-                         m.at.offset + m.at.length, m.sentence, m.label, m.help);
-        }
-        if (!result.good()) {
-            hal::Texts::fail();
-        }
+        hal::bus::report(texts, result.messages, path, text);
         config_ = std::move(result.card);
         if (!link_.get().empty()) {
             config_.address = link_.get();

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "bus/component/message_report.hpp"
 #include "hal/component.hpp"
 #include "hal/texts.hpp"
 #include "modbus/config/plan.hpp"
@@ -47,17 +48,7 @@ struct ModbusArguments {
         file = texts.find(config.get());
         text = texts.read("config", config.get());
         ReadResult result = read(text, config.get());
-        if (!texts.offered() && !result.good()) {
-            throw std::invalid_argument(text::errors_text(result.messages, file));
-        }
-        texts.begin(file, text);
-        for (const auto& m : result.messages) {
-            texts.report(static_cast<hal_severity>(m.severity), code_of(m.topic), m.at.offset,
-                         m.at.offset + m.at.length, m.sentence, m.label, m.help);
-        }
-        if (!result.good()) {
-            hal::Texts::fail();
-        }
+        hal::bus::report(texts, result.messages, file, text);
         bus = std::move(result.bus);
         if (!link.get().empty()) {
             bus.link = link.get();

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "bus/component/message_report.hpp"
 #include "fieldbus/scocan/station/station_events.hpp"
 #include "hal/component.hpp"
 #include "hal/texts.hpp"
@@ -75,17 +76,7 @@ struct TableArguments {
             text = texts.read("config", config.get());
         }
         Reading reading = read(text);
-        if (!texts.offered() && !reading.good()) {
-            throw std::invalid_argument(text::errors_text(reading.messages, file));
-        }
-        texts.begin(file, text);
-        for (const Report& m : reading.messages) {
-            texts.report(static_cast<hal_severity>(m.severity), code_of(m.topic), m.at.offset,
-                         m.at.offset + m.at.length, m.sentence, m.label, m.help);
-        }
-        if (!reading.good()) {
-            hal::Texts::fail();
-        }
+        hal::bus::report(texts, reading.messages, file, text);
         table = std::move(reading.table);
         if (node.get().empty()) {
             throw std::invalid_argument("missing node=; nodes in " + file + ": " + names(table));

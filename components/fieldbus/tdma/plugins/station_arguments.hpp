@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "bus/component/message_report.hpp"
 #include "fieldbus/tdma/config/schedule.hpp"
 #include "fieldbus/tdma/tunnel/tap.hpp"
 #include "hal/component.hpp"
@@ -93,17 +94,7 @@ struct StationArguments {
             }
         }
         config::Reading reading = config::read(text);
-        if (!texts.offered() && !reading.good()) {
-            throw std::invalid_argument(config::to_string(reading, file));
-        }
-        texts.begin(file, text);
-        for (const config::Message& m : reading.messages) {
-            texts.report(static_cast<hal_severity>(m.severity), config::code_of(m.topic),
-                         m.at.offset, m.at.offset + m.at.length, m.sentence, m.label, m.help);
-        }
-        if (!reading.good()) {
-            hal::Texts::fail();
-        }
+        hal::bus::report(texts, reading.messages, file, text);
         schedule = std::move(reading.schedule);
         if (station.get().empty()) {
             throw std::invalid_argument("missing station=; stations in " + file + ": " +
