@@ -4,10 +4,12 @@
 
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "hal/retained.hpp"
+#include "latch_timer.hpp"
 #include "mesa/driver/edge_velocity.hpp"
 #include "mesa/driver/position_counter.hpp"
 #include "mesa/hostmot2/formulas.hpp"
@@ -126,9 +128,7 @@ private:
                                                   encoder::filter_15;
 
     static const char* named(unsigned unit, const char* name) {
-        static thread_local std::string text;
-        text = pin_name("encoder", unit, name);
-        return text.c_str();
+        return brief_name("encoder.%02u.%s", unit, name);
     }
     std::uint32_t settings() const noexcept {
         std::uint32_t bits = filter_ ? encoder::filter_15 : 0;
@@ -206,13 +206,10 @@ public:
           clock_hz_(module.clock_hz),
           divider_(module.addresses.at(encoder::timestamp_divider)),
           filter_(module.addresses.at(encoder::filter)),
-          dpll_timer_(module.addresses.at(encoder::dpll_timer)),
           hires_(o.component, o.write, "encoder.hires-timestamp",
                  "TRUE: times of edges in 0.1 us, for periods up to 6 ms; FALSE: in 0.5 us") {
         const bool is_muxed = module.tag() == Tag::muxed_encoder;
-        for (unsigned unit = 0; unit < module.used; ++unit) {
-            units_.push_back(std::make_unique<Encoder>(o, unit, module));
-        }
+        units_ = make_units<Encoder>(o, module);
         frequency_ = std::make_unique<hal::In<std::uint32_t>>(
             o.component, o.write,
             is_muxed ? "encoder.muxed-sample-frequency" : "encoder.sample-frequency",
@@ -225,10 +222,9 @@ public:
                                                       hal::PinOptions<double>{.unit = "ns"});
         }
         if (has_dpll) {
-            timer_ = std::make_unique<hal::Param<std::int32_t>>(
-                o.component, "encoder.timer-number",
-                "timer of the DPLL that latches counts, 0..4; -1: none",
-                hal::PinOptions<std::int32_t>{.initial = -1});
+            timer_.emplace(o, "encoder.timer-number",
+                           "timer of the DPLL that latches counts, 0..4; -1: none",
+                           module.addresses.at(encoder::dpll_timer));
         }
     }
 
@@ -256,9 +252,7 @@ public:
         }
         out.put(filter_, filter);
         if (timer_) {
-            const std::int32_t timer = *timer_;
-            const bool is_on = timer >= 0 && timer <= 4;
-            out.put(dpll_timer_, is_on ? stepgen::dpll_select(static_cast<unsigned>(timer)) : 0);
+            timer_->transmit(out);
         }
         for (const auto& unit : units_) {
             unit->transmit(out, writing);
@@ -268,11 +262,7 @@ public:
     /// Calls `report(unit)` for each one that may have lost counts in a gap. [realtime]
     template <class Report>
     void take_losses(Report&& report) noexcept {
-        for (std::size_t n = 0; n < units_.size(); ++n) {
-            if (units_[n]->take_loss()) {
-                report(n);
-            }
-        }
+        report_each(units_, &Encoder::take_loss, report);
     }
 
 private:
@@ -282,12 +272,12 @@ private:
 
     const ModuleAddresses addresses_;
     const std::uint32_t clock_hz_;
-    Setting divider_, filter_, dpll_timer_;
+    Setting divider_, filter_;
     std::vector<std::unique_ptr<Encoder>> units_;
     hal::In<bool> hires_;
     std::unique_ptr<hal::In<std::uint32_t>> frequency_;
     std::unique_ptr<hal::In<double>> skew_;
-    std::unique_ptr<hal::Param<std::int32_t>> timer_;
+    std::optional<LatchTimer> timer_;
     std::size_t now_ = 0;
     std::size_t counts_ = 0;
     std::size_t controls_ = 0;

@@ -2,8 +2,11 @@
 // The pins of a kind of module, as the component sees them.
 #pragma once
 
+#include <cstdarg>
 #include <cstdio>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "hal/component.hpp"
 #include "mesa/driver/card_image.hpp"
@@ -66,6 +69,38 @@ inline std::string pin_name(const char* prefix, unsigned unit, const char* name)
     char text[96];
     std::snprintf(text, sizeof text, "%s.%02u.%s", prefix, unit, name);
     return text;
+}
+
+/// Returns a name made by a format of printf, valid until the next call in this thread: longer than
+/// the declaration of a pin. [setup]
+[[gnu::format(printf, 1, 2)]] inline const char* brief_name(const char* format, ...) {
+    static thread_local char text[96];
+    va_list values;
+    va_start(values, format);
+    std::vsnprintf(text, sizeof text, format, values);
+    va_end(values);
+    return text;
+}
+
+/// Declares the units of a module that are used. [setup]
+template <class Unit>
+std::vector<std::unique_ptr<Unit>> make_units(const PinOwner& o, const CardModule& module) {
+    std::vector<std::unique_ptr<Unit>> units;
+    for (unsigned unit = 0; unit < module.used; ++unit) {
+        units.push_back(std::make_unique<Unit>(o, unit, module));
+    }
+    return units;
+}
+
+/// Calls `report(n)` for each unit whose `member()` returns true. [realtime]
+template <class Unit, class Report>
+void report_each(const std::vector<std::unique_ptr<Unit>>& units, bool (Unit::*member)() noexcept,
+                 Report&& report) noexcept {
+    for (std::size_t n = 0; n < units.size(); ++n) {
+        if (((*units[n]).*member)()) {
+            report(n);
+        }
+    }
 }
 
 }  // namespace hal::mesa

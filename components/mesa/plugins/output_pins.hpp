@@ -50,9 +50,7 @@ private:
         hal::In<bool> out, invert;
     };
     static const char* named(const char* prefix, unsigned unit, const char* name, unsigned number) {
-        static thread_local char text[48];
-        std::snprintf(text, sizeof text, "%s.%02u.%s-%02u", prefix, unit, name, number);
-        return text;
+        return brief_name("%s.%02u.%s-%02u", prefix, unit, name, number);
     }
     std::vector<std::unique_ptr<Output>> outputs_;
 };

@@ -55,9 +55,7 @@ private:
     using Parameter = std::unique_ptr<hal::Param<bool>>;
 
     static const char* named(unsigned number, const char* name) {
-        static thread_local char text[32];
-        std::snprintf(text, sizeof text, "gpio.%03u.%s", number, name);
-        return text;
+        return brief_name("gpio.%03u.%s", number, name);
     }
     static Parameter parameter(const PinOwner& o, const char* name, const char* doc) {
         return std::make_unique<hal::Param<bool>>(o.component, name, doc);

@@ -45,9 +45,7 @@ public:
 
 private:
     static const char* named(unsigned unit, const char* name) {
-        static thread_local std::string text;
-        text = pin_name("pwmgen", unit, name);
-        return text.c_str();
+        return brief_name("pwmgen.%02u.%s", unit, name);
     }
     double duty() const noexcept {
         const double by = scale_ == 0.0 || !std::isfinite(scale_) ? 1.0 : scale_.get();
@@ -90,9 +88,7 @@ public:
                          {.initial = 20'000, .unit = "Hz"}),
           pdm_frequency_(o.component, "pwmgen.pdm_frequency", "pulses per second of PDM",
                          {.initial = 20'000, .unit = "Hz"}) {
-        for (unsigned unit = 0; unit < module.used; ++unit) {
-            units_.push_back(std::make_unique<PwmGenerator>(o, unit, module));
-        }
+        units_ = make_units<PwmGenerator>(o, module);
     }
 
     void transmit(Outgoing& out, const Writing& writing) noexcept override {

@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "dpll_pins.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
+#include "latch_timer.hpp"
 #include "mesa/driver/position_counter.hpp"
 #include "mesa/driver/step_control.hpp"
 #include "mesa/hostmot2/formulas.hpp"
@@ -127,14 +129,10 @@ public:
         show();
     }
     /// The card is lost: from here on its motor stops at an unknown time. [realtime] read
-    void hold() noexcept {
-        held_moved_ = moved_;
-    }
+    void hold() noexcept { held_moved_ = moved_; }
     /// The outputs of the card were off while it may have had a rate: the motor did not follow. Returns
     /// whether the position, which was valid, is lost by that. [realtime] read
-    bool was_off() noexcept {
-        return is_moving(possible_rate_) && lose_position();
-    }
+    bool was_off() noexcept { return is_moving(possible_rate_) && lose_position(); }
     /// Another master has the card: its rates are unknown. Returns whether the position was valid.
     /// [realtime] read
     bool was_taken() noexcept {
@@ -185,9 +183,7 @@ private:
 
     /// Valid until the next call.
     static const char* named(unsigned unit, const char* name) {
-        static thread_local std::string text;
-        text = pin_name("stepgen", unit, name);
-        return text.c_str();
+        return brief_name("stepgen.%02u.%s", unit, name);
     }
 
     /// A generator that stands corrects its position with fractions of a step per second, so hardly
@@ -297,16 +293,12 @@ public:
     StepgenPins(const PinOwner& o, const CardModule& module, const DpllPins* dpll)
         : addresses_(module.addresses),
           dpll_(dpll),
-          master_rate_(module.addresses.at(stepgen::master_rate)),
-          dpll_timer_(module.addresses.at(stepgen::dpll_timer)) {
-        for (unsigned unit = 0; unit < module.used; ++unit) {
-            units_.push_back(std::make_unique<Stepgen>(o, unit, module));
-        }
+          units_(make_units<Stepgen>(o, module)),
+          master_rate_(module.addresses.at(stepgen::master_rate)) {
         if (dpll_ != nullptr) {
-            timer_ = std::make_unique<hal::Param<std::int32_t>>(
-                o.component, "stepgen.timer-number",
-                "timer of the DPLL that latches positions, 0..4; -1: none",
-                hal::PinOptions<std::int32_t>{.initial = -1});
+            timer_.emplace(o, "stepgen.timer-number",
+                           "timer of the DPLL that latches positions, 0..4; -1: none",
+                           module.addresses.at(stepgen::dpll_timer));
         }
     }
 
@@ -318,7 +310,7 @@ public:
     void receive(const Reply& reply, const Reading& reading) noexcept override {
         Reading own = reading;
         if (timer_) {
-            own.age_s += dpll_->latched_before_s(*timer_, reading.period_s);
+            own.age_s += dpll_->latched_before_s(timer_->number(), reading.period_s);
         }
         for (std::size_t n = 0; n < units_.size(); ++n) {
             units_[n]->receive(reply.word(accumulators_, n), own);
@@ -333,9 +325,7 @@ public:
         if (units_.empty()) return;
         out.put(master_rate_, stepgen::all_masters);
         if (timer_) {
-            const std::int32_t timer = *timer_;
-            const bool is_on = timer >= 0 && timer <= 4;
-            out.put(dpll_timer_, is_on ? stepgen::dpll_select(static_cast<unsigned>(timer)) : 0);
+            timer_->transmit(out);
         }
         for (const auto& unit : units_) {
             unit->transmit(out, writing);
@@ -354,29 +344,17 @@ public:
     /// Calls `report(unit)` for each one whose position is lost. [realtime]
     template <class Report>
     void was_off(Report&& report) noexcept {
-        for (std::size_t n = 0; n < units_.size(); ++n) {
-            if (units_[n]->was_off()) {
-                report(n);
-            }
-        }
+        report_each(units_, &Stepgen::was_off, report);
     }
     /// The same for each one that has run on while its outputs were off. [realtime]
     template <class Report>
     void take_run_on(Report&& report) noexcept {
-        for (std::size_t n = 0; n < units_.size(); ++n) {
-            if (units_[n]->take_run_on()) {
-                report(n);
-            }
-        }
+        report_each(units_, &Stepgen::take_run_on, report);
     }
     /// Another master has the card. Calls `report(unit)` as was_off() does. [realtime]
     template <class Report>
     void were_taken(Report&& report) noexcept {
-        for (std::size_t n = 0; n < units_.size(); ++n) {
-            if (units_[n]->was_taken()) {
-                report(n);
-            }
-        }
+        report_each(units_, &Stepgen::was_taken, report);
     }
     void hold() noexcept {
         for (const auto& unit : units_) {
@@ -394,8 +372,8 @@ private:
     const ModuleAddresses addresses_;
     const DpllPins* const dpll_;
     std::vector<std::unique_ptr<Stepgen>> units_;
-    Setting master_rate_, dpll_timer_;
-    std::unique_ptr<hal::Param<std::int32_t>> timer_;
+    Setting master_rate_;
+    std::optional<LatchTimer> timer_;
     std::size_t accumulators_ = 0;
 };
 
