@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "cia301/values.hpp"
 #include "eds_reader.hpp"
 
 namespace hal::canopen::eds {
@@ -13,14 +14,6 @@ void append(std::vector<std::uint8_t>& out, std::uint64_t value, unsigned bytes)
     for (unsigned i = 0; i < bytes; ++i) {
         out.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
     }
-}
-
-std::uint64_t number_of(std::span<const std::uint8_t> bytes) {
-    std::uint64_t out = 0;
-    for (std::size_t i = 0; i < bytes.size() && i < 8; ++i) {
-        out |= std::uint64_t{bytes[i]} << (8 * i);
-    }
-    return out;
 }
 
 constexpr std::uint32_t pdo_off = 0x80000000;
@@ -141,7 +134,7 @@ private:
         }
         const std::vector<std::uint8_t> final_cob = value_of(*cob, node_);
         if (final_cob.size() == 4) {
-            add(communication.index, 1, number_of(final_cob) | pdo_off, 4);
+            add(communication.index, 1, cia301::natural_of(final_cob) | pdo_off, 4);
         }
         if (!mapped.empty()) {
             const Entry* count = mapping->find(0);
@@ -165,7 +158,7 @@ private:
                 out_.writes.push_back(std::move(write));
             }
         }
-        if (final_cob.size() == 4 && (number_of(final_cob) & pdo_off) == 0) {
+        if (final_cob.size() == 4 && (cia301::natural_of(final_cob) & pdo_off) == 0) {
             out_.writes.push_back({communication.index, 1, final_cob});
         }
     }
@@ -212,7 +205,7 @@ std::optional<std::vector<Write>> parse_concise(std::span<const std::uint8_t> by
     if (bytes.size() < 4) {
         return {};
     }
-    const std::uint64_t count = number_of(bytes.first(4));
+    const std::uint64_t count = cia301::natural_of(bytes.first(4));
     bytes = bytes.subspan(4);
     if (count > bytes.size() / head) {
         return {};
@@ -222,11 +215,12 @@ std::optional<std::vector<Write>> parse_concise(std::span<const std::uint8_t> by
         if (bytes.size() < head) {
             return {};
         }
-        const std::uint64_t size = number_of(bytes.subspan(3, 4));
+        const std::uint64_t size = cia301::natural_of(bytes.subspan(3, 4));
         if (size > bytes.size() - head) {
             return {};
         }
-        out.push_back({static_cast<std::uint16_t>(number_of(bytes.first(2))), bytes[2], {}});
+        out.push_back(
+            {static_cast<std::uint16_t>(cia301::natural_of(bytes.first(2))), bytes[2], {}});
         const auto data = bytes.subspan(head, static_cast<std::size_t>(size));
         out.back().data.assign(data.begin(), data.end());
         bytes = bytes.subspan(head + data.size());

@@ -2,6 +2,7 @@
 // Rules between objects, and modules joined to their device.
 #include <algorithm>
 
+#include "cia301/values.hpp"
 #include "eds_reader.hpp"
 
 namespace hal::canopen::eds {
@@ -68,14 +69,8 @@ private:
         const std::string& text =
             entry.parameter_value.empty() ? entry.default_value : entry.parameter_value;
         const Encoded encoded = encode(text, entry.data_type, node_);
-        if (!encoded || encoded.bytes.empty() || encoded.bytes.size() > 8) {
-            return {};
-        }
-        std::uint64_t out = 0;
-        for (std::size_t i = 0; i < encoded.bytes.size(); ++i) {
-            out |= std::uint64_t{encoded.bytes[i]} << (8 * i);
-        }
-        return out;
+        if (!encoded || encoded.bytes.empty() || encoded.bytes.size() > 8) return {};
+        return cia301::natural_of(encoded.bytes);
     }
 
     void mapping(const Object& object, bool receive) {

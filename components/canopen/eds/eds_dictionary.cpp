@@ -4,27 +4,21 @@
 #include <bit>
 #include <limits>
 
+#include "cia301/values.hpp"
+
 namespace hal::canopen::eds {
 
 namespace {
 
 std::optional<std::int64_t> limit(const std::string& text, const DataType& type) {
     const Encoded value = encode(text, type.code, 0);
-    if (!value || value.bytes.empty() || value.bytes.size() > 8) {
-        return {};
-    }
-    std::uint64_t bits = 0;
-    for (std::size_t i = 0; i < value.bytes.size(); ++i) {
-        bits |= std::uint64_t{value.bytes[i]} << (8 * i);
-    }
+    if (!value || value.bytes.empty() || value.bytes.size() > 8) return {};
+    const std::uint64_t bits = cia301::natural_of(value.bytes);
     if (type.kind == Kind::real) {
-        return std::bit_cast<std::int64_t>(
-            type.bits == 32 ? double{std::bit_cast<float>(static_cast<std::uint32_t>(bits))}
-                            : std::bit_cast<double>(bits));
+        return std::bit_cast<std::int64_t>(cia301::real_of(bits, type.bits));
     }
     if (type.kind != Kind::integer) return static_cast<std::int64_t>(bits);
-    const unsigned unused = 64 - type.bits;
-    return static_cast<std::int64_t>(bits << unused) >> unused;
+    return cia301::sign_extended(bits, type.bits);
 }
 
 std::int64_t widest(const DataType& type, bool low) {

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <iterator>
 
+#include "cia301/values.hpp"
 #include "eds_text.hpp"
 #include "text/characters.hpp"
 #include "text/find_row.hpp"
@@ -450,10 +451,7 @@ std::string spell(std::span<const std::uint8_t> bytes, std::uint16_t code) {
         }
         return out;
     }
-    std::uint64_t value = 0;
-    for (std::size_t i = 0; i < bytes.size(); ++i) {
-        value |= std::uint64_t{bytes[i]} << (8 * i);
-    }
+    const std::uint64_t value = cia301::natural_of(bytes);
     std::array<char, 64> text{};
     if (kind == Kind::real) {
         char* end = bytes.size() == 4
@@ -466,8 +464,7 @@ std::string spell(std::span<const std::uint8_t> bytes, std::uint16_t code) {
         return {text.data(), end};
     }
     if (kind == Kind::integer) {
-        const unsigned unused = 64 - type->bits;
-        return std::to_string(static_cast<std::int64_t>(value << unused) >> unused);
+        return std::to_string(cia301::sign_extended(value, type->bits));
     }
     std::snprintf(text.data(), text.size(), "0x%0*llX", static_cast<int>(2 * bytes.size()),
                   static_cast<unsigned long long>(value));
@@ -476,35 +473,16 @@ std::string spell(std::span<const std::uint8_t> bytes, std::uint16_t code) {
 
 std::optional<Comparable> comparable(std::string_view text, std::uint16_t code, unsigned node_id) {
     const DataType* type = data_type(code);
-    if (type == nullptr || trimmed(text).empty()) {
-        return {};
-    }
-    if (type->kind == Kind::real) {
-        const Encoded value = encode(text, code, node_id);
-        if (!value) {
-            return {};
-        }
-        std::uint64_t bits = 0;
-        for (std::size_t i = 0; i < value.bytes.size(); ++i) {
-            bits |= std::uint64_t{value.bytes[i]} << (8 * i);
-        }
-        return type->bits == 32 ? double{std::bit_cast<float>(static_cast<std::uint32_t>(bits))}
-                                : std::bit_cast<double>(bits);
-    }
-    if (type->kind != Kind::boolean && type->kind != Kind::integer && type->kind != Kind::natural) {
-        return {};
-    }
+    if (type == nullptr || trimmed(text).empty()) return {};
+    const bool is_number = type->kind == Kind::boolean || type->kind == Kind::integer ||
+                           type->kind == Kind::natural || type->kind == Kind::real;
+    if (!is_number) return {};
     const Encoded value = encode(text, code, node_id);
-    if (!value) {
-        return {};
-    }
-    std::uint64_t bits = 0;
-    for (std::size_t i = 0; i < value.bytes.size(); ++i) {
-        bits |= std::uint64_t{value.bytes[i]} << (8 * i);
-    }
+    if (!value) return {};
+    const std::uint64_t bits = cia301::natural_of(value.bytes);
+    if (type->kind == Kind::real) return cia301::real_of(bits, type->bits);
     if (type->kind != Kind::integer) return bits;
-    const unsigned unused = 64 - type->bits;
-    return static_cast<std::int64_t>(bits << unused) >> unused;
+    return cia301::sign_extended(bits, type->bits);
 }
 
 }  // namespace hal::canopen::eds

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "cia301/values.hpp"
+
 namespace hal::ethercat::devices {
 
 namespace {
@@ -26,8 +28,7 @@ void write(const SampledEntry& entry, std::uint64_t value) noexcept {
 std::int64_t extended(const SampledEntry& entry) noexcept {
     const std::uint64_t value = read(entry);
     if (!entry.is_signed) return static_cast<std::int64_t>(value);
-    const unsigned unused = 64 - entry.bits;
-    return static_cast<std::int64_t>(value << unused) >> unused;
+    return cia301::sign_extended(value, entry.bits);
 }
 
 /// Returns the count of a value, limited to the range of the entry. A bit is set above 0.

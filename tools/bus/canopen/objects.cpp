@@ -7,6 +7,7 @@
 #include "bus/json_text.hpp"
 #include "canopen/eds/xdd.hpp"
 #include "canopen/master/gateway/gateway_values.hpp"
+#include "cia301/values.hpp"
 #include "cli/output.hpp"
 #include "text/characters.hpp"
 #include "text/diagnostic.hpp"
@@ -54,13 +55,6 @@ std::string text_in(std::span<const std::uint8_t> bytes) {
         text.pop_back();
     }
     return text;
-}
-
-std::uint64_t natural(std::span<const std::uint8_t> bytes) {
-    std::uint64_t value = 0;
-    std::copy_n(bytes.begin(), std::min<std::size_t>(bytes.size(), 8),
-                reinterpret_cast<std::uint8_t*>(&value));
-    return value;
 }
 
 bool is_text(Type type) { return type == Type::visible_string; }
@@ -246,16 +240,17 @@ std::string number_text(std::span<const std::uint8_t> bytes, Type type, const st
 }
 
 std::string time_text(std::span<const std::uint8_t> bytes, const std::string& raw) {
-    const auto ms = natural(bytes.first(4)) & 0x0fffffff;
-    return fmt::format("{} days {:02}:{:02}:{:02}.{:03} ({})", natural(bytes.subspan(4)),
+    const auto ms = cia301::natural_of(bytes.first(4)) & 0x0fffffff;
+    return fmt::format("{} days {:02}:{:02}:{:02}.{:03} ({})", cia301::natural_of(bytes.subspan(4)),
                        ms / 3'600'000, ms / 60'000 % 60, ms / 1000 % 60, ms % 1000, raw);
 }
 
 /// Everything that up to eight bytes without a type may mean.
 std::string guesses(std::span<const std::uint8_t> bytes, const std::string& raw) {
-    const unsigned unused = 64 - 8 * static_cast<unsigned>(bytes.size());
-    const auto integer = static_cast<std::int64_t>(natural(bytes) << unused) >> unused;
-    return fmt::format("{} ({}{}{})", raw, natural(bytes),
+    const std::uint64_t number = cia301::natural_of(bytes);
+    const std::int64_t integer =
+        cia301::sign_extended(number, 8 * static_cast<unsigned>(bytes.size()));
+    return fmt::format("{} ({}{}{})", raw, number,
                        integer < 0 ? fmt::format(", or {}", integer) : "",
                        looks_like_text(bytes) ? fmt::format(", or \"{}\"", text_in(bytes)) : "");
 }
@@ -275,7 +270,8 @@ std::string bytes_text(std::span<const std::uint8_t> bytes, Type type) {
 std::string value_text(std::span<const std::uint8_t> bytes, Type type) {
     const std::size_t size = bytes.size();
     if (size == 0) return "empty (0 bytes)";
-    const std::string raw = size <= 8 ? fmt::format("0x{:0{}X}", natural(bytes), 2 * size) : "";
+    const std::string raw =
+        size <= 8 ? fmt::format("0x{:0{}X}", cia301::natural_of(bytes), 2 * size) : "";
     if (type == Type::boolean && size == 1) {
         return fmt::format("{} ({})", bytes[0] != 0 ? "true" : "false", raw);
     }
@@ -298,7 +294,7 @@ std::string value_json(std::span<const std::uint8_t> bytes, Type type) {
         return text.find_first_of("nN") == text.npos ? text : json_text(text);
     }
     if (type == Type::none && !bytes.empty() && bytes.size() <= 8) {
-        return fmt::format("{}", natural(bytes));
+        return fmt::format("{}", cia301::natural_of(bytes));
     }
     if (type == Type::none && looks_like_text(bytes)) return json_text(text_in(bytes));
     return json_text(hex_bytes(bytes, ""));

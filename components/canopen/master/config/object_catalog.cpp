@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "canopen/protocol/description.hpp"
+#include "cia301/values.hpp"
 #include "config_lines.hpp"
 
 namespace hal::canopen::config {
@@ -146,14 +147,6 @@ struct Default {
     unsigned number;
     std::initializer_list<std::uint32_t> objects;
 };
-
-std::uint64_t value_of(const std::vector<std::uint8_t>& bytes) {
-    std::uint64_t out = 0;
-    for (std::size_t i = 0; i < bytes.size() && i < 8; ++i) {
-        out |= std::uint64_t{bytes[i]} << (8 * i);
-    }
-    return out;
-}
 
 std::vector<std::uint8_t> little(std::uint64_t value, unsigned bytes) {
     std::vector<std::uint8_t> out;
@@ -319,7 +312,8 @@ bool Catalog::has(std::uint16_t index) const {
 std::uint64_t Catalog::number(std::uint16_t index, std::uint8_t sub,
                               std::uint64_t otherwise) const {
     const Known* k = find(index, sub);
-    return k == nullptr || k->value.empty() || k->value.size() > 8 ? otherwise : value_of(k->value);
+    const bool has_number = k != nullptr && !k->value.empty() && k->value.size() <= 8;
+    return has_number ? cia301::natural_of(k->value) : otherwise;
 }
 
 std::vector<std::string> Catalog::names(bool to_node) const {

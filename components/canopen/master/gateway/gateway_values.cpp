@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "canopen/eds/eds_text.hpp"
+#include "cia301/values.hpp"
 #include "text/numbers.hpp"
 #include "text/quoting.hpp"
 
@@ -66,8 +67,7 @@ std::string number_text(std::span<const std::uint8_t> bytes, const Format& forma
     } else if (format.type == Type::real64) {
         end = std::to_chars(end, limit, load<double>(bytes.data())).ptr;
     } else if (is_signed(format.type)) {
-        const unsigned unused = 64 - bits_of(format.type);
-        end = std::to_chars(end, limit, static_cast<std::int64_t>(value << unused) >> unused).ptr;
+        end = std::to_chars(end, limit, cia301::sign_extended(value, bits_of(format.type))).ptr;
     } else {
         end = std::to_chars(end, limit, value).ptr;
     }

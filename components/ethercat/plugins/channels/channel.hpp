@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "cia301/values.hpp"
 #include "ethercat/config/lcec_channel.hpp"
 #include "hal/component.hpp"
 #include "hal/pin_codec.hpp"
@@ -42,9 +43,7 @@ struct ImageField {
     bool read_bit(const SlaveImage& image) const noexcept { return (read(image) & 1) != 0; }
     /// Returns the value with its sign. [realtime]
     std::int64_t read_signed(const SlaveImage& image) const noexcept {
-        if (!present()) return 0;
-        const unsigned unused = 64 - bits;
-        return static_cast<std::int64_t>(read(image) << unused) >> unused;
+        return present() ? cia301::sign_extended(read(image), bits) : 0;
     }
     /// Writes the low bits of a value. [realtime]
     void write(const SlaveImage& image, std::uint64_t value) const noexcept {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "cia301/values.hpp"
 #include "ethercat/plugins/channels/channel.hpp"
 
 namespace hal::ethercat {
@@ -244,9 +245,8 @@ private:
     }
     /// Returns a - b in the range of the counter, which wraps.
     std::int64_t difference(std::int64_t a, std::int64_t b) const noexcept {
-        const unsigned unused = 64 - count_field_.bits;
         const auto distance = static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b);
-        return static_cast<std::int64_t>(distance << unused) >> unused;
+        return cia301::sign_extended(distance, count_field_.bits);
     }
 
     ImageField count_field_, latch_field_, set_field_, set_done_field_, set_value_field_;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "cia301/values.hpp"
 #include "ethercat/master/request_queue.hpp"
 #include "ethercat/plugins/channels/channel.hpp"
 
@@ -95,9 +96,8 @@ private:
         state_ = good ? State::known : State::unknown;
         if (good) {
             const std::uint64_t raw = read_bits(data_, 0, bits_);
-            const unsigned unused = 64 - bits_;
-            value_ = is_signed_ ? static_cast<std::int64_t>(raw << unused) >> unused
-                                : static_cast<std::int64_t>(raw);
+            value_ =
+                is_signed_ ? cia301::sign_extended(raw, bits_) : static_cast<std::int64_t>(raw);
         }
     }
 
