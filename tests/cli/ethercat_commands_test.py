@@ -175,7 +175,7 @@ class Values(Ethercat):
         )
         self.assertIn("registers are 0..0xffff", self.refused("reg-write", "-p", 1, "0x10"))
         self.assertIn(
-            "no slave at position 4; the last one of 4 is at position 3",
+            "no slave at position 4; the bus has 4, the last one at position 3",
             self.refused("reg-read", "-p", 4, "0x130"),
         )
 

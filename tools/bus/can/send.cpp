@@ -3,11 +3,10 @@
 #include "bus/can/send.hpp"
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include "bus/can/bus.hpp"
+#include "bus/can/periodic.hpp"
 #include "cli/output.hpp"
-#include "text/quoting.hpp"
 
 namespace hal::tools {
 
@@ -32,31 +31,17 @@ int run_can_send(const SendOptions& options) {
     }
     Bus bus;
     if (!bus.open(options, options.words[0], fd)) return 1;
-    std::uint64_t rounds = 0;
-    std::uint64_t wanted = 0;
-    const std::int64_t began = monotonic_ns();
-    for (std::int64_t due = began;;) {
+    const auto send = [&](std::uint64_t) {
         for (const can::Frame& f : frames) {
             send_with_timeout(bus, f);
-            ++wanted;
         }
-        bus.link->flush(can::unclocked);
-        ++rounds;
-        due += options.every_ns;
-        if (options.every_ns == 0 || rounds == options.count ||
-            (options.for_ns >= 0 && due - began >= options.for_ns)) {
-            break;
-        }
-        const std::int64_t left = due - monotonic_ns();
-        if (left > 0 ? bus.stop.wait_ns(left) : bus.stop.requested()) break;
+    };
+    if (options.every_ns == 0) {
+        send(0);
+        return finish_sending(bus, options, frames.size());
     }
-    const double seconds = static_cast<double>(monotonic_ns() - began) / 1e9;
-    const int status = finish_sending(bus, options, wanted);
-    if (status == 0 && options.every_ns != 0) {
-        write_all(STDERR_FILENO,
-                  fmt::format("{} in {:.2f} s\n", counted(wanted, "frame"), seconds));
-    }
-    return status;
+    const Repeated sent = repeat(bus, options, options.every_ns, send);
+    return finish_rounds(bus, options, sent.rounds * frames.size(), sent);
 }
 
 }  // namespace hal::tools

@@ -1,17 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstdint>
-
-#include "bus/can/bus_options.hpp"
+#include "bus/can/periodic_options.hpp"
 
 namespace hal::tools {
 
-struct SendOptions : Options {
-    std::int64_t every_ns = 0;  ///< 0: once
-    std::int64_t for_ns = -1;   ///< -1: not given
-    std::uint64_t count = 0;    ///< 0: unlimited
-
+/// `every_ns` is 0 when the frames are sent once.
+struct SendOptions : PeriodicOptions {
     void declare(OptionSet& set) override {
         set.words("ADDRESS FRAME",
                   "the bus; frames in candump format: 123#1122AABB, 18FF0001#00, 123#R4, "

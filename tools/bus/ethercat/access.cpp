@@ -159,4 +159,21 @@ std::optional<std::vector<std::uint8_t>> EthercatAccess::receive(std::int64_t un
     }
 }
 
+std::optional<std::size_t> chosen_position(const EthercatPositionOptions& options,
+                                           std::size_t slaves) {
+    if (options.position < 0 && slaves != 1) {
+        fail(options,
+             fmt::format("{} slaves on the bus; choose one with -p 0 … -p {}", slaves, slaves - 1));
+        return std::nullopt;
+    }
+    const auto position = static_cast<std::size_t>(std::max(options.position, 0));
+    if (position >= slaves) {
+        fail(options,
+             fmt::format("no slave at position {}; the bus has {}, the last one at position {}",
+                         position, slaves, slaves - 1));
+        return std::nullopt;
+    }
+    return position;
+}
+
 }  // namespace hal::tools

@@ -43,4 +43,8 @@ private:
     std::int64_t now_ns_ = 0;
 };
 
+/// Returns the position that --position names among `slaves` slaves, or that of the only one;
+/// nullopt after printing the reason.
+std::optional<std::size_t> chosen_position(const EthercatPositionOptions&, std::size_t slaves);
+
 }  // namespace hal::tools

@@ -120,21 +120,8 @@ BusSlave* EthercatSession::chosen(const EthercatPositionOptions& options) {
 
         return nullptr;
     }
-    if (options.position < 0 && size() != 1) {
-        fail(options,
-             fmt::format("{} slaves on the bus; choose one with -p 0 … -p {}", size(), size() - 1));
-
-        return nullptr;
-    }
-    const auto position = static_cast<std::size_t>(options.position < 0 ? 0 : options.position);
-    if (position >= size()) {
-        fail(options,
-             fmt::format("no slave at position {}; the bus has {}, the last one at position {}",
-                         position, size(), size() - 1));
-
-        return nullptr;
-    }
-    return &slave(position);
+    const auto position = chosen_position(options, size());
+    return position ? &slave(*position) : nullptr;
 }
 
 bool EthercatSession::set_boot(const EthercatOptions& options, BusSlave& s, bool boot) {

@@ -181,20 +181,8 @@ bool EthercatWire::open(const EthercatOptions& options, bool alone) {
 }
 
 ethercat::master::BusSlave* EthercatWire::chosen(const EthercatPositionOptions& options) {
-    if (options.position < 0 && size() != 1) {
-        fail(options,
-             fmt::format("{} slaves on the bus; choose one with -p 0 … -p {}", size(), size() - 1));
-
-        return nullptr;
-    }
-    const auto position = static_cast<std::size_t>(options.position < 0 ? 0 : options.position);
-    if (position >= size()) {
-        fail(options, fmt::format("no slave at position {}; the last one of {} is at position {}",
-                                  position, size(), size() - 1));
-
-        return nullptr;
-    }
-    return &slaves_[position];
+    const auto position = chosen_position(options, size());
+    return position ? &slaves_[*position] : nullptr;
 }
 
 bool EthercatWire::without_arguments(const EthercatOptions& options) const {
