@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fmt/core.h>
+#include <numeric>
 #include <vector>
 
 #include "cli/output.hpp"
@@ -172,6 +173,32 @@ std::string instance_with(const std::map<std::string, StationPins>& instances,
     return {};
 }
 
+/// The line of ping number `done`.
+std::string line_of(const Pinger& pinger, Outcome outcome, const std::string& station,
+                    std::uint64_t done) {
+    if (outcome != Outcome::answered) {
+        return fmt::format("{} {}: {}\n", station, done, to_string(outcome));
+    }
+    return fmt::format(
+        "{} {}: {:.2f} us, {:.2f} cycles; {:.2f} us of it at {}, {:.2f} us each way\n", station,
+        done, pinger.time(), pinger.cycles(), pinger.held(), station,
+        (pinger.time() - pinger.held()) / 2);
+}
+
+/// The last line. `times` are those of the answered pings, in us; `done` is not 0.
+std::string summary(const std::string& instance, std::uint64_t done,
+                    const std::vector<double>& times) {
+    const std::uint64_t lost = done - times.size();
+    const std::string text = fmt::format(
+        "{} from {}, {} answered, {} lost ({:.0f} %)", counted(done, "ping"), instance,
+        times.size(), lost, 100.0 * static_cast<double>(lost) / static_cast<double>(done));
+    if (times.empty()) return text + "\n";
+    const auto [min, max] = std::minmax_element(times.begin(), times.end());
+    const double sum = std::accumulate(times.begin(), times.end(), 0.0);
+    return fmt::format("{}; min {:.2f}, mean {:.2f}, max {:.2f} us\n", text, *min,
+                       sum / static_cast<double>(times.size()), *max);
+}
+
 }  // namespace
 
 int run_tdma_ping(const TdmaPingOptions& options) {
@@ -179,23 +206,17 @@ int run_tdma_ping(const TdmaPingOptions& options) {
         return fail(options, "exactly one station is required: hal tdma ping STATION");
     }
     StopRequest stop;
-    std::string problem;
-    const auto client = Client::connect(instance_wanted(options.name), problem);
-    if (!client) return fail(options, problem);
-    const auto instances = stations_of(*client, problem);
+    SegmentMachine machine;
+    std::string problem = machine.connect(options.name);
     if (!problem.empty()) return fail(options, problem);
-    if (instances.empty()) {
-        return fail(options, fmt::format("instance '{}' has no station of a segment (loadrt tdma)",
-                                         client->instance()));
-    }
-    const std::string instance = instance_with(instances, options, problem);
+    const std::string instance = instance_with(machine.instances, options, problem);
     if (instance.empty()) return fail(options, problem);
     const std::string& station = options.words.front();
-    if (!is_on(instances.at(instance), "running")) {
+    if (!is_on(machine.instances.at(instance), "running")) {
         return fail(options, fmt::format("{} is not running; see: hal tdma status", instance));
     }
 
-    Pinger pinger(*client, instance, station);
+    Pinger pinger(*machine.client, instance, station);
     std::vector<double> times;
     std::uint64_t done = 0;
     Outcome last = Outcome::none;
@@ -205,40 +226,20 @@ int run_tdma_ping(const TdmaPingOptions& options) {
         last = pinger.ask(stop, problem);
         if (last == Outcome::none) break;
         ++done;
-        std::string line = fmt::format("{} {}: {}\n", station, done, to_string(last));
         if (last == Outcome::answered) {
             times.push_back(pinger.time());
-            line = fmt::format(
-                "{} {}: {:.2f} us, {:.2f} cycles; {:.2f} us of it at {}, {:.2f} us each way\n",
-                station, done, pinger.time(), pinger.cycles(), pinger.held(), station,
-                (pinger.time() - pinger.held()) / 2);
         }
-        if (!print(line)) return 1;
+        if (!print(line_of(pinger, last, station, done))) return 1;
     }
     if (!problem.empty()) return fail(options, problem);
-    if (done == 0) {
-        return 1;  // Ctrl-C
-    }
-    const std::uint64_t lost = done - times.size();
-    std::string text = fmt::format("{} from {}, {} answered, {} lost ({:.0f} %)",
-                                   counted(done, "ping"), instance, times.size(), lost,
-                                   100.0 * static_cast<double>(lost) / static_cast<double>(done));
-    if (!times.empty()) {
-        const auto [min, max] = std::minmax_element(times.begin(), times.end());
-        double sum = 0;
-        for (const double t : times) {
-            sum += t;
-        }
-        text += fmt::format("; min {:.2f}, mean {:.2f}, max {:.2f} us", *min,
-                            sum / static_cast<double>(times.size()), *max);
-    }
-    if (!print(text + "\n")) return 1;
+    if (done == 0) return 1;  // Ctrl-C
+    if (!print(summary(instance, done, times))) return 1;
     if (!times.empty()) return 0;
-    const auto now = stations_of(*client, problem);
+    const auto now = stations_of(*machine.client, problem);
     const auto pins = now.find(instance);
-    return fail(options,
-                explanation(last, pins == now.end() ? instances.at(instance) : pins->second,
-                            instance, station));
+    const bool is_gone = pins == now.end();
+    return fail(options, explanation(last, is_gone ? machine.instances.at(instance) : pins->second,
+                                     instance, station));
 }
 
 }  // namespace hal::tools

@@ -120,23 +120,27 @@ std::map<std::string, Pins> stations_of(Client& client, std::string& problem) {
     return instances;
 }
 
+std::string SegmentMachine::connect(const std::string& name) {
+    std::string problem;
+    client = Client::connect(instance_wanted(name), problem);
+    if (!client) return problem;
+    instances = stations_of(*client, problem);
+    if (!problem.empty() || !instances.empty()) return problem;
+    return fmt::format("instance '{}' has no station of a segment (loadrt tdma)",
+                       client->instance());
+}
+
 int run_tdma_status(const TdmaStatusOptions& options) {
     if (!options.words.empty()) {
         return fail(options, fmt::format("unexpected '{}'; see: hal help tdma status",
                                          options.words.front()));
     }
-    std::string problem;
-    const auto client = Client::connect(instance_wanted(options.name), problem);
-    if (!client) return fail(options, problem);
-    const auto instances = stations_of(*client, problem);
+    SegmentMachine machine;
+    const std::string problem = machine.connect(options.name);
     if (!problem.empty()) return fail(options, problem);
-    if (instances.empty()) {
-        return fail(options, fmt::format("instance '{}' has no station of a segment (loadrt tdma)",
-                                         client->instance()));
-    }
-    if (options.json) return exit_code(print(json(instances).dump() + "\n"));
+    if (options.json) return exit_code(print(json(machine.instances).dump() + "\n"));
     std::string text;
-    for (const auto& [instance, pins] : instances) {
+    for (const auto& [instance, pins] : machine.instances) {
         text += rows(instance, pins);
     }
     return exit_code(print(text));

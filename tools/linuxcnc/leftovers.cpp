@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <fmt/core.h>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 #include <sys/file.h>
 #include <sys/ipc.h>
@@ -21,6 +20,7 @@
 #include <unistd.h>
 
 #include "cli/output.hpp"
+#include "linuxcnc/nml_buffers.hpp"
 #include "text/folder_entries.hpp"
 #include "text/numbers.hpp"
 
@@ -83,6 +83,28 @@ constexpr const char* one_machine =
 std::string temporary_folder() {
     const char* const named = std::getenv("TMPDIR");
     return named && *named ? named : "/tmp";
+}
+
+/// Removes the System V segment of this user with that key. Returns false while it is used.
+bool remove_segment(key_t key) {
+    const int id = ::shmget(key, 0, 0);
+    if (id < 0) return true;
+    shmid_ds segment{};
+    const bool is_known = ::shmctl(id, IPC_STAT, &segment) == 0;
+    if (segment.shm_nattch != 0) return false;
+    if (is_known && segment.shm_perm.uid == ::geteuid()) {
+        ::shmctl(id, IPC_RMID, nullptr);
+    }
+    return true;
+}
+
+void remove_semaphores(key_t key) {
+    const int set = ::semget(key, 0, 0);
+    semid_ds semaphores{};
+    if (set >= 0 && ::semctl(set, 0, IPC_STAT, &semaphores) == 0 &&
+        semaphores.sem_perm.uid == ::geteuid()) {
+        ::semctl(set, 0, IPC_RMID);
+    }
 }
 
 }  // namespace
@@ -200,29 +222,15 @@ void remove_segments(const Configuration& configuration) {
     if (motion) {
         keys.push_back(static_cast<key_t>(*motion));
     }
-    std::ifstream file(configuration.nml);
-    for (std::string line;
-         std::getline(file, line);) {  // B NAME SHMEM HOST SIZE 0 0 NUMBER PROCESSES KEY …
-        std::istringstream in(line);
-        const std::vector<std::string> words{std::istream_iterator<std::string>(in), {}};
-        if (words.size() < 10 || words[0] != "B" || words[2] != "SHMEM") continue;
-        if (const auto key = parse_natural(words[9])) {
-            keys.push_back(static_cast<key_t>(*key));
+    for (const NmlBuffer& buffer : shared_nml_buffers(configuration.nml)) {
+        if (buffer.key) {
+            keys.push_back(*buffer.key);
         }
     }
     for (const key_t key : keys) {
-        shmid_ds segment{};
-        const int id = ::shmget(key, 0, 0);
-        if (id >= 0 && ::shmctl(id, IPC_STAT, &segment) == 0 && segment.shm_nattch == 0 &&
-            segment.shm_perm.uid == ::geteuid()) {
-            ::shmctl(id, IPC_RMID, nullptr);
-        }
-        if (id >= 0 && segment.shm_nattch != 0) continue;
-        semid_ds semaphores{};
-        const int set = key == static_cast<key_t>(motion.value_or(0)) ? -1 : ::semget(key, 0, 0);
-        if (set >= 0 && ::semctl(set, 0, IPC_STAT, &semaphores) == 0 &&
-            semaphores.sem_perm.uid == ::geteuid()) {
-            ::semctl(set, 0, IPC_RMID);
+        const bool has_semaphores = key != static_cast<key_t>(motion.value_or(0));
+        if (remove_segment(key) && has_semaphores) {
+            remove_semaphores(key);
         }
     }
 }

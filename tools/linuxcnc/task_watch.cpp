@@ -3,14 +3,11 @@
 
 #include <algorithm>
 #include <cstring>
-#include <fstream>
-#include <iterator>
-#include <sstream>
 #include <sys/ipc.h>
 #include <sys/shm.h>
 #include <vector>
 
-#include "text/numbers.hpp"
+#include "linuxcnc/nml_buffers.hpp"
 
 namespace hal::tools {
 
@@ -31,23 +28,12 @@ struct Buffer {
 
 /// The buffer of that name in an NML configuration; key -1: there is none in shared memory.
 Buffer buffer_of(const std::string& nml, const std::string& name) {
-    std::ifstream file(nml);
-    // B NAME SHMEM HOST SIZE 0 0 NUMBER PROCESSES KEY …
-    for (std::string line; std::getline(file, line);) {
-        std::istringstream in(line);
-        const std::vector<std::string> words{std::istream_iterator<std::string>(in), {}};
-        if (words.size() < 10 || words[0] != "B" || words[1] != name || words[2] != "SHMEM") {
-            continue;
-        }
-        const auto processes = parse_natural(words[8]);
-        const auto key = parse_natural(words[9]);
-        if (!key || !processes || *processes > max_processes) {
-            return {};
-        }
-        return {static_cast<key_t>(*key),
-                name_bytes + static_cast<std::size_t>(*processes) + sizeof(std::int64_t)};
-    }
-    return {};
+    const std::vector<NmlBuffer> all = shared_nml_buffers(nml);
+    const auto found = std::ranges::find(all, name, &NmlBuffer::name);
+    const bool is_usable =
+        found != all.end() && found->key && found->processes && *found->processes <= max_processes;
+    if (!is_usable) return {};
+    return {*found->key, name_bytes + *found->processes + sizeof(std::int64_t)};
 }
 
 std::int64_t number_at(const char* memory) {

@@ -118,6 +118,20 @@ std::string described(const Message& descriptor) {
     return packed(message);
 }
 
+Message event_of(std::uint64_t type, std::uint64_t interned_name, std::uint64_t track,
+                 const std::vector<Annotation>& annotations) {
+    Message event;
+    event.number(event::type, type)
+        .number(event::name_iid, interned_name)
+        .number(event::track, track);
+    for (const auto& one : annotations) {
+        Message annotation;
+        annotation.text(annotation::name, one.name).number(annotation::uint, one.value);
+        event.message(event::annotations, annotation);
+    }
+    return event;
+}
+
 std::string frame_name(const ThreadEvent& frame) {
     const bool sent =
         frame.kind == ThreadEvent::can_sent || frame.kind == ThreadEvent::ethernet_sent;
@@ -188,15 +202,8 @@ std::uint64_t PerfettoWriter::interned(const std::string& name, Message& to) {
 
 void PerfettoWriter::slice(std::string& out, std::uint64_t track, std::int64_t begin_ns,
                            const std::string& name, const std::vector<Annotation>& annotations) {
-    Message message = packet_at(begin_ns), event;
-    event.number(event::type, slice_begin)
-        .number(event::name_iid, interned(name, message))
-        .number(event::track, track);
-    for (const Annotation& one : annotations) {
-        Message annotation;
-        annotation.text(annotation::name, one.name).number(annotation::uint, one.value);
-        event.message(event::annotations, annotation);
-    }
+    Message message = packet_at(begin_ns);
+    const Message event = event_of(slice_begin, interned(name, message), track, annotations);
     out += packed(message.message(packet::track_event, event));
 }
 
@@ -209,15 +216,8 @@ void PerfettoWriter::end(std::string& out, std::uint64_t track, std::int64_t tim
 void PerfettoWriter::mark(std::string& out, std::uint64_t track, std::int64_t time_ns,
                           const std::string& name, const std::vector<Annotation>& annotations,
                           const std::string& text) {
-    Message message = packet_at(time_ns), event;
-    event.number(event::type, instant_event)
-        .number(event::name_iid, interned(name, message))
-        .number(event::track, track);
-    for (const Annotation& one : annotations) {
-        Message annotation;
-        annotation.text(annotation::name, one.name).number(annotation::uint, one.value);
-        event.message(event::annotations, annotation);
-    }
+    Message message = packet_at(time_ns);
+    Message event = event_of(instant_event, interned(name, message), track, annotations);
     if (!text.empty()) {
         Message annotation;
         annotation.text(annotation::name, "text").text(annotation::string, text);

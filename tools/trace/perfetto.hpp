@@ -56,6 +56,12 @@ struct ClockReading {
     std::int64_t boottime_ns = 0;
 };
 
+/// A number beside an event.
+struct Annotation {
+    const char* name;
+    std::uint64_t value;
+};
+
 /// Turns events into packets. All packets belong to one sequence, which begins with begin().
 class PerfettoWriter {
 public:
@@ -76,10 +82,6 @@ public:
     static std::string switches(const std::vector<Switch>& all);
 
 private:
-    struct Annotation {
-        const char* name;
-        std::uint64_t value;
-    };
     std::uint64_t track(const TraceThread& thread, std::string& out);
     std::uint64_t interned(const std::string& name, Message& packet);
     void slice(std::string& out, std::uint64_t track, std::int64_t begin_ns,
