@@ -79,6 +79,11 @@ struct Frame {
         return {data.data(), length < 64 ? length : std::size_t{64}};
     }
 
+    /// Returns true for a classic frame with an 11-bit identifier, the kind that CANopen and SCoCAN
+    /// use. [any]
+    bool is_standard() const noexcept { return !extended && !fd && !error; }
+    /// Returns true for a data frame of that kind. [any]
+    bool is_standard_data() const noexcept { return is_standard() && !remote; }
     /// Returns true for a frame that a controller can send (ISO 11898-1). [any]
     bool valid() const noexcept;
     /// Returns true when the frames are equal on the bus; times and flags of origin are ignored.

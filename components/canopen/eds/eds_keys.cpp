@@ -112,14 +112,31 @@ std::string Keys::text(IniSection& section, std::string_view key) {
     return found->value;
 }
 
-std::string Keys::bare(IniSection& section, std::string_view key) {
-    IniKey* found = section.find(key);
-    if (found == nullptr) {
-        return {};
+IniKey* Keys::read(IniSection& section, std::string_view key) {
+    IniKey* const found = section.find(key);
+    if (found != nullptr) {
+        found->used = true;
+        cut_comment(*found);
     }
-    found->used = true;
-    cut_comment(*found);
-    return found->value;
+    return found;
+}
+
+IniKey* Keys::read_value(IniSection& section, std::string_view key, const std::string& what,
+                         const char* consequence) {
+    IniKey* const found = read(section, key);
+    if (found != nullptr && !found->value.empty()) return found;
+    if (consequence != nullptr) {
+        const Span at = found != nullptr ? found->value_at : section.at;
+        const char* const problem = found != nullptr ? "empty" : "missing";
+        report(Severity::warning, Topic::missing, at,
+               "'" + std::string(key) + "' of " + what + " is " + problem, consequence);
+    }
+    return nullptr;
+}
+
+std::string Keys::bare(IniSection& section, std::string_view key) {
+    const IniKey* const found = read(section, key);
+    return found != nullptr ? found->value : std::string();
 }
 
 std::optional<std::uint64_t> Keys::parse(IniSection& section, IniKey& key, std::uint64_t max) {
@@ -170,11 +187,8 @@ std::optional<std::uint64_t> Keys::number(IniSection& section, std::string_view 
 }
 
 bool Keys::flag(IniSection& section, std::string_view key, bool otherwise) {
-    IniKey* found = section.find(key);
-    if (found == nullptr) return otherwise;
-    found->used = true;
-    cut_comment(*found);
-    if (found->value.empty()) return otherwise;
+    const IniKey* const found = read(section, key);
+    if (found == nullptr || found->value.empty()) return otherwise;
     const auto number = parse_number(found->value);
     if (number && !number->node_id && number->magnitude < 2) return number->magnitude == 1;
     for (const std::string_view word : {"true", "yes", "y", "no", "false", "n"}) {

@@ -37,6 +37,12 @@ public:
                 std::string help = "") {
         messages_.push_back({severity, topic, at, std::move(sentence), std::move(help)});
     }
+    /// Returns a key that is being read, without a trailing comment; nullptr if it is missing.
+    IniKey* read(IniSection& section, std::string_view key);
+    /// Returns a key that is being read and has a value; nullptr if it has none. Reports that of
+    /// the key of `what` unless `consequence` is nullptr.
+    IniKey* read_value(IniSection& section, std::string_view key, const std::string& what,
+                       const char* consequence);
     /// Returns the value as written; empty if the key is missing.
     std::string text(IniSection& section, std::string_view key);
     /// Returns the value without a trailing comment.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "eds_reader.hpp"
+#include "text/find_row.hpp"
 
 namespace hal::canopen::eds {
 
@@ -60,25 +61,19 @@ constexpr TypeWord object_types[] = {
 }  // namespace
 
 std::string_view name_of(ObjectType type) {
-    for (const TypeWord& row : object_types) {
-        if (row.type == type) return row.word;
-    }
-    return "?";
+    const TypeWord* const row = find_row(object_types, type, &TypeWord::type);
+    return row != nullptr ? row->word : "?";
 }
 
 std::string_view name_of(Access access) {
-    for (const AccessWord& row : access_words) {
-        if (row.access == access) return row.word;
-    }
-    return "?";
+    const AccessWord* const row = find_row(access_words, access, &AccessWord::access);
+    return row != nullptr ? row->word : "?";
 }
 
 ObjectType EntryReader::object_type(IniSection& section, const std::string& what, bool& given) {
-    IniKey* key = section.find("ObjectType");
+    IniKey* const key = keys_.read(section, "ObjectType");
     given = key != nullptr;
     if (key == nullptr) return ObjectType::var;
-    key->used = true;
-    keys_.cut_comment(*key);
     if (key->value.empty()) {
         given = false;
         keys_.report(Severity::warning, Topic::missing, key->value_at,
@@ -107,21 +102,12 @@ ObjectType EntryReader::object_type(IniSection& section, const std::string& what
 }
 
 std::uint16_t EntryReader::data_type_of(IniSection& section, const std::string& what, bool needed) {
-    IniKey* key = section.find("DataType");
-    if (key != nullptr) {
-        key->used = true;
-        keys_.cut_comment(*key);
-    }
-    if (key == nullptr || key->value.empty()) {
-        if (needed) {
-            keys_.report(Severity::warning, Topic::missing,
-                         key != nullptr ? key->value_at : section.at,
-                         "'DataType' of " + what + " is " + (key != nullptr ? "empty" : "missing"),
-                         "without it the object is read and written as raw bytes; write "
-                         "DataType=0x0007 for UNSIGNED32");
-        }
-        return 0;
-    }
+    IniKey* const key = keys_.read_value(
+        section, "DataType", what,
+        needed ? "without it the object is read and written as raw bytes; write DataType=0x0007 "
+                 "for UNSIGNED32"
+               : nullptr);
+    if (key == nullptr) return 0;
     if (const DataType* named = data_type(std::string_view(key->value)); named != nullptr) {
         keys_.report(Severity::warning, Topic::object, key->value_at,
                      "'DataType' of " + what + " is a name, not a number",
@@ -140,20 +126,10 @@ std::uint16_t EntryReader::data_type_of(IniSection& section, const std::string& 
 }
 
 Access EntryReader::access_of(IniSection& section, const std::string& what, bool needed) {
-    IniKey* key = section.find("AccessType");
-    if (key != nullptr) {
-        key->used = true;
-        keys_.cut_comment(*key);
-    }
-    if (key == nullptr || key->value.empty()) {
-        if (needed) {
-            keys_.report(
-                Severity::warning, Topic::missing, key != nullptr ? key->value_at : section.at,
-                "'AccessType' of " + what + " is " + (key != nullptr ? "empty" : "missing"),
-                "read as rw; the access types are ro, wo, rw, rwr, rww, const");
-        }
-        return Access::rw;
-    }
+    IniKey* const key = keys_.read_value(
+        section, "AccessType", what,
+        needed ? "read as rw; the access types are ro, wo, rw, rwr, rww, const" : nullptr);
+    if (key == nullptr) return Access::rw;
     for (const AccessWord& row : access_words) {
         if (!same_word(row.word, key->value)) continue;
         if (!row.proper) {

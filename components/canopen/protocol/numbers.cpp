@@ -3,16 +3,29 @@
 
 #include <array>
 
+#include "text/text_table.hpp"
+
 namespace hal::canopen {
 
 const char* to_string(NmtState state) noexcept {
-    switch (state) {
-    case NmtState::initialising: return "initialising";
-    case NmtState::stopped: return "stopped";
-    case NmtState::operational: return "operational";
-    case NmtState::pre_operational: return "pre-operational";
-    }
-    return "unknown";
+    constexpr TextRow<NmtState> texts[] = {
+        {NmtState::initialising, "initialising"},
+        {NmtState::stopped, "stopped"},
+        {NmtState::operational, "operational"},
+        {NmtState::pre_operational, "pre-operational"},
+    };
+    return find_text(texts, state, "unknown");
+}
+
+const char* to_string(NmtCommand command) noexcept {
+    constexpr TextRow<NmtCommand> texts[] = {
+        {NmtCommand::start, "start"},
+        {NmtCommand::stop, "stop"},
+        {NmtCommand::enter_pre_operational, "enter pre-operational"},
+        {NmtCommand::reset_node, "reset node"},
+        {NmtCommand::reset_communication, "reset communication"},
+    };
+    return find_text(texts, command, nullptr);
 }
 
 namespace {

@@ -55,6 +55,9 @@ enum class NmtCommand : std::uint8_t {
     reset_node = 0x81,
     reset_communication = 0x82,
 };
+/// Returns the name of the command, such as "enter pre-operational"; nullptr for an undefined
+/// value. [any]
+const char* to_string(NmtCommand) noexcept;
 
 /// Bits 31, 30 and 29 of a COB-ID object (1005h, 1014h, 1400h:1, …); the meaning of bit 30 depends
 /// on the object.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
 
 namespace hal::modbus {
 
@@ -103,18 +104,12 @@ Answer decode(const Pdu& request, std::span<const std::uint8_t> answer, bool hua
 }
 
 const char* exception_name(std::uint8_t code) noexcept {
-    switch (code) {
-    case 1: return "illegal function";
-    case 2: return "illegal data address";
-    case 3: return "illegal data value";
-    case 4: return "device failure";
-    case 5: return "acknowledge, the request takes long";
-    case 6: return "device busy";
-    case 8: return "memory parity error";
-    case 10: return "gateway path unavailable";
-    case 11: return "gateway target does not respond";
-    default: return "unknown exception";
-    }
+    constexpr const char* names[] = {
+        "unknown exception",  "illegal function",         "illegal data address",
+        "illegal data value", "device failure",           "acknowledge, the request takes long",
+        "device busy",        "unknown exception",        "memory parity error",
+        "unknown exception",  "gateway path unavailable", "gateway target does not respond"};
+    return names[code < std::size(names) ? code : 0];
 }
 
 std::string request_text(const Pdu& request) {

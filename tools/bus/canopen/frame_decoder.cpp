@@ -60,22 +60,11 @@ std::string block_segment(const Frame& f) {
                        (f.data[0] & 0x80) != 0 ? ", the last" : "");
 }
 
-const char* name_of(canopen::NmtCommand command) {
-    switch (command) {
-    case canopen::NmtCommand::start: return "start";
-    case canopen::NmtCommand::stop: return "stop";
-    case canopen::NmtCommand::enter_pre_operational: return "enter pre-operational";
-    case canopen::NmtCommand::reset_node: return "reset node";
-    case canopen::NmtCommand::reset_communication: return "reset communication";
-    }
-    return nullptr;
-}
-
 DecodedFrame nmt(const Frame& f) {
     if (f.remote || f.length != 2) {
         return {FrameKind::nmt, "NMT with a wrong length: it has 2 bytes"};
     }
-    const char* const known = name_of(static_cast<canopen::NmtCommand>(f.data[0]));
+    const char* const known = canopen::to_string(static_cast<canopen::NmtCommand>(f.data[0]));
     const std::string command = known ? known : fmt::format("unknown command 0x{:02X}", f.data[0]);
     const std::string who = f.data[1] == 0 ? "all nodes" : fmt::format("node {}", f.data[1]);
     return {FrameKind::nmt, fmt::format("NMT {}: {}", command, who)};
@@ -299,7 +288,7 @@ DecodedFrame FrameDecoder::answer(unsigned node, const Frame& f) {
 
 DecodedFrame FrameDecoder::decode(const Frame& f) {
     if (f.error) return {FrameKind::error, error_frame_text(f)};
-    const ServiceRow* const row = f.extended || f.fd ? nullptr : find_service(f.id);
+    const ServiceRow* const row = f.is_standard() ? find_service(f.id) : nullptr;
     if (row == nullptr) return {};
     const unsigned node = f.id & 0x7f;
     switch (row->service) {

@@ -41,7 +41,7 @@ struct Heard {
 using Nodes = std::map<unsigned, Heard>;
 
 void take(Nodes& nodes, const can::Frame& f) {
-    if (f.own || f.error || f.extended || f.remote || f.fd) return;
+    if (f.own || !f.is_standard_data()) return;
     if (f.id > 0x700 && f.id < 0x780 && f.length == 1) {
         Heard& n = nodes[f.id & 0x7f];
         if (f.data[0] == 0) {

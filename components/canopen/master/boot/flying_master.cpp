@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "flying_master.hpp"
 
+#include "text/text_table.hpp"
+
 namespace hal::canopen {
 
 namespace {
@@ -18,15 +20,15 @@ constexpr std::uint32_t heartbeats = 0x700;
 }  // namespace
 
 const char* to_string(FlyingMaster::State s) noexcept {
-    switch (s) {
-    case FlyingMaster::State::off: return "off";
-    case FlyingMaster::State::waiting: return "waiting";
-    case FlyingMaster::State::asking: return "asking for the active master";
-    case FlyingMaster::State::negotiating: return "negotiating";
-    case FlyingMaster::State::passive: return "passive";
-    case FlyingMaster::State::active: return "active";
-    }
-    return "?";
+    constexpr TextRow<FlyingMaster::State> texts[] = {
+        {FlyingMaster::State::off, "off"},
+        {FlyingMaster::State::waiting, "waiting"},
+        {FlyingMaster::State::asking, "asking for the active master"},
+        {FlyingMaster::State::negotiating, "negotiating"},
+        {FlyingMaster::State::passive, "passive"},
+        {FlyingMaster::State::active, "active"},
+    };
+    return find_text(texts, s, "?");
 }
 
 std::vector<std::string> problems_of(const FlyingSetup& s) {
@@ -118,7 +120,7 @@ void FlyingMaster::heard_master(std::uint8_t priority, std::uint8_t id, Time now
 }
 
 bool FlyingMaster::handle(const Frame& f, Time now) noexcept {
-    if (f.error || f.extended || f.fd || f.remote) return false;
+    if (!f.is_standard_data()) return false;
     if (state_ == State::passive && f.id == heartbeats + master_) {
         heard_ = now;
         return false;

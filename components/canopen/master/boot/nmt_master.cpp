@@ -166,7 +166,7 @@ bool Master::remove(std::uint8_t id, Time now) noexcept {
 
 bool Master::handle(const Frame& f, Time now) noexcept {
     now_ = now;
-    if (f.error || f.extended || f.fd) return false;
+    if (!f.is_standard()) return false;
     if (f.id == 0) {
         if (f.remote) return false;
         if (f.length == 2) {

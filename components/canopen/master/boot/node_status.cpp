@@ -7,65 +7,66 @@
 #include <cstring>
 
 #include "canopen/protocol/emcy.hpp"
+#include "text/text_table.hpp"
 
 namespace hal::canopen {
 
 const char* to_string(Step s) noexcept {
-    switch (s) {
-    case Step::off: return "off";
-    case Step::queued: return "queued";
-    case Step::resetting: return "resetting";
-    case Step::identifying: return "identifying";
-    case Step::checking_state: return "checking its state";
-    case Step::checking_program: return "checking its program";
-    case Step::updating: return "updating its program";
-    case Step::restoring: return "restoring its defaults";
-    case Step::configuring: return "configuring";
-    case Step::saving: return "saving";
-    case Step::watching: return "waiting for its heartbeat";
-    case Step::ready: return "ready";
-    case Step::starting: return "starting";
-    case Step::running: return "running";
-    case Step::waiting: return "waiting";
-    case Step::failed: return "failed";
-    case Step::stopped: return "stopped";
-    }
-    return "?";
+    constexpr TextRow<Step> texts[] = {
+        {Step::off, "off"},
+        {Step::queued, "queued"},
+        {Step::resetting, "resetting"},
+        {Step::identifying, "identifying"},
+        {Step::checking_state, "checking its state"},
+        {Step::checking_program, "checking its program"},
+        {Step::updating, "updating its program"},
+        {Step::restoring, "restoring its defaults"},
+        {Step::configuring, "configuring"},
+        {Step::saving, "saving"},
+        {Step::watching, "waiting for its heartbeat"},
+        {Step::ready, "ready"},
+        {Step::starting, "starting"},
+        {Step::running, "running"},
+        {Step::waiting, "waiting"},
+        {Step::failed, "failed"},
+        {Step::stopped, "stopped"},
+    };
+    return find_text(texts, s, "?");
 }
 
 const char* to_string(BootResult r) noexcept {
-    switch (r) {
-    case BootResult::none: return "not booted yet";
-    case BootResult::good: return "booted";
-    case BootResult::not_listed: return "not in the network list";
-    case BootResult::no_answer: return "no response";
-    case BootResult::device_type: return "wrong device type";
-    case BootResult::vendor: return "wrong vendor";
-    case BootResult::no_heartbeat: return "no heartbeat while its state was checked";
-    case BootResult::no_guarding: return "no response to node guarding";
-    case BootResult::no_program: return "program or program objects missing";
-    case BootResult::no_update: return "wrong program, update not allowed";
-    case BootResult::update: return "program download failed";
-    case BootResult::configuration: return "configuration failed";
-    case BootResult::watching: return "no heartbeat at the start of error control";
-    case BootResult::was_operational: return "already operational";
-    case BootResult::product: return "wrong product";
-    case BootResult::revision: return "wrong revision";
-    case BootResult::serial: return "wrong serial number";
-    }
-    return "?";
+    constexpr TextRow<BootResult> texts[] = {
+        {BootResult::none, "not booted yet"},
+        {BootResult::good, "booted"},
+        {BootResult::not_listed, "not in the network list"},
+        {BootResult::no_answer, "no response"},
+        {BootResult::device_type, "wrong device type"},
+        {BootResult::vendor, "wrong vendor"},
+        {BootResult::no_heartbeat, "no heartbeat while its state was checked"},
+        {BootResult::no_guarding, "no response to node guarding"},
+        {BootResult::no_program, "program or program objects missing"},
+        {BootResult::no_update, "wrong program, update not allowed"},
+        {BootResult::update, "program download failed"},
+        {BootResult::configuration, "configuration failed"},
+        {BootResult::watching, "no heartbeat at the start of error control"},
+        {BootResult::was_operational, "already operational"},
+        {BootResult::product, "wrong product"},
+        {BootResult::revision, "wrong revision"},
+        {BootResult::serial, "wrong serial number"},
+    };
+    return find_text(texts, r, "?");
 }
 
 const char* to_string(NetworkState s) noexcept {
-    switch (s) {
-    case NetworkState::off: return "off";
-    case NetworkState::booting: return "booting";
-    case NetworkState::operational: return "operational";
-    case NetworkState::degraded: return "degraded";
-    case NetworkState::stopped: return "stopped";
-    case NetworkState::failed: return "failed";
-    }
-    return "?";
+    constexpr TextRow<NetworkState> texts[] = {
+        {NetworkState::off, "off"},
+        {NetworkState::booting, "booting"},
+        {NetworkState::operational, "operational"},
+        {NetworkState::degraded, "degraded"},
+        {NetworkState::stopped, "stopped"},
+        {NetworkState::failed, "failed"},
+    };
+    return find_text(texts, s, "?");
 }
 
 namespace {
@@ -106,40 +107,34 @@ const char* identity(std::uint16_t index, std::uint8_t sub) {
 
 /// Returns the meaning of the error code in 1F57h, bits 7 to 1 (CiA 302-3).
 const char* flash_error_text(std::uint64_t status) {
-    switch (status >> 1 & 0x7f) {
-    case 1: return "no valid program";
-    case 2: return "unknown data format";
-    case 3: return "data format error or CRC error";
-    case 4: return "flash not erased before writing";
-    case 5: return "flash write error";
-    case 6: return "address out of range";
-    case 7: return "flash write-protected";
-    default: return "unspecified error";
-    }
+    constexpr TextRow<std::uint64_t> texts[] = {
+        {1, "no valid program"},
+        {2, "unknown data format"},
+        {3, "data format error or CRC error"},
+        {4, "flash not erased before writing"},
+        {5, "flash write error"},
+        {6, "address out of range"},
+        {7, "flash write-protected"},
+    };
+    return find_text(texts, status >> 1 & 0x7f, "unspecified error");
 }
 
 const char* during(Step s) {
-    switch (s) {
-    case Step::identifying: return "while it was identified";
-    case Step::checking_state: return "while its state was checked";
-    case Step::checking_program: return "while its program was checked";
-    case Step::updating: return "while its program was updated";
-    case Step::restoring: return "while its defaults were restored";
-    case Step::saving: return "while it saved its configuration";
-    case Step::watching: return "at the start of error control";
-    default: return "while it was configured";
-    }
+    constexpr TextRow<Step> texts[] = {
+        {Step::identifying, "while it was identified"},
+        {Step::checking_state, "while its state was checked"},
+        {Step::checking_program, "while its program was checked"},
+        {Step::updating, "while its program was updated"},
+        {Step::restoring, "while its defaults were restored"},
+        {Step::saving, "while it saved its configuration"},
+        {Step::watching, "at the start of error control"},
+    };
+    return find_text(texts, s, "while it was configured");
 }
 
-const char* command_text(std::uint8_t command) {
-    switch (static_cast<NmtCommand>(command)) {
-    case NmtCommand::start: return "NMT start";
-    case NmtCommand::stop: return "NMT stop";
-    case NmtCommand::enter_pre_operational: return "NMT enter pre-operational";
-    case NmtCommand::reset_node: return "NMT reset node";
-    case NmtCommand::reset_communication: return "NMT reset communication";
-    }
-    return "an NMT command";
+std::string command_text(std::uint8_t command) {
+    const char* const name = to_string(static_cast<NmtCommand>(command));
+    return name == nullptr ? "an NMT command" : std::string("NMT ") + name;
 }
 
 std::string program(const NodeSetup& n, const NodeStatus& s) {
@@ -222,7 +217,7 @@ std::string rebooted(const NodeStatus& s) {
 std::string left_operational(const NodeStatus& s) {
     if (s.foreign_command != 0) {
         return "left the operational state after another device sent " +
-               std::string(command_text(s.foreign_command)) + " and is " + to_string(s.state) +
+               command_text(s.foreign_command) + " and is " + to_string(s.state) +
                ": remove the second NMT master";
     }
     return "left the operational state without a command from this master and is " +

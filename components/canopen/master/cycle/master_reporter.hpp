@@ -200,7 +200,7 @@ private:
         if (name == "frames") {
             return foreign.frames > 1 ? print(" (%u frames)", unsigned{foreign.frames}) : "";
         }
-        if (name == "command") return nmt_word(foreign.data[0]);
+        if (name == "command") return command_text(foreign.data[0]);
         if (name == "pdo") return rpdo_name(foreign.id);
         return {};
     }
@@ -235,15 +235,9 @@ private:
         }
         return "an RPDO";
     }
-    static std::string nmt_word(std::uint8_t command) {
-        switch (static_cast<NmtCommand>(command)) {
-        case NmtCommand::start: return "start";
-        case NmtCommand::stop: return "stop";
-        case NmtCommand::enter_pre_operational: return "pre-operational";
-        case NmtCommand::reset_node: return "reset node";
-        case NmtCommand::reset_communication: return "reset communication";
-        }
-        return "command " + std::to_string(command);
+    static std::string command_text(std::uint8_t command) {
+        const char* const name = to_string(static_cast<NmtCommand>(command));
+        return name != nullptr ? name : "command " + std::to_string(command);
     }
 
     const config::MasterConfig& config_;

@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "canopen/eds/eds_text.hpp"
+#include "text/text_table.hpp"
 
 namespace hal::canopen::gateway {
 
@@ -311,31 +312,31 @@ bool Reader::command() {
 }  // namespace
 
 const char* to_string(Error error) {
-    switch (error) {
-    case Error::none: return "no error";
-    case Error::not_supported: return "request not supported";
-    case Error::syntax: return "syntax error";
-    case Error::state: return "request not processed due to internal state";
-    case Error::timeout: return "timeout";
-    case Error::no_net: return "no default net set";
-    case Error::no_node: return "no default node set";
-    case Error::bad_net: return "unsupported net";
-    case Error::bad_node: return "unsupported node";
-    case Error::lost_guarding: return "lost guarding message";
-    case Error::heartbeat_started: return "heartbeat started";
-    case Error::lost_heartbeat: return "heartbeat lost";
-    case Error::boot_up: return "boot-up";
-    case Error::init_failed: return "CAN could not be initialised";
-    case Error::pdo_used: return "PDO already used";
-    case Error::pdo_length: return "PDO length exceeded";
-    case Error::lss_own: return "LSS: error of the device's own";
-    case Error::lss_node_id: return "LSS: node-ID not supported";
-    case Error::lss_bit_rate: return "LSS: bit rate not supported";
-    case Error::lss_store: return "LSS: parameters cannot be stored";
-    case Error::lss_media: return "LSS: no access to the memory";
-    case Error::no_memory: return "running out of memory";
-    }
-    return "error";
+    constexpr TextRow<Error> texts[] = {
+        {Error::none, "no error"},
+        {Error::not_supported, "request not supported"},
+        {Error::syntax, "syntax error"},
+        {Error::state, "request not processed due to internal state"},
+        {Error::timeout, "timeout"},
+        {Error::no_net, "no default net set"},
+        {Error::no_node, "no default node set"},
+        {Error::bad_net, "unsupported net"},
+        {Error::bad_node, "unsupported node"},
+        {Error::lost_guarding, "lost guarding message"},
+        {Error::heartbeat_started, "heartbeat started"},
+        {Error::lost_heartbeat, "heartbeat lost"},
+        {Error::boot_up, "boot-up"},
+        {Error::init_failed, "CAN could not be initialised"},
+        {Error::pdo_used, "PDO already used"},
+        {Error::pdo_length, "PDO length exceeded"},
+        {Error::lss_own, "LSS: error of the device's own"},
+        {Error::lss_node_id, "LSS: node-ID not supported"},
+        {Error::lss_bit_rate, "LSS: bit rate not supported"},
+        {Error::lss_store, "LSS: parameters cannot be stored"},
+        {Error::lss_media, "LSS: no access to the memory"},
+        {Error::no_memory, "running out of memory"},
+    };
+    return find_text(texts, error, "error");
 }
 
 Parsed parse(std::string_view line) {

@@ -104,7 +104,7 @@ void Station::receive(Time now) noexcept {
 }
 
 void Station::accept(const can::Frame& frame) noexcept {
-    if (frame.error || frame.extended || frame.fd) return;
+    if (!frame.is_standard()) return;
     const Crystal& crystal = core_.crystal;
     const auto bits = can::frame_bits(frame).nominal - can::intermission_bits;
     const Time bus_begin = frame.time_ns - (timed_ ? core_.table.bits(bits) : 0);

@@ -6,7 +6,7 @@ namespace hal::scocan {
 namespace {
 
 bool is_plain(const can::Frame& f, std::uint32_t id) noexcept {
-    return f.id == id && !f.extended && !f.remote && !f.fd && !f.error;
+    return f.id == id && f.is_standard_data();
 }
 std::uint8_t low(std::uint32_t value) noexcept { return static_cast<std::uint8_t>(value & 0xff); }
 
