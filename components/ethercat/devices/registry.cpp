@@ -11,6 +11,7 @@
 #include "ethercat/devices/servo.hpp"
 #include "ethercat/esi/lookup.hpp"
 #include "hal/read_file.hpp"
+#include "text/find_row.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::ethercat::devices {
@@ -32,10 +33,7 @@ constexpr DeviceRow device_rows[] = {
 };
 
 const DeviceRow* device_row(std::string_view name) {
-    for (const auto& row : device_rows) {
-        if (row.name == name) return &row;
-    }
-    return nullptr;
+    return find_row(device_rows, name, &DeviceRow::name);
 }
 
 bool offers(const DeviceRow& row, std::string_view option) {

@@ -6,6 +6,7 @@
 #include "ethercat/esi/esi.hpp"
 #include "ethercat/wire/byte_order.hpp"
 #include "text/characters.hpp"
+#include "text/find_row.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::ethercat::esi {
@@ -26,12 +27,7 @@ unsigned OpMode::samples() const noexcept {
     return max;
 }
 
-const Value* Object::find(std::uint8_t sub) const {
-    for (const Value& v : values) {
-        if (v.sub == sub) return &v;
-    }
-    return nullptr;
-}
+const Value* Object::find(std::uint8_t sub) const { return find_row(values, sub, &Value::sub); }
 
 const Object* Device::find(std::uint16_t index) const {
     const auto found =

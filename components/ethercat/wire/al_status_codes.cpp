@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "ethercat/wire/al_status_codes.hpp"
 
+#include "text/find_row.hpp"
+
 namespace hal::ethercat {
 
 namespace {
@@ -103,10 +105,7 @@ constexpr AlStatusCode al_status_rows[] = {
 }  // namespace
 
 const AlStatusCode* al_status(std::uint16_t code) noexcept {
-    for (const AlStatusCode& row : al_status_rows) {
-        if (row.code == code) return &row;
-    }
-    return nullptr;
+    return find_row(al_status_rows, code, &AlStatusCode::code);
 }
 
 }  // namespace hal::ethercat

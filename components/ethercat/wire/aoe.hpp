@@ -10,6 +10,7 @@
 #include <span>
 
 #include "ethercat/wire/mailbox.hpp"
+#include "text/text_table.hpp"
 
 namespace hal::ethercat::aoe {
 
@@ -128,11 +129,7 @@ inline constexpr std::uint32_t timeout = 0x745;
 }  // namespace error
 /// Returns the meaning of an ADS error; nullptr for others, which may be SDO abort codes. [any]
 constexpr const char* error_text(std::uint32_t code) noexcept {
-    struct Row {
-        std::uint32_t code;
-        const char* text;
-    };
-    constexpr Row rows[] = {
+    constexpr TextRow<std::uint32_t> rows[] = {
         {error::none, "ok"},
         {error::no_port, "target port not found"},
         {error::no_machine, "target machine not found"},
@@ -152,10 +149,7 @@ constexpr const char* error_text(std::uint32_t code) noexcept {
         {error::not_found, "not found"},
         {error::timeout, "timeout"},
     };
-    for (const Row& row : rows) {
-        if (row.code == code) return row.text;
-    }
-    return nullptr;
+    return find_text(rows, code, nullptr);
 }
 
 }  // namespace hal::ethercat::aoe

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "ethercat/wire/mailbox.hpp"
+#include "text/text_table.hpp"
 
 namespace hal::ethercat::soe {
 
@@ -151,62 +152,56 @@ inline constexpr std::uint16_t no_element = 0x800c;
 }  // namespace error
 /// Returns the meaning of an error code, as in "value is read-only". [any]
 constexpr const char* error_text(std::uint16_t code) noexcept {
-    struct Row {
-        std::uint16_t code;
-        const char* text;
-    };
-    constexpr Row rows[] = {{0x1001, "IDN does not exist"},
-                            {0x1009, "invalid access to element 1"},
-                            {0x2001, "no name"},
-                            {0x2002, "name too short"},
-                            {0x2003, "name too long"},
-                            {0x2004, "name is read-only"},
-                            {0x2005, "name is write-protected now"},
-                            {0x3002, "attribute too short"},
-                            {0x3003, "attribute too long"},
-                            {0x3004, "attribute is read-only"},
-                            {0x3005, "attribute is write-protected now"},
-                            {0x4001, "no unit"},
-                            {0x4002, "unit too short"},
-                            {0x4003, "unit too long"},
-                            {0x4004, "unit is read-only"},
-                            {0x4005, "unit is write-protected now"},
-                            {0x5001, "no minimum"},
-                            {0x5002, "minimum too short"},
-                            {0x5003, "minimum too long"},
-                            {0x5004, "minimum is read-only"},
-                            {0x5005, "minimum is write-protected now"},
-                            {0x6001, "no maximum"},
-                            {0x6002, "maximum too short"},
-                            {0x6003, "maximum too long"},
-                            {0x6004, "maximum is read-only"},
-                            {0x6005, "maximum is write-protected now"},
-                            {0x7002, "value too short"},
-                            {0x7003, "value too long"},
-                            {0x7004, "value is read-only"},
-                            {0x7005, "value is write-protected in this state"},
-                            {0x7006, "value below the minimum"},
-                            {0x7007, "value above the maximum"},
-                            {0x7008, "invalid value"},
-                            {0x7009, "value is protected by a password"},
-                            {0x700a, "value is write-protected"},
-                            {0x700b, "invalid indirect address"},
-                            {0x700c, "value is write-protected by other settings"},
-                            {0x7010, "command already active"},
-                            {0x7011, "command cannot be interrupted"},
-                            {0x7012, "command cannot be executed now"},
-                            {0x7013, "command cannot be executed"},
-                            {0x7014, "no data state"},
-                            {0x8001, "no default value"},
-                            {0x8002, "default value too long"},
-                            {0x8004, "default value is read-only"},
-                            {0x800a, "invalid drive number"},
-                            {0x800b, "general error"},
-                            {0x800c, "no element addressed"}};
-    for (const auto& row : rows) {
-        if (row.code == code) return row.text;
-    }
-    return "unknown SoE error";
+    constexpr TextRow<std::uint16_t> rows[] = {
+        {0x1001, "IDN does not exist"},
+        {0x1009, "invalid access to element 1"},
+        {0x2001, "no name"},
+        {0x2002, "name too short"},
+        {0x2003, "name too long"},
+        {0x2004, "name is read-only"},
+        {0x2005, "name is write-protected now"},
+        {0x3002, "attribute too short"},
+        {0x3003, "attribute too long"},
+        {0x3004, "attribute is read-only"},
+        {0x3005, "attribute is write-protected now"},
+        {0x4001, "no unit"},
+        {0x4002, "unit too short"},
+        {0x4003, "unit too long"},
+        {0x4004, "unit is read-only"},
+        {0x4005, "unit is write-protected now"},
+        {0x5001, "no minimum"},
+        {0x5002, "minimum too short"},
+        {0x5003, "minimum too long"},
+        {0x5004, "minimum is read-only"},
+        {0x5005, "minimum is write-protected now"},
+        {0x6001, "no maximum"},
+        {0x6002, "maximum too short"},
+        {0x6003, "maximum too long"},
+        {0x6004, "maximum is read-only"},
+        {0x6005, "maximum is write-protected now"},
+        {0x7002, "value too short"},
+        {0x7003, "value too long"},
+        {0x7004, "value is read-only"},
+        {0x7005, "value is write-protected in this state"},
+        {0x7006, "value below the minimum"},
+        {0x7007, "value above the maximum"},
+        {0x7008, "invalid value"},
+        {0x7009, "value is protected by a password"},
+        {0x700a, "value is write-protected"},
+        {0x700b, "invalid indirect address"},
+        {0x700c, "value is write-protected by other settings"},
+        {0x7010, "command already active"},
+        {0x7011, "command cannot be interrupted"},
+        {0x7012, "command cannot be executed now"},
+        {0x7013, "command cannot be executed"},
+        {0x7014, "no data state"},
+        {0x8001, "no default value"},
+        {0x8002, "default value too long"},
+        {0x8004, "default value is read-only"},
+        {0x800a, "invalid drive number"},
+        {0x800b, "general error"},
+        {0x800c, "no element addressed"}};
+    return find_text(rows, code, "unknown SoE error");
 }
 
 }  // namespace hal::ethercat::soe

@@ -12,8 +12,10 @@
 #include "bus/ethercat/mailbox_failure.hpp"
 #include "bus/ethercat/session.hpp"
 #include "bus/ethercat/words.hpp"
+#include "cia301/values.hpp"
 #include "cli/output.hpp"
 #include "ethercat/wire/coe.hpp"
+#include "text/find_row.hpp"
 
 namespace hal::tools {
 
@@ -46,14 +48,6 @@ constexpr ValueType value_types[] = {{"bool", Form::logic, 1, code::boolean},
                                      {"string", Form::text, 0, code::visible_string},
                                      {"octet_string", Form::octets, 0, code::octet_string}};
 
-std::uint64_t little_endian(const Bytes& bytes) {
-    std::uint64_t value = 0;
-    for (std::size_t n = std::min<std::size_t>(bytes.size(), 8); n-- > 0;) {
-        value = value << 8 | bytes[n];
-    }
-    return value;
-}
-
 /// Returns the value as `upload` shows it; `plain` is its second half, as JSON.
 std::string value_text_of(const Bytes& bytes, const ValueType& type, std::string& plain) {
     if (type.form == Form::text) {
@@ -66,12 +60,10 @@ std::string value_text_of(const Bytes& bytes, const ValueType& type, std::string
         json_quote(plain, hex_text(bytes));
         return hex_text(bytes);
     }
-    const std::uint64_t raw = little_endian(bytes);
+    const std::uint64_t raw = cia301::natural_of(bytes);
+    const auto bits = static_cast<unsigned>(8 * type.bytes);
     if (type.form == Form::real) {
-        const double value =
-            type.bytes == 4
-                ? static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(raw)))
-                : std::bit_cast<double>(raw);
+        const double value = cia301::real_of(raw, bits);
         const std::string text = fmt::format("{}", value);
         if (std::isfinite(value)) {
             plain += text;
@@ -80,54 +72,63 @@ std::string value_text_of(const Bytes& bytes, const ValueType& type, std::string
         }
         return text;
     }
-    const auto unused = static_cast<unsigned>(64 - 8 * type.bytes);
-    plain += type.form == Form::sign
-                 ? fmt::format("{}", static_cast<std::int64_t>(raw << unused) >> unused)
-                 : fmt::format("{}", raw);
+    plain += type.form == Form::sign ? fmt::format("{}", cia301::sign_extended(raw, bits))
+                                     : fmt::format("{}", raw);
     return fmt::format("0x{:0{}x} {}", raw, 2 * type.bytes, plain);
+}
+
+/// Parses hexadecimal bytes separated by blanks.
+std::optional<Bytes> octets_of(const std::string& text) {
+    Bytes bytes;
+    char* end = nullptr;
+    for (const char* at = text.c_str(); *at != '\0'; at = end) {
+        const unsigned long value = std::strtoul(at, &end, 16);
+        if (end == at || value > 0xff) return std::nullopt;
+        bytes.push_back(static_cast<std::uint8_t>(value));
+        while (*end == ' ') {
+            ++end;
+        }
+    }
+    return bytes.empty() ? std::nullopt : std::optional(bytes);
+}
+
+std::optional<std::uint64_t> real_bits(const std::string& text, unsigned bits) {
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    if (end == text.c_str() || *end != '\0') return std::nullopt;
+    return bits == 32 ? std::bit_cast<std::uint32_t>(static_cast<float>(value))
+                      : std::bit_cast<std::uint64_t>(value);
+}
+
+std::optional<std::uint64_t> signed_bits(const std::string& text, unsigned bits) {
+    char* end = nullptr;
+    errno = 0;
+    const std::int64_t value = std::strtoll(text.c_str(), &end, 0);
+    if (end == text.c_str() || *end != '\0' || errno != 0) return std::nullopt;
+    const auto raw = static_cast<std::uint64_t>(value);
+    return cia301::sign_extended(raw, bits) == value ? std::optional(raw) : std::nullopt;
+}
+
+/// Returns the bits of a number; nullopt: invalid or out of range.
+std::optional<std::uint64_t> number_bits(const std::string& text, const ValueType& type) {
+    const auto bits = static_cast<unsigned>(8 * type.bytes);
+    switch (type.form) {
+    case Form::real: return real_bits(text, bits);
+    case Form::sign: return signed_bits(text, bits);
+    case Form::logic: return ethercat_number(text, 1);
+    default: return ethercat_number(text, UINT64_MAX >> (64 - bits));
+    }
 }
 
 /// Returns the bytes of a typed value; nullopt: invalid or out of range.
 std::optional<Bytes> value_bytes(const std::string& text, const ValueType& type) {
-    Bytes bytes;
     if (type.form == Form::text) return Bytes(text.begin(), text.end());
-    char* end = nullptr;
-    errno = 0;
-    if (type.form == Form::octets) {
-        for (const char* at = text.c_str(); *at != '\0'; at = end) {
-            const unsigned long value = std::strtoul(at, &end, 16);
-            if (end == at || value > 0xff) return std::nullopt;
-            bytes.push_back(static_cast<std::uint8_t>(value));
-            while (*end == ' ') {
-                ++end;
-            }
-        }
-        return bytes.empty() ? std::nullopt : std::optional(bytes);
-    }
-    std::uint64_t raw = 0;
-    const auto bits = static_cast<unsigned>(8 * type.bytes);
-    if (type.form == Form::real) {
-        const double value = std::strtod(text.c_str(), &end);
-        if (end == text.c_str() || *end != '\0') return std::nullopt;
-        raw = type.bytes == 4 ? std::bit_cast<std::uint32_t>(static_cast<float>(value))
-                              : std::bit_cast<std::uint64_t>(value);
-    } else if (type.form == Form::sign) {
-        const std::int64_t value = std::strtoll(text.c_str(), &end, 0);
-        const std::int64_t min = bits == 64 ? INT64_MIN : -(std::int64_t{1} << (bits - 1));
-        if (end == text.c_str() || *end != '\0' || errno != 0 || value < min ||
-            value > -(min + 1)) {
-            return std::nullopt;
-        }
-        raw = static_cast<std::uint64_t>(value);
-    } else {
-        const auto value = ethercat_number(text, type.form == Form::logic ? 1
-                                                 : bits == 64             ? UINT64_MAX
-                                                              : (std::uint64_t{1} << bits) - 1);
-        if (!value) return std::nullopt;
-        raw = *value;
-    }
+    if (type.form == Form::octets) return octets_of(text);
+    const std::optional<std::uint64_t> raw = number_bits(text, type);
+    if (!raw) return std::nullopt;
+    Bytes bytes;
     for (std::size_t n = 0; n < type.bytes; ++n) {
-        bytes.push_back(static_cast<std::uint8_t>(raw >> 8 * n));
+        bytes.push_back(static_cast<std::uint8_t>(*raw >> 8 * n));
     }
     return bytes;
 }
@@ -148,9 +149,8 @@ int fail_mailbox(const Options& options, const BusSlave& s, const std::string& w
 const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& session,
                          const BusSlave& s, std::uint16_t index, std::uint8_t sub) {
     if (!options.type.empty()) {
-        for (const ValueType& t : value_types) {
-            if (options.type == t.name) return &t;
-        }
+        const ValueType* const named = find_row(value_types, options.type, &ValueType::name);
+        if (named != nullptr) return named;
         fail(options,
              fmt::format("unknown type '{}'; see: hal help ethercat upload", options.type));
 
@@ -163,12 +163,10 @@ const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& s
     request.index = index;
     request.sub = sub;
     request.data = name;
-    if (session.run(request) && request.result) {
-        for (const ValueType& t : value_types) {
-            if (request.entry.type == t.coe_type) return &t;
-        }
-    }
-    return &value_types[std::size(value_types) - 1];
+    const bool is_known = session.run(request) && request.result;
+    const ValueType* const reported =
+        is_known ? find_row(value_types, request.entry.type, &ValueType::coe_type) : nullptr;
+    return reported != nullptr ? reported : &value_types[std::size(value_types) - 1];
 }
 
 /// One SDO transfer as the arguments describe it.

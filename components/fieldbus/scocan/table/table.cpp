@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "link/timing.hpp"
+#include "text/find_row.hpp"
 #include "text/quoting.hpp"
 
 namespace hal::scocan {
@@ -66,10 +67,7 @@ const Use* Table::owner(std::uint32_t number, std::uint32_t id) const noexcept {
 }
 
 const Message* Table::message(std::uint32_t id) const noexcept {
-    for (const Message& m : messages) {
-        if (m.id == id) return &m;
-    }
-    return nullptr;
+    return find_row(messages, id, &Message::id);
 }
 
 std::optional<std::size_t> Table::find(std::string_view node) const {
