@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // The table from CAN address to driver.
-#include <algorithm>
 #include <charconv>
 #include <optional>
 
@@ -15,7 +14,6 @@
 #include "can/udp/can_udp.hpp"
 #include "link/address.hpp"
 #include "link/can.hpp"
-#include "text/numbers.hpp"
 
 namespace hal::can {
 
@@ -45,8 +43,6 @@ constexpr Driver drivers[] = {
      "own restart sendqueue receivequeue"},
 };
 
-using link::quoted;
-
 /// Parses 500000, 500k, 1M, unlimited.
 std::optional<std::uint32_t> rate(std::string_view text) {
     if (text == "unlimited") return unlimited;
@@ -67,55 +63,40 @@ std::optional<std::uint32_t> rate(std::string_view text) {
     return static_cast<std::uint32_t>(value);
 }
 
-std::optional<std::uint32_t> number(std::string_view text) {
-    std::uint32_t value = 0;
-    return parse_whole(text, value) ? std::optional(value) : std::nullopt;
+/// Applies a bit rate.
+template <auto member>
+std::string set_rate(const link::AddressOption& option, Options& options) {
+    const auto bits = rate(option.value);
+    if (!bits) {
+        return link::invalid_value(option, "bits per second, as in 500000, 500k or 1M");
+    }
+    options.*member = *bits;
+    return {};
 }
 
-/// Applies an option. Returns the problem, or "".
-std::string apply(std::string_view key, std::string_view value, bool has_value, Options& o) {
-    const auto to_flag = [&](bool& flag) { return link::to_flag(key, value, has_value, flag); };
-    const auto to_rate = [&](std::uint32_t& to) -> std::string {
-        const auto r = rate(value);
-        if (!r) {
-            return "invalid " + std::string(key) + " " + quoted(value) +
-                   "; write bits per second, as in 500000, 500k or 1M";
-        }
-        to = *r;
-        return {};
-    };
-    const auto to_number = [&](auto& to, std::uint32_t max) -> std::string {
-        const auto n = number(value);
-        if (!n || *n > max) {
-            return "invalid " + std::string(key) + " " + quoted(value) + "; write a number 0.." +
-                   std::to_string(max);
-        }
-        to = *n;
-        return {};
-    };
-    if (key == "bitrate") return to_rate(o.bit_rate);
-    if (key == "datarate") {
-        o.fd = true;
-        return to_rate(o.data_rate);
-    }
-    if (key == "fd") return to_flag(o.fd);
-    if (key == "listen") return to_flag(o.listen_only);
-    if (key == "own") return to_flag(o.own_frames);
-    if (key == "errors") return to_flag(o.error_frames);
-    if (key == "stamps") return to_flag(o.stamps);
-    if (key == "restart") return to_number(o.restart_ms, 3'600'000);
-    if (key == "sendqueue") return to_number(o.send_capacity, 65536);
-    if (key == "receivequeue") return to_number(o.receive_capacity, 65536);
-    return std::string(link::no_option) + quoted(key) +
-           "; options are bitrate, datarate, fd, listen, own, errors, stamps, restart, sendqueue, "
-           "receivequeue";
+std::string set_data_rate(const link::AddressOption& option, Options& options) {
+    options.fd = true;
+    return set_rate<&Options::data_rate>(option, options);
 }
+
+constexpr link::OptionRow<Options> options_of_can[] = {
+    {"bitrate", set_rate<&Options::bit_rate>},
+    {"datarate", set_data_rate},
+    {"fd", link::set_flag<&Options::fd>},
+    {"listen", link::set_flag<&Options::listen_only>},
+    {"own", link::set_flag<&Options::own_frames>},
+    {"errors", link::set_flag<&Options::error_frames>},
+    {"stamps", link::set_flag<&Options::stamps>},
+    {"restart", link::set_number<&Options::restart_ms, 0, 3'600'000>},
+    {"sendqueue", link::set_number<&Options::send_capacity, 0, 65536>},
+    {"receivequeue", link::set_number<&Options::receive_capacity, 0, 65536>},
+};
 
 }  // namespace
 
 Opened open(std::string_view address, const Options& given) {
     return link::open_address<Opened, Options, Description>(
-        address, given, drivers, apply, "a CAN bus",
+        address, given, drivers, options_of_can, "a CAN bus",
         {journal::open_journaled, journal::open_ordered});
 }
 

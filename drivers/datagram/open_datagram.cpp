@@ -19,28 +19,26 @@ constexpr Driver datagram_drivers[] = {
      Driver::Journal::order},
 };
 
-/// Applies an option. Returns the problem, or "".
-std::string apply_datagram_option(std::string_view key, std::string_view value, bool,
-                                  Options& options) {
-    if (key != "spin") {
-        return std::string(link::no_option) + link::quoted(key) + "; the option is spin";
-    }
+std::string set_spin(const link::AddressOption& option, Options& options) {
     constexpr std::int64_t max_us = 10'000;
+    const char* const last = option.value.data() + option.value.size();
     std::int64_t us = -1;
-    const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), us);
-    const std::string_view unit(end, static_cast<std::size_t>(value.data() + value.size() - end));
+    const auto [end, error] = std::from_chars(option.value.data(), last, us);
+    const std::string_view unit(end, static_cast<std::size_t>(last - end));
     if (error != std::errc() || unit != "us" || us < 0 || us > max_us) {
-        return "invalid spin " + link::quoted(value) + "; write a duration 0us..10000us";
+        return link::invalid_value(option, "a duration 0us..10000us");
     }
     options.spin_ns = us * 1000;
     return {};
 }
 
+constexpr link::OptionRow<Options> datagram_options[] = {{"spin", set_spin}};
+
 }  // namespace
 
 Opened open(std::string_view address, const Options& given) {
     return link::open_address<Opened, Options, Description>(address, given, datagram_drivers,
-                                                            apply_datagram_option, "a card",
+                                                            datagram_options, "a card",
                                                             {journal::open_journaled, nullptr});
 }
 

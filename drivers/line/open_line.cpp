@@ -4,7 +4,6 @@
 #include "line/sim_line.hpp"
 #include "line/tcp_line.hpp"
 #include "link/address.hpp"
-#include "text/numbers.hpp"
 
 namespace hal::line {
 
@@ -21,31 +20,23 @@ constexpr link::Driver<Opened, Options, Description> line_drivers[] = {
     {link::form_of(address_forms, "sim"), sim::open, sim::describe, nullptr, nullptr, "rs485"},
 };
 
-/// Applies an option. Returns the problem, or "".
-std::string apply_line_option(std::string_view key, std::string_view value, bool has_value,
-                              Options& o) {
-    if (key == "rs485") return link::to_flag(key, value, has_value, o.rs485);
-    if (key == "format") {
-        if (parse_format(value, o)) return {};
-        return "invalid format " + link::quoted(value) + "; write 8N1, 8E1, 8O1 or 8N2";
-    }
-    if (key == "baud") {
-        std::uint32_t baud = 0;
-        if (!parse_whole(value, baud) || baud < 300 || baud > 4'000'000) {
-            return "invalid baud " + link::quoted(value) + "; write a number 300..4000000";
-        }
-        o.baud = baud;
-        return {};
-    }
-    return std::string(link::no_option) + link::quoted(key) + "; options are baud, format, rs485";
+std::string set_format(const link::AddressOption& option, Options& options) {
+    if (parse_format(option.value, options)) return {};
+    return link::invalid_value(option, "8N1, 8E1, 8O1 or 8N2");
 }
+
+constexpr link::OptionRow<Options> line_options[] = {
+    {"baud", link::set_number<&Options::baud, 300, 4'000'000>},
+    {"format", set_format},
+    {"rs485", link::set_flag<&Options::rs485>},
+};
 
 }  // namespace
 
 // A line is used by a helper thread, whose values the journal of a machine does not have.
 Opened open(std::string_view address, const Options& given) {
     return link::open_address<Opened, Options, Description>(
-        address, given, line_drivers, apply_line_option, "a line", {nullptr, nullptr});
+        address, given, line_drivers, line_options, "a line", {nullptr, nullptr});
 }
 
 Description describe(std::string_view address) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <charconv>
 #include <cstdint>
 #include <cstdlib>
 #include <exception>
@@ -10,6 +11,8 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <system_error>
+#include <type_traits>
 #include <utility>
 
 #include "link/address_form.hpp"
@@ -23,16 +26,84 @@ inline std::string quoted(std::string_view text) { return "'" + std::string(text
 /// see. `hal check --deterministic` sets it for its simulations.
 inline constexpr const char* links_inside = "HALCYON_LINKS_INSIDE";
 
-/// Prefix of the problem that `apply` below returns for an unknown key.
+/// Prefix of the problem of an unknown option.
 inline constexpr std::string_view no_option = "unknown option ";
 
-/// Parses `key`, `key=0` or `key=1`. Returns the problem, or "".
-inline std::string to_flag(std::string_view key, std::string_view value, bool has_value,
-                           bool& flag) {
-    if (has_value && value != "0" && value != "1") {
-        return "invalid " + std::string(key) + " " + quoted(value) + "; write 0 or 1";
+/// An address `DRIVER:PLACE?OPTIONS` behind its colon.
+struct Target {
+    explicit Target(std::string_view text)
+        : place(text.substr(0, text.find('?'))),
+          options(text.substr(std::min(place.size() + 1, text.size()))) {}
+
+    std::string_view place;
+    std::string_view options;  ///< `key=value&key&key=value`
+};
+
+/// One option of an address, `key` or `key=value`.
+struct AddressOption {
+    std::string_view text;
+    std::string_view key;
+    std::string_view value;  ///< empty without `=`
+    bool has_value = false;
+
+    /// Removes the first option from `options`, which is not empty, and returns it.
+    static AddressOption pop(std::string_view& options) {
+        const std::string_view text = options.substr(0, options.find('&'));
+        options.remove_prefix(std::min(text.size() + 1, options.size()));
+        const std::size_t equals = std::min(text.find('='), text.size());
+        const bool has_value = equals < text.size();
+        return {text, text.substr(0, equals), text.substr(equals + has_value), has_value};
     }
-    flag = !has_value || value == "1";
+};
+
+/// A common option of the addresses of a kind of bus. `apply` sets its value, and returns the
+/// problem, or "".
+template <class Options>
+struct OptionRow {
+    std::string_view name;
+    std::string (*apply)(const AddressOption&, Options&);
+};
+
+/// Applies an option of the table. Returns the problem, or "".
+template <class Options>
+std::string apply_option(std::span<const OptionRow<Options>> rows, const AddressOption& option,
+                         Options& options) {
+    std::string names;
+    for (const auto& row : rows) {
+        if (row.name == option.key) return row.apply(option, options);
+        names.append(names.empty() ? "" : ", ").append(row.name);
+    }
+    return std::string(no_option) + quoted(option.key) +
+           (rows.size() == 1 ? "; the option is " : "; options are ") + names;
+}
+
+/// Returns "invalid KEY 'VALUE'; write EXAMPLE".
+inline std::string invalid_value(const AddressOption& option, const std::string& example) {
+    return "invalid " + std::string(option.key) + " " + quoted(option.value) + "; write " + example;
+}
+
+/// Applies `key`, `key=0` or `key=1`.
+template <auto member, class Options>
+std::string set_flag(const AddressOption& option, Options& options) {
+    if (option.has_value && option.value != "0" && option.value != "1") {
+        return invalid_value(option, "0 or 1");
+    }
+    options.*member = !option.has_value || option.value == "1";
+    return {};
+}
+
+/// Applies a whole number from `min` to `max`.
+template <auto member, long min, long max, class Options>
+std::string set_number(const AddressOption& option, Options& options) {
+    long number = 0;
+    const auto [end, error] =
+        std::from_chars(option.value.data(), option.value.data() + option.value.size(), number);
+    const bool is_whole = error == std::errc() && end == option.value.data() + option.value.size();
+    if (!is_whole || number < min || number > max) {
+        return invalid_value(option,
+                             "a number " + std::to_string(min) + ".." + std::to_string(max));
+    }
+    options.*member = static_cast<std::remove_reference_t<decltype(options.*member)>>(number);
     return {};
 }
 
@@ -80,33 +151,6 @@ std::string address_forms(std::span<const Driver<Opened, Options, Description>> 
     }
     return text;
 }
-
-/// An address `DRIVER:PLACE?OPTIONS` behind its colon.
-struct Target {
-    explicit Target(std::string_view text)
-        : place(text.substr(0, text.find('?'))),
-          options(text.substr(std::min(place.size() + 1, text.size()))) {}
-
-    std::string_view place;
-    std::string_view options;  ///< `key=value&key&key=value`
-};
-
-/// One option of an address, `key` or `key=value`.
-struct AddressOption {
-    std::string_view text;
-    std::string_view key;
-    std::string_view value;  ///< empty without `=`
-    bool has_value = false;
-
-    /// Removes the first option from `options`, which is not empty, and returns it.
-    static AddressOption pop(std::string_view& options) {
-        const std::string_view text = options.substr(0, options.find('&'));
-        options.remove_prefix(std::min(text.size() + 1, options.size()));
-        const std::size_t equals = std::min(text.find('='), text.size());
-        const bool has_value = equals < text.size();
-        return {text, text.substr(0, equals), text.substr(equals + has_value), has_value};
-    }
-};
 
 /// Returns the driver that an address names; nullptr: none of them.
 template <class Driver>
@@ -158,12 +202,12 @@ struct JournaledOpen {
     }
 };
 
-/// Opens an address with the driver that it names. `apply(key, value, has_value, options)` applies
-/// an option and returns the problem, or ""; `kind` completes "'x' is not the address of ".
-template <class Opened, class Options, class Description, class Apply>
+/// Opens an address with the driver that it names. `kind` completes "'x' is not the address of ".
+template <class Opened, class Options, class Description>
 Opened open_address(std::string_view address, Options options,
-                    std::span<const Driver<Opened, Options, Description>> drivers, Apply apply,
-                    std::string_view kind, const JournaledOpen<Opened>& open) {
+                    std::span<const Driver<Opened, Options, Description>> drivers,
+                    std::span<const OptionRow<Options>> rows, std::string_view kind,
+                    const JournaledOpen<Opened>& open) {
     const auto* const driver = driver_of(address, drivers);
     if (driver == nullptr) {
         return {nullptr, quoted(address) + " is not the address of " + std::string(kind) +
@@ -180,7 +224,7 @@ Opened open_address(std::string_view address, Options options,
 
     const std::string name(driver->name());
     const auto apply_common = [&](const AddressOption& option) {
-        std::string problem = apply(option.key, option.value, option.has_value, options);
+        std::string problem = apply_option(rows, option, options);
         if (problem.starts_with(no_option) && driver->own_options != nullptr) {
             problem += ", and for " + name + ": " + driver->own_options();
         }

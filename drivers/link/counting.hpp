@@ -15,6 +15,11 @@ inline void trace(link::FrameKind kind, const Frame& f) noexcept {
     link::trace_frame(kind, f.extended ? f.id | 0x80000000U : f.id, f.bytes().size());
 }
 
+/// Returns whether a frame can be sent with these options. [realtime]
+inline bool may_send(const Frame& frame, const Options& options) noexcept {
+    return frame.valid() && !options.listen_only && (!frame.fd || options.fd);
+}
+
 /// Counters of one link. The sending thread writes `sent`, `sent_bytes`, `dropped`; the receiving
 /// one the rest; both add to the load. [realtime]
 class Counting {
@@ -42,6 +47,11 @@ public:
         to.fetch_add(value, std::memory_order_relaxed);
     }
 
+    /// Counts a frame that is not sent. Sending thread.
+    Sent drop(Sent why) noexcept {
+        add(dropped);
+        return why;
+    }
     /// Counts a sent frame. Sending thread.
     void count_sent(const Frame& f) noexcept {
         trace(link::can_sent, f);

@@ -100,17 +100,13 @@ public:
     }
 
     Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
-        const auto drop = [this](Sent why) {
-            Counting::add(counting_.dropped);
-            return why;
-        };
-        if (!frame.valid() || frame.fd || options_.listen_only) return drop(Sent::rejected);
+        if (frame.fd || !may_send(frame, options_)) return counting_.drop(Sent::rejected);
         guard_.sent(frame, now_ns != unclocked || simulated_ ? now_ns : link::monotonic_ns());
         if (is_replaced(frame)) return Sent::queued;
         auto& queue = is_service(frame) ? service_data_ : process_data_;
         if (queue.push(frame)) return Sent::queued;
         flush(now_ns);
-        return queue.push(frame) ? Sent::queued : drop(Sent::full);
+        return queue.push(frame) ? Sent::queued : counting_.drop(Sent::full);
     }
 
     void flush(std::int64_t now_ns) noexcept override {

@@ -19,9 +19,6 @@ namespace {
 
 constexpr std::string_view segment_keys[] = {"mac",         "speed",   "policy", "spin",
                                              "promiscuous", "forward", "noise"};
-constexpr std::string_view own_keys[] = {"format", "order",  "slot", "priority", "learn",
-                                         "to",     "master", "also", "key"};
-
 bool is_in(const auto& keys, std::string_view key) {
     return std::find(std::begin(keys), std::end(keys), key) != std::end(keys);
 }
@@ -30,11 +27,6 @@ std::optional<unsigned> number(std::string_view text, unsigned min, unsigned max
     unsigned value = 0;
     const bool good = parse_whole(text, value) && value >= min && value <= max;
     return good ? std::optional(value) : std::nullopt;
-}
-
-std::string is(std::string_view key, std::string_view value, std::string_view write) {
-    return "invalid " + std::string(key) + " '" + std::string(value) + "'; write " +
-           std::string(write);
 }
 
 /// Reads the key of a segment: 32 hexadecimal digits in a file that only its owner may read.
@@ -69,70 +61,106 @@ std::string read_key(const std::string& file, std::optional<Key>& key) {
     return {};
 }
 
-std::string apply(std::string_view key, std::string_view value, Settings& s, bool reads_key) {
-    const auto one_of = [&](std::string_view first, std::string_view second,
-                            auto set) -> std::string {
-        if (value != first && value != second) {
-            return is(key, value, std::string(first) + " or " + std::string(second));
-        }
-        set(value == first);
-        return {};
-    };
-    if (key == "format") {
-        return one_of("single", "packed",
-                      [&](bool first) { s.format = first ? Format::single : Format::packed; });
+/// Parses one of two words. Sets `is_second`, and returns the problem, or "".
+std::string choose(const link::AddressOption& option, const char* first, const char* second,
+                   bool& is_second) {
+    is_second = option.value == second;
+    if (is_second || option.value == first) return {};
+    return link::invalid_value(option, std::string(first) + " or " + second);
+}
+
+std::string set_format(const link::AddressOption& option, Settings& s) {
+    bool is_packed = true;
+    std::string problem = choose(option, "single", "packed", is_packed);
+    s.format = is_packed ? Format::packed : Format::single;
+    return problem;
+}
+std::string set_order(const link::AddressOption& option, Settings& s) {
+    bool is_little = false;
+    std::string problem = choose(option, "big", "little", is_little);
+    s.order = is_little ? Order::little : Order::big;
+    return problem;
+}
+std::string set_learning(const link::AddressOption& option, Settings& s) {
+    return choose(option, "0", "1", s.learns);
+}
+std::string set_receiver(const link::AddressOption& option, Settings& s) {
+    return choose(option, "all", "master", s.produced_to_master);
+}
+
+template <auto member, unsigned max>
+std::string set_up_to(const link::AddressOption& option, Settings& s) {
+    const auto n = number(option.value, 0, max);
+    if (!n) {
+        return link::invalid_value(option, "a whole number up to " + std::to_string(max));
     }
-    if (key == "order") {
-        return one_of("big", "little",
-                      [&](bool first) { s.order = first ? Order::big : Order::little; });
-    }
-    if (key == "to") {
-        return one_of("all", "master", [&](bool first) { s.produced_to_master = !first; });
-    }
-    if (key == "learn") {
-        return one_of("0", "1", [&](bool first) { s.learns = !first; });
-    }
-    if (key == "slot" || key == "priority") {
-        const unsigned max = key == "slot" ? 255 : 30;
-        const auto n = number(value, 0, max);
-        if (!n) return is(key, value, "a whole number up to " + std::to_string(max));
-        if (key == "slot") {
-            s.slot = n;
-        } else {
-            s.priority = *n;
-        }
-        return {};
-    }
-    if (key == "key") {
-        return reads_key ? read_key(std::string(value), s.key) : std::string{};
-    }
-    const auto address = ethernet::parse_address(value);
-    if (key == "master" || key == "also") {
-        if (!address || ((*address)[0] & 1) != 0) {
-            return is(key, value, "the address of a station, as in 02:00:00:00:00:05");
-        }
-        if (key == "master") {
-            s.master = address;
-        } else {
-            s.also.push_back(*address);
-        }
-        return {};
-    }
-    const auto id = number(key.substr(4), 1, 127);
-    if (!id) return "invalid node '" + std::string(key) + "'; write node5=02:00:00:00:00:05";
-    if (!address || ((*address)[0] & 1) != 0) {
-        return is(key, value, "the address of a station, as in 02:00:00:00:00:05");
-    }
-    s.nodes.emplace_back(*id, *address);
+    s.*member = *n;
     return {};
+}
+
+/// Parses the address of a station. Returns the problem, or "".
+std::string station_of(const link::AddressOption& option, ethernet::Address& address) {
+    const auto parsed = ethernet::parse_address(option.value);
+    if (!parsed || ((*parsed)[0] & 1) != 0) {
+        return link::invalid_value(option, "the address of a station, as in 02:00:00:00:00:05");
+    }
+    address = *parsed;
+    return {};
+}
+
+std::string set_master(const link::AddressOption& option, Settings& s) {
+    ethernet::Address address{};
+    std::string problem = station_of(option, address);
+    if (problem.empty()) {
+        s.master = address;
+    }
+    return problem;
+}
+std::string add_master(const link::AddressOption& option, Settings& s) {
+    ethernet::Address address{};
+    std::string problem = station_of(option, address);
+    if (problem.empty()) {
+        s.also.push_back(address);
+    }
+    return problem;
+}
+std::string set_key(const link::AddressOption& option, Settings& s) {
+    return read_key(std::string(option.value), s.key);
+}
+
+/// The options besides those of the segment and of the nodes. The last one reads a file.
+constexpr link::OptionRow<Settings> own_rows[] = {
+    {"format", set_format},
+    {"order", set_order},
+    {"slot", set_up_to<&Settings::slot, 255>},
+    {"priority", set_up_to<&Settings::priority, 30>},
+    {"learn", set_learning},
+    {"to", set_receiver},
+    {"master", set_master},
+    {"also", add_master},
+    {"key", set_key},
+};
+
+/// Applies `node5=02:00:00:00:00:05`.
+std::string apply_node(const link::AddressOption& option, Settings& s) {
+    const auto id = number(option.key.substr(4), 1, 127);
+    if (!id) {
+        return "invalid node '" + std::string(option.key) + "'; write node5=02:00:00:00:00:05";
+    }
+    ethernet::Address address{};
+    std::string problem = station_of(option, address);
+    if (problem.empty()) {
+        s.nodes.emplace_back(*id, address);
+    }
+    return problem;
 }
 
 }  // namespace
 
 std::string own_options() {
     std::string text;
-    for (const auto key : own_keys) {
-        text += std::string(key) + ", ";
+    for (const auto& row : own_rows) {
+        text += std::string(row.name) + ", ";
     }
     for (const auto key : segment_keys) {
         text += std::string(key) + ", ";
@@ -141,7 +169,9 @@ std::string own_options() {
 }
 
 bool is_own_option(std::string_view key) {
-    return is_in(own_keys, key) || is_in(segment_keys, key) || key.starts_with("node");
+    const bool is_listed =
+        std::ranges::any_of(own_rows, [&](const auto& row) { return row.name == key; });
+    return is_listed || is_in(segment_keys, key) || key.starts_with("node");
 }
 
 std::string parse(std::string_view target, Settings& s, bool reads_key) {
@@ -159,7 +189,10 @@ std::string parse(std::string_view target, Settings& s, bool reads_key) {
             s.segment_options += (s.segment_options.empty() ? '?' : '&') + std::string(option.text);
             continue;
         }
-        std::string problem = apply(option.key, option.value, s, reads_key);
+        if (option.key == "key" && !reads_key) continue;
+        std::string problem = option.key.starts_with("node")
+                                  ? apply_node(option, s)
+                                  : link::apply_option<Settings>(own_rows, option, s);
         if (!problem.empty()) return problem;
     }
     if (s.key && s.format == Format::single) {

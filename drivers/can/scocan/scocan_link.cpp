@@ -81,17 +81,13 @@ public:
     bool join() { return exchange_->add(user_); }
 
     Sent send(const Frame& frame, std::int64_t) noexcept override {
-        const auto drop = [this](Sent why) {
-            Counting::add(counting_.dropped);
-            return why;
-        };
         if (!frame.valid() || frame.fd || frame.extended || options_.listen_only) {
-            return drop(Sent::rejected);
+            return counting_.drop(Sent::rejected);
         }
-        if (state() == State::down) return drop(Sent::down);
+        if (state() == State::down) return counting_.drop(Sent::down);
         SlotFrame outgoing{frame, place_.slot};
         outgoing.frame.id = on_bus(frame.id);
-        if (!user_.outgoing.push(outgoing)) return drop(Sent::full);
+        if (!user_.outgoing.push(outgoing)) return counting_.drop(Sent::full);
         counting_.count_sent(frame);
         return Sent::queued;
     }

@@ -38,7 +38,6 @@ Bus::Bus(std::string its_name, std::uint32_t rate, std::uint32_t fast, bool has_
       data_rate(fast),
       fd(has_fd) {
     nodes.reserve(64);
-    disturbances.reserve(64);
 }
 
 std::shared_ptr<Bus> Bus::find(const std::string& name, const Options& options,
@@ -207,7 +206,7 @@ void Bus::work_untimed(std::int64_t now) noexcept {
                 n->outgoing.drop();
                 continue;
             }
-            const Active* fault = struck(c, time);
+            const Disturbances::Active* fault = struck(c, time);
             if (fault != nullptr && fault->what.fault == Fault::delay) {
                 time += fault->what.delay_ns;
             }
@@ -338,8 +337,9 @@ void Bus::count_protocol_error(const Candidate& c, bool sending, std::int64_t no
 void Bus::destroy(const Arbitration& a, bool collision, std::int64_t start) noexcept {
     const Bits length = frame_bits(*a.winner.frame);
     const unsigned body = length.total() - intermission_bits;
-    const unsigned broken =
-        collision ? std::min(body, 40U) : 1 + static_cast<unsigned>(draw() % body);
+    const unsigned broken = collision
+                                ? std::min(body, 40U)
+                                : 1 + static_cast<unsigned>(disturbances.random.draw() % body);
     const unsigned slow = std::min(broken, length.nominal);
     const auto noticed = start + duration_ns({slow, broken - slow}, bit_rate, data_rate);
     occupy(start, noticed + bits(error_frame_bits));
@@ -394,7 +394,7 @@ void Bus::transmit(std::int64_t start, std::int64_t now) noexcept {
     if (a.acknowledging < 2) return fail_to_acknowledge(a.winner, start, now);  // only the sender
 
     const bool collision = collides(a, start);
-    const Active* const active = struck(a.winner, start);
+    const Disturbances::Active* const active = struck(a.winner, start);
     const auto has_fault = [&](Fault fault) {
         return active != nullptr && active->what.fault == fault;
     };
@@ -515,38 +515,25 @@ void Bus::publish(Node& n) noexcept {
 
 /// Returns the first disturbance that hits this frame. Except for errors it is asked once, however
 /// often the frame is repeated.
-Bus::Active* Bus::struck(const Candidate& c, std::int64_t start) noexcept {
+Bus::Disturbances::Active* Bus::struck(const Candidate& c, std::int64_t start) noexcept {
     Node& n = *c.node;
-    Active* found = nullptr;
+    Disturbances::Active* found = nullptr;
     for (auto& d : disturbances) {
         const Disturbance& w = d.what;
-        if (((c.frame->id ^ w.id) & w.mask) != 0 || (w.node >= 0 && w.node != n.number)) continue;
-        if (start < w.from_ns || start >= w.until_ns) continue;
-        if (d.hits >= w.count || (w.fault == Fault::delay && n.delayed) ||
-            (w.fault == Fault::duplicate && n.doubled)) {
-            continue;
-        }
-        if (w.every != 0 && n.counted && w.fault != Fault::error) continue;
-        ++d.matched;
-        const bool hit = w.every != 0 ? d.matched % w.every == 0
-                                      : static_cast<double>(draw() >> 11) * 0x1p-53 < w.probability;
-        if (!hit || found != nullptr) continue;
+        const bool is_meant =
+            ((c.frame->id ^ w.id) & w.mask) == 0 && (w.node < 0 || w.node == n.number);
+        if (!is_meant || !d.is_active(start)) continue;
+        const bool was_delayed = w.fault == Fault::delay && n.delayed;
+        const bool was_doubled = w.fault == Fault::duplicate && n.doubled;
+        const bool was_counted = w.every != 0 && n.counted && w.fault != Fault::error;
+        if (was_delayed || was_doubled || was_counted) continue;
+        if (!disturbances.match(d) || found != nullptr) continue;
         ++d.hits;
         found = &d;
-        if (w.fault == Fault::delay) {
-            n.delayed = true;
-        }
+        n.delayed = n.delayed || w.fault == Fault::delay;
     }
     n.counted = true;
     return found;
-}
-
-std::uint64_t Bus::draw() noexcept {  // splitmix64
-    random += 0x9e3779b97f4a7c15U;
-    auto z = random;
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9U;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebU;
-    return z ^ z >> 31;
 }
 
 // Transmit windows: frames that may start at certain times only.

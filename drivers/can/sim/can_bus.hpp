@@ -22,6 +22,7 @@
 
 #include "hal/queue.hpp"
 #include "link/can.hpp"
+#include "link/disturbances.hpp"
 #include "link/simulation.hpp"
 #include "link/timing.hpp"
 
@@ -110,14 +111,9 @@ public:
         return change();
     }
 
-    struct Active {
-        Disturbance what;
-        std::uint64_t matched = 0;
-        std::uint64_t hits = 0;
-    };
-    std::vector<Active> disturbances;  ///< only within exclusively(), as the next two
+    using Disturbances = link::Disturbances<Disturbance>;
+    Disturbances disturbances;  ///< only within exclusively(), as the next one
     std::vector<Node*> nodes;
-    std::uint64_t random = 1;
 
     const std::string name;
     const std::uint32_t bit_rate, data_rate;  ///< bit_rate 0: frames take no time
@@ -168,8 +164,7 @@ private:
     bool discard_expired(std::int64_t start) noexcept;
     bool was_idle(std::int64_t from, std::int64_t until) const noexcept;
     void discard(Node&) noexcept;
-    Active* struck(const Candidate&, std::int64_t start) noexcept;
-    std::uint64_t draw() noexcept;
+    Disturbances::Active* struck(const Candidate&, std::int64_t start) noexcept;
     std::int64_t bits(unsigned count) const noexcept { return duration_ns({count, 0}, bit_rate); }
 
     std::vector<std::unique_ptr<Node>> leaving_;  ///< [setup]

@@ -12,7 +12,6 @@ namespace hal::can::simbus {
 
 namespace {
 
-constexpr std::size_t max_disturbances = 64;
 constexpr std::size_t max_filters = 1024;
 
 class SimulatedLink final : public Link, public Simulation {
@@ -35,26 +34,14 @@ public:
     ~SimulatedLink() override { bus_->remove(std::move(owned_)); }
 
     Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
-        const auto drop = [this](Sent why) {
-            node_.dropped.fetch_add(1, std::memory_order_relaxed);
-            return why;
-        };
-        if (!frame.valid() || node_.listen_only || (frame.fd && !bus_->fd)) {
-            return drop(Sent::rejected);
-        }
-        if (state() == State::bus_off) return drop(Sent::bus_off);
+        const Sent refusal = refuse(frame);
+        if (refusal != Sent::queued) return drop(refusal);
         return queue({frame}, bus_->time(now_ns), now_ns);
     }
     Sent send_within(const Frame& frame, const Window& window,
                      std::int64_t now_ns) noexcept override {
-        if (!frame.valid() || node_.listen_only || (frame.fd && !bus_->fd) || bus_->bit_rate == 0) {
-            node_.dropped.fetch_add(1, std::memory_order_relaxed);
-            return Sent::rejected;
-        }
-        if (state() == State::bus_off) {
-            node_.dropped.fetch_add(1, std::memory_order_relaxed);
-            return Sent::bus_off;
-        }
+        const Sent refusal = bus_->bit_rate == 0 ? Sent::rejected : refuse(frame);
+        if (refusal != Sent::queued) return drop(refusal);
         const Outgoing outgoing{frame, window.last_start_ns, window.idle_from_ns,
                                 window.idle_until_ns, window.single_shot};
         return queue(outgoing, std::max(window.not_before_ns, bus_->time(now_ns)), now_ns);
@@ -126,21 +113,13 @@ public:
 
     int node() const noexcept override { return node_.number; }
     void seed(std::uint64_t value) override {
-        bus_->exclusively([&] { bus_->random = value; });
+        bus_->exclusively([&] { bus_->disturbances.random.seed(value); });
     }
     int disturb(const Disturbance& what) override {
-        return bus_->exclusively([&] {
-            if (bus_->disturbances.size() >= max_disturbances) return -1;
-            bus_->disturbances.push_back({what, 0, 0});
-            return static_cast<int>(bus_->disturbances.size()) - 1;
-        });
+        return bus_->exclusively([&] { return bus_->disturbances.add(what); });
     }
     std::uint64_t hits(int number) const override {
-        return bus_->exclusively([&] {
-            const auto index = static_cast<std::size_t>(number);
-            return number >= 0 && index < bus_->disturbances.size() ? bus_->disturbances[index].hits
-                                                                    : 0;
-        });
+        return bus_->exclusively([&] { return bus_->disturbances.hits(number); });
     }
     void calm() override {
         bus_->exclusively([&] {
@@ -188,9 +167,16 @@ private:
         trace(link::can_sent, frame);
         if (node_.outgoing.push(frame)) return Sent::queued;
         flush(now_ns);
-        if (node_.outgoing.push(frame)) return Sent::queued;
+        return node_.outgoing.push(frame) ? Sent::queued : drop(Sent::full);
+    }
+    /// Returns why a frame is not sent; queued: it may be.
+    Sent refuse(const Frame& frame) const noexcept {
+        if (!frame.valid() || node_.listen_only || (frame.fd && !bus_->fd)) return Sent::rejected;
+        return state() == State::bus_off ? Sent::bus_off : Sent::queued;
+    }
+    Sent drop(Sent why) noexcept {
         node_.dropped.fetch_add(1, std::memory_order_relaxed);
-        return Sent::full;
+        return why;
     }
 
     const std::shared_ptr<Bus> bus_;

@@ -134,19 +134,13 @@ public:
     }
 
     Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
-        const auto drop = [this](Sent why) {
-            Counting::add(counting_.dropped);
-            return why;
-        };
-        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) {
-            return drop(Sent::rejected);
-        }
+        if (!may_send(frame, options_)) return counting_.drop(Sent::rejected);
         const State state = counting_.state.load(std::memory_order_relaxed);
-        if (state == State::down) return drop(Sent::down);
-        if (state == State::bus_off) return drop(Sent::bus_off);
+        if (state == State::down) return counting_.drop(Sent::down);
+        if (state == State::bus_off) return counting_.drop(Sent::bus_off);
         if (outgoing_.push(frame)) return Sent::queued;
         flush(now_ns);
-        return outgoing_.push(frame) ? Sent::queued : drop(Sent::full);
+        return outgoing_.push(frame) ? Sent::queued : counting_.drop(Sent::full);
     }
 
     void flush(std::int64_t) noexcept override {

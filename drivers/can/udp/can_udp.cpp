@@ -169,14 +169,10 @@ public:
     }
 
     Sent send(const Frame& frame, std::int64_t now_ns) noexcept override {
-        if (!frame.valid() || options_.listen_only || (frame.fd && !options_.fd)) {
-            Counting::add(counting_.dropped);
-            return Sent::rejected;
-        }
+        if (!may_send(frame, options_)) return counting_.drop(Sent::rejected);
         if (outgoing_.push(frame)) return Sent::queued;
         flush(now_ns);
-        return outgoing_.push(frame) ? Sent::queued
-                                     : (Counting::add(counting_.dropped), Sent::full);
+        return outgoing_.push(frame) ? Sent::queued : counting_.drop(Sent::full);
     }
 
     void flush(std::int64_t) noexcept override {

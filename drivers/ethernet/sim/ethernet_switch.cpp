@@ -14,7 +14,6 @@ namespace hal::ethernet::simbus {
 namespace {
 
 constexpr std::size_t max_events = 8192;
-constexpr std::size_t max_disturbances = 64;
 constexpr std::size_t max_stations = 256;
 // memory of a small switch per line; frames beyond it are lost
 constexpr std::size_t egress_bytes = 65536;
@@ -51,7 +50,6 @@ Switch::Switch(std::string its_name, const Options& o)
       speed(o.speed != 0 ? o.speed : 100),
       forward_ns(o.forward_ns >= 0 ? o.forward_ns : 2000) {
     events_.reserve(max_events);
-    disturbances.reserve(max_disturbances);
     stations.reserve(max_stations);
 }
 
@@ -404,17 +402,11 @@ bool Switch::is_meant(const Disturbance& w, const Event& e, bool only_one) noexc
 
 /// Counts the frame in all disturbances that it matches. Returns the first that hits it; nullptr:
 /// none does.
-Switch::Active* Switch::find_disturbance(const Event& e, bool only_one) noexcept {
-    Active* found = nullptr;
-    for (Active& d : disturbances) {
-        const Disturbance& w = d.what;
-        if (!is_meant(w, e, only_one)) continue;
-        const bool is_active = e.time_ns >= w.from_ns && e.time_ns < w.until_ns;
-        if (!is_active || d.hits >= w.count) continue;
-        ++d.matched;
-        const bool hit = w.every != 0 ? d.matched % w.every == 0
-                                      : static_cast<double>(draw() >> 11) * 0x1p-53 < w.probability;
-        if (!hit || found != nullptr) continue;
+Switch::Disturbances::Active* Switch::find_disturbance(const Event& e, bool only_one) noexcept {
+    Disturbances::Active* found = nullptr;
+    for (auto& d : disturbances) {
+        if (!is_meant(d.what, e, only_one) || !d.is_active(e.time_ns)) continue;
+        if (!disturbances.match(d) || found != nullptr) continue;
         ++d.hits;
         found = &d;
     }
@@ -424,7 +416,7 @@ Switch::Active* Switch::find_disturbance(const Event& e, bool only_one) noexcept
 /// Applies disturbances to the frame. Returns true when nothing of it proceeds unchanged. Those of
 /// one receiver apply at its line, all others where the frame leaves.
 bool Switch::disturbed(Event& e, bool only_one) noexcept {
-    const Active* const found = find_disturbance(e, only_one);
+    const Disturbances::Active* const found = find_disturbance(e, only_one);
     if (found == nullptr) return false;
     const Disturbance& w = found->what;
     switch (w.fault) {
@@ -439,8 +431,8 @@ bool Switch::disturbed(Event& e, bool only_one) noexcept {
         return false;
     case Fault::garble:
         if (e.length == 0) return false;
-        e.garbled = static_cast<std::int32_t>(draw() % e.length);
-        e.mask = static_cast<std::uint8_t>(1U + draw() % 255U);
+        e.garbled = static_cast<std::int32_t>(disturbances.random.draw() % e.length);
+        e.mask = static_cast<std::uint8_t>(1U + disturbances.random.draw() % 255U);
         return false;
     }
     return false;
@@ -463,19 +455,11 @@ void Switch::release(const Event& e) noexcept {
 
 void Switch::give_back(User& user, std::uint32_t slot) noexcept { user.unused.push(slot); }
 
-std::uint64_t Switch::draw() noexcept {  // splitmix64
-    random += 0x9e3779b97f4a7c15U;
-    auto z = random;
-    z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9U;
-    z = (z ^ z >> 27) * 0x94d049bb133111ebU;
-    return z ^ z >> 31;
-}
-
 /// Returns a normal random number with sigma 1, as the sum of twelve uniform ones.
 double Switch::noise() noexcept {
     double sum = -6.0;
     for (int i = 0; i < 3; ++i) {
-        for (auto [bits, k] = std::pair{draw(), 0}; k < 4; ++k, bits >>= 16) {
+        for (auto [bits, k] = std::pair{disturbances.random.draw(), 0}; k < 4; ++k, bits >>= 16) {
             sum += (static_cast<double>(bits & 0xffff) + 0.5) / 65536.0;
         }
     }

@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "hal/queue.hpp"
+#include "link/disturbances.hpp"
 #include "link/segment.hpp"
 
 namespace hal::ethernet::simbus {
@@ -134,14 +135,9 @@ public:
     }
     Station* station(int number) noexcept;  ///< only within exclusively(), as all below
 
-    struct Active {
-        Disturbance what;
-        std::uint64_t matched = 0;
-        std::uint64_t hits = 0;
-    };
-    std::vector<Active> disturbances;
+    using Disturbances = link::Disturbances<Disturbance>;
+    Disturbances disturbances;
     std::vector<std::unique_ptr<Station>> stations;  ///< in order of their numbers
-    std::uint64_t random = 1;
     /// the user with a responder; then the segment is a cable
     User* responding = nullptr;
 
@@ -177,14 +173,13 @@ private:
     void deliver(const Event&, Station& to) noexcept;
     bool add_event(const Event&) noexcept;
     static bool is_meant(const Disturbance&, const Event&, bool only_one) noexcept;
-    Active* find_disturbance(const Event&, bool only_one) noexcept;
+    Disturbances::Active* find_disturbance(const Event&, bool only_one) noexcept;
     bool disturbed(Event&, bool only_one) noexcept;
     void release(const Event&) noexcept;
     void give_back(User&, std::uint32_t slot) noexcept;
     std::int64_t wire_ns(std::size_t length) const noexcept {
         return static_cast<std::int64_t>(wire_bytes(length) * 8000 / speed);
     }
-    std::uint64_t draw() noexcept;
     double noise() noexcept;
     void sweep(std::vector<std::unique_ptr<User>>& gone,
                std::vector<std::unique_ptr<Station>>& empty);

@@ -11,7 +11,6 @@ namespace hal::ethernet::simbus {
 
 namespace {
 
-constexpr std::size_t max_disturbances = 64;
 constexpr std::size_t babble_capacity = 256;
 
 class SimulatedPort final : public Port, public Segment {
@@ -109,22 +108,13 @@ public:
 
     int port() const noexcept override { return station_.number; }
     void seed(std::uint64_t value) override {
-        switch_->exclusively([&] { switch_->random = value; });
+        switch_->exclusively([&] { switch_->disturbances.random.seed(value); });
     }
     int disturb(const Disturbance& what) override {
-        return switch_->exclusively([&] {
-            if (switch_->disturbances.size() >= max_disturbances) return -1;
-            switch_->disturbances.push_back({what, 0, 0});
-            return static_cast<int>(switch_->disturbances.size()) - 1;
-        });
+        return switch_->exclusively([&] { return switch_->disturbances.add(what); });
     }
     std::uint64_t hits(int number) const override {
-        return switch_->exclusively([&] {
-            const auto index = static_cast<std::size_t>(number);
-            return number >= 0 && index < switch_->disturbances.size()
-                       ? switch_->disturbances[index].hits
-                       : 0;
-        });
+        return switch_->exclusively([&] { return switch_->disturbances.hits(number); });
     }
     void calm() override {
         switch_->exclusively([&] {
