@@ -20,6 +20,7 @@ constexpr Classic table[] = {
     {"halscope", Part::core, halscope},
     {"halshow", Part::core, halshow},
     {"lcec_conf", Part::core, lcec_conf},
+    {"mb2hal", Part::core, mb2hal},
     {"halcompile", Part::tools, IN_TOOLS(halcompile)::run},
     {"halsampler", Part::tools, IN_TOOLS(halsampler)::run},
     {"halstreamer", Part::tools, IN_TOOLS(halstreamer)::run},

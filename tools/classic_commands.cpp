@@ -162,16 +162,24 @@ int halrun(int argc, char** argv) {
     return run_run(options);
 }
 
-/// The configuration program of LinuxCNC's EtherCAT component.
-int lcec_conf(int argc, char** argv) {
+namespace {
+
+/// Runs `hal GROUP COMMAND` with the arguments of another program.
+int run_as(std::string group, std::string command, int argc, char** argv) {
     std::string hal = "hal";
-    std::string group = "ethercat";
-    std::string command = "lcec-conf";
     std::vector<char*> line{hal.data(), group.data(), command.data()};
     line.insert(line.end(), argv + std::min(argc, 1), argv + argc);
     const int words = static_cast<int>(line.size());
     line.push_back(nullptr);
     return run_command_line(words, line.data());
 }
+
+}  // namespace
+
+/// The configuration program of LinuxCNC's EtherCAT component.
+int lcec_conf(int argc, char** argv) { return run_as("ethercat", "lcec-conf", argc, argv); }
+
+/// LinuxCNC's Modbus program.
+int mb2hal(int argc, char** argv) { return run_as("modbus", "mb2hal", argc, argv); }
 
 }  // namespace hal::tools

@@ -8,5 +8,6 @@ int halcmd(int argc, char** argv);  ///< hal shell
 int halrun(int argc, char** argv);  ///< hal run
 /// The configuration program of LinuxCNC's EtherCAT component: hal ethercat lcec-conf.
 int lcec_conf(int argc, char** argv);
+int mb2hal(int argc, char** argv);
 
 }  // namespace hal::tools

@@ -334,6 +334,9 @@ constexpr Subcommand table[] = {
         "write registers or coils of a Modbus slave"),
     command<ModbusMonitorOptions, OF_MODBUS(run_modbus_monitor)>(
         "modbus monitor", "LINE [--for TIME]", "print the frames on a serial line"),
+    command<ModbusMb2halOptions, OF_MODBUS(run_modbus_mb2hal)>(
+        "modbus mb2hal", "FILE [--check] [--name NAME]",
+        "exchange the transactions of LinuxCNC's mb2hal, for loadusr (mb2hal)"),
     command<MesaScanOptions, OF_MESA(run_mesa_scan)>(
         "mesa scan", "[HOST | NETWORK/BITS]… [--timeout TIME]", "find Mesa Ethernet cards"),
     command<MesaCardOptions, OF_MESA(run_mesa_info)>(

@@ -67,6 +67,7 @@ ROWS = {
         "components/ethercat/devices",
         "components/ethercat/config",
         "components/modbus/device",
+        "components/modbus/master",
         "components/mesa/card",
     ],  # hal can, ethercat, node, tdma
     "tools/panel": ["tools/cli"],

@@ -26,7 +26,7 @@ PACKAGES = {
         "depends": OWN,
         "fields": {"Conflicts": "linuxcnc-uspace, linuxcnc", "Architecture": "all"},
         "summary": "LinuxCNC's command names for Halcyon",
-        "text": "halrun, halcmd, halcompile, halmeter, halsampler, halscope, halshow, halstreamer,\nhaltcl and lcec_conf as names of the program hal. Programs that a machine starts\nfind them without this package.",
+        "text": "halrun, halcmd, halcompile, halmeter, halsampler, halscope, halshow, halstreamer,\nhaltcl, lcec_conf and mb2hal as names of the program hal. Programs that a machine starts\nfind them without this package.",
     },
     "halcyon-vision": {
         "depends": OWN,
@@ -77,7 +77,7 @@ PACKAGES = {
 
 DOC = "usr/share/doc/Halcyon/"
 ALIASES = (
-    "(halrun|halcmd|halcompile|halmeter|halsampler|halscope|halshow|halstreamer|haltcl|lcec_conf)"
+    "(halrun|halcmd|halcompile|halmeter|halsampler|halscope|halshow|halstreamer|haltcl|lcec_conf|mb2hal)"
 )
 GROUPS = ("vision", "dds", "estimation")  # components that are packages of their own
 

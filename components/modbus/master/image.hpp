@@ -16,7 +16,7 @@
 
 namespace hal::modbus {
 
-/// What happened on a bus; the rows of plugins/event_texts.hpp are in this order.
+/// What happened on a bus; the rows of event_texts.hpp are in this order.
 enum class Event : std::uint8_t {
     slave_online,
     slave_offline,
@@ -74,6 +74,7 @@ struct SlaveImage {
 struct TelegramImage {
     std::atomic<std::int64_t> stamp{0};
     std::atomic<std::uint32_t> rejected{0};
+    std::atomic<std::uint32_t> failures{0};
 };
 
 /// Command of a drive: direction, and bit 2 for a reset.
@@ -134,6 +135,10 @@ public:
     /// Whether the slave rejects a telegram: what it reads is as old as that of an offline slave.
     std::atomic<std::uint32_t>& rejected(std::size_t telegram) const noexcept {
         return telegrams_[telegram].rejected;
+    }
+    /// How often a telegram has failed in a row: no answer, a corrupt one, or an exception.
+    std::atomic<std::uint32_t>& failures(std::size_t telegram) const noexcept {
+        return telegrams_[telegram].failures;
     }
     /// The bits of a value: a double when it is scaled or a float, else a whole number.
     std::atomic<std::uint64_t>& value(std::size_t n) const noexcept { return values_[n]; }

@@ -318,6 +318,7 @@ void Master::succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) no
         own.is_sent = true;
     }
     image_.stamp(job_.telegram).store(now_ns, std::memory_order_relaxed);
+    image_.failures(job_.telegram).store(0, std::memory_order_relaxed);
     touch(job_.slave);
     end_of_job();
 }
@@ -408,6 +409,7 @@ void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexc
     }
     touch(job_.slave);
     if (job_.telegram == stop_job) return fail_stop(failure, now_ns);
+    image_.failures(job_.telegram).fetch_add(1, std::memory_order_relaxed);
     telegrams_[job_.telegram].due_ns =
         now_ns + (plan_.telegrams[job_.telegram].kind == Telegram::Kind::read
                       ? plan_.telegrams[job_.telegram].period_ns
@@ -464,6 +466,7 @@ void Master::reject(std::uint8_t code, std::int64_t now_ns) noexcept {
     is_verified_ = true;  // an exception is not an echo
     is_echo_known_ = true;
     image_.tell({Event::exception, job_.slave, job_.telegram, code});
+    image_.failures(job_.telegram).fetch_add(1, std::memory_order_relaxed);
     count_rejection(job_.telegram);
     const Telegram& t = plan_.telegrams[job_.telegram];
     TelegramState& own = telegrams_[job_.telegram];

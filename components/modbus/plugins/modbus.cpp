@@ -5,11 +5,11 @@
 #include <filesystem>
 
 #include "bus/component/bus_component.hpp"
-#include "event_texts.hpp"
 #include "hal/background.hpp"
 #include "hal/reporter.hpp"
 #include "link/call_journal.hpp"
 #include "modbus/guardian/guardian_process.hpp"
+#include "modbus/master/event_texts.hpp"
 #include "modbus/master/local_master.hpp"
 #include "modbus_arguments.hpp"
 #include "slave_pins.hpp"

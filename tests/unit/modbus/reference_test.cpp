@@ -2,7 +2,7 @@
 // The page has the tables that the reader, the profiles and the events are made of.
 #include "hal/read_file.hpp"
 #include "modbus/config/bus_config.hpp"
-#include "modbus/plugins/event_texts.hpp"
+#include "modbus/master/event_texts.hpp"
 
 namespace hal::modbus {
 namespace {

@@ -71,6 +71,18 @@ struct ModbusMonitorOptions : Options {
     }
 };
 
+struct ModbusMb2halOptions : Options {
+    std::string name;  ///< of the instance; empty: the one that started this program
+    bool check = false;
+
+    void declare(OptionSet& set) override {
+        set.words("FILE", "LinuxCNC's configuration of mb2hal, or config=FILE");
+        set.value("--name", name, "NAME",
+                  "instance of the machine (default: the one that started this program)");
+        set.flag("--check", check, "only check the file");
+    }
+};
+
 struct ModbusNodeOptions : Options {
     std::string link;
     std::vector<std::string> faults, settings;
@@ -102,6 +114,7 @@ int run_modbus_read(const ModbusAccessOptions&);
 int run_modbus_write(const ModbusAccessOptions&);
 int run_modbus_scan(const ModbusScanOptions&);
 int run_modbus_monitor(const ModbusMonitorOptions&);
+int run_modbus_mb2hal(const ModbusMb2halOptions&);
 int run_node_modbus(const ModbusNodeOptions&);
 
 }  // namespace hal::tools
