@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <cstdio>
 #include <deque>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -23,6 +24,8 @@ namespace {
 
 using namespace hal::dds;
 
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
 /// Another node, as its cycle and the engine's threads know it.
 struct Other {
     Other(hal::Component& c, const hal::Function& f, std::string node)
@@ -39,7 +42,9 @@ struct Other {
                  "online: its signals are valid, or its status is received if it sends none to "
                  "this node",
                  {.safe = false}),
-          age(c, f, age_ms_name.c_str(), "age of its signals, or of its status", {.unit = "ms"}),
+          age(c, f, age_ms_name.c_str(),
+              "age of its signals, or of its status; infinite: none yet, or the thread is stopped",
+              {.initial = infinite, .unit = "ms", .safe = infinite}),
           incompatible(c, f, incompatible_name.c_str(),
                        "it runs another version of the netlist; its signals are ignored") {}
 

@@ -11,6 +11,8 @@ namespace {
 
 using namespace hal::messages;
 
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
 struct CanReceive : hal::Component {
     using Component::Component;
 
@@ -48,8 +50,9 @@ struct CanReceive : hal::Component {
     hal::Out<double> age{
         *this,
         "age",
-        "time since the end of the newest message; infinite while the thread is stopped",
-        {.unit = "s", .safe = std::numeric_limits<double>::infinity()}};
+        "time since the end of the newest message; infinite without one, and while the thread is "
+        "stopped",
+        {.initial = infinite, .unit = "s", .safe = infinite}};
     hal::Out<std::uint64_t> received{*this, "received", "messages received"};
     hal::Out<std::uint64_t> overwritten{*this, "overwritten",
                                         "messages that a later one of the same cycle replaced"};
@@ -96,7 +99,7 @@ struct CanReceive : hal::Component {
         link_->flush(now);
         fresh = any;
         ever_ = ever_ || any;
-        age = ever_ ? 1e-9 * static_cast<double>(now - newest_) : 0.0;
+        age = ever_ ? 1e-9 * static_cast<double>(now - newest_) : infinite;
         valid = ever_ && !(timeout > 0.0 && age > timeout);
     }
 

@@ -2,6 +2,7 @@
 // The pins of a slave, and what copies them to and from the image.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -99,7 +100,8 @@ public:
               const Bus& bus, const Plan& plan, std::size_t index, SetPointPins& set_points)
         : index_(index),
           age_(c, receive, (name_of(bus, index) + ".age").c_str(),
-               "age of its oldest value; -1: one was not read", {.initial = -1.0, .unit = "s"}),
+               "age of its oldest value; infinite: one was not read, or the thread is stopped",
+               age_options),
           online_(c, receive, (name_of(bus, index) + ".online").c_str(), "the slave answers",
                   {.safe = false}),
           timeouts_(c, receive, (name_of(bus, index) + ".timeouts").c_str(),
@@ -151,10 +153,10 @@ public:
     }
     /// Shows how old the values are, in each cycle. [realtime]
     void show_ages(const Image& image, std::int64_t now_ns) noexcept {
-        age_ = oldest_ns_ == 0 ? -1.0 : seconds_between(oldest_ns_, now_ns);
+        age_ = oldest_ns_ == 0 ? infinite : seconds_between(oldest_ns_, now_ns);
         for (AgePin& age : ages_) {
             const std::int64_t stamp = image.stamp(age.telegram).load(std::memory_order_relaxed);
-            *age.pin = stamp == 0 ? -1.0 : seconds_between(stamp, now_ns);
+            *age.pin = stamp == 0 ? infinite : seconds_between(stamp, now_ns);
         }
     }
 
@@ -187,6 +189,9 @@ private:
         std::uint32_t telegram;
     };
     static constexpr std::uint32_t no_value = UINT32_MAX;
+    static constexpr double infinite = std::numeric_limits<double>::infinity();
+    static constexpr hal::PinOptions<double> age_options{
+        .initial = infinite, .unit = "s", .safe = infinite};
 
     static const std::string& name_of(const Bus& bus, std::size_t index) {
         return bus.slaves[index].name;
@@ -240,8 +245,9 @@ private:
         if (v.has_age) {
             ages_.push_back(
                 {std::make_unique<hal::Out<double>>(
-                     c, receive, (name + "-age").c_str(), "age of the value; -1: it was not read",
-                     hal::PinOptions<double>{.initial = -1.0, .unit = "s"}),
+                     c, receive, (name + "-age").c_str(),
+                     "age of the value; infinite: it was not read, or the thread is stopped",
+                     age_options),
                  planned.telegram});
         }
     }

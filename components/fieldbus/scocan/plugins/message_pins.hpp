@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 
 #include "fieldbus/messages/field_pins.hpp"
@@ -57,9 +58,8 @@ public:
                 {.initial = !m.event}),
           sent_(c, receive, (m.name + ".sent").c_str(), "frames of this message sent") {
         declare_fields(fields_, c, f, m);
-        invalid_ =
-            invalid_counter(c, f, m, fields_,
-                            "messages with a field that was not finite: its last value was sent");
+        invalid_ = invalid_counter(
+            c, f, m, fields_, "messages with a field that was not finite: its last value was sent");
         if (m.fields.empty() && m.bytes > 0) {
             data_ = std::make_unique<hal::In<std::uint64_t>>(c, f, (m.name + ".data").c_str(),
                                                              "data, little endian");
@@ -132,8 +132,10 @@ public:
           fresh_(c, f, (m.name + ".fresh").c_str(), "the message has arrived since the last cycle",
                  {.safe = false}),
           received_(c, f, (m.name + ".received").c_str(), "frames of this message received"),
-          age_(c, f, (m.name + ".age").c_str(),
-               "time since the message was sent; 0: never received", {.unit = "s"}),
+          age_(
+              c, f, (m.name + ".age").c_str(),
+              "time since the message was sent; infinite: never received, or the thread is stopped",
+              {.initial = infinite, .unit = "s", .safe = infinite}),
           interval_(c, f, (m.name + ".interval").c_str(),
                     "time between the begins of the last two frames", {.unit = "us"}) {
         declare_fields(fields_, c, f, m);
@@ -174,6 +176,8 @@ public:
     }
 
 private:
+    static constexpr double infinite = std::numeric_limits<double>::infinity();
+
     const Message& message_;
     hal::Out<bool> fresh_;
     hal::Out<std::uint32_t> received_;
