@@ -314,7 +314,7 @@ TEST(Foreign_frame, has_a_sender_only_where_the_table_knows_one) {
               "frame 0x000 in slot 3, outside of its own; a SYNC, of node clock or a backup");
     EXPECT_EQ(texts.line({Event::foreign_frame, no_node, announce_id, 3}),
               "frame 0x001 in slot 3, outside of its own; an idle slot announced by the monitor");
-    EXPECT_EQ(texts.line({Event::foreign_frame, no_node, answer_id, 3}),
+    EXPECT_EQ(texts.line({Event::foreign_frame, no_node, node_id, 3}),
               "frame 0x781 in slot 3, outside of its own; reserved for the bus itself");
     EXPECT_EQ(texts.line({Event::foreign_frame, no_node, 0x555, 3}),
               "frame 0x555 in slot 3, outside of its own; its sender is not in the table");

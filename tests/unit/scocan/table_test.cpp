@@ -136,7 +136,8 @@ TEST(Frames, are_read_as_they_were_written) {
     EXPECT_FALSE(decode(hal::can::Frame(0, {64, 0}), s));
     EXPECT_FALSE(decode(hal::can::Frame(0, {1}), s));
     Request r;
-    ASSERT_TRUE(decode(encode(Request{Request::What::prepare, 3, 0xbeef, 17}), r));
+    ASSERT_TRUE(decode(encode(Request{5, Request::What::prepare, 3, 0xbeef, 17}), r));
+    EXPECT_EQ(5U, r.sender);
     EXPECT_EQ(0xbeef, r.crc);
     EXPECT_EQ(17, r.at_counter);
     Answer a;

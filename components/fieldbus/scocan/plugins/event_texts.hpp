@@ -83,7 +83,7 @@ public:
     /// The table outlives it. `reset`: the command that resumes a silenced node. [setup]
     EventTexts(const Table& table, std::size_t node, std::string reset)
         : t_(table), own_(table.nodes[node].name), reset_(std::move(reset)) {
-        for (const std::uint32_t id : {sync_id, announce_id, request_id, answer_id}) {
+        for (const std::uint32_t id : {sync_id, announce_id, configuration_ids, node_id}) {
             add_frame(id, no_node);
         }
         // the owner of a slot takes precedence, as in the line

@@ -178,7 +178,8 @@ protected:
             m->arrived(frame, begin);
         }
         exchange_->each([&](can::SlotUser& user) {
-            if (frame.id < request_id || frame.id > answer_id + arguments_.table.nodes.size()) {
+            if (frame.id < configuration_ids ||
+                frame.id > node_id + arguments_.table.nodes.size()) {
                 if (!user.incoming.push(frame)) {
                     user.lost.fetch_add(1, std::memory_order_relaxed);
                 }

@@ -26,8 +26,8 @@ bool ModeControl::request(std::uint32_t mode) noexcept {
     change_.at = core_.clock.cycle() + change_cycles;
     change_.ready[core_.node] = true;
     core_.send_shared(
-        encode(Request{Request::What::prepare, static_cast<std::uint8_t>(mode), core_.table.crc,
-                       static_cast<std::uint8_t>(core_.counter_of(change_.at))}),
+        encode(Request{core_.node, Request::What::prepare, static_cast<std::uint8_t>(mode),
+                       core_.table.crc, static_cast<std::uint8_t>(core_.counter_of(change_.at))}),
         false);
     return true;
 }
@@ -78,8 +78,8 @@ void ModeControl::continue_change() noexcept {
 
 void ModeControl::refuse(std::uint32_t who, Answer::Reason reason) noexcept {
     core_.raise(Event::mode_refused, who, change_.mode, static_cast<Time>(reason));
-    core_.send_shared(encode(Request{Request::What::cancel, static_cast<std::uint8_t>(change_.mode),
-                                     core_.table.crc, 0}),
+    core_.send_shared(encode(Request{core_.node, Request::What::cancel,
+                                     static_cast<std::uint8_t>(change_.mode), core_.table.crc, 0}),
                       false);
     change_ = {};
 }

@@ -72,7 +72,7 @@ bool Station::request_silence(std::uint32_t node, bool silent) noexcept {
         return false;
     }
     const auto what = silent ? Request::What::silence : Request::What::resume;
-    const Request request{what, static_cast<std::uint8_t>(node), core_.table.crc, 0};
+    const Request request{core_.node, what, static_cast<std::uint8_t>(node), core_.table.crc, 0};
     return core_.queue.push(encode(request), no_slot, false, false);
 }
 
@@ -118,7 +118,7 @@ void Station::accept(const can::Frame& frame) noexcept {
     if (std::uint32_t slot = 0; decode_announcement(frame, slot)) {
         return accept_announcement(slot, w);
     }
-    if (frame.id >= request_id) {
+    if (frame.id >= configuration_ids) {
         accept_configuration(frame);
     }
     ++core_.count.received;
@@ -208,7 +208,7 @@ void Station::accept_echo(const can::Frame& frame, const SlotTime& w, Time bus_b
     SendQueue::Entry sent;
     const bool known = core_.queue.confirm(frame, sent);
     slot_monitor_.check_own(frame, w, bus_begin);
-    if (known || frame.id < request_id) {
+    if (known || frame.id < configuration_ids) {
         core_.sink.on_sent(frame, bus_begin);
     }
 }
@@ -247,6 +247,8 @@ void Station::compare_tables(const Request& r) noexcept {
 /// other numbers.
 void Station::silence(const Request& r) noexcept {
     if (r.mode != core_.node || r.crc != core_.table.crc) return;
+    if (r.sender >= core_.table.nodes.size()) return;
+    if (core_.table.nodes[r.sender].role != Role::monitor) return;
     if (r.what == Request::What::resume) return reset();
     if (!core_.silenced) {
         core_.raise(Event::silenced_by_monitor, core_.node);

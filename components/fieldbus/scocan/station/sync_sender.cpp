@@ -133,7 +133,8 @@ void SyncSender::other_sent(const Sync& s) noexcept {
 }
 
 void SyncSender::announce_table() noexcept {
-    core_.send_shared(encode(Request{Request::What::table, 0, core_.table.crc, 0}), true);
+    core_.send_shared(encode(Request{core_.node, Request::What::table, 0, core_.table.crc, 0}),
+                      true);
 }
 
 }  // namespace hal::scocan

@@ -29,12 +29,17 @@ const char* code_of(Topic);  ///< "scocan-line", …: the diagnostic's code
 
 inline constexpr std::uint32_t sync_id = 0;
 inline constexpr std::uint32_t announce_id = 1;
-inline constexpr std::uint32_t request_id = 0x780;
-inline constexpr std::uint32_t answer_id = 0x781;
+/// From here on the identifiers are reserved for the configuration.
+inline constexpr std::uint32_t configuration_ids = 0x780;
+/// Plus the number of a node: its requests and answers. Two nodes that send different data with the
+/// same identifier at once disturb each other until both are off the bus (ISO 11898-1, bit error).
+inline constexpr std::uint32_t node_id = 0x781;
 inline constexpr std::uint32_t identifiers = 0x800;
 /// Returns whether the discipline itself uses the identifier: 0x000..0x00F, 0x780..0x7FF.
 /// [realtime]
-constexpr bool is_reserved(std::uint32_t id) noexcept { return id < 0x10 || id >= request_id; }
+constexpr bool is_reserved(std::uint32_t id) noexcept {
+    return id < 0x10 || id >= configuration_ids;
+}
 inline constexpr std::size_t max_nodes = 126;
 inline constexpr std::size_t max_slots = 256;
 inline constexpr std::size_t max_modes = 16;

@@ -8,6 +8,9 @@ namespace {
 bool is_plain(const can::Frame& f, std::uint32_t id) noexcept {
     return f.id == id && f.is_standard_data();
 }
+bool is_of_node(const can::Frame& f) noexcept {
+    return f.id >= node_id && f.id < node_id + max_nodes && is_plain(f, f.id);
+}
 std::uint8_t low(std::uint32_t value) noexcept { return static_cast<std::uint8_t>(value & 0xff); }
 
 }  // namespace
@@ -43,33 +46,30 @@ bool decode_announcement(const can::Frame& f, std::uint32_t& slot) noexcept {
 }
 
 can::Frame encode(const Request& r) noexcept {
-    return {request_id,
+    return {node_id + r.sender,
             {low(static_cast<std::uint32_t>(r.what)), r.mode, low(r.crc),
              low(static_cast<std::uint32_t>(r.crc) >> 8), r.at_counter}};
 }
 
 bool decode(const can::Frame& f, Request& r) noexcept {
-    if (!is_plain(f, request_id) || f.length != 5 || f.data[0] > 4 || f.data[4] >= counter_cycles) {
+    if (!is_of_node(f) || f.length != 5 || f.data[0] > 4 || f.data[4] >= counter_cycles) {
         return false;
     }
     if (f.data[1] >= (f.data[0] >= 3 ? max_nodes : max_modes)) return false;
-    r = {static_cast<Request::What>(f.data[0]), f.data[1],
+    r = {f.id - node_id, static_cast<Request::What>(f.data[0]), f.data[1],
          static_cast<std::uint16_t>(f.data[2] | f.data[3] << 8), f.data[4]};
     return true;
 }
 
 can::Frame encode(const Answer& a) noexcept {
-    return {answer_id + a.node,
+    return {node_id + a.node,
             {low(static_cast<std::uint32_t>(a.reason)), a.mode, low(a.crc),
              low(static_cast<std::uint32_t>(a.crc) >> 8)}};
 }
 
 bool decode(const can::Frame& f, Answer& a) noexcept {
-    if (f.id < answer_id || f.id > 0x7ff || !is_plain(f, f.id) || f.length != 4 || f.data[0] > 1 ||
-        f.data[1] >= max_modes) {
-        return false;
-    }
-    a = {f.id - answer_id, f.data[1], static_cast<Answer::Reason>(f.data[0]),
+    if (!is_of_node(f) || f.length != 4 || f.data[0] > 1 || f.data[1] >= max_modes) return false;
+    a = {f.id - node_id, f.data[1], static_cast<Answer::Reason>(f.data[0]),
          static_cast<std::uint16_t>(f.data[2] | f.data[3] << 8)};
     return true;
 }

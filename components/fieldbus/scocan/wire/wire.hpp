@@ -29,12 +29,13 @@ can::Frame announcement(std::uint32_t slot) noexcept;
 /// Returns false for a frame that is not a valid announcement. [realtime]
 bool decode_announcement(const can::Frame&, std::uint32_t& slot) noexcept;
 
-/// Configuration, identifier 0x780: from the SYNC sender to all nodes, or from the monitor to one
-/// (silence, resume).
+/// Configuration, identifier 0x781 + sender, DLC 5: from the SYNC sender to all nodes, or from the
+/// monitor to one (silence, resume).
 struct Request {
     enum class What : std::uint8_t { table = 0, prepare = 1, cancel = 2, silence = 3, resume = 4 };
+    std::uint32_t sender = 0;     ///< node, by the sender's table
     What what = What::table;
-    std::uint8_t mode = 0;       ///< silence, resume: the node
+    std::uint8_t mode = 0;        ///< silence, resume: the node
     std::uint16_t crc = 0;        ///< of the sender's table
     std::uint8_t at_counter = 0;  ///< prepare: cycle of the switch
 };
@@ -42,7 +43,7 @@ can::Frame encode(const Request&) noexcept;
 /// Returns false for an invalid frame. [realtime]
 bool decode(const can::Frame&, Request&) noexcept;
 
-/// Answer, identifier 0x781 + node.
+/// Answer, identifier 0x781 + node, DLC 4.
 struct Answer {
     /// offline: no answer
     enum class Reason : std::uint8_t { ready = 0, unknown_mode = 1, offline = 2 };
