@@ -135,6 +135,7 @@ private:
         skip_ = 0;
         quiet_sum_ = quiet_square_ = 0.0;
         quiet_count_ = 0.0;
+        late_sum_ = late_count_ = 0.0;
         if (next != Phase::done && next != Phase::failed) {
             failure = 0;
         }
@@ -143,13 +144,18 @@ private:
         enter(Phase::failed);
         failure = static_cast<std::uint32_t>(why);
     }
-    /// The second half of the settling time gives the steady state and the noise.
+    /// The second half of the settling time gives the steady state and the noise; its two halves
+    /// give the drift.
     void rest(double y) noexcept {
         if (time_ > 0.5 * settle_time) {
             quiet_sum_ += y - first_;
             quiet_square_ += (y - first_) * (y - first_);
 
             quiet_count_ += 1.0;
+            if (time_ > 0.75 * settle_time) {
+                late_sum_ += y - first_;
+                late_count_ += 1.0;
+            }
         } else {
             first_ = y;
         }
@@ -159,7 +165,25 @@ private:
         noise_ = quiet_count_ > 0.0
                      ? std::sqrt(std::fmax(quiet_square_ / quiet_count_ - mean * mean, 0.0))
                      : 0.0;
+        find_drift();
         enter(Phase::step);
+    }
+    /// How fast the value still moves at the step, and the uncertainty of that by the noise.
+    void find_drift() noexcept {
+        const double early_count = quiet_count_ - late_count_;
+        drift_ = drift_noise_ = 0.0;
+        if (!(early_count > 0.0 && late_count_ > 0.0 && settle_time > 0.0)) return;
+        const double quarter = 0.25 * settle_time;
+        const double early = (quiet_sum_ - late_sum_) / early_count;
+        drift_ = (late_sum_ / late_count_ - early) / quarter;
+        drift_noise_ = noise_ * std::sqrt(1.0 / early_count + 1.0 / late_count_) / quarter;
+    }
+    /// Returns whether the plant had settled before the step, whose response ended at `end`. With a
+    /// time constant of at most a quarter of the step, which the end of the response has shown, a
+    /// drift goes on by at most that many seconds of it.
+    bool was_settled(double end) const noexcept {
+        const double longest = 0.25 * step_time;
+        return (std::fabs(drift_) - 3.0 * drift_noise_) * longest <= 0.02 * std::fabs(end);
     }
     void keep(double y) noexcept {
         if (skip_++ % thin_ != 0) return;
@@ -199,9 +223,11 @@ private:
         if (!(std::fabs(end) > 4.0 * noise_) || end == 0.0) {
             return fail(end == 0.0 ? Failure::no_answer : Failure::noisy);
         }
-        if (std::fabs(end - before) > 0.02 * std::fabs(end) + 3.0 * noise_) {
+        const double uncertain = noise_ * std::sqrt(2.0 / static_cast<double>(tail));
+        if (std::fabs(end - before) > 0.01 * std::fabs(end) + 3.0 * uncertain) {
             return fail(Failure::too_long);
         }
+        if (!was_settled(end)) return fail(Failure::too_long);
         double a0 = 0.0;
         double a1 = 0.0;
         double at = 0.0;
@@ -342,6 +368,10 @@ private:
 
     double quiet_square_ = 0.0;
     double quiet_count_ = 0.0;
+    double late_sum_ = 0.0;
+    double late_count_ = 0.0;
+    double drift_ = 0.0;  // at the step, per second
+    double drift_noise_ = 0.0;  // its standard deviation
     std::vector<double> kept_;  // the answer, from where it rested
     std::size_t count_ = 0;
     std::size_t thin_ = 1;
@@ -366,6 +396,10 @@ private:
                              {"quiet-sum", quiet_sum_},
                              {"quiet-square", quiet_square_},
                              {"quiet-count", quiet_count_},
+                             {"late-sum", late_sum_},
+                             {"late-count", late_count_},
+                             {"drift", drift_},
+                             {"drift-noise", drift_noise_},
                              {"kept", kept_},
                              {"count", count_},
                              {"thin", thin_},
@@ -393,7 +427,8 @@ HAL_COMPONENT(
 The plant is modelled as K e^(-L s) / (T s + 1), first order with dead time.
 
 **Step.** The output remains at `bias` for `settle-time`, then steps by `amplitude` for `step-time`. K, T and L follow from the areas under the response,
-which are insensitive to noise; `fit` is the quality of the model. The proposed gains follow Skogestad's SIMC rule: a PI with the closed-loop time constant
+which are insensitive to noise; `fit` is the quality of the model. The plant must have settled before the step, and within it: failure 4 is a value that drifted at
+the step by more than 2 % of the response within a quarter of `step-time`, or that changed by more than 1 % between the last two tenths of it, beyond the noise. The proposed gains follow Skogestad's SIMC rule: a PI with the closed-loop time constant
 `closed-loop-time`, or the dead time.
 
 **Relay.** The output switches between bias + amplitude and bias - amplitude whenever `value` passes `setpoint`; the plant oscillates, four equal periods
