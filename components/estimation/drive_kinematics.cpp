@@ -7,7 +7,8 @@ The two wheels are `track` apart. Joints are the measured wheel speeds, left the
 the turning speed, and the commands are the wheel speeds for them. `diff_drive` does the same from wheel angles, with a named pin
 for each value and with limits of speed and acceleration.
 
-If an input or `track` is NaN, infinite or above 1e9, all outputs keep their values and `solved` becomes FALSE.
+If `target-0`, `target-1` or `track` is NaN, infinite or above 1e9, the wheel commands are 0. With such a measured speed they follow the target, and the odometry
+keeps its values. `solved` is FALSE in both cases.
 
     loadrt drive_kinematics names=base
     addf base.update servo

@@ -40,20 +40,27 @@ protected:
     /// Copies the joints to `measured_`. False, with `solved` FALSE, when an input or one of the
     /// machine's `dimensions` is not finite or exceeds 1e9. [realtime]
     bool read_inputs(std::initializer_list<double> dimensions = {}) noexcept {
-        const auto is_valid = [](double value) { return std::fabs(value) < 1e9; };  // not for NaN
-        const bool valid = std::ranges::all_of(joint, is_valid) &&
-                           std::ranges::all_of(target, is_valid) &&
-                           std::ranges::all_of(dimensions, is_valid);
+        const bool valid = std::ranges::all_of(target, is_valid) &&
+                           std::ranges::all_of(dimensions, is_valid) && read_joints();
         if (!valid) {
-            bad_inputs = bad_inputs + 1;
-            solved = false;
-            return false;
+            reject_inputs();
         }
+        return valid;
+    }
+    /// Copies the joints to `measured_`. False when one is not valid. [realtime]
+    bool read_joints() noexcept {
+        if (!std::ranges::all_of(joint, is_valid)) return false;
         for (std::size_t i = 0; i < joint.size(); ++i) {
             measured_(static_cast<Eigen::Index>(i)) = joint[i];
         }
         return true;
     }
+    /// Counts a cycle with an invalid input. [realtime]
+    void reject_inputs() noexcept {
+        bad_inputs = bad_inputs + 1;
+        solved = false;
+    }
+    static bool is_valid(double value) noexcept { return std::fabs(value) < 1e9; }  // not for NaN
 
     Vector measured_;
 
@@ -64,8 +71,8 @@ public:
     Out<bool> solved{*this, "solved", "TRUE while the commands reach the target"};
     Out<std::uint32_t> bad_inputs{
         *this, "bad-inputs",
-        "cycles with an input or a dimension that is NaN, infinite or above 1e9; the outputs keep "
-        "their values"};
+        "cycles with an input or a dimension that is NaN, infinite or above 1e9; positions keep "
+        "their values, speeds of wheels become 0"};
 };
 
 }  // namespace hal::estimation

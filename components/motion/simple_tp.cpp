@@ -58,7 +58,7 @@ may change at any time: the axis reverses or decelerates within `maxaccel`. Whil
 beyond 1e20, it brakes with `maxaccel` and stops. The initial position is 0. It stops within a thousandth of the distance of the first cycle of
 an acceleration, `maxaccel` * T * T for a thread of period T.
 
-**Differences from LinuxCNC:** A `maxvel` or `maxaccel` that is negative or NaN counts as 0: no motion, no change of the speed (LinuxCNC:
+**Differences from LinuxCNC:** A `maxvel` or `maxaccel` that is negative counts as 0: no motion, no change of the speed. For NaN its last valid value applies (LinuxCNC:
 NaN in `current-pos`, or motion away from the target).
 
     loadrt simple_tp names=tp
