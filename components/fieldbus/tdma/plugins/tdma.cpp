@@ -357,7 +357,7 @@ private:
 
     // Events of the station. [realtime]
     void on_event(Event e, const Address& who, Time value) noexcept override {
-        if (e == Event::master_there || e == Event::withdrew) {
+        if (e == Event::master_there || e == Event::withdrew || e == Event::yielded) {
             withdrawn_ = true;
         }
         if (event_rows[static_cast<std::size_t>(e)].effect == hal::bus::Effect::ends && ends(e)) {

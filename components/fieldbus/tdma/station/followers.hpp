@@ -16,11 +16,23 @@ public:
 
     /// Notes a calibration request. [realtime]
     void calibrated(const Address& who, Time now) noexcept { heard(who, now); }
-    /// Notes any other frame. [realtime]
-    void sent(const Address& who, Time now) noexcept {
-        if (Follower* f = heard(who, now)) {
-            f->sends = true;
+    /// Notes any other frame; `elsewhere`: it was in a slot of another master's schedule.
+    /// [realtime]
+    void sent(const Address& who, Time now, bool elsewhere) noexcept {
+        Follower* const f = heard(who, now);
+        f->sends = true;
+        if (elsewhere) {
+            f->elsewhere = now;
         }
+    }
+    /// Returns true when there is a station that sends, and in no other schedule: it was heard
+    /// within `timeout` (ns), and not elsewhere. [realtime]
+    bool proven(Time now, Time timeout) const noexcept {
+        return std::any_of(list_.begin(), list_.begin() + static_cast<std::ptrdiff_t>(used_),
+                           [&](const Follower& f) {
+            const bool was_elsewhere = f.elsewhere != 0 && now - f.elsewhere <= timeout;
+            return f.sends && now - f.heard <= timeout && !was_elsewhere;
+        });
     }
     /// Returns true when there is a follower: a sending station heard within `timeout` (ns), or one
     /// that calibrated and never sends. [realtime]
@@ -36,6 +48,7 @@ private:
         Address who{};
         Time heard = 0;
         bool sends = false;
+        Time elsewhere = 0;  ///< last frame in another schedule; 0: none
     };
     /// Returns its entry; a new one replaces the least recently heard when the list is full.
     Follower* heard(const Address& who, Time now) noexcept {
@@ -47,7 +60,7 @@ private:
                                                      [](const auto& a, const auto& b) {
                 return a.heard < b.heard;
             });
-            *f = {who, now, false};
+            *f = {who, now, false, 0};
         }
         f->heard = now;
         return &*f;

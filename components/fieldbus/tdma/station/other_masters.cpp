@@ -39,9 +39,9 @@ bool OtherMasters::allows(const Address& master) noexcept {
 }
 
 /// Returns the last entry of a sender, or nullptr.
-Claimant* OtherMasters::find(const Address& who) noexcept {
-    Claimant* found = nullptr;
-    for (Claimant& known : claimants_) {
+const Claimant* OtherMasters::find(const Address& who) const noexcept {
+    const Claimant* found = nullptr;
+    for (const Claimant& known : claimants_) {
         if (known.row != 0 && known.who == who) {
             found = &known;
         }
@@ -49,20 +49,33 @@ Claimant* OtherMasters::find(const Address& who) noexcept {
     return found;
 }
 
-const Claimant& OtherMasters::claim(const Decoded& d) noexcept {
+const Claimant& OtherMasters::claim(const Decoded& d, Time arrived) noexcept {
     const Sync& s = d.sync;
-    Claimant* c = find(d.from);
-    if (c == nullptr) {
-        c = &claimants_[next_claimant_++ % claimants_.size()];
-        *c = {d.from, s.cycle, 1, s.scheduled, 0};
-        return *c;
+    const auto offset = static_cast<Time>(static_cast<std::uint64_t>(s.stamp) -
+                                          static_cast<std::uint64_t>(arrived));
+    const Claimant* const known = find(d.from);
+    if (known == nullptr) {
+        Claimant& added = claimants_[next_claimant_++ % claimants_.size()];
+        added = {d.from, s.cycle, 1, s.scheduled, 0, offset};
+        return added;
     }
+    Claimant* const c = &claimants_[static_cast<std::size_t>(known - claimants_.data())];
     const auto cycles = static_cast<std::int32_t>(s.cycle - c->cycle);
     const Time every = cycles > 0 && cycles < 1000 ? (s.scheduled - c->scheduled) / cycles : 0;
     const bool consistent =
         every > 0 && (c->row == 1 || std::abs(every - c->every) <= core_.setup.guard);
-    *c = {d.from, s.cycle, consistent ? c->row + 1 : 1, s.scheduled, every};
+    *c = {d.from, s.cycle, consistent ? c->row + 1 : 1, s.scheduled, every, offset};
     return *c;
+}
+
+std::optional<SlotTime> OtherMasters::left_at(Time arrived, std::size_t length) const noexcept {
+    const Claimant* const c = present() ? find(other_) : nullptr;
+    if (c == nullptr || !c->confirmed()) return std::nullopt;
+    const Time longer = 2 * (core_.wire(length) - core_.wire(0));  // stored and forwarded once
+    const Time into = arrived + c->offset - longer - c->scheduled;
+    const Time cycles = core_.cycles_in(into);
+    return SlotTime{c->cycle + static_cast<std::uint32_t>(cycles),
+                    into - cycles * core_.setup.cycle};
 }
 
 void OtherMasters::confirm(const Address& who, const Followers& followers, Time now) noexcept {
@@ -70,6 +83,7 @@ void OtherMasters::confirm(const Address& who, const Followers& followers, Time 
     other_ = who;
     heard_ = now;
     if (first) {
+        since_ = now;
         established_ = followers.any(now, gone_after);
     }
     if (reported_ && !other_gate_.open()) return;

@@ -42,6 +42,17 @@ public:
             ++h.late;
         }
     }
+    /// Notes whether a frame of station `n` was in its own slot, or in that of another one.
+    /// [realtime]
+    void placed(std::size_t n, bool in_own) noexcept {
+        if (n >= list_.size()) return;
+        list_[n].misplaced = in_own ? 0 : list_[n].misplaced + 1;
+    }
+    /// Returns the number of its last frames, without one in its own slots, in slots of others.
+    /// [realtime]
+    std::uint32_t misplaced(std::size_t n) const noexcept { return list_[n].misplaced; }
+    /// Forgets a station that was taken for another one. [realtime]
+    void forget(std::size_t n) noexcept { list_[n] = {}; }
     /// Uses a time stamp of its clock, from a calibration request or an answer to a ping: two of
     /// them 0.3 s to 10 s apart give its drift, unless its clock jumped. [realtime]
     void stamp(std::size_t n, Time its, Time global) noexcept {
@@ -81,6 +92,7 @@ public:
 private:
     struct Entry {
         Heard heard;
+        std::uint32_t misplaced = 0;
         Time stamped = 0;
         Time stamp = 0;
     };

@@ -53,6 +53,52 @@ bool SlotMonitor::is_in_slot(const Other& other, SlotTime at) const noexcept {
     return false;
 }
 
+/// Returns how long after the begin of the last of these slots a frame began, ns; the length of a
+/// cycle or more when none was in that time.
+Time SlotMonitor::after_slot(const std::vector<SlotSetup>& slots, SlotTime at) const noexcept {
+    constexpr Time stamp_error = 2'000;
+    const Time cycle = core_.setup.cycle;
+    Time nearest = cycle;
+    for (const SlotSetup& slot : slots) {
+        for (const int turn : {-1, 0, 1}) {
+            const Time after = at.offset + stamp_error - slot.offset - turn * cycle;
+            const std::uint32_t number = at.cycle + static_cast<std::uint32_t>(turn);
+            const bool is_used = number % slot.period == slot.phasing;
+            if (is_used && after >= 0) {
+                nearest = std::min(nearest, after);
+            }
+        }
+    }
+    return nearest;
+}
+
+/// Returns the index of the other station in whose slot a frame began: of all slots, also those of
+/// this station, the one that begins last before the frame. The windows of is_in_slot() overlap,
+/// because they allow for a late sender.
+std::optional<std::size_t> SlotMonitor::block_at(SlotTime at) const noexcept {
+    const auto& others = core_.setup.others;
+    Time nearest = after_slot(core_.setup.slots, at);
+    std::optional<std::size_t> block;
+    for (std::size_t n = 0; n < others.size(); ++n) {
+        const Time after = after_slot(others[n].slots, at);
+        if (after >= nearest) continue;
+        nearest = after;
+        block = n;
+    }
+    return block && is_in_slot(others[*block], at) ? block : std::nullopt;
+}
+
+bool SlotMonitor::is_elsewhere(const Address& from, Time arrived, std::size_t length,
+                               SlotTime there) const noexcept {
+    const auto n = by_address(from);
+    if (!n || !core_.runs()) return false;
+    const auto& slots = core_.setup.others[*n].slots;
+    const Time late = core_.setup.guard + std::max<Time>(20'000, core_.setup.cycle / 20);
+    const Time after = after_slot(slots, there);
+    constexpr Time margin = 5'000;
+    return after <= late && after + margin < after_slot(slots, core_.left_at(arrived, length));
+}
+
 /// Returns the index of the station with an address: of the schedule, or of earlier frames.
 std::optional<std::size_t> SlotMonitor::by_address(const Address& from) const noexcept {
     const auto& others = core_.setup.others;
@@ -65,16 +111,16 @@ std::optional<std::size_t> SlotMonitor::by_address(const Address& from) const no
     return std::nullopt;
 }
 
+/// Returns true for a block without an address, while no station with it is online.
+bool SlotMonitor::is_unknown(std::size_t n) const noexcept {
+    return core_.setup.others[n].mac == Address{} && !roster_[n].alive;
+}
+
 /// Returns the index of an unknown station in whose slot a frame was.
 std::optional<std::size_t> SlotMonitor::by_slot(Time arrived, std::size_t length) const noexcept {
-    if (!core_.runs()) return std::nullopt;
-    const auto& others = core_.setup.others;
-    const SlotTime at = core_.left_at(arrived, length);
-    for (std::size_t n = 0; n < others.size(); ++n) {
-        const bool unknown = others[n].mac == Address{} && !roster_[n].alive;
-        if (unknown && is_in_slot(others[n], at)) return n;
-    }
-    return std::nullopt;
+    if (!core_.runs() || !learns_) return std::nullopt;
+    const auto n = block_at(core_.left_at(arrived, length));
+    return n && is_unknown(*n) ? n : std::nullopt;
 }
 
 /// Returns the index of the last unknown station with the role of the sender of a sync.
@@ -83,8 +129,7 @@ std::optional<std::size_t> SlotMonitor::by_role(const Sync& sync) const noexcept
     const bool master = core_.is_from_master(lateness_of(sync));
     const Role role = master ? Role::master : Role::backup;
     for (std::size_t n = others.size(); n-- > 0;) {
-        const bool unknown = others[n].mac == Address{} && !roster_[n].alive;
-        if (unknown && others[n].role == role) return n;
+        if (is_unknown(n) && others[n].role == role) return n;
     }
     return std::nullopt;
 }
@@ -92,13 +137,26 @@ std::optional<std::size_t> SlotMonitor::by_role(const Sync& sync) const noexcept
 std::optional<std::size_t> SlotMonitor::sender_of(const Decoded& d, Time arrived,
                                                   std::size_t length) const noexcept {
     if (const auto known = by_address(d.from)) return known;
-    if (const auto found = by_slot(arrived, length)) return found;
-    return d.kind == Kind::sync ? by_role(d.sync) : std::nullopt;
+    if (d.kind == Kind::sync) return by_role(d.sync);
+    // a reply is in the requester's slot
+    return d.kind == Kind::reply ? std::nullopt : by_slot(arrived, length);
+}
+
+/// Forgets the address of station `n` when its frames are in the slots of another one that is
+/// unknown, or whose frames are elsewhere, too: it was learned for the wrong block.
+void SlotMonitor::check_block(std::size_t n, Time arrived, std::size_t length) noexcept {
+    if (core_.setup.others[n].mac != Address{} || !core_.runs() || !learns_) return;
+    const auto block = block_at(core_.left_at(arrived, length));
+    if (!block) return;
+    roster_.placed(n, *block == n);
+    if (roster_.misplaced(n) < confirmations) return;
+    if (is_unknown(*block) || roster_.misplaced(*block) >= confirmations) {
+        roster_.forget(n);
+    }
 }
 
 void SlotMonitor::note(const Decoded& d, Time arrived, std::size_t length, Time now) noexcept {
     if (roster_.size() == 0) return;
-    // a reply is in the requester's slot
     const bool in_own_slot = d.kind != Kind::sync && d.kind != Kind::reply;
     const auto n = sender_of(d, arrived, length);
     if (!n) {
@@ -110,6 +168,9 @@ void SlotMonitor::note(const Decoded& d, Time arrived, std::size_t length, Time 
     const bool late = in_own_slot && core_.runs() &&
                       !is_in_slot(core_.setup.others[*n], core_.left_at(arrived, length));
     roster_.frame(*n, d.from, now, late);
+    if (in_own_slot) {
+        check_block(*n, arrived, length);
+    }
     if (d.kind == Kind::request && core_.status.leading) {
         roster_.stamp(*n, d.request.stamp, core_.clock.global(arrived));
     }
@@ -118,18 +179,14 @@ void SlotMonitor::note(const Decoded& d, Time arrived, std::size_t length, Time 
 /// Detects a station that no block names in the slots of another one that sends, too: two stations
 /// were given the same block.
 void SlotMonitor::check_duplicate(const Address& from, Time arrived, std::size_t length) noexcept {
-    if (!core_.runs()) return;
-    const SlotTime at = core_.left_at(arrived, length);
-    for (std::size_t n = 0; n < core_.setup.others.size(); ++n) {
-        const Other& other = core_.setup.others[n];
-        const Heard& first = roster_[n];
-        if (!first.alive || first.from == from || !is_in_slot(other, at)) continue;
-        duplicate_row_ = from == duplicate_ ? duplicate_row_ + 1 : 1;
-        duplicate_ = from;
-        if (duplicate_row_ >= confirmations && duplicate_gate_.pass()) {
-            core_.report(Event::duplicate_slot, from, duplicate_value(first.from, other.index));
-        }
-        return;
+    if (!core_.runs() || !learns_) return;
+    const auto n = block_at(core_.left_at(arrived, length));
+    if (!n || !roster_[*n].alive || roster_[*n].from == from) return;
+    duplicate_row_ = from == duplicate_ ? duplicate_row_ + 1 : 1;
+    duplicate_ = from;
+    if (duplicate_row_ >= confirmations && duplicate_gate_.pass()) {
+        core_.report(Event::duplicate_slot, from,
+                     duplicate_value(roster_[*n].from, core_.setup.others[*n].index));
     }
 }
 

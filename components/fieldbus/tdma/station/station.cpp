@@ -266,10 +266,14 @@ void Station::accept(const ethernet::Arrival& arrival, Time now) noexcept {
         rtcfg_->heard(d.from, now);
     }
     if (core_.status.state == State::unconfigured && d.kind != Kind::none) return;
+    slot_monitor_.learn(!other_masters_.present());
     slot_monitor_.note(d, arrived, frame.size(), now);
     if (d.kind == Kind::sync) return accept_sync(d, arrived, now);
     if (d.kind != Kind::request && !other_masters_.is(d.from)) {
-        followers_.sent(d.from, now);
+        const auto there = other_masters_.left_at(arrived, frame.size());
+        const bool elsewhere =
+            there && slot_monitor_.is_elsewhere(d.from, arrived, frame.size(), *there);
+        followers_.sent(d.from, now, elsewhere);
     }
     if (d.kind == Kind::none && d.defect != Defect::ethertype) {
         ++core_.status.count.foreign;
@@ -385,14 +389,14 @@ void Station::accept_sync(const Decoded& d, Time arrived, Time now) noexcept {
     }
     if (finds_master(d)) return withdraw(Event::master_there, d.from);
     if (status.state == State::listening) return listen_to(d, arrived, now);
-    if (!core_.fits(s)) return accept_foreign_sync(d, now);
+    if (!core_.fits(s)) return accept_foreign_sync(d, arrived, now);
     if (is_outdated(s)) return;
     if (is_new_sender(d.from)) {
         if (status.leading) return;
         count_lost(s);
         return note_sync(s, arrived);
     }
-    if (status.leading && !yields_to(d, now)) return;
+    if (status.leading && !yields_to(d, arrived, now)) return;
     follow(d, arrived);
 }
 
@@ -435,13 +439,13 @@ void Station::note_sync(const Sync& s, Time arrived) noexcept {
 }
 
 /// Returns true when this station stops sending syncs for another one.
-bool Station::yields_to(const Decoded& d, Time now) noexcept {
+bool Station::yields_to(const Decoded& d, Time arrived, Time now) noexcept {
     const StationSetup& setup = core_.setup;
     const Time lateness = lateness_of(d.sync);
     if (setup.role == Role::master) {
         // A backup that missed a sync is harmless, a second master is not.
         if (core_.is_from_master(lateness)) {
-            accept_foreign_sync(d, now);
+            accept_foreign_sync(d, arrived, now);
         }
         return false;
     }
@@ -489,7 +493,7 @@ void Station::change_master(const Decoded& d) noexcept {
 void Station::listen_to(const Decoded& d, Time arrived, Time now) noexcept {
     const Sync& s = d.sync;
     const bool fits = core_.fits(s);
-    const Claimant& c = other_masters_.claim(d);
+    const Claimant& c = other_masters_.claim(d, arrived);
     if (!fits) {
         unfit_sync_ = now;
     }
@@ -520,8 +524,17 @@ void Station::listen_to(const Decoded& d, Time arrived, Time now) noexcept {
     }
 }
 
+/// Returns true when this station, which leads, ends a conflict with another schedule although it
+/// had followers as that appeared: no station proves that it follows, or they follow the other one.
+/// A backup gives way to a master, later a master to a backup, whose schedule it takes over.
+bool Station::gives_way(bool to_master, Time now) const noexcept {
+    if (followers_.proven(now, gone_after)) return false;
+    if (core_.setup.role == Role::backup) return to_master && other_masters_.lasts(now, gone_after);
+    return !to_master && other_masters_.lasts(now, 2 * gone_after);
+}
+
 /// Handles a sync of another schedule.
-void Station::accept_foreign_sync(const Decoded& d, Time now) noexcept {
+void Station::accept_foreign_sync(const Decoded& d, Time arrived, Time now) noexcept {
     Status& status = core_.status;
     ++status.count.foreign;
     const bool is_master = !status.leading && d.from == status.master;
@@ -530,11 +543,12 @@ void Station::accept_foreign_sync(const Decoded& d, Time now) noexcept {
         ++status.count.losses;
         return begin();
     }
-    if (!other_masters_.claim(d).confirmed() || is_master) return;
+    if (!other_masters_.claim(d, arrived).confirmed() || is_master) return;
     other_masters_.confirm(d.from, followers_, now);
-    // a schedule with followers is kept
-    if (!status.leading || other_masters_.established()) return;
+    if (!status.leading) return;
     const bool from_master = core_.is_from_master(lateness_of(d.sync));
+    // a schedule with followers is kept
+    if (other_masters_.established() && !gives_way(from_master, now)) return;
     if (core_.setup.role == Role::master && from_master) {
         if (d.from < core_.address) {
             unfit_sync_ = now;

@@ -135,11 +135,12 @@ private:
     bool is_outdated(const Sync&) const noexcept;
     bool finds_master(const Decoded&) noexcept;
     void listen_to(const Decoded&, Time arrived, Time now) noexcept;
-    void accept_foreign_sync(const Decoded&, Time now) noexcept;
+    void accept_foreign_sync(const Decoded&, Time arrived, Time now) noexcept;
+    bool gives_way(bool to_master, Time now) const noexcept;
     bool is_new_sender(const Address&) noexcept;
     void count_lost(const Sync&) noexcept;
     void note_sync(const Sync&, Time arrived) noexcept;
-    bool yields_to(const Decoded&, Time now) noexcept;
+    bool yields_to(const Decoded&, Time arrived, Time now) noexcept;
     void change_master(const Decoded&) noexcept;
     void follow(const Decoded&, Time arrived) noexcept;
     void withdraw(Event why, const Address& who) noexcept;
