@@ -65,6 +65,7 @@ void Node::turn(Time now, std::int64_t link_now) noexcept {
         booted_once_ = true;
     } else if (!powered_ && runs_) {
         runs_ = false;
+        program_.lose_power();
         device_.out().clear();
         bus_.clear();
     }
@@ -83,6 +84,8 @@ void Node::turn(Time now, std::int64_t link_now) noexcept {
         watch_bus(now);
         program_.step(now);
         device_.poll(now);
+    } else if (booted_once_) {
+        program_.rest(now);
     }
     send(now, link_now);
     link_->flush(link_now);

@@ -46,6 +46,10 @@ public:
     /// Advances the application to `now` (ns). Called once per turn, after received frames are
     /// handled and before frames are sent. [realtime]
     virtual void step(Time now) noexcept { (void)now; }
+    /// Handles the loss of the supply. [realtime]
+    virtual void lose_power() noexcept {}
+    /// Lets time pass without supply, for what moves by itself. [realtime]
+    virtual void rest(Time now) noexcept { (void)now; }
 
     /// Sets a value of the simulated environment by name, such as "in-3" or "fx". Returns false for
     /// an unknown name. Call it between turns, from the thread that turns the node. [any]

@@ -68,7 +68,7 @@ struct CanopenDrive final : NodeComponent {
         for (unsigned n = 0; n < load_torque.size(); ++n) {
             const auto s = drive.status(n);
             position[n] = s.place / resolution;
-            velocity[n] = on ? s.speed / 60.0 : 0.0;
+            velocity[n] = s.speed / 60.0;
             torque[n] = on ? s.torque : 0.0;
             current[n] = on ? s.current : 0.0;
             enabled[n] = on && s.state == cia402::State::operation_enabled;

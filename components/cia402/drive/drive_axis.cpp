@@ -50,6 +50,22 @@ void DriveAxis::power_up() noexcept {
     publish();
 }
 
+void DriveAxis::power_down() noexcept {
+    state_ = State::not_ready_to_switch_on;
+    control_ = {};
+    stopping_.reset();
+    enable_next_ = false;
+    release_left_ = engage_left_ = 0;
+    restart_modes();
+    train_.follow();
+    publish();
+}
+
+void DriveAxis::coast(double dt) noexcept {
+    train_.step(dt, disturbance());
+    publish_motion();
+}
+
 void DriveAxis::step(double dt) noexcept {
     train_.scale().update();
     continue_transitions(dt);

@@ -41,8 +41,14 @@ public:
     void connect(AxisBus& bus) noexcept { faults_.connect(bus); }
     /// Handles power-on and the reset of the application: the encoder counts from 0.
     void power_up() noexcept;
+    /// Handles the loss of the drive's supply: the motor has no torque, and the brake closes.
+    void power_down() noexcept;
     /// Advances by `dt` s, at most 1 ms.
     void step(double dt) noexcept;
+    /// Advances the motor of a drive without supply by `dt` s, at most 1 ms.
+    void coast(double dt) noexcept;
+    /// Returns true when the motor moves, or has torque.
+    bool moves() const noexcept { return powered() || train_.speed() != 0 || around_.load != 0; }
     /// Handles the loss of the master as configured in 6007h. Unless 6007h = 0 keeps the drive as it
     /// is, "ready to switch on" becomes "switch on disabled", and the controlword counts as 0.
     void lose_connection() noexcept;

@@ -14,6 +14,9 @@ namespace {
 // for valid outputs and SYNC0 after OP was requested
 constexpr std::int64_t op_timeout_ns = 200'000'000;
 constexpr std::int64_t lost_pulses = 10;
+// between two steps without process data; in SAFE-OP longer than any cycle of SYNC0
+constexpr std::int64_t idle_step_ns = 1'000'000;
+constexpr std::int64_t idle_in_safeop_ns = 50'000'000;
 constexpr std::uint8_t mode_bits = 0x0f;
 constexpr std::uint8_t buffered_outputs = 0x04;
 constexpr std::uint8_t buffered_inputs = 0x00;
@@ -125,6 +128,32 @@ void Firmware::power_on(esc::Pdi& pdi) noexcept {
     pdi.set_al_status(static_cast<std::uint16_t>(State::init), 0);
 }
 
+void Firmware::power_off() noexcept {
+    clear_outputs();
+    behaviour_->power_off();
+}
+
+void Firmware::rest(std::int64_t now_ns) noexcept {
+    const std::int64_t passed_ns = now_ns - last_step_ns_;
+    if (passed_ns < idle_step_ns) return;
+    last_step_ns_ = now_ns;
+    behaviour_->rest(passed_ns);
+}
+
+/// Lets time pass while no process data does: below SAFE-OP, and in SAFE-OP without SYNC0. A motor
+/// that turned when the slave left OP comes to rest in this time.
+void Firmware::step_idle() noexcept {
+    if (state_ == State::op) return;
+    const std::int64_t passed_ns = now_ns_ - last_step_ns_;
+    const std::int64_t pause_ns = state_ == State::safeop ? idle_in_safeop_ns : idle_step_ns;
+    if (passed_ns < pause_ns) return;
+    if (behaviour_->moves()) {
+        work({now_ns_, passed_ns, false});
+    } else {
+        last_step_ns_ = now_ns_;
+    }
+}
+
 void Firmware::run(esc::Pdi& pdi, std::int64_t now_ns) noexcept {
     now_ns_ = now_ns;
     if (const auto control = pdi.take_al_control()) {
@@ -142,6 +171,7 @@ void Firmware::run(esc::Pdi& pdi, std::int64_t now_ns) noexcept {
             watch(pdi);
         }
     }
+    step_idle();
 }
 
 /// Takes new outputs out of all sync managers. Returns whether there are any. Their first sample is
@@ -235,7 +265,7 @@ void Firmware::step(esc::Pdi& pdi, std::int64_t dt_ns) noexcept {
 void Firmware::work(Step s) noexcept {
     behaviour_->step(s);
     last_step_ns_ = now_ns_;
-    if (design_.coe) {
+    if (design_.coe && state_ != State::init) {
         send(s.emergencies);
     }
 }

@@ -69,6 +69,13 @@ public:
     virtual ~Behaviour() = default;
     /// Starts anew; the dictionary has its initial values. [realtime]
     virtual void power_on() noexcept {}
+    /// Handles the loss of power: outputs are off. [realtime]
+    virtual void power_off() noexcept {}
+    /// Lets time pass without power. [realtime]
+    virtual void rest(std::int64_t /*dt_ns*/) noexcept {}
+    /// Returns true while time changes something without process data, such as the position of a
+    /// motor. [realtime]
+    virtual bool moves() const noexcept { return false; }
     /// Returns why a value that an SDO writes is rejected. [realtime]
     virtual coe::Abort check(std::uint16_t, std::uint8_t, std::span<const std::uint8_t>) noexcept {
         return coe::Abort::none;
@@ -109,6 +116,8 @@ class Firmware final : public esc::Application, private DictionaryGuard {
 public:
     Firmware(Design, std::unique_ptr<Behaviour>);  ///< [setup]
     void power_on(esc::Pdi&) noexcept override;
+    void power_off() noexcept override;
+    void rest(std::int64_t now_ns) noexcept override;
     void run(esc::Pdi&, std::int64_t now_ns) noexcept override;
 
     FirmwareFaults& faults() noexcept { return faults_; }  ///< [any]
@@ -155,6 +164,7 @@ private:
     void run_samples(esc::Pdi&, const esc::Pdi::Sync&) noexcept;
     void step(esc::Pdi&, std::int64_t dt_ns) noexcept;
     void work(Step) noexcept;
+    void step_idle() noexcept;
     void pack(unsigned sample) noexcept;
     void write_inputs(esc::Pdi&) noexcept;
     void count_missed() noexcept;

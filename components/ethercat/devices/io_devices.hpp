@@ -24,6 +24,7 @@ public:
                 bool digital);
     void step(Step&) noexcept override;
     void power_on() noexcept override;
+    void power_off() noexcept override { power_on(); }
     void set_input(unsigned channel, std::int32_t value) noexcept {
         values_[channel % max_channels].store(value, std::memory_order_relaxed);
     }

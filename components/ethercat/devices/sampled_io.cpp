@@ -59,6 +59,12 @@ void SampledIo::power_on() noexcept {
     }
 }
 
+void SampledIo::power_off() noexcept {
+    for (auto& value : values_) {
+        value.store(0, std::memory_order_relaxed);
+    }
+}
+
 void SampledIo::set_input(std::size_t channel, double offset, double amplitude,
                           double frequency) noexcept {
     Wave& wave = waves_[channel];

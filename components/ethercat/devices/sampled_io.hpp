@@ -28,6 +28,7 @@ public:
     SampledIo(std::shared_ptr<Dictionary>, std::vector<SampledEntry> inputs,
               std::vector<SampledEntry> outputs, std::vector<SampledEntry> counters);
     void power_on() noexcept override;
+    void power_off() noexcept override;
     void step(Step&) noexcept override;
 
     std::size_t inputs() const noexcept { return inputs_.size(); }  ///< [any]

@@ -109,13 +109,28 @@ void ServoAxis::follow_sync_cycle(std::int64_t cycle_ns) noexcept {
     axis_.values().interpolation_exponent = static_cast<std::int8_t>(exponent);
 }
 
-void ServoAxis::advance(std::int64_t dt_ns) noexcept {
+/// Divides a time into steps that the axis can make, s.
+template <class Advance>
+void ServoAxis::in_steps(std::int64_t dt_ns, Advance advance) noexcept {
     if (dt_ns <= 0) return;
     const double dt = std::min(static_cast<double>(dt_ns) * 1e-9, max_gap);
     const int steps = std::max(1, static_cast<int>(std::ceil(dt / max_step * (1 - 1e-9))));
     for (int n = 0; n < steps; ++n) {
-        axis_.step(dt / steps);
+        advance(dt / steps);
     }
+}
+
+void ServoAxis::power_off() noexcept {
+    outputs_valid_ = false;
+    axis_.power_down();
+    show(false);
+}
+
+void ServoAxis::rest(std::int64_t dt_ns) noexcept {
+    copy_surroundings();
+    if (!axis_.moves()) return;
+    in_steps(dt_ns, [this](double dt) noexcept { axis_.coast(dt); });
+    show(false);
 }
 
 void ServoAxis::step(Step& step) noexcept {
@@ -132,7 +147,7 @@ void ServoAxis::step(Step& step) noexcept {
     if (outputs_valid_ && std::exchange(command_waits_, false)) {
         axis_.written(o402::controlword, 0);
     }
-    advance(step.dt_ns);
+    in_steps(step.dt_ns, [this](double dt) noexcept { axis_.step(dt); });
     step.emergencies.append(pending_);
     pending_ = {};
     show(step.outputs_valid);
@@ -180,6 +195,22 @@ void Servo::power_on() noexcept {
     for (auto& axis : axes_) {
         axis->power_on();
     }
+}
+
+void Servo::power_off() noexcept {
+    for (auto& axis : axes_) {
+        axis->power_off();
+    }
+}
+
+void Servo::rest(std::int64_t dt_ns) noexcept {
+    for (auto& axis : axes_) {
+        axis->rest(dt_ns);
+    }
+}
+
+bool Servo::moves() const noexcept {
+    return std::any_of(axes_.begin(), axes_.end(), [](const auto& axis) { return axis->moves(); });
 }
 
 void Servo::step(Step& step) noexcept {

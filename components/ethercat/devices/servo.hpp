@@ -18,6 +18,11 @@ public:
     /// Binds axis `number`, counted from 0, to its objects. [setup]
     ServoAxis(Dictionary&, unsigned number, const cia402::AxisSettings&);
     void power_on() noexcept;
+    void power_off() noexcept;
+    void rest(std::int64_t dt_ns) noexcept;
+    bool moves() const noexcept {
+        return axis_.moves() || load_torque_.load(std::memory_order_relaxed) != 0;
+    }
     coe::Abort check(std::uint16_t index, std::span<const std::uint8_t> value) const noexcept;
     void written(std::uint16_t index, std::uint8_t sub) noexcept;
     void step(Step&) noexcept;
@@ -62,7 +67,8 @@ private:
 
     void copy_surroundings() noexcept;
     void follow_sync_cycle(std::int64_t cycle_ns) noexcept;
-    void advance(std::int64_t dt_ns) noexcept;
+    template <class Advance>
+    static void in_steps(std::int64_t dt_ns, Advance) noexcept;
     void show(bool outputs_valid) noexcept;
 
     const unsigned number_;
@@ -93,6 +99,9 @@ public:
     /// [setup]
     Servo(std::shared_ptr<Dictionary>, unsigned axes, const cia402::AxisSettings&);
     void power_on() noexcept override;
+    void power_off() noexcept override;
+    void rest(std::int64_t dt_ns) noexcept override;
+    bool moves() const noexcept override;
     coe::Abort check(std::uint16_t index, std::uint8_t sub,
                      std::span<const std::uint8_t> value) noexcept override;
     void written(std::uint16_t index, std::uint8_t sub) noexcept override;

@@ -159,8 +159,20 @@ void Controller::commit(std::int64_t now_ns) noexcept {
     }
 }
 
+void Controller::power_off() noexcept {
+    powered_ = false;
+    if (application_ != nullptr) {
+        application_->power_off();
+    }
+}
+
 void Controller::work_until(std::int64_t now_ns) noexcept {
-    if (!powered_) return;
+    if (!powered_) {
+        if (application_ != nullptr) {
+            application_->rest(now_ns);
+        }
+        return;
+    }
     if (now_ns - due_ns_ > controller_facts::max_pause_ns) {
         dc_.clock_changed(now_ns);
         last_run_ns_ = std::max(last_run_ns_, now_ns - controller_facts::idle_ns);

@@ -60,7 +60,7 @@ public:
 
     void power_on(std::int64_t now_ns) noexcept;  ///< Starts with the reset values. [realtime]
     /// Stops; memory and configuration are lost. [realtime]
-    void power_off() noexcept { powered_ = false; }
+    void power_off() noexcept;
     bool powered() const noexcept { return powered_; }
 
     // The line's side. [realtime]

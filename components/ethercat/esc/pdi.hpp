@@ -79,6 +79,10 @@ public:
     virtual ~Application() = default;
     /// Starts as after power-on: all volatile state is lost. [realtime]
     virtual void power_on(Pdi&) noexcept = 0;
+    /// Handles the loss of power: outputs are off. [realtime]
+    virtual void power_off() noexcept {}
+    /// Lets time pass without power, for what moves by itself. [realtime]
+    virtual void rest(std::int64_t /*now_ns*/) noexcept {}
     /// Works once; called at the end of each frame that concerns the slave, at every SYNC0 and
     /// SYNC1 pulse, when the watchdog expires, and at least every millisecond of traffic, in order
     /// of time. [realtime]

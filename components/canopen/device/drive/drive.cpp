@@ -41,7 +41,9 @@ void Drive::start(Time now) noexcept {
     device_.start(now);
 }
 
-void Drive::step(Time now) noexcept {
+/// Calls `advance` for each axis and each step until `now`.
+template <class Advance>
+void Drive::advance_to(Time now, Advance advance) noexcept {
     const Time passed = now - last_;
     last_ = now;
     if (passed <= 0) return;
@@ -49,9 +51,23 @@ void Drive::step(Time now) noexcept {
     const int steps = std::max(1, static_cast<int>(std::ceil(dt / max_step * (1 - 1e-9))));
     for (int n = 0; n < steps; ++n) {
         for (auto& a : axes_) {
-            a->axis().step(dt / steps);
+            advance(a->axis(), dt / steps);
         }
     }
+}
+
+void Drive::step(Time now) noexcept {
+    advance_to(now, [](cia402::DriveAxis& axis, double dt) noexcept { axis.step(dt); });
+}
+
+void Drive::lose_power() noexcept {
+    for (auto& a : axes_) {
+        a->axis().power_down();
+    }
+}
+
+void Drive::rest(Time now) noexcept {
+    advance_to(now, [](cia402::DriveAxis& axis, double dt) noexcept { axis.coast(dt); });
 }
 
 cia402::AxisStatus Drive::status(unsigned axis) const noexcept {

@@ -66,6 +66,10 @@ public:
     /// set-points arrive. After a gap of more than 100 ms the motor has not moved: the caller is
     /// taken to have been suspended. [realtime]
     void step(Time now) noexcept;
+    /// Handles the loss of the supply: the motors have no torque, and the brakes close. [realtime]
+    void lose_power() noexcept;
+    /// Advances the motors to `now` (ns) without supply. [realtime]
+    void rest(Time now) noexcept;
 
     unsigned axes() const noexcept { return static_cast<unsigned>(axes_.size()); }
     /// Returns the status of an axis, counted from 0; this and the functions below ignore an axis
@@ -83,6 +87,8 @@ public:
     void set_encoder_broken(unsigned axis, bool broken) noexcept;
 
 private:
+    template <class Advance>
+    void advance_to(Time now, Advance) noexcept;
     void on_state(NmtState) noexcept override;
     void on_reset(bool application) noexcept override;
     void on_sync(std::uint8_t counter, Time) noexcept override;

@@ -18,6 +18,8 @@ public:
     Device& make(const DeviceSettings&) override;
     void boot(Time now) noexcept override { drive_->start(now); }
     void step(Time now) noexcept override { drive_->step(now); }
+    void lose_power() noexcept override { drive_->lose_power(); }
+    void rest(Time now) noexcept override { drive_->rest(now); }
     bool set(std::string_view name, double value) override;
     std::vector<std::string> settable() const override;
     std::string summary() const override;
