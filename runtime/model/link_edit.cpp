@@ -64,11 +64,28 @@ void uncount(Pin& pin, Signal& signal) {
     }
 }
 
-/// Returns the arrows of `net` for what looks like another one; empty for any other text.
+/// Returns the arrow of `net` that a text like `->` stands for; empty for any other text.
+std::string_view meant_arrow(std::string_view text) {
+    constexpr std::pair<std::string_view, std::string_view> others[] = {
+        {"\u2192", "=>"}, {"\u21d2", "=>"},  {"\u2190", "<="},
+        {"\u21d0", "<="}, {"\u2194", "<=>"}, {"\u21d4", "<=>"}};
+    for (const auto& [other, arrow] : others) {
+        if (text == other) return arrow;
+    }
+    if (text.find_first_not_of("-=<>") != text.npos) return {};
+    const bool left = text.find('<') != text.npos;
+    const bool right = text.find('>') != text.npos;
+    if (left && right) return "<=>";
+    if (left) return "<=";
+    return right ? "=>" : "";
+}
+
+/// Returns what to write in place of another arrow; empty for any other text.
 std::string arrow_help(std::string_view text) {
-    const bool looks_like_one =
-        text.find_first_not_of("-=<>") == text.npos && text.find_first_of("<>") != text.npos;
-    return looks_like_one ? "the arrows are =>, <= and <=>, and may be left out" : "";
+    if (text == "=") return "delete it, or write one of the arrows =>, <= and <=>";
+    const std::string_view arrow = meant_arrow(text);
+    if (arrow.empty()) return {};
+    return "write " + hal::quoted(arrow) + "; arrows may also be left out";
 }
 
 std::string nothing_yet(std::string_view kind) { return "no " + std::string(kind) + "s exist yet"; }

@@ -92,11 +92,22 @@ const std::vector<std::vector<UsageWord>>& usage_forms(std::string_view argument
 
 namespace {
 
-/// Returns what to type in place of `NAME = VALUE`; empty for any other arguments.
+/// Returns what to type in place of `NAME = VALUE` or `NAME=VALUE`; empty for any other arguments.
 std::string without_equals_sign(std::string_view command, std::span<const Token> args) {
-    if (args.size() != 3 || args[1].text != "=") return {};
-    return "write it without '=': " + std::string(command) + " " + args[0].text + " " +
-           args[2].text;
+    std::string_view name;
+    std::string_view value;
+    if (args.size() == 3 && args[1].text == "=") {
+        name = args[0].text;
+        value = args[2].text;
+    } else if (args.size() == 1) {
+        const std::string_view text = args[0].text;
+        const auto at = std::min(text.find('='), text.size());
+        name = text.substr(0, at);
+        value = text.substr(std::min(at + 1, text.size()));
+    }
+    if (name.empty() || value.empty()) return {};
+    return "write it without '=': " + std::string(command) + " " + std::string(name) + " " +
+           std::string(value);
 }
 
 }  // namespace
@@ -127,7 +138,7 @@ bool check_arity(const Usage& usage, const Token& name, std::span<const Token> a
             at.end = last.end;
         }
     }
-    const std::string remedy = without_equals_sign(usage.name, args);
+    const std::string remedy = min == 2 ? without_equals_sign(usage.name, args) : "";
     diagnostics.error("wrong-arguments", at,
                       std::string(usage.name) + " takes " + (min == max ? "" : limit) +
                           counted(bound, "argument") + ", not " + std::to_string(given),

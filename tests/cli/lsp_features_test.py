@@ -219,6 +219,9 @@ class Places(Lsp):
         )
 
 
+AND2 = "loadrt and2 names=a\n"
+
+
 class Edits(Lsp):
     def fixed(self, text, title=None):
         """The text after the first quick fix of its first error, or the one of that title."""
@@ -242,6 +245,11 @@ class Edits(Lsp):
             ("loadrt sum2\nsetp sum2.0.ino 1\n", "loadrt sum2\nsetp sum2.0.in0 1\n"),
             ("newthread t 1ms\nloadrt sum\n", "newthread t 1ms\nloadrt sum2\n"),
             ("setpp a 1\n", "setp a 1\n"),
+            (AND2 + "setp a.in0 = 1\n", AND2 + "setp a.in0 1\n"),
+            (AND2 + "setp a.in0=1\n", AND2 + "setp a.in0 1\n"),
+            (AND2 + "net x a.out -> a.in0\n", AND2 + "net x a.out => a.in0\n"),
+            ("loadrt sum2\nsetp sum2.0.in0 1,5\n", "loadrt sum2\nsetp sum2.0.in0 1.5\n"),
+            ("newthread t 2,5ms\n", "newthread t 2.5ms\n"),
         ):
             with self.subTest(wrong):
                 self.assertEqual(right, self.fixed(wrong))

@@ -78,6 +78,7 @@ public:
     std::vector<QuickFix> all() {
         add_names(diagnostic_.label);
         add_names(diagnostic_.message);
+        add_number();
         for (const std::string& help : diagnostic_.help) {
             add_names(help);
             for (const std::string& word : listed_words(help)) {
@@ -95,6 +96,17 @@ private:
         }
     }
 
+    /// "'1,5' is not a number; write 1.5", if that is what the text has at this place.
+    void add_number() {
+        const auto number = between(diagnostic_.message, "' is not a number; write ", "");
+        const std::string& text = document_.text();
+        const std::size_t begin = document_.offset(diagnostic_.range.begin);
+        const std::size_t end = document_.offset(diagnostic_.range.end);
+        if (number && text.substr(begin, end - begin).find(',') != text.npos) {
+            replace_range(*number);
+        }
+    }
+
     void replace_range(const std::string& text) {
         fixes_.push_back({"Replace by '" + text + "'", diagnostic_.range, text});
     }
@@ -108,6 +120,8 @@ private:
                 {"Insert '" + *command + "'", {{line, 0}, {line, 0}}, *command + "\n"});
         } else if (const auto whole = between(help, "write it without '=': ", "")) {
             fixes_.push_back({"Write '" + *whole + "'", line_of(document_, line), *whole});
+        } else if (const auto word = between(help, "write '", "'; ")) {
+            replace_range(*word);
         }
     }
 

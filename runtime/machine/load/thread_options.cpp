@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "text/numbers.hpp"
+#include "text/quoting.hpp"
 
 namespace hal {
 namespace {
@@ -20,6 +21,16 @@ bool is_no_period(std::string_view text) {
     return ns && *ns <= 0;
 }
 
+/// Returns what to write in place of an invalid period.
+std::string period_help(std::string text) {
+    std::replace(text.begin(), text.end(), ',', '.');
+    const auto ns = parse_duration_ns(text, 1.0);
+    if (ns && *ns >= shortest_period_ns && *ns <= max_period_ns) {
+        return "write " + hal::quoted(text) + "; the decimal sign is a point";
+    }
+    return "write a period of 1us..1000s with its unit, as in 1ms, or in nanoseconds: 1000000";
+}
+
 bool set_period(NewThread& thread, std::string_view text, Span at, Diagnostics& diagnostics) {
     thread.period_at = at;
     const auto ns = parse_duration_ns(text, 1.0);
@@ -28,7 +39,7 @@ bool set_period(NewThread& thread, std::string_view text, Span at, Diagnostics& 
         return true;
     }
     diagnostics.error("bad-period", at, "'" + std::string(text) + "' is not a period", "",
-                      "a period is in nanoseconds, at least 1000: 1000000 is a millisecond");
+                      period_help(std::string(text)));
     return false;
 }
 
