@@ -37,8 +37,8 @@ bool belongs(const Subcommand& row, const Group& group) {
     return !row.missing_package() && begins(row, group.name);
 }
 
-/// The package of the commands that begin with these words, where this build leaves all of them out; else
-/// nullptr.
+/// The package of the commands that begin with these words, where this build leaves all of them
+/// out; else nullptr.
 const TreePackage* missing_package(std::string_view words) {
     const TreePackage* missing = nullptr;
     for (const Subcommand& row : subcommands()) {

@@ -72,8 +72,8 @@ const AxisOrders& Axis::act(const AxisCommand& command, const AxisRules& rules, 
     return orders_;
 }
 
-/// Commands the drive to stop in the cycle that found a failure, after its state machine was stepped
-/// for an axis without one.
+/// Commands the drive to stop in the cycle that found a failure, after its state machine was
+/// stepped for an axis without one.
 void Axis::stop_now(const AxisCommand& command, const AxisRules& rules, Time now) noexcept {
     if (!in_.operational || walk_.wanted() != State::operation_enabled) return;
     want_state(state_of(in_.statusword), command.quick_stop);
@@ -390,8 +390,8 @@ void Axis::follow_position(const AxisCommand& command, const AxisRules& rules, T
     }
 }
 
-/// Lets the position sent to the drive follow the measured one while the drive does not follow it. A
-/// drive that still obeys its last target keeps it: the measured position would be a step back by
+/// Lets the position sent to the drive follow the measured one while the drive does not follow it.
+/// A drive that still obeys its last target keeps it: the measured position would be a step back by
 /// the lag.
 void Axis::follow_target(bool by_cycle) noexcept {
     const bool obeys = walk_.state() == State::operation_enabled &&

@@ -103,13 +103,13 @@ public:
 
     /// Reports which half of step() is missing: `unwritten` (the caller of act()), `unread` (the
     /// caller of observe()), `none`. Without one of them the axis fails, brakes with quick stop and
-    /// cannot be enabled; the remaining caller calls act(). The failure of an axis that was off ends
-    /// when both run again. [realtime]
+    /// cannot be enabled; the remaining caller calls act(). The failure of an axis that was off
+    /// ends when both run again. [realtime]
     void set_missing(Cause half) noexcept;
 
     /// Disables the axis after a time without cycles, in which the drive was stopped. This is not a
-    /// failure; enable needs another edge. The bus may have been stopped, too: in the first second of
-    /// cycles, and until the drive has been enabled, the first loss of the node is not a failure
+    /// failure; enable needs another edge. The bus may have been stopped, too: in the first second
+    /// of cycles, and until the drive has been enabled, the first loss of the node is not a failure
     /// either, and enabling waits for its return. [realtime]
     void interrupt() noexcept;
 

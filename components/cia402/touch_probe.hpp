@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The master's side of a touch probe of CiA 402 (60B8h to 60BDh): it arms the probe of the drive, and
-// knows when the drive has latched a position. It knows no bus.
+// The master's side of a touch probe of CiA 402 (60B8h to 60BDh): it arms the probe of the drive,
+// and knows when the drive has latched a position. It knows no bus.
 #pragma once
 
 #include <cstdint>

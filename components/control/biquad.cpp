@@ -101,11 +101,14 @@ private:
 HAL_COMPONENT(Biquad, "biquad", "Second-order filter: low pass, notch or user-defined", R"(
     H(z) = (n0 + n1/z + n2/z²) / (1 + d1/z + d2/z²)
 
-A rising edge of `enable` designs the filter: `type` 1 (low pass) and 2 (notch) compute the parameters from `f0` and `Q` and clear `s1` and `s2`;
-`type` 0 uses the parameters and the state as they are. `f0` must be above 0 and at most half the rate of the thread, `Q` in 0.5..2; otherwise
-`valid` is FALSE and `in` is copied to `out`. While the input is NaN or infinite, `out` keeps its value; a filter that diverges is cleared.
+A rising edge of `enable` designs the filter: `type` 1 (low pass) and 2 (notch) compute the
+parameters from `f0` and `Q` and clear `s1` and `s2`; `type` 0 uses the parameters and the state as
+they are. `f0` must be above 0 and at most half the rate of the thread, `Q` in 0.5..2; otherwise
+`valid` is FALSE and `in` is copied to `out`. While the input is NaN or infinite, `out` keeps its
+value; a filter that diverges is cleared.
 
-**Differences from LinuxCNC:** an `f0` of 0 or below is invalid (LinuxCNC: the filter diverges), and so are NaN parameters; `out` recovers from NaN.
+**Differences from LinuxCNC:** an `f0` of 0 or below is invalid (LinuxCNC: the filter diverges), and
+so are NaN parameters; `out` recovers from NaN.
 
     # remove the 50 Hz hum of a force sensor
     loadrt biquad names=no-hum

@@ -439,7 +439,8 @@ Bldc::Bldc(const hal_host* host) : Component(host) {
 
 HAL_COMPONENT(Bldc, "bldc", "Commutation of a three-phase motor: from its feedback to the drive",
               R"(
-`cfg=` has a group of letters per instance: lower case for the motor's feedback, upper case for the drive's inputs.
+`cfg=` has a group of letters per instance: lower case for the motor's feedback, upper case for the
+drive's inputs.
 
 | input | | output | |
 | --- | --- | --- | --- |
@@ -451,22 +452,28 @@ HAL_COMPONENT(Bldc, "bldc", "Commutation of a three-phase motor: from its feedba
 | f | 4-bit Gray code of Fanuc "red cap" motors | F | emulated Gray code |
 | | | T | trapezoid instead of sine |
 
-The angle of the field, `phase-angle`, leads `rotor-angle` by `lead-angle` (90 degrees without that pin), or lags it when `out`
-is negative. Motor zero is the rotor position with A positive, B and C negative. With sine outputs A = cos(phase), and B and C are a third of a turn
-later and earlier; a trapezoid drives the two phases nearest to the angle, each for a third of a turn. The angle of an encoder is extrapolated by
-half a period, because the outputs hold for a period. With H and F there are no phase outputs.
+The angle of the field, `phase-angle`, leads `rotor-angle` by `lead-angle` (90 degrees without that
+pin), or lags it when `out` is negative. Motor zero is the rotor position with A positive, B and C
+negative. With sine outputs A = cos(phase), and B and C are a third of a turn later and earlier; a
+trapezoid drives the two phases nearest to the angle, each for a third of a turn. The angle of an
+encoder is extrapolated by half a period, because the outputs hold for a period. H and F have no
+phase outputs.
 
-**Finding zero.** *a*: known, at `encoder-offset` counts. *qh*: trapezoid from the Hall sensors until their first edge. *qhi*: the same until
-the index, which is `encoder-offset` counts before zero. *qi*: a rising edge of `init` turns the field at one electrical turn per second with the amplitude
-`initvalue` until the index. *q*: `init` pulls the rotor to zero with the amplitude `initvalue`, in three seconds. Until zero is
-found, the outputs are 0. Link `rawcounts` to the encoder's pin of that name.
+**Finding zero.** *a*: known, at `encoder-offset` counts. *qh*: trapezoid from the Hall sensors
+until their first edge. *qhi*: the same until the index, which is `encoder-offset` counts before
+zero. *qi*: a rising edge of `init` turns the field at one electrical turn per second with the
+amplitude `initvalue` until the index. *q*: `init` pulls the rotor to zero with the amplitude
+`initvalue`, in three seconds. Until zero is found, the outputs are 0. Link `rawcounts` to the
+encoder's pin of that name.
 
-**Hall patterns** 0..47 (25: 60 degrees, 26: its reverse, 0: 30 degrees, 17: 120 degrees). `hall-error` is TRUE after a code outside of the
-pattern, which also sets all outputs to 0, and after a skipped state. A `pattern` above 47 is set to 0.
+**Hall patterns** 0..47 (25: 60 degrees, 26: its reverse, 0: 30 degrees, 17: 120 degrees).
+`hall-error` is TRUE after a code outside of the pattern, which also sets all outputs to 0, and
+after a skipped state. A `pattern` above 47 is set to 0.
 
-**Differences from LinuxCNC:** the first cycle sets the outputs (LinuxCNC: they remain 0). A trapezoid follows `phase-angle` (LinuxCNC: `rotor-angle`,
-without `lead-angle`). A code outside of the Hall pattern sets the outputs to 0 (LinuxCNC keeps driving). The angle is extrapolated by fractions of a
-count (LinuxCNC: whole counts). `in-type` and `out-type` have other numbers.
+**Differences from LinuxCNC:** the first cycle sets the outputs (LinuxCNC: they remain 0). A
+trapezoid follows `phase-angle` (LinuxCNC: `rotor-angle`, without `lead-angle`). A code outside of
+the Hall pattern sets the outputs to 0 (LinuxCNC keeps driving). The angle is extrapolated by
+fractions of a count (LinuxCNC: whole counts). `in-type` and `out-type` have other numbers.
 
     loadrt bldc cfg=qh names=spindle
     addf spindle servo
@@ -481,7 +488,8 @@ count (LinuxCNC: whole counts). `in-type` and `out-type` have other numbers.
     net phase-v    <= spindle.B-value
     net phase-w    <= spindle.C-value
 
-**Differences from LinuxCNC:** in LinuxCNC, trapezoids and emulated Hall sensors from an encoder lead by 60 degrees more than `lead-angle`,
-`phase-angle` from Hall sensors alone has the wrong sign, the bits of three outputs are not symmetrical, and a negative `value` does not
-reverse a field without feedback.
+**Differences from LinuxCNC:** in LinuxCNC, trapezoids and emulated Hall sensors from an encoder
+lead by 60 degrees more than `lead-angle`, `phase-angle` from Hall sensors alone has the wrong sign,
+the bits of three outputs are not symmetrical, and a negative `value` does not reverse a field
+without feedback.
 )")

@@ -26,8 +26,9 @@ HAL_COMPONENT(Clarke2, "clarke2", "Clarke transform of two phases whose sum with
     x = a
     y = (a + 2 b) / sqrt(3)
 
-In a three-wire system the third phase is -(a + b), so two phases are sufficient. The transform preserves amplitudes: three sines of amplitude 1
-give a vector of length 1. See `clarke3` for phases whose sum is not zero, `clarkeinv` for the inverse.
+In a three-wire system the third phase is -(a + b), so two phases are sufficient. The transform
+preserves amplitudes: three sines of amplitude 1 give a vector of length 1. See `clarke3` for phases
+whose sum is not zero, `clarkeinv` for the inverse.
 
     loadrt clarke2 names=currents
     addf currents servo

@@ -29,8 +29,9 @@ HAL_COMPONENT(Clarke3, "clarke3", "Clarke transform of three phases", R"(
     y = (b - c) / sqrt(3)
     h = (a + b + c) sqrt(2) / 3
 
-The transform preserves amplitudes: three sines of amplitude 1, a third of a turn apart, give a vector of length 1. The part common to all phases is
-h / sqrt(2) in each. The constants are exact (LinuxCNC: 15 digits). See `clarke2` for phases whose sum is zero, `clarkeinv` for the inverse.
+The transform preserves amplitudes: three sines of amplitude 1, a third of a turn apart, give a
+vector of length 1. The part common to all phases is h / sqrt(2) in each. The constants are exact
+(LinuxCNC: 15 digits). See `clarke2` for phases whose sum is zero, `clarkeinv` for the inverse.
 
     loadrt clarke3 names=currents
     addf currents servo

@@ -38,16 +38,18 @@ struct ClarkeInv : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(ClarkeInv, "clarkeinv", "Inverse Clarke transform, with rotation", R"(
-Rotates the vector (x, y) by `theta` turns (1.0 is 360 degrees) to (x', y') and computes the three phases:
+Rotates the vector (x, y) by `theta` turns (1.0 is 360 degrees) to (x', y') and computes the three
+phases:
 
     a = x' + h / sqrt(2)
     b = -x' / 2 + y' sqrt(3) / 2 + h / sqrt(2)
     c = -x' / 2 - y' sqrt(3) / 2 + h / sqrt(2)
 
-With `theta` 0 it is the inverse of `clarke3`, and of `clarke2` with h = 0. With `theta` as the rotor angle, x and y are in the rotor's frame.
+With `theta` 0 it is the inverse of `clarke3`, and of `clarke2` with h = 0. With `theta` as the
+rotor angle, x and y are in the rotor's frame.
 
-**Differences from LinuxCNC:** whole turns of `theta` are removed first, and the constants are exact (LinuxCNC: 2 pi with ten digits, so that the
-angle is off by 1e-8 of a turn after 100 turns).
+**Differences from LinuxCNC:** whole turns of `theta` are removed first, and the constants are exact
+(LinuxCNC: 2 pi with ten digits, so that the angle is off by 1e-8 of a turn after 100 turns).
 
     loadrt clarkeinv names=drive
     addf drive servo

@@ -22,8 +22,8 @@ HAL_COMPONENT(Feedcomp, "feedcomp",
     out = in * vel / feed    while enable is TRUE and feed is not 0
     out = in                 else
 
-For a laser or an extruder whose output must decrease while the machine decelerates in a corner. With `feed` 0, `out` is `in`
-(LinuxCNC: infinity).
+For a laser or an extruder whose output must decrease while the machine decelerates in a corner.
+With `feed` 0, `out` is `in` (LinuxCNC: infinity).
 
     loadrt feedcomp names=laser
     addf laser servo

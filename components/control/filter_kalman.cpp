@@ -56,10 +56,11 @@ private:
 }  // namespace
 
 HAL_COMPONENT(FilterKalman, "filter_kalman", "Kalman filter of one value", R"(
-Estimates a value from noisy measurements. `Rk` is the variance of the sensor: record it at rest and compute the variance of the
-samples. `Qk` is the variance of the true value's change per cycle: a smaller value gives a smoother and slower estimate. Only their
-ratio matters once the filter has settled. Set both; the defaults fit no real sensor. Negative values count as 0 (LinuxCNC: the estimate diverges).
-Measurements that are NaN or infinite are ignored.
+Estimates a value from noisy measurements. `Rk` is the variance of the sensor: record it at rest and
+compute the variance of the samples. `Qk` is the variance of the true value's change per cycle: a
+smaller value gives a smoother and slower estimate. Only their ratio matters once the filter has
+settled. Set both; the defaults fit no real sensor. Negative values count as 0 (LinuxCNC: the
+estimate diverges). Measurements that are NaN or infinite are ignored.
 
     loadrt filter_kalman names=coolant-filter
     addf coolant-filter servo

@@ -58,9 +58,11 @@ HAL_COMPONENT(Gearchange, "gearchange", "Scales and limits a spindle speed for o
 | FALSE | speed-in between min1 and max1 | dir-in |
 | TRUE  | (speed-in between min2 and max2) / scale2 | dir-in, inverted while reverse is TRUE |
 
-Scale the drive for gear 1; `scale2` is the ratio of the spindle speeds in gear 2 and gear 1 at the same drive speed. Gear 2 is the high
-gear: a `scale2` below 1, or NaN, is set to 1. The limits are spindle speeds in either direction: a negative `speed-in` is limited to the range from
--max to -min. Below the minimum, the minimum applies, even if it is above the maximum. While `speed-in` is NaN, the minimum applies (LinuxCNC: NaN).
+Scale the drive for gear 1; `scale2` is the ratio of the spindle speeds in gear 2 and gear 1 at the
+same drive speed. Gear 2 is the high gear: a `scale2` below 1, or NaN, is set to 1. The limits are
+spindle speeds in either direction: a negative `speed-in` is limited to the range from -max to -min.
+Below the minimum, the minimum applies, even if it is above the maximum. While `speed-in` is NaN,
+the minimum applies (LinuxCNC: NaN).
 
     loadrt gearchange names=gears
     addf gears servo

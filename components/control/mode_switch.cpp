@@ -137,13 +137,15 @@ HAL_COMPONENT(ModeSwitch, "mode_switch", "Switches between sources without a jum
 | 3 slew | by `rate` |
 | 4 keep | constant until the next switch or `clear` (a jog that continues from the program's position) |
 
-This is the bumpless transfer of process control (K. Astroem, T. Haegglund, *Advanced PID Control*, ISA 2006). `out` follows the motion of the new source
-immediately; only the gap fades. If a source can track (an integrator, a trajectory), load it with `out` while its `active-##` is FALSE; then
+This is the bumpless transfer of process control (K. Astroem, T. Haegglund, *Advanced PID Control*,
+ISA 2006). `out` follows the motion of the new source immediately; only the gap fades. If a source
+can track (an integrator, a trajectory), load it with `out` while its `active-##` is FALSE; then
 there is no gap.
 
-While `select` is out of range, the last source remains in use. While the source is NaN or infinite, `out` keeps its value; the return to the source is a
-transition, as it is after `hold`. A source that is used in the first cycle is used without a transition. A `transition` above 4 is a jump.
-A `time`, `rate` or `transition` that changes meanwhile applies to the offset that is left.
+While `select` is out of range, the last source remains in use. While the source is NaN or infinite,
+`out` keeps its value; the return to the source is a transition, as it is after `hold`. A source
+that is used in the first cycle is used without a transition. A `transition` above 4 is a jump. A
+`time`, `rate` or `transition` that changes meanwhile applies to the offset that is left.
 
     loadrt mode_switch names=effort-source inputs=2
     addf effort-source servo

@@ -64,11 +64,13 @@ HAL_COMPONENT(Ohmic, "ohmic", "Ohmic sensing of a plasma torch with a voltage-to
     thcad-volts = (velocity-in * thcad-divide - thcad-0-volt-freq) / (thcad-max-volt-freq - thcad-0-volt-freq) * thcad-fullscale
     ohmic-volts = thcad-volts * volt-divider
 
-`arc-on` is TRUE while the card is at full scale. While `is-probing` is TRUE, `ohmic-on` is TRUE at and above `ohmic-threshold`; afterwards it
-keeps its state until the voltage is at or below `ohmic-low`.
+`arc-on` is TRUE while the card is at full scale. While `is-probing` is TRUE, `ohmic-on` is TRUE at
+and above `ohmic-threshold`; afterwards it keeps its state until the voltage is at or below
+`ohmic-low`.
 
-**Differences from LinuxCNC:** While the two frequencies are equal, as before they are set, the voltages are 0 (LinuxCNC: infinite or NaN). In 2.9,
-`ohmic-on` compares the voltage with 1 instead of `ohmic-threshold`; this is the component of 2.10.
+**Differences from LinuxCNC:** While the two frequencies are equal, as before they are set, the
+voltages are 0 (LinuxCNC: infinite or NaN). In 2.9, `ohmic-on` compares the voltage with 1 instead
+of `ohmic-threshold`; this is the component of 2.10.
 
     loadrt ohmic names=touch
     addf touch servo

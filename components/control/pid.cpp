@@ -358,26 +358,31 @@ HAL_COMPONENT(
     output    = bias + error * Pgain + errorI * Igain + errorD * Dgain
               + command * FF0 + commandD * FF1 + commandDD * FF2 + commandDDD * FF3, limited to ±maxoutput
 
-Here `error` is the error after `maxerror` and `deadband`; the pin `error` is the error before both. The pins `errorI` to `feedbackD` exist with
-`debug=1` only. `errorI` is the integral before Igain, in units of `error` times seconds; it is 0 while `enable` is FALSE and during
-auto-tuning. A limit of 0 disables it. With `error-previous-target` (the default) the error is computed from the target of the
-previous cycle, which the feedback had time to follow. The slopes are `command-deriv` and `feedback-deriv` if they are
-linked, else the difference from the previous cycle; `maxerror`, `deadband` and `error-previous-target` do not change
-them, so Dgain damps inside the deadband, too. In the cycle of the falling edge of `index-enable`, a slope computed as a difference
-keeps its value. While an input is NaN, `output` is 0 and the integral and the derivatives keep their values. While a limit is NaN, its last
-valid value applies, and a fault is raised.
+Here `error` is the error after `maxerror` and `deadband`; the pin `error` is the error before both.
+The pins `errorI` to `feedbackD` exist with `debug=1` only. `errorI` is the integral before Igain,
+in units of `error` times seconds; it is 0 while `enable` is FALSE and during auto-tuning. A limit
+of 0 disables it. With `error-previous-target` (the default) the error is computed from the target
+of the previous cycle, which the feedback had time to follow. The slopes are `command-deriv` and
+`feedback-deriv` if they are linked, else the difference from the previous cycle; `maxerror`,
+`deadband` and `error-previous-target` do not change them, so Dgain damps inside the deadband, too.
+In the cycle of the falling edge of `index-enable`, a slope computed as a difference keeps its
+value. While an input is NaN, `output` is 0 and the integral and the derivatives keep their values.
+While a limit is NaN, its last valid value applies, and a fault is raised.
 
-**Differences from LinuxCNC:** the output is bit-identical except in these cases. In the first cycle the slopes
-are 0 and the error is that of the current command (LinuxCNC starts from 0, which kicks FF1 and Dgain). Setting `maxoutput`
-to 0 ends the saturation (LinuxCNC: `saturated` and the held integral remain). A negative limit or deadband counts
-as positive (LinuxCNC: the output jumps between its limits). While an input is NaN the output is 0 (LinuxCNC: NaN). While a limit is NaN its last valid value applies (LinuxCNC: no limit).
-Auto-tuning ignores the first two half cycles, before the oscillation is stable (LinuxCNC averages them in).
+**Differences from LinuxCNC:** the output is bit-identical except in these cases. In the first cycle
+the slopes are 0 and the error is that of the current command (LinuxCNC starts from 0, which kicks
+FF1 and Dgain). Setting `maxoutput` to 0 ends the saturation (LinuxCNC: `saturated` and the held
+integral remain). A negative limit or deadband counts as positive (LinuxCNC: the output jumps
+between its limits). While an input is NaN the output is 0 (LinuxCNC: NaN). While a limit is NaN its
+last valid value applies (LinuxCNC: no limit). Auto-tuning ignores the first two half cycles, before
+the oscillation is stable (LinuxCNC averages them in).
 
-**Auto-tuning** measures the loop by the relay method and sets the gains by the rules of Ziegler and Nichols. Hold `command`
-constant near the middle of the travel; set `tune-effort` to a small value, then set `enable`, `tune-mode` and `tune-start`. If the loop
-does not oscillate visibly, increase `tune-effort`. When `tune-start` becomes FALSE the gains are set (except gains
-linked to a signal), and `output` remains at `bias` until `tune-mode` is FALSE. Clearing `enable`,
-`tune-mode` or `tune-start` aborts the tuning.
+**Auto-tuning** measures the loop by the relay method and sets the gains by the rules of Ziegler and
+Nichols. Hold `command` constant near the middle of the travel; set `tune-effort` to a small value,
+then set `enable`, `tune-mode` and `tune-start`. If the loop does not oscillate visibly, increase
+`tune-effort`. When `tune-start` becomes FALSE the gains are set (except gains linked to a signal),
+and `output` remains at `bias` until `tune-mode` is FALSE. Clearing `enable`, `tune-mode` or
+`tune-start` aborts the tuning.
 
     loadrt pid names=pid.x
     addf pid.x.do-pid-calcs servo

@@ -123,10 +123,12 @@ private:
 
 HAL_COMPONENT(SampleClock, "sample_clock",
               "Times the samples of a loop over a network, and measures their delay", R"(
-`sample` numbers the samples: one every `period`, or in each cycle in which `external` is TRUE. The number travels with the sample through controller
-and network; `measure` compares the returned `echo` with the time at which that sample was taken. The resolution is the period of the thread.
+`sample` numbers the samples: one every `period`, or in each cycle in which `external` is TRUE. The
+number travels with the sample through controller and network; `measure` compares the returned
+`echo` with the time at which that sample was taken. The resolution is the period of the thread.
 
-`jitter` is the difference between the longest and the shortest delay since `reset`. The last 256 samples are known; older echoes are ignored.
+`jitter` is the difference between the longest and the shortest delay since `reset`. The last 256
+samples are known; older echoes are ignored.
 
     loadrt sample_clock names=sampling
     loadrt sampled_pid names=loop

@@ -80,7 +80,8 @@ struct SampledPid : hal::Component {
     }
 
 private:
-    /// u = K (b r - y) + I + D;  I += K h / Ti (r - y) after its use;  D = a D - K Td N / (Td + N h) (y - y_before), a = Td / (Td + N h).
+    /// u = K (b r - y) + I + D;  I += K h / Ti (r - y) after its use;  D = a D - K Td N / (Td + N
+    /// h) (y - y_before), a = Td / (Td + N h).
     void compute() noexcept {
         const double h = period > 0.0 ? period.get() : 1e-3;
         const double td = std::fmax(derivative_time, 0.0);
@@ -137,12 +138,15 @@ HAL_COMPONENT(SampledPid, "sampled_pid", "A PID controller that computes when a 
     I = I + K h / Ti (r - y)                                 after u
     D = a D - K Td N / (Td + N h) (y - y of the sample before),   a = Td / (Td + N h)
 
-The discrete PID controller with setpoint weight and filtered derivative (K. J. Åström, B. Wittenmark, *Computer-Controlled Systems*, third edition,
-section 8.5). Unlike `pid` it computes once per sample, whatever the period of its thread: for a loop over a network, where `trigger` is the arrival
-of a message. It uses the designed period h, not the time between two arrivals, as a controller does that does not know of jitter.
+The discrete PID controller with setpoint weight and filtered derivative (K. J. Åström, B.
+Wittenmark, *Computer-Controlled Systems*, third edition, section 8.5). Unlike `pid` it computes
+once per sample, whatever the period of its thread: for a loop over a network, where `trigger` is
+the arrival of a message. It uses the designed period h, not the time between two arrivals, as a
+controller does that does not know of jitter.
 
-`delay` holds each output back for a constant time after its sample: up to 64 outputs wait. While `max-output` limits the output, the integral
-changes only towards the range. Samples that are NaN or infinite are ignored.
+`delay` holds each output back for a constant time after its sample: up to 64 outputs wait. While
+`max-output` limits the output, the integral changes only towards the range. Samples that are NaN or
+infinite are ignored.
 
     loadrt can_receive names=sample link=sim:loop id=0x6f0 fields=position:f32
     loadrt sampled_pid names=loop

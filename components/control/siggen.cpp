@@ -75,13 +75,15 @@ With the phase p running from 0 to 1 in 1/frequency seconds:
     triangle = falls for p < 0.5, then rises           sawtooth = offset + amplitude * (2 p - 1)
     square   = offset - amplitude for p <= 0.5, else offset + amplitude
 
-p begins at 0, and each cycle adds frequency * period to it before the waves are computed. While `reset` is TRUE p is 0.5: sine and sawtooth
-are at `offset`, the others at `offset - amplitude`. A frequency above half the rate of the thread is limited to it; if the pin is unlinked, it
-shows the limited frequency.
+p begins at 0, and each cycle adds frequency * period to it before the waves are computed. While
+`reset` is TRUE p is 0.5: sine and sawtooth are at `offset`, the others at `offset - amplitude`. A
+frequency above half the rate of the thread is limited to it; if the pin is unlinked, it shows the
+limited frequency.
 
-**Differences from LinuxCNC:** `sine` and `cosine` are exact (LinuxCNC computes with a pi that is 4.6e-8 too large). A negative frequency runs
-all waves backwards (LinuxCNC: `sawtooth` and `triangle` leave their ranges); the frequencies below minus half the rate are not
-limited. A frequency that is NaN holds the phase (LinuxCNC: all outputs remain NaN).
+**Differences from LinuxCNC:** `sine` and `cosine` are exact (LinuxCNC computes with a pi that is
+4.6e-8 too large). A negative frequency runs all waves backwards (LinuxCNC: `sawtooth` and
+`triangle` leave their ranges); the frequencies below minus half the rate are not limited. A
+frequency that is NaN holds the phase (LinuxCNC: all outputs remain NaN).
 
     loadrt siggen names=test-signal
     addf test-signal.update servo

@@ -155,23 +155,28 @@ private:
 
 HAL_COMPONENT(Spindle, "spindle",
               "Spindle with acceleration and deceleration, brake and up to 16 gears", R"(
-For a drive with inputs for speed and direction. The target is `commanded-speed` with its magnitude limited to `min` and `max` of the
-gear (`min` does not apply at 0), or 0 while `enable` is FALSE. `output` is the magnitude of the speed commanded to the drive, plus
-`offset`, times `scale`; `forward` and `reverse` are its direction, both FALSE at 0. To change direction the spindle first decelerates to 0.
-`max`, `accel` and `decel` have no effect while they are 0, the default.
+For a drive with inputs for speed and direction. The target is `commanded-speed` with its magnitude
+limited to `min` and `max` of the gear (`min` does not apply at 0), or 0 while `enable` is FALSE.
+`output` is the magnitude of the speed commanded to the drive, plus `offset`, times `scale`;
+`forward` and `reverse` are its direction, both FALSE at 0. To change direction the spindle first
+decelerates to 0. `max`, `accel` and `decel` have no effect while they are 0, the default.
 
-With `simulate-encoder` the commanded speed changes by `accel` and `decel` rpm per second and counts as the speed of the spindle. With an
-encoder it is the measured speed plus `accel`, or minus `decel`, up to the target, so a loaded spindle gets more time. While `at-speed` is TRUE
-it is the target. `at-speed` compares the speed at the beginning of the cycle with `commanded-speed` before `min` and `max`.
+With `simulate-encoder` the commanded speed changes by `accel` and `decel` rpm per second and counts
+as the speed of the spindle. With an encoder it is the measured speed plus `accel`, or minus
+`decel`, up to the target, so a loaded spindle gets more time. While `at-speed` is TRUE it is the
+target. `at-speed` compares the speed at the beginning of the cycle with `commanded-speed` before
+`min` and `max`.
 
 `brake` is TRUE while the spindle turns (above `zero-tolerance`) too fast or in the wrong direction. `numgears=N` gives N gears with a pin of
 each kind; `select-gear` is the gear, or, while it is 0, the highest `select.N` that is TRUE. `spindle-rpm-abs` is filtered by
 r += (speed - r) * spindle-lpf * period while at speed.
 
-**Differences from LinuxCNC:** `brake` is set as documented (LinuxCNC: always FALSE). `reverse` remains TRUE while a spindle that turns backwards
-decelerates to a stop, like `forward` (LinuxCNC: it becomes FALSE at once, and the spindle coasts). A `select-gear` beyond the last gear is the
-last one (LinuxCNC reads pins that do not exist). A NaN or infinite speed counts as 0 (LinuxCNC: the outputs remain NaN).
-While the machine is stopped, `output` is 0, and `forward` and `reverse` are FALSE (LinuxCNC: they keep their values).
+**Differences from LinuxCNC:** `brake` is set as documented (LinuxCNC: always FALSE). `reverse`
+remains TRUE while a spindle that turns backwards decelerates to a stop, like `forward` (LinuxCNC:
+it becomes FALSE at once, and the spindle coasts). A `select-gear` beyond the last gear is the last
+one (LinuxCNC reads pins that do not exist). A NaN or infinite speed counts as 0 (LinuxCNC: the
+outputs remain NaN). While the machine is stopped, `output` is 0, and `forward` and `reverse` are
+FALSE (LinuxCNC: they keep their values).
 
     loadrt spindle names=router
     addf router servo

@@ -71,12 +71,14 @@ private:
 
 HAL_COMPONENT(SpindleMonitor, "spindle_monitor",
               "Detects when a spindle reaches its speed and when it drops below it", R"(
-With the spindle on, `spindle-at-speed` becomes TRUE when the speed is within `threshold` of the command. If the speed then
-drops more than `threshold` below the command, or is NaN, `spindle-underspeed` becomes TRUE. Both remain TRUE until the spindle is off.
-Each change of `level` takes a cycle, and both are cleared one cycle after it becomes 0.
+With the spindle on, `spindle-at-speed` becomes TRUE when the speed is within `threshold` of the
+command. If the speed then drops more than `threshold` below the command, or is NaN,
+`spindle-underspeed` becomes TRUE. Both remain TRUE until the spindle is off. Each change of `level`
+takes a cycle, and both are cleared one cycle after it becomes 0.
 
-**Differences from LinuxCNC:** Speeds are compared in the direction of the command: with a command of -100, a speed of -80 is an
-underspeed and -110 is not (LinuxCNC: the other way round); a NaN speed is one.
+**Differences from LinuxCNC:** Speeds are compared in the direction of the command: with a command
+of -100, a speed of -80 is an underspeed and -110 is not (LinuxCNC: the other way round); a NaN
+speed is one.
 
     loadrt spindle_monitor names=watch
     addf watch servo

@@ -115,11 +115,14 @@ private:
 }  // namespace
 
 HAL_COMPONENT(StepSeries, "step_series", "Repeats a step and keeps statistics of the responses", R"(
-Every `samples` samples the setpoint changes between 0 and `size`. Each response is measured until the next step: overshoot and settling as in
-`step_meter`, and ITAE, the integral of t |1 - y|. The outputs are the mean, the standard deviation and the maximum over all complete steps but the
-first. `samples` should be long enough for the loop to settle; a loop that has not settled in the time of a step counts with that time.
+Every `samples` samples the setpoint changes between 0 and `size`. Each response is measured until
+the next step: overshoot and settling as in `step_meter`, and ITAE, the integral of t |1 - y|. The
+outputs are the mean, the standard deviation and the maximum over all complete steps but the first.
+`samples` should be long enough for the loop to settle; a loop that has not settled in the time of a
+step counts with that time.
 
-For an experiment in which one response is not enough, because a disturbance has another phase in each of them.
+For an experiment in which one response is not enough, because a disturbance has another phase in
+each of them.
 
     loadrt step_series names=steps
     addf steps.update bus

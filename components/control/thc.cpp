@@ -40,14 +40,16 @@ HAL_COMPONENT(Thc, "thc", "Torch height control from the arc voltage", R"(
     volts     = (encoder-vel - scale-offset) * vel-scale, at least 0
     z-pos-out = z-pos-in + correction,   z-fb-out = z-pos-in
 
-While enabled, with the torch on, the arc stable and the machine moving at the requested velocity or at most `velocity-tol` percent slower, each
-cycle changes the correction by `correction-vel`: up if the voltage is too low by `voltage-tol` or more (the arc is too short), down if it is
-too high by `voltage-tol` or more. With the torch off, upward motion of Z removes the correction, by at most the distance Z moves up in the cycle. While disabled, Z passes
-through.
+While enabled, with the torch on, the arc stable and the machine moving at the requested velocity or
+at most `velocity-tol` percent slower, each cycle changes the correction by `correction-vel`: up if
+the voltage is too low by `voltage-tol` or more (the arc is too short), down if it is too high by
+`voltage-tol` or more. With the torch off, upward motion of Z removes the correction, by at most the
+distance Z moves up in the cycle. While disabled, Z passes through.
 
-**Differences from LinuxCNC:** LinuxCNC's `thc` removes the whole correction in one cycle and delays `offset-value` by one cycle, unlike its
-documentation. Halcyon implements the documented behaviour. `vel-status` is FALSE while `enable` is FALSE (LinuxCNC: keeps its value), and
-disabling clears the correction (LinuxCNC: it returns with `enable`, in one jump).
+**Differences from LinuxCNC:** LinuxCNC's `thc` removes the whole correction in one cycle and delays
+`offset-value` by one cycle, unlike its documentation. Halcyon implements the documented behaviour.
+`vel-status` is FALSE while `enable` is FALSE (LinuxCNC: keeps its value), and disabling clears the
+correction (LinuxCNC: it returns with `enable`, in one jump).
 
     loadrt thc
     addf thc servo

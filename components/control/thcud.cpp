@@ -27,13 +27,16 @@ struct Thcud : TorchHeight {
 HAL_COMPONENT(Thcud, "thcud", "Torch height control from up and down signals", R"(
     z-pos-out = z-pos-in + correction,   z-fb-out = z-pos-in
 
-While enabled, with the torch on, the arc stable and the machine moving at the requested velocity or at most `velocity-tol` percent slower, each
-cycle changes the correction by `correction-vel`, up or down according to the inputs; with both inputs TRUE it does not change. With the torch off, upward motion of
-Z removes the correction, by at most the distance Z moves up in the cycle, so the torch never drops when the arc ends. While disabled, Z passes through.
+While enabled, with the torch on, the arc stable and the machine moving at the requested velocity or
+at most `velocity-tol` percent slower, each cycle changes the correction by `correction-vel`, up or
+down according to the inputs; with both inputs TRUE it does not change. With the torch off, upward
+motion of Z removes the correction, by at most the distance Z moves up in the cycle, so the torch
+never drops when the arc ends. While disabled, Z passes through.
 
-**Differences from LinuxCNC:** LinuxCNC's `thcud` removes the whole correction in one cycle, and its `cur-offset` remains 0, unlike its
-documentation. Halcyon implements the documented behaviour. `correction-vel` is an input as in 2.9.10 and 2.10 (in 2.9.0 it
-is a parameter). `vel-status` is FALSE while `enable` is FALSE (LinuxCNC: keeps its value).
+**Differences from LinuxCNC:** LinuxCNC's `thcud` removes the whole correction in one cycle, and its
+`cur-offset` remains 0, unlike its documentation. Halcyon implements the documented behaviour.
+`correction-vel` is an input as in 2.9.10 and 2.10 (in 2.9.0 it is a parameter). `vel-status` is
+FALSE while `enable` is FALSE (LinuxCNC: keeps its value).
 
     loadrt thcud
     addf thcud servo

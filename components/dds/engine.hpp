@@ -12,9 +12,9 @@
 //     const Schema schema = Schema::of_fields("angle:float");
 //     const auto participant = open({.domain = 3, .name = "arm"});
 //     const auto writer = participant->writer({"arm/state", schema.type, schema.sample.size()}, {.reliable = false}, nullptr);
-//     auto bytes = schema.sample;                                             // header and alignment included
+//     auto bytes = schema.sample;                       // header and alignment included
 //     std::memcpy(bytes.data() + schema.places[0].offset, &angle, sizeof angle);
-//     if (!writer->write(bytes)) …                                            // the history of a reliable writer is full
+//     if (!writer->write(bytes)) …                      // the history of a reliable writer is full
 //
 // Every function is [setup] or for an ordinary thread, unless its comment names another. Errors are
 // std::runtime_error with a message for the user: what failed, why, what to type.

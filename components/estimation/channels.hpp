@@ -15,7 +15,8 @@ namespace hal::estimation {
 
 class Channels {
 public:
-    /// `z-N`, `age-N`, `new-N`; with names NAME, `NAME-age`, `NAME-new`. In a component's constructor.
+    /// `z-N`, `age-N`, `new-N`; with names NAME, `NAME-age`, `NAME-new`. In a component's
+    /// constructor.
     Channels(hal::Component& component, Eigen::Index count,
              const std::vector<std::string>& names = {})
         : gate(component, "gate",

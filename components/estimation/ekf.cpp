@@ -257,14 +257,16 @@ The model is a file of lines:
     measure encoder = angle           sigma 0.002  wrap
     measure camera  = l * sin(angle)  sigma 0.005
 
-At most 8 states, 8 inputs, 12 measurements. Formulas have + - * / ^, brackets, pi and sin cos tan asin acos atan atan2 sqrt exp log abs tanh min max.
-`wrap` after a measurement declares an angle: 359 degrees are 1 degree from 0; `wrap 65536` declares a 16-bit counter. Pins are
-named as in the file (with `-` for `_`): here `torque`, `encoder`, `encoder-age`, `encoder-new`, `camera` and so on, and `x-angle`, `sigma-angle`,
-`x-speed`, `sigma-speed`.
+At most 8 states, 8 inputs, 12 measurements. Formulas have + - * / ^, brackets, pi and sin cos tan
+asin acos atan atan2 sqrt exp log abs tanh min max. `wrap` after a measurement declares an angle:
+359 degrees are 1 degree from 0; `wrap 65536` declares a 16-bit counter. Pins are named as in the
+file (with `-` for `_`): here `torque`, `encoder`, `encoder-age`, `encoder-new`, `camera` and so on,
+and `x-angle`, `sigma-angle`, `x-speed`, `sigma-speed`.
 
-A period is one Runge-Kutta step; the derivatives with respect to the states are exact (forward differentiation). Late and invalid measurements
-are handled as in kalman: see its manual for age, new, gate, timeout and the counters. If a formula has no value at the
-estimate (the root of a negative number), its measurement counts as an outlier.
+A period is one Runge-Kutta step; the derivatives with respect to the states are exact (forward
+differentiation). Late and invalid measurements are handled as in kalman: see its manual for age,
+new, gate, timeout and the counters. If a formula has no value at the estimate (the root of a
+negative number), its measurement counts as an outlier.
 
     loadrt ekf names=swing
     addf swing.update servo

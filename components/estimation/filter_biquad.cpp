@@ -130,13 +130,16 @@ private:
 
 HAL_COMPONENT(FilterBiquad, "filter_biquad",
               "Butterworth low and high pass of any even order, band pass, notch, peak", R"(
-A series of second-order sections. `lowpass` and `highpass` are Butterworth filters of the given `order`, 3 dB down at `frequency`; the others are `order`
-equal sections with the centre `frequency` and the quality `Q` = `frequency` / bandwidth each. The bandwidth of one section is between the
-frequencies at which a band pass or a notch (with `gain` 0) is 3 dB down, and a peak has half of its gain in dB; that of two band passes in series
-is 0.64 of it. `lowpass` and `highpass` ignore `Q`. `frequency` may change in every cycle, for example to track a resonance
-that depends on a speed. The filter starts in the steady state of its first input, so its output does not jump.
+A series of second-order sections. `lowpass` and `highpass` are Butterworth filters of the given
+`order`, 3 dB down at `frequency`; the others are `order` equal sections with the centre `frequency`
+and the quality `Q` = `frequency` / bandwidth each. The bandwidth of one section is between the
+frequencies at which a band pass or a notch (with `gain` 0) is 3 dB down, and a peak has half of its
+gain in dB; that of two band passes in series is 0.64 of it. `lowpass` and `highpass` ignore `Q`.
+`frequency` may change in every cycle, for example to track a resonance that depends on a speed. The
+filter starts in the steady state of its first input, so its output does not jump.
 
-Compared to LinuxCNC's `biquad`, which is also available, this filter starts without an edge and supports more shapes and higher orders.
+Compared to LinuxCNC's `biquad`, which is also available, this filter starts without an edge and
+supports more shapes and higher orders.
 
     loadrt filter_biquad names=quiet type=lowpass order=4
     addf quiet servo

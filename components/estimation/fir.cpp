@@ -119,8 +119,9 @@ HAL_COMPONENT(Fir, "fir",
               "Filter with a finite impulse response: given coefficients, or a low pass", R"(
     out(k) = taps[0] in(k) + taps[1] in(k-1) + ...
 
-Up to 1024 `taps`; or `length` and `corner` for a low pass with a Hamming window, whose delay is (length - 1) / 2 cycles at every frequency. The history is
-filled with the first input, so the output does not jump at the start. A NaN or infinite input is replaced by the previous one.
+Up to 1024 `taps`; or `length` and `corner` for a low pass with a Hamming window, whose delay is
+(length - 1) / 2 cycles at every frequency. The history is filled with the first input, so the
+output does not jump at the start. A NaN or infinite input is replaced by the previous one.
 
     loadrt fir names=smooth length=41 corner=0.05
     addf smooth servo

@@ -229,25 +229,29 @@ private:
 
 HAL_COMPONENT(ForceControl, "force_control",
               "Force control of one axis: direct, by an admittance, or as an impedance", R"(
-**0, explicit direct.** effort = FF0 command + PID(command - force) - velocity-damping velocity. The fastest mode; needs an actuator with a force input.
-The integral adds error × period in every cycle, this one's error included (backward rectangles); the derivative is the difference of this
-error and the last, divided by the period.
+**0, explicit direct.** effort = FF0 command + PID(command - force) - velocity-damping velocity. The
+fastest mode; needs an actuator with a force input. The integral adds error × period in every cycle,
+this one's error included (backward rectangles); the derivative is the difference of this error and
+the last, divided by the period.
 
-**1, explicit indirect.** The error of the force moves the position that an inner loop follows: offset = A(s) (command - force) with the admittance
+**1, explicit indirect.** The error of the force moves the position that an inner loop follows:
+offset = A(s) (command - force) with the admittance
 
     A(s) = 1 / (m s² + c s + k)
 
-and `position-out` = position-command + offset. Works with any position-controlled drive. With `k` 0 the admittance integrates and the error
-converges to 0; with `k` an error remains that is proportional to the offset. It is stable against a wall of stiffness K if the inner loop is fast
-compared to K / c. The admittance is solved exactly for an error that is constant during the cycle (zero-order hold): it is stable for any
-period, and its speed does not depend on the period.
+and `position-out` = position-command + offset. Works with any position-controlled drive. With `k` 0
+the admittance integrates and the error converges to 0; with `k` an error remains that is
+proportional to the offset. It is stable against a wall of stiffness K if the inner loop is fast
+compared to K / c. The admittance is solved exactly for an error that is constant during the cycle
+(zero-order hold): it is stable for any period, and its speed does not depend on the period.
 
-**2, impedance.** effort = k (path - position) + c (path' - velocity) + command: the axis behaves like a spring around the path; the force depends on the
-distance of the path inside the wall, and is as accurate as that distance. Needs no force sensor.
+**2, impedance.** effort = k (path - position) + c (path' - velocity) + command: the axis behaves
+like a spring around the path; the force depends on the distance of the path inside the wall, and is
+as accurate as that distance. Needs no force sensor.
 
-(N. Hogan, *Impedance Control*, ASME J. Dynamic Systems 107, 1985; B. Siciliano, L. Villani, *Robot Force Control*, 1999.) While effort or offset is at
-its limit the integrators are held. A change of `mode` clears all state. While an input is NaN or infinite, effort is 0
-and `position-out` is held.
+(N. Hogan, *Impedance Control*, ASME J. Dynamic Systems 107, 1985; B. Siciliano, L. Villani, *Robot
+Force Control*, 1999.) While effort or offset is at its limit the integrators are held. A change of
+`mode` clears all state. While an input is NaN or infinite, effort is 0 and `position-out` is held.
 
     loadrt force_control names=finger
     addf finger.update servo

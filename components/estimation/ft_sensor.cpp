@@ -242,15 +242,18 @@ HAL_COMPONENT(FtSensor, "ft_sensor",
               "Six-axis force/torque sensor: decoupling, tare, tool weight, overload", R"(
     wrench = decoupling * raw - weight of the tool - tare
 
-`decoupling` is the 6 x 6 matrix of the sensor's calibration, a load argument (a comma between numbers, a `;` between rows) or `decoupling = ...` in a
-`file=` (see state_space); without it the channels count as N and N*m. The tool's weight acts in its centre of mass along the direction of
-gravity in the sensor frame; if a wrist rotates the sensor, link `gravity-x y z` to the kinematics. A tare removes the remaining offset.
+`decoupling` is the 6 x 6 matrix of the sensor's calibration, a load argument (a comma between
+numbers, a `;` between rows) or `decoupling = ...` in a `file=` (see state_space); without it the
+channels count as N and N*m. The tool's weight acts in its centre of mass along the direction of
+gravity in the sensor frame; if a wrist rotates the sensor, link `gravity-x y z` to the kinematics.
+A tare removes the remaining offset.
 
-**Overload** monitors the total load of the sensor, including tool and tare. The default limits are those of a JR3 50M31A-I25, the sensor of
-the source system: full scale 100, 100, 200 N and 5 N*m, overload 471.4, 471.4, 1862.2 N and 20.31, 20.31, 15.8 N*m. Link `overload` to the
-safety chain.
+**Overload** monitors the total load of the sensor, including tool and tare. The default limits are
+those of a JR3 50M31A-I25, the sensor of the source system: full scale 100, 100, 200 N and 5 N*m,
+overload 471.4, 471.4, 1862.2 N and 20.31, 20.31, 15.8 N*m. Link `overload` to the safety chain.
 
-While a channel is NaN or infinite, `valid` is FALSE and the wrench is held. A singular matrix is rejected.
+While a channel is NaN or infinite, `valid` is FALSE and the wrench is held. A singular matrix is
+rejected.
 
     loadrt ft_sensor names=wrist decoupling="diag 0.01 0.01 0.02 5e-4 5e-4 5e-4"
     addf wrist.update servo

@@ -404,28 +404,36 @@ private:
 }  // namespace
 
 HAL_COMPONENT(FurutaControl, "furuta_control", "Swing-up and balancing of a Furuta pendulum", R"(
-**Swing-up.** The arm is accelerated so that energy flows into the pendulum until it has the energy of the upright position (K. Åström, K. Furuta, *Swinging
-up a pendulum by energy control*, Automatica 36, 2000), while a weak virtual spring holds the arm around `arm-command`. The torque for the
-acceleration is computed by the rig's equations (see the manual of furuta), so the parameters are those of the rig.
+**Swing-up.** The arm is accelerated so that energy flows into the pendulum until it has the energy
+of the upright position (K. Åström, K. Furuta, *Swinging up a pendulum by energy control*,
+Automatica 36, 2000), while a weak virtual spring holds the arm around `arm-command`. The torque for
+the acceleration is computed by the rig's equations (see the manual of furuta), so the parameters
+are those of the rig.
 
-**Identification.** During swing-up, recursive least squares on both equations of motion identifies the ratios of the rig's inertias, its
-weight and its friction from the measured motion and the commanded torque (L. Ljung, *System Identification*, 2nd edition, 11.2); energy, torque and
-prediction use them. `identified-frequency` is a result. Parameter errors of 20 % are tolerated. `identify` FALSE uses the given parameters.
+**Identification.** During swing-up, recursive least squares on both equations of motion identifies
+the ratios of the rig's inertias, its weight and its friction from the measured motion and the
+commanded torque (L. Ljung, *System Identification*, 2nd edition, 11.2); energy, torque and
+prediction use them. `identified-frequency` is a result. Parameter errors of 20 % are tolerated.
+`identify` FALSE uses the given parameters.
 
-**Homing.** An incremental encoder counts from its position at power-on. If the pendulum was not hanging at rest then, every angle is wrong, and a swing-up
-makes the arm spin. The identification also determines the angle around which the pendulum oscillates, `zero-offset`. Beyond 0.3 rad `homed` becomes FALSE, a fault
-is raised, and the torque is 0. Let the pendulum hang at rest, zero its encoder, and set `enable` to FALSE and TRUE.
+**Homing.** An incremental encoder counts from its position at power-on. If the pendulum was not
+hanging at rest then, every angle is wrong, and a swing-up makes the arm spin. The identification
+also determines the angle around which the pendulum oscillates, `zero-offset`. Beyond 0.3 rad
+`homed` becomes FALSE, a fault is raised, and the torque is 0. Let the pendulum hang at rest, zero
+its encoder, and set `enable` to FALSE and TRUE.
 
-**Catching.** Balancing starts within `catch-angle` of upright, if a simulation of the rig 0.6 s ahead with the available torque
-succeeds. A pendulum or an arm that is too fast swings through and tries again.
+**Catching.** Balancing starts within `catch-angle` of upright, if a simulation of the rig 0.6 s
+ahead with the available torque succeeds. A pendulum or an arm that is too fast swings through and
+tries again.
 
-**Balancing.** torque = -(gain-arm arm + gain-pendulum tilt + gain-arm-velocity arm' + gain-pendulum-velocity tilt'); link the gains to an lqr with these
-states and the torque as input. Beyond `lose-angle` the swing-up starts again. The deviation from `arm-command` is limited to `arm-reach`, which limits the speed
-of larger steps.
+**Balancing.** torque = -(gain-arm arm + gain-pendulum tilt + gain-arm-velocity arm' +
+gain-pendulum-velocity tilt'); link the gains to an lqr with these states and the torque as input.
+Beyond `lose-angle` the swing-up starts again. The deviation from `arm-command` is limited to
+`arm-reach`, which limits the speed of larger steps.
 
-`pendulum-age` is the latency of the pendulum encoder: angle and speed are predicted by this time with the rig's equations. The voltage compensates
-the resistance and the back-EMF of the motor; the amplifier may limit it further. While a measurement is NaN or infinite, the
-torque is 0.
+`pendulum-age` is the latency of the pendulum encoder: angle and speed are predicted by this time
+with the rig's equations. The voltage compensates the resistance and the back-EMF of the motor; the
+amplifier may limit it further. While a measurement is NaN or infinite, the torque is 0.
 
     loadrt furuta_control names=swing
     addf swing.update servo

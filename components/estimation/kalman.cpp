@@ -256,21 +256,27 @@ private:
 HAL_COMPONENT(Kalman, "kalman", "Kalman filter of a linear plant, with late measurements", R"(
     x(k+1) = A x + B u + w,  z = C x + v,   w with covariance QN, v with RN
 
-(R. Kalman, *A New Approach to Linear Filtering and Prediction Problems*, 1960.) Up to 12 states, inputs and measurements; their numbers follow from
-the matrices, which are load arguments or in a `file=` (see state_space). With `plant=continuous` A and B are those of x' = Ax + Bu and QN is
-the density of its noise; all three are converted to the thread's period in its first cycle.
+(R. Kalman, *A New Approach to Linear Filtering and Prediction Problems*, 1960.) Up to 12 states,
+inputs and measurements; their numbers follow from the matrices, which are load arguments or in a
+`file=` (see state_space). With `plant=continuous` A and B are those of x' = Ax + Bu and QN is the
+density of its noise; all three are converted to the thread's period in its first cycle.
 
-`x-N` is the estimate at the end of the cycle, `sigma-N` its standard deviation. Add the function after the measurements and before the controller; `u-N` is then
-the controller's output of the previous cycle, which acted in between.
+`x-N` is the estimate at the end of the cycle, `sigma-N` its standard deviation. Add the function
+after the measurements and before the controller; `u-N` is then the controller's output of the
+previous cycle, which acted in between.
 
-**Late measurements.** `age-N` is the age of `z-N` in seconds. The filter keeps the last `history` cycles; a late measurement is applied at its own time and
-all later steps are repeated, so the estimate is as good as with a measurement in time. A cycle runs one step plus
-one per cycle of age of its oldest measurement. `new-N` is TRUE if the cycle has a measurement: for sensors slower than the thread.
+**Late measurements.** `age-N` is the age of `z-N` in seconds. The filter keeps the last `history`
+cycles; a late measurement is applied at its own time and all later steps are repeated, so the
+estimate is as good as with a measurement in time. A cycle runs one step plus one per cycle of age
+of its oldest measurement. `new-N` is TRUE if the cycle has a measurement: for sensors slower than
+the thread.
 
-**Invalid measurements** are ignored and counted: NaN and infinity in `skipped`; older than the history in `late`; a deviation above `gate` standard
-deviations in `outliers` (0: no gate). `valid` becomes FALSE if no measurement was used for `timeout` (0: no timeout). The covariance is updated by Joseph's form, which keeps
-it symmetric and positive; should it become invalid nevertheless, it is reset to P0 and `renewals` increases. If RN has correlated
-noise, measurements are used only if all of them are present.
+**Invalid measurements** are ignored and counted: NaN and infinity in `skipped`; older than the
+history in `late`; a deviation above `gate` standard deviations in `outliers` (0: no gate). `valid`
+becomes FALSE if no measurement was used for `timeout` (0: no timeout). The covariance is updated by
+Joseph's form, which keeps it symmetric and positive; should it become invalid nevertheless, it is
+reset to P0 and `renewals` increases. If RN has correlated noise, measurements are used only if all
+of them are present.
 
 A plant with an unstable mode that is not observable is rejected; the error names the mode.
 

@@ -51,8 +51,8 @@ private:
 
 HAL_COMPONENT(KinematicsAlias, "kinematics",
               "Deprecated name of arm_kinematics, mill_kinematics and drive_kinematics", R"(
-Loads the component that `machine` selects, with its pins, and prints a warning with the name to use instead: `arm_kinematics`, `mill_kinematics` or
-`drive_kinematics`.
+Loads the component that `machine` selects, with its pins, and prints a warning with the name to use
+instead: `arm_kinematics`, `mill_kinematics` or `drive_kinematics`.
 
     loadrt kinematics names=scara machine=arm dh=0.3,0,0,0;0.2,0,0,0
     addf scara.update servo

@@ -325,15 +325,18 @@ HAL_COMPONENT(Lqr, "lqr", "Linear-quadratic regulator, designed from plant and w
     plant=sampled      x' = Ax + Bu with u held over a period; the cost is integrated, not summed (C. Van Loan, 1978)
     plant=discrete     x(k+1) = Ax + Bu
 
-`sampled` matches a thread: the gain is for its period, and is computed again if the thread has a period other than `period=`. Matrices are load
-arguments, a comma between numbers and a `;` between rows, or stand in a `file=` (see state_space). Riccati's equation is solved by
-structure-preserving doubling (E. Chu, H. Fan, W. Lin, 2004 and 2005) when the component is loaded, and later in a thread of its own: a change of
-the weights `q-N` or `r-N` (the diagonals of Q and R) starts it, and the cycle swaps the gain in when it is done. Under `hal sim` that is the
-next cycle, so that each run comes out the same.
+`sampled` matches a thread: the gain is for its period, and is computed again if the thread has a
+period other than `period=`. Matrices are load arguments, a comma between numbers and a `;` between
+rows, or stand in a `file=` (see state_space). Riccati's equation is solved by structure-preserving
+doubling (E. Chu, H. Fan, W. Lin, 2004 and 2005) when the component is loaded, and later in a thread
+of its own: a change of the weights `q-N` or `r-N` (the diagonals of Q and R) starts it, and the
+cycle swaps the gain in when it is done. Under `hal sim` that is the next cycle, so that each run
+comes out the same.
 
-A plant with an unstable mode that is not controllable, or that Q does not observe, is rejected; the error names the mode. A NaN or infinite state is
-replaced by its last valid value for `hold-cycles`; then `valid` becomes FALSE and all u are 0 until it is valid again. Link `gain-I-J` to a
-component with its own control law, such as furuta_control.
+A plant with an unstable mode that is not controllable, or that Q does not observe, is rejected; the
+error names the mode. A NaN or infinite state is replaced by its last valid value for `hold-cycles`;
+then `valid` becomes FALSE and all u are 0 until it is valid again. Link `gain-I-J` to a component
+with its own control law, such as furuta_control.
 
     loadrt lqr names=sled plant=sampled a=0,1;0,0 b=0;0.5 q=100,0;0,1 r=0.01
     addf sled.update servo

@@ -128,11 +128,14 @@ public:
 HAL_COMPONENT(Luenberger, "luenberger", "Luenberger observer with a given gain or given poles", R"(
     xm = A x + B u,   x = xm + L (z - C xm)
 
-(D. Luenberger, *Observing the State of a Linear System*, 1964, in the form that uses the newest measurement at once.) The error of the estimate is
-multiplied by (I - LC) A in each cycle; `poles` are the eigenvalues of that matrix, and L follows from them. A plant that is not observable
-with these measurements is rejected, and so is an L that makes the observer unstable. Matrices are given as in state_space.
+(D. Luenberger, *Observing the State of a Linear System*, 1964, in the form that uses the newest
+measurement at once.) The error of the estimate is multiplied by (I - LC) A in each cycle; `poles`
+are the eigenvalues of that matrix, and L follows from them. A plant that is not observable with
+these measurements is rejected, and so is an L that makes the observer unstable. Matrices are given
+as in state_space.
 
-Use it instead of kalman if poles are known rather than noise; it also needs less time. NaN and infinite measurements are ignored.
+Use it instead of kalman if poles are known rather than noise; it also needs less time. NaN and
+infinite measurements are ignored.
 
     loadrt luenberger names=sled a=1,0.001;0,1 b=0;0.001 c=1,0 poles=0.9,0.95
     addf sled.update servo

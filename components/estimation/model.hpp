@@ -15,7 +15,8 @@ namespace hal::estimation {
 
 /// The lines of a model: `constant NAME = FORMULA`, `input NAME`, `state NAME = START sigma S noise
 /// N`, `NAME' = FORMULA`,
-/// `measure NAME = FORMULA sigma S`, with `wrap` behind an angle, `wrap PERIOD` behind a counter. [setup]
+/// `measure NAME = FORMULA sigma S`, with `wrap` behind an angle, `wrap PERIOD` behind a counter.
+/// [setup]
 class Model {
 public:
     static constexpr std::size_t max_inputs = 8;

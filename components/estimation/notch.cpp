@@ -97,9 +97,10 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Notch, "notch", "Removes a variable frequency and its multiples from a signal", R"(
-A notch of `width` Hz around `frequency` and, with `harmonics`, around its multiples: mains hum in a force sensor, the teeth of a gear, a spindle's
-imbalance. Link `frequency` to the speed (in turns per second) and the notches follow it in every cycle. A notch above 0.45 of the
-thread's rate, or with an invalid width or depth, is disabled; `active` is the number of active ones.
+A notch of `width` Hz around `frequency` and, with `harmonics`, around its multiples: mains hum in a
+force sensor, the teeth of a gear, a spindle's imbalance. Link `frequency` to the speed (in turns
+per second) and the notches follow it in every cycle. A notch above 0.45 of the thread's rate, or
+with an invalid width or depth, is disabled; `active` is the number of active ones.
 
     loadrt notch names=no-hum harmonics=3
     addf no-hum servo

@@ -142,9 +142,11 @@ private:
 
 HAL_COMPONENT(SavgolDiff, "savgol_diff",
               "Speed and acceleration from a position (Savitzky-Golay filter)", R"(
-A polynomial of degree `order` is fitted to the last `window` samples by least squares and evaluated at the newest: there is no delay for signals that
-such a polynomial describes exactly (A. Savitzky, M. Golay, 1964; evaluated at the end of the window as in P. Gorry, 1990). More samples reduce noise; a
-higher order reduces lag. For an encoder position use 15 to 31 samples and order 2 or 3. A NaN or infinite input is replaced by the previous one.
+A polynomial of degree `order` is fitted to the last `window` samples by least squares and evaluated
+at the newest: there is no delay for signals that such a polynomial describes exactly (A. Savitzky,
+M. Golay, 1964; evaluated at the end of the window as in P. Gorry, 1990). More samples reduce noise;
+a higher order reduces lag. For an encoder position use 15 to 31 samples and order 2 or 3. A NaN or
+infinite input is replaced by the previous one.
 
     loadrt savgol_diff names=speed window=21 order=2
     addf speed servo

@@ -144,9 +144,10 @@ HAL_COMPONENT(StateSpace, "state_space", "A linear plant or filter in state-spac
     plant=continuous:  x' = A x + B u,         y = C x + D u
     plant=discrete:    x(k+1) = A x(k) + B u,  y = C x + D u, a step per cycle
 
-Up to 12 states, inputs and outputs; their numbers follow from the matrices. `y` is the output at the end of the period, with
-the current input. A continuous plant is discretised exactly for inputs held for the period (K. Åström, B. Wittenmark,
-*Computer-Controlled Systems*, 2.3), in the first cycle of a thread, which takes a few microseconds longer.
+Up to 12 states, inputs and outputs; their numbers follow from the matrices. `y` is the output at
+the end of the period, with the current input. A continuous plant is discretised exactly for inputs
+held for the period (K. Åström, B. Wittenmark, *Computer-Controlled Systems*, 2.3), in the first
+cycle of a thread, which takes a few microseconds longer.
 
 Matrices are load arguments, with a comma between numbers and a `;` between rows, or in a `file=`:
 
@@ -157,8 +158,8 @@ Matrices are load arguments, with a comma between numbers and a `;` between rows
         0.5
     C = 1 0
 
-A NaN or infinite input is replaced by the previous one. If the states of an unstable plant overflow, they are
-reset to `x0`.
+A NaN or infinite input is replaced by the previous one. If the states of an unstable plant
+overflow, they are reset to `x0`.
 
     loadrt state_space names=sled a=0,1;-50,-0.5 b=0;0.5 c=1,0
     addf sled.update servo

@@ -91,8 +91,9 @@ private:
 
 HAL_COMPONENT(StepMeter, "step_meter",
               "Overshoot, rise time, settling time and steady error of a step", R"(
-Each change of `command` starts a measurement from the current value; the outputs converge during the step. A settling time
-equal to `time` means that the value has not settled. NaN and infinite values are ignored.
+Each change of `command` starts a measurement from the current value; the outputs converge during
+the step. A settling time equal to `time` means that the value has not settled. NaN and infinite
+values are ignored.
 
     loadrt step_meter names=meter
     addf meter.update servo

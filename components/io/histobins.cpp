@@ -137,13 +137,15 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Histobins, "histobins", "Histogram of a value", R"(
-Counts the value of each cycle in one of `nbins` bins: bin i is from `minvalue` + i `binsize` up to, but not including, the next.
-Set `index` and, once `check` is equal to it, read `binvalue`. `reset` and a change of the bins clear everything; the value of that cycle is the
-first of `nsamples`, but not counted in a bin, and neither is a value at the upper edge of the last bin. The variance is the sample variance, with the
-divisor `nsamples` - 1.
+Counts the value of each cycle in one of `nbins` bins: bin i is from `minvalue` + i `binsize` up to,
+but not including, the next. Set `index` and, once `check` is equal to it, read `binvalue`. `reset`
+and a change of the bins clear everything; the value of that cycle is the first of `nsamples`, but
+not counted in a bin, and neither is a value at the upper edge of the last bin. The variance is the
+sample variance, with the divisor `nsamples` - 1.
 
-**Differences from LinuxCNC:** `mean` and `variance` include the first value (LinuxCNC divides by its number and leaves it out). A `binsize` that is
-not above 0 and a value that is NaN or infinite set `input-error` (LinuxCNC: writes outside of its memory). So does a value beyond ±1e150, because
+**Differences from LinuxCNC:** `mean` and `variance` include the first value (LinuxCNC divides by
+its number and leaves it out). A `binsize` that is not above 0 and a value that is NaN or infinite
+set `input-error` (LinuxCNC: writes outside of its memory). So does a value beyond ±1e150, because
 its square is infinite (LinuxCNC counts it, and `variance` is infinite or NaN until a reset).
 
     loadrt histobins names=errors

@@ -350,7 +350,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Lcd, "lcd", "Text and values for a character display, a byte per cycle", R"(
-`fmt_strings=` has a text per display. Each `%` format in it, as in C's printf, creates a pin `page.PP.arg.NN`:
+`fmt_strings=` has a text per display. Each `%` format in it, as in C's printf, creates a pin
+`page.PP.arg.NN`:
 
 | format | pin | shows |
 | --- | --- | --- |
@@ -360,12 +361,13 @@ HAL_COMPONENT(Lcd, "lcd", "Text and values for a character display, a byte per c
 | %c | u32 | the character with this code, repeated to the width |
 | %bYN | bit | the first character when TRUE, the second when FALSE |
 
-Between % and the letter may be 0 (leading zeros), + (always a sign), the width including sign and separator, and `.N` decimals. NaN and values that do
-not fit the width are shown as asterisks. `\n` ends a line, `\t` is four spaces, `\NN` the character with this hexadecimal
-code, `\\` a backslash and `%%` a percent sign; `|` starts the next page, a comma (`\2C`) the text of the next display.
+Between % and the letter may be 0 (leading zeros), + (always a sign), the width including sign and
+separator, and `.N` decimals. NaN and values that do not fit the width are shown as asterisks. `\n`
+ends a line, `\t` is four spaces, `\NN` the character with this hexadecimal code, `\\` a backslash
+and `%%` a percent sign; `|` starts the next page, a comma (`\2C`) the text of the next display.
 
-The bytes are those of an ADM-3 terminal, as for the Mesa 7I73. After a start-up of 100 cycles the page is sent repeatedly from the
-top. Default names are `lcd.00`, `lcd.01` …
+The bytes are those of an ADM-3 terminal, as for the Mesa 7I73. After a start-up of 100 cycles the
+page is sent repeatedly from the top. Default names are `lcd.00`, `lcd.01` …
 
     loadrt lcd fmt_strings="X %+9.3f|Feed %5d" names=panel
     addf lcd slow

@@ -152,9 +152,11 @@ HAL_COMPONENT(MatrixKb, "matrix_kb",
 Without s at the end the keypad has a controller: `keycode` 0xC0 + key sets the pin of the key, 0x80 + key clears it, other codes change
 nothing. The number of a key is row * w + column, where w is the number of columns rounded up to a power of two, at least 2.
 
-With s the keypad is scanned: one row is driven per cycle, and the columns are read in the next. A key change is accepted if it is equal in two
-scans. When several keys of a row change, `keycode` has the last one. With `key_rollover` keys down, further keys are ignored, because most keypads then report ghost keys; increase it for keypads with
-diodes. `negative-logic` is for inputs that are TRUE when open. Use a slow thread.
+With s the keypad is scanned: one row is driven per cycle, and the columns are read in the next. A
+key change is accepted if it is equal in two scans. When several keys of a row change, `keycode` has
+the last one. With `key_rollover` keys down, further keys are ignored, because most keypads then
+report ghost keys; increase it for keypads with diodes. `negative-logic` is for inputs that are TRUE
+when open. Use a slow thread.
 
 The default name of an instance is `matrix_kb.N`.
 

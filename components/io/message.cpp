@@ -78,10 +78,11 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Message, "message", "Prints a message when a bit changes", R"(
-An edge of `trigger` prints the instance's text to the standard error of the process that runs the netlist. The cycle only counts; a separate
-thread prints, a few hundredths of a second later, and at most one line per second: further messages of an instance in that time are
-counted, and the next line ends with their number, as in `(12 times in 1.0 s)`. Before the first cycle `trigger` counts as FALSE. The default
-text is `message`.
+An edge of `trigger` prints the instance's text to the standard error of the process that runs the
+netlist. The cycle only counts; a separate thread prints, a few hundredths of a second later, and at
+most one line per second: further messages of an instance in that time are counted, and the next
+line ends with their number, as in `(12 times in 1.0 s)`. Before the first cycle `trigger` counts as
+FALSE. The default text is `message`.
 
     loadrt message names=oillow,inverterfail messages="Slideway oil low,Spindle inverter fault"
     addf oillow servo

@@ -246,16 +246,19 @@ private:
 
 HAL_COMPONENT(RecorderTrigger, "recorder_trigger",
               "Triggers a record of the cycles before and after an event", R"(
-Extends `sampler` to a transient recorder: the values are delayed by `pre` cycles, and `record` enables the sampler from the trigger
-on for `pre` + `post` cycles, so the record starts `pre` cycles before the trigger. `index` is the number of the cycle; record it, too.
+Extends `sampler` to a transient recorder: the values are delayed by `pre` cycles, and `record`
+enables the sampler from the trigger on for `pre` + `post` cycles, so the record starts `pre` cycles
+before the trigger. `index` is the number of the cycle; record it, too.
 
-A rising edge of `arm` arms the trigger; it is active once `pre` cycles have been stored. The conditions are `trigger-bit` (`bit-mode`) and
-`trigger-value` (`value-mode`, `threshold`), either of them or, with `both`, both in the same cycle; `force` triggers at any time. For an edge, the
-value must first be beyond `hysteresis` on the other side. With `auto-arm` the trigger is armed again `hold-off` after each record. `arm` FALSE
-disarms, but does not end a record. A record forced before the pre-trigger is full starts with older values.
+A rising edge of `arm` arms the trigger; it is active once `pre` cycles have been stored. The
+conditions are `trigger-bit` (`bit-mode`) and `trigger-value` (`value-mode`, `threshold`), either of
+them or, with `both`, both in the same cycle; `force` triggers at any time. For an edge, the value
+must first be beyond `hysteresis` on the other side. With `auto-arm` the trigger is armed again
+`hold-off` after each record. `arm` FALSE disarms, but does not end a record. A record forced before
+the pre-trigger is full starts with older values.
 
-The memory is allocated when the component is loaded: `depth` cycles (the limit of `pre`), 8 bytes per value. Add the functions in this order: the
-sources of the values, this component, the sampler.
+The memory is allocated when the component is loaded: `depth` cycles (the limit of `pre`), 8 bytes
+per value. Add the functions in this order: the sources of the values, this component, the sampler.
 
     loadrt recorder_trigger names=catch channels=2 depth=2000
     loadrt sampler depth=4000 cfg=ffs

@@ -115,20 +115,23 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Sampler, "sampler", "Records pins into a FIFO for external programs", R"(
-In each cycle in which `enable` is TRUE, the values of all pins are written to the FIFO with a sequence number. `hal record` and
-LinuxCNC-style `halsampler` read it while the machine runs. A FIFO of `depth=N` holds N - 1 records. If it is full, the new record is lost,
-never an old one: `overruns` counts it, and `hal record` prints `overrun` at this place; the numbers have no gap. The number of pins is not
-limited.
+In each cycle in which `enable` is TRUE, the values of all pins are written to the FIFO with a
+sequence number. `hal record` and LinuxCNC-style `halsampler` read it while the machine runs. A FIFO
+of `depth=N` holds N - 1 records. If it is full, the new record is lost, never an old one:
+`overruns` counts it, and `hal record` prints `overrun` at this place; the numbers have no gap. The
+number of pins is not limited.
 
-With both arguments, there are as many instances as the shorter list has values: `depth=100,50 cfg=ff,b` makes `sampler.0` and
-`sampler.1`, `depth=100 cfg=ff,b` only `sampler.0`, as in LinuxCNC. Without `depth=`, all that `cfg=` lists have the default.
+With both arguments, there are as many instances as the shorter list has values:
+`depth=100,50 cfg=ff,b` makes `sampler.0` and `sampler.1`, `depth=100 cfg=ff,b` only `sampler.0`, as
+in LinuxCNC. Without `depth=`, all that `cfg=` lists have the default.
 
-With `samples=10`, each letter of `cfg=` has ten pins, `pin.0-00` to `pin.0-09`, and each cycle writes ten records, in the order of the samples. Their times are a
-tenth of the period apart, from `sample-time` on. So a CSV has a line for each sample of a device with oversampling, with its own time; if the FIFO has not enough
-space, all samples of the cycle are lost.
+With `samples=10`, each letter of `cfg=` has ten pins, `pin.0-00` to `pin.0-09`, and each cycle
+writes ten records, in the order of the samples. Their times are a tenth of the period apart, from
+`sample-time` on. So a CSV has a line for each sample of a device with oversampling, with its own
+time; if the FIFO has not enough space, all samples of the cycle are lost.
 
-**Differences from LinuxCNC:** `sample-num` is the number of the next record (LinuxCNC: always 0). `depth=1` is an error (LinuxCNC: every
-record is lost).
+**Differences from LinuxCNC:** `sample-num` is the number of the next record (LinuxCNC: always 0).
+`depth=1` is an error (LinuxCNC: every record is lost).
 
     loadrt sampler depth=2000 cfg=ffb
     addf sampler.0 servo-thread

@@ -26,8 +26,9 @@ struct Supply : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Supply, "supply", "Outputs with values set by the user", R"(
-`setp supply.0.value 3` sets `variable` to 3 and `_variable` to -3; `setp supply.0.d 1` sets `q` and clears `_q`. It exists for
-netlists that already use it: `setp` on an unlinked input and `sets` on a signal without writer do the same.
+`setp supply.0.value 3` sets `variable` to 3 and `_variable` to -3; `setp supply.0.d 1` sets `q` and
+clears `_q`. It exists for netlists that already use it: `setp` on an unlinked input and `sets` on a
+signal without writer do the same.
 
     loadrt supply num_chan=1
     loadrt pid

@@ -28,8 +28,8 @@ private:
 
 HAL_COMPONENT(Threadtest, "threadtest", "Counts the runs of one thread between those of another",
               R"(
-With `increment` in a fast thread and `reset` in a slow one, `count` runs from 1 to the ratio of their periods. The reset takes effect in the next
-run of `increment`.
+With `increment` in a fast thread and `reset` in a slow one, `count` runs from 1 to the ratio of
+their periods. The reset takes effect in the next run of `increment`.
 
     loadrt threadtest names=ratio
     addf ratio.increment fast

@@ -41,8 +41,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Time, "time", "Elapsed time in hours, minutes and seconds", R"(
-Counts the time for which `start` is TRUE and `pause` FALSE, from 0 when one of the two becomes TRUE after both were FALSE. Otherwise the
-result is held. The time is a sum of periods, not read from a clock: missed periods are not included.
+Counts the time for which `start` is TRUE and `pause` FALSE, from 0 when one of the two becomes TRUE
+after both were FALSE. Otherwise the result is held. The time is a sum of periods, not read from a
+clock: missed periods are not included.
 
     loadrt time
     addf time.0 servo-thread

@@ -68,9 +68,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Timedelta, "timedelta", "Measures how regularly a thread runs", R"(
-Each run measures the time since the previous one; the error is its difference from the period. Add it first in the thread to measure
-wake-ups, last to include the other functions. On a virtual clock the errors are 0. `show thread` prints histograms of every thread
-without this component.
+Each run measures the time since the previous one; the error is its difference from the period. Add
+it first in the thread to measure wake-ups, last to include the other functions. On a virtual clock
+the errors are 0. `show thread` prints histograms of every thread without this component.
 
     loadrt timedelta names=wake
     addf wake servo 1

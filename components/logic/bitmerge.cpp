@@ -26,7 +26,8 @@ struct Bitmerge : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Bitmerge, "bitmerge", "Merges bits into a word", R"(
-`personality` is the number of bits with an input, 32 by default; bits without an input are 0. `bitslice` is the inverse.
+`personality` is the number of bits with an input, 32 by default; bits without an input are 0.
+`bitslice` is the inverse.
 
     loadrt bitmerge names=control personality=3
     addf control servo

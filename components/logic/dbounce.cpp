@@ -34,8 +34,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Dbounce, "dbounce", "Filters a noisy digital input", R"(
-`out` follows `in` once it has been stable for `delay` cycles after the cycle of the change. While it bounces, cycles with the new state
-count up and cycles with the old state count down, as in `debounce`. Unlike `debounce` it has a delay pin for each input.
+`out` follows `in` once it has been stable for `delay` cycles after the cycle of the change. While
+it bounces, cycles with the new state count up and cycles with the old state count down, as in
+`debounce`. Unlike `debounce` it has a delay pin for each input.
 
     loadrt dbounce names=home-filter
     addf home-filter servo

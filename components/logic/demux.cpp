@@ -30,11 +30,13 @@ struct Demux : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Demux, "demux", "Sets one of several outputs, or the first N of them", R"(
-The selection is `sel-u32` plus the binary number of the `sel-bit` inputs; usually only one of the two is used. The selected output is TRUE; a selection
-above the last output selects the last one. With `bargraph` the selection is the number of outputs that are TRUE: 0 sets none, 3 sets the first three.
-`personality` is the number of outputs.
+The selection is `sel-u32` plus the binary number of the `sel-bit` inputs; usually only one of the
+two is used. The selected output is TRUE; a selection above the last output selects the last one.
+With `bargraph` the selection is the number of outputs that are TRUE: 0 sets none, 3 sets the first
+three. `personality` is the number of outputs.
 
-In LinuxCNC the last output of a bar is never TRUE; in Halcyon it is TRUE if the selection is at least the number of outputs.
+In LinuxCNC the last output of a bar is never TRUE; in Halcyon it is TRUE if the selection is at
+least the number of outputs.
 
     # a bar of four lamps
     loadrt demux names=load-bar personality=4

@@ -50,9 +50,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Edge, "edge", "Turns an edge into a pulse", R"(
-`out` becomes TRUE in the cycle of the edge, for `out-width-ns` rounded up to whole cycles, at least one; another
-edge during the pulse restarts it. An input that is TRUE from the start is not an edge. The default,
-`in-edge` TRUE, is the *falling* edge.
+`out` becomes TRUE in the cycle of the edge, for `out-width-ns` rounded up to whole cycles, at least
+one; another edge during the pulse restarts it. An input that is TRUE from the start is not an edge.
+The default, `in-edge` TRUE, is the *falling* edge.
 
     loadrt edge names=button-down
     addf button-down servo

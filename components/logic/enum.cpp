@@ -99,15 +99,16 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Enum, "enum", "Converts between integers and named bits", R"(
-For the status and control words of drives with codes such as 0 stop, 1 forward, 2 backward instead of a bit for each state. For each instance,
-`enums` has `D` (decode: number to bits) or `E` (encode: bits to number) and the labels of 0, 1, 2 …; leave the label of an unused
-value empty:
+For the status and control words of drives with codes such as 0 stop, 1 forward, 2 backward instead
+of a bit for each state. For each instance, `enums` has `D` (decode: number to bits) or `E` (encode:
+bits to number) and the labels of 0, 1, 2 …; leave the label of an unused value empty:
 
     loadrt enum enums=E;stop;forward;;;jog,D;ready;running;;fault
 
-makes `enum-encode.00` with `stop-in` (0), `forward-in` (1), `jog-in` (4) and `output`, and `enum-decode.01` with `input`, `ready-out` (0),
-`running-out` (1) and `fault-out` (3). The value of each label is a pin that may be set: `jog-val`. `names=` sets other instance names.
-While no input is TRUE `output` is 0, with or without a label for 0.
+makes `enum-encode.00` with `stop-in` (0), `forward-in` (1), `jog-in` (4) and `output`, and
+`enum-decode.01` with `input`, `ready-out` (0), `running-out` (1) and `fault-out` (3). The value of
+each label is a pin that may be set: `jog-val`. `names=` sets other instance names. While no input
+is TRUE `output` is 0, with or without a label for 0.
 
     loadrt enum enums=D;ready;running;;fault names=drive-state
     addf drive-state servo

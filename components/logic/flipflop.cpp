@@ -38,8 +38,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Flipflop, "flipflop", "D flip-flop with set and reset", R"(
-`reset` overrides `set`, and both override `clk`; a `clk` that is TRUE in the first cycle is an edge. The bit is stored in `out` itself, which is an
-input/output pin, so another writer on the same signal can change it.
+`reset` overrides `set`, and both override `clk`; a `clk` that is TRUE in the first cycle is an
+edge. The bit is stored in `out` itself, which is an input/output pin, so another writer on the same
+signal can change it.
 
     # remember a short alarm until the operator acknowledges it
     loadrt flipflop names=alarm-memory

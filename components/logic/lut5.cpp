@@ -22,8 +22,8 @@ struct Lut5 : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Lut5, "lut5", "Any logic function of five inputs, from a table", R"(
-`in-4` to `in-0` are the binary number of a row, 0..31; `out` is that bit of `function`. `function` is the sum of
-2^row over all rows in which `out` is TRUE. Leave unused inputs unlinked.
+`in-4` to `in-0` are the binary number of a row, 0..31; `out` is that bit of `function`. `function`
+is the sum of 2^row over all rows in which `out` is TRUE. Leave unused inputs unlinked.
 
 | function   | is                          |
 | ---------- | --------------------------- |

@@ -26,7 +26,8 @@ struct Match8 : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Match8, "match8", "Compares eight bits with eight others", R"(
-`out` is TRUE while `in` is TRUE and `a0` = `b0` … `a7` = `b7`. For more bits, link `out` to the `in` of another `match8`.
+`out` is TRUE while `in` is TRUE and `a0` = `b0` … `a7` = `b7`. For more bits, link `out` to the
+`in` of another `match8`.
 
     # a code switch against a number set once
     loadrt match8 names=address

@@ -58,8 +58,9 @@ private:
 
 HAL_COMPONENT(Momentary2nist, "momentary2nist",
               "Push button for a device with inputs to switch on and off", R"(
-Each press (rising edge of `in`) requests the other state of the device: `on` is TRUE until `is-on` is TRUE, or `off` is TRUE
-until `is-on` is FALSE. If the device does not follow within `max-pulse-length` cycles, the request ends.
+Each press (rising edge of `in`) requests the other state of the device: `on` is TRUE until `is-on`
+is TRUE, or `off` is TRUE until `is-on` is FALSE. If the device does not follow within
+`max-pulse-length` cycles, the request ends.
 
     loadrt momentary2nist names=power
     addf power servo

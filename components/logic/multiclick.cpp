@@ -108,9 +108,10 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Multiclick, "multiclick", "Detects single, double, triple and quadruple clicks", R"(
-A click is a press of at most `max-hold-ns`. Clicks with pauses of at most `max-space-ns` between them form a series: the
-outputs without `only` are TRUE for `output-hold-ns` from the end of the click, those with `only` from the end of the series.
-A longer press ends the series without an `only` output. Debounce a noisy button first (`debounce`).
+A click is a press of at most `max-hold-ns`. Clicks with pauses of at most `max-space-ns` between
+them form a series: the outputs without `only` are TRUE for `output-hold-ns` from the end of the
+click, those with `only` from the end of the series. A longer press ends the series without an
+`only` output. Debounce a noisy button first (`debounce`).
 
     loadrt multiclick names=pendant
     addf pendant servo

@@ -65,7 +65,8 @@ private:
 
 HAL_COMPONENT(Multiswitch, "multiswitch", "A switch of several positions, moved by buttons", R"(
 Each press of `up` or `down` moves by one position and wraps around between `top-position` and 0.
-The bit of the current position is TRUE; a position above the number of bits has none. `cfg=3,5` creates two switches, with three and five positions.
+The bit of the current position is TRUE; a position above the number of bits has none. `cfg=3,5`
+creates two switches, with three and five positions.
 
     loadrt multiswitch names=jog-step cfg=3
     addf jog-step servo

@@ -19,7 +19,8 @@ struct Mux8 : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Mux8, "mux8", "Selects one of eight values", R"(
-The selection is the binary number `sel2 sel1 sel0`: with `sel2` and `sel0` TRUE and `sel1` FALSE, `out` is `in5`.
+The selection is the binary number `sel2 sel1 sel0`: with `sel2` and `sel0` TRUE and `sel1` FALSE,
+`out` is `in5`.
 
     loadrt mux8 names=feed-steps
     addf feed-steps servo

@@ -54,8 +54,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Oneshot, "oneshot", "Pulse of fixed duration after an edge", R"(
-An edge of `in` sets `out` for `width` seconds, rounded up to whole cycles. `rising` and `falling` select the
-edges. An edge during a pulse restarts it, or, with `retriggerable` FALSE, is ignored.
+An edge of `in` sets `out` for `width` seconds, rounded up to whole cycles. `rising` and `falling`
+select the edges. An edge during a pulse restarts it, or, with `retriggerable` FALSE, is ignored.
 
     loadrt oneshot names=lube
     addf lube servo

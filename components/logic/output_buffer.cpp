@@ -22,7 +22,8 @@ struct OutputBuffer : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(OutputBuffer, "output_buffer", "Passes several bits while enabled", R"(
-While `enable` is TRUE each output equals its input; otherwise all outputs are FALSE. `personality` is the number of bits.
+While `enable` is TRUE each output equals its input; otherwise all outputs are FALSE. `personality`
+is the number of bits.
 
     loadrt output_buffer names=valves personality=2
     addf valves servo

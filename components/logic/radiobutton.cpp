@@ -35,8 +35,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Radiobutton, "radiobutton", "Radio buttons: the last button pressed stays on", R"(
-A rising edge of a button sets its output and clears all others. At the start no output is TRUE. If several buttons are
-pressed in the same cycle, the lowest number takes precedence. `personality` is the number of buttons.
+A rising edge of a button sets its output and clears all others. At the start no output is TRUE. If
+several buttons are pressed in the same cycle, the lowest number takes precedence. `personality` is
+the number of buttons.
 
     loadrt radiobutton names=axis-choice personality=3
     addf axis-choice servo

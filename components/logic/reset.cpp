@@ -42,8 +42,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Reset, "reset", "Writes values into signals at an edge", R"(
-An edge of `trigger` writes each `reset-` input to the signal of its `out-` pin, which other components may then change. Unlinked outputs have no
-effect.
+An edge of `trigger` writes each `reset-` input to the signal of its `out-` pin, which other
+components may then change. Unlinked outputs have no effect.
 
     loadrt reset names=clear-override
     addf clear-override servo

@@ -44,9 +44,10 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Timedelay, "timedelay", "Time-delay relay", R"(
-`out` becomes TRUE when `in` has been TRUE for `on-delay` seconds without interruption, and FALSE when it has been FALSE for
-`off-delay`. The time includes the cycle in which `in` changes, so `out` follows one cycle earlier than `q` of `ton` with the same time.
-`elapsed` keeps its last value while `in` and `out` are equal. A NaN delay counts as 0 (LinuxCNC: `out` never changes).
+`out` becomes TRUE when `in` has been TRUE for `on-delay` seconds without interruption, and FALSE
+when it has been FALSE for `off-delay`. The time includes the cycle in which `in` changes, so `out`
+follows one cycle earlier than `q` of `ton` with the same time. `elapsed` keeps its last value while
+`in` and `out` are equal. A NaN delay counts as 0 (LinuxCNC: `out` never changes).
 
     loadrt timedelay names=pressure-ok
     addf pressure-ok servo

@@ -28,10 +28,10 @@ struct Tof : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Tof, "tof", "IEC timer: off-delay", R"(
-`q` becomes TRUE with `in`, and FALSE after `in` has been FALSE for `pt` seconds. `et` includes the cycle of the falling edge; `q` follows in
-the cycle after the one in which `et` reaches `pt`. `et` also counts from the start until `in` is TRUE for the first time. A negative `pt` is
-set to 0.
-A NaN `pt` counts as 0 (LinuxCNC: `q` remains TRUE).
+`q` becomes TRUE with `in`, and FALSE after `in` has been FALSE for `pt` seconds. `et` includes the
+cycle of the falling edge; `q` follows in the cycle after the one in which `et` reaches `pt`. `et`
+also counts from the start until `in` is TRUE for the first time. A negative `pt` is set to 0. A NaN
+`pt` counts as 0 (LinuxCNC: `q` remains TRUE).
 
     loadrt tof names=run-on
     addf run-on servo

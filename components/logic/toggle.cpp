@@ -47,8 +47,10 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Toggle, "toggle", "Push on, push off", R"(
-A press that is stable for `debounce` cycles inverts `out`; the release must be stable as long before the next press counts. While the button
-bounces, the cycles in which it is pressed count up and the others count down. A `debounce` of 0 or above 10000 is set to 2. `out` is an io pin: the next press inverts the value of the signal, even if another component wrote it.
+A press that is stable for `debounce` cycles inverts `out`; the release must be stable as long
+before the next press counts. While the button bounces, the cycles in which it is pressed count up
+and the others count down. A `debounce` of 0 or above 10000 is set to 2. `out` is an io pin: the
+next press inverts the value of the signal, even if another component wrote it.
 
     loadrt toggle names=lamp-button
     addf lamp-button servo

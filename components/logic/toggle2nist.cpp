@@ -63,13 +63,15 @@ private:
 
 HAL_COMPONENT(Toggle2nist, "toggle2nist", "Switch for a device with inputs to switch on and off",
               R"(
-A rising edge of `in` while the device is off requests `on` until `is-on` is TRUE; a falling edge while it is on requests `off`
-until `is-on` is FALSE. If the device does not follow within `max-pulse-length` cycles, the request ends. For a button that
-is TRUE while pressed use `momentary2nist`.
+A rising edge of `in` while the device is off requests `on` until `is-on` is TRUE; a falling edge
+while it is on requests `off` until `is-on` is FALSE. If the device does not follow within
+`max-pulse-length` cycles, the request ends. For a button that is TRUE while pressed use
+`momentary2nist`.
 
-**Differences from LinuxCNC:** This is the component of 2.10. In 2.9 both edges request the other state of the device, there is no `debounce`
-and no `max-pulse-length`. In 2.10 the time of `max-pulse-length` is not that of the request: it runs all the time, so a request can end
-after one cycle.
+**Differences from LinuxCNC:** This is the component of 2.10. In 2.9 both edges request the other
+state of the device, there is no `debounce` and no `max-pulse-length`. In 2.10 the time of
+`max-pulse-length` is not that of the request: it runs all the time, so a request can end after one
+cycle.
 
     loadrt toggle2nist names=power
     addf power servo

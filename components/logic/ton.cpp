@@ -28,9 +28,10 @@ struct Ton : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Ton, "ton", "IEC timer: on-delay", R"(
-`q` becomes TRUE after `in` has been TRUE for `pt` seconds, and FALSE with `in`. `et` includes the cycle of the rising edge; `q` follows in
-the cycle after the one in which `et` reaches `pt` (`timedelay` switches in that cycle). A negative `pt` is set to 0.
-A NaN `pt` counts as 0 (LinuxCNC: `q` remains FALSE).
+`q` becomes TRUE after `in` has been TRUE for `pt` seconds, and FALSE with `in`. `et` includes the
+cycle of the rising edge; `q` follows in the cycle after the one in which `et` reaches `pt`
+(`timedelay` switches in that cycle). A negative `pt` is set to 0. A NaN `pt` counts as 0 (LinuxCNC:
+`q` remains FALSE).
 
     loadrt ton names=spin-up
     addf spin-up servo

@@ -34,8 +34,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Tp, "tp", "IEC timer: pulse", R"(
-A rising edge of `in` sets `q` for `pt` seconds, regardless of further changes of `in`. `et` includes the current cycle; it returns to 0 in
-the second cycle after the pulse. An edge in the first one is ignored, as in LinuxCNC. A negative `pt` is set to 0.
+A rising edge of `in` sets `q` for `pt` seconds, regardless of further changes of `in`. `et`
+includes the current cycle; it returns to 0 in the second cycle after the pulse. An edge in the
+first one is ignored, as in LinuxCNC. A negative `pt` is set to 0.
 
     loadrt tp names=lubricate
     addf lubricate servo

@@ -4,8 +4,8 @@
 using TristateBit = Tristate<bool>;
 
 HAL_COMPONENT(TristateBit, "tristate_bit", "Writes a bit to a shared signal while enabled", R"(
-Several instances may write to one signal; the one that runs last in a cycle takes precedence. While none is enabled the signal keeps
-its value.
+Several instances may write to one signal; the one that runs last in a cycle takes precedence. While
+none is enabled the signal keeps its value.
 
     loadrt tristate_bit names=from-pendant,from-panel
     addf from-pendant servo

@@ -57,9 +57,10 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Updown, "updown", "Counts up and down, with limits or wrap-around", R"(
-Rising edges of `countup` and `countdown` count; both in one cycle cancel, and the first cycle has no edges. While `reset` is TRUE the
-count is 0, or with `clamp` or `wrap` the limit nearest to 0 or the wrapped value. Without `clamp` and `wrap` the count wraps around at the limits of its type.
-If `min` is above `max`, `max` is checked first.
+Rising edges of `countup` and `countdown` count; both in one cycle cancel, and the first cycle has
+no edges. While `reset` is TRUE the count is 0, or with `clamp` or `wrap` the limit nearest to 0 or
+the wrapped value. Without `clamp` and `wrap` the count wraps around at the limits of its type. If
+`min` is above `max`, `max` is checked first.
 
     loadrt updown names=parts
     addf parts servo

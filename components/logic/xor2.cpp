@@ -16,7 +16,8 @@ struct Xor2 : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Xor2, "xor2", "Two-input exclusive-OR gate", R"(
-`out = in0 XOR in1`: TRUE while exactly one input is TRUE. With one input constant it passes or inverts the other.
+`out = in0 XOR in1`: TRUE while exactly one input is TRUE. With one input constant it passes or
+inverts the other.
 
     loadrt xor2 names=channels-differ
     addf channels-differ servo

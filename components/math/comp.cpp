@@ -27,8 +27,10 @@ struct Comp : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Comp, "comp", "Compares two values, with hysteresis", R"(
-`out` becomes TRUE when `in1` rises above `in0 + hyst/2` and FALSE when it falls below `in0 - hyst/2`; between the two, and at equal
-inputs with `hyst` 0, it keeps its value. Set `hyst` to use `equal`: measured values are hardly ever exactly equal. While an input is NaN, `out` keeps its value and `equal` is FALSE (LinuxCNC: TRUE).
+`out` becomes TRUE when `in1` rises above `in0 + hyst/2` and FALSE when it falls below
+`in0 - hyst/2`; between the two, and at equal inputs with `hyst` 0, it keeps its value. Set `hyst`
+to use `equal`: measured values are hardly ever exactly equal. While an input is NaN, `out` keeps
+its value and `equal` is FALSE (LinuxCNC: TRUE).
 
     loadrt comp names=too-hot
     addf too-hot servo

@@ -77,8 +77,8 @@ struct Widening : hal::Component {
     void update(hal::Cycle) noexcept { out = convert<To, From>(in, false); }
 
     static constexpr const char* manual = R"(
-HAL does not convert between types implicitly; link this component between two signals. Every input value is in the range of the output; a
-64-bit integer keeps about 16 digits as a float. For example:
+HAL does not convert between types implicitly; link this component between two signals. Every input
+value is in the range of the output; a 64-bit integer keeps about 16 digits as a float. For example:
 
     loadrt conv_s32_float
     addf conv-s32-float.0 servo
@@ -119,15 +119,17 @@ struct Narrowing : hal::Component {
     }
 
     static constexpr const char* manual = R"(
-HAL does not convert between types implicitly; link this component between two signals. The fraction of a float is truncated
-(1.9 becomes 1, -1.9 becomes -1). A value out of range wraps around (modulo 2^32 or 2^64; a bit is TRUE for all but 0), or, with `clamp`, is
-set to the nearest limit of the range. With `clamp`, `out-of-range` is TRUE while the input is outside of the range. Without, it becomes TRUE
-with the first input that is not converted exactly, a fraction included, and remains TRUE until a cycle with `clamp`. A NaN input gives 0 and
-sets `out-of-range`.
+HAL does not convert between types implicitly; link this component between two signals. The fraction
+of a float is truncated (1.9 becomes 1, -1.9 becomes -1). A value out of range wraps around (modulo
+2^32 or 2^64; a bit is TRUE for all but 0), or, with `clamp`, is set to the nearest limit of the
+range. With `clamp`, `out-of-range` is TRUE while the input is outside of the range. Without, it
+becomes TRUE with the first input that is not converted exactly, a fraction included, and remains
+TRUE until a cycle with `clamp`. A NaN input gives 0 and sets `out-of-range`.
 
-**Differences from LinuxCNC:** an integer that wraps around sets `out-of-range` (LinuxCNC: not between signed and unsigned integers of the
-same width). A float wraps around and NaN gives 0 (LinuxCNC: what the processor's conversion gives, on x86 the lowest number). With `clamp`,
-NaN sets `out-of-range`.
+**Differences from LinuxCNC:** an integer that wraps around sets `out-of-range` (LinuxCNC: not
+between signed and unsigned integers of the same width). A float wraps around and NaN gives 0
+(LinuxCNC: what the processor's conversion gives, on x86 the lowest number). With `clamp`, NaN sets
+`out-of-range`.
 
 For example:
 

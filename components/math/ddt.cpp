@@ -24,8 +24,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Ddt, "ddt", "Derivative of a value", R"(
-`out = (in - in of the previous cycle) / period`. Before the first cycle the input counts as 0; after a NaN input
-`out` is 0 for a cycle (LinuxCNC: NaN). A quantised input gives a noisy derivative: filter it with `lowpass`.
+`out = (in - in of the previous cycle) / period`. Before the first cycle the input counts as 0;
+after a NaN input `out` is 0 for a cycle (LinuxCNC: NaN). A quantised input gives a noisy
+derivative: filter it with `lowpass`.
 
     loadrt ddt names=velocity
     addf velocity servo

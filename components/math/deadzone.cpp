@@ -28,8 +28,9 @@ struct Deadzone : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Deadzone, "deadzone", "Ignores small deviations from a centre", R"(
-`out = center` while `in` is within `center ± threshold/2`. Outside of the zone `out` is `in`, moved by `threshold/2` towards `center`, so
-that it begins at `center` without a jump. While `in` is NaN, `out` is `center`.
+`out = center` while `in` is within `center ± threshold/2`. Outside of the zone `out` is `in`, moved
+by `threshold/2` towards `center`, so that it begins at `center` without a jump. While `in` is NaN,
+`out` is `center`.
 
     # a joystick that does not quite return to the middle
     loadrt deadzone names=stick

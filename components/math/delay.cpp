@@ -79,12 +79,14 @@ private:
 HAL_COMPONENT(Delay, "delay", "Delays a value and a bit by cycles or seconds", R"(
     out(t) = in(t - cycles * period - seconds)
 
-A dead time, as of a bus, a camera or a conveyor. The memory is allocated when the component is loaded: `depth` cycles, 16 bytes each. The delay
-may change at any time: when it grows, values are repeated; when it shrinks, values are skipped. A delay that is not a multiple of the period is rounded to
-the nearest cycle, or with `interpolate` interpolated linearly between its neighbours (a NaN then affects both intervals).
+A dead time, as of a bus, a camera or a conveyor. The memory is allocated when the component is
+loaded: `depth` cycles, 16 bytes each. The delay may change at any time: when it grows, values are
+repeated; when it shrinks, values are skipped. A delay that is not a multiple of the period is
+rounded to the nearest cycle, or with `interpolate` interpolated linearly between its neighbours (a
+NaN then affects both intervals).
 
-Until the first value is old enough, `out` is the first value; `reset` restarts this. A delay above `depth` counts as `depth`, a
-negative or NaN delay as 0; `limited` is TRUE then.
+Until the first value is old enough, `out` is the first value; `reset` restarts this. A delay above
+`depth` counts as `depth`, a negative or NaN delay as 0; `limited` is TRUE then.
 
     loadrt delay names=camera-lag depth=100
     addf camera-lag servo

@@ -31,8 +31,9 @@ struct DemuxGeneric : hal::Component {
 
 HAL_COMPONENT(DemuxGeneric, "demux_generic", "Routes a value of any type to one of many outputs",
               R"(
-The inverse of `mux_generic`, with the same `config=`, selection, debouncing and type conversion. The selected output follows
-the input; the others keep their values, initially 0. `config=fu12` creates `demux-gen.00` with a float input and twelve u32 outputs.
+The inverse of `mux_generic`, with the same `config=`, selection, debouncing and type conversion.
+The selected output follows the input; the others keep their values, initially 0. `config=fu12`
+creates `demux-gen.00` with a float input and twelve u32 outputs.
 
     loadrt demux_generic config=ss3 names=to-axis
     addf to-axis servo

@@ -27,9 +27,11 @@ struct Div2 : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Div2, "div2", "Quotient of two numbers", R"(
-A divisor between -`deadband` and +`deadband` counts as -`deadband` below 0 and as +`deadband` from 0 on, which limits `out`.
-(LinuxCNC's manual page documents an `out` of 0 there; its component behaves as described here.) A `deadband` below 1e-12, or
-NaN, is set to 1e-12 (LinuxCNC: NaN remains, and a divisor of 0 gives infinity). LinuxCNC prints a message at a divisor within the deadband.
+A divisor between -`deadband` and +`deadband` counts as -`deadband` below 0 and as +`deadband` from
+0 on, which limits `out`. (LinuxCNC's manual page documents an `out` of 0 there; its component
+behaves as described here.) A `deadband` below 1e-12, or NaN, is set to 1e-12 (LinuxCNC: NaN
+remains, and a divisor of 0 gives infinity). LinuxCNC prints a message at a divisor within the
+deadband.
 
     loadrt div2 names=power-factor
     addf power-factor servo

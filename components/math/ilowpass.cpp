@@ -31,9 +31,11 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Ilowpass, "ilowpass", "Low-pass filter for counts", R"(
-Turns the steps of a handwheel into smooth motion: each cycle, `out` moves by the fraction `gain` of the remaining distance to `in * scale`, and it
-reaches it exactly. Divide the jog scale of the axis by `scale`. `out` wraps around at the limits of its type, as counters do; use its
-differences. Beyond the range of s64 it is 0. A cycle whose result is NaN is skipped; above a gain of 2 the filter is unstable.
+Turns the steps of a handwheel into smooth motion: each cycle, `out` moves by the fraction `gain` of
+the remaining distance to `in * scale`, and it reaches it exactly. Divide the jog scale of the axis
+by `scale`. `out` wraps around at the limits of its type, as counters do; use its differences.
+Beyond the range of s64 it is 0. A cycle whose result is NaN is skipped; above a gain of 2 the
+filter is unstable.
 
     loadrt ilowpass names=wheel-smooth
     addf wheel-smooth servo

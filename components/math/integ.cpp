@@ -27,9 +27,10 @@ struct Integ : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Integ, "integ", "Integrator with gain, reset and limits", R"(
-`out = out + gain * in * period`, limited to `min` and `max`, which also prevents wind-up. If they exclude 0, `reset` sets `out` to
-the nearer one. NaN and infinite inputs are ignored (LinuxCNC: `out` remains NaN); while a limit is NaN, its last valid value applies,
-and a fault is raised. In LinuxCNC 2.10~pre1 `reset` has no effect; this is the `reset` of 2.9.
+`out = out + gain * in * period`, limited to `min` and `max`, which also prevents wind-up. If they
+exclude 0, `reset` sets `out` to the nearer one. NaN and infinite inputs are ignored (LinuxCNC:
+`out` remains NaN); while a limit is NaN, its last valid value applies, and a fault is raised. In
+LinuxCNC 2.10~pre1 `reset` has no effect; this is the `reset` of 2.9.
 
     loadrt integ names=distance
     addf distance servo

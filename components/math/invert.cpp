@@ -27,10 +27,11 @@ struct Invert : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Invert, "invert", "Reciprocal", R"(
-`out = 1 / in`. An input between -`deadband` and +`deadband` counts as -`deadband` below 0 and as +`deadband` from 0 on, which limits `out`:
-an input of 0 gives 1e12 with the default. A `deadband` below 1e-12, or NaN, is set to 1e-12 (LinuxCNC:
-NaN remains, and an input of 0 gives infinity). (LinuxCNC's manual page documents an `out` of 0 within
-the deadband; its component behaves as described here.)
+`out = 1 / in`. An input between -`deadband` and +`deadband` counts as -`deadband` below 0 and as
++`deadband` from 0 on, which limits `out`: an input of 0 gives 1e12 with the default. A `deadband`
+below 1e-12, or NaN, is set to 1e-12 (LinuxCNC: NaN remains, and an input of 0 gives infinity).
+(LinuxCNC's manual page documents an `out` of 0 within the deadband; its component behaves as
+described here.)
 
     loadrt invert names=period
     addf period servo

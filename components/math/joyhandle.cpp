@@ -61,9 +61,10 @@ HAL_COMPONENT(Joyhandle, "joyhandle", "Shapes the movement of a joystick", R"(
     out = ±(scale * (a |in|^power + b |in|) + offset)      for deadband <= |in| <= 1
     out = 0                                                for |in| < deadband
 
-`a` and `b` are such that the curve starts at `deadband` with `offset` and ends at 1 with `scale + offset`; above 1 it is constant.
-`inverse` rotates the curve by half a turn, in contrast to LinuxCNC for both directions of the stick. A `power` below 1
-is set to 1, a `deadband` below 0 to 0 and above 0.99 to 0.99. A NaN input gives 0.
+`a` and `b` are such that the curve starts at `deadband` with `offset` and ends at 1 with
+`scale + offset`; above 1 it is constant. `inverse` rotates the curve by half a turn, in contrast to
+LinuxCNC for both directions of the stick. A `power` below 1 is set to 1, a `deadband` below 0 to 0
+and above 0.99 to 0.99. A NaN input gives 0.
 
     loadrt joyhandle names=stick-x
     addf stick-x servo

@@ -43,9 +43,10 @@ private:
 
 HAL_COMPONENT(Knob2float, "knob2float", "Turns the counts of a knob into a number within limits",
               R"(
-While `enable` is TRUE each count changes `out` by `scale`, between `min-out` and `max-out`; turning back from a limit takes effect
-immediately. Counts while `enable` is FALSE are ignored. A `min-out` above `max-out` is set to it. A counter that
-wraps around goes on (LinuxCNC: `out` jumps by 2^32 counts).
+While `enable` is TRUE each count changes `out` by `scale`, between `min-out` and `max-out`; turning
+back from a limit takes effect immediately. Counts while `enable` is FALSE are ignored. A `min-out`
+above `max-out` is set to it. A counter that wraps around goes on (LinuxCNC: `out` jumps by 2^32
+counts).
 
     loadrt knob2float names=feed
     addf feed servo

@@ -21,9 +21,9 @@ struct Limit1 : hal::Component {
 HAL_COMPONENT(Limit1, "limit1", "Limits a value to a range", R"(
 `out = min(max(in, min), max)`
 
-If `min` is above `max`, `max` applies. A NaN input passes through unchanged, so that the consumer can detect the fault. While `min` or `max` is
-NaN, its last valid value applies, and a fault is raised.
-`limit2` also limits the slope, `limit3` the slope and the acceleration.
+If `min` is above `max`, `max` applies. A NaN input passes through unchanged, so that the consumer
+can detect the fault. While `min` or `max` is NaN, its last valid value applies, and a fault is
+raised. `limit2` also limits the slope, `limit3` the slope and the acceleration.
 
     loadrt limit1 names=torque-limit
     addf torque-limit servo

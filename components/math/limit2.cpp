@@ -45,8 +45,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Limit2, "limit2", "Follows a value within limits of position and speed", R"(
-`out` starts at 0 and moves to `in`, limited to `min` and `max`, by at most `maxv` per second. `load` sets it to `in` immediately. While the
-input is NaN or infinite, `out` keeps its value; it also does while `maxv` is not above 0. While a limit is NaN, its last valid value applies, and a
+`out` starts at 0 and moves to `in`, limited to `min` and `max`, by at most `maxv` per second.
+`load` sets it to `in` immediately. While the input is NaN or infinite, `out` keeps its value; it
+also does while `maxv` is not above 0. While a limit is NaN, its last valid value applies, and a
 fault is raised. If `min` is above `max`, a value below `min` gives `min` and any other one `max`.
 
     loadrt limit2 names=spindle-ramp

@@ -255,23 +255,25 @@ private:
 
 HAL_COMPONENT(Limit3, "limit3",
               "Follows a value within limits of position, velocity and acceleration", R"(
-`out` moves to `in` as fast as `min`, `max`, `maxv` and `maxa` allow, and stops there without overshoot; it meets a moving
-input at the input's speed, and follows an input within the limits without lag. It brakes in time for `min`
-and `max`. If a limit moves or the input reverses so that the output can no longer stop in time, the output overshoots within
-`maxa` and returns. It uses the full `maxa` or the full `maxv` until a few cycles before a stop. With
-`smooth-steps` above 2 the acceleration fades out over that many cycles: this takes slightly longer and is smoother with a
+`out` moves to `in` as fast as `min`, `max`, `maxv` and `maxa` allow, and stops there without
+overshoot; it meets a moving input at the input's speed, and follows an input within the limits
+without lag. It brakes in time for `min` and `max`. If a limit moves or the input reverses so that
+the output can no longer stop in time, the output overshoots within `maxa` and returns. It uses the
+full `maxa` or the full `maxv` until a few cycles before a stop. With `smooth-steps` above 2 the
+acceleration fades out over that many cycles: this takes slightly longer and is smoother with a
 jittering input.
 
-`out` starts at 0; `load` sets it to the input. While the input or a limit is NaN its last valid value applies; for a limit a fault
-is raised. If `maxa` is not
-positive, `out` does not move. If `min` is above `max`, `max` applies.
+`out` starts at 0; `load` sets it to the input. While the input or a limit is NaN its last valid
+value applies; for a limit a fault is raised. If `maxa` is not positive, `out` does not move. If
+`min` is above `max`, `max` applies.
 
-**Differences from LinuxCNC:** acceleration and cruising are the same. Halcyon's `limit3` stops with `maxa` exactly at the target
-(LinuxCNC halves the remaining distance in each of about 30 last cycles), respects `min` and `max` also with the default `maxv` and
-`maxa` (LinuxCNC exceeds them), leaves `min` and `max` together with the input (LinuxCNC a few cycles earlier,
-to match its speed), brakes towards an input that approaches faster than `maxv` (LinuxCNC reverses), and
-leaves `load` within `maxa`, with the speed of the input as far as `maxv`, and a stop within `min` and `max`, allow
-it (LinuxCNC within `maxv` only).
+**Differences from LinuxCNC:** acceleration and cruising are the same. Halcyon's `limit3` stops with
+`maxa` exactly at the target (LinuxCNC halves the remaining distance in each of about 30 last
+cycles), respects `min` and `max` also with the default `maxv` and `maxa` (LinuxCNC exceeds them),
+leaves `min` and `max` together with the input (LinuxCNC a few cycles earlier, to match its speed),
+brakes towards an input that approaches faster than `maxv` (LinuxCNC reverses), and leaves `load`
+within `maxa`, with the speed of the input as far as `maxv`, and a stop within `min` and `max`,
+allow it (LinuxCNC within `maxv` only).
 
     loadrt limit3 names=jog
     addf jog servo

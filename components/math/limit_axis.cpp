@@ -60,9 +60,10 @@ private:
 }  // namespace
 
 HAL_COMPONENT(LimitAxis, "limit_axis", "Limits of an axis that depend on another axis", R"(
-The first enabled range with `min-range` <= `fb` <= `max-range` sets the limits. A sticky range remains the current one while `fb` is
-in it, even if an earlier one contains `fb`, too. If no range matches, or its limits are inverted, the outputs are held and an
-error output is TRUE: stop the axis then. `personality` is the number of ranges, up to 10.
+The first enabled range with `min-range` <= `fb` <= `max-range` sets the limits. A sticky range
+remains the current one while `fb` is in it, even if an earlier one contains `fb`, too. If no range
+matches, or its limits are inverted, the outputs are held and an error output is TRUE: stop the axis
+then. `personality` is the number of ranges, up to 10.
 
     # C may turn only a little while Z is above -10
     loadrt limit_axis names=c-limits personality=2

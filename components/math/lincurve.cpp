@@ -40,9 +40,10 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Lincurve, "lincurve", "Piecewise linear curve through given points", R"(
-`out` is the value at `in` of the curve through the points (`x-val-00`, `y-val-00`), (`x-val-01`, `y-val-01`) …; before the
-first and after the last point it is constant. `personality` is the number of points, up to 16. Two points with the same x are
-a step; at this x the value of the second one applies. While `in` is NaN the output keeps its value.
+`out` is the value at `in` of the curve through the points (`x-val-00`, `y-val-00`), (`x-val-01`,
+`y-val-01`) …; before the first and after the last point it is constant. `personality` is the number
+of points, up to 16. Two points with the same x are a step; at this x the value of the second one
+applies. While `in` is NaN the output keeps its value.
 
     # a thermocouple
     loadrt lincurve personality=3 names=thermo

@@ -28,8 +28,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Lowpass, "lowpass", "First-order low-pass filter", R"(
-`out = out + (in - out) * gain`. For a corner frequency f in Hz and a period T in s: `gain = 1 - exp(-2 pi f T)`. The
-gain is 0 until it is set, so the output does not change; above 2 the filter is unstable. NaN inputs are ignored.
+`out = out + (in - out) * gain`. For a corner frequency f in Hz and a period T in s:
+`gain = 1 - exp(-2 pi f T)`. The gain is 0 until it is set, so the output does not change; above 2
+the filter is unstable. NaN inputs are ignored.
 
     # 10 Hz in a 1 kHz thread
     loadrt lowpass names=load-smooth

@@ -23,9 +23,11 @@ struct Minmax : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Minmax, "minmax", "Tracks the minimum and the maximum of a value", R"(
-Both begin at 0: pulse `reset` once to begin with the input. While `reset` is TRUE, the input sets both.
+Both begin at 0: pulse `reset` once to begin with the input. While `reset` is TRUE, the input sets
+both.
 
-**Differences from LinuxCNC:** NaN inputs are ignored (LinuxCNC: with `reset` they set both outputs, which then remain NaN).
+**Differences from LinuxCNC:** NaN inputs are ignored (LinuxCNC: with `reset` they set both outputs,
+which then remain NaN).
 
     loadrt minmax names=error-range
     addf error-range servo

@@ -49,8 +49,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Modmath, "modmath", "Shortest direction to a position of a tool magazine", R"(
-The positions are `min-num` to `max-num`. With `wrap` they form a circle, and the shorter way is selected, of two equal ones the one that does not
-cross the end; without `wrap` they form a line. `mod_dir=2` creates two instances, `mod-dir.0` and `mod-dir.1`.
+The positions are `min-num` to `max-num`. With `wrap` they form a circle, and the shorter way is
+selected, of two equal ones the one that does not cross the end; without `wrap` they form a line.
+`mod_dir=2` creates two instances, `mod-dir.0` and `mod-dir.1`.
 
     loadrt modmath names=magazine
     addf magazine servo

@@ -53,12 +53,13 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Mux16, "mux16", "Selects one of sixteen values, with Gray code and debouncing", R"(
-The selection is the number `sel3 sel2 sel1 sel0`, in binary or in Gray code, in which adjacent positions of a switch differ
-in one bit. A new selection is in use after it was seen for `debounce-time`; until then the outputs are held. The time does not begin again
-when the selection changes back or to another one, so a contact that bounces for longer passes.
+The selection is the number `sel3 sel2 sel1 sel0`, in binary or in Gray code, in which adjacent
+positions of a switch differ in one bit. A new selection is in use after it was seen for
+`debounce-time`; until then the outputs are held. The time does not begin again when the selection
+changes back or to another one, so a contact that bounces for longer passes.
 
-**Differences from LinuxCNC:** `out-s` is limited to its range and 0 for NaN (LinuxCNC: what the processor's conversion gives, on x86
--2147483648).
+**Differences from LinuxCNC:** `out-s` is limited to its range and 0 for NaN (LinuxCNC: what the
+processor's conversion gives, on x86 -2147483648).
 
     loadrt mux16 names=override
     addf override servo

@@ -30,15 +30,18 @@ struct MuxGeneric : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(MuxGeneric, "mux_generic", "Selects one of many values of any type", R"(
-`config=bb8,fu12` creates `mux-gen.00`, which selects one of eight bits, and `mux-gen.01`, which selects one of twelve floats and converts it
-to u32. The letters are b (bit), f (float), s (s32) and u (u32): first the type in, then the type out.
+`config=bb8,fu12` creates `mux-gen.00`, which selects one of eight bits, and `mux-gen.01`, which
+selects one of twelve floats and converts it to u32. The letters are b (bit), f (float), s (s32) and
+u (u32): first the type in, then the type out.
 
-The selection is `sel-int` plus the binary number of the `sel-bit` inputs, which exist if the number of inputs is a power of
-two or one more. A selection above the last input selects the last one; a sum above 4294967295 counts as that (in LinuxCNC it wraps around). A new selection is in use after `debounce-us`; until then the output is
-held. The time begins when the selection leaves `selected` and ends when it is back, so a contact that bounces for longer passes.
+The selection is `sel-int` plus the binary number of the `sel-bit` inputs, which exist if the number
+of inputs is a power of two or one more. A selection above the last input selects the last one; a
+sum above 4294967295 counts as that (in LinuxCNC it wraps around). A new selection is in use after
+`debounce-us`; until then the output is held. The time begins when the selection leaves `selected`
+and ends when it is back, so a contact that bounces for longer passes.
 
-A value is truncated to an integer and limited to the range of the output's type. As a bit, a float is
-FALSE within 2e-7 of 0. NaN gives 0.
+A value is truncated to an integer and limited to the range of the output's type. As a bit, a float
+is FALSE within 2e-7 of 0. NaN gives 0.
 
     loadrt mux_generic config=sf3 names=tool-speed
     addf tool-speed servo

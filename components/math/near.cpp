@@ -24,8 +24,9 @@ struct Near : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Near, "near", "Detects whether two values are nearly equal", R"(
-`out` is TRUE while the larger of two values of the same sign is at most `scale` times the smaller one, or while they
-differ by at most `difference`, which is 0 or more. With a NaN input `out` is FALSE.
+`out` is TRUE while the larger of two values of the same sign is at most `scale` times the smaller
+one, or while they differ by at most `difference`, which is 0 or more. With a NaN input `out` is
+FALSE.
 
     loadrt near names=at-speed
     addf at-speed servo

@@ -23,8 +23,9 @@ struct Offset : hal::Component {
 
 HAL_COMPONENT(Offset, "offset", "Adds an offset to a command and subtracts it from the feedback",
               R"(
-`out = in + offset` and `fb-out = fb-in - offset`, in two functions, so that a loop is shifted without affecting the
-planner: run `update-feedback` before the controller and `update-output` after the planner.
+`out = in + offset` and `fb-out = fb-in - offset`, in two functions, so that a loop is shifted
+without affecting the planner: run `update-feedback` before the controller and `update-output` after
+the planner.
 
     loadrt offset names=z-shift
     addf z-shift.update-feedback servo

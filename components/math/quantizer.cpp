@@ -95,12 +95,15 @@ HAL_COMPONENT(Quantizer, "quantizer",
     out   = level * step + offset
     error = in - out
 
-Mode 0 rounds halves away from 0. With `hysteresis` h the level changes only when `in` is beyond its border by h steps, so that noise
-does not cause chatter. A 12-bit converter for ±10 V has step 20/4096, min-level -2048, max-level 2047 (B. Widrow, I. Kollar,
-*Quantization Noise*, Cambridge 2008). For values distributed uniformly within a step, the standard deviation of the error is step / sqrt(12).
+Mode 0 rounds halves away from 0. With `hysteresis` h the level changes only when `in` is beyond its
+border by h steps, so that noise does not cause chatter. A 12-bit converter for ±10 V has step
+20/4096, min-level -2048, max-level 2047 (B. Widrow, I. Kollar, *Quantization Noise*, Cambridge
+2008). For values distributed uniformly within a step, the standard deviation of the error is step /
+sqrt(12).
 
-While `in` is NaN or infinite its last valid value applies. With `step` 0, infinite or NaN, or above 2^53 levels, `out` is `in` and
-`level` is 0. The sign of `step` has no effect. A mode above 3 is mode 0. If `min-level` is above `max-level`, `max-level` applies.
+While `in` is NaN or infinite its last valid value applies. With `step` 0, infinite or NaN, or above
+2^53 levels, `out` is `in` and `level` is 0. The sign of `step` has no effect. A mode above 3 is
+mode 0. If `min-level` is above `max-level`, `max-level` applies.
 
     loadrt quantizer names=adc
     addf adc servo

@@ -24,8 +24,8 @@ struct ScaledS32Sums : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(ScaledS32Sums, "scaled_s32_sums", "Weighted sum of four integers", R"(
-`out-f = in0 * scale0 + in1 * scale1 + in2 * scale2 + in3 * scale3`. `out-s` is the sum truncated to an integer and limited to
-the range of s32, and 0 while the sum is NaN.
+`out-f = in0 * scale0 + in1 * scale1 + in2 * scale2 + in3 * scale3`. `out-s` is the sum truncated to
+an integer and limited to the range of s32, and 0 while the sum is NaN.
 
     # two hand wheels, one of them fine
     loadrt scaled_s32_sums names=jog

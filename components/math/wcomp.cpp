@@ -26,8 +26,9 @@ struct Wcomp : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(Wcomp, "wcomp", "Window comparator", R"(
-Exactly one of `under`, `out` and `over` is TRUE while `min` is below `max`. A window with `max` at or below `min` is
-empty: `out` is never TRUE, and `under` and `over` may be TRUE together. With a NaN input all are FALSE.
+Exactly one of `under`, `out` and `over` is TRUE while `min` is below `max`. A window with `max` at
+or below `min` is empty: `out` is never TRUE, and `under` and `over` may be TRUE together. With a
+NaN input all are FALSE.
 
     loadrt wcomp names=in-position
     addf in-position servo

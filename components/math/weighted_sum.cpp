@@ -43,9 +43,11 @@ struct WeightedSum : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(WeightedSum, "weighted_sum", "Number from weighted bits", R"(
-`sum` is `offset` plus the weights of all bits that are TRUE; `hold` holds it. The weights are initially 1, 2, 4 …, so that the bits are a
-binary number. `wsum_sizes=3,8` creates `wsum.0` with three bits and `wsum.1` with eight; one function, `process_wsums`, computes all sums.
-A sum wraps around at the limits of its type. LinuxCNC supports up to 8 sums of 16 bits; in Halcyon a sum has up to 32 bits.
+`sum` is `offset` plus the weights of all bits that are TRUE; `hold` holds it. The weights are
+initially 1, 2, 4 …, so that the bits are a binary number. `wsum_sizes=3,8` creates `wsum.0` with
+three bits and `wsum.1` with eight; one function, `process_wsums`, computes all sums. A sum wraps
+around at the limits of its type. LinuxCNC supports up to 8 sums of 16 bits; in Halcyon a sum has up
+to 32 bits.
 
     # a switch of four positions, coded with two contacts, as tool numbers from 10 on
     loadrt weighted_sum names=tool wsum_sizes=2

@@ -163,15 +163,18 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Anglejog, "anglejog", "Jogs two axes at an angle with one handwheel", R"(
-`counts-in` times `scale-in` is a distance along `angle-degrees-in`, covered with at most `max-vel` and `max-accel`. Its cosine component is
-`coscounts` for the first axis, its sine component `sincounts` for the second, in units of `current-scale-out` =
-scale / `iscale-factor`. New values of angle, scale and factor are accepted while `enable-in` is FALSE, which also discards the remaining distance:
-the motion brakes with `max-accel`. It stops within a thousandth of the distance of the first cycle of an acceleration.
-Set `max-vel` and `max-accel` no higher than either axis allows.
+`counts-in` times `scale-in` is a distance along `angle-degrees-in`, covered with at most `max-vel`
+and `max-accel`. Its cosine component is `coscounts` for the first axis, its sine component
+`sincounts` for the second, in units of `current-scale-out` = scale / `iscale-factor`. New values of
+angle, scale and factor are accepted while `enable-in` is FALSE, which also discards the remaining
+distance: the motion brakes with `max-accel`. It stops within a thousandth of the distance of the
+first cycle of an acceleration. Set `max-vel` and `max-accel` no higher than either axis allows.
 
-**Differences from LinuxCNC:** the acceleration fractions are positive in all directions (LinuxCNC: with the sign of cosine and sine, and the
-motion controller takes a negative one as 1). Disabled and enabled again while it brakes, the motion goes on braking (LinuxCNC: the speed is held
-until the wheel turns). NaN inputs and a factor out of range change nothing; negative limits count as 0 (LinuxCNC: NaN).
+**Differences from LinuxCNC:** the acceleration fractions are positive in all directions (LinuxCNC:
+with the sign of cosine and sine, and the motion controller takes a negative one as 1). Disabled and
+enabled again while it brakes, the motion goes on braking (LinuxCNC: the speed is held until the
+wheel turns). NaN inputs and a factor out of range change nothing; negative limits count as 0
+(LinuxCNC: NaN).
 
     loadrt anglejog names=aj
     addf aj servo

@@ -26,12 +26,13 @@ struct Axistest : axis_test::Mover {
 
 HAL_COMPONENT(Axistest, "axistest",
               "Moves an axis through a trajectory planner, to test speed and acceleration", R"(
-While `run` is TRUE `position-cmd` alternates between the two ends `run-low` and `run-high`, at the distance
-`amplitude` from the initial position on the sides selected by `dir`. It changes after `position-fb` has been within `epsilon` of the end for `pause`
-seconds. After `run` the axis returns to the initial position, and `running` becomes FALSE there. A jog commands a position 10 units ahead of the
-axis; `jog-minus` takes precedence. Otherwise the command is the feedback. `maxvel` is not used, as in LinuxCNC.
-`run-target` equals `position-cmd` (LinuxCNC: always 0).
-Put a planner that limits the motion, for example `simple_tp`, between this component and the axis.
+While `run` is TRUE `position-cmd` alternates between the two ends `run-low` and `run-high`, at the
+distance `amplitude` from the initial position on the sides selected by `dir`. It changes after
+`position-fb` has been within `epsilon` of the end for `pause` seconds. After `run` the axis returns
+to the initial position, and `running` becomes FALSE there. A jog commands a position 10 units ahead
+of the axis; `jog-minus` takes precedence. Otherwise the command is the feedback. `maxvel` is not
+used, as in LinuxCNC. `run-target` equals `position-cmd` (LinuxCNC: always 0). Put a planner that
+limits the motion, for example `simple_tp`, between this component and the axis.
 
     loadrt axistest names=try
     loadrt simple_tp names=tp

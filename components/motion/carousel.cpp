@@ -460,8 +460,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Carousel, "carousel", "Turns the carousel of a tool changer to a pocket", R"(
-A rising edge of `enable` sets `active` and moves to `pocket-number`, in the shorter direction with `dir=2`; then `active` is FALSE and `ready`
-TRUE. `enable` FALSE stops the carousel. Pockets are numbered from 1.
+A rising edge of `enable` sets `active` and moves to `pocket-number`, in the shorter direction with
+`dir=2`; then `active` is FALSE and `ready` TRUE. `enable` FALSE stops the carousel. Pockets are
+numbered from 1.
 
 | encoding | sensors |
 | --- | --- |
@@ -471,18 +472,20 @@ TRUE. `enable` FALSE stops the carousel. Pockets are numbered from 1.
 | edge | as index, but both edges of sense-1 are pockets |
 | counts | `counts`, `scale` per pocket; sense-0 or the encoder's index (`index-enable`) is the home |
 
-The last three must first find pocket 1: the first `enable` turns forward until the index, even if `enable` becomes FALSE meanwhile. With `index` and
-`edge`, each pass of the index corrects the count. With `counts`, a pocket is reached within `width` of its centre.
+The last three must first find pocket 1: the first `enable` turns forward until the index, even if
+`enable` becomes FALSE meanwhile. With `index` and `edge`, each pass of the index corrects the
+count. With `counts`, a pocket is reached within `width` of its centre.
 
-With `align-dc` the carousel stops at the marker for `decel-time`, moves back slowly past the marker, and forward onto it. With
-`rev-pulse` it is then driven in reverse against its lock for that time. At standstill `motor-vel` is `hold-dc`. `jog-fwd` and `jog-rev` move by
-one pocket while the carousel is stopped and disabled.
+With `align-dc` the carousel stops at the marker for `decel-time`, moves back slowly past the
+marker, and forward onto it. With `rev-pulse` it is then driven in reverse against its lock for that
+time. At standstill `motor-vel` is `hold-dc`. `jog-fwd` and `jog-rev` move by one pocket while the
+carousel is stopped and disabled.
 
-**Differences from LinuxCNC:** the states have other numbers. `enable` FALSE stops a move at once (LinuxCNC: with `rev-pulse`, `decel-time` and
-`align-dc`, as at the pocket).
+**Differences from LinuxCNC:** the states have other numbers. `enable` FALSE stops a move at once
+(LinuxCNC: with `rev-pulse`, `decel-time` and `align-dc`, as at the pocket).
 
-All arguments are lists with an element per carousel (`pockets=10,10,8`); missing elements have the default value (LinuxCNC repeats
-the last element).
+All arguments are lists with an element per carousel (`pockets=10,10,8`); missing elements have the
+default value (LinuxCNC repeats the last element).
 
     loadrt carousel pockets=12 encoding=index names=tools
     addf tools servo

@@ -29,8 +29,8 @@ HAL_COMPONENT(CorexyByHal, "corexy_by_hal", "Kinematics of a CoreXY belt drive",
     alpha-cmd = (j0-motor-pos-cmd + j1-motor-pos-cmd) / 2      j0-motor-pos-fb = alpha-fb + beta-fb
     beta-cmd  = (j0-motor-pos-cmd - j1-motor-pos-cmd) / 2      j1-motor-pos-fb = alpha-fb - beta-fb
 
-Joint 0 is x, joint 1 is y; one unit of a motor moves x and y by one unit each. With the transform in HAL the
-joints are Cartesian, so x and y are homed separately.
+Joint 0 is x, joint 1 is y; one unit of a motor moves x and y by one unit each. With the transform
+in HAL the joints are Cartesian, so x and y are homed separately.
 
     loadrt corexy_by_hal names=belts
     addf belts servo

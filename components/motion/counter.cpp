@@ -72,9 +72,10 @@ private:
 
 HAL_COMPONENT(Counter, "counter",
               "Counts pulses of a sensor on a shaft that turns in one direction", R"(
-For a spindle with slots and an index pulse per revolution. `encoder` with `counter-mode` has the same functions and more; `counter`
-is for netlists that already use it. The first sample has no edge (LinuxCNC: a `phase-A` that is TRUE from the start
-counts). Below 0.1 counts per second `velocity` is 0.
+For a spindle with slots and an index pulse per revolution. `encoder` with `counter-mode` has the
+same functions and more; `counter` is for netlists that already use it. The first sample has no edge
+(LinuxCNC: a `phase-A` that is TRUE from the start counts). Below 0.1 counts per second `velocity`
+is 0.
 
     loadrt counter names=spindle
     addf counter.update-counters base

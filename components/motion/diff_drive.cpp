@@ -225,14 +225,16 @@ HAL_COMPONENT(DiffDrive, "diff_drive", "Kinematics and odometry of a robot on tw
     y      += way * sin(turn/2) / (turn/2) * sin(heading + turn/2)
     heading += turn
 
-(G. Dudek, M. Jenkin, *Computational Principles of Mobile Robotics*, chapter 3; the chord of the arc as in J. Borenstein, H. Everett, L.
-Feng, *Where am I?*, 1996, 1.3.1, with the exact factor.) The pose is exact if the ratio of the wheel speeds is constant within a cycle.
-Units are SI; heading 0 is along x, positive to the left. The radii are separate because they differ on a real robot (calibrate them).
+(G. Dudek, M. Jenkin, *Computational Principles of Mobile Robotics*, chapter 3; the chord of the arc
+as in J. Borenstein, H. Everett, L. Feng, *Where am I?*, 1996, 1.3.1, with the exact factor.) The
+pose is exact if the ratio of the wheel speeds is constant within a cycle. Units are SI; heading 0
+is along x, positive to the left. The radii are separate because they differ on a real robot
+(calibrate them).
 
-The speed limits scale `linear` and `angular` together, so the robot stays on its curve at a lower speed; the
-acceleration limits scale their changes together. `enable` FALSE commands standstill immediately. NaN wheel angles are
-ignored; the next valid angle includes the motion meanwhile. The first cycle only stores the angles. A radius or track that is not positive counts as
-1e-9.
+The speed limits scale `linear` and `angular` together, so the robot stays on its curve at a lower
+speed; the acceleration limits scale their changes together. `enable` FALSE commands standstill
+immediately. NaN wheel angles are ignored; the next valid angle includes the motion meanwhile. The
+first cycle only stores the angles. A radius or track that is not positive counts as 1e-9.
 
     loadrt diff_drive names=base
     addf base.odometry servo

@@ -190,28 +190,34 @@ private:
 
 HAL_COMPONENT(Encoder, "encoder", "Counts quadrature and pulse encoders in software", R"(
 `encoder.update-counters` samples the phases of all encoders and belongs in the fastest thread;
-`encoder.capture-position` scales the counts and belongs in the servo thread, before the controller. The two may run on
-different CPUs.
+`encoder.capture-position` scales the counts and belongs in the servo thread, before the controller.
+The two may run on different CPUs.
 
-A phase must keep each state for at least one period of the fast thread: with 50 us that is 20 000 counts/s. If both
-phases change at once, edges are lost and `quad-errors` increases.
+A phase must keep each state for at least one period of the fast thread: with 50 us that is 20 000
+counts/s. If both phases change at once, edges are lost and `quad-errors` increases.
 
-* **Counting.** With `x4-mode` each edge counts; A leads B in the forward direction. Without it one edge per cycle counts: A while B is
-  low. With `counter-mode` each rising edge of A counts up, whatever the state of B.
-* **Index.** Set `index-enable`; the next rising edge of phase-Z sets the position to 0 and `index-enable` to FALSE. With
-  `counter-mode` and `missing-teeth` (a wheel with a gap: 58 teeth, 2 missing, scale 60) the end of the gap is the index.
-* **Velocity** is the distance between two edges divided by the time between them. While no edge arrives, the estimate falls to what
-  the next one would give; below `min-speed-estimate` it is 0. An edge crossed back gives 0: the position is the same.
+* **Counting.** With `x4-mode` each edge counts; A leads B in the forward direction. Without it one
+  edge per cycle counts: A while B is low. With `counter-mode` each rising edge of A counts up,
+  whatever the state of B.
+* **Index.** Set `index-enable`; the next rising edge of phase-Z sets the position to 0 and
+  `index-enable` to FALSE. With `counter-mode` and `missing-teeth` (a wheel with a gap: 58 teeth, 2
+  missing, scale 60) the end of the gap is the index.
+* **Velocity** is the distance between two edges divided by the time between them. While no edge
+  arrives, the estimate falls to what the next one would give; below `min-speed-estimate` it is 0.
+  An edge crossed back gives 0: the position is the same.
 
 Counts are kept in 64 bits, so `position` is continuous when the 32 bits of `counts` wrap.
 
-**Differences from LinuxCNC:** `counts`, `position` and `velocity` are bit-identical except in these cases. Counting starts from
-the state of the phases in the first cycle (LinuxCNC starts from both FALSE, so a phase that is TRUE counts). `velocity` starts with the second
-edge (LinuxCNC: the third), is 0 after the first edge in the opposite direction (LinuxCNC: one count per time since the last edge, so a shaft that
-trembles across one edge appears to turn), and is 0 whenever it is below `min-speed-estimate`. `position-interpolated` equals `position` at an
-edge crossed forwards, and has the same value at that edge crossed backwards (LinuxCNC: one count less, one fast period later). `rawcounts` includes
-this cycle's count (LinuxCNC: the previous cycle's). With `missing-teeth` each of the first teeth counts one (LinuxCNC counts each
-as a gap, and as the index, until the pitch is known).
+**Differences from LinuxCNC:** `counts`, `position` and `velocity` are bit-identical except in these
+cases. Counting starts from the state of the phases in the first cycle (LinuxCNC starts from both
+FALSE, so a phase that is TRUE counts). `velocity` starts with the second edge (LinuxCNC: the
+third), is 0 after the first edge in the opposite direction (LinuxCNC: one count per time since the
+last edge, so a shaft that trembles across one edge appears to turn), and is 0 whenever it is below
+`min-speed-estimate`. `position-interpolated` equals `position` at an edge crossed forwards, and has
+the same value at that edge crossed backwards (LinuxCNC: one count less, one fast period later).
+`rawcounts` includes this cycle's count (LinuxCNC: the previous cycle's). With `missing-teeth` each
+of the first teeth counts one (LinuxCNC counts each as a gap, and as the index, until the pitch is
+known).
 
     loadrt encoder names=x
     addf encoder.update-counters base-thread

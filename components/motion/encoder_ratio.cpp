@@ -110,10 +110,12 @@ Counts the encoders of both axes and computes the error for the position loop of
 
     error = slave / slave-ppr - master / master-ppr * master-teeth / slave-teeth
 
-Master counts are counted while `enable` is TRUE only, so engaging and releasing the gear causes no jump; while it is FALSE the slave
-holds its position. All edges count: for an encoder with 500 pulses per revolution `ppr` is 2000. A `ppr` or `slave-teeth` of 0 disables that
-axis. A change of `ppr` or teeth applies to all counts since the start (LinuxCNC: to later counts; with a `ppr` or `slave-teeth` of 0 the error
-is held). `encoder-ratio.sample` must run at least twice as often as edges occur.
+Master counts are counted while `enable` is TRUE only, so engaging and releasing the gear causes no
+jump; while it is FALSE the slave holds its position. All edges count: for an encoder with 500
+pulses per revolution `ppr` is 2000. A `ppr` or `slave-teeth` of 0 disables that axis. A change of
+`ppr` or teeth applies to all counts since the start (LinuxCNC: to later counts; with a `ppr` or
+`slave-teeth` of 0 the error is held). `encoder-ratio.sample` must run at least twice as often as
+edges occur.
 
     loadrt encoder_ratio names=hob
     loadrt pid names=hob-pid

@@ -148,12 +148,14 @@ With a = `radius-ref` * `rfraction` and t the angle since `start-angle`:
 | 2 | a / 2 * (1 - cos(fmult t)) | sine |
 | 3 | a in the middle half of each wave, else 0 | square wave |
 
-A polygon needs an `fmult` above 2. `kcounts` is the offset times `k`, truncated. While the machine is on, `enable-in` starts the offset once
-it has been FALSE; after its falling edge `clear` is TRUE until `active` is FALSE. If the shape is impossible, `kcounts` becomes 0, and once `active` is FALSE,
-`enable-in` must be FALSE before the offset starts again. Each change of state takes a cycle.
+A polygon needs an `fmult` above 2. `kcounts` is the offset times `k`, truncated. While the machine
+is on, `enable-in` starts the offset once it has been FALSE; after its falling edge `clear` is TRUE
+until `active` is FALSE. If the shape is impossible, `kcounts` becomes 0, and once `active` is
+FALSE, `enable-in` must be FALSE before the offset starts again. Each change of state takes a cycle.
 
-**Differences from LinuxCNC:** a polygon has the same shape at negative angles (LinuxCNC: another one), `kcounts` is rounded up where it is within
-1e-6 of the next count, `clear` becomes FALSE when the machine is switched off, and nothing is printed.
+**Differences from LinuxCNC:** a polygon has the same shape at negative angles (LinuxCNC: another
+one), `kcounts` is rounded up where it is within 1e-6 of the next count, `clear` becomes FALSE when
+the machine is switched off, and nothing is printed.
 
     loadrt eoffset_per_angle names=opa
     addf opa servo

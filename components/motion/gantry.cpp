@@ -85,17 +85,20 @@ private:
 
 HAL_COMPONENT(Gantry, "gantry", "Drives several joints from one axis and squares them while homing",
               R"(
-All joints follow `position-cmd`, each with its own offset: pos-cmd = position-cmd - offset. While `position-cmd` moves in the
-direction of `search-vel` and some but not all home switches are on, the joints whose switch is on do not move, and their offset absorbs
-the motion. Once the last switch is on, the offsets are known and all joints move together, until all switches have
-been off. Joints stop without a ramp, so home slowly, and use the same sign for HOME_SEARCH_VEL and HOME_LATCH_VEL.
+All joints follow `position-cmd`, each with its own offset: pos-cmd = position-cmd - offset. While
+`position-cmd` moves in the direction of `search-vel` and some but not all home switches are on, the
+joints whose switch is on do not move, and their offset absorbs the motion. Once the last switch is
+on, the offsets are known and all joints move together, until all switches have been off. Joints
+stop without a ramp, so home slowly, and use the same sign for HOME_SEARCH_VEL and HOME_LATCH_VEL.
 
-`personality` is the number of joints, 2 by default. `position-fb` is the feedback of a joint plus its offset: of joint 0, and, from when its
-home switch stops it, of the first joint that still moves, so that it does not jump. While an input is NaN, the last command is held.
+`personality` is the number of joints, 2 by default. `position-fb` is the feedback of a joint plus
+its offset: of joint 0, and, from when its home switch stops it, of the first joint that still
+moves, so that it does not jump. While an input is NaN, the last command is held.
 
-**Differences from LinuxCNC:** `home` waits for all joints (LinuxCNC, with more than two: not for the last ones). The first command is not a
-motion (LinuxCNC: from 0). Offsets have double precision (LinuxCNC: single). Without `personality` there are two joints (LinuxCNC 2.10: an
-error; 2.9 crashes).
+**Differences from LinuxCNC:** `home` waits for all joints (LinuxCNC, with more than two: not for
+the last ones). The first command is not a motion (LinuxCNC: from 0). Offsets have double precision
+(LinuxCNC: single). Without `personality` there are two joints (LinuxCNC 2.10: an error; 2.9
+crashes).
 
     loadrt gantry names=y personality=2
     addf y.read servo

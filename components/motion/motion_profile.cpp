@@ -402,38 +402,45 @@ private:
 
 HAL_COMPONENT(MotionProfile, "motion_profile",
               "Motion to a target within limits of speed, acceleration, deceleration and jerk", R"(
-`position` moves to its target as fast as the limits allow and stops there exactly. With `max-jerk` 0 the speed profile is trapezoidal, else an
-S-curve of up to seven segments. Target and limits may change in any cycle and in any state of motion. The units are up to the user: mm gives mm/s,
-mm/s^2, mm/s^3.
+`position` moves to its target as fast as the limits allow and stops there exactly. With `max-jerk`
+0 the speed profile is trapezoidal, else an S-curve of up to seven segments. Target and limits may
+change in any cycle and in any state of motion. The units are up to the user: mm gives mm/s, mm/s^2,
+mm/s^3.
 
     settled speed  = v + a |a| / (2 jerk)                              what the speed comes to when the acceleration fades out
     peak^2         = jerk * dv + a^2 / 2,  at most the limit           the acceleration on the way to a change of speed dv
     trapezoid      : x = w^2 / (2 acc) + w T + w^2 / (2 dec)           w the cruising speed, T how long
     rest to rest   : w >= acc^2 / jerk: each ramp takes w / acc + acc / jerk,  else 2 sqrt(w / jerk)
 
-After each change the path is planned again from the current state, by the decisions of T. Kroeger, *On-Line Trajectory Generation in
-Robotic Systems* (Springer 2010, ch. 3 to 5), from the segments of L. Biagiotti, C. Melchiorri, *Trajectory Planning for Automatic
-Machines and Robots* (Springer 2008, 3.2 and 3.4); the cruising speed is the root of distance(w) = x. The path is time-optimal for equal acceleration
-and deceleration. If they differ and the speed changes its sign, the faster of two paths is used: with the smaller limit throughout, or with a
-momentary stop. A state beyond a limit (because the limit was lowered during the move) is brought within it first. Planning takes a few
+After each change the path is planned again from the current state, by the decisions of T. Kroeger,
+*On-Line Trajectory Generation in Robotic Systems* (Springer 2010, ch. 3 to 5), from the segments of
+L. Biagiotti, C. Melchiorri, *Trajectory Planning for Automatic Machines and Robots* (Springer 2008,
+3.2 and 3.4); the cruising speed is the root of distance(w) = x. The path is time-optimal for equal
+acceleration and deceleration. If they differ and the speed changes its sign, the faster of two
+paths is used: with the smaller limit throughout, or with a momentary stop. A state beyond a limit
+(because the limit was lowered during the move) is brought within it first. Planning takes a few
 microseconds; the cost of other cycles is negligible.
 
-* **mode 0** follows `target` and stops at each. (For an input in continuous motion use `limit3`, which matches its speed.)
-* **mode 1** takes set-points like the profile position mode of CiA 402. Set `target`, `target-velocity` (0: `max-velocity`) and `relative`;
-  set `new-set-point`; wait for `set-point-acknowledge`; clear it; once acknowledge is FALSE the next one may follow. It is queued
-  (argument `queue`, capacity 8), or replaces all others with `change-immediately`. With `change-on-set-point` the previous one, if it is in the same
-  direction, is passed at its own speed without a stop; the speed of the new one applies from the next cycle. If the queue is full, a set-point
-  is accepted as soon as the queue has space, provided `new-set-point` stays TRUE.
-* **mode 2** runs a table (argument `table`: number of rows), each row with position, speed and dwell. `run-table` starts it and, when
-  FALSE, stops.
+* **mode 0** follows `target` and stops at each. (For an input in continuous motion use `limit3`,
+  which matches its speed.)
+* **mode 1** takes set-points like the profile position mode of CiA 402. Set `target`,
+  `target-velocity` (0: `max-velocity`) and `relative`; set `new-set-point`; wait for
+  `set-point-acknowledge`; clear it; once acknowledge is FALSE the next one may follow. It is queued
+  (argument `queue`, capacity 8), or replaces all others with `change-immediately`. With
+  `change-on-set-point` the previous one, if it is in the same direction, is passed at its own speed
+  without a stop; the speed of the new one applies from the next cycle. If the queue is full, a
+  set-point is accepted as soon as the queue has space, provided `new-set-point` stays TRUE.
+* **mode 2** runs a table (argument `table`: number of rows), each row with position, speed and
+  dwell. `run-table` starts it and, when FALSE, stops.
 * **mode 3** brings the speed to `target-velocity`.
 
-`halt` brakes and keeps the set-points; `stop` and `quick-stop` brake and discard the set-point, the queue and the table, as does a change of
-mode. In modes 0 and 3 the motion resumes when they end. `load` sets the position, with velocity 0 at once (to the feedback, while
-the drive is off).
+`halt` brakes and keeps the set-points; `stop` and `quick-stop` brake and discard the set-point, the
+queue and the table, as does a change of mode. In modes 0 and 3 the motion resumes when they end.
+`load` sets the position, with velocity 0 at once (to the feedback, while the drive is off).
 
-While `target` is NaN its last valid value applies (in mode 1 the set-point is rejected). A limit that is negative or NaN, or
-0 for speed or acceleration, sets `limit-error`, and the motion stops with the last valid limits. Positions are limited to ±1e15.
+While `target` is NaN its last valid value applies (in mode 1 the set-point is rejected). A limit
+that is negative or NaN, or 0 for speed or acceleration, sets `limit-error`, and the motion stops
+with the last valid limits. Positions are limited to ±1e15.
 
     loadrt motion_profile names=x-profile
     addf x-profile servo

@@ -233,14 +233,16 @@ HAL_COMPONENT(Moveoff, "moveoff",
               R"(
     pos-plusoffset = pos + offset,   fb-minusoffset = fb - offset
 
-While `power-on`, `move-enable` and `apply-offsets` are TRUE, each offset moves to its `offset-in`, within `offset-min` and `offset-max`,
-`offset-vel` and `offset-accel`. When one of the enables becomes FALSE, the offsets return to 0: with `backtrack-enable` along the waypoints
-of their path, else each joint directly. A waypoint is stored when a joint has moved by `waypoint-threshold`, at most every
-`waypoint-sample-secs`. The memory holds 1000 waypoints; when it is full, the offsets are held until they return. The three waypoint settings
-are read while there are no offsets.
+While `power-on`, `move-enable` and `apply-offsets` are TRUE, each offset moves to its `offset-in`,
+within `offset-min` and `offset-max`, `offset-vel` and `offset-accel`. When one of the enables
+becomes FALSE, the offsets return to 0: with `backtrack-enable` along the waypoints of their path,
+else each joint directly. A waypoint is stored when a joint has moved by `waypoint-threshold`, at
+most every `waypoint-sample-secs`. The memory holds 1000 waypoints; when it is full, the offsets are
+held until they return. The three waypoint settings are read while there are no offsets.
 
-`warning` is TRUE after `apply-offsets` becomes FALSE with offsets active, until they are 0 or it is TRUE again; no message is printed.
-While `power-on` is FALSE the offsets are held. The component does not know the machine's limits: set `offset-min` and `offset-max`.
+`warning` is TRUE after `apply-offsets` becomes FALSE with offsets active, until they are 0 or it is
+TRUE again; no message is printed. While `power-on` is FALSE the offsets are held. The component
+does not know the machine's limits: set `offset-min` and `offset-max`.
 
     loadrt moveoff names=mv personality=2
     addf mv.read-inputs servo

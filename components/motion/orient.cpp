@@ -74,12 +74,13 @@ A rising edge of `enable` sets the command to a position whose fraction of a tur
 | 1 | the next at or above `position` (clockwise) |
 | 2 | the next at or below `position` (counterclockwise) |
 
-In any other mode the command is held. `angle` may be any number of degrees; whole turns are ignored. While enabled, `poserr` is
-`position` - `command` in degrees. `is-oriented` becomes TRUE in the 101st cycle in which it is within `tolerance` and remains TRUE until
-`enable` is FALSE, so that a spindle that passes the angle is not reported.
+In any other mode the command is held. `angle` may be any number of degrees; whole turns are
+ignored. While enabled, `poserr` is `position` - `command` in degrees. `is-oriented` becomes TRUE in
+the 101st cycle in which it is within `tolerance` and remains TRUE until `enable` is FALSE, so that
+a spindle that passes the angle is not reported.
 
-**Differences from LinuxCNC:** if position or angle is NaN or infinite at the edge of `enable`, the command is held, and `is-oriented` remains FALSE until the
-next edge (LinuxCNC: NaN).
+**Differences from LinuxCNC:** if position or angle is NaN or infinite at the edge of `enable`, the
+command is held, and `is-oriented` remains FALSE until the next edge (LinuxCNC: NaN).
 
     loadrt orient names=orient
     loadrt pid names=orient-pid

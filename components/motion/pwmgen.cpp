@@ -224,8 +224,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Pwmgen, "pwmgen", "Pulse width and pulse density modulation in software", R"(
-`pwmgen.update` converts the values of all instances to duty cycles and belongs in the servo thread, after the controller;
-`pwmgen.make-pulses` generates the waveforms in the fastest thread. The two may run on different CPUs.
+`pwmgen.update` converts the values of all instances to duty cycles and belongs in the servo thread,
+after the controller; `pwmgen.make-pulses` generates the waveforms in the fastest thread. The two
+may run on different CPUs.
 
     dc = value / scale + offset, kept between min-dc and max-dc (and between -max-dc and -min-dc)
 
@@ -235,19 +236,24 @@ HAL_COMPONENT(Pwmgen, "pwmgen", "Pulse width and pulse density modulation in sof
 | 1 | `pwm`, `dir` | set `dir` |
 | 2 | `up`, `down` | pulse on `down` instead of `up` |
 
-* **PWM** (`pwm-freq` above 0): without `dither-pwm` the period is a whole number of fast periods and the duty one of as many
-  steps; `pwm-freq` and `curr-dc` show what came out. With `dither-pwm` frequency and duty are exact in the average.
-  The upper limit is half the rate of the fast thread. A new value begins with the next period; FALSE on `enable` acts at once.
-* **PDM** (`pwm-freq` 0): single pulses of one fast period, spread evenly; resolution is that of the average.
+* **PWM** (`pwm-freq` above 0): without `dither-pwm` the period is a whole number of fast periods
+  and the duty one of as many steps; `pwm-freq` and `curr-dc` show what came out. With `dither-pwm`
+  frequency and duty are exact in the average. The upper limit is half the rate of the fast thread.
+  A new value begins with the next period; FALSE on `enable` acts at once.
+* **PDM** (`pwm-freq` 0): single pulses of one fast period, spread evenly; resolution is that of the
+  average.
 
-All outputs go low on stop, unload and faults, and when `update`,
-which reads `enable`, has not run for 100 of its periods (a fault names it). A `min-dc` or `max-dc` that is NaN is set to its last valid value, and a fault is raised.
+All outputs go low on stop, unload and faults, and when `update`, which reads `enable`, has not run
+for 100 of its periods (a fault names it). A `min-dc` or `max-dc` that is NaN is set to its last
+valid value, and a fault is raised.
 
-**Differences from LinuxCNC:** the waveforms are the same except in these cases. The first PWM period starts with `enable` (LinuxCNC: the
-outputs stay low for up to a period, and all periods start one fast period earlier). `dir` changes between periods, so that
-no period has both directions (LinuxCNC: within a period, in `update`, a fast period earlier). `dir` is FALSE and `curr-dc` 0 while disabled
-(LinuxCNC: both are updated). PDM generates its first pulse when the accumulated duty cycle reaches one (LinuxCNC: immediately). A `scale` set before
-the first cycle is used (LinuxCNC ignores a scale of 2).
+**Differences from LinuxCNC:** the waveforms are the same except in these cases. The first PWM
+period starts with `enable` (LinuxCNC: the outputs stay low for up to a period, and all periods
+start one fast period earlier). `dir` changes between periods, so that no period has both directions
+(LinuxCNC: within a period, in `update`, a fast period earlier). `dir` is FALSE and `curr-dc` 0
+while disabled (LinuxCNC: both are updated). PDM generates its first pulse when the accumulated duty
+cycle reaches one (LinuxCNC: immediately). A `scale` set before the first cycle is used (LinuxCNC
+ignores a scale of 2).
 
     loadrt pwmgen output_type=1
     loadrt pid

@@ -283,24 +283,28 @@ private:
 
 HAL_COMPONENT(PxmcAxis, "pxmc_axis",
               "Position controller of one axis: trajectory, PID, supervision", R"(
-One axis as in the motion controllers of small mobile robots: it takes a position or a speed, plans the trajectory, closes the loop and
-monitors it.
+One axis as in the motion controllers of small mobile robots: it takes a position or a speed, plans
+the trajectory, closes the loop and monitors it.
 
     commanded = time-optimal way to requested-position within max-speed, max-acceleration, max-jerk (see motion_profile)
     e         = commanded-position - actual-position
     output    = P e + I * integral of e + D (commanded-speed - actual-speed) + FF commanded-speed,  at most max-output
 
-(G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of Dynamic Systems*, 4.3; the trajectory: T. Kroeger, *On-Line Trajectory
-Generation in Robotic Systems*, Springer 2010.) Units are those of `actual-position`; all limits and gains may change at any time.
+(G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of Dynamic Systems*, 4.3; the
+trajectory: T. Kroeger, *On-Line Trajectory Generation in Robotic Systems*, Springer 2010.) Units
+are those of `actual-position`; all limits and gains may change at any time.
 
-* `enable` closes the loop at the current position, at standstill; then `active` is TRUE. After a `stop` of the machine, or when the
-  function was in no thread, the axis stays off until `enable` has a rising edge. A rising edge of `go` starts a move, also during a move.
-* `speed-mode` moves at `requested-speed`, and stops at `min-position` and `max-position`. Positions beyond them are limited
-  (`request-limited`).
-* `stop` brakes with `max-acceleration`. `busy` is TRUE while the trajectory runs (and until the axis is within `position-window`).
+* `enable` closes the loop at the current position, at standstill; then `active` is TRUE. After a
+  `stop` of the machine, or when the function was in no thread, the axis stays off until `enable`
+  has a rising edge. A rising edge of `go` starts a move, also during a move.
+* `speed-mode` moves at `requested-speed`, and stops at `min-position` and `max-position`. Positions
+  beyond them are limited (`request-limited`).
+* `stop` brakes with `max-acceleration`. `busy` is TRUE while the trajectory runs (and until the
+  axis is within `position-window`).
 * The integral is held while it would increase the saturation.
 
-An error sets `output` to 0 in the same cycle and remains until a rising edge of `reset`; then the axis holds its current position.
+An error sets `output` to 0 in the same cycle and remains until a rising edge of `reset`; then the
+axis holds its current position.
 
 | error-code | |
 | --- | --- |

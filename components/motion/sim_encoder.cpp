@@ -82,12 +82,14 @@ private:
 
 HAL_COMPONENT(SimEncoder, "sim_encoder",
               "Simulated quadrature encoder that turns at a commanded speed", R"(
-Generates the phases of an encoder with `ppr` pulses per revolution whose shaft turns at `speed` / `scale` revolutions per second.
-`sim-encoder.update-speed` belongs in the servo thread, `sim-encoder.make-pulses` in the fastest thread; it generates at most one
-edge per period T, so the speed is limited to 1 / (4 ppr T) revolutions per second. It starts with `phase-A` TRUE, at the index.
+Generates the phases of an encoder with `ppr` pulses per revolution whose shaft turns at `speed` /
+`scale` revolutions per second. `sim-encoder.update-speed` belongs in the servo thread,
+`sim-encoder.make-pulses` in the fastest thread; it generates at most one edge per period T, so the
+speed is limited to 1 / (4 ppr T) revolutions per second. It starts with `phase-A` TRUE, at the
+index.
 
-**Differences from LinuxCNC:** `rawcounts` is an output (LinuxCNC: declared as an input that the component writes). At the highest speed it turns
-forward (LinuxCNC: backwards).
+**Differences from LinuxCNC:** `rawcounts` is an output (LinuxCNC: declared as an input that the
+component writes). At the highest speed it turns forward (LinuxCNC: backwards).
 
     loadrt sim_encoder num_chan=1
     loadrt encoder num_chan=1

@@ -470,15 +470,17 @@ private:
 
 HAL_COMPONENT(Stepgen, "stepgen",
               "Step pulses in software: step and direction, up and down, motor phases", R"(
-`stepgen.make-pulses` generates the waveforms in the fastest thread; `stepgen.capture-position` and `stepgen.update-freq` belong
-in the servo thread, before and after the controller. The three may run on different CPUs.
+`stepgen.make-pulses` generates the waveforms in the fastest thread; `stepgen.capture-position` and
+`stepgen.update-freq` belong in the servo thread, before and after the controller. The three may run
+on different CPUs.
 
-`position-cmd` (ctrl_type=p) is followed as fast as `maxvel` and `maxaccel` allow without overshooting a constant
-command: v = √(2 a e + (a T/2)²) - a T/2 for a distance e, plus the speed of the command. `velocity-cmd` (ctrl_type=v) is
-followed within the same limits. With `maxaccel` the speed changes linearly from one update to the next, without jumps. A command that is NaN or infinite
-brakes to a standstill within it.
-There is at most one step per period of the fast thread; a step that must
-wait for one of the times below is delayed, never lost. A step occurs when the position passes the midpoint between two steps.
+`position-cmd` (ctrl_type=p) is followed as fast as `maxvel` and `maxaccel` allow without
+overshooting a constant command: v = √(2 a e + (a T/2)²) - a T/2 for a distance e, plus the speed of
+the command. `velocity-cmd` (ctrl_type=v) is followed within the same limits. With `maxaccel` the
+speed changes linearly from one update to the next, without jumps. A command that is NaN or infinite
+brakes to a standstill within it. There is at most one step per period of the fast thread; a step
+that must wait for one of the times below is delayed, never lost. A step occurs when the position
+passes the midpoint between two steps.
 
 | step_type | outputs | times used |
 | --- | --- | --- |
@@ -493,16 +495,19 @@ wait for one of the times below is delayed, never lost. A step occurs when the p
 | 13, 14 | five phases, half step: one or two on, two or three on | steplen, dirdelay |
 | 15 | defined by `user_step_type`: a number per state, bit 0 is phase A | steplen, dirdelay |
 
-All times are in nanoseconds; the parameters are rounded up to whole periods of the fast thread. A `steplen` of 0, and a `dirdelay` or both
-`dirhold` and `dirsetup` of 0 with step types 0 and 1, are one period. A negative `maxvel` or `maxaccel` is set to 0; one that is above what
-the pulse timing permits (for `maxaccel`: from 0 to the highest speed in one update) is set to that. With `stepspace` 0 a pulse may occur in every period,
-for ports that reset the pulse themselves. When `update-freq`, which reads `enable`, has not run for 100 of its periods, the motor stops,
-and a fault names the missing function.
+All times are in nanoseconds; the parameters are rounded up to whole periods of the fast thread. A
+`steplen` of 0, and a `dirdelay` or both `dirhold` and `dirsetup` of 0 with step types 0 and 1, are
+one period. A negative `maxvel` or `maxaccel` is set to 0; one that is above what the pulse timing
+permits (for `maxaccel`: from 0 to the highest speed in one update) is set to that. With `stepspace`
+0 a pulse may occur in every period, for ports that reset the pulse themselves. When `update-freq`,
+which reads `enable`, has not run for 100 of its periods, the motor stops, and a fault names the
+missing function.
 
-**Differences from LinuxCNC:** steps occur in different periods. A command with constant speed is followed with a lag of one update (LinuxCNC:
-two and a half), and braking starts as late as possible. `position-fb` is exact (LinuxCNC: fixed point with a resolution of
-2e-8 steps). Without `maxaccel` the speed changes immediately (LinuxCNC: within an update). `dir` changes before the first step back (LinuxCNC:
-when the speed changes its sign, even if no step follows).
+**Differences from LinuxCNC:** steps occur in different periods. A command with constant speed is
+followed with a lag of one update (LinuxCNC: two and a half), and braking starts as late as
+possible. `position-fb` is exact (LinuxCNC: fixed point with a resolution of 2e-8 steps). Without
+`maxaccel` the speed changes immediately (LinuxCNC: within an update). `dir` changes before the
+first step back (LinuxCNC: when the speed changes its sign, even if no step follows).
 
     loadrt stepgen step_type=0,0 ctrl_type=p,v
     addf stepgen.make-pulses base-thread

@@ -27,11 +27,13 @@ struct Steptest : axis_test::Mover {
 
 HAL_COMPONENT(Steptest, "steptest",
               "Moves an axis with a step generator, to test speed and acceleration", R"(
-While `run` is TRUE `position-cmd` alternates between the two ends `run-low` and `run-high`, at the distance
-`amplitude` from the initial position on the sides selected by `dir`. It changes after `position-fb` has been within `epsilon` of the end for `pause`
-seconds. After `run` the axis returns to the initial position, and `running` becomes FALSE there. A jog commands a position two cycles at `maxvel`
-ahead of the axis; `jog-minus` takes precedence. Otherwise the command follows the feedback, until both differ by at most a thousandth of
-what `maxvel` moves in a cycle. The step generator that follows limits the motion with its own `maxvel` and `maxaccel`.
+While `run` is TRUE `position-cmd` alternates between the two ends `run-low` and `run-high`, at the
+distance `amplitude` from the initial position on the sides selected by `dir`. It changes after
+`position-fb` has been within `epsilon` of the end for `pause` seconds. After `run` the axis returns
+to the initial position, and `running` becomes FALSE there. A jog commands a position two cycles at
+`maxvel` ahead of the axis; `jog-minus` takes precedence. Otherwise the command follows the
+feedback, until both differ by at most a thousandth of what `maxvel` moves in a cycle. The step
+generator that follows limits the motion with its own `maxvel` and `maxaccel`.
 
 `run-target` equals `position-cmd` (LinuxCNC: always 0).
 

@@ -210,12 +210,15 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Playback, "playback", "Plays a recording into pins", R"(
-The file is one that `hal record` wrote, or another MCAP file with ROS 2 messages: their numbers are played, texts and arrays of any length are skipped. Each recorded value becomes an output of its own name and
-type: `x-pid.error` is `playback.0.x-pid.error`. In each cycle the outputs have the values that were recorded at that time after the first row; a
-recording of a thread of the same period is played row by row. The whole file is read when the component is loaded, at most 1 GiB of values.
-A file that was cut off or damaged is played as far as it goes, and a warning states what is missing.
+The file is one that `hal record` wrote, or another MCAP file with ROS 2 messages: their numbers are
+played, texts and arrays of any length are skipped. Each recorded value becomes an output of its own
+name and type: `x-pid.error` is `playback.0.x-pid.error`. In each cycle the outputs have the values
+that were recorded at that time after the first row; a recording of a thread of the same period is
+played row by row. The whole file is read when the component is loaded, at most 1 GiB of values. A
+file that was cut off or damaged is played as far as it goes, and a warning states what is missing.
 
-A table (.csv) has no types: its values are float, but for those that `types` names, as in `types=on:bit,count:s32`.
+A table (.csv) has no types: its values are float, but for those that `types` names, as in
+`types=on:bit,count:s32`.
 
     loadrt playback file=run.csv values=x-*
     loadrt lowpass names=filter
@@ -229,5 +232,6 @@ A table (.csv) has no types: its values are float, but for those that `types` na
     5.000,0.0,1.0
     5.001,0.1,1.0
 
-`hal replay` does this for a netlist by itself, and compares what it computes with what was recorded.
+`hal replay` does this for a netlist by itself, and compares what it computes with what was
+recorded.
 )")

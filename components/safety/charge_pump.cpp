@@ -34,10 +34,10 @@ private:
 }  // namespace
 
 HAL_COMPONENT(ChargePump, "charge_pump", "Square waves that show that the thread runs", R"(
-A charge pump in an output stage keeps a relay closed only while its input is a square wave: when the thread stops, the machine enters the safe
-state, regardless of the last output level. `out` has half the frequency of the thread, `out-2` and
-`out-4` a half and a quarter of that. While `enable` is FALSE
-the outputs are FALSE; the waves then go on where they stopped.
+A charge pump in an output stage keeps a relay closed only while its input is a square wave: when
+the thread stops, the machine enters the safe state, regardless of the last output level. `out` has
+half the frequency of the thread, `out-2` and `out-4` a half and a quarter of that. While `enable`
+is FALSE the outputs are FALSE; the waves then go on where they stopped.
 
     loadrt charge_pump
     addf charge-pump servo-thread

@@ -206,11 +206,13 @@ HAL_COMPONENT(DualChannel, "dual_channel", "Compares two channels of a value and
     b'      = b * scale-b + offset-b
     differs = |a - b'| > tolerance + relative-tolerance * max(|a|, |b'|)   or the bits differ
 
-For two encoders, two force sensors, or a command and its feedback: a value is valid only while both channels agree (comparison as in
-category 3 of ISO 13849-1). They may differ for `discrepancy-time`; meanwhile `out` keeps its value and `bit-out` is FALSE unless both
-bits are TRUE. A longer difference is a `fault`; it remains until a rising edge of `reset` while the channels agree, or without `latch` until they agree.
-A NaN value or an invalid parameter is an immediate fault. A stop or a fault of the runtime requires a reset,
-too. Leave an unused pair unlinked. The comparison runs as software on one computer and is not a second channel itself.
+For two encoders, two force sensors, or a command and its feedback: a value is valid only while both
+channels agree (comparison as in category 3 of ISO 13849-1). They may differ for `discrepancy-time`;
+meanwhile `out` keeps its value and `bit-out` is FALSE unless both bits are TRUE. A longer
+difference is a `fault`; it remains until a rising edge of `reset` while the channels agree, or
+without `latch` until they agree. A NaN value or an invalid parameter is an immediate fault. A stop
+or a fault of the runtime requires a reset, too. Leave an unused pair unlinked. The comparison runs
+as software on one computer and is not a second channel itself.
 
 | reason | |
 | --- | --- |

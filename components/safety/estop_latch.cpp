@@ -56,10 +56,12 @@ private:
 
 HAL_COMPONENT(EstopLatch, "estop_latch", "Emergency stop latch: holds a fault until it is reset",
               R"(
-The latch has two states: "faulted" (initial) and "OK". A rising edge of `reset` with `ok-in` TRUE and `fault-in` FALSE enters OK.
-`ok-in` FALSE or `fault-in` TRUE enters faulted in the same cycle. In the OK state `watchdog` toggles every cycle, for a `watchdog`
-or a charge pump that trips when this function stops running. As in LinuxCNC, a `reset` that is TRUE in the first cycle counts as a rising
-edge; the other safety components need a FALSE first. Chain latches by linking `ok-out` to the next `ok-in`.
+The latch has two states: "faulted" (initial) and "OK". A rising edge of `reset` with `ok-in` TRUE
+and `fault-in` FALSE enters OK. `ok-in` FALSE or `fault-in` TRUE enters faulted in the same cycle.
+In the OK state `watchdog` toggles every cycle, for a `watchdog` or a charge pump that trips when
+this function stops running. As in LinuxCNC, a `reset` that is TRUE in the first cycle counts as a
+rising edge; the other safety components need a FALSE first. Chain latches by linking `ok-out` to
+the next `ok-in`.
 
 `reason` keeps the first cause until the latch is OK again. A rising edge of `reset` that does not help sets it to the present cause.
 

@@ -77,16 +77,19 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Faults, "faults", "Faults of the runtime as pins for the safety chain", R"(
-An exception in a component, NaN on an output declared finite, a cycle beyond its budget and a hung thread
-are faults; `show fault` describes them. This component provides them as pins: link `ok` into the emergency stop chain.
+An exception in a component, NaN on an output declared finite, a cycle beyond its budget and a hung
+thread are faults; `show fault` describes them. This component provides them as pins: link `ok` into
+the emergency stop chain.
 
-A fault whose condition lasts cannot be acknowledged: a thread that hangs or that a fault stopped, a node that is offline, a cycle that still
-takes too long. Neither `reset` nor `fault clear` makes `ok` TRUE before it is over, and its end alone does not either: acknowledge it again, or hold
+A fault whose condition lasts cannot be acknowledged: a thread that hangs or that a fault stopped, a
+node that is offline, a cycle that still takes too long. Neither `reset` nor `fault clear` makes
+`ok` TRUE before it is over, and its end alone does not either: acknowledge it again, or hold
 `reset` until it is over.
 
-`alive` is for a watchdog: it toggles only while the thread supervisor runs and each thread has finished a
-cycle within its supervision limit. Add the function to the fastest thread and link `alive` to a watchdog input, or to a
-hardware charge pump: `net alive faults.alive => watchdog.input-0`. It toggles every few milliseconds to 50 ms, so a
+`alive` is for a watchdog: it toggles only while the thread supervisor runs and each thread has
+finished a cycle within its supervision limit. Add the function to the fastest thread and link
+`alive` to a watchdog input, or to a hardware charge pump:
+`net alive faults.alive => watchdog.input-0`. It toggles every few milliseconds to 50 ms, so a
 timeout of 200 ms or more is suitable for all machines.
 
 | last-code | |

@@ -220,13 +220,16 @@ private:
 
 HAL_COMPONENT(HeartbeatMonitor, "heartbeat_monitor",
               "Monitors a heartbeat: a toggling bit or a counter", R"(
-Monitors a heartbeat, such as a toggling bit or an increasing counter (the life counter of a bus node, another computer, a user-space
-program). The time between two heartbeats must be within `min-time` and `timeout` (a window watchdog). `ok` becomes TRUE after
-`heartbeats-needed` valid heartbeats. A timeout is an immediate fault; early or skipped heartbeats are a fault if more than `misses-allowed`
-occur in a row. A fault remains until a rising edge of `reset`, or without `latch` until `heartbeats-needed` valid heartbeats. After a stop of the
-runtime, `latch` requires a reset, too.
+Monitors a heartbeat, such as a toggling bit or an increasing counter (the life counter of a bus
+node, another computer, a user-space program). The time between two heartbeats must be within
+`min-time` and `timeout` (a window watchdog). `ok` becomes TRUE after `heartbeats-needed` valid
+heartbeats. A timeout is an immediate fault; early or skipped heartbeats are a fault if more than
+`misses-allowed` occur in a row. A fault remains until a rising edge of `reset`, or without `latch`
+until `heartbeats-needed` valid heartbeats. After a stop of the runtime, `latch` requires a reset,
+too.
 
-`watchdog` monitors many bits for timeouts only; this component monitors one source in detail. The thread must be fast enough to see every heartbeat.
+`watchdog` monitors many bits for timeouts only; this component monitors one source in detail. The
+thread must be fast enough to see every heartbeat.
 
 | reason | |
 | --- | --- |

@@ -189,8 +189,9 @@ private:
 
 HAL_COMPONENT(Interlock, "interlock",
               "Interlock of up to 64 conditions with first-out annunciation", R"(
-`ok` is TRUE while every monitored condition is good. When it becomes FALSE, `first` is the number of the condition that tripped first, regardless
-of later ones: the first-out sequence of ISA-18.1. Masks have a bit per condition (bit 0 is `in-00`) and may be written in hexadecimal, as in 0x11.
+`ok` is TRUE while every monitored condition is good. When it becomes FALSE, `first` is the number
+of the condition that tripped first, regardless of later ones: the first-out sequence of ISA-18.1.
+Masks have a bit per condition (bit 0 is `in-00`) and may be written in hexadecimal, as in 0x11.
 
 | mask | bit n set |
 | --- | --- |
@@ -207,8 +208,9 @@ of later ones: the first-out sequence of ISA-18.1. Masks have a bit per conditio
 | flashing at 1 Hz | first condition, acknowledged; or another one, not acknowledged |
 | on | bad or latched, acknowledged, not the first one |
 
-`delay-##` filters a flickering condition. `acknowledge` turns off `horn`; `reset` clears conditions that are good again. With `start-needs-reset`
-a reset is required after the start; after a stop or a fault of the runtime it is always required. This is software on one computer, not a certified safety
+`delay-##` filters a flickering condition. `acknowledge` turns off `horn`; `reset` clears conditions
+that are good again. With `start-needs-reset` a reset is required after the start; after a stop or a
+fault of the runtime it is always required. This is software on one computer, not a certified safety
 function.
 
     loadrt interlock names=spindle-may-run inputs=4

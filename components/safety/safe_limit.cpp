@@ -396,8 +396,9 @@ private:
 
 HAL_COMPONENT(SafeLimit, "safe_limit",
               "Supervision of position, speed and slew, with warning, limiting and stops", R"(
-Limits the speed command of an axis before it reaches the drive, and monitors the axis. Every limit has a reaction as defined in
-IEC 60204-1 (9.2.2, stop categories) and IEC 61800-5-2 (SLP, SLS, SLA with STO, SS1, SS2):
+Limits the speed command of an axis before it reaches the drive, and monitors the axis. Every limit
+has a reaction as defined in IEC 60204-1 (9.2.2, stop categories) and IEC 61800-5-2 (SLP, SLS, SLA
+with STO, SS1, SS2):
 
 | reaction | |
 | --- | --- |
@@ -410,11 +411,13 @@ IEC 60204-1 (9.2.2, stop categories) and IEC 61800-5-2 (SLP, SLS, SLA with STO, 
 
     speed = velocity, or (position - position before) / period through the filter speed-filter,   slew = change of speed / period
 
-The reaction is in the same cycle (plus `filter-time`). A stop remains until a rising edge of `reset` after its cause no longer
-exists. The initial state is a stop: the first reset enables the power. Beyond a position limit a reset is accepted at standstill, and then the axis may move
-inwards only. A stop that takes longer than `stop-time`, a NaN value and an invalid parameter cause a stop 0; a stop or a fault of
-the runtime requires a reset. `stop-in` requests a stop 1, during which all limits remain monitored. Link `power` to the drive's enable. This is software on one computer, not
-a certified safety function.
+The reaction is in the same cycle (plus `filter-time`). A stop remains until a rising edge of
+`reset` after its cause no longer exists. The initial state is a stop: the first reset enables the
+power. Beyond a position limit a reset is accepted at standstill, and then the axis may move inwards
+only. A stop that takes longer than `stop-time`, a NaN value and an invalid parameter cause a stop
+0; a stop or a fault of the runtime requires a reset. `stop-in` requests a stop 1, during which all
+limits remain monitored. Link `power` to the drive's enable. This is software on one computer, not a
+certified safety function.
 
 | reason | |
 | --- | --- |

@@ -63,10 +63,12 @@ private:
 }  // namespace
 
 HAL_COMPONENT(SafetyLatch, "safety_latch", "Error latch that tolerates short disturbances", R"(
-A cycle with `error-in` TRUE adds `harm` to the count, any other decreases it; the count is limited to `min` and `max`. A
-count above `threshold` sets `error-out`. With `latching` it remains TRUE until a rising edge of `reset`; without, until the count
-is no longer above the threshold. During a disturbance, `reset` only restarts the count. If `min` is above `max`, `max` applies. While `enable` is FALSE,
-`error-out` is `error-in`, and a latched error is cleared as by `reset`, as in LinuxCNC: link `enable` to nothing that can switch by itself.
+A cycle with `error-in` TRUE adds `harm` to the count, any other decreases it; the count is limited
+to `min` and `max`. A count above `threshold` sets `error-out`. With `latching` it remains TRUE
+until a rising edge of `reset`; without, until the count is no longer above the threshold. During a
+disturbance, `reset` only restarts the count. If `min` is above `max`, `max` applies. While `enable`
+is FALSE, `error-out` is `error-in`, and a latched error is cleared as by `reset`, as in LinuxCNC:
+link `enable` to nothing that can switch by itself.
 
 LinuxCNC's manual page contradicts itself about `latching`; its component behaves as described here.
 

@@ -258,8 +258,8 @@ private:
         }
     }
 
-    /// Once a contact has opened, both must have been open before both may be closed. `overdue`: the
-    /// contacts have disagreed for too long.
+    /// Once a contact has opened, both must have been open before both may be closed. `overdue`:
+    /// the contacts have disagreed for too long.
     std::uint32_t next_state(bool accepted, bool overdue) const noexcept {
         if (latched() && !accepted) return state_;
         if (both_open()) return contacts_open;
@@ -338,21 +338,29 @@ private:
 
 HAL_COMPONENT(SafetySwitch, "safety_switch",
               "Two-channel safety input with reset, discrepancy time and test pulses", R"(
-Monitors a switch with two contacts (door, emergency stop button, light curtain) and enables
-the machine. It follows the practice of two-channel safety relays: ISO 13849-1 (category 3 and 4: a single
-fault must not lose the function and is found at the next demand; clause 5.2.2: a manual reset acts when the button is released),
-IEC 61496-1 (start and restart interlock, test pulses on outputs), IEC 60204-1 (9.2.3.4: reset does not start motion),
-PLCopen Safety Part 1 (SF_Equivalent, SF_Antivalent). It is software on one computer, not a certified safety function.
+Monitors a switch with two contacts (door, emergency stop button, light curtain) and enables the
+machine. It follows the practice of two-channel safety relays: ISO 13849-1 (category 3 and 4: a
+single fault must not lose the function and is found at the next demand; clause 5.2.2: a manual
+reset acts when the button is released), IEC 61496-1 (start and restart interlock, test pulses on
+outputs), IEC 60204-1 (9.2.3.4: reset does not start motion), PLCopen Safety Part 1 (SF_Equivalent,
+SF_Antivalent). It is software on one computer, not a certified safety function.
 
-* **Contacts.** `antivalent` FALSE: both are closed while safe. TRUE: A is closed and B open. `safe` becomes FALSE in the cycle in which
-  either contact changes (plus `filter-time`); they are safe again after `debounce-time`.
-* **Discrepancy.** They may disagree for `discrepancy-time`; a longer disagreement is a fault. Once one has opened, both must open.
-* **Reset.** With both contacts safe, `reset-mode` 0 sets `safe` immediately (also at the start), 1 on a press of `reset`, 2 on its release after a press
-  between `reset-min-time` and `reset-max-time`. A press that started too early does not count. A stop or a fault of the runtime also requires a reset.
-* **Test pulses.** With `test-period` above 0, `test-a` and `test-b` alternately become FALSE for `test-width`. Supply A from `test-a` and B from `test-b`.
-  A conducting contact must show its pulse (else it is shorted to the supply or to the other), and the other must not. A contact
-  that opens during its pulse is seen `test-response` after it: reaction time grows by `test-width` + `test-response`.
-* **Faults** remain until the cause no longer exists, both contacts have opened and `reset` was pressed; then both must close again.
+* **Contacts.** `antivalent` FALSE: both are closed while safe. TRUE: A is closed and B open. `safe`
+  becomes FALSE in the cycle in which either contact changes (plus `filter-time`); they are safe
+  again after `debounce-time`.
+* **Discrepancy.** They may disagree for `discrepancy-time`; a longer disagreement is a fault. Once
+  one has opened, both must open.
+* **Reset.** With both contacts safe, `reset-mode` 0 sets `safe` immediately (also at the start), 1
+  on a press of `reset`, 2 on its release after a press between `reset-min-time` and
+  `reset-max-time`. A press that started too early does not count. A stop or a fault of the runtime
+  also requires a reset.
+* **Test pulses.** With `test-period` above 0, `test-a` and `test-b` alternately become FALSE for
+  `test-width`. Supply A from `test-a` and B from `test-b`. A conducting contact must show its pulse
+  (else it is shorted to the supply or to the other), and the other must not. A contact that opens
+  during its pulse is seen `test-response` after it: reaction time grows by `test-width` +
+  `test-response`.
+* **Faults** remain until the cause no longer exists, both contacts have opened and `reset` was
+  pressed; then both must close again.
 
 | reason | |
 | --- | --- |

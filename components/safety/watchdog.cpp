@@ -134,12 +134,14 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Watchdog, "watchdog", "Detects inputs that stop changing", R"(
-Each `input-N` must change at least once in `timeout-N` seconds. If one does not, `ok-out` becomes FALSE and remains so until
-a rising edge of `enable-in`; `tripped-by` is the number of the input. If that input has not changed since, `ok-out` waits for its next
-change: LinuxCNC's watchdog reports OK for another timeout over an input that is still dead. Without a timeout `ok-out` is always
-FALSE: a watchdog that is not configured must not report OK. Add `set-timeouts` to a thread for the timeouts to take
-effect; the thread of `process` must be fast enough to see each change. A rising edge of `enable-in` begins a new timeout, as in LinuxCNC: an `enable-in`
-that rises more often than the timeout hides an input that is dead. Link it to a button, not to a signal that can oscillate.
+Each `input-N` must change at least once in `timeout-N` seconds. If one does not, `ok-out` becomes
+FALSE and remains so until a rising edge of `enable-in`; `tripped-by` is the number of the input. If
+that input has not changed since, `ok-out` waits for its next change: LinuxCNC's watchdog reports OK
+for another timeout over an input that is still dead. Without a timeout `ok-out` is always FALSE: a
+watchdog that is not configured must not report OK. Add `set-timeouts` to a thread for the timeouts
+to take effect; the thread of `process` must be fast enough to see each change. A rising edge of
+`enable-in` begins a new timeout, as in LinuxCNC: an `enable-in` that rises more often than the
+timeout hides an input that is dead. Link it to a button, not to a signal that can oscillate.
 
     loadrt watchdog num_inputs=2
     loadrt charge_pump

@@ -143,14 +143,16 @@ HAL_COMPONENT(DcMotor, "dc_motor", "A brushed DC motor with amplifier, encoder, 
     inductance i' = u - resistance i - torque-constant w,     |i| <= current-limit
     inertia w'    = torque-constant i - load-torque - viscous w - coulomb tanh(w / 0.01 rad/s)
 
-The usual equations (G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of Dynamic Systems*, section 2.3). The
-current is solved exactly over a step, the motion by fourth-order Runge-Kutta in steps of at most 0.1 ms. Friction is smoothed
-around standstill: with a constant torque below the Coulomb torque the shaft creeps. Without load and Coulomb friction the motor
+The usual equations (G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of Dynamic
+Systems*, section 2.3). The current is solved exactly over a step, the motion by fourth-order
+Runge-Kutta in steps of at most 0.1 ms. Friction is smoothed around standstill: with a constant
+torque below the Coulomb torque the shaft creeps. Without load and Coulomb friction the motor
 settles at w = u k / (k² + resistance viscous).
 
-The amplifier takes a voltage, or `pwm` and `dir` from `pwmgen`; while `pwm` is low the current freewheels through the bridge.
-The default parameters are those of a motor with 24 V and 85 W, as in the component `furuta`. For the encoder phases the thread must sample
-every count: with 2000 counts per revolution, 100 us allow up to 31 rad/s, 50 us up to 62 rad/s.
+The amplifier takes a voltage, or `pwm` and `dir` from `pwmgen`; while `pwm` is low the current
+freewheels through the bridge. The default parameters are those of a motor with 24 V and 85 W, as in
+the component `furuta`. For the encoder phases the thread must sample every count: with 2000 counts
+per revolution, 100 us allow up to 31 rad/s, 50 us up to 62 rad/s.
 
     loadrt dc_motor names=x-motor
     addf x-motor.update base-thread

@@ -99,8 +99,9 @@ HAL_COMPONENT(Finger, "finger", "Simulated robot finger in front of a stiff wall
     mass x'' = actuator - viscous x' - wall,   wall = max(0, wall-stiffness depth + wall-damping x') where depth = x - wall > 0
     actuator-lag actuator' = effort - actuator
 
-The wall pushes but never pulls. The integration is backward Euler with steps of 20 us. With the default parameters the finger oscillates on the wall with
-√(k / m) = 200 rad/s, damped to a quarter. Numbers are assumed; those of a small gripper against a sheet of steel.
+The wall pushes but never pulls. The integration is backward Euler with steps of 20 us. With the
+default parameters the finger oscillates on the wall with √(k / m) = 200 rad/s, damped to a quarter.
+Numbers are assumed; those of a small gripper against a sheet of steel.
 
     loadrt finger names=tip
     addf tip.update servo

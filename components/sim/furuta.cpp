@@ -279,13 +279,14 @@ private:
 
 HAL_COMPONENT(Furuta, "furuta",
               "Simulated Furuta pendulum with motor, encoders, radio link and base", R"(
-A motor turns a horizontal arm; at its end a pendulum swings freely in the plane perpendicular to the arm. The component simulates
-the whole rig, from the inputs of the amplifier to the outputs of the encoders and of the switch under the base.
+A motor turns a horizontal arm; at its end a pendulum swings freely in the plane perpendicular to
+the arm. The component simulates the whole rig, from the inputs of the amplifier to the outputs of
+the encoders and of the switch under the base.
 
 ## Equations
 
-With *q* the angle of the arm, *a* that of the pendulum (0 hanging), *L* the length of the arm, *m*, *l* mass and centre of
-the pendulum, *J* = rotor + arm + m L², *K* = pendulum-inertia + m l²:
+With *q* the angle of the arm, *a* that of the pendulum (0 hanging), *L* the length of the arm, *m*,
+*l* mass and centre of the pendulum, *J* = rotor + arm + m L², *K* = pendulum-inertia + m l²:
 
     (J + K sin²a) q" + m L l cos a a" + K sin 2a q' a' - m L l sin a a'²  = k i - friction(q')
     m L l cos a q"   + K a"           - ½ K sin 2a q'² + m g l sin a      =     - friction(a')
@@ -301,20 +302,23 @@ The friction model has no stiction: with a constant torque below the Coulomb tor
 
 ## Encoders
 
-Counts change half a count to either side of 0. The thread must be fast enough for the quadrature outputs: with 2000 counts
-per revolution and 100 us the shafts may turn at up to 31 rad/s. The pendulum encoder is sent by radio with the latency `radio-delay`.
+Counts change half a count to either side of 0. The thread must be fast enough for the quadrature
+outputs: with 2000 counts per revolution and 100 us the shafts may turn at up to 31 rad/s. The
+pendulum encoder is sent by radio with the latency `radio-delay`.
 
 ## The base
 
 The Newton-Euler equations of arm and rod give the force and the moment between base and table.
-`tip-ratio` is how far from the middle of the foot, in radii, the table pushes back; beyond 1 it would have to pull, and the
-base lifts: `base-down` opens and `base-lifted` closes, for at least `lift-hold`. The tilt itself is not simulated.
+`tip-ratio` is how far from the middle of the foot, in radii, the table pushes back; beyond 1 it
+would have to pull, and the base lifts: `base-down` opens and `base-lifted` closes, for at least
+`lift-hold`. The tilt itself is not simulated.
 
 ## Source of the numbers
 
-The source system's rig has a DC motor of 24 V and 85 W, an amplifier limited to 4 A and encoders of 2000 counts per turn on both
-axes. Torque constant and resistance follow from 85 W at 4 A if that is at 3000 rpm: 85 W / (314 rad/s 4 A) = 0.0677 N·m/A;
-(24 V - 0.0677 V·s 314 rad/s) / 4 A = 0.68 Ω. Lengths and masses were not published: those here are assumed, and parameters.
+The source system's rig has a DC motor of 24 V and 85 W, an amplifier limited to 4 A and encoders of
+2000 counts per turn on both axes. Torque constant and resistance follow from 85 W at 4 A if that is
+at 3000 rpm: 85 W / (314 rad/s 4 A) = 0.0677 N·m/A; (24 V - 0.0677 V·s 314 rad/s) / 4 A = 0.68 Ω.
+Lengths and masses were not published: those here are assumed, and parameters.
 
 ## Example
 

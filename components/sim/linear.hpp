@@ -72,8 +72,9 @@ private:
 
     /// Powers of two that, as units of the states, bring the columns of `a` to the size of its rows
     /// (B. Parlett, C. Reinsch,
-    /// *Balancing a matrix*, Numerische Mathematik 13, 1969), and `a` in these units. A stiff spring on a small mass then needs as
-    /// many squarings as it swings in a step, and not their square.
+    /// *Balancing a matrix*, Numerische Mathematik 13, 1969), and `a` in these units. A stiff
+    /// spring on a small mass then needs as many squarings as it swings in a step, and not their
+    /// square.
     static States balance(std::array<std::array<double, N>, N>& a) noexcept {
         States units;
         units.fill(1.0);

@@ -166,10 +166,11 @@ HAL_COMPONENT(Noise, "noise", "Seeded noise: uniform, Gaussian or pink", R"(
 | 1 | Gaussian with standard deviation 1 (Marsaglia's polar method) |
 | 2 | pink, power falling with 1/f over 20 octaves, standard deviation 1 (Voss, McCartney) |
 
-The sequence is a function of `seed` alone: the same netlist gives the same values in every run, and two instances with the same seed the
-same noise, so give each its own. A change of `seed` and a rising edge of `restart` restart the sequence. `hold` n draws a value every n cycles;
-`limit` limits its magnitude. A type above 2 counts as 0, a NaN amplitude as 0. The generator is xorshift64*, which is
-not cryptographically secure.
+The sequence is a function of `seed` alone: the same netlist gives the same values in every run, and
+two instances with the same seed the same noise, so give each its own. A change of `seed` and a
+rising edge of `restart` restart the sequence. `hold` n draws a value every n cycles; `limit` limits
+its magnitude. A type above 2 counts as 0, a NaN amplitude as 0. The generator is xorshift64*, which
+is not cryptographically secure.
 
     loadrt noise names=tacho-noise
     addf tacho-noise servo

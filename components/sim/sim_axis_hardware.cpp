@@ -97,11 +97,14 @@ private:
 
 HAL_COMPONENT(SimAxisHardware, "sim_axis_hardware",
               "Simulated home and limit switches of X, Y, Z, A, U, V and tandem X2, Y2", R"(
-Each axis has a home switch centred at `homesw-pos`, `homesw-hyst` wide, and two limit switches with a lower and an upper end. The maximum
-switch trips `limit-offset` above its lower end, the minimum switch `limit-offset` below its upper end. Further pins combine switches, as
-on machines with shared inputs; while any axis is homing they ignore all limit switches, and `homesw-all` ignores the home switches while none is.
+Each axis has a home switch centred at `homesw-pos`, `homesw-hyst` wide, and two limit switches with
+a lower and an upper end. The maximum switch trips `limit-offset` above its lower end, the minimum
+switch `limit-offset` below its upper end. Further pins combine switches, as on machines with shared
+inputs; while any axis is homing they ignore all limit switches, and `homesw-all` ignores the home
+switches while none is.
 
-**Differences from LinuxCNC:** `Amaxsw-homesw-out`, `Aminsw-homesw-out` and `Abothsw-homesw-out` work (LinuxCNC: always FALSE).
+**Differences from LinuxCNC:** `Amaxsw-homesw-out`, `Aminsw-homesw-out` and `Abothsw-homesw-out`
+work (LinuxCNC: always FALSE).
 
     loadrt sim_axis_hardware names=switches
     addf switches.update servo

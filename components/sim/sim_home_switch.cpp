@@ -63,9 +63,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(SimHomeSwitch, "sim_home_switch", "Simulated home switch and index", R"(
-`home-sw` is on at and above `home-pos`, or at and below it if `home-pos` is negative; it turns off `hysteresis`
-before that position. A rising edge of `index-enable` starts a delay of `index-delay-ms`, after which it is cleared; a delay of 0 or less does
-not clear it.
+`home-sw` is on at and above `home-pos`, or at and below it if `home-pos` is negative; it turns off
+`hysteresis` before that position. A rising edge of `index-enable` starts a delay of
+`index-delay-ms`, after which it is cleared; a delay of 0 or less does not clear it.
 
     loadrt sim_home_switch names=x-home
     addf x-home servo

@@ -54,9 +54,10 @@ private:
 }  // namespace
 
 HAL_COMPONENT(SimMatrixKb, "sim_matrix_kb", "Simulated keypad controller with 8 by 8 keys", R"(
-Simulates a keypad: each change of a button outputs a code for one cycle, 0xC0 + 8 row + column when pressed, 0x80 + 8 row + column when
-released. Without a change the code is 0x40 while a key is pressed, else 0. If several change in one cycle, their codes follow one per cycle, the
-lowest key first.
+Simulates a keypad: each change of a button outputs a code for one cycle, 0xC0 + 8 row + column when
+pressed, 0x80 + 8 row + column when released. Without a change the code is 0x40 while a key is
+pressed, else 0. If several change in one cycle, their codes follow one per cycle, the lowest key
+first.
 
     loadrt sim_matrix_kb names=pad
     addf pad servo

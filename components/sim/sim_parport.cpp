@@ -79,9 +79,10 @@ private:
 }  // namespace
 
 HAL_COMPONENT(SimParport, "sim_parport", "Simulated parallel port", R"(
-Has all pins of `hal_parport` for both directions, with the same names, and for each a `-fake` pin for the outside: `pin-02-in` follows
-`pin-02-in-fake`, `pin-01-out-fake` follows `pin-01-out`, inverted by `pin-01-out-invert`. Load it under the port's name; the rest of the
-netlist needs no change.
+Has all pins of `hal_parport` for both directions, with the same names, and for each a `-fake` pin
+for the outside: `pin-02-in` follows `pin-02-in-fake`, `pin-01-out-fake` follows `pin-01-out`,
+inverted by `pin-01-out-invert`. Load it under the port's name; the rest of the netlist needs no
+change.
 
     loadrt sim_parport names=parport.0
     addf parport.0.read base-thread

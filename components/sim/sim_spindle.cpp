@@ -31,8 +31,9 @@ struct SimSpindle : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(SimSpindle, "sim_spindle", "Simulated spindle with an index", R"(
-Turns at `velocity-cmd` * `scale` turns per second, without acceleration. While `index-enable` is TRUE the next full turn, in either direction,
-takes the full turns away from `position-fb` and clears `index-enable`. Backwards from exactly a full turn the first cycle does. The position is held
+Turns at `velocity-cmd` * `scale` turns per second, without acceleration. While `index-enable` is
+TRUE the next full turn, in either direction, takes the full turns away from `position-fb` and
+clears `index-enable`. Backwards from exactly a full turn the first cycle does. The position is held
 while the speed is NaN or infinite.
 
     loadrt sim_spindle names=spindle-sim

@@ -36,8 +36,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Sphereprobe, "sphereprobe", "Simulated probe over a hemisphere", R"(
-A hemisphere with centre (cx, cy, cz) and radius r is on a table at height cz. Beside the hemisphere, `probe-out` is TRUE while the probe
-is below the table; above or below the hemisphere, while it is at most r away from the centre.
+A hemisphere with centre (cx, cy, cz) and radius r is on a table at height cz. Beside the
+hemisphere, `probe-out` is TRUE while the probe is below the table; above or below the hemisphere,
+while it is at most r away from the centre.
 
     loadrt sphereprobe names=ball
     addf ball servo

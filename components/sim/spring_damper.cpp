@@ -108,13 +108,15 @@ private:
 HAL_COMPONENT(SpringDamper, "spring_damper", "Simulated mass on a spring and a damper", R"(
     mass x'' = force - stiffness (x - base) - damping (x' - base')
 
-(G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of Dynamic Systems*, 2.1.) The mass oscillates at sqrt(stiffness / mass) rad/s with a
-damping ratio of damping / (2 sqrt(stiffness mass)); its equilibrium is base + force / stiffness. `reaction` is the force of spring and damper
-on the mass.
+(G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of Dynamic Systems*, 2.1.) The mass
+oscillates at sqrt(stiffness / mass) rad/s with a damping ratio of damping / (2 sqrt(stiffness
+mass)); its equilibrium is base + force / stiffness. `reaction` is the force of spring and damper on
+the mass.
 
-The equations are solved exactly for a constant force and a base with constant velocity within a period, so any period is stable.
-Parameters may change at any time; such a cycle takes a few microseconds longer. Negative values count as 0. With `mass` 0 spring
-and damper follow the force with the time constant damping / stiffness; if all three are 0, nothing moves. The mass starts at 0;
+The equations are solved exactly for a constant force and a base with constant velocity within a
+period, so any period is stable. Parameters may change at any time; such a cycle takes a few
+microseconds longer. Negative values count as 0. With `mass` 0 spring and damper follow the force
+with the time constant damping / stiffness; if all three are 0, nothing moves. The mass starts at 0;
 `reset` sets it to the base.
 
     loadrt spring_damper names=contact

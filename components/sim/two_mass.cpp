@@ -106,14 +106,15 @@ HAL_COMPONENT(TwoMass, "two_mass", "Simulated motor and load on an elastic shaft
     load-inertia w2'  = shaft - load-torque - load-viscous w2
     shaft             = stiffness (angle1 - angle2) + damping (w1 - w2)
 
-The usual model of a drive with an elastic coupling, belt or screw (G. Franklin, J. D. Powell, A. Emami-Naeini, *Feedback Control of
-Dynamic Systems*, 2.1; D. Schroeder, *Elektrische Antriebe - Regelung von Antriebssystemen*, "Zweimassensystem"). Without damping the load
-alone oscillates at sqrt(stiffness / load-inertia), both against each other at sqrt(stiffness (1 / motor-inertia + 1 / load-inertia))
-rad/s. For a linear axis use kg, N and m (and ignore `pitch`).
+The usual model of a drive with an elastic coupling, belt or screw (G. Franklin, J. D. Powell, A.
+Emami-Naeini, *Feedback Control of Dynamic Systems*, 2.1; D. Schroeder, *Elektrische Antriebe -
+Regelung von Antriebssystemen*, "Zweimassensystem"). Without damping the load alone oscillates at
+sqrt(stiffness / load-inertia), both against each other at sqrt(stiffness (1 / motor-inertia + 1 /
+load-inertia)) rad/s. For a linear axis use kg, N and m (and ignore `pitch`).
 
-The equations are solved exactly for constant torques within a period, so any period is stable and the result does not depend on it.
-Parameters may change at any time; such a cycle takes a few microseconds longer. Negative values count as 0; an inertia is
-at least 1e-12.
+The equations are solved exactly for constant torques within a period, so any period is stable and
+the result does not depend on it. Parameters may change at any time; such a cycle takes a few
+microseconds longer. Negative values count as 0; an inertia is at least 1e-12.
 
     loadrt two_mass names=x-drive
     addf x-drive.update servo

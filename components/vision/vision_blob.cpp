@@ -163,15 +163,17 @@ private:
 
 HAL_COMPONENT(VisionBlob, "vision_blob",
               "Detects and tracks coloured objects on the ground, such as bottles and cans", R"(
-An object is an upright cylinder of one colour; each kind has a hue and a radius. Its position is one radius behind the lower edge of its image, on
-the ground. The mapping from pixels to the ground follows from the mounting of the camera (`focal`, `camera_height`, `pitch`,
-`forward`), or from measured points (`ground=`, a file as for vision_homography).
+An object is an upright cylinder of one colour; each kind has a hue and a radius. Its position is
+one radius behind the lower edge of its image, on the ground. The mapping from pixels to the ground
+follows from the mounting of the camera (`focal`, `camera_height`, `pitch`, `forward`), or from
+measured points (`ground=`, a file as for vision_homography).
 
-An object keeps its track and its id while it is detected again within `forget` and within `gate` of its last position; of two
-candidates the nearer one is used. Without detections `track-#-unseen` increases. `valid` is TRUE while valid frames arrive, even
-without objects; their number is `count`.
+An object keeps its track and its id while it is detected again within `forget` and within `gate` of
+its last position; of two candidates the nearer one is used. Without detections `track-#-unseen`
+increases. `valid` is TRUE while valid frames arrive, even without objects; their number is `count`.
 
-Two objects of one kind that touch in the image count as one; an object that crosses the lower edge of the image is ignored.
+Two objects of one kind that touch in the image count as one; an object that crosses the lower edge
+of the image is ignored.
 
     loadrt vision_scene show=floor objects=2
     loadrt vision_blob source=sim:floor camera_height=0.3 pitch=0.6 kinds=2

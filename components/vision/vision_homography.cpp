@@ -89,13 +89,15 @@ public:
 
 HAL_COMPONENT(VisionHomography, "vision_homography",
               "Converts pixels to positions on the ground by a homography", R"(
-A camera above a table or a floor maps each position on it to one pixel. Four points with known pixel and position define this mapping,
-a homography; more points average out errors, and `error` is the residual. Put four marks on the ground, as far
-apart as possible in the image, measure their positions, and read their pixels from `u` and `v` of vision_marker.
+A camera above a table or a floor maps each position on it to one pixel. Four points with known
+pixel and position define this mapping, a homography; more points average out errors, and `error` is
+the residual. Put four marks on the ground, as far apart as possible in the image, measure their
+positions, and read their pixels from `u` and `v` of vision_marker.
 
-`channels=` pixels, `u-N` and `v-N`, are converted to positions, `x-N` and `y-N`. `valid-N` is FALSE if the pixel is at or above the horizon
-or NaN, or if `enable-N` is FALSE; then the position is held. The conversion is valid for points on the ground only: the top of a can
-appears at the position of the ground behind it.
+`channels=` pixels, `u-N` and `v-N`, are converted to positions, `x-N` and `y-N`. `valid-N` is FALSE
+if the pixel is at or above the horizon or NaN, or if `enable-N` is FALSE; then the position is
+held. The conversion is valid for points on the ground only: the top of a can appears at the
+position of the ground behind it.
 
 For a lens with visible distortion, give its calibration, `camera=` (see vision_marker).
 

@@ -119,12 +119,15 @@ private:
 
 HAL_COMPONENT(VisionLine, "vision_line", "Detects a line on the floor for a line-following robot",
               R"(
-The image is divided into `bands`. In each band, areas that differ from the floor by `contrast` and are about as wide as the line are candidates;
-the line is the parabola on the ground that most bands agree with. `offset`, `heading` and `curvature` are those of the parabola `ahead` of the
-robot's centre. Gaps, shadows and objects beside the line are bands that disagree; if fewer than `min-quality` agree, `valid` is FALSE.
+The image is divided into `bands`. In each band, areas that differ from the floor by `contrast` and
+are about as wide as the line are candidates; the line is the parabola on the ground that most bands
+agree with. `offset`, `heading` and `curvature` are those of the parabola `ahead` of the robot's
+centre. Gaps, shadows and objects beside the line are bands that disagree; if fewer than
+`min-quality` agree, `valid` is FALSE.
 
-The mapping from pixels to the ground follows from the mounting of the camera (`focal`, `camera_height`, `pitch`, `forward`), or from measured
-points (`ground=`, a file as for vision_homography). A robot with the turning speed k1 offset + k2 heading follows the line.
+The mapping from pixels to the ground follows from the mounting of the camera (`focal`,
+`camera_height`, `pitch`, `forward`), or from measured points (`ground=`, a file as for
+vision_homography). A robot with the turning speed k1 offset + k2 heading follows the line.
 
     loadrt vision_scene show=floor
     loadrt vision_line source=sim:floor camera_height=0.3 pitch=0.6

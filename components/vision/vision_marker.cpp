@@ -121,9 +121,10 @@ private:
 
 HAL_COMPONENT(VisionMarker, "vision_marker",
               "Detects a square marker and its pose relative to the camera", R"(
-Detects ArUco markers in the frames of `source=` and computes the pose of one of them: `x` to the right, `y` down, `z` in front of the
-camera in mm; the rotation from the marker (x right, y up, z out of its face) to the camera is R = Rz(yaw) Ry(pitch) Rx(roll) in degrees. An upright marker
-that faces the camera has roll 180.
+Detects ArUco markers in the frames of `source=` and computes the pose of one of them: `x` to the
+right, `y` down, `z` in front of the camera in mm; the rotation from the marker (x right, y up, z
+out of its face) to the camera is R = Rz(yaw) Ry(pitch) Rx(roll) in degrees. An upright marker that
+faces the camera has roll 180.
 
 The pose requires a file with the camera's calibration, `camera=`:
 
@@ -132,18 +133,22 @@ The pose requires a file with the camera's calibration, `camera=`:
     centre 319.5 239.5
     distortion 0.05 -0.12 0 0 0     # k1 k2 p1 p2 k3
 
-or the YAML file of OpenCV's calibration, and `size`, the side length of the black square. Without a calibration only `id`, `u` and `v`
-are available.
+or the YAML file of OpenCV's calibration, and `size`, the side length of the black square. Without a
+calibration only `id`, `u` and `v` are available.
 
-**Ambiguity.** The image of a small, distant or nearly frontal square matches two poses almost equally well: the correct one and its mirror image
-about the line of sight, with the same position and a different tilt (T. Collins and A. Bartoli, 2014). Both are tracked from frame to frame, and the
-pins have the one with the smaller error over the last frames (each frame has 0.8 times the weight of the next). `ambiguity` is the ratio of the
-two errors. A controller that uses the tilt should compare it with a limit, for example 0.7; `x`, `y`, `z` and `yaw` hardly depend on it.
+**Ambiguity.** The image of a small, distant or nearly frontal square matches two poses almost
+equally well: the correct one and its mirror image about the line of sight, with the same position
+and a different tilt (T. Collins and A. Bartoli, 2014). Both are tracked from frame to frame, and
+the pins have the one with the smaller error over the last frames (each frame has 0.8 times the
+weight of the next). `ambiguity` is the ratio of the two errors. A controller that uses the tilt
+should compare it with a limit, for example 0.7; `x`, `y`, `z` and `yaw` hardly depend on it.
 
 A separate thread processes the newest frame; `update` copies the last result to the pins.
-Controllers should use `valid`: it is TRUE if the newest processed frame contains the marker and is not older than
-`max-age-ms`. While it is FALSE the pins keep their last values. If the camera is unplugged, covered or hangs, a message is printed, `valid` becomes FALSE, and
-operation resumes automatically with valid frames. Several components may use the same camera, all with the same options.
+Controllers should use `valid`: it is TRUE if the newest processed frame contains the marker and is
+not older than `max-age-ms`. While it is FALSE the pins keep their last values. If the camera is
+unplugged, covered or hangs, a message is printed, `valid` becomes FALSE, and operation resumes
+automatically with valid frames. Several components may use the same camera, all with the same
+options.
 
     loadrt threads name1=servo period1=1000000
     loadrt vision_marker names=dock source=v4l2:/dev/video0?width=640&height=480

@@ -192,17 +192,21 @@ private:
 
 HAL_COMPONENT(VisionPendulum, "vision_pendulum", "Both angles of a Furuta pendulum from a camera",
               R"(
-A red ball marks the pendulum's pivot, a green one its end (other colours: `pivot-hue`, `tip-hue`). Their centres, weighted by colour, are
-accurate to a few hundredths of a pixel; the angles follow by least squares, and `residual` is the remaining error.
-At 320 x 240 with noise of 3 of 255 the error of both angles is 0.5 mrad (rms).
+A red ball marks the pendulum's pivot, a green one its end (other colours: `pivot-hue`, `tip-hue`).
+Their centres, weighted by colour, are accurate to a few hundredths of a pixel; the angles follow by
+least squares, and `residual` is the remaining error. At 320 x 240 with noise of 3 of 255 the error
+of both angles is 0.5 mrad (rms).
 
-The camera stands in front of the rig, `distance` from the motor's axis and `camera_height` above the arm, and looks at where axis and arm
-meet; the arm's zero points at it. Near an arm of 90 degrees the pendulum swings to and from the camera, and two attitudes look the same:
-such a frame does not count, nor does one from which an angle follows badly (`max-sigma`). The filter has to bridge them.
+The camera stands in front of the rig, `distance` from the motor's axis and `camera_height` above
+the arm, and looks at where axis and arm meet; the arm's zero points at it. Near an arm of 90
+degrees the pendulum swings to and from the camera, and two attitudes look the same: such a frame
+does not count, nor does one from which an angle follows badly (`max-sigma`). The filter has to
+bridge them.
 
-For an ekf, link `pendulum-angle`, `age` and `new` to a measurement, its `-age` and its `-new`. `new` is TRUE in one cycle per frame; the filter compensates the
-latency. `valid` becomes FALSE if the newest frame does not contain the pendulum or is older than `max-age-ms`; after
-`lost-time` without it a fault is raised once, for `show fault` and the safety chain.
+For an ekf, link `pendulum-angle`, `age` and `new` to a measurement, its `-age` and its `-new`.
+`new` is TRUE in one cycle per frame; the filter compensates the latency. `valid` becomes FALSE if
+the newest frame does not contain the pendulum or is older than `max-age-ms`; after `lost-time`
+without it a fault is raised once, for `show fault` and the safety chain.
 
     loadrt vision_scene show=furuta
     loadrt vision_pendulum source=sim:furuta

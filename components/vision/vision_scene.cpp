@@ -204,21 +204,25 @@ public:
 HAL_COMPONENT(
     VisionScene, "vision_scene",
     "Simulated camera: a Furuta pendulum, a floor with bottles, cans and a line, or markers", R"(
-Simulates a camera and its scene. Link the pins to the plant of the netlist; the vision components read the frames with
-`source=sim:NAME`, where NAME is `camera=`, or by default `show=`. Frames are a function of the runtime's clock and of `seed`: on the virtual
-clock the same netlist renders the same frames.
+Simulates a camera and its scene. Link the pins to the plant of the netlist; the vision components
+read the frames with `source=sim:NAME`, where NAME is `camera=`, or by default `show=`. Frames are a
+function of the runtime's clock and of `seed`: on the virtual clock the same netlist renders the
+same frames.
 
-A frame is due every 1/fps s. It is the mean of the scene during `exposure`, its timestamp is the middle of the exposure,
-and it arrives `delay` after the end of the exposure.
+A frame is due every 1/fps s. It is the mean of the scene during `exposure`, its timestamp is the
+middle of the exposure, and it arrives `delay` after the end of the exposure.
 
-**furuta.** The camera stands `distance` from the motor's axis, `camera_height` above the arm, and looks at where they meet. The arm is
-0.2 m long, the pendulum 0.3 m; a red ball marks the pendulum's pivot and a green one its end.
+**furuta.** The camera stands `distance` from the motor's axis, `camera_height` above the arm, and
+looks at where they meet. The arm is 0.2 m long, the pendulum 0.3 m; a red ball marks the pendulum's
+pivot and a green one its end.
 
-**floor.** The camera is above the robot's middle, `camera_height` above the floor, and looks forward and down by `pitch`. Bottles are
-green, 60 mm in diameter and 200 mm high; cans are red, 66 mm and 115 mm.
+**floor.** The camera is above the robot's middle, `camera_height` above the floor, and looks
+forward and down by `pitch`. Bottles are green, 60 mm in diameter and 200 mm high; cans are red, 66
+mm and 115 mm.
 
-**markers.** ArUco markers of the dictionary 4x4_50 with a white border; their poses are seen from the camera: x to the right, y down, z
-away; the rotation is yaw after pitch after roll, each about an axis of the camera.
+**markers.** ArUco markers of the dictionary 4x4_50 with a white border; their poses are seen from
+the camera: x to the right, y down, z away; the rotation is yaw after pitch after roll, each about
+an axis of the camera.
 
     loadrt vision_scene show=furuta fps=100
     addf vision-scene.0.update servo

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A line in memory: what one user sends arrives at all others, a character at a time. Two users that
-// send at the same time destroy each other's characters, and a user with another baud rate or parity
-// receives other characters.
+// A line in memory: what one user sends arrives at all others, a character at a time. Two users
+// that send at the same time destroy each other's characters, and a user with another baud rate or
+// parity receives other characters.
 #include "sim_line.hpp"
 
 #include <algorithm>

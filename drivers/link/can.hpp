@@ -110,7 +110,8 @@ enum ErrorClass : std::uint32_t {
 std::uint8_t length_of_code(unsigned code) noexcept;
 std::uint8_t code_of_length(std::size_t length) noexcept;
 
-/// A filter that passes frames of one kind with (frame id & mask) == (id & mask). A link without filters passes everything.
+/// A filter that passes frames of one kind with (frame id & mask) == (id & mask). A link without
+/// filters passes everything.
 struct Filter {
     std::uint32_t id = 0;
     std::uint32_t mask = 0;

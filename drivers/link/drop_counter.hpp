@@ -10,10 +10,10 @@
 
 namespace hal::link {
 
-/// Reads the kernel's counter (SO_MEMINFO) while a backlog is received: a queue that was full is one.
-/// The counter that frames carry (SO_RXQ_OVFL) is that of the time when each was queued, so the drops
-/// behind the last queued frame would be unknown until another frame arrives. Used by the receiving
-/// thread.
+/// Reads the kernel's counter (SO_MEMINFO) while a backlog is received: a queue that was full is
+/// one. The counter that frames carry (SO_RXQ_OVFL) is that of the time when each was queued, so
+/// the drops behind the last queued frame would be unknown until another frame arrives. Used by the
+/// receiving thread.
 class DropCounter {
 public:
     /// Call after each receive call. `frames`: how many it returned; `drained`: the queue was empty

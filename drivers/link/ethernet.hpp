@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // The seam to every Ethernet segment: frames, launch times, timestamps, link state, statistics. An
 // address picks the driver:
-// `eth:enp3s0` a real interface, `sim:NAME` a segment in memory with exact wire times, `udp:HOST` frames in UDP datagrams, `replay:FILE` a
-// capture. A user of `sim:NAME` is a station of its own; all users of `sim:NAME/STATION` share that
-// station's line and address, as the users of one interface do.
+// `eth:enp3s0` a real interface, `sim:NAME` a segment in memory with exact wire times, `udp:HOST`
+// frames in UDP datagrams, `replay:FILE` a capture. A user of `sim:NAME` is a station of its own;
+// all users of `sim:NAME/STATION` share that station's line and address, as the users of one
+// interface do.
 //
 //     auto opened = hal::ethernet::open("eth:enp3s0", {.types = {0x9021}});   // [setup]
 //     if (!opened) throw std::runtime_error(opened.problem);
@@ -207,8 +208,8 @@ struct Opened {
 
 /// Opens `DRIVER:PLACE` or `DRIVER:PLACE?key=value&…`: `speed=100`, `policy=block`, `spin=50us`,
 /// `mac=02:00:00:00:00:07`,
-/// `pacer`, `priority=80`, `cpu=1`, `promiscuous`, `txstamps`, `sendqueue=64`, `receivequeue=256`, `forward=2us`, `noise=1us`. They take
-/// precedence over `options`. [setup]
+/// `pacer`, `priority=80`, `cpu=1`, `promiscuous`, `txstamps`, `sendqueue=64`, `receivequeue=256`,
+/// `forward=2us`, `noise=1us`. They take precedence over `options`. [setup]
 Opened open(std::string_view address, const Options& options = {});
 /// Describes the port that open() would return, as far as the address determines it, without
 /// opening it. `transport` is empty for an unknown driver. [setup]

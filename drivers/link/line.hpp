@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The seam to every line of bytes: serial lines, TCP connections, a line in memory. An address picks
-// the driver. Code above this header does not know the kind of line; this header does not know the
-// protocol of the bytes.
+// The seam to every line of bytes: serial lines, TCP connections, a line in memory. An address
+// picks the driver. Code above this header does not know the kind of line; this header does not
+// know the protocol of the bytes.
 //
 // Lines are used by threads that are not real time: a call never waits, but it may enter the kernel
 // or take a lock.

@@ -48,7 +48,8 @@ public:
     virtual ~Responder() = default;
     /// Takes a frame whose first bit arrived at `first_bit_ns`; replies by send() of any port, with
     /// Launch::at_ns from `first_bit_ns` on and
-    /// `first_bit_ns` as the time. `frame` may be changed; it is valid during the call only. [realtime] on the thread that works the segment
+    /// `first_bit_ns` as the time. `frame` may be changed; it is valid during the call only.
+    /// [realtime] on the thread that works the segment
     virtual void arrived(std::span<std::uint8_t> frame, std::int64_t first_bit_ns) noexcept = 0;
 };
 

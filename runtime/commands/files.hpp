@@ -19,7 +19,8 @@ std::vector<std::string> netlist_places(const std::string& name, const std::stri
 /// Reads the first readable file and sets `path` to it. False: `problem` is the reason.
 bool read_netlist(const std::string& name, const std::string& directory, std::string& path,
                   std::string& text, std::string& problem);
-/// `~` and `~/…` become the home directory; a relative path is taken from `directory` unless that is empty.
+/// `~` and `~/…` become the home directory; a relative path is taken from `directory` unless that
+/// is empty.
 std::string resolve_path(const std::string& path, const std::string& directory);
 /// The one name of the file, whatever way leads to it; `path` itself when it does not exist.
 std::string canonical_path(const std::string& path);

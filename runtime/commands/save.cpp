@@ -126,8 +126,8 @@ std::optional<std::string> elements_of(std::string_view list,
     return text;
 }
 
-/// Returns the value that an argument has for what remains of its load; nothing when these instances
-/// are made without it.
+/// Returns the value that an argument has for what remains of its load; nothing when these
+/// instances are made without it.
 std::optional<std::string> value_for(const LoadArgument& argument,
                                      const std::vector<const Instance*>& instances) {
     switch (argument.use) {

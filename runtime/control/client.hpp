@@ -40,8 +40,8 @@ public:
     const std::string& closed_because() const;
     /// Receives what a waiting command reports meanwhile; without it these reports are dropped.
     void on_notice(std::function<void(std::string_view)> take);
-    /// After fork(), in the child: closes its copy of the socket, so that the end of the parent ends
-    /// the connection. No lock is taken.
+    /// After fork(), in the child: closes its copy of the socket, so that the end of the parent
+    /// ends the connection. No lock is taken.
     void close_in_child();
     int fd() const;  ///< for poll(); readable when next_event() may have something
     /// A non-blocking descriptor (for example a signalfd) that becomes readable when the user wants
@@ -69,7 +69,8 @@ public:
 
     struct Answer {
         int status = 1;
-        /// False: the instance did not execute it, or the connection was lost; `err` has the reason.
+        /// False: the instance did not execute it, or the connection was lost; `err` has the
+        /// reason.
         bool executed = false;
         std::string out, err;
         bool quit = false;  ///< the command was quit or exit

@@ -25,8 +25,8 @@ public:
     const Clients& all() const { return clients_; }
     /// Returns the number of clients with or without a place.
     std::size_t count(bool placed) const;
-    /// Returns true when requests of this client are read: it has few replies pending, and space for
-    /// another request.
+    /// Returns true when requests of this client are read: it has few replies pending, and space
+    /// for another request.
     bool listens_to(const ServedClient& client) const;
 
     /// Sends what the client reads at once. Disconnects a client that reads nothing for too long.

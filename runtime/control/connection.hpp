@@ -25,7 +25,8 @@ class Shell;
 
 class Connection {
 public:
-    /// `shell` is the program's own; the connection has a sibling of it. `peer` is the client's process.
+    /// `shell` is the program's own; the connection has a sibling of it. `peer` is the client's
+    /// process.
     Connection(Shell& shell, pid_t peer);
     ~Connection();  ///< forgets an open `begin`; a component registered by the client is gone
     Connection(const Connection&) = delete;
@@ -68,8 +69,8 @@ public:
     /// Where lines go that a command which waits has for the client meanwhile; called in the thread
     /// that is in handle().
     void on_event(std::function<void(std::string line)> take);
-    /// Keeps the connection for commands: it is beyond the `max_clients` that may have components. 0
-    /// makes it an ordinary one. [any]
+    /// Keeps the connection for commands: it is beyond the `max_clients` that may have components.
+    /// 0 makes it an ordinary one. [any]
     void reserve(std::size_t max_clients);
     /// True while nothing depends on this connection: no request being executed, no subscription,
     /// no component, no open `begin`. Never waits; may be false while the session's lock is held.

@@ -71,8 +71,8 @@ bool Endpoint::open(std::string_view name, const std::string& group, Diagnostics
     return false;
 }
 
-/// Makes the folder if needed. It must be ours, and nobody else may write to it: a socket in it gives
-/// full control of a machine.
+/// Makes the folder if needed. It must be ours, and nobody else may write to it: a socket in it
+/// gives full control of a machine.
 bool Endpoint::prepare_folder(const std::string& folder, Diagnostics& diagnostics) {
     if (mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
         diagnostics.error("no-socket", {},

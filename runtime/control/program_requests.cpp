@@ -422,7 +422,8 @@ public:
     std::uint64_t writable() const {
         return readable() + 1 < capacity() ? capacity() - 1 - readable() : 0;
     }
-    /// Appends `count` bytes in hexadecimal; removes them unless `peek`. False when there are fewer.
+    /// Appends `count` bytes in hexadecimal; removes them unless `peek`. False when there are
+    /// fewer.
     bool read(std::uint64_t count, bool peek, std::string& hex) {
         if (!port_ || count > readable()) return false;
         for (std::uint64_t i = 0; i < count; ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a function changes in the process around it: the reasons of faults HAL_FAULT_VIOLATION, which
-// are compared by their addresses.
+// What a function changes in the process around it: the reasons of faults HAL_FAULT_VIOLATION,
+// which are compared by their addresses.
 #pragma once
 
 namespace hal::violation {

@@ -38,8 +38,8 @@ public:
     void back() const;
 
 private:
-    /// An object the model keeps (at `kept` of the old row) and its declaration in the new version (at
-    /// `fresh` of the new row).
+    /// An object the model keeps (at `kept` of the old row) and its declaration in the new version
+    /// (at `fresh` of the new row).
     struct Pair {
         std::size_t fresh, kept;
     };

@@ -25,7 +25,8 @@ public:
     // --- functions and threads ---
     Thread* add_thread(Word name, const ThreadOptions& options);
     bool remove_thread(Word name);
-    /// `position` as addf has it: appended (-1 or none), n from the front, -n from the end, never 0.
+    /// `position` as addf has it: appended (-1 or none), n from the front, -n from the end, never
+    /// 0.
     bool add_function(Word function, Word thread, int position, Span position_at, bool init);
     bool remove_function(Word function, Word thread);
     void take_from_thread(LoadedFunction& function);

@@ -80,11 +80,11 @@ std::vector<Command> parse(const Sources& sources, std::uint32_t source,
 /// Ranges in the first argument (the thing the command is about) make a command per name, other
 /// arguments' ranges run along with it and must have as many names; where the first argument has
 /// none, ranges stand for the list of names, in place.
-/// `net j[0..2]-cmd traj.[0..2].out => pid.[0..2].command` is three commands, `net on s.on => pid.{x,y}.enable` is one.
-/// In `key=value` they stand for a comma list: `names={x,y}-pid` is `names=x-pid,y-pid`. Several in
-/// one word are combined, the last one running fastest. What stands between quotes is left alone,
-/// and so is all of print, echo, help, loadusr, source and save. A faulty command gives none, and
-/// an error.
+/// `net j[0..2]-cmd traj.[0..2].out => pid.[0..2].command` is three commands,
+/// `net on s.on => pid.{x,y}.enable` is one. In `key=value` they stand for a comma list:
+/// `names={x,y}-pid` is `names=x-pid,y-pid`. Several in one word are combined, the last one running
+/// fastest. What stands between quotes is left alone, and so is all of print, echo, help, loadusr,
+/// source and save. A faulty command gives none, and an error.
 std::vector<Command> expand(const Command& command, Diagnostics& diagnostics);
 
 /// A command of words that were separated before: one-shot commands of a command line. Nothing in

@@ -60,7 +60,8 @@ struct FiniteCheck {
 /// A triple buffer of values from one thread to another. Written at the end of the writer's cycle,
 /// taken at the start of the reader's; the reader sees whole finished cycles only.
 ///
-/// `middle` holds the index of the buffer that is nobody's, plus `fresh` when the writer has put a newer one there.
+/// `middle` holds the index of the buffer that is nobody's, plus `fresh` when the writer has put a
+/// newer one there.
 ///   1. writer fills back       2. writer swaps back <-> middle|fresh       (release)
 ///   3. reader sees fresh       4. reader swaps front <-> middle            (acquire)
 /// If 2 happens again between 3 and 4, the reader gets the newer buffer; writer and reader never

@@ -16,8 +16,8 @@
 
 namespace hal::tools {
 
-/// The history of the shell: a line per command, in the user's state folder, appended to at once, so
-/// that several shells share it.
+/// The history of the shell: a line per command, in the user's state folder, appended to at once,
+/// so that several shells share it.
 class HistoryFile {
 public:
     static constexpr std::size_t max = 2000;

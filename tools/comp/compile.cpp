@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal compile FILE…`: a plugin from one source file, installed where the runtime looks. A kind of file is a row of the table.
+// `hal compile FILE…`: a plugin from one source file, installed where the runtime looks. A kind of
+// file is a row of the table.
 #include "comp/compile.hpp"
 
 #include <algorithm>

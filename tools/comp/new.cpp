@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal new component NAME`: a component that compiles and has a test, in a folder of its own outside of the tree.
-// `hal new machine NAME`: a machine that runs and has a test.
+// `hal new component NAME`: a component that compiles and has a test, in a folder of its own
+// outside of the tree. `hal new machine NAME`: a machine that runs and has a test.
 #include "comp/new.hpp"
 
 #include <algorithm>

@@ -25,8 +25,8 @@ struct NewMachine {
 /// The buses that a new machine can have: none, canopen, ethercat.
 std::vector<std::string_view> machine_buses();
 
-/// Returns the netlist, its INI file, the configuration of the bus, a test with its expected output,
-/// and a README. `machine.bus` is one of machine_buses(). [setup]
+/// Returns the netlist, its INI file, the configuration of the bus, a test with its expected
+/// output, and a README. `machine.bus` is one of machine_buses(). [setup]
 std::vector<NewFile> machine_files(const NewMachine& machine);
 
 }  // namespace hal::tools

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal doc [COMPONENT]`: the manual page of a component, derived from its declarations; without a name, all components.
-// `hal doc --all --output DIR`: the pages of all of them, with an index.
+// `hal doc [COMPONENT]`: the manual page of a component, derived from its declarations; without a
+// name, all components. `hal doc --all --output DIR`: the pages of all of them, with an index.
 #include "doc/doc.hpp"
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal doctor`: what on this machine prevents real time, remedies to type, and the measured wake-up jitter.
+// `hal doctor`: what on this machine prevents real time, remedies to type, and the measured wake-up
+// jitter.
 #include "inspect/doctor.hpp"
 
 #include <algorithm>

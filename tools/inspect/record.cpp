@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal record` and halsampler: the samples of a sampler as text. Values without a sampler: record/recorder.hpp.
+// `hal record` and halsampler: the samples of a sampler as text. Values without a sampler:
+// record/recorder.hpp.
 #include "inspect/record.hpp"
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal shell` and `halcmd`: the client of the control socket. One-shot commands must start quickly: they create no session.
+// `hal shell` and `halcmd`: the client of the control socket. One-shot commands must start quickly:
+// they create no session.
 #include "inspect/shell.hpp"
 
 #include <csignal>
@@ -42,8 +43,8 @@ int show(const RemoteShellOptions& options, const Client::Answer& answer) {
 constexpr std::string_view watch_help =
     "watch NAME…            show values live, with minimum, maximum and rate; q ends it\n";
 
-/// `watch NAME…` is a command of this program, which is `hal watch` with the same names; `help watch` describes it. Returns nothing
-/// for another command.
+/// `watch NAME…` is a command of this program, which is `hal watch` with the same names;
+/// `help watch` describes it. Returns nothing for another command.
 std::optional<int> run_own(const RemoteShellOptions& options, const Client& client,
                            std::string_view line) {
     std::istringstream words{std::string(line)};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal tdma ping`: measures the round-trip time to a station of a segment. The machine sends the ping in its own slot; this program requests it
-// through a pin and reads the result from others.
+// `hal tdma ping`: measures the round-trip time to a station of a segment. The machine sends the
+// ping in its own slot; this program requests it through a pin and reads the result from others.
 #include "inspect/tdma_ping.hpp"
 
 #include <algorithm>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal top`: all instances, their threads and faults; of this machine through their control sockets, of others through DDS where it is installed.
+// `hal top`: all instances, their threads and faults; of this machine through their control
+// sockets, of others through DDS where it is installed.
 #include "inspect/top.hpp"
 
 #include <algorithm>

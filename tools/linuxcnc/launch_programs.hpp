@@ -13,7 +13,8 @@
 
 namespace hal::tools {
 
-/// Programs of a configuration, with or without a component, and what these leave behind. For the thread of Launch: every call takes the session's lock itself.
+/// Programs of a configuration, with or without a component, and what these leave behind. For the
+/// thread of Launch: every call takes the session's lock itself.
 class LaunchPrograms {
 public:
     struct Program {

@@ -12,7 +12,8 @@ namespace hal::tools {
 
 class TaskWatch {
 public:
-    /// `nml`: the NML configuration that names the buffer; `timeout_ns`: longest time between two cycles, 0: not watched.
+    /// `nml`: the NML configuration that names the buffer; `timeout_ns`: longest time between two
+    /// cycles, 0: not watched.
     TaskWatch(std::string nml, std::int64_t timeout_ns)
         : nml_(std::move(nml)), timeout_ns_(timeout_ns) {}
     ~TaskWatch();

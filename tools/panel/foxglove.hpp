@@ -18,7 +18,8 @@ class PanelServer;
 
 class FoxgloveClient : public WebClient, ControlLink::User {
 public:
-    /// `browser`: the connection has an origin, which was checked. `token`: from the address (?t=…); empty without one.
+    /// `browser`: the connection has an origin, which was checked. `token`: from the address
+    /// (?t=…); empty without one.
     FoxgloveClient(PanelServer& server, lws* wsi, bool browser, const std::string& token);
 
     void tick(std::int64_t now_ms) override;

@@ -35,7 +35,8 @@ struct PanelLayout {
 
 /// Reads a `.panel` text or, when it begins with `<`, a PyVCP file; files that it includes are
 /// relative to its folder.
-/// `component`: the name of the component; empty: by the file. Appends errors as they are printed to `errors`.
+/// `component`: the name of the component; empty: by the file. Appends errors as they are printed
+/// to `errors`.
 PanelLayout read_panel_file(const std::string& path, const std::string& component,
                             std::string& errors);
 /// The same for a text. `name` is the file in messages.

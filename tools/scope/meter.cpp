@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal meter NAME`: one value of a running instance in large digits; a line per value when the output is not a terminal.
+// `hal meter NAME`: one value of a running instance in large digits; a line per value when the
+// output is not a terminal.
 #include "scope/meter.hpp"
 
 #include <chrono>

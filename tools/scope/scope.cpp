@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal scope`: an oscilloscope for a running instance, in the terminal or writing one record to files.
+// `hal scope`: an oscilloscope for a running instance, in the terminal or writing one record to
+// files.
 #include "scope/scope.hpp"
 
 #include <algorithm>

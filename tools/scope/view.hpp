@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the scope's keys change: scales, cursors, trigger, time window. Knows no terminal: tests give
-// it keys and read its lines.
+// What the scope's keys change: scales, cursors, trigger, time window. Knows no terminal: tests
+// give it keys and read its lines.
 #pragma once
 
 #include <cstdint>

@@ -72,8 +72,8 @@ struct ValueRemark {
     std::string sentence;
     std::string help;
 };
-/// Returns what is invalid or doubtful about the value `text` of the data type `type`. `it` names the
-/// value: "'DefaultValue' of 6207:1".
+/// Returns what is invalid or doubtful about the value `text` of the data type `type`. `it` names
+/// the value: "'DefaultValue' of 6207:1".
 std::optional<ValueRemark> remark_on_value(const std::string& it, const std::string& text,
                                            std::uint16_t type);
 

@@ -100,11 +100,13 @@ private:
 }  // namespace
 
 HAL_COMPONENT(CanBridge, "can_bridge", "Forwards CAN frames between two buses", R"(
-Forwards every frame received on one bus to the other, in both directions; at most 64 frames per direction and cycle, so put `update` into
-a thread as fast as the buses need. Frames keep identifier, length and data; timing and arbitration are those of each bus.
+Forwards every frame received on one bus to the other, in both directions; at most 64 frames per
+direction and cycle, so put `update` into a thread as fast as the buses need. Frames keep
+identifier, length and data; timing and arbitration are those of each bus.
 
-A `sim:` bus lives in the memory of its machine. A bridge makes it reachable for `hal can`, python-can and other programs while the
-machine runs; here over the UDP multicast group that those tools use by default:
+A `sim:` bus lives in the memory of its machine. A bridge makes it reachable for `hal can`,
+python-can and other programs while the machine runs; here over the UDP multicast group that those
+tools use by default:
 
     loadrt canopen_io link=sim:arm id=5 start_by_itself=1
     loadrt can_bridge a=sim:arm b=udp:239.74.163.2:43113
@@ -114,6 +116,6 @@ machine runs; here over the UDP multicast group that those tools use by default:
 
     hal can scan udp:239.74.163.2:43113
 
-With `read-only`, programs on bus b can watch bus a but not send to it. Two bridges between the same two buses would forward each frame in
-an endless loop.
+With `read-only`, programs on bus b can watch bus a but not send to it. Two bridges between the same
+two buses would forward each frame in an endless loop.
 )")

@@ -429,8 +429,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Canopen, "canopen", "CANopen master: nodes of a CAN bus as pins", R"(
-Boots the nodes of a network, monitors them, and exchanges process data with them in every cycle. A configuration file beside the netlist,
-`axis.canopen`, lists the nodes of the bus, the objects that become pins and the PDOs that carry them:
+Boots the nodes of a network, monitors them, and exchanges process data with them in every cycle. A
+configuration file beside the netlist, `axis.canopen`, lists the nodes of the bus, the objects that
+become pins and the PDOs that carry them:
 
 ```
 [bus]
@@ -454,24 +455,29 @@ addf canopen.0.transmit servo-thread -1
 net x-status canopen.0.x.statusword => …
 ```
 
-Every object that a PDO carries is a pin below the node's name, named as in the device description. Objects the node sends are output
-pins, objects it receives are input pins. `receive`, at the beginning of the cycle, updates the output pins with everything received since
-the last cycle; `transmit`, at its end, sends the SYNC and the input pins of this cycle. While a node is not operational, the master sends
-it safe values: quick stop in controlwords, 0 for speeds, torques and digital outputs, the last value for everything else. On `stop`,
-`unload`, a fault of the thread or the end of the process, the master sends the safe values at once and commands the nodes to leave the
-operational state. When the thread runs again it boots the network; an axis needs another edge of its `enable`.
+Every object that a PDO carries is a pin below the node's name, named as in the device description.
+Objects the node sends are output pins, objects it receives are input pins. `receive`, at the
+beginning of the cycle, updates the output pins with everything received since the last cycle;
+`transmit`, at its end, sends the SYNC and the input pins of this cycle. While a node is not
+operational, the master sends it safe values: quick stop in controlwords, 0 for speeds, torques and
+digital outputs, the last value for everything else. On `stop`, `unload`, a fault of the thread or
+the end of the process, the master sends the safe values at once and commands the nodes to leave the
+operational state. When the thread runs again it boots the network; an axis needs another edge of
+its `enable`.
 
-With `sync = follow` all threads of the machine are synchronised to the SYNC of another node (see `show thread`); with
-`flying-master = medium` several masters share a network and one of them is active. docs/canopen-configuration.md is the reference.
+With `sync = follow` all threads of the machine are synchronised to the SYNC of another node (see
+`show thread`); with `flying-master = medium` several masters share a network and one of them is
+active. docs/canopen-configuration.md is the reference.
 
-The loss of a node raises a fault (`show fault`) and sets its pin `fault`. The master boots the node again when it returns; the other nodes
-keep running.
+The loss of a node raises a fault (`show fault`) and sets its pin `fault`. The master boots the node
+again when it returns; the other nodes keep running.
 
 A single node needs no file; its objects are given by index:
 
     loadrt canopen inputs=24831 outputs=24675,25600 slavenodeid=2 masternodeid=1
     addf canopen.0.update servo-thread
 
-Pins are named by the indices as written. `inputs` are sent to the node, `outputs` are received from it, and there is one function,
-`update`. Several such instances share a bus if they have the same `link=`.
+Pins are named by the indices as written. `inputs` are sent to the node, `outputs` are received from
+it, and there is one function, `update`. Several such instances share a bus if they have the same
+`link=`.
 )")

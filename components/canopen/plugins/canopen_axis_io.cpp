@@ -116,17 +116,21 @@ private:
 
 HAL_COMPONENT(CanopenAxisIo, "canopen_axis_io",
               "Simulated CANopen axis with its control loop closed over the bus", R"(
-The remote end of a control loop over the bus, for machines without the hardware: a node with a pulse-width amplifier, two 16-bit encoder
-counters, four outputs and an input, and the simulated plant behind it. The controller is in the master's netlist. The node samples both
-counters at every SYNC; received set-points take effect at once. Its states are those of CiA 402 (controlword 6040h, statusword 6041h), so
-the component `cia402` with `mode` 4 and `counter-bits` 16 controls them; a motor that is not on carries no current.
-RPDO 1 carries the controlword, 2100h PWM set-point (-32767..32767) and 2103h outputs; TPDO 1 the statusword, 2101h and 2102h (counts of
-both encoders) and 2104h inputs. 2105h is the current in mA. When `2110h` SYNC periods (1006h; usually 3) pass without a SYNC or a set-point,
-the motor is switched off with fault 8700h. Fault 7305h is a broken encoder; with 2111h = 1 an open input is fault 9000h.
+The remote end of a control loop over the bus, for machines without the hardware: a node with a
+pulse-width amplifier, two 16-bit encoder counters, four outputs and an input, and the simulated
+plant behind it. The controller is in the master's netlist. The node samples both counters at every
+SYNC; received set-points take effect at once. Its states are those of CiA 402 (controlword 6040h,
+statusword 6041h), so the component `cia402` with `mode` 4 and `counter-bits` 16 controls them; a
+motor that is not on carries no current. RPDO 1 carries the controlword, 2100h PWM set-point
+(-32767..32767) and 2103h outputs; TPDO 1 the statusword, 2101h and 2102h (counts of both encoders)
+and 2104h inputs. 2105h is the current in mA. When `2110h` SYNC periods (1006h; usually 3) pass
+without a SYNC or a set-point, the motor is switched off with fault 8700h. Fault 7305h is a broken
+encoder; with 2111h = 1 an open input is fault 9000h.
 
-`plant=axis` is a slide on a screw of 5 mm pitch. `plant=furuta` is the Furuta pendulum, with the arm on the first encoder, the pendulum on
-the second and the contact under the base at the input. On a `sim:` bus the node answers in the cycle of `update` that receives the request.
-`hal node axis-io` runs the same device as a process; `hal node axis-io --eds` prints its EDS.
+`plant=axis` is a slide on a screw of 5 mm pitch. `plant=furuta` is the Furuta pendulum, with the
+arm on the first encoder, the pendulum on the second and the contact under the base at the input. On
+a `sim:` bus the node answers in the cycle of `update` that receives the request. `hal node axis-io`
+runs the same device as a process; `hal node axis-io --eds` prints its EDS.
 
     loadrt canopen_axis_io link=cane:sim:rig id=2 plant=furuta
     addf canopen-axis-io.0.update servo

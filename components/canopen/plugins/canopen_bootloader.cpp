@@ -70,13 +70,15 @@ private:
 
 HAL_COMPONENT(CanopenBootloader, "canopen_bootloader",
               "Simulated CANopen device with a boot loader for program download", R"(
-Objects 1F50h (program data), 1F51h (program control: 0 stop, 1 start, 2 reset, 3 clear), 1F56h (software identification: the CRC-32 of
-the image) and 1F57h (flash status) of CiA 302. To update the program a master stops it, clears the flash, waits until 1F57h is not busy,
-writes the image and starts it. The device then boots with the revision number (1018h:3) and software version (100Ah) of the new program.
+Objects 1F50h (program data), 1F51h (program control: 0 stop, 1 start, 2 reset, 3 clear), 1F56h
+(software identification: the CRC-32 of the image) and 1F57h (flash status) of CiA 302. To update
+the program a master stops it, clears the flash, waits until 1F57h is not busy, writes the image and
+starts it. The device then boots with the revision number (1018h:3) and software version (100Ah) of
+the new program.
 
-An image is a 20-byte header followed by the program. The header is `HLCP`, product code 0x302, version, length and CRC-32 of the program,
-all little endian.
-`hal node bootloader --make-image 2.1` prints one.
+An image is a 20-byte header followed by the program. The header is `HLCP`, product code 0x302,
+version, length and CRC-32 of the program, all little endian. `hal node bootloader --make-image 2.1`
+prints one.
 
     loadrt canopen_bootloader link=sim:arm id=4
     addf canopen-bootloader.0.update servo

@@ -109,16 +109,18 @@ private:
 
 HAL_COMPONENT(CanopenDrive, "canopen_drive", "Simulated CANopen drive (CiA 402), up to eight axes",
               R"(
-A servo drive on a CAN bus with its motors simulated, for machines without the hardware: the state machine and all modes of CiA 402 (pp, vl,
-pv, tq, hm, ip, csp, csv, cst), homing methods 1 to 37, touch probes, limits, brakes and faults. The objects of axis n are at +0x800 n, its
-PDOs at +64 n.
+A servo drive on a CAN bus with its motors simulated, for machines without the hardware: the state
+machine and all modes of CiA 402 (pp, vl, pv, tq, hm, ip, csp, csv, cst), homing methods 1 to 37,
+touch probes, limits, brakes and faults. The objects of axis n are at +0x800 n, its PDOs at +64 n.
 
-`motor` sets motor parameters as NAME:VALUE, in SI units and encoder increments: `motor=inertia:1e-4,endless:1` is a wheel. Names:
-resolution, endless, inertia, viscous-friction, coulomb-friction, rated-torque, peak-torque, rated-current, rated-voltage, highest-speed,
-start, negative-limit, positive-limit, negative-stop, positive-stop, home-from, home-to, brake-torque.
+`motor` sets motor parameters as NAME:VALUE, in SI units and encoder increments:
+`motor=inertia:1e-4,endless:1` is a wheel. Names: resolution, endless, inertia, viscous-friction,
+coulomb-friction, rated-torque, peak-torque, rated-current, rated-voltage, highest-speed, start,
+negative-limit, positive-limit, negative-stop, positive-stop, home-from, home-to, brake-torque.
 
-On a `sim:` bus the drive answers in the cycle of `update` that receives the request: put `update` into a thread as fast as the bus needs.
-`hal node drive` runs the same device as a process; `hal node drive --eds` prints its EDS.
+On a `sim:` bus the drive answers in the cycle of `update` that receives the request: put `update`
+into a thread as fast as the bus needs. `hal node drive` runs the same device as a process;
+`hal node drive --eds` prints its EDS.
 
     loadrt canopen_drive link=sim:arm id=2 axes=2
     addf canopen-drive.0.update servo

@@ -67,16 +67,20 @@ private:
 }  // namespace
 
 HAL_COMPONENT(CanopenIo, "canopen_io", "Simulated CANopen I/O node (CiA 401)", R"(
-A node with digital and analogue inputs and outputs on a CAN bus, a simulated bus coupler for machines without the hardware. The terminals
-are pins; the objects are those of CiA 401: polarity, input filter, interrupt masks, limits and deltas, error modes and error values. By
-default RPDO 1 carries the digital outputs, RPDO 2 to 4 the analogue outputs; TPDO 1 carries the digital inputs and is sent when one
-changes, TPDO 2 to 4 carry the analogue inputs and are sent on change only when object 6423h is true.
+A node with digital and analogue inputs and outputs on a CAN bus, a simulated bus coupler for
+machines without the hardware. The terminals are pins; the objects are those of CiA 401: polarity,
+input filter, interrupt masks, limits and deltas, error modes and error values. By default RPDO 1
+carries the digital outputs, RPDO 2 to 4 the analogue outputs; TPDO 1 carries the digital inputs and
+is sent when one changes, TPDO 2 to 4 carry the analogue inputs and are sent on change only when
+object 6423h is true.
 
-Outputs take their error values (6206h, 6207h, 6443h, 6444h) when the node is stopped, on loss of a heartbeat it consumes (1016h) or of the
-master's life guarding, and on bus off. They keep them until they are written again.
+Outputs take their error values (6206h, 6207h, 6443h, 6444h) when the node is stopped, on loss of a
+heartbeat it consumes (1016h) or of the master's life guarding, and on bus off. They keep them until
+they are written again.
 
-On a `sim:` bus the node answers in the cycle of `update` that receives the request, so put `update` into a thread as fast as the bus needs.
-`hal node io` runs the same device as a process; `hal node io --eds` prints its EDS.
+On a `sim:` bus the node answers in the cycle of `update` that receives the request, so put `update`
+into a thread as fast as the bus needs. `hal node io` runs the same device as a process;
+`hal node io --eds` prints its EDS.
 
     loadrt canopen_io link=sim:arm id=5 start_by_itself=1
     addf canopen-io.0.update servo

@@ -73,17 +73,19 @@ private:
 
 HAL_COMPONENT(CanopenJr3, "canopen_jr3", "Simulated CANopen force/torque node with a JR3 sensor",
               R"(
-A six-axis force/torque sensor and the node that connects it to a CAN bus. The sensor sends its raw readings, its supply voltage and its
-calibration memory as a stream of 20-bit packets at 2.2 MHz. The node decodes the packets, decouples the readings with the 6 by 6 matrix
-of the calibration and serves forces and torques as objects of CiA 404.
+A six-axis force/torque sensor and the node that connects it to a CAN bus. The sensor sends its raw
+readings, its supply voltage and its calibration memory as a stream of 20-bit packets at 2.2 MHz.
+The node decodes the packets, decouples the readings with the 6 by 6 matrix of the calibration and
+serves forces and torques as objects of CiA 404.
 
-TPDO 1 and 2 carry the forces in 0.01 N, TPDO 3 and 4 the torques in 0.001 N*m: three INTEGER16 each, then a status byte and a sample
-counter. TPDO 2 and 4 are sent at each SYNC. TPDO 1 and 3 are sent when a value changes; they are disabled until a master writes their
-COB-ID without bit 31 to 1800h:1 and 1802h:1.
+TPDO 1 and 2 carry the forces in 0.01 N, TPDO 3 and 4 the torques in 0.001 N*m: three INTEGER16
+each, then a status byte and a sample counter. TPDO 2 and 4 are sent at each SYNC. TPDO 1 and 3 are
+sent when a value changes; they are disabled until a master writes their COB-ID without bit 31 to
+1800h:1 and 1802h:1.
 
-A load beyond the range of a channel saturates it: its reading is full scale, and the node sets the bits saturated and overload in 2201h
-and sends EMCY FF01h. A force or torque that is infinite is such a load; one that is NaN saturates all channels, since each depends on
-all six.
+A load beyond the range of a channel saturates it: its reading is full scale, and the node sets the
+bits saturated and overload in 2201h and sends EMCY FF01h. A force or torque that is infinite is
+such a load; one that is NaN saturates all channels, since each depends on all six.
 
     loadrt canopen_jr3 link=sim:arm id=0x50
     addf canopen-jr3.0.update servo

@@ -65,13 +65,16 @@ private:
 
 HAL_COMPONENT(CanopenSafeIo, "canopen_safe_io", "Simulated CANopen safety I/O node (EN 50325-5)",
               R"(
-Eight safety inputs, sent by SRDO 1, and eight safety outputs, received by SRDO 2, after EN 50325-5 (CiA 304). It implements the protocol
-for testing a machine and is not a certified safety device: do not rely on it for anyone's safety.
+Eight safety inputs, sent by SRDO 1, and eight safety outputs, received by SRDO 2, after EN 50325-5
+(CiA 304). It implements the protocol for testing a machine and is not a certified safety device: do
+not rely on it for anyone's safety.
 
-Both SRDOs are active once a master has configured them (`tsrdo1` and `rsrdo2` of its configuration). A changed input is sent at once,
-otherwise every refresh time. Any fault switches the outputs off: an SRDO that is late, incomplete, out of order or not inverted, or a
-global fail-safe command. They stay off until a rising edge of `acknowledge`, or until the node is started again. The faults no-srdo, srdo-half,
-srdo-wrong, srdo-order and late-srdo (load argument `faults=`) corrupt the SRDOs it sends.
+Both SRDOs are active once a master has configured them (`tsrdo1` and `rsrdo2` of its
+configuration). A changed input is sent at once, otherwise every refresh time. Any fault switches
+the outputs off: an SRDO that is late, incomplete, out of order or not inverted, or a global
+fail-safe command. They stay off until a rising edge of `acknowledge`, or until the node is started
+again. The faults no-srdo, srdo-half, srdo-wrong, srdo-order and late-srdo (load argument `faults=`)
+corrupt the SRDOs it sends.
     loadrt canopen_safe_io link=sim:cell id=7 faults=srdo-wrong
     addf canopen-safe-io.0.update servo
     start

@@ -80,8 +80,9 @@ private:
 
 HAL_COMPONENT(CanopenSync, "canopen_sync",
               "SYNC producer with a clock of its own on a simulated CAN bus", R"(
-Sends SYNC on a simulated bus by a clock of its own that drifts against the threads, like a remote node with another quartz. For testing
-masters with `sync = follow`: how they lock to the SYNC and what they do when it is lost.
+Sends SYNC on a simulated bus by a clock of its own that drifts against the threads, like a remote
+node with another quartz. For testing masters with `sync = follow`: how they lock to the SYNC and
+what they do when it is lost.
 
     loadrt canopen_sync link=sim:arm period_us=1000
     setp canopen-sync.0.skew-ppm 200

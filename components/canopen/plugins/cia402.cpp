@@ -374,46 +374,61 @@ private:
 
 HAL_COMPONENT(Cia402, "cia402",
               "One axis of a CiA 402 drive: states, modes, homing, units, supervision", R"(
-The master's side of a servo drive on any bus: the process data of the drive on one side, an axis in user units on the other. It tracks
-the state machine of the drive and steps it towards the commanded state, one transition per cycle.
+The master's side of a servo drive on any bus: the process data of the drive on one side, an axis in
+user units on the other. It tracks the state machine of the drive and steps it towards the commanded
+state, one transition per cycle.
 
-* `enable` steps the drive to *operation enabled*. If the drive does not make a transition within `step-timeout`, the axis is in fault and
-  `show fault` names the transition: `x: enable: drive stays in "switched on" after "enable operation" for 2 s`. FALSE brakes on the drive's
-  ramp and disables the axis; TRUE before that has finished enables it again.
-* While the axis is not enabled, the position sent to the drive is the measured one, so the axis does not jump when it is enabled. A drive that
-  is still in *operation enabled* keeps the last commanded position: the measured one would be a step back by the lag. Let
-  `position-cmd` track `position-fb` while `active` is FALSE. If the two differ at enabling by more than `max-step`, enabling is rejected;
-  with `max-step` 0, the difference is blended out over `blend-time`.
-* While `operational` is FALSE the controlword is quick stop: the feedback of the drive is lost, but it may still receive.
-* A fault (see the table) brakes with quick stop in the same cycle, disables the axis and stays until a rising edge of `reset`. After a fault, after
-  `quick-stop` and after the node was lost, `enable` needs another rising edge. At start-up and after a stop, `enable` waits until the node is operational.
-* When `read-all` or `write-all` has not run for 100 cycles of the other one, the axis is in fault and brakes with quick stop, and `show
-  fault` names the missing function. The fault of an axis that was off ends when both run again.
-* `keeps-power` is TRUE, and a fault is raised, when a drive does not obey: it is still in *operation enabled*, *quick stop active* or *fault
-  reaction active* after `stop-timeout` of a command to disable, or `step-timeout` of a quick stop. No further command is left then: connect the
-  pin to what removes the power by other means, such as a contactor. On CANopen, `restart` of the node is one more try: it resets the drive by NMT,
-  which does not depend on its PDOs. `keeps-power` stays TRUE until the drive is seen without power or is enabled again.
-* When the thread is stopped (`stop`, an exception, a hang, a suspended process), the axis is disabled without a fault. When the thread
-  runs again, the axis stays off until `enable` has another rising edge. `reload cia402` acts like such a stop and keeps a fault.
+* `enable` steps the drive to *operation enabled*. If the drive does not make a transition within
+  `step-timeout`, the axis is in fault and `show fault` names the transition:
+  `x: enable: drive stays in "switched on" after "enable operation" for 2 s`. FALSE brakes on the
+  drive's ramp and disables the axis; TRUE before that has finished enables it again.
+* While the axis is not enabled, the position sent to the drive is the measured one, so the axis
+  does not jump when it is enabled. A drive that is still in *operation enabled* keeps the last
+  commanded position: the measured one would be a step back by the lag. Let `position-cmd` track
+  `position-fb` while `active` is FALSE. If the two differ at enabling by more than `max-step`,
+  enabling is rejected; with `max-step` 0, the difference is blended out over `blend-time`.
+* While `operational` is FALSE the controlword is quick stop: the feedback of the drive is lost, but
+  it may still receive.
+* A fault (see the table) brakes with quick stop in the same cycle, disables the axis and stays
+  until a rising edge of `reset`. After a fault, after `quick-stop` and after the node was lost,
+  `enable` needs another rising edge. At start-up and after a stop, `enable` waits until the node is
+  operational.
+* When `read-all` or `write-all` has not run for 100 cycles of the other one, the axis is in fault
+  and brakes with quick stop, and `show fault` names the missing function. The fault of an axis that
+  was off ends when both run again.
+* `keeps-power` is TRUE, and a fault is raised, when a drive does not obey: it is still in
+  *operation enabled*, *quick stop active* or *fault reaction active* after `stop-timeout` of a
+  command to disable, or `step-timeout` of a quick stop. No further command is left then: connect
+  the pin to what removes the power by other means, such as a contactor. On CANopen, `restart` of
+  the node is one more try: it resets the drive by NMT, which does not depend on its PDOs.
+  `keeps-power` stays TRUE until the drive is seen without power or is enabled again.
+* When the thread is stopped (`stop`, an exception, a hang, a suspended process), the axis is
+  disabled without a fault. When the thread runs again, the axis stays off until `enable` has
+  another rising edge. `reload cia402` acts like such a stop and keeps a fault.
 * `mode` may change at any time; the command is followed once the drive displays the new mode.
-* `halt` brakes on the drive's ramp in modes 1 to 7. In the cyclic modes the target freezes, or drops to 0, at once: bring the command to
-  rest first.
-* `home` selects mode hm, starts homing as configured in the drive's objects 6098h, 6099h and 609Ah, waits for its end, and returns to
-  `mode`. Then `position-fb` is the position counted by the drive.
-* `position-fb` = counts * `position-scale-divisor` / `position-scale`; it does not wrap with the drive's counter.
+* `halt` brakes on the drive's ramp in modes 1 to 7. In the cyclic modes the target freezes, or
+  drops to 0, at once: bring the command to rest first.
+* `home` selects mode hm, starts homing as configured in the drive's objects 6098h, 6099h and 609Ah,
+  waits for its end, and returns to `mode`. Then `position-fb` is the position counted by the drive.
+* `position-fb` = counts * `position-scale-divisor` / `position-scale`; it does not wrap with the
+  drive's counter.
 
 The drive latches positions at its touch probes (60B8h to 60BDh) by itself, between two cycles:
 
-* `probe-1-enable` arms probe 1. At the first rising edge of its input, `probe-1-latched` becomes TRUE, and `probe-1-position` is the position of
-  the edge. `probe-1-falling` selects the falling edge, `probe-1-index` the index pulse of the encoder. With `probe-1-continuous`,
+* `probe-1-enable` arms probe 1. At the first rising edge of its input, `probe-1-latched` becomes
+  TRUE, and `probe-1-position` is the position of the edge. `probe-1-falling` selects the falling
+  edge, `probe-1-index` the index pulse of the encoder. With `probe-1-continuous`,
   `probe-1-position` follows each further edge. Probe 2 has the same pins.
-* A rising edge of `probe-1-enable` arms the probe again, and so does another selection. What was latched before does not count.
-* `probe-1-armed` stays FALSE while the drive does not report the probe as enabled. `touch-probe-function`, `touch-probe-status` and the positions
-  of the edges must be in the process data.
-* For LinuxCNC, link `probe-1-latched` to `motion.probe-input`. Motion takes the position of its own cycle; `probe-1-position` is the exact one.
+* A rising edge of `probe-1-enable` arms the probe again, and so does another selection. What was
+  latched before does not count.
+* `probe-1-armed` stays FALSE while the drive does not report the probe as enabled.
+  `touch-probe-function`, `touch-probe-status` and the positions of the edges must be in the process
+  data.
+* For LinuxCNC, link `probe-1-latched` to `motion.probe-input`. Motion takes the position of its own
+  cycle; `probe-1-position` is the exact one.
 
-Call `read-all` after the function that receives from the bus and `write-all` before the one that sends, with the controller of the axis
-between the two.
+Call `read-all` after the function that receives from the bus and `write-all` before the one that
+sends, with the controller of the axis between the two.
 
 
 | mode | name | follows |
@@ -447,14 +462,16 @@ between the two.
 | 14 | `write-all` does not run |
 | 15 | `read-all` does not run |
 
-`failed-step`: 0 wait, 1 shutdown, 2 switch on, 3 enable operation, 4 disable operation, 5 disable voltage, 6 quick stop, 7 fault reset.
-`state`: 0 not ready to switch on, 1 switch on disabled, 2 ready to switch on, 3 switched on, 4 operation enabled, 5 quick stop active,
-6 fault reaction active, 7 fault, 8 none of these.
+`failed-step`: 0 wait, 1 shutdown, 2 switch on, 3 enable operation, 4 disable operation, 5 disable
+voltage, 6 quick stop, 7 fault reset. `state`: 0 not ready to switch on, 1 switch on disabled, 2
+ready to switch on, 3 switched on, 4 operation enabled, 5 quick stop active, 6 fault reaction
+active, 7 fault, 8 none of these.
 
-Coming from LinuxCNC's component of the same name: `pos-cmd`, `pos-fb`, `velocity-cmd`, `opmode`, `opmode-display`,
-`drv-actual-position`, `drv-target-position`, `pos-scale` and `stat-*` are `position-cmd`, `position-fb`, `velocity-cmd`,
-`modes-of-operation`, `modes-of-operation-display`, `position-actual-value`, `target-position`, `position-scale`, and `state` with the
-related pins; `csp-mode` is `mode` 8 or 9.
+Coming from LinuxCNC's component of the same name: `pos-cmd`, `pos-fb`, `velocity-cmd`, `opmode`,
+`opmode-display`, `drv-actual-position`, `drv-target-position`, `pos-scale` and `stat-*` are
+`position-cmd`, `position-fb`, `velocity-cmd`, `modes-of-operation`, `modes-of-operation-display`,
+`position-actual-value`, `target-position`, `position-scale`, and `state` with the related pins;
+`csp-mode` is `mode` 8 or 9.
 
     loadrt cia402 names=x
     addf x.read-all servo

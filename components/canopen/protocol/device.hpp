@@ -4,8 +4,8 @@
 //
 //     Description d = basic_device({.vendor = 1, .product = 2, .heartbeat_ms = 100});
 //     d.add(0x2000, 0, Type::integer32, Access::read_write, 7, "speed").mappable();
-//     Events events;                                         // override what the application reacts to
-//     Device device(d, {.node_id = 5}, events);              // [setup]
+//     Events events;                                     // override what the application reacts to
+//     Device device(d, {.node_id = 5}, events);          // [setup]
 //     device.start(now);
 //     each cycle:
 //         while (link.receive(frame, now)) device.handle(frame, now);

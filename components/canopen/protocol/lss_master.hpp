@@ -3,7 +3,7 @@
 // time:
 //
 //     LssMaster lss(queue);
-//     lss.scan(now);                                    // finds one slave without node ID and selects it
+//     lss.scan(now);                              // finds one slave without node ID and selects it
 //     while (lss.busy()) ... lss.handle(frame, now), lss.poll(now);
 //     if (lss.result().answered) lss.configure_node_id(5, now);
 #pragma once

@@ -572,8 +572,8 @@ void Pdos::poll(Time now) noexcept {
     }
 }
 
-/// Polls are a little early or late, because an external clock reference adjusts the caller's cycle:
-/// a timer has expired if the next poll would be later than its end, not only after its last
+/// Polls are a little early or late, because an external clock reference adjusts the caller's
+/// cycle: a timer has expired if the next poll would be later than its end, not only after its last
 /// nanosecond. `part`: of the interval between polls.
 bool Pdos::has_expired(Time since, Time timer, Time part, Time now) const noexcept {
     return now - since + std::min(poll_interval_ / part, timer / 4) >= timer;

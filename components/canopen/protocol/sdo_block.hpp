@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// SDO block transfer (CiA 301): both sides of the segments of a block, which are the same for client
-// and server. A sender numbers the segments of a block from 1; the receiver acknowledges the number
-// of those that arrived in sequence and asks for the size of the next block. A gap invalidates the
-// rest of the block: the sender continues after the acknowledged segment.
+// SDO block transfer (CiA 301): both sides of the segments of a block, which are the same for
+// client and server. A sender numbers the segments of a block from 1; the receiver acknowledges the
+// number of those that arrived in sequence and asks for the size of the next block. A gap
+// invalidates the rest of the block: the sender continues after the acknowledged segment.
 #pragma once
 
 #include <algorithm>

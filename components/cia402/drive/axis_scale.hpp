@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The scale of an axis: user units of the objects, encoder increments counted from power-on, and the
-// limits that the objects set in them. Positions of the user have 32 bits, or the range of 607Bh,
-// and wrap; the position of the axis does not.
+// The scale of an axis: user units of the objects, encoder increments counted from power-on, and
+// the limits that the objects set in them. Positions of the user have 32 bits, or the range of
+// 607Bh, and wrap; the position of the axis does not.
 #pragma once
 
 #include <cmath>

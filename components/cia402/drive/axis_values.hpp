@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The values of the objects of one axis, without an object dictionary: a bus binds its dictionary to
-// them.
+// The values of the objects of one axis, without an object dictionary: a bus binds its dictionary
+// to them.
 #pragma once
 
 #include <array>

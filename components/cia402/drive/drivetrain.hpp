@@ -38,7 +38,8 @@ public:
     /// Both must outlive it. [setup]
     Drivetrain(const AxisSettings&, const AxisValues&);
 
-    /// The encoder counts from 0 unless it is absolute, and the user's position is that of the encoder.
+    /// The encoder counts from 0 unless it is absolute, and the user's position is that of the
+    /// encoder.
     void power_up() noexcept;
     /// Switches the loops off; the reference follows the motor.
     void follow() noexcept;

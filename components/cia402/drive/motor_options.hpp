@@ -10,8 +10,8 @@
 
 namespace hal::cia402 {
 
-/// Sets a motor parameter by name, as in "inertia" and 1e-4. Returns false for an unknown name or an
-/// impossible value.
+/// Sets a motor parameter by name, as in "inertia" and 1e-4. Returns false for an unknown name or
+/// an impossible value.
 bool set_motor(MotorSettings&, std::string_view name, double value);
 /// Parses "inertia:1e-4,resolution:8192", or with semicolons where a comma has another meaning;
 /// empty is valid. Returns the problem, or "".

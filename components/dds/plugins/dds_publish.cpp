@@ -175,8 +175,9 @@ private:
 }  // namespace
 
 HAL_COMPONENT(DdsPublish, "dds_publish", "Publishes a group of pins as a DDS topic", R"(
-The values of all fields, sampled in the same cycle, are one sample of a typed topic: final, without a key, XCDR1. The cycle only stores them
-into a queue; a thread of the process, not a real-time one, writes them. `hal doc dds_subscribe` describes the subscriber.
+The values of all fields, sampled in the same cycle, are one sample of a typed topic: final, without
+a key, XCDR1. The cycle only stores them into a queue; a thread of the process, not a real-time one,
+writes them. `hal doc dds_subscribe` describes the subscriber.
 
     loadrt dds_publish topic=arm/state names=state fields=angle:float,ready:bit,joint:float*6 rate=0 deadline_ms=20
     addf state servo-thread
@@ -185,10 +186,12 @@ into a queue; a thread of the process, not a real-time one, writes them. `hal do
 
 `rate` is in samples per second; 0 is every cycle. Nothing leaves the machine without `interfaces=`.
 
-A publisher and a subscriber match when topic, type and domain are equal. Without `type=` the type name is derived from names and types of
-the fields, so that different groups never exchange data; both sides then report both types (`wrong-type`).
+A publisher and a subscriber match when topic, type and domain are equal. Without `type=` the type
+name is derived from names and types of the fields, so that different groups never exchange data;
+both sides then report both types (`wrong-type`).
 
-ROS 2 sees `ros=std_msgs/Float64 topic=/arm/angle` as its topic /arm/angle. The fields are then those of the message: `data`; `linear-x` to
-`angular-z`; `force-x` to `torque-z`; of a JointState NAME-position, NAME-velocity, NAME-effort for each of `joints=`; `height`, `width`,
-`step` of an Image, which is sent without pixels. The stamp of the header is the time of the cycle.
+ROS 2 sees `ros=std_msgs/Float64 topic=/arm/angle` as its topic /arm/angle. The fields are then
+those of the message: `data`; `linear-x` to `angular-z`; `force-x` to `torque-z`; of a JointState
+NAME-position, NAME-velocity, NAME-effort for each of `joints=`; `height`, `width`, `step` of an
+Image, which is sent without pixels. The stamp of the header is the time of the cycle.
 )")

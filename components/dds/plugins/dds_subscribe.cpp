@@ -363,25 +363,29 @@ private:
 
 HAL_COMPONENT(DdsSubscribe, "dds_subscribe",
               "Subscribes to a DDS topic and sets pins from its newest sample", R"(
-The subscriber for `dds_publish`: give both the same `topic`, `fields` and `domain`. Samples arrive in threads that are not real-time; each cycle
-uses the newest complete one.
+The subscriber for `dds_publish`: give both the same `topic`, `fields` and `domain`. Samples arrive
+in threads that are not real-time; each cycle uses the newest complete one.
 
     loadrt dds_subscribe topic=arm/state names=state fields=angle:float=0,ready:bit=0,joint:float*6 timeout_ms=50
     addf state servo-thread
     net angle  <= state.angle
     net ok     <= state.valid
 
-`valid` is true while a sample was received within `timeout_ms`, by this machine's monotonic clock. When it becomes false, fields with `=VALUE`
-take this value, the others keep theirs, and a fault is raised. It recovers by itself. `age-ms` counts from the publisher's cycle and needs
-synchronised clocks; when they differ (`clock-differs`), it counts from the reception.
+`valid` is true while a sample was received within `timeout_ms`, by this machine's monotonic clock.
+When it becomes false, fields with `=VALUE` take this value, the others keep theirs, and a fault is
+raised. It recovers by itself. `age-ms` counts from the publisher's cycle and needs synchronised
+clocks; when they differ (`clock-differs`), it counts from the reception.
 
-`lost` counts gaps in the publisher's sequence numbers. With `reliable=1` a lost sample is retransmitted while it is among the newest `depth` samples
-of the publisher and at most `depth` newer ones arrived here: a subscriber that needs every sample, even after its host was suspended, needs a
-`depth` of as many samples as are published meanwhile.
+`lost` counts gaps in the publisher's sequence numbers. With `reliable=1` a lost sample is
+retransmitted while it is among the newest `depth` samples of the publisher and at most `depth`
+newer ones arrived here: a subscriber that needs every sample, even after its host was suspended,
+needs a `depth` of as many samples as are published meanwhile.
 
-A topic has one publisher: the first one, until it sends nothing for half of the timeout. Samples of a second one are ignored,
-`second-publisher` becomes true, a fault is raised, and its participant is named. `exclusive=0`, the default with `ros=`, accepts all publishers.
+A topic has one publisher: the first one, until it sends nothing for half of the timeout. Samples of
+a second one are ignored, `second-publisher` becomes true, a fault is raised, and its participant is
+named. `exclusive=0`, the default with `ros=`, accepts all publishers.
 
-`silent`: a publisher is matched, but sent nothing for `silence_ms`. `wrong-type`: another participant uses the topic with another type. Each is
-reported once on standard error. `ros=` is as for `dds_publish`; joints are matched by name, in any order.
+`silent`: a publisher is matched, but sent nothing for `silence_ms`. `wrong-type`: another
+participant uses the topic with another type. Each is reported once on standard error. `ros=` is as
+for `dds_publish`; joints are matched by name, in any order.
 )")

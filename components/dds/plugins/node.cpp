@@ -296,17 +296,18 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Node, "node", "Monitors the other nodes of a netlist for several machines", R"(
-`hal run FILE --node NAME` loads it; a netlist does not. Its pins show whether every other node is online:
+`hal run FILE --node NAME` loads it; a netlist does not. Its pins show whether every other node is
+online:
 
-* `node.OTHER.online`: its signals are received within their deadline. A node that sends none to this one is online while its status is
-  received.
+* `node.OTHER.online`: its signals are received within their deadline. A node that sends none to
+  this one is online while its status is received.
 * `node.OTHER.age-ms`: the age of its signals.
-* `node.OTHER.incompatible`: it runs a version of the netlist in which a signal between the two differs. Its signals are ignored, and a line
-  on standard error names the signal and both nodes. A node that finds an incompatible node, or a duplicate of itself, while it starts fails
-  to start.
+* `node.OTHER.incompatible`: it runs a version of the netlist in which a signal between the two
+  differs. Its signals are ignored, and a line on standard error names the signal and both nodes. A
+  node that finds an incompatible node, or a duplicate of itself, while it starts fails to start.
 
-A part of the netlist links them like any other pins. What the loader does for the node `motor` of a netlist that also has a node `desk`,
-by hand:
+A part of the netlist links them like any other pins. What the loader does for the node `motor` of a
+netlist that also has a node `desk`, by hand:
 
     loadrt node cell=conveyor node=motor others=desk
     loadrt not names=alarm

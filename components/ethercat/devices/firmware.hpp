@@ -2,8 +2,8 @@
 // The firmware of an emulated slave: its state machine with all checks, its mailbox, its process
 // data. What the device does is a Behaviour.
 //
-//     auto firmware = Firmware(std::move(design), std::make_unique<Blinker>());   // [setup]
-//     firmware.faults().reject[State::op] = 0x0029;                               // from any thread
+//     auto firmware = Firmware(std::move(design), std::make_unique<Blinker>());  // [setup]
+//     firmware.faults().reject[State::op] = 0x0029;                              // from any thread
 #pragma once
 
 #include <array>

@@ -19,7 +19,8 @@ inline constexpr unsigned max_channels = 64;
 /// thread.
 class IoBehaviour : public Behaviour {
 public:
-    /// `index` is the first channel's object, at `index` + 10h * n sub 1, or, for bits, sub n + 1. [setup]
+    /// `index` is the first channel's object, at `index` + 10h * n sub 1, or, for bits, sub n + 1.
+    /// [setup]
     IoBehaviour(std::shared_ptr<Dictionary>, std::uint16_t index, unsigned channels, bool output,
                 bool digital);
     void step(Step&) noexcept override;

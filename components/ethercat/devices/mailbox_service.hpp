@@ -68,8 +68,8 @@ public:
     virtual void reset() noexcept {}
     /// Takes a message and answers it. The outbox has space for two messages. [realtime]
     virtual void take(const MailboxMessage&, State, Outbox&) noexcept = 0;
-    /// Queues the next message of a long answer that take() has begun, if there is one; called while
-    /// the outbox is empty, until it has queued none. [realtime]
+    /// Queues the next message of a long answer that take() has begun, if there is one; called
+    /// while the outbox is empty, until it has queued none. [realtime]
     virtual void pump(Outbox&) noexcept {}
 };
 

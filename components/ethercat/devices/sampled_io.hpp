@@ -33,8 +33,8 @@ public:
 
     std::size_t inputs() const noexcept { return inputs_.size(); }  ///< [any]
     std::size_t outputs() const noexcept { return outputs_.size(); }  ///< [any]
-    /// Sets the value of an input: `offset` + `amplitude` sin(2 pi `frequency` t), t in system time.
-    /// [any]
+    /// Sets the value of an input: `offset` + `amplitude` sin(2 pi `frequency` t), t in system
+    /// time. [any]
     void set_input(std::size_t channel, double offset, double amplitude, double frequency) noexcept;
     /// Returns the newest sample of an output. [any]
     std::int64_t output(std::size_t channel) const noexcept {

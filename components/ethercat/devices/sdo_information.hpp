@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// SDO information of an emulated slave (ETG.1000.6, clause 5.6.3): lists of objects, descriptions of
-// objects and entries.
+// SDO information of an emulated slave (ETG.1000.6, clause 5.6.3): lists of objects, descriptions
+// of objects and entries.
 #pragma once
 
 #include <span>

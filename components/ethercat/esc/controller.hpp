@@ -55,7 +55,8 @@ struct Settings {
 
 class Controller final : public Pdi, private DatagramMemory {
 public:
-    /// `sii`: the EEPROM's content from word 0 on. `application` is not owned and may be nullptr. Starts without power. [setup]
+    /// `sii`: the EEPROM's content from word 0 on. `application` is not owned and may be nullptr.
+    /// Starts without power. [setup]
     Controller(const Settings& settings, std::vector<std::uint8_t> sii, Application* application);
 
     void power_on(std::int64_t now_ns) noexcept;  ///< Starts with the reset values. [realtime]

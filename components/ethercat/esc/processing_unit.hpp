@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The processing unit of an emulated controller: how it executes datagrams (ETG.1000.4, clause 5.4),
-// with the rules of the working counter.
+// The processing unit of an emulated controller: how it executes datagrams (ETG.1000.4, clause
+// 5.4), with the rules of the working counter.
 #pragma once
 
 #include <cstdint>

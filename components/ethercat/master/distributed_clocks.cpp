@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::int64_t synchronise_timeout_ns = 5'000 * millisecond;
 
-// How far ahead SYNC0 starts: the two writes take a cycle each, and some are repeated. When they took
-// longer, the start is repeated with twice the time.
+// How far ahead SYNC0 starts: the two writes take a cycle each, and some are repeated. When they
+// took longer, the start is repeated with twice the time.
 constexpr std::int64_t sync_start_ns = 10 * millisecond;
 constexpr std::int64_t sync_start_cycles = 10;
 constexpr unsigned sync_start_attempts = 5;
@@ -291,8 +291,8 @@ Task<bool> start_sync_signals(Channel& c, Bus& bus, Device& d) noexcept {
                                    at_station(d.slave.station, registers::dc_sync0_cycle), 8);
     if (a.wkc != 1) co_return false;
     // The grid of all slaves starts at system time 0, so all SYNC0 of one cycle time coincide but
-    // for their shift. With a SYNC0 at a fraction of the cycle, its first pulse begins a cycle, from
-    // which SYNC1 and the samples are counted.
+    // for their shift. With a SYNC0 at a fraction of the cycle, its first pulse begins a cycle,
+    // from which SYNC1 and the samples are counted.
     const auto period = static_cast<std::uint64_t>(bus.setup.cycle_ns);
     const bool is_fraction = cycle < period && period % cycle == 0;
     const std::uint64_t step = is_fraction ? period : cycle;

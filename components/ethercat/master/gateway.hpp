@@ -80,7 +80,8 @@ struct GatewaySetup {
 /// Answers an SDO upload, also with complete access, or a request for SDO information, from the
 /// dictionary of the master (ETG.1510): names, 8000h + n configuration of slave n, F000h, F020h
 /// addresses. The list of objects is as long as one message.
-/// `message` holds the request, and then the answer; returns its length, 0 for a message that is not understood. [any]
+/// `message` holds the request, and then the answer; returns its length, 0 for a message that is
+/// not understood. [any]
 std::size_t answer_for_master(std::span<const GatewaySlave> slaves, std::span<std::uint8_t> message,
                               std::size_t length) noexcept;
 

@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::uint8_t sm_full = 0x08;
 constexpr std::uint8_t sm_repeat = 0x02;
-// A mailbox of up to this size is read at once after a request, until that was in vain: most replies
-// are there by the next cycle. Of others, the state is read first.
+// A mailbox of up to this size is read at once after a request, until that was in vain: most
+// replies are there by the next cycle. Of others, the state is read first.
 constexpr std::size_t max_eager_bytes = 256;
 // answers with WKC 0 in a row after which a slave counts as not on the bus
 constexpr unsigned max_absent = 4;

@@ -31,7 +31,8 @@ struct Bus;
 /// See the top of this file.
 class Master {
 public:
-    /// `source` is the address frames leave with; `events` and `coe` must outlive the master. [setup]
+    /// `source` is the address frames leave with; `events` and `coe` must outlive the master.
+    /// [setup]
     Master(Setup setup, const std::array<std::uint8_t, 6>& source, Events& events, CoeAccess& coe);
     ~Master();
     Master(const Master&) = delete;
@@ -91,10 +92,10 @@ public:
     };
     Phase dc_phase() const noexcept;
 
-    /// Returns when the first sample of the inputs of a slave was taken that samples several times in
-    /// a cycle, on the clock of the cycle, ns; nullopt: without the time of the reference clock, or
-    /// while the slave is not operational. The samples of a cycle are complete at the last of their
-    /// pulses; those that are complete when the frame passes are in it. [realtime]
+    /// Returns when the first sample of the inputs of a slave was taken that samples several times
+    /// in a cycle, on the clock of the cycle, ns; nullopt: without the time of the reference clock,
+    /// or while the slave is not operational. The samples of a cycle are complete at the last of
+    /// their pulses; those that are complete when the frame passes are in it. [realtime]
     std::optional<std::int64_t> first_sample_ns(std::size_t slave) const noexcept;
 
     // Slaves as found, for tools and mailbox clients.

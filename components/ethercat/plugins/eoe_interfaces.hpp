@@ -45,8 +45,8 @@ public:
     EoeInterfaces(const EoeInterfaces&) = delete;
     EoeInterfaces& operator=(const EoeInterfaces&) = delete;
 
-    /// Opens the interfaces and starts their thread; on the virtual clock no interface is opened. Throws
-    /// std::runtime_error with the reason. [setup]
+    /// Opens the interfaces and starts their thread; on the virtual clock no interface is opened.
+    /// Throws std::runtime_error with the reason. [setup]
     void start() {
         const auto* host = hal::extension<hal_background>(HAL_BACKGROUND);
         if (host != nullptr && host->is_virtual != 0) {

@@ -19,8 +19,10 @@ using Ethercat = hal::ethercat::MasterComponent<Names>;
 }  // namespace
 
 HAL_COMPONENT(Ethercat, "ethercat", "EtherCAT master: process data of slaves as pins", R"(
-Brings the slaves of a bus to OP and exchanges their process data in every cycle. A configuration file beside the netlist lists the slaves and the
-objects that become pins (docs/ethercat-configuration.md). LinuxCNC's `ethercat-conf.xml` is read as well; one instance drives one of its masters.
+Brings the slaves of a bus to OP and exchanges their process data in every cycle. A configuration
+file beside the netlist lists the slaves and the objects that become pins
+(docs/ethercat-configuration.md). LinuxCNC's `ethercat-conf.xml` is read as well; one instance
+drives one of its masters.
 
 `machine.ethercat`:
 
@@ -43,18 +45,24 @@ The netlist, with an emulated drive:
     addf ethercat-segment.0.update servo-thread
     net x-status ethercat.0.x.statusword
 
-`receive` belongs to the beginning of the thread, `transmit` to its end; the period of the thread is the cycle. Slaves are started in parallel, while
-others already exchange data; one that was lost is started again. Until a slave is `operational` its outputs are off and its inputs keep their last
+`receive` belongs to the beginning of the thread, `transmit` to its end; the period of the thread is
+the cycle. Slaves are started in parallel, while others already exchange data; one that was lost is
+started again. Until a slave is `operational` its outputs are off and its inputs keep their last
 values.
 
-`operational` is also FALSE while the process data of a slave in OP is not exchanged for 30 cycles and 30 ms, although the slave answers: its frames
-return later than the next cycle (or `frame-timeout`), or with a working counter that is too small. A fault names the reason. Its inputs keep their
-last values, its outputs may still arrive. It is operational again after as many good cycles.
+`operational` is also FALSE while the process data of a slave in OP is not exchanged for 30 cycles
+and 30 ms, although the slave answers: its frames return later than the next cycle (or
+`frame-timeout`), or with a working counter that is too small. A fault names the reason. Its inputs
+keep their last values, its outputs may still arrive. It is operational again after as many good
+cycles.
 
-With `dc` in the configuration the threads of this machine follow the reference clock, unless `clock = thread` is written there. `pll-err` is the remaining error.
+With `dc` in the configuration the threads of this machine follow the reference clock, unless
+`clock = thread` is written there. `pll-err` is the remaining error.
 
-At the end, on `stop` and when a fault stops the thread, the slaves leave OP at once: their outputs are off, and `operational` is FALSE. When the thread
-runs again they are started again; an axis needs another edge of its `enable`.
+At the end, on `stop` and when a fault stops the thread, the slaves leave OP at once: their outputs
+are off, and `operational` is FALSE. When the thread runs again they are started again; an axis
+needs another edge of its `enable`.
 
-EtherCAT is a registered trademark and patented technology, licensed by Beckhoff Automation GmbH, Germany.
+EtherCAT is a registered trademark and patented technology, licensed by Beckhoff Automation GmbH,
+Germany.
 )")

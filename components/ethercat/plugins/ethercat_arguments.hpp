@@ -21,7 +21,8 @@
 namespace hal::ethercat {
 
 struct EthercatArguments {
-    /// `lcec`: the file is that of `loadusr lcec_conf FILE`, and there is an instance for each of its masters.
+    /// `lcec`: the file is that of `loadusr lcec_conf FILE`, and there is an instance for each of
+    /// its masters.
     EthercatArguments(hal::Component& component, const char* usual_file, bool lcec)
         : component_(component), usual_file_(usual_file), lcec_(lcec) {}
 

@@ -235,26 +235,31 @@ private:
 
 HAL_COMPONENT(EthercatSegment, "ethercat_segment",
               "Emulated EtherCAT slaves on a segment in memory", R"(
-A line of EtherCAT slaves for machines without the hardware: controllers with registers, sync managers, FMMUs, EEPROM, watchdog and distributed
-clocks, and the firmware of couplers, digital and analogue I/O and CiA 402 servo drives. Frames are answered while they pass, with the delays of
+A line of EtherCAT slaves for machines without the hardware: controllers with registers, sync
+managers, FMMUs, EEPROM, watchdog and distributed clocks, and the firmware of couplers, digital and
+analogue I/O and CiA 402 servo drives. Frames are answered while they pass, with the delays of
 cables and devices, at the same times in every run of `hal sim`.
 
     loadrt ethercat_segment devices="coupler, digital_in bits=16, servo axes=2" link=sim:line
     addf ethercat-segment.0.update servo-thread
     setp ethercat-segment.0.slave-2.axis-0.inputs 1
 
-Each axis of a servo is the simulated one of `canopen_drive`: all modes of CiA 402, homing methods 1 to 37, touch probes, limits, a brake and faults,
-with 10 000 increments per revolution, an absolute encoder and an endless travel. `motor` changes the parameters that `canopen_drive` lists, separated by
-semicolons.
+Each axis of a servo is the simulated one of `canopen_drive`: all modes of CiA 402, homing methods 1
+to 37, touch probes, limits, a brake and faults, with 10 000 increments per revolution, an absolute
+encoder and an endless travel. `motor` changes the parameters that `canopen_drive` lists, separated
+by semicolons.
 
-A device of an ESI file whose PDOs have samples (OSFac) takes one at each pulse of SYNC0. Its inputs are `offset-NN` + `sine-amplitude-NN` times a sine of
-`sine-frequency-NN`, which is 0 at system time 0; `value-NN` is the newest sample of an output.
+A device of an ESI file whose PDOs have samples (OSFac) takes one at each pulse of SYNC0. Its inputs
+are `offset-NN` + `sine-amplitude-NN` times a sine of `sine-frequency-NN`, which is 0 at system time
+0; `value-NN` is the newest sample of an output.
 
 A master on the same segment is `loadrt ethercat config=machine.ethercat link=sim:line`.
 
-Slaves are counted from 0 along the line. `slave-N.power` and `slave-N.cable` switch a slave off and break its cable. `slave-N.reject-state` with
-`slave-N.reject-code` makes a slave reject a state, `slave-N.leave-op` makes it leave OP, and `slave-N.mailbox-delay` makes its mailbox slow. Frames on the
-cable before a slave are disturbed by `lose-every`, `corrupt-every`, `double-every` and `delay-every` with `delay`, its clock by `drift` and `clock-jump`, its
-EEPROM by `eeprom-fail`, `eeprom-damaged` and `wrong-identity`, and `expire-watchdog` stops its outputs. With `backup` the line is a ring with both ports of the
-master.
+Slaves are counted from 0 along the line. `slave-N.power` and `slave-N.cable` switch a slave off and
+break its cable. `slave-N.reject-state` with `slave-N.reject-code` makes a slave reject a state,
+`slave-N.leave-op` makes it leave OP, and `slave-N.mailbox-delay` makes its mailbox slow. Frames on
+the cable before a slave are disturbed by `lose-every`, `corrupt-every`, `double-every` and
+`delay-every` with `delay`, its clock by `drift` and `clock-jump`, its EEPROM by `eeprom-fail`,
+`eeprom-damaged` and `wrong-identity`, and `expire-watchdog` stops its outputs. With `backup` the
+line is a ring with both ports of the master.
 )");

@@ -42,16 +42,20 @@ The netlist, with an emulated drive. On a machine the first line and the last `a
     addf ethercat-segment.0.update servo-thread
     net x-status lcec.0.x.srv-cia-statusword
 
-`lcec.N.read` and `lcec.N.write` are the same for one master. `initf lcec.activate` has no effect: the masters start with the machine.
+`lcec.N.read` and `lcec.N.write` are the same for one master. `initf lcec.activate` has no effect:
+the masters start with the machine.
 
-Without `link=`, the interface of a master is `MASTER0_DEVICE` of the file `ethercat.conf` beside `ethercat-conf.xml`, or else of `/etc/ethercat.conf`,
-the file of the IgH master: a MAC address, an interface (`enp3s0`) or a link address (`eth:enp3s0`, `sim:NAME`). `MASTER0_BACKUP` closes a ring. Without
-`loadusr lcec_conf`, the file is `config=`, or `ethercat-conf.xml` beside the netlist.
+Without `link=`, the interface of a master is `MASTER0_DEVICE` of the file `ethercat.conf` beside
+`ethercat-conf.xml`, or else of `/etc/ethercat.conf`, the file of the IgH master: a MAC address, an
+interface (`enp3s0`) or a link address (`eth:enp3s0`, `sim:NAME`). `MASTER0_BACKUP` closes a ring.
+Without `loadusr lcec_conf`, the file is `config=`, or `ethercat-conf.xml` beside the netlist.
 
-With several masters in the file there is an instance for each, `lcec.0`, `lcec.1`; `link=` is then a list. A master that has a name in the file needs it
-as the name of its instance: `names=lcec.NAME master=0`.
+With several masters in the file there is an instance for each, `lcec.0`, `lcec.1`; `link=` is then
+a list. A master that has a name in the file needs it as the name of its instance:
+`names=lcec.NAME master=0`.
 
 The elements that are read, and the differences to lcec, are in docs/ethercat-configuration.md.
 
-EtherCAT is a registered trademark and patented technology, licensed by Beckhoff Automation GmbH, Germany.
+EtherCAT is a registered trademark and patented technology, licensed by Beckhoff Automation GmbH,
+Germany.
 )")

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // EtherCAT frames: Ethernet header, EtherCAT header, datagrams (ETG.1000.4, clause 5).
 //
-//     FrameWriter frame(buffer, source_address);                        // a frame with one datagram
+//     FrameWriter frame(buffer, source_address);                       // a frame with one datagram
 //     if (std::uint8_t* data = frame.add(Command::brd, 7, 0x0130'0000, 2)) put<std::uint16_t>(data, 0);
 //     port.send(frame.finish(), {}, now_ns);
 //     ...

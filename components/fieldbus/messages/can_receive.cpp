@@ -135,10 +135,12 @@ private:
 }  // namespace
 
 HAL_COMPONENT(CanReceive, "can_receive", "Receives one CAN message whose data become pins", R"(
-The counterpart of `can_send`: `fields=` names the data of the message in order, little endian. The pins keep the values of the newest message;
-`new` is TRUE for the cycle in which it arrived, `age` is the time since its last bit. If several messages arrive within a cycle, the last one
-remains and the others are counted in `overwritten`; with `one-by-one` they wait for the next cycles instead. A message of another length is ignored and counted in `malformed`.
-NaN and infinity are ignored: the pin keeps its value, and `invalid` counts these messages.
+The counterpart of `can_send`: `fields=` names the data of the message in order, little endian. The
+pins keep the values of the newest message; `new` is TRUE for the cycle in which it arrived, `age`
+is the time since its last bit. If several messages arrive within a cycle, the last one remains and
+the others are counted in `overwritten`; with `one-by-one` they wait for the next cycles instead. A
+message of another length is ignored and counted in `malformed`. NaN and infinity are ignored: the
+pin keeps its value, and `invalid` counts these messages.
 
 With `ids=8` eight consecutive identifiers are received; `id-offset` is that of the newest message.
 

@@ -131,14 +131,17 @@ private:
 }  // namespace
 
 HAL_COMPONENT(CanSend, "can_send", "Sends one CAN message whose data are pins", R"(
-For nodes without a protocol: one instance is one message. `fields=` names its data in order, little endian, at most 8 bytes; each field is a pin
-(`u8`, `u16` and `u32` are u32 pins, `s8`, `s16`, `s32` are s32 pins, `f32` and `f64` are float pins). Values out of the range of a field are limited
-to it. NaN and infinity are not sent: the last valid value is, and `invalid` counts these messages. Without `fields=` the message has no data.
+For nodes without a protocol: one instance is one message. `fields=` names its data in order, little
+endian, at most 8 bytes; each field is a pin (`u8`, `u16` and `u32` are u32 pins, `s8`, `s16`, `s32`
+are s32 pins, `f32` and `f64` are float pins). Values out of the range of a field are limited to it.
+NaN and infinity are not sent: the last valid value is, and `invalid` counts these messages. Without
+`fields=` the message has no data.
 
-A message leaves in each cycle in which `trigger` is TRUE, at multiples of `period`, counted from the first cycle, and with `on-change` when its data
-are not those sent last (at the start: zeros). Each instance is a node of its
-own on a `sim:` bus, so the messages of several instances are sent in order of their identifiers, as by a controller with a buffer for each. With
-`ids=8` the pin `id-offset` selects one of eight consecutive identifiers.
+A message leaves in each cycle in which `trigger` is TRUE, at multiples of `period`, counted from
+the first cycle, and with `on-change` when its data are not those sent last (at the start: zeros).
+Each instance is a node of its own on a `sim:` bus, so the messages of several instances are sent in
+order of their identifiers, as by a controller with a buffer for each. With `ids=8` the pin
+`id-offset` selects one of eight consecutive identifiers.
 
     loadrt can_send link=sim:robot names=position id=0x10a fields=a:s32,b:s32
     addf position.update servo

@@ -186,13 +186,15 @@ private:
 }  // namespace
 
 HAL_COMPONENT(CanTraffic, "can_traffic", "The load of other nodes on a CAN bus", R"(
-`messages=` messages with consecutive identifiers, each from a node of its own, are released together at multiples of `period`: the critical instant of
-the response-time analysis for every message with a higher identifier. Their data change from message to message, always in the same way; with
-`data=longest` each has nearly as many stuff bits as a message can have.
+`messages=` messages with consecutive identifiers, each from a node of its own, are released
+together at multiples of `period`: the critical instant of the response-time analysis for every
+message with a higher identifier. Their data change from message to message, always in the same way;
+with `data=longest` each has nearly as many stuff bits as a message can have.
 
-`worst-response` is the longest time from a release to the last bit of a message on the bus; it must not exceed the computed response time
-(`hal canopen plan`); 0 on a bus that does not report what was sent. A message that is released while eight of its predecessors wait is dropped. With
-`one_node=1` all messages come from one node.
+`worst-response` is the longest time from a release to the last bit of a message on the bus; it must
+not exceed the computed response time (`hal canopen plan`); 0 on a bus that does not report what was
+sent. A message that is released while eight of its predecessors wait is dropped. With `one_node=1`
+all messages come from one node.
 
     loadrt can_traffic names=others link=sim:can0 id=0x200 messages=18
     addf others.update bus

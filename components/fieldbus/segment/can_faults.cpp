@@ -118,11 +118,14 @@ private:
 }  // namespace
 
 HAL_COMPONENT(CanFaults, "can_faults", "Fault injection on a CAN bus in memory", R"(
-Destroys, loses, duplicates or delays frames of a `sim:` bus, cuts a wire, or babbles: on the clock of the threads, reproducibly.
+Destroys, loses, duplicates or delays frames of a `sim:` bus, cuts a wire, or babbles: on the clock
+of the threads, reproducibly.
 
-`faults` is a comma-separated list of error (destroyed by an error frame), loss (acknowledged, but not received), duplicate (the sender missed the
-acknowledgement) and delay (in the sender's controller), each with options: `id=0x10A` (this identifier only), `every=50` (every 50th frame; default every
-frame), `probability=0.02` (random frames, the same ones for the same `seed`), `count=3` (ends after 3 frames), `from=1s`, `until=2s`, `time=20us` (delay).
+`faults` is a comma-separated list of error (destroyed by an error frame), loss (acknowledged, but
+not received), duplicate (the sender missed the acknowledgement) and delay (in the sender's
+controller), each with options: `id=0x10A` (this identifier only), `every=50` (every 50th frame;
+default every frame), `probability=0.02` (random frames, the same ones for the same `seed`),
+`count=3` (ends after 3 frames), `from=1s`, `until=2s`, `time=20us` (delay).
 
     loadrt can_faults link=sim:robot faults=error:id=0:from=1s:until=1.1s,delay:id=0:time=60us:count=1
     addf can-faults.0.update bus

@@ -135,14 +135,18 @@ private:
 
 HAL_COMPONENT(SegmentFaults, "segment_faults", "Fault injection on an Ethernet segment in memory",
               R"(
-Loses, duplicates, delays, truncates or corrupts frames of a `sim:` segment, or cuts a cable: on the clock of the threads, reproducibly.
+Loses, duplicates, delays, truncates or corrupts frames of a `sim:` segment, or cuts a cable: on the
+clock of the threads, reproducibly.
 
-`faults` is a comma-separated list of loss, duplicate, delay, cut (truncates) and garble (corrupts), each with options: `every=50` (every 50th
-frame; default every frame), `probability=0.02` (random frames, the same ones for the same `seed`), `count=3` (ends after 3 frames), `from=1s`,
-`until=2s`, `type=0x9023` (this Ethertype only), `frame=reply` (TDMA sync, request or reply only), `time=2ms` (delay), `length=30` (cut: remaining
-bytes). A garbled frame has a valid Ethernet checksum, like one from a hostile station.
+`faults` is a comma-separated list of loss, duplicate, delay, cut (truncates) and garble (corrupts),
+each with options: `every=50` (every 50th frame; default every frame), `probability=0.02` (random
+frames, the same ones for the same `seed`), `count=3` (ends after 3 frames), `from=1s`, `until=2s`,
+`type=0x9023` (this Ethertype only), `frame=reply` (TDMA sync, request or reply only), `time=2ms`
+(delay), `length=30` (cut: remaining bytes). A garbled frame has a valid Ethernet checksum, like one
+from a hostile station.
 
-The station in `link` can also babble: while `babble` is TRUE it sends a frame every `babble-period`, outside any slot.
+The station in `link` can also babble: while `babble` is TRUE it sends a frame every
+`babble-period`, outside any slot.
 
     loadrt segment_faults link=sim:net0/tester faults=loss:every=50:from=1s:until=2s,garble:every=7:type=0x9023
     addf segment-faults.0.update servo

@@ -121,12 +121,13 @@ private:
 
 HAL_COMPONENT(SegmentRecord, "segment_record", "Captures an Ethernet segment into a pcapng file",
               R"(
-Captures every frame on a segment in memory, for any station, with its time, as pcapng: for Wireshark and tshark, which decode TDMA and RTcfg,
-and for `link=replay:seen.pcapng`. Times are those of the run: on the virtual clock they begin at 0, which Wireshark shows as 1970.
+Captures every frame on a segment in memory, for any station, with its time, as pcapng: for
+Wireshark and tshark, which decode TDMA and RTcfg, and for `link=replay:seen.pcapng`. Times are
+those of the run: on the virtual clock they begin at 0, which Wireshark shows as 1970.
 
     loadrt segment_record link=sim:net0/recorder file=seen.pcapng
     addf segment-record.0.update servo
 
-The position of `update` in the thread does not matter. On a real interface, `link=eth:enp3s0`, it captures received frames only; capture sent
-frames with `tcpdump -i enp3s0 -w seen.pcap`.
+The position of `update` in the thread does not matter. On a real interface, `link=eth:enp3s0`, it
+captures received frames only; capture sent frames with `tcpdump -i enp3s0 -w seen.pcap`.
 )")

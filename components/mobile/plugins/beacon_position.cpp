@@ -312,8 +312,9 @@ private:
 
 HAL_COMPONENT(BeaconPosition, "beacon_position",
               "Position and heading by three beacons and a rotating laser", R"(
-While the position is known, each reflection is assigned to the beacon that is expected in its direction (within `gate`) and with its width (within
-`width-tolerance`); the bearing goes to a Kalman filter (`ekf`), which fuses it with odometry. Other reflections are rejected: slip rings that
+While the position is known, each reflection is assigned to the beacon that is expected in its
+direction (within `gate`) and with its width (within `width-tolerance`); the bearing goes to a
+Kalman filter (`ekf`), which fuses it with odometry. Other reflections are rejected: slip rings that
 oxidise, and shiny things beside the field, produce them.
 
 Without three accepted bearings within `timeout` the position is `lost`. Then three successive reflections are triangulated (V. Pierlot, M. Van
@@ -321,8 +322,8 @@ Droogenbroeck, IEEE Transactions on Robotics 30, 2014) in each assignment to the
 by odometry. If one assignment gives a place in the field that explains the widths clearly better than the others, `fix-new` is TRUE for one cycle: the
 filter starts again from `fix-x`, `fix-y`, `fix-heading`. Near the circle through the three beacons no position exists (D = 0): `degenerate` counts.
 
-The beacons have numbers 1 to 3 in the order in which a laser that turns to the left meets them from inside of their triangle. `time` is the clock of
-the scanner; only its differences matter.
+The beacons have numbers 1 to 3 in the order in which a laser that turns to the left meets them from
+inside of their triangle. `time` is the clock of the scanner; only its differences matter.
 
     loadrt beacon_position names=beacons
     addf beacons.update servo

@@ -230,17 +230,19 @@ private:
 
 HAL_COMPONENT(DriveAround, "drive_around",
               "Drives a two-wheeled robot to a point, around obstacles", R"(
-Computes the speeds for `diff_drive` from pose, target and the readings of a ring of 16 infrared sensors: an octagon with two sensors per side, side 1
-forwards, counted to the left.
+Computes the speeds for `diff_drive` from pose, target and the readings of a ring of 16 infrared
+sensors: an octagon with two sensors per side, side 1 forwards, counted to the left.
 
     distance = sqrt(constant / reading) - offset
 
-Each obstacle closes the directions in which the robot, with `body-radius`, would touch it; of the free ones the robot takes the one nearest to the
-target, and nearest to the one it took before (vector field histogram: J. Borenstein, Y. Koren, IEEE Transactions on Robotics and Automation 7, 1991).
-It drives slower towards what is near. An ultrasonic head (`echo_range`) adds what the ring does not see: each new value of `echo-count` is an echo at `echo-range` and
-`echo-bearing`. An obstacle is remembered for `memory`, because what is beside
-the robot may be between two sensors. There is no map beyond that: a dead end deeper than the range of the sensors can hold it, and `blocked` or a long time without
-`reached` is for the program above.
+Each obstacle closes the directions in which the robot, with `body-radius`, would touch it; of the
+free ones the robot takes the one nearest to the target, and nearest to the one it took before
+(vector field histogram: J. Borenstein, Y. Koren, IEEE Transactions on Robotics and Automation 7,
+1991). It drives slower towards what is near. An ultrasonic head (`echo_range`) adds what the ring
+does not see: each new value of `echo-count` is an echo at `echo-range` and `echo-bearing`. An
+obstacle is remembered for `memory`, because what is beside the robot may be between two sensors.
+There is no map beyond that: a dead end deeper than the range of the sensors can hold it, and
+`blocked` or a long time without `reached` is for the program above.
 
     loadrt drive_around names=pilot
     loadrt diff_drive names=base

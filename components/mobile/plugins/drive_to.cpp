@@ -29,8 +29,8 @@ struct DriveTo : hal::Component {
 }  // namespace
 
 HAL_COMPONENT(DriveTo, "drive_to", "Drives a two-wheeled robot to a point", R"(
-Computes the speeds for `diff_drive` from its pose and a target: the robot turns towards the target, drives faster as the heading error
-falls, and stops within `tolerance`. The target may move.
+Computes the speeds for `diff_drive` from its pose and a target: the robot turns towards the target,
+drives faster as the heading error falls, and stops within `tolerance`. The target may move.
 
     loadrt drive_to names=pilot
     loadrt diff_drive names=base

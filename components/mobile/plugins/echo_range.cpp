@@ -114,9 +114,10 @@ private:
 }  // namespace
 
 HAL_COMPONENT(EchoRange, "echo_range", "Distance of the nearest echo in a burst of messages", R"(
-An ultrasonic head reports an echo in 32 messages of eight samples; their number modulo 8 is in the identifier. The distance is that of the first sample
-of at least `threshold`. Messages may overtake each other on a bus that sorts them by identifier, but not those of the same identifier. A burst with a
-message missing is counted in `incomplete` and gives no range.
+An ultrasonic head reports an echo in 32 messages of eight samples; their number modulo 8 is in the
+identifier. The distance is that of the first sample of at least `threshold`. Messages may overtake
+each other on a bus that sorts them by identifier, but not those of the same identifier. A burst
+with a message missing is counted in `incomplete` and gives no range.
 
     loadrt echo_range names=echo
     addf echo.update servo

@@ -73,8 +73,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Goals, "goals", "Places to drive to, one after the other", R"(
-The file has a line `goal X Y` for each place, in metres, at most 256. A rising edge of `next` proceeds; after the last goal `done` is TRUE, or with
-`loop` the first follows.
+The file has a line `goal X Y` for each place, in metres, at most 256. A rising edge of `next`
+proceeds; after the last goal `done` is TRUE, or with `loop` the first follows.
 
     loadrt goals names=tour
     loadrt drive_to names=pilot

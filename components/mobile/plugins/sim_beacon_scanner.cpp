@@ -103,10 +103,13 @@ private:
 
 HAL_COMPONENT(SimBeaconScanner, "sim_beacon_scanner",
               "A rotating laser that meets reflecting beacons", R"(
-A laser and a photodiode turn on the robot; each beacon of the floor plan reflects once per turn. Angles are those at the moment of the reflection, in
-whole counts to the left of the heading; the width is that of the beacon, a cylinder, as seen from there. Walls do not hide the beacons; `hidden` does.
+A laser and a photodiode turn on the robot; each beacon of the floor plan reflects once per turn.
+Angles are those at the moment of the reflection, in whole counts to the left of the heading; the
+width is that of the beacon, a cylinder, as seen from there. Walls do not hide the beacons; `hidden`
+does.
 
-At most one reflection per cycle is given. `spurious` adds pulses at random angles, always in the same sequence.
+At most one reflection per cycle is given. `spurious` adds pulses at random angles, always in the
+same sequence.
 
     loadrt sim_beacon_scanner names=scanner
     addf scanner.update servo

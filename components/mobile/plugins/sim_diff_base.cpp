@@ -137,11 +137,14 @@ HAL_COMPONENT(SimDiffBase, "sim_diff_base",
     way = (l + r) / 2,  turn = (r - l) / track,  l and r: distances that the rims cover
     the centre of the axle moves along the chord of its arc
 
-Where the body, a circle, would come closer to an obstacle that it touches, it stays and its wheels slip: `contact` is TRUE and odometry goes wrong, as
-it does on the real floor. The radii and the track are those of the machine, not those that its odometry assumes. `lift` carries the robot elsewhere.
+Where the body, a circle, would come closer to an obstacle that it touches, it stays and its wheels
+slip: `contact` is TRUE and odometry goes wrong, as it does on the real floor. The radii and the
+track are those of the machine, not those that its odometry assumes. `lift` carries the robot
+elsewhere.
 
-The floor plan has lines `wall X1 Y1 X2 Y2`, `box X1 Y1 X2 Y2`, `circle X Y RADIUS` and `beacon X Y RADIUS`, in metres, at most 256 shapes. The arguments
-`x`, `y` and `heading` are the place at the start.
+The floor plan has lines `wall X1 Y1 X2 Y2`, `box X1 Y1 X2 Y2`, `circle X Y RADIUS` and
+`beacon X Y RADIUS`, in metres, at most 256 shapes. The arguments `x`, `y` and `heading` are the
+place at the start.
 
     loadrt sim_diff_base names=body x=0.5 y=0.5
     addf body.update servo

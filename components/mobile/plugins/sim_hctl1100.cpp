@@ -205,7 +205,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(SimHctl1100, "sim_hctl1100", "A motor behind an HCTL-1100 controller", R"(
-The four modes of the motion controller HCTL-1100 (Hewlett-Packard, data sheet 1992), a sample every 1.024 ms:
+The four modes of the motion controller HCTL-1100 (Hewlett-Packard, data sheet 1992), a sample every
+1.024 ms:
 
 | mode | does |
 | --- | --- |
@@ -217,8 +218,9 @@ The four modes of the motion controller HCTL-1100 (Hewlett-Packard, data sheet 1
     MC = K/4 (e - A/256 e') - B/256 MC',   -127..127,  ' the sample before
     speed' = (MC/127 motor-speed - speed) / motor-time
 
-`profile-done` is the end of the profile, not the arrival. A change of mode begins at the current position. The acceleration is that of the registers in
-counts per sample squared, with 16 fractional bits.
+`profile-done` is the end of the profile, not the arrival. A change of mode begins at the current
+position. The acceleration is that of the registers in counts per sample squared, with 16 fractional
+bits.
 
     loadrt sim_hctl1100 names=left
     addf left.update servo

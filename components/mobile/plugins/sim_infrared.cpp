@@ -103,8 +103,9 @@ HAL_COMPONENT(SimInfrared, "sim_infrared",
               "A ring of 16 infrared sensors on an octagon, on a floor with obstacles", R"(
     reading = constant cos(incidence) / (distance + offset)^2,  clipped to 0..4095
 
-Two sensors on each side of an octagon face outwards; side 1 faces forwards, the sides are counted to the left, and sensors 2 n and 2 n + 1 are those
-of side n + 1. They are read in turn, 592 us each, so a ring takes 9.472 ms. `ring` is TRUE in the cycle in which a ring is complete.
+Two sensors on each side of an octagon face outwards; side 1 faces forwards, the sides are counted
+to the left, and sensors 2 n and 2 n + 1 are those of side n + 1. They are read in turn, 592 us
+each, so a ring takes 9.472 ms. `ring` is TRUE in the cycle in which a ring is complete.
 
 The floor plan is that of `sim_diff_base`.
 

@@ -109,11 +109,13 @@ private:
 
 HAL_COMPONENT(SimUltrasound, "sim_ultrasound",
               "A rotating ultrasonic range finder, on a floor with obstacles", R"(
-A head turns in 200 steps. At each it records 256 samples of an echo, 25.6 ms at 10 kHz and 17.15 mm each, and then gives them in a burst of 32
-messages of eight samples, one per cycle. `begins` announces a burst with the position of the head. While the burst is given, the next echo is
+A head turns in 200 steps. At each it records 256 samples of an echo, 25.6 ms at 10 kHz and 17.15 mm
+each, and then gives them in a burst of 32 messages of eight samples, one per cycle. `begins`
+announces a burst with the position of the head. While the burst is given, the next echo is
 recorded.
 
-The amplitude is that of the nearest surface in nine rays over 24 degrees. The floor plan is that of `sim_diff_base`.
+The amplitude is that of the nearest surface in nine rays over 24 degrees. The floor plan is that of
+`sim_diff_base`.
 
     loadrt sim_ultrasound names=sonar
     loadrt can_send link=sim:yair names=echo id=0x310 ids=8 fields=s0:u8,s1:u8

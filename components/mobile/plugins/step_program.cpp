@@ -150,8 +150,9 @@ A sequence in a text file, in the manner of a sequential function chart (IEC 611
       after 2s -> drive               # time since the step began
     at 88s -> wait                    # time since the program left its first step; once, before any condition
 
-At most one transition is taken per cycle. A pin `in-STEP` for each step is TRUE in that step. At most 64 inputs, 64 outputs, 128 steps and 32
-transitions per step. Names have a to z, 0 to 9 and `-`.
+At most one transition is taken per cycle. A pin `in-STEP` for each step is TRUE in that step. At
+most 64 inputs, 64 outputs, 128 steps and 32 transitions per step. Names have a to z, 0 to 9 and
+`-`.
 
     loadrt step_program file=match.program names=match
     addf match.update servo

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The memory in which the values of a bus meet the cycle. It has no pointers, so that the master may
-// be in another process (the guardian) that maps the same memory.
+// The memory in which the values of a bus meet the cycle. It has no pointers, so that the master
+// may be in another process (the guardian) that maps the same memory.
 //
 // Every member has one writer: `engine` is the thread or process with the line, `cycle` the
 // real-time thread. All are lock-free atomics; a value is one of them, so that it never tears.

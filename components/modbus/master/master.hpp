@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The engine of a bus: decides which telegram is next, sends it, decodes the answer, and stops the
-// drives. It has no thread and no clock. The owner of the line calls work() when bytes have arrived,
-// and when the time that the last call returned has come.
+// drives. It has no thread and no clock. The owner of the line calls work() when bytes have
+// arrived, and when the time that the last call returned has come.
 //
 // Which telegram is next:
 //   1. stop telegrams, when a stop was requested: nothing else until they are acknowledged or their

@@ -443,7 +443,8 @@ private:
 HAL_COMPONENT(Modbus, "modbus",
               "Modbus master (RTU and TCP): registers as pins, drives as spindles, stop telegrams",
               R"(
-Exchanges registers with the slaves of a Modbus line in the background. A configuration names the line, the slaves and their values:
+Exchanges registers with the slaves of a Modbus line in the background. A configuration names the
+line, the slaves and their values:
 
 `spindle.modbus`:
 
@@ -469,13 +470,17 @@ A real line is `link = serial:/dev/ttyUSB0`. The netlist:
     net speed => modbus.0.spindle.speed-cmd
     sets speed 12000
 
-A cycle only copies values. The telegrams are exchanged by another process, the guardian, when a slave has stop telegrams, else by a background thread. `age`
-is how old the values of a slave are. Set-points that have changed are sent first. A slave that does not answer is offline after three requests and then uses at
-most 5 % of the line.
+A cycle only copies values. The telegrams are exchanged by another process, the guardian, when a
+slave has stop telegrams, else by a background thread. `age` is how old the values of a slave are.
+Set-points that have changed are sent first. A slave that does not answer is offline after three
+requests and then uses at most 5 % of the line.
 
-A drive that is online starts with a rising edge of `run`, once its speed has been read. After a stop, a lost slave or an e-stop it needs another edge. The stop telegrams
-are sent when `estop` is TRUE, until they are acknowledged, when the thread is stopped or hangs, on `unloadrt`, and when the process ends, however that happens.
+A drive that is online starts with a rising edge of `run`, once its speed has been read. After a
+stop, a lost slave or an e-stop it needs another edge. The stop telegrams are sent when `estop` is
+TRUE, until they are acknowledged, when the thread is stopped or hangs, on `unloadrt`, and when the
+process ends, however that happens.
 
-`docs/modbus.md` has the keys of the configuration and the table of profiles. `hal modbus plan FILE` shows the telegrams; `hal modbus scan`, `read`
-and `write` talk to slaves by hand; `hal node modbus FILE` emulates the slaves of a file.
+`docs/modbus.md` has the keys of the configuration and the table of profiles. `hal modbus plan FILE`
+shows the telegrams; `hal modbus scan`, `read` and `write` talk to slaves by hand;
+`hal node modbus FILE` emulates the slaves of a file.
 )")

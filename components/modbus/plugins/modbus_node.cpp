@@ -198,8 +198,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(ModbusNode, "modbus_node", "Emulated Modbus slaves and drives, for simulations", R"(
-Emulates all slaves of a configuration on a line: their registers, and a motor behind each frequency converter. With the master on the same line in memory a
-machine runs in `hal sim`:
+Emulates all slaves of a configuration on a line: their registers, and a motor behind each frequency
+converter. With the master on the same line in memory a machine runs in `hal sim`:
 
 `spindle.modbus`:
 
@@ -220,10 +220,12 @@ The netlist puts both on a line in memory:
     addf modbus-node.0 servo-thread
     addf modbus.0.transmit servo-thread
 
-On the virtual clock the line works once in each cycle of the fastest thread: a telegram takes at least two of them.
+On the virtual clock the line works once in each cycle of the fastest thread: a telegram takes at
+least two of them.
 
-What the master reads is an input pin here, and what it writes is an output pin. The inputs `silence`, `late`, `corrupt`, `wrong-unit`, `exception` and `half`
-make the faults of a slave. `trip` and `blocked` of a drive make those of a motor.
+What the master reads is an input pin here, and what it writes is an output pin. The inputs
+`silence`, `late`, `corrupt`, `wrong-unit`, `exception` and `half` make the faults of a slave.
+`trip` and `blocked` of a drive make those of a motor.
 
 As a process of its own, on a pseudo terminal or a TCP port, it is `hal node modbus FILE`.
 )")

@@ -41,8 +41,8 @@ struct Found {
 /// Whose frames are received.
 enum class Role : std::uint8_t { answers, requests };
 
-/// Returns the length of an RTU frame that begins with these bytes; 0: more bytes are needed, or the
-/// function is unknown. [any]
+/// Returns the length of an RTU frame that begins with these bytes; 0: more bytes are needed, or
+/// the function is unknown. [any]
 std::size_t rtu_length(std::span<const std::uint8_t> bytes, Role role, bool huanyang) noexcept;
 
 /// What the first received bytes are.

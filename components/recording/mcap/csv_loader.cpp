@@ -84,8 +84,8 @@ std::string note_of_csv(std::size_t equal) {
     return counted(equal, "row has", "rows have") + " the time of the row before";
 }
 
-/// Columns of which a row has values together: those of one thread. Columns that share a row, or are
-/// connected by such columns, are a group.
+/// Columns of which a row has values together: those of one thread. Columns that share a row, or
+/// are connected by such columns, are a group.
 class ColumnGroups {
 public:
     explicit ColumnGroups(std::size_t columns) : parents_(columns) {

@@ -8,9 +8,9 @@
 
 namespace hal::mcap {
 
-/// Loads a .csv as `hal record` writes it: the times of the first column are seconds, an empty field
-/// has the value of the row before. Columns with values in the same rows make a table. Returns false
-/// and sets `problem`.
+/// Loads a .csv as `hal record` writes it: the times of the first column are seconds, an empty
+/// field has the value of the row before. Columns with values in the same rows make a table.
+/// Returns false and sets `problem`.
 bool load_csv(const std::string& path, Recording& to, std::string& problem,
               const LoadOptions& options);
 

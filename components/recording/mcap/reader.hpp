@@ -59,8 +59,8 @@ public:
 
     using Visit = std::function<bool(const Message&)>;
     /// Calls `visit` for the messages with begin <= log time < end, in the order of the file, until
-    /// it returns false. Only chunks that may have some are read. Damaged ones are left out: then it
-    /// returns false, problem() is that of the first, and damaged() are all of them.
+    /// it returns false. Only chunks that may have some are read. Damaged ones are left out: then
+    /// it returns false, problem() is that of the first, and damaged() are all of them.
     bool each(const Visit& visit, std::uint64_t begin = 0,
               std::uint64_t end = std::numeric_limits<std::uint64_t>::max());
     std::uint64_t chunks_read() const { return chunks_read_; }

@@ -41,7 +41,8 @@ struct Marker {
 /// to frame and returns the one with the smaller error over the last frames.
 class MarkerDetector {
 public:
-    /// `dictionary`: "4x4_50" ... "7x7_1000". Throws std::invalid_argument with the list of names. [setup]
+    /// `dictionary`: "4x4_50" ... "7x7_1000". Throws std::invalid_argument with the list of names.
+    /// [setup]
     MarkerDetector(const std::string& dictionary, std::optional<Camera> camera);
     ~MarkerDetector();
 

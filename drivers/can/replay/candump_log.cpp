@@ -4,7 +4,8 @@
 // if bit 29 is set. The time may be a date, as `candump -L -tA` writes it; a direction R or T may
 // follow (`candump -x`, python-can); bytes may be separated by dots, and a raw DLC of 9 to 15 may
 // follow eight of them (`_E`).
-// The terminal format is `(TIME)  CHANNEL  [RX|TX - -]  ID  [LENGTH]  BYTES`, with the time only for `candump -t`.
+// The terminal format is `(TIME)  CHANNEL  [RX|TX - -]  ID  [LENGTH]  BYTES`, with the time only
+// for `candump -t`.
 #include <algorithm>
 #include <array>
 #include <cstdio>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A port of a segment in memory, whose calls are ordered by the journal of the program that uses it.
+// A port of a segment in memory, whose calls are ordered by the journal of the program that uses
+// it.
 #pragma once
 
 #include <functional>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 // An Ethernet segment in memory: stations, each with a full-duplex line to one store-and-forward
 // switch. Its time is the newest
-// `now_ns` its users passed in; everything up to that time is processed, in order of time, by whichever of them calls first ("the pump").
-// What starts strictly before now is done, so that the order in which functions run at one instant
-// does not matter; simultaneous events are ordered by station, then user, then the order of
-// sending.
+// `now_ns` its users passed in; everything up to that time is processed, in order of time, by
+// whichever of them calls first ("the pump"). What starts strictly before now is done, so that the
+// order in which functions run at one instant does not matter; simultaneous events are ordered by
+// station, then user, then the order of sending.
 //
 // Threads: a user has a pool of buffers for its frames. Their numbers circulate: sender ->
 // `outgoing` -> pump -> `unused` -> sender; each queue has one writer and one reader. Arrived

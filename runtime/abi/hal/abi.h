@@ -2,10 +2,10 @@
 /*
  * The C11 boundary between the Halcyon runtime (the host) and a component plugin.
  *
- * A plugin exports one symbol, `hal_plugin`. The runtime, `hal doc`, `hal check` and every unit test
- * are hosts of this same interface. Rules: structs that may grow begin with their size and grow at the
- * end; within a major version nothing is renamed or removed; no exception, no C++ type and no ownership
- * of memory crosses. Every function names the thread it may be called from:
+ * A plugin exports one symbol, `hal_plugin`. The runtime, `hal doc`, `hal check` and every unit
+ * test are hosts of this same interface. Rules: structs that may grow begin with their size and
+ * grow at the end; within a major version nothing is renamed or removed; no exception, no C++ type
+ * and no ownership of memory crosses. Every function names the thread it may be called from:
  *   [setup]     an ordinary thread, no cycle of this instance is running
  *   [realtime]  inside a cycle: must not allocate, lock, block, log or throw
  *   [any]       either
@@ -27,8 +27,8 @@ extern "C" {
 typedef enum hal_type { HAL_TYPE_BIT, HAL_TYPE_FLOAT, HAL_TYPE_S32, HAL_TYPE_U32, HAL_TYPE_S64, HAL_TYPE_U64, HAL_TYPE_PORT } hal_type;
 typedef enum hal_dir { HAL_DIR_IN, HAL_DIR_OUT, HAL_DIR_IO, HAL_DIR_PARAM } hal_dir;
 
-/* A byte stream between one writer and one reader. The host owns it; `head` is written by the writer
- * only, `tail` by the reader only, both count bytes for ever (index = count % capacity). */
+/* A byte stream between one writer and one reader. The host owns it; `head` is written by the
+ * writer only, `tail` by the reader only, both count bytes for ever (index = count % capacity). */
 typedef struct hal_port {
     uint32_t capacity; /* bytes; 0 until `sets SIGNAL BYTES` */
     uint32_t pad;
@@ -48,8 +48,8 @@ typedef union hal_value {
     hal_port *port;
 } hal_value;
 
-/* A pin in the memory of its instance. While the pin is not linked, `slot` points to `own`. Only the host
- * changes `slot`, at the beginning of a cycle of the thread the pin belongs to. */
+/* A pin in the memory of its instance. While the pin is not linked, `slot` points to `own`. Only
+ * the host changes `slot`, at the beginning of a cycle of the thread the pin belongs to. */
 typedef struct hal_pin {
     hal_value *slot;
     hal_value own;
@@ -94,8 +94,9 @@ typedef struct hal_call {
     void *self;
 } hal_call;
 
-/* Since 1.1: does `*current = call; call->step(call->self, cycle)` for each call in [first, last), which all have the
- * same step. `current` shows the host the running call, in case it does not return. [realtime] */
+/* Since 1.1: does `*current = call; call->step(call->self, cycle)` for each call in [first, last),
+ * which all have the same step. `current` shows the host the running call, in case it does not
+ * return. [realtime] */
 typedef void (*hal_row)(const hal_call *first, const hal_call *last, const hal_cycle *cycle, const hal_call *volatile *current);
 
 enum {
@@ -132,7 +133,8 @@ typedef struct hal_argument_decl {
 /* What a rejection is about. */
 typedef enum hal_subject { HAL_SUBJECT_INSTANCE, HAL_SUBJECT_ARGUMENT, HAL_SUBJECT_PIN } hal_subject;
 
-/* Since 1.2: why create or start returns false. The host copies all texts; it reads only the first `size` bytes. */
+/* Since 1.2: why create or start returns false. The host copies all texts; it reads only the first
+ * `size` bytes. */
 typedef struct hal_rejection {
     uint32_t size;
     hal_subject subject;
@@ -153,8 +155,9 @@ typedef struct hal_host {
     void *(*allocate)(const struct hal_host *, size_t bytes, size_t align); /* zeroed, lives as long as the instance */
     void (*fail)(const struct hal_host *, const char *reason);              /* why create or start will return false */
     const void *(*extension)(const struct hal_host *, const char *id);      /* NULL when the host has none */
-    /* Since 1.2: like fail(), with the cause typed. The first call of fail() or reject() counts. A host that is older has a smaller `size`:
-     * a plugin then passes the text to fail(). A plugin that is older calls fail() only: the host reports its reason for the instance. */
+    /* Since 1.2: like fail(), with the cause typed. The first call of fail() or reject() counts. A
+     * host that is older has a smaller `size`: a plugin then passes the text to fail(). A plugin
+     * that is older calls fail() only: the host reports its reason for the instance. */
     void (*reject)(const struct hal_host *, const hal_rejection *);
 } hal_host;
 
@@ -182,8 +185,9 @@ typedef struct hal_component {
     void (*destroy)(void *self);                     /* [setup] */
 } hal_component;
 
-/* Extension "hal.stream/1": a FIFO of records between a component and programs outside (sampler, streamer).
- * One producer, one consumer; head and tail count records for ever and are accessed atomically. */
+/* Extension "hal.stream/1": a FIFO of records between a component and programs outside (sampler,
+ * streamer). One producer, one consumer; head and tail count records for ever and are accessed
+ * atomically. */
 typedef struct hal_stream {
     uint32_t size;
     uint32_t columns;    /* values per record */
@@ -197,11 +201,13 @@ typedef struct hal_stream {
 
 typedef struct hal_stream_host {
     uint32_t size;
-    /* [setup] in start; withdrawn at stop. `name` is below the instance's name; "" is that name itself. */
+    /* [setup] in start; withdrawn at stop. `name` is below the instance's name; "" is that name
+     * itself. */
     bool (*publish)(const hal_host *, const char *name, hal_stream *);
 } hal_stream_host;
 
-/* Extension "hal.faults/1": the runtime's fault record, for a safety chain and for components that detect faults. */
+/* Extension "hal.faults/1": the runtime's fault record, for a safety chain and for components that
+ * detect faults. */
 typedef struct hal_faults {
     uint32_t size;
     uint32_t pad;
@@ -221,17 +227,20 @@ typedef enum hal_fault_code {
     HAL_FAULT_VIOLATION /* since 1.3 */
 } hal_fault_code;
 
-/* Extension "hal.clock/1": lets one instance discipline the deadlines of all threads to an external clock reference. */
+/* Extension "hal.clock/1": lets one instance discipline the deadlines of all threads to an external
+ * clock reference. */
 typedef struct hal_clock {
     uint32_t size;
     uint32_t pad;
     int64_t shift_ns; /* sum of all clock adjustments; written by the host, read atomically [any] */
     int64_t limit_ns; /* largest adjustment per cycle in either direction: a tenth of the period of the fastest thread; read
                          atomically [any] */
-    /* [realtime] in a cycle of the leading instance only: delays (negative: advances) all later deadlines of all threads by `ns`, so that
-       their relative phase is kept. hal_cycle.start_ns is the adjusted time. */
+    /* [realtime] in a cycle of the leading instance only: delays (negative: advances) all later
+       deadlines of all threads by `ns`, so that their relative phase is kept. hal_cycle.start_ns is
+       the adjusted time. */
     void (*step)(const struct hal_clock *, int64_t ns);
-    /* [setup] in start: this instance leads until it is stopped. false, after fail(): another instance leads. */
+    /* [setup] in start: this instance leads until it is stopped. false, after fail(): another
+     * instance leads. */
     bool (*claim)(const struct hal_clock *, const hal_host *);
 } hal_clock;
 

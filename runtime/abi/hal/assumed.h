@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Extension "hal.assumed/1", offered while an instance is created: names that `hal check --assume` takes to exist.
+ * Extension "hal.assumed/1", offered while an instance is created: names that `hal check --assume`
+ * takes to exist.
  */
 #ifndef HAL_ASSUMED_H
 #define HAL_ASSUMED_H

@@ -16,7 +16,8 @@ extern "C" {
 
 typedef struct hal_pin_names {
     uint32_t size;
-    /* Declares whether the names of further pins are complete, without the name of the instance. [setup] */
+    /* Declares whether the names of further pins are complete, without the name of the instance.
+     * [setup] */
     void (*whole)(const hal_host *, bool whole);
 } hal_pin_names;
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Extension "hal.retained/1", offered while an instance is created: variables that `reload` copies from an instance to the one that replaces it.
- * hal/retained.hpp is what components use.
+ * Extension "hal.retained/1", offered while an instance is created: variables that `reload` copies
+ * from an instance to the one that replaces it. hal/retained.hpp is what components use.
  */
 #ifndef HAL_RETAINED_H
 #define HAL_RETAINED_H
@@ -26,8 +26,9 @@ typedef struct hal_variable {
 typedef struct hal_retained {
     uint32_t size;
     uint32_t pad;
-    /* Declares a variable. The host copies it before the first cycle of the new instance and after the last one of the old instance, in the
-     * thread that runs them or while no thread does. false: create must fail. [setup] */
+    /* Declares a variable. The host copies it before the first cycle of the new instance and after
+     * the last one of the old instance, in the thread that runs them or while no thread does.
+     * false: create must fail. [setup] */
     bool (*declare)(const hal_host *, const hal_variable *);
 } hal_retained;
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Extension "hal.texts/1", offered while an instance is created: reports errors in a file that the component reads in the same form as
- * errors of the netlist.
+ * Extension "hal.texts/1", offered while an instance is created: reports errors in a file that the
+ * component reads in the same form as errors of the netlist.
  */
 #ifndef HAL_TEXTS_H
 #define HAL_TEXTS_H
@@ -28,11 +28,11 @@ typedef struct hal_text_message {
 
 typedef struct hal_texts {
     uint32_t size;
-    /* Returns the path of `file`: beside the netlist that loads the component, or else as written. Valid until create
-     * returns. [setup] */
+    /* Returns the path of `file`: beside the netlist that loads the component, or else as written.
+     * Valid until create returns. [setup] */
     const char *(*find)(const hal_host *, const char *file);
-    /* Sets the text, and its name, to which the following messages refer. Without a name they refer to the command that
-     * loads the component. [setup] */
+    /* Sets the text, and its name, to which the following messages refer. Without a name they refer
+     * to the command that loads the component. [setup] */
     void (*begin)(const hal_host *, const char *name, const char *text, size_t bytes);
     /* Reports a message. After an error create must fail; fail() is then unnecessary. [setup] */
     void (*report)(const hal_host *, const hal_text_message *);

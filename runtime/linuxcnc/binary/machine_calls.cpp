@@ -96,7 +96,8 @@ int set_parameter(const char* name, int type, const void* value) {
     return 0;
 }
 
-/// `data` leads to a copy, which the next call overwrites: where a value is changes with every edit.
+/// `data` leads to a copy, which the next call overwrites: where a value is changes with every
+/// edit.
 int value_of(const char* function, int kind, const char* name, int* type, void** data,
              bool* linked) {
     static hal_value copy;

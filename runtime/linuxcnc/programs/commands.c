@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* LinuxCNC's functions that act on the machine as a whole: each is a command to it, or asks it. All [setup]; 0, or a negative errno. */
+/* LinuxCNC's functions that act on the machine as a whole: each is a command to it, or asks it. All
+ * [setup]; 0, or a negative errno. */
 #define _GNU_SOURCE
 #include <stdio.h>
 #include <stdlib.h>
@@ -104,9 +105,10 @@ int hal_set_lock(unsigned char lock) {
     return -EINVAL;
 }
 
-/* --- values by name -------------------------------------------------------------------------------------------------------- */
+/* --- values by name --- */
 
-/* Asks for a value by name. `data` leads to a copy, which the next call of the same thread overwrites. */
+/* Asks for a value by name. `data` leads to a copy, which the next call of the same thread
+ * overwrites. */
 static int value_of(const char* kind, const char* name, int* type, union halcyon_data** data,
                     bool* flag, bool of_signal) {
     static _Thread_local struct halcyon_object found;
@@ -163,7 +165,7 @@ int hal_param_u64_set(const char* name, unsigned long value) {
     return hal_param_set(name, HAL_U64, &(uint64_t){value});
 }
 
-/* --- what a program does not have ------------------------------------------------------------------------------------------------ */
+/* --- what a program does not have --- */
 
 /* In LinuxCNC a piece of its memory, for halcmd's `sets`. */
 int hal_port_alloc(unsigned size) {

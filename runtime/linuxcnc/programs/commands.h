@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* What the sources of liblinuxcnchal.so.0 share: commands to the machine, and what it knows by name. All [setup]. */
+/* What the sources of liblinuxcnchal.so.0 share: commands to the machine, and what it knows by
+ * name. All [setup]. */
 #ifndef HALCYON_PROGRAMS_COMMANDS_H
 #define HALCYON_PROGRAMS_COMMANDS_H
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Runs one command, given as its words up to NULL. 0, or a negative errno after printing why. Sets number, if there is one, to that behind `key` in what the
- * command prints. */
+/* Runs one command, given as its words up to NULL. 0, or a negative errno after printing why. Sets
+ * number, if there is one, to that behind `key` in what the command prints. */
 int halcyon_run(const char* const* words, const char* key, unsigned* number);
 #define RUN(...) halcyon_run((const char* const[]){__VA_ARGS__, NULL}, NULL, NULL)
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a program needs beside streams.cpp and shared_memory.cpp of runtime/linuxcnc/binary: ports, and
-// waiting for a port or a stream. It has no cycles.
+// What a program needs beside streams.cpp and shared_memory.cpp of runtime/linuxcnc/binary: ports,
+// and waiting for a port or a stream. It has no cycles.
 #include <cstdint>
 #include <ctime>
 #include <vector>

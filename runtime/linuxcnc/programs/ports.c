@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Byte streams: the numbers of a program's port pins. A number holds the places of the component and of its pin, so it needs no table. */
+/* Byte streams: the numbers of a program's port pins. A number holds the places of the component
+ * and of its pin, so it needs no table. */
 #include "linuxcnc/programs/ports.h"
 
 #include "linuxcnc/inside.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What LinuxCNC 2.10 has for programs beside the pins by handle (declare.c): values by name in a structure. All [setup]. */
+/* What LinuxCNC 2.10 has for programs beside the pins by handle (declare.c): values by name in a
+ * structure. All [setup]. */
 #define _GNU_SOURCE
 #include <stdio.h>
 #include <string.h>

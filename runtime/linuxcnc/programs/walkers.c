@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Some programs of LinuxCNC's (halcmd, halrmt, halmeter, halscope, the Tcl package Hal, Python's _hal) follow pointers through its shared
- * memory. A machine of ours has no such memory: a program that is linked to these two variables ends before its main(), with the command
- * that takes its place. It is recognised by where the linker has put them: into the program.
+ * Some programs of LinuxCNC's (halcmd, halrmt, halmeter, halscope, the Tcl package Hal, Python's
+ * _hal) follow pointers through its shared memory. A machine of ours has no such memory: a program
+ * that is linked to these two variables ends before its main(), with the command that takes its
+ * place. It is recognised by where the linker has put them: into the program.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -16,8 +17,9 @@
 
 #include "commands.h"
 
-/* 8 bytes each: programs have copies of that size. Of a library they point to a page that nothing may access: so functions of LinuxCNC's Python
- * module that only test hal_shmem_base work, and those that follow the pointers end with the sentence. */
+/* 8 bytes each: programs have copies of that size. Of a library they point to a page that nothing
+ * may access: so functions of LinuxCNC's Python module that only test hal_shmem_base work, and
+ * those that follow the pointers end with the sentence. */
 char *hal_data, *hal_shmem_base;
 const int halcyon_here = 0;
 
@@ -72,7 +74,8 @@ void halcyon_begins(void) {
     hal_data = hal_shmem_base = forbidden;
 }
 
-/* Without its window, classicladder only fills the module's memory with a program, and looks for no pin. */
+/* Without its window, classicladder only fills the module's memory with a program, and looks for no
+ * pin. */
 static int without_window(const char* name, int argc, char** argv) {
     if (strcmp(name, "classicladder") != 0) return 0;
     for (int i = 1; i < argc; ++i) {

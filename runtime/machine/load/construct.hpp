@@ -67,7 +67,8 @@ Code failure_code(std::string_view given, Code usual);
 bool construct(Model& model, Edit& edit, LoadedComponent& component, const LoadRequest& request,
                Sources& sources, Diagnostics& diagnostics);
 
-/// Memory that lives as long as the instance; nullptr when memory is exhausted or the request is invalid.
+/// Memory that lives as long as the instance; nullptr when memory is exhausted or the request is
+/// invalid.
 void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noexcept;
 
 /// Starts one instance: it may acquire hardware. Returns why it failed, or an empty Failure.

@@ -72,7 +72,8 @@ bool names_itself(Elaboration& on, const Token& name, Origin origin) {
     return plugin && (plugin->component->flags & HAL_COMPONENT_WHOLE_NAMES);
 }
 
-/// `count=` as LinuxCNC reads it: 0x10 and 010 are hexadecimal and octal, nothing is the default. Returns false after reporting.
+/// `count=` as LinuxCNC reads it: 0x10 and 010 are hexadecimal and octal, nothing is the default.
+/// Returns false after reporting.
 bool read_count(Elaboration& on, const Token& token, const std::string& key,
                 const std::string& value, LoadRequest& request) {
     if (value.empty()) return true;
@@ -253,7 +254,8 @@ bool take_origin(Elaboration& on, Args& args, Origin& origin) {
     return false;
 }
 
-/// `hal check` does not run a module: it may access hardware. So neither its arguments nor what names its pins is checked.
+/// `hal check` does not run a module: it may access hardware. So neither its arguments nor what
+/// names its pins is checked.
 bool is_unchecked(Elaboration& on, const Token& name, Origin origin) {
     Diagnostics ignored;
     const auto plugin = open_component(on.plugins, name.text, origin, name.span, ignored);

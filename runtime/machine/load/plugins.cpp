@@ -102,8 +102,8 @@ std::string underlined(std::string_view name) {
     return text;
 }
 
-/// Why the build left a component out, or "": a Debian package that is missing, or the switch of its
-/// package of the tree. The build lists them beside the plugins.
+/// Why the build left a component out, or "": a Debian package that is missing, or the switch of
+/// its package of the tree. The build lists them beside the plugins.
 std::string left_out_for(const std::string& name, const std::vector<std::string>& path) {
     for (const std::string& folder : path) {
         std::ifstream file(folder + "/absent");

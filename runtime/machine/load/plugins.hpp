@@ -26,7 +26,8 @@ std::string user_folder(std::string_view kind);
 /// looked in.
 class Plugins {
 public:
-    /// `first`: folders searched before HALCYON_PLUGIN_PATH, the user's folder, the build tree and the installation.
+    /// `first`: folders searched before HALCYON_PLUGIN_PATH, the user's folder, the build tree and
+    /// the installation.
     explicit Plugins(std::vector<std::string> first = {});
     /// The plugin of that name (`-` and `_` are the same), built first where build_on_demand() does
     /// that; nothing after reporting no-such-component or bad-plugin.

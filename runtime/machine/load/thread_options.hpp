@@ -22,7 +22,8 @@ struct NewThread {
 
 /// `NAME PERIOD_NS [fp|nofp] [cpu=N] [policy=…] [priority=N] [spin=TIME] [budget=TIME] [supervise=TIME|off] [profile=every]`
 bool parse_new_thread(std::span<const Token> args, NewThread& thread, Diagnostics& diagnostics);
-/// `name1=… period1=… fp1=… cpu1=… name2=…`: as many as are named, without those of period 0. LinuxCNC's defaults: thread1, 1 ms.
+/// `name1=… period1=… fp1=… cpu1=… name2=…`: as many as are named, without those of period 0.
+/// LinuxCNC's defaults: thread1, 1 ms.
 bool parse_threads(std::span<const Token> args, Span at, std::vector<NewThread>& threads,
                    Diagnostics& diagnostics);
 /// LinuxCNC rounds a period to a multiple of the fastest thread's; so do we, with a warning.

@@ -20,8 +20,8 @@ std::string socket_path(std::string_view name);
 /// The socket that a client connects to: this user's, else that of a service which shares it with a
 /// group of this user; socket_path() when there is neither.
 std::string found_socket(std::string_view name);
-/// The group that a service of this name shares its socket with; empty: it shares none, or this user
-/// is in it.
+/// The group that a service of this name shares its socket with; empty: it shares none, or this
+/// user is in it.
 std::string group_without_user(std::string_view name);
 /// The file beside the socket that a running instance keeps locked; it contains the process id.
 std::string lock_path(std::string_view name);

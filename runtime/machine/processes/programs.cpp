@@ -373,7 +373,8 @@ void Programs::child_ended(pid_t pid, int status) {
     }
 }
 
-/// The process of a second component of it has ended; the connection ends a moment earlier or later.
+/// The process of a second component of it has ended; the connection ends a moment earlier or
+/// later.
 void Programs::end_component(Entry& entry, int status) {
     constexpr std::int64_t between_ns = 1'000'000'000;
     const Entry::Dead* const dead = entry.death();
@@ -462,7 +463,8 @@ void Programs::give_up(Entry& entry) {
     notify();
 }
 
-// --- what happens in time: heartbeat timeouts, declared values after a death, restarts, SIGKILL ---
+// --- what happens in time: heartbeat timeouts, declared values after a death, restarts, SIGKILL
+// ---
 
 void Programs::schedule(Entry& entry) {
     const std::int64_t now = monotonic_ns();

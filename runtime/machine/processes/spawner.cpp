@@ -28,7 +28,8 @@
 namespace hal {
 namespace {
 
-/// `folders` before those of a variable like PATH, as far as they are there and not among those already.
+/// `folders` before those of a variable like PATH, as far as they are there and not among those
+/// already.
 std::string with_folders(const char* variable, const std::vector<std::string>& folders) {
     const char* const before = std::getenv(variable);
     const std::string there = before ? before : "";

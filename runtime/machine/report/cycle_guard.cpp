@@ -51,7 +51,8 @@ CycleGuard::~CycleGuard() {
 
 namespace {
 
-/// Of a cycle that has ended, too late: most are shorter than the interval in which the guard looks.
+/// Of a cycle that has ended, too late: most are shorter than the interval in which the guard
+/// looks.
 void end_after_slow_cycle(const Core& core, std::int64_t took_ns) {
     const CycleNames names = names_of(CycleNow{&core, 0, 0});
     make_all_safe();

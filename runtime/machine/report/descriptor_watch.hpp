@@ -14,8 +14,8 @@ namespace hal {
 struct LostDescriptor;
 
 /// Looks at the listed descriptors every 100 ms from a thread of its own, which uses none. When one
-/// is lost, it stops the machine, reports the descriptor and ends the process with status 1. A limit
-/// of open files that was lowered is raised again (FileLimit).
+/// is lost, it stops the machine, reports the descriptor and ends the process with status 1. A
+/// limit of open files that was lowered is raised again (FileLimit).
 class DescriptorWatch {
 public:
     static constexpr std::int64_t interval_ns = 100'000'000;

@@ -28,7 +28,8 @@ public:
     ~ExitObserver();
     ExitObserver(const ExitObserver&) = delete;
 
-    /// Returns the mark of a new thread; nullptr when all marks are used, or without an observer. [setup]
+    /// Returns the mark of a new thread; nullptr when all marks are used, or without an observer.
+    /// [setup]
     CycleMark* take_mark();
     /// The thread has ended. [setup]
     void give_back(const CycleMark* mark);

@@ -2,8 +2,8 @@
 // A model that threads run, as its parts: the model and its transactions, the threads, the values,
 // the plugin host and the reports. A Session is one with programs.
 //
-// Every member and every member of its parts is [setup] and is called with lock() held, unless it is
-// marked otherwise.
+// Every member and every member of its parts is [setup] and is called with lock() held, unless it
+// is marked otherwise.
 #pragma once
 
 #include <atomic>

@@ -22,8 +22,8 @@ struct EditForm {
     bool arrows = false;  ///< arrows may stand among its arguments and are not counted
 };
 
-/// The open transaction of a machine, made by RunningModel::begin(). There is at most one at a time, and
-/// its owner holds the machine's lock. Destruction rolls back. [setup]
+/// The open transaction of a machine, made by RunningModel::begin(). There is at most one at a
+/// time, and its owner holds the machine's lock. Destruction rolls back. [setup]
 class Transaction {
 public:
     Transaction(Transaction&& other) noexcept : machine_(std::exchange(other.machine_, nullptr)) {}

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * realtime PLUGIN.so [NAME=VALUE...]: what `hal compile --check-rt` compiles and runs. A host of the component interface that
- * stands before the C library: it runs each function of one instance a thousand cycles with random and extreme values, and prints
- * a line for each function that does in a cycle what may wait, takes longer than a period, or crashes. Exit code 2: there are some.
+ * realtime PLUGIN.so [NAME=VALUE...]: what `hal compile --check-rt` compiles and runs. A host of
+ * the component interface that stands before the C library: it runs each function of one instance a
+ * thousand cycles with random and extreme values, and prints a line for each function that does in
+ * a cycle what may wait, takes longer than a period, or crashes. Exit code 2: there are some.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -39,7 +40,7 @@ static void check(const char* call) {
     }
 }
 
-/* --- what stands before the C library -------------------------------------------------------------------------------- */
+/* --- what stands before the C library --- */
 
 void* __libc_malloc(size_t);
 void* __libc_calloc(size_t, size_t);
@@ -78,7 +79,7 @@ void free(void* memory) {
     __libc_free(memory);
 }
 
-/* --- exceptions: what a component in C++ throws goes through here ------------------------------------------------------- */
+/* --- exceptions: what a component in C++ throws goes through here --- */
 
 static const char* thrown; /* the type of the last one, as its author wrote it */
 
@@ -229,7 +230,7 @@ int __printf_chk(int flag, const char* format, ...) {
     return length;
 }
 
-/* --- host ------------------------------------------------------------------------------------------------------------- */
+/* --- host --- */
 
 static struct {
     hal_pin* memory;
@@ -305,7 +306,7 @@ static const void* no_extension(const hal_host* host, const char* id) {
     return (void)host, (void)id, NULL;
 }
 
-/* --- values ------------------------------------------------------------------------------------------------------------- */
+/* --- values --- */
 
 static uint64_t random_bits(void) {
     static uint64_t state = 88172645463325252u;

@@ -17,9 +17,10 @@ namespace hal {
 
 class Background {
 public:
-    /// `turn` does a piece of the work at the runtime clock's time `now_ns`. When it `may_wait` it is called again and again by a thread of
-    /// its own, and waits by itself, for at most 0.1 s, until there is something to do; else it
-    /// must not wait. It meets the cycle through hal/queue.hpp only and throws nothing. [setup]
+    /// `turn` does a piece of the work at the runtime clock's time `now_ns`. When it `may_wait` it
+    /// is called again and again by a thread of its own, and waits by itself, for at most 0.1 s,
+    /// until there is something to do; else it must not wait. It meets the cycle through
+    /// hal/queue.hpp only and throws nothing. [setup]
     explicit Background(std::function<void(std::int64_t now_ns, bool may_wait)> turn)
         : turn_(std::move(turn)) {}
     Background(const Background&) = delete;

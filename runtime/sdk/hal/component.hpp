@@ -212,9 +212,9 @@ protected:
     }
 };
 
-/// What the host calls to make hardware outputs safe: on stop, unload, `delf` of the instance's last
-/// function, a fault that stops the thread, the end of the process and in a crash handler. Must be async-signal-safe: it may write
-/// to devices and must not allocate, lock or log.
+/// What the host calls to make hardware outputs safe: on stop, unload, `delf` of the instance's
+/// last function, a fault that stops the thread, the end of the process and in a crash handler.
+/// Must be async-signal-safe: it may write to devices and must not allocate, lock or log.
 class Emergency : Function {
 public:
     template <std::derived_from<Component> C>

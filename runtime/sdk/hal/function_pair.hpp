@@ -74,8 +74,8 @@ public:
         return true;
     }
 
-    /// Returns true while receive() has not run for `tolerated_cycles`: outputs are to be made safe.
-    /// Only for transmit(). [realtime]
+    /// Returns true while receive() has not run for `tolerated_cycles`: outputs are to be made
+    /// safe. Only for transmit(). [realtime]
     bool receive_is_missing() const noexcept { return receive_is_missing_; }
 
     /// Returns true while transmit() has not run for `tolerated_cycles`. Only for receive().

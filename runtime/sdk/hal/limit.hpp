@@ -18,8 +18,8 @@ namespace hal {
 enum class ZeroLimit { lets_nothing_pass, disables };
 
 /// A pin with a limit. While its value is NaN, the last value that was a number applies, and a
-/// fault is raised once, whose text states what applies. Before the first number the default applies
-/// if it is a limit, else nothing passes. One function of an instance reads it.
+/// fault is raised once, whose text states what applies. Before the first number the default
+/// applies if it is a limit, else nothing passes. One function of an instance reads it.
 template <class P, ZeroLimit zero = ZeroLimit::lets_nothing_pass>
 class LimitPin : public P {
 public:

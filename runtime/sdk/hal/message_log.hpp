@@ -26,7 +26,8 @@ struct MessageSubject {
     std::string kind, detail = {};
 };
 
-/// How the lines of a log begin: "INSTANCE: ", or, in a program of its own, the time since its start,
+/// How the lines of a log begin: "INSTANCE: ", or, in a program of its own, the time since its
+/// start,
 /// "    1.234 s  ".
 class LinePrefix {
 public:

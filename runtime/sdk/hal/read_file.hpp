@@ -16,8 +16,8 @@
 #include "hal/abi.h"
 
 /// Defined by `hal lsp` only: passes the text that an editor has of the file at `path`, which takes
-/// precedence over what is on the disk, to `take`. Returns false for a file that no editor has open.
-/// [setup]
+/// precedence over what is on the disk, to `take`. Returns false for a file that no editor has
+/// open. [setup]
 extern "C" HAL_EXPORT __attribute__((weak)) bool hal_editor_text(
     const char* path, void (*take)(void* bytes, const char* text, std::size_t size), void* bytes);
 

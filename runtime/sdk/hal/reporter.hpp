@@ -15,9 +15,9 @@
 
 namespace hal {
 
-/// `Event` must be trivially copyable. A cycle queues events, one thread formats them; on the virtual clock they are printed at the end of
-/// the instant, so that the sentences of several instances come in the same order every time. The
-/// rate is limited as MessageLog states.
+/// `Event` must be trivially copyable. A cycle queues events, one thread formats them; on the
+/// virtual clock they are printed at the end of the instant, so that the sentences of several
+/// instances come in the same order every time. The rate is limited as MessageLog states.
 template <class Event>
 class Reporter {
 public:

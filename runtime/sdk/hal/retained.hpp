@@ -46,8 +46,8 @@ concept Elements = !Retainable<T> && requires(T& all) {
 
 }  // namespace detail
 
-/// Names a variable for hal::Retained. It is trivially copyable, an atomic, or a class that declares
-/// itself `retainable`, and contains no pointer.
+/// Names a variable for hal::Retained. It is trivially copyable, an atomic, or a class that
+/// declares itself `retainable`, and contains no pointer.
 class RetainedVariable {
 public:
     template <detail::Retainable T>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A stream whose records carry the time at which they were made, and how many were lost before them. */
+/* A stream whose records carry the time at which they were made, and how many were lost before
+ * them. */
 #ifndef HAL_STREAM_TIMES_H
 #define HAL_STREAM_TIMES_H
 

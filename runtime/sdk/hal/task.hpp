@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Sequential work spread over cycles: coroutines that wait for an answer, an event or a time. Their
-// frames come from memory that a channel reserved, so that they run in real time without allocation.
+// frames come from memory that a channel reserved, so that they run in real time without
+// allocation.
 //
 //     class Sensor : public hal::TaskChannel {
 //         struct Reply {
@@ -44,8 +45,8 @@ class TaskMemory {
 public:
     /// Reserves the memory. [setup]
     explicit TaskMemory(std::size_t bytes) : bytes_(bytes) {}
-    /// Returns space for a frame. The deepest chain of tasks is fixed by the code, and the tests run
-    /// all of them: too little memory ends the program. [realtime]
+    /// Returns space for a frame. The deepest chain of tasks is fixed by the code, and the tests
+    /// run all of them: too little memory ends the program. [realtime]
     void* take(std::size_t size) noexcept {
         size = round(size);
         if (used_ + size > bytes_.size()) {

@@ -204,7 +204,8 @@ public:
     }
 
 private:
-    /// Returns the time of the frame as --time has it: since the first frame of all buses by default.
+    /// Returns the time of the frame as --time has it: since the first frame of all buses by
+    /// default.
     double seconds_of(const can::Frame& f, Source& source) {
         if (options_.time == "absolute") {
             if (source.frames == 0) {

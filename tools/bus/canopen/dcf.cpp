@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// `hal can dcf read` and `hal can dcf write`: saves the settings of a node as a DCF (CiA 306), and restores them to the node or its replacement.
-// Only differences are written, PDOs in the order required by CiA 301, and read back.
+// `hal can dcf read` and `hal can dcf write`: saves the settings of a node as a DCF (CiA 306), and
+// restores them to the node or its replacement. Only differences are written, PDOs in the order
+// required by CiA 301, and read back.
 #include "bus/canopen/dcf.hpp"
 
 #include <algorithm>

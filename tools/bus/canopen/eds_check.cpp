@@ -37,7 +37,8 @@ Diagnostic worded(const eds::Message& message, std::uint32_t source) {
     return out;
 }
 
-/// "motor.eds: not reliable (2 problems); Motor by Maker; 52 objects, 238 entries, 4 RPDOs, 4 TPDOs; 1 warning, 0 notes"
+/// "motor.eds: not reliable (2 problems); Motor by Maker; 52 objects, 238 entries, 4 RPDOs, 4
+/// TPDOs; 1 warning, 0 notes"
 std::string summary(const std::string& path, const eds::Reading& reading) {
     const eds::DeviceDescription& d = *reading.description;
     std::size_t receive = 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal can flash`: program download after CiA 302-3: stop the program, erase the flash, download, start, and check the result.
+// `hal can flash`: program download after CiA 302-3: stop the program, erase the flash, download,
+// start, and check the result.
 #include "bus/canopen/flash.hpp"
 
 #include <cstring>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal can gateway`: the gateway of CiA 309-3 behind a local socket; programs write lines and read answers.
+// `hal can gateway`: the gateway of CiA 309-3 behind a local socket; programs write lines and read
+// answers.
 #include "bus/canopen/gateway.hpp"
 
 #include <arpa/inet.h>

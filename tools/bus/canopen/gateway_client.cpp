@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal can gateway --connect`: a client of a CiA 309-3 gateway. It adds the sequence numbers and prints error texts.
+// `hal can gateway --connect`: a client of a CiA 309-3 gateway. It adds the sequence numbers and
+// prints error texts.
 #include "bus/canopen/gateway.hpp"
 
 #include <algorithm>

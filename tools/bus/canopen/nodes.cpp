@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal can nodes`: lists the nodes that send: states, age of the last heartbeat, newest emergencies. Sends nothing.
+// `hal can nodes`: lists the nodes that send: states, age of the last heartbeat, newest
+// emergencies. Sends nothing.
 #include "bus/canopen/nodes.hpp"
 
 #include <algorithm>

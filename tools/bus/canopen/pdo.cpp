@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal can pdo`: lists the PDOs of a node and their mapping, prints received values, and changes a mapping in the order of CiA 301.
+// `hal can pdo`: lists the PDOs of a node and their mapping, prints received values, and changes a
+// mapping in the order of CiA 301.
 #include "bus/canopen/pdo.hpp"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal canopen plan`: schedulability of a configuration, the worst-case response time of each message. `hal canopen check`: checks a
-// configuration and lists its pins.
+// `hal canopen plan`: schedulability of a configuration, the worst-case response time of each
+// message. `hal canopen check`: checks a configuration and lists its pins.
 #include "bus/canopen/plan.hpp"
 
 #include <algorithm>

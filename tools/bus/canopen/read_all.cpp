@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal can read-all`: reads every object that the description of a node lists, with the reason of each abort.
+// `hal can read-all`: reads every object that the description of a node lists, with the reason of
+// each abort.
 #include "bus/canopen/read_all.hpp"
 
 #include <fmt/core.h>

@@ -136,8 +136,8 @@ bool Supervision::read_consumer(std::vector<std::uint32_t>& entries) {
     return true;
 }
 
-/// Returns a node ID for our heartbeat that no other node sends; 0: none is free. Programs that start
-/// together begin with different IDs.
+/// Returns a node ID for our heartbeat that no other node sends; 0: none is free. Programs that
+/// start together begin with different IDs.
 std::uint8_t Supervision::free_node_id() const {
     constexpr unsigned all = last_own - first_own + 1;
     const auto start = static_cast<unsigned>(::getpid()) % all;
@@ -156,8 +156,8 @@ bool Supervision::is_left_over(std::uint32_t entry) const {
     return is_chosen_here && !heartbeat_seen_[id];
 }
 
-/// Returns the entry for our heartbeat: the first free one, or the last one that was left over, with
-/// its node ID then. std::nullopt: all are in use.
+/// Returns the entry for our heartbeat: the first free one, or the last one that was left over,
+/// with its node ID then. std::nullopt: all are in use.
 std::optional<std::size_t> Supervision::choose_entry(std::vector<std::uint32_t>& entries) {
     std::optional<std::size_t> chosen;
     for (std::size_t i = entries.size(); i > 0; --i) {

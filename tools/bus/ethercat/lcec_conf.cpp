@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// `hal ethercat lcec-conf`, and lcec_conf in netlists for LinuxCNC: checks the configuration of the component lcec before that is loaded, and shows
-// its size as pins. It gives the path of the file to the component.
+// `hal ethercat lcec-conf`, and lcec_conf in netlists for LinuxCNC: checks the configuration of the
+// component lcec before that is loaded, and shows its size as pins. It gives the path of the file
+// to the component.
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal ethercat sdos`, `foe-read` and `foe-write`: the object dictionary and the files of one slave.
+// `hal ethercat sdos`, `foe-read` and `foe-write`: the object dictionary and the files of one
+// slave.
 #include <unistd.h>
 
 #include "bus/ethercat/mailbox_failure.hpp"

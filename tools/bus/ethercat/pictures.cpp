@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal ethercat xml` and `graph`: a device description from the EEPROM of a slave, and the topology as a picture.
+// `hal ethercat xml` and `graph`: a device description from the EEPROM of a slave, and the topology
+// as a picture.
 #include <algorithm>
 #include <iterator>
 

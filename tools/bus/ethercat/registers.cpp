@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal ethercat reg-read`, `reg-write`, `sii-read`, `sii-write` and `alias`: registers and EEPROM of one slave.
+// `hal ethercat reg-read`, `reg-write`, `sii-read`, `sii-write` and `alias`: registers and EEPROM
+// of one slave.
 #include <fmt/core.h>
 #include <unistd.h>
 

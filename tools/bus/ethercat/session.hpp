@@ -4,7 +4,7 @@
 // [setup]; everything has a timeout.
 //
 //     EthercatSession session;
-//     if (!session.open(options)) return 1;                                    // the reason is printed
+//     if (!session.open(options)) return 1;                                // the reason is printed
 //     master::MailboxRequest request; ...
 //     if (!session.run(request)) ...
 #pragma once

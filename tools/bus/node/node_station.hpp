@@ -22,9 +22,10 @@ public:
 };
 
 /// Creates the station named by options and schedule on the interface of the link, and offers its
-/// slots to `cane:` links. Adds its slot to `link` if it names none. With `--tdma auto` it waits for
-/// the schedule from the master and calls `ended` every few milliseconds to see whether to give up.
-/// `prefix` begins each line about the segment. Returns the problem, or "": in a build without TDMA, that it is left out. [setup]
+/// slots to `cane:` links. Adds its slot to `link` if it names none. With `--tdma auto` it waits
+/// for the schedule from the master and calls `ended` every few milliseconds to see whether to give
+/// up. `prefix` begins each line about the segment. Returns the problem, or "": in a build without
+/// TDMA, that it is left out. [setup]
 std::string make_tdma_station(const NodeOptions&, std::string& link, const hal::LinePrefix& prefix,
                               const std::function<bool()>& ended,
                               std::unique_ptr<NodeStation>& made);

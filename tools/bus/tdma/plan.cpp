@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal tdma plan`: the schedule of an Ethernet segment as a timeline, with line load and worst-case latency from an input to an output;
-// or as a picture.
+// `hal tdma plan`: the schedule of an Ethernet segment as a timeline, with line load and worst-case
+// latency from an input to an output; or as a picture.
 #include "bus/tdma/plan.hpp"
 
 #include <algorithm>

@@ -109,8 +109,8 @@ std::uint32_t initial_value(std::uint16_t index, const AnalogChannel& c) {
     }
 }
 
-/// Returns where a value is: -1 below the lower limit, 1 above the upper one, 0 between. Limits that
-/// are equal are off.
+/// Returns where a value is: -1 below the lower limit, 1 above the upper one, 0 between. Limits
+/// that are equal are off.
 std::int8_t zone_of(double value, double lower, double upper) noexcept {
     if (!(lower < upper)) return 0;
     if (value < lower) return -1;

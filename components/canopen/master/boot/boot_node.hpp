@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One node as its master sees it: waits for its turn, boots (boot_slave.hpp), starts, is supervised,
-// and boots again after a failure or loss. Private to the master.
+// One node as its master sees it: waits for its turn, boots (boot_slave.hpp), starts, is
+// supervised, and boots again after a failure or loss. Private to the master.
 #pragma once
 
 #include "boot_channel.hpp"

@@ -7,9 +7,9 @@
 //                           +-----------------> prepare --------> figure 11, D
 //                                               figure 8, C
 //
-// Without keep-alive the path goes from identify to prepare. A program that was replaced, or defaults
-// that were restored, lead back to identify. The letters B, C and D are the connectors between the
-// figures.
+// Without keep-alive the path goes from identify to prepare. A program that was replaced, or
+// defaults that were restored, lead back to identify. The letters B, C and D are the connectors
+// between the figures.
 #pragma once
 
 #include <optional>

@@ -20,8 +20,8 @@ public:
         }
     }
 
-    /// Runs one cycle. `received`: PDOs received so far; `syncs`: SYNCs so far. Returns true when the
-    /// timeout expires. [realtime]
+    /// Runs one cycle. `received`: PDOs received so far; `syncs`: SYNCs so far. Returns true when
+    /// the timeout expires. [realtime]
     bool step(bool operational, std::uint64_t received, std::uint64_t syncs, Time now) noexcept {
         if (!operational || received != received_) {
             came_ = operational && received != received_;

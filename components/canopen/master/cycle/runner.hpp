@@ -91,7 +91,8 @@ public:
 
     /// [realtime]
     void receive(Time now) noexcept;
-    /// `leads`: the SYNC and the heartbeat are ours; another master on the same bus makes them otherwise. [realtime]
+    /// `leads`: the SYNC and the heartbeat are ours; another master on the same bus makes them
+    /// otherwise. [realtime]
     void transmit(Time now, Time period, bool leads = true) noexcept;
     /// Sets all outputs to their safe values and takes nodes out of the operational state as
     /// configured. The network boots anew when cycles go on. Sends nothing while a cycle of another

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Data types and values as CiA 309-3 writes them: `u16 567`, `r32 1.5`, `vs "two words"`, `d aGFsY3lvbg==`.
+// Data types and values as CiA 309-3 writes them: `u16 567`, `r32 1.5`, `vs "two words"`,
+// `d aGFsY3lvbg==`.
 #pragma once
 
 #include <cstdint>

@@ -92,7 +92,8 @@ public:
         return slave_ + "." + channel.name + (joined ? "" : "-") + suffix;
     }
 
-    /// Returns the full name of a pin whose number is the name of the channel: SLAVE.PREFIX-CHANNEL.
+    /// Returns the full name of a pin whose number is the name of the channel:
+    /// SLAVE.PREFIX-CHANNEL.
     std::string numbered_pin(const std::string& prefix) const {
         return slave_ + "." + prefix + "-" + channel.name;
     }

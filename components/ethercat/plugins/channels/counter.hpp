@@ -14,9 +14,9 @@ namespace hal::ethercat {
 ///
 ///     count += difference of the counter since the last cycle       pos = count / pos-scale
 ///
-/// `reset` and a latch event make the position of that moment 0. The objects decide which pins there
-/// are: `enable-c`, `enable-pos`, `enable-neg` with `valid-c`, `valid-ext` and `latch` are the
-/// latches; `set`, `set-done` and `set-value` write the counter; `period` and `frequency` are
+/// `reset` and a latch event make the position of that moment 0. The objects decide which pins
+/// there are: `enable-c`, `enable-pos`, `enable-neg` with `valid-c`, `valid-ext` and `latch` are
+/// the latches; `set`, `set-done` and `set-value` write the counter; `period` and `frequency` are
 /// measured by the terminal. The setting `index` adds an index input that is a pin, and `absolute`
 /// the pin abs-mode.
 class Counter final : public Channel {

@@ -11,8 +11,8 @@
 
 namespace hal::ethercat {
 
-/// The Delta ASDA servo drives, in cyclic synchronous velocity mode (the setting `velocity-mode`) or
-/// position mode. The bits of the control word are pins.
+/// The Delta ASDA servo drives, in cyclic synchronous velocity mode (the setting `velocity-mode`)
+/// or position mode. The bits of the control word are pins.
 class DeltaServo final : public Channel {
 public:
     explicit DeltaServo(const ChannelPlan& plan)

@@ -7,7 +7,8 @@
 
 namespace hal::ethercat {
 
-/// The modes that a drive of CiA 402 supports (its `object`, 6502h), as NAME-supported-modes and a bit for each.
+/// The modes that a drive of CiA 402 supports (its `object`, 6502h), as NAME-supported-modes and a
+/// bit for each.
 class DriveModes final : public Channel {
 public:
     explicit DriveModes(const ChannelPlan& plan)

@@ -8,8 +8,8 @@
 namespace hal::ethercat {
 
 /// An object that is not in the process data, as the parameter NAME of type s32, within the
-/// settings `min` and `max`. It begins with the setting `initial`, and is written by SDO once it has
-/// had another value; until then the slave keeps what it has.
+/// settings `min` and `max`. It begins with the setting `initial`, and is written by SDO once it
+/// has had another value; until then the slave keeps what it has.
 class ObjectParam final : public Channel {
 public:
     explicit ObjectParam(const ChannelPlan& plan)

@@ -46,8 +46,8 @@ public:
           turn_scale_(plan.component, plan.reads, plan.pin(name + "-pprev-scale").c_str(),
                       "turns of one step", {.initial = 1.0}) {}
 
-    /// Extends a position of the slave. `steps_per_turn` of 0: unknown, the scale is that of a step.
-    /// [realtime]
+    /// Extends a position of the slave. `steps_per_turn` of 0: unknown, the scale is that of a
+    /// step. [realtime]
     void update(std::uint64_t raw, std::uint64_t steps_per_turn, double scale) noexcept {
         if (steps_per_turn != steps_per_turn_) {
             steps_per_turn_ = steps_per_turn;

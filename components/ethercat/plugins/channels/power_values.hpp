@@ -8,8 +8,8 @@
 
 namespace hal::ethercat {
 
-/// The values that a power measurement terminal, as the EL3403, sends one after the other: `request`
-/// selects one of six, and `selector` is the number of the value in `val`.
+/// The values that a power measurement terminal, as the EL3403, sends one after the other:
+/// `request` selects one of six, and `selector` is the number of the value in `val`.
 class PowerValues final : public Channel {
 public:
     explicit PowerValues(const ChannelPlan& plan)

@@ -9,8 +9,8 @@
 
 namespace hal::ethercat {
 
-/// An axis of a drive of SERCOS over EtherCAT (IEC 61800-7-204) in velocity mode, as the AX5000. The
-/// setting `drive` is its number:
+/// An axis of a drive of SERCOS over EtherCAT (IEC 61800-7-204) in velocity mode, as the AX5000.
+/// The setting `drive` is its number:
 ///
 ///     target = srv-velo-cmd * srv-scale * 60 / srv-vel-scale
 ///

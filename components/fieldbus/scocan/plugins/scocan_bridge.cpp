@@ -82,8 +82,10 @@ private:
 
 HAL_COMPONENT(ScocanBridge, "scocan_bridge",
               "Bridge between a CAN bus with time slots (SCoCAN) and an ordinary one", R"(
-A node with two controllers: an ordinary participant on `pc=`, which knows nothing of slots, takes part in the bus. Its frames are held and sent in the private
-slot that the table gives their identifier, only the newest of each, or else in shared slots; frames from the bus are forwarded at once.
+A node with two controllers: an ordinary participant on `pc=`, which knows nothing of slots, takes
+part in the bus. Its frames are held and sent in the private slot that the table gives their
+identifier, only the newest of each, or else in shared slots; frames from the bus are forwarded at
+once.
 
 `robot.scocan`:
 
@@ -99,7 +101,8 @@ The netlist:
     addf scocan-bridge.0.receive bus
     addf scocan-bridge.0.transmit bus
 
-The messages of the bridge in the table are those of the participant and have no pins.
-Frames with a reserved identifier (0x000..0x00F, 0x780..0x7FF) or one that the table gives to another node, in a private slot or as a message, are dropped and
-counted in `rejected`; the first of each identifier is reported. Otherwise the node is one like any other, see `hal doc scocan`.
+The messages of the bridge in the table are those of the participant and have no pins. Frames with a
+reserved identifier (0x000..0x00F, 0x780..0x7FF) or one that the table gives to another node, in a
+private slot or as a message, are dropped and counted in `rejected`; the first of each identifier is
+reported. Otherwise the node is one like any other, see `hal doc scocan`.
 )")

@@ -63,8 +63,10 @@ private:
 
 HAL_COMPONENT(ScocanMonitor, "scocan_monitor",
               "Monitor of a CAN bus with time slots (SCoCAN): announces idle slots", R"(
-Announces each private slot whose owner has not sent by the idle time of the table, by a frame with identifier 1 and the number of the slot: nodes of type B,
-which cannot detect that themselves, then share the rest of it. It counts idle slots and frames outside of their slots, and reports their senders by the table.
+Announces each private slot whose owner has not sent by the idle time of the table, by a frame with
+identifier 1 and the number of the slot: nodes of type B, which cannot detect that themselves, then
+share the rest of it. It counts idle slots and frames outside of their slots, and reports their
+senders by the table.
 
 `robot.scocan`:
 
@@ -81,9 +83,11 @@ The netlist:
     addf scocan-monitor.0.receive bus
     addf scocan-monitor.0.transmit bus
 
-A node that disturbs the bus is silenced by the pin `silence-NAME` of the monitor, on whichever machine it runs; a falling edge lets it send again:
+A node that disturbs the bus is silenced by the pin `silence-NAME` of the monitor, on whichever
+machine it runs; a falling edge lets it send again:
 
     setp scocan-monitor.0.silence-motor TRUE
 
-Without a monitor only nodes of type A use idle slots. Otherwise the node is one like any other, see `hal doc scocan`.
+Without a monitor only nodes of type A use idle slots. Otherwise the node is one like any other, see
+`hal doc scocan`.
 )")

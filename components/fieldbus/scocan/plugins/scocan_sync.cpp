@@ -48,9 +48,11 @@ private:
 
 HAL_COMPONENT(ScocanSync, "scocan_sync",
               "SYNC node of a CAN bus with time slots (SCoCAN), or its backup", R"(
-Sends the SYNC that begins each cycle. The node with the role `sync` in the table is the primary; a `backup K` sends it K offsets later in each cycle in
-which no SYNC came, so that no cycle passes without one. A primary first listens for 3 cycles; when it returns, it takes over from the backup at a cycle whose
-counter is a multiple of 8. A primary that hears another one is on standby until that one is lost.
+Sends the SYNC that begins each cycle. The node with the role `sync` in the table is the primary; a
+`backup K` sends it K offsets later in each cycle in which no SYNC came, so that no cycle passes
+without one. A primary first listens for 3 cycles; when it returns, it takes over from the backup at
+a cycle whose counter is a multiple of 8. A primary that hears another one is on standby until that
+one is lost.
 
 `robot.scocan`:
 
@@ -69,6 +71,7 @@ The netlist:
     addf scocan-sync.0.transmit bus
     addf scocan-sync.1.transmit bus
 
-A new value of `mode-command` changes the mode: all nodes of the table are asked to prepare, and when all have answered, all switch at the same cycle. If a node
-does not answer, the change is cancelled and the node reported. Otherwise the node is one like any other, see `hal doc scocan`.
+A new value of `mode-command` changes the mode: all nodes of the table are asked to prepare, and
+when all have answered, all switch at the same cycle. If a node does not answer, the change is
+cancelled and the node reported. Otherwise the node is one like any other, see `hal doc scocan`.
 )")

@@ -46,7 +46,8 @@ public:
     std::uint32_t of(std::uint64_t cycle) const noexcept {
         return armed_.confirmed && cycle >= armed_.at ? armed_.mode : mode_;
     }
-    /// Returns false while it is unknown whether the mode changes with that cycle: its SYNC shows it.
+    /// Returns false while it is unknown whether the mode changes with that cycle: its SYNC shows
+    /// it.
     bool settled(std::uint64_t cycle) const noexcept;
     /// Returns true when the SYNC has a mode that the table does not have.
     bool unknown() const noexcept { return unknown_; }

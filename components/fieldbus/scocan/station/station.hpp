@@ -23,8 +23,8 @@ namespace hal::scocan {
 
 class Station {
 public:
-    /// Frames that a link in memory should hold: twice those that receive() handles at most. 20 nodes
-    /// with more do not fit into a cache.
+    /// Frames that a link in memory should hold: twice those that receive() handles at most. 20
+    /// nodes with more do not fit into a cache.
     static constexpr std::size_t receive_capacity = 512;
 
     /// The table and the sink outlive it. [setup]

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Sends the frames of a node in its private slots, in shared slots and in idle private slots of
-// others. A link with transmit windows gets each frame ahead with its instant; on all others a frame
-// is sent in the call that is within its window.
+// others. A link with transmit windows gets each frame ahead with its instant; on all others a
+// frame is sent in the call that is within its window.
 #pragma once
 
 #include <array>

@@ -417,9 +417,10 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Tdma, "tdma", "Station of an Ethernet segment with time slots (RTnet's TDMA)", R"(
-Divides an Ethernet segment into time slots: a master sends a sync at the beginning of each cycle, and every station sends in its own slots only,
-so that no frame waits for another. The frames are RTnet's (RTmac 2.0, TDMA 2.1a). A file that all stations have, `cell.tdma` in the format of
-RTnet's `tdma.conf`, defines the slots:
+Divides an Ethernet segment into time slots: a master sends a sync at the beginning of each cycle,
+and every station sends in its own slots only, so that no frame waits for another. The frames are
+RTnet's (RTmac 2.0, TDMA 2.1a). A file that all stations have, `cell.tdma` in the format of RTnet's
+`tdma.conf`, defines the slots:
 
 ```
 master:
@@ -442,7 +443,8 @@ addf tdma.0.transmit servo-thread -1
 addf tdma.1.transmit servo-thread -1
 ```
 
-A short schedule can be part of the netlist. This is a complete segment in memory, also on the virtual clock:
+A short schedule can be part of the netlist. This is a complete segment in memory, also on the
+virtual clock:
 
     loadrt tdma link=sim:cell/master,sim:cell/x station=master,x schedule="master:; cycle 1000; slot 0 100; slave:; name x; slot 0 200"
     addf tdma.0.receive  servo-thread
@@ -450,24 +452,31 @@ A short schedule can be part of the netlist. This is a complete segment in memor
     addf tdma.0.transmit servo-thread
     addf tdma.1.transmit servo-thread
 
-A machine has one station, `loadrt tdma link=eth:enp3s0 config=cell.tdma station=master`. The period of the thread must be the cycle. `receive` is
-first in the thread, `transmit` last; between them other components queue frames for the station: a CANopen master with
-`link = cane:enp3s0?slot=2` sends in slot 2. Unless the station is the master, all threads of the process are synchronised to the sync.
+A machine has one station, `loadrt tdma link=eth:enp3s0 config=cell.tdma station=master`. The period
+of the thread must be the cycle. `receive` is first in the thread, `transmit` last; between them
+other components queue frames for the station: a CANopen master with `link = cane:enp3s0?slot=2`
+sends in slot 2. Unless the station is the master, all threads of the process are synchronised to
+the sync.
 
-Without a sync for `lost` cycles the station stops sending, `synchronous` and `running` become false, and a fault is recorded. It recovers by
-itself with the next syncs. A master that finds another one at its start does not send until that one is lost. A second master that appears later
-is reported and ignored; only a master without followers yields to it, if the address of the second one is smaller. After a `stop`, or a fault that
-stopped the thread, a station listens before it sends, and returns by itself.
+Without a sync for `lost` cycles the station stops sending, `synchronous` and `running` become
+false, and a fault is recorded. It recovers by itself with the next syncs. A master that finds
+another one at its start does not send until that one is lost. A second master that appears later is
+reported and ignored; only a master without followers yields to it, if the address of the second one
+is smaller. After a `stop`, or a fault that stopped the thread, a station listens before it sends,
+and returns by itself.
 
-With `tunnel=hal0` the component creates a network interface hal0, through which `ping`, `ssh` and other IP traffic crosses the segment in slot 1,
-never in a real-time slot. It has the `ip` of the block, the MAC address of the port and an MTU of the slot size minus 4; creating it needs
+With `tunnel=hal0` the component creates a network interface hal0, through which `ping`, `ssh` and
+other IP traffic crosses the segment in slot 1, never in a real-time slot. It has the `ip` of the
+block, the MAC address of the port and an MTU of the slot size minus 4; creating it needs
 CAP_NET_ADMIN.
 
-A station can start without the file: with `station=auto` the master, whose file contains the station's `mac` or `ip`, sends its block, and with
-`stage2=FILE` also a file (RTcfg).
+A station can start without the file: with `station=auto` the master, whose file contains the
+station's `mac` or `ip`, sends its block, and with `stage2=FILE` also a file (RTcfg).
 
-Pins with the name of a station as prefix show its state. A new number in `x.ping` sends a ping to station x: request and answer use the time that
-real-time frames leave in their senders' slots. `hal tdma ping x` does this and prints the result.
+Pins with the name of a station as prefix show its state. A new number in `x.ping` sends a ping to
+station x: request and answer use the time that real-time frames leave in their senders' slots.
+`hal tdma ping x` does this and prints the result.
 
-`hal tdma plan cell.tdma` prints the timing of a schedule; docs/tdma.md describes everything in detail.
+`hal tdma plan cell.tdma` prints the timing of a schedule; docs/tdma.md describes everything in
+detail.
 )")

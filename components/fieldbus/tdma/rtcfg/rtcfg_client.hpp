@@ -32,7 +32,8 @@ public:
 
 class Client final : public Companion, private hal::TaskChannel {
 public:
-    /// `own`: identifies this station besides its MAC address. Requests stage 2 when `wants_file`. [setup]
+    /// `own`: identifies this station besides its MAC address. Requests stage 2 when `wants_file`.
+    /// [setup]
     Client(Station& station, Logical own, ClientEvents& events, bool wants_file = true);
 
     void arrived(std::span<const std::uint8_t> frame, Time now) noexcept override;

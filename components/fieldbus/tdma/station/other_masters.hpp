@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The senders of syncs that are not this station's master: what is known of their schedules, and the
-// second master that was confirmed.
+// The senders of syncs that are not this station's master: what is known of their schedules, and
+// the second master that was confirmed.
 #pragma once
 
 #include <array>

@@ -205,8 +205,8 @@ Address Transmitter::ping_target(std::size_t n) const noexcept {
     return roster_[n].from != Address{} ? roster_[n].from : others[n].mac;
 }
 
-/// Sends the next ping to a station with a known address. Returns false when no ping is due, or when
-/// it could not be sent; then it is tried again.
+/// Sends the next ping to a station with a known address. Returns false when no ping is due, or
+/// when it could not be sent; then it is tried again.
 bool Transmitter::send_ping(Time local_at) noexcept {
     for (std::size_t n = pings_.waiting(); n != pings_.size(); n = pings_.waiting()) {
         const Address to = ping_target(n);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The life of the instances of a translated .comp file; comp_instance.h has the part that depends on the file. */
+/* The life of the instances of a translated .comp file; comp_instance.h has the part that depends
+ * on the file. */
 #include "comp_instance.h"
 #include "inside.h"
 

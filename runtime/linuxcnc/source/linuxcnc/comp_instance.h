@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the C source that `hal compile` makes of a .comp file includes: HAL's headers, and the instance's constructor as
- * far as it is the same for all components. Everything is called __comp_…, which a .comp file may not use itself.
- * A pin stands in `struct __comp_state` as a hal_pin, whose first member is the address of its value.
+ * What the C source that `hal compile` makes of a .comp file includes: HAL's headers, and the
+ * instance's constructor as far as it is the same for all components. Everything is called
+ * __comp_…, which a .comp file may not use itself. A pin stands in `struct __comp_state` as a
+ * hal_pin, whose first member is the address of its value.
  */
 #ifndef HAL_LINUXCNC_COMP_INSTANCE_H
 #define HAL_LINUXCNC_COMP_INSTANCE_H
@@ -19,7 +20,8 @@
 #include "rtapi_app.h"
 #include "rtapi_string.h"
 
-/* What hal.h and rtapi.h need to know of an instance: comp_component.c, in a program comp_program.c. [setup] */
+/* What hal.h and rtapi.h need to know of an instance: comp_component.c, in a program
+ * comp_program.c. [setup] */
 bool halcyon_enter(const hal_host* of, const char* instance);
 bool halcyon_fail_setup(const char* function, int result);
 bool halcyon_leave(bool good);

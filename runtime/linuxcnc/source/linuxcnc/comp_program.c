@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * main() of a program made of a .comp file with `option userspace`: makes the instances that count= or names= ask for, then runs the
- * file's user_mainloop(). Other words are left to its userinit().
+ * main() of a program made of a .comp file with `option userspace`: makes the instances that count=
+ * or names= ask for, then runs the file's user_mainloop(). Other words are left to its userinit().
  */
 #include <stdio.h>
 #include <stdlib.h>

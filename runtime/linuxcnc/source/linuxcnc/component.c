@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A Halcyon component whose constructor calls the user's rtapi_app_main(). `hal compile FILE.c` compiles this file with the user's, with
- * HALCYON_COMPONENT as the name of the plugin.
+ * A Halcyon component whose constructor calls the user's rtapi_app_main(). `hal compile FILE.c`
+ * compiles this file with the user's, with HALCYON_COMPONENT as the name of the plugin.
  *
- * Such a component keeps its state in static variables, so it has one instance; it chooses its number of channels itself,
- * under whole names. Its pins may be used by any of its functions, in whichever threads (HAL_COMPONENT_LOOSE_PINS).
+ * Such a component keeps its state in static variables, so it has one instance; it chooses its
+ * number of channels itself, under whole names. Its pins may be used by any of its functions, in
+ * whichever threads (HAL_COMPONENT_LOOSE_PINS).
  */
 #include <stdio.h>
 #include <string.h>

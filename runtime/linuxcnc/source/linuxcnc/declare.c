@@ -27,7 +27,7 @@ static const char* instance_name =
 
 void halcyon_set_instance(const char* name) { instance_name = name; }
 
-/* --- pins and parameters ---------------------------------------------------------------------------------------------------- */
+/* --- pins and parameters --- */
 
 static bool hal_type_of(hal_type_t type, hal_type* to) {
     switch (type) {
@@ -222,8 +222,9 @@ BOTH_BY_POINTER(s64, HAL_S64)
 BOTH_BY_POINTER(u64, HAL_U64)
 BY_POINTER(port, HAL_PORT)
 
-/* A parameter by pointer lives twice: where the runtime reads and writes it, and in the user's variable, which has the width of
- * its type only. Whichever has changed since they were last compared is copied to the other, before and after each function. */
+/* A parameter by pointer lives twice: where the runtime reads and writes it, and in the user's
+ * variable, which has the width of its type only. Whichever has changed since they were last
+ * compared is copied to the other, before and after each function. */
 void halcyon_sync_parameters(void) {
     for (struct pin* p = parameters; p; p = p->next) {
         hal_value outside = {.raw = __atomic_load_n(&p->pin.slot->raw, __ATOMIC_RELAXED)};
@@ -242,7 +243,7 @@ void halcyon_sync_parameters(void) {
     }
 }
 
-/* --- the lists ------------------------------------------------------------------------------------------------------------------- */
+/* --- the lists --- */
 
 void halcyon_mark_pins(void) {
     marked_pins = pins;
@@ -261,7 +262,7 @@ void halcyon_detach_pins(void) {
     }
 }
 
-/* --- functions ------------------------------------------------------------------------------------------------------------------- */
+/* --- functions --- */
 
 static void call(void* self, const hal_cycle* cycle) {
     const struct funct* const funct = self;
@@ -305,7 +306,8 @@ static void step_with_parameters(void* self, const hal_cycle* cycle) {
     halcyon_sync_parameters();
 }
 
-/* Called for each function of a .comp file, not in a program. EXTRA_SETUP has run, so the parameters by pointer are known. */
+/* Called for each function of a .comp file, not in a program. EXTRA_SETUP has run, so the
+ * parameters by pointer are known. */
 bool halcyon_step(const hal_host* of, hal_function_decl* decl) {
     if (!parameters) return true;
     struct stepped* const stepped = of->allocate(of, sizeof *stepped, _Alignof(struct stepped));

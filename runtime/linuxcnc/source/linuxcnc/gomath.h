@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Vectors, rotations and poses of three dimensions, as plain C; included at the end: gomath_geometry.h (lines, planes, links) and
- * gomath_matrix.h (matrices, polynomials). Functions return GO_RESULT_OK, or another result when there is none (a unit vector of nothing); those that return go_flag
- * return whether something is so, within GO_REAL_EPSILON. Results may be written over arguments. Angles in rad. [any] */
+/* Vectors, rotations and poses of three dimensions, as plain C; included at the end:
+ * gomath_geometry.h (lines, planes, links) and gomath_matrix.h (matrices, polynomials). Functions
+ * return GO_RESULT_OK, or another result when there is none (a unit vector of nothing); those that
+ * return go_flag return whether something is so, within GO_REAL_EPSILON. Results may be written
+ * over arguments. Angles in rad. [any] */
 #ifndef HALCYON_GOMATH_H
 #define HALCYON_GOMATH_H
 
@@ -79,7 +81,7 @@ static inline go_pose go_pose_this(go_real x, go_real y, go_real z, go_real rs, 
     return (go_pose){{x, y, z}, {rs, rx, ry, rz}};
 }
 
-/* --- vectors ---------------------------------------------------------------------------------------------------------- */
+/* --- vectors --- */
 
 static inline go_real __go_dot(const go_cart* a, const go_cart* b) {
     return a->x * b->x + a->y * b->y + a->z * b->z;
@@ -259,7 +261,7 @@ static inline int go_rvec_cart_convert(const go_rvec* v, go_cart* to) {
     return GO_RESULT_OK;
 }
 
-/* --- quaternions ------------------------------------------------------------------------------------------------------ */
+/* --- quaternions --- */
 
 static inline go_flag go_quat_is_norm(const go_quat* q) {
     return GO_CLOSE(go_sq(q->s) + go_sq(q->x) + go_sq(q->y) + go_sq(q->z), 1.0);
@@ -366,7 +368,7 @@ static inline int go_cart_cart_rot(const go_cart* a, const go_cart* b, go_quat* 
     return go_quat_norm(&q, to);
 }
 
-/* --- rotation matrices ------------------------------------------------------------------------------------------------ */
+/* --- rotation matrices --- */
 
 static inline int go_mat_cart_mult(const go_mat* m, const go_cart* v, go_cart* to) {
     go_cart sum = {v->x * m->x.x, v->x * m->x.y, v->x * m->x.z};
@@ -468,7 +470,8 @@ static inline int go_zyx_quat_convert(const go_zyx* a, go_quat* to) {
 static inline int go_rpy_quat_convert(const go_rpy* a, go_quat* to) {
     return __go_in_turn(2, a->y, 1, a->p, 0, a->r, to);
 }
-/* Where the middle angle is 0 or a half turn the first and the third are one rotation: all of it is given as the first. */
+/* Where the middle angle is 0 or a half turn the first and the third are one rotation: all of it is
+ * given as the first. */
 static inline int go_mat_zyz_convert(const go_mat* m, go_zyz* to) {
     const go_real level = hypot(m->z.x, m->z.y);
     const go_real y = atan2(level, m->z.z);
@@ -527,7 +530,7 @@ __GO_THROUGH(rpy, mat, zyz)
 __GO_THROUGH(rpy, mat, zyx)
 #undef __GO_THROUGH
 
-/* --- poses ------------------------------------------------------------------------------------------------------------ */
+/* --- poses --- */
 
 static inline go_flag go_pose_pose_compare(const go_pose* a, const go_pose* b) {
     return go_cart_cart_compare(&a->tran, &b->tran) && go_quat_quat_compare(&a->rot, &b->rot);

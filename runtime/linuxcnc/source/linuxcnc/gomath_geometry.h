@@ -95,7 +95,8 @@ static inline int go_plane_evaluate(const go_plane* plane, go_real u, go_real v,
     *to = __go_plus(&at, v, &across);
     return GO_RESULT_OK;
 }
-/* `distance` from the line's point to where it meets the plane; a line in the plane meets it at its point. */
+/* `distance` from the line's point to where it meets the plane; a line in the plane meets it at its
+ * point. */
 static inline int go_line_plane_intersect(const go_line* line, const go_plane* plane,
                                           go_cart* point, go_real* distance) {
     const go_real above = __go_above(&line->point, plane);
@@ -125,7 +126,7 @@ static inline int go_line_from_planes(const go_plane* a, const go_plane* b, go_l
     return go_line_from_point_direction(&point, &direction, to);
 }
 
-/* --- links ------------------------------------------------------------------------------------------------------------ */
+/* --- links --- */
 
 typedef struct {
     go_real a, alpha, d, theta;

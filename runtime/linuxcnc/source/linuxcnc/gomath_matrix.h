@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Part of gomath.h: matrices of any size in memory of their own, square ones of 3, 4 and 6 rows, complex numbers and polynomials. */
+/* Part of gomath.h: matrices of any size in memory of their own, square ones of 3, 4 and 6 rows,
+ * complex numbers and polynomials. */
 #ifndef HALCYON_GOMATH_MATRIX_H
 #define HALCYON_GOMATH_MATRIX_H
 
@@ -11,7 +12,8 @@ typedef struct {
     go_integer* index;
 } go_matrix;
 
-/* GO_MATRIX_DECLARE(m, m_space, 3, 4); go_matrix_init(m, m_space, 3, 4); makes a matrix on the stack. */
+/* GO_MATRIX_DECLARE(m, m_space, 3, 4); go_matrix_init(m, m_space, 3, 4); makes a matrix on the
+ * stack. */
 #define GO_MATRIX_DECLARE(m, space, row_count, col_count)                \
     go_matrix m = {0, 0, 0, 0, 0, 0};                                    \
     struct {                                                             \
@@ -239,7 +241,7 @@ __GO_SQUARE(4)
 __GO_SQUARE(6)
 #undef __GO_SQUARE
 
-/* --- complex numbers, polynomials ------------------------------------------------------------------------------------- */
+/* --- complex numbers, polynomials --- */
 
 typedef struct {
     go_real re, im;
@@ -288,7 +290,8 @@ static inline void go_complex_cbrt(go_complex a, go_complex* first, go_complex* 
     *second = (go_complex){size * cos(part + turn), size * sin(part + turn)};
     *third = (go_complex){size * cos(part - turn), size * sin(part - turn)};
 }
-/* The larger real root first from the sum, the other from the product, so that neither loses digits. */
+/* The larger real root first from the sum, the other from the product, so that neither loses
+ * digits. */
 static inline int go_quadratic_solve(const go_quadratic* q, go_complex* first, go_complex* second) {
     const go_real half = -q->a / 2.0;
     const go_real square = half * half - q->b;

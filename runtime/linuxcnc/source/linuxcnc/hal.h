@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * LinuxCNC's HAL interface for real-time components, as its manual pages (section 3, hal) describe it, over Halcyon's own:
- * both the handles with getters and setters, and the older pointers. Bodies are in the sources
- * beside this file, which `hal compile FILE.c` compiles with the user's file.
+ * LinuxCNC's HAL interface for real-time components, as its manual pages (section 3, hal) describe
+ * it, over Halcyon's own: both the handles with getters and setters, and the older pointers. Bodies
+ * are in the sources beside this file, which `hal compile FILE.c` compiles with the user's file.
  *
- * A handle or a pin's pointer leads to the slot where the value is; the runtime sets it when the pin is linked. So it must
- * stay where it was declared: in memory of hal_malloc() or a static variable.
+ * A handle or a pin's pointer leads to the slot where the value is; the runtime sets it when the
+ * pin is linked. So it must stay where it was declared: in memory of hal_malloc() or a static
+ * variable.
  */
 #ifndef HAL_H
 #define HAL_H
@@ -41,7 +42,7 @@ typedef enum {
 typedef hal_pdir_t hal_pin_dir_t;
 typedef hal_pdir_t hal_param_dir_t;
 
-/* --- values by handle ------------------------------------------------------------------------------------------------ */
+/* --- values by handle --- */
 
 #define HALCYON_SLOT(type, member)                       \
     struct __attribute__((may_alias)) halcyon_##member { \
@@ -125,7 +126,7 @@ int hal_param_new_ui32(int comp, hal_pdir_t dir, hal_uint_t* handle, rtapi_u32 i
                        const char* name, ...) HALCYON_NAMED(5);
 int hal_param_new_fake(int comp, hal_refs_u* handle); /* a value without a name */
 
-/* --- values by pointer, the older way ---------------------------------------------------------------------------------- */
+/* --- values by pointer, the older way --- */
 
 typedef bool hal_bool;
 typedef double real_t;
@@ -159,7 +160,7 @@ int hal_pin_new(const char* name, hal_type_t type, hal_pdir_t dir, void** pointe
 int hal_param_new(const char* name, hal_type_t type, hal_pdir_t dir, volatile void* value,
                   int comp);
 
-/* --- component, functions, memory: all [setup] --------------------------------------------------------------------------- */
+/* --- component, functions, memory: all [setup] --- */
 
 typedef void (*hal_funct_t)(void* arg, long period);
 int hal_init(const char* name);
@@ -173,20 +174,22 @@ int hal_export_funct(const char* name, hal_funct_t code, void* arg, int uses_fp,
 int hal_export_functf(hal_funct_t code, void* arg, int uses_fp, int reentrant, int comp,
                       const char* name, ...) HALCYON_NAMED(6);
 
-/* --- programs of Halcyon: nothing of LinuxCNC's. [any] thread of a program; 0, or a negative errno ------------------------- */
+/* --- programs of Halcyon: nothing of LinuxCNC's. [any] thread of a program; 0, or a negative errno --- */
 
 #ifdef HALCYON_PROGRAM
-/* Declares that the program calls halcyon_alive() at least every so many milliseconds. When it has not for `timeout_ms` longer, `show
- * comp` shows "not responding" and its outputs take their declared values, until it calls again. 0: no longer. */
+/* Declares that the program calls halcyon_alive() at least every so many milliseconds. When it has
+ * not for `timeout_ms` longer, `show comp` shows "not responding" and its outputs take their
+ * declared values, until it calls again. 0: no longer. */
 int halcyon_every(int comp, unsigned every_ms, unsigned timeout_ms);
 int halcyon_alive(int comp);
-/* Declares what an output takes when the program is dead or does not respond; without it, it keeps its value. */
+/* Declares what an output takes when the program is dead or does not respond; without it, it keeps
+ * its value. */
 int halcyon_safe(int comp, const char* pin, double value);
 /* Whether the machine is there. While it is not, inputs keep their last values. */
 bool halcyon_connected(int comp);
 #endif
 
-/* --- byte streams: [realtime] ---------------------------------------------------------------------------------------------- */
+/* --- byte streams: [realtime] --- */
 
 bool hal_port_read(hal_port_t port, char* to, unsigned count);
 bool hal_port_peek(hal_port_t port, char* to, unsigned count);
@@ -209,7 +212,7 @@ unsigned hal_port_buffer_size(hal_port_t port);
 #define hal_port_buffer_size(port) hal_port_buffer_size(HALCYON_PORT(port))
 #endif
 
-/* --- streams of records between a component and a program --------------------------------------------------------------------- */
+/* --- streams of records between a component and a program --- */
 
 typedef union hal_stream_data {
     rtapi_bool b;

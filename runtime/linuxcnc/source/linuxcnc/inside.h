@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the sources behind hal.h and rtapi.h share; nothing for components. They are linked with the user's files, so every shared
- * name begins with halcyon_. tools/comp/build_plugin.cpp lists which of them make a plugin and which a program.
+ * What the sources behind hal.h and rtapi.h share; nothing for components. They are linked with the
+ * user's files, so every shared name begins with halcyon_. tools/comp/build_plugin.cpp lists which
+ * of them make a plugin and which a program.
  */
 #ifndef HALCYON_LINUXCNC_INSIDE_H
 #define HALCYON_LINUXCNC_INSIDE_H
@@ -15,7 +16,8 @@
 
 enum { component_id = 1 }; /* in a plugin */
 
-/* Names the host of the instance that is being created, else NULL; a program has the same host all the time. plugin.c, program.c */
+/* Names the host of the instance that is being created, else NULL; a program has the same host all
+ * the time. plugin.c, program.c */
 extern const hal_host* halcyon_current_host;
 const hal_host* halcyon_host_of(
     int comp); /* of a component that hal_init() made; NULL: none, or not while an instance is created */
@@ -39,10 +41,12 @@ bool halcyon_fail_setup(const char* function,
 /* arguments.c: takes the values of the file's module parameters. False after reporting why not. */
 bool halcyon_take_arguments(void);
 
-/* restore.c: notes the static variables at the first call and restores them at each later one. False when out of memory. */
+/* restore.c: notes the static variables at the first call and restores them at each later one.
+ * False when out of memory. */
 bool halcyon_restore_variables(void);
 
-/* rtapi.c: what a component prints is collected while it is created, and queued while its functions run. */
+/* rtapi.c: what a component prints is collected while it is created, and queued while its functions
+ * run. */
 extern char halcyon_messages[2048];
 void halcyon_prepare_messages(void);
 void halcyon_print_messages(void);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* hal.h in a plugin: the component's name, its memory, and how the creation of an instance fails. */
+/* hal.h in a plugin: the component's name, its memory, and how the creation of an instance
+ * fails. */
 #include <stdio.h>
 #include <string.h>
 

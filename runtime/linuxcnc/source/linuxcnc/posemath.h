@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Vectors, rotations and poses of three dimensions, as plain C. Functions return 0, or -1 when the result does not exist (a unit vector of
- * nothing, a division by 0); results may be written over arguments. Angles in rad. [any] */
+/* Vectors, rotations and poses of three dimensions, as plain C. Functions return 0, or -1 when the
+ * result does not exist (a unit vector of nothing, a division by 0); results may be written over
+ * arguments. Angles in rad. [any] */
 #ifndef HALCYON_POSEMATH_H
 #define HALCYON_POSEMATH_H
 
@@ -68,7 +69,7 @@ static inline double __pm_dot(const PmCartesian* a, const PmCartesian* b) {
 
 static inline double pmSqrt(double x) { return x > 0.0 ? sqrt(x) : 0.0; }
 
-/* --- vectors ---------------------------------------------------------------------------------------------------------- */
+/* --- vectors --- */
 
 static inline int pmCartCartCompare(const PmCartesian* a, const PmCartesian* b) {
     return fabs(a->x - b->x) < 1e-6 && fabs(a->y - b->y) < 1e-6 && fabs(a->z - b->z) < 1e-6;
@@ -170,7 +171,7 @@ static inline int pmCylSphConvert(const PmCylindrical* c, PmSpherical* to) {
     return 0;
 }
 
-/* --- rotations -------------------------------------------------------------------------------------------------------- */
+/* --- rotations --- */
 
 static inline int pmQuatNorm(const PmQuaternion* q, PmQuaternion* to) {
     const double size = sqrt(q->s * q->s + q->x * q->x + q->y * q->y + q->z * q->z);
@@ -363,7 +364,8 @@ static inline int pmZyxQuatConvert(const PmEulerZyx* a, PmQuaternion* to) {
     pmQuatAxisAngleMult(to, PM_Y, a->y, to);
     return pmQuatAxisAngleMult(to, PM_X, a->x, to);
 }
-/* Where the middle angle makes the first and the third one rotation, all of it is given as the first. */
+/* Where the middle angle makes the first and the third one rotation, all of it is given as the
+ * first. */
 static inline int pmMatZyzConvert(const PmRotationMatrix* m, PmEulerZyz* to) {
     const double level = hypot(m->z.x, m->z.y);
     const double y = atan2(level, m->z.z);
@@ -448,7 +450,7 @@ static inline int pmMatInv(const PmRotationMatrix* m, PmRotationMatrix* to) {
     return 0;
 }
 
-/* --- poses ------------------------------------------------------------------------------------------------------------ */
+/* --- poses --- */
 
 static inline int pmPosePoseCompare(const PmPose* a, const PmPose* b) {
     return pmCartCartCompare(&a->tran, &b->tran) && pmQuatQuatCompare(&a->rot, &b->rot);

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * hal.h in a program: its pins live in the running machine, which it reaches by the control socket (docs/protocol.md). `hal compile`
- * compiles this file with the user's main(), or with that of comp_program.c; LinuxCNC's own programs find it in runtime/linuxcnc/programs.
+ * hal.h in a program: its pins live in the running machine, which it reaches by the control socket
+ * (docs/protocol.md). `hal compile` compiles this file with the user's main(), or with that of
+ * comp_program.c; LinuxCNC's own programs find it in runtime/linuxcnc/programs.
  *
- * Every pin has a value in this process, where the program reads and writes it. program_exchange.c exchanges the values. When the
- * machine ends, HALCYON_LOST=end (which loadusr sets) ends the program as SIGTERM does; otherwise it reconnects when the machine is back.
+ * Every pin has a value in this process, where the program reads and writes it. program_exchange.c
+ * exchanges the values. When the machine ends, HALCYON_LOST=end (which loadusr sets) ends the
+ * program as SIGTERM does; otherwise it reconnects when the machine is back.
  */
 #define _GNU_SOURCE
 #include <locale.h>
@@ -38,7 +40,7 @@ const hal_host* halcyon_host_of(int comp) {
     return program_of(comp) ? &hosts[comp - halcyon_first_id] : NULL;
 }
 
-/* --- the host ------------------------------------------------------------------------------------------------------------------- */
+/* --- the host --- */
 
 locale_t halcyon_lock(void) {
     static locale_t plain;
@@ -132,7 +134,7 @@ static const void* extension(const hal_host* host_itself, const char* id) {
 
 char halcyon_program_prefix[256];
 
-/* --- life ------------------------------------------------------------------------------------------------------------------------ */
+/* --- life --- */
 
 int hal_init(const char* name) {
     if (!name || !*name || strlen(name) > HAL_NAME_LEN) return -EINVAL;

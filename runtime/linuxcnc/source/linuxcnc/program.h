@@ -7,7 +7,7 @@
 #include "hal/abi.h"
 #include "hal/naming.h"
 
-/* --- program.c: the components, each with its pins ---------------------------------------------------------------------------- */
+/* --- program.c: the components, each with its pins --- */
 
 struct halcyon_link {
     hal_pin* pin;
@@ -31,8 +31,9 @@ struct halcyon_program {
     bool alive; /* reported by the program since the last exchange */
     long long alive_ns; /* time of the last report to the machine */
 };
-/* All under the lock. Most programs have one; LinuxCNC's task has one of its own and one of its interpreter. Their ids count from 4, because
- * programs print them: in LinuxCNC 1 to 3 belong to the runtime. */
+/* All under the lock. Most programs have one; LinuxCNC's task has one of its own and one of its
+ * interpreter. Their ids count from 4, because programs print them: in LinuxCNC 1 to 3 belong to
+ * the runtime. */
 enum { halcyon_most_programs = 16, halcyon_first_id = 4 };
 extern struct halcyon_program halcyon_programs[halcyon_most_programs];
 const char* halcyon_program_name(void); /* of the first, for messages about all of them */
@@ -42,7 +43,7 @@ locale_t halcyon_lock(
     void); /* numbers have a point until halcyon_unlock() restores the locale that this returns */
 void halcyon_unlock(locale_t before);
 
-/* --- program_exchange.c: what the machine and this process exchange; all under the lock ------------------------------------ */
+/* --- program_exchange.c: what the machine and this process exchange; all under the lock --- */
 
 extern bool halcyon_ending; /* the helper thread is to end */
 bool halcyon_find_machine(void);
@@ -57,7 +58,7 @@ void halcyon_catch_end_signals(void);
 __attribute__((weak)) void halcyon_begins(
     void); /* ../../programs: called by hal_init() */
 
-/* --- program_protocol.c: requests and replies --------------------------------------------------------------------------------- */
+/* --- program_protocol.c: requests and replies --- */
 
 extern int halcyon_connection; /* -1: none */
 extern char* halcyon_rejection; /* why the last request failed */
@@ -73,8 +74,8 @@ void halcyon_add_string(const char* text);
 void halcyon_add_value(hal_type type, hal_value value);
 void halcyon_add_number(hal_type type, double value);
 void halcyon_drop_request(void);
-/* Reads, peeks (verb) or writes count bytes of a port, or asks for its state. Returns true when all were transferred; sets number to the value of
- * the reply's key. Under the lock. */
+/* Reads, peeks (verb) or writes count bytes of a port, or asks for its state. Returns true when all
+ * were transferred; sets number to the value of the reply's key. Under the lock. */
 bool halcyon_use_port(const struct halcyon_link* port, const char* verb, char* to, const char* from,
                       unsigned count, const char* key, unsigned* number);
 char* halcyon_ask(

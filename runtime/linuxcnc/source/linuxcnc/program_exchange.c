@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a program and the machine exchange (docs/protocol.md): registration, declarations, and the values, which a helper thread
- * exchanges some 400 times a second. It sends what the program has changed and stores what the machine has changed, unless the program
- * has changed the same pin in the meantime; then the program's value is sent with the next exchange.
+ * What a program and the machine exchange (docs/protocol.md): registration, declarations, and the
+ * values, which a helper thread exchanges some 400 times a second. It sends what the program has
+ * changed and stores what the machine has changed, unless the program has changed the same pin in
+ * the meantime; then the program's value is sent with the next exchange.
  */
 #define _GNU_SOURCE
 #include <locale.h>
@@ -44,7 +45,8 @@ static void report_loss(void) {
     if (loss_reported) return;
     const char* const wanted = getenv("HALCYON_LOST");
     const bool end = wanted && strcmp(wanted, "end") == 0;
-    /* The kernel's SIGTERM, or the machine's, is on its way. A program that has a handler and begins to wait after it has come needs another. */
+    /* The kernel's SIGTERM, or the machine's, is on its way. A program that has a handler and
+     * begins to wait after it has come needs another. */
     if (end && tied && ++loss_rounds < patient_rounds) return;
     loss_reported = true;
     rtapi_print_msg(RTAPI_MSG_ERR, "%s: the machine '%s' (process %ld) has ended; %s\n",
@@ -122,7 +124,7 @@ void halcyon_unregister(struct halcyon_program* of) {
     }
 }
 
-/* --- exchange --------------------------------------------------------------------------------------------------------------------- */
+/* --- exchange --- */
 
 static bool own(const struct halcyon_link* one) {
     return one->dir == HAL_DIR_OUT || one->read_only;
@@ -142,7 +144,8 @@ static struct exchange add_values(struct halcyon_program* of, uint64_t* seen, lo
         seen[i] = __atomic_load_n(&one->pin->slot->raw, __ATOMIC_ACQUIRE);
         if (one->type == HAL_TYPE_PORT) continue;
         request.reads = request.reads || !own(one);
-        /* also an input that the program itself has set, as LinuxCNC's task does: an unlinked one keeps that value */
+        /* also an input that the program itself has set, as LinuxCNC's task does: an unlinked one
+         * keeps that value */
         if (!one->fresh && halcyon_significant(one->type, seen[i]) == one->last) continue;
         halcyon_add(request.writes ? ",%zu," : ",\"write\":[%zu,", i);
         halcyon_add_value(one->type, (hal_value){.raw = seen[i]});

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The control protocol (docs/protocol.md) as a program needs it: requests are written as text, replies are lines of JSON. */
+/* The control protocol (docs/protocol.md) as a program needs it: requests are written as text,
+ * replies are lines of JSON. */
 #define _GNU_SOURCE
 #include <math.h>
 #include <poll.h>
@@ -16,7 +17,7 @@
 int halcyon_connection = -1;
 char* halcyon_rejection;
 
-/* --- text ------------------------------------------------------------------------------------------------------------------ */
+/* --- text --- */
 
 static struct text {
     char* at;
@@ -119,7 +120,7 @@ hal_value halcyon_take_value(const char** at, hal_type type) {
     return value;
 }
 
-/* --- the connection ------------------------------------------------------------------------------------------------------------ */
+/* --- the connection --- */
 
 void halcyon_disconnect(void) {
     if (halcyon_connection >= 0) {
@@ -220,7 +221,7 @@ bool halcyon_use_port(const struct halcyon_link* port, const char* verb, char* t
     return done;
 }
 
-/* --- the machine --------------------------------------------------------------------------------------------------------------- */
+/* --- the machine --- */
 
 const char* halcyon_instance(void) {
     const char* const named = getenv("HALCYON_INSTANCE");

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Gives a second instance in the place of the first the static variables as they were when the library was loaded. */
+/* Gives a second instance in the place of the first the static variables as they were when the
+ * library was loaded. */
 #define _GNU_SOURCE
 #include <link.h>
 #include <stdlib.h>

@@ -18,10 +18,11 @@ static bool in_cycles;
 
 enum { line_length = 240, lines_in_flight = 128 };
 
-/* --- messages ------------------------------------------------------------------------------------------------------------ */
+/* --- messages --- */
 
-/* Any thread fills a line, the printer empties it. `turn` is the owner: n for the writer of message n, n + 1 for the
- * printer of message n; then it is n + lines_in_flight for the next writer. A full queue loses the new message and counts it. */
+/* Any thread fills a line, the printer empties it. `turn` is the owner: n for the writer of message
+ * n, n + 1 for the printer of message n; then it is n + lines_in_flight for the next writer. A full
+ * queue loses the new message and counts it. */
 static struct line {
     uint64_t turn;
     int level;
@@ -153,7 +154,7 @@ void halcyon_stop_printing(void) {
     print_lines();
 }
 
-/* --- rtapi ------------------------------------------------------------------------------------------------------------------ */
+/* --- rtapi --- */
 
 int rtapi_vsnprintf(char* to, unsigned long size, const char* format, va_list arguments) {
     return vsnprintf(to, size, format, arguments);

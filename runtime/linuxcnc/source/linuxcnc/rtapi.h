@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * LinuxCNC's real-time interface for components, as its manual pages (section 3, rtapi) describe it, over Halcyon's own.
- * Bodies are in the sources beside this file, which `hal compile FILE.c` compiles with the user's file.
+ * LinuxCNC's real-time interface for components, as its manual pages (section 3, rtapi) describe
+ * it, over Halcyon's own. Bodies are in the sources beside this file, which `hal compile FILE.c`
+ * compiles with the user's file.
  */
 #ifndef RTAPI_H
 #define RTAPI_H
@@ -32,7 +33,8 @@ typedef enum {
     RTAPI_MSG_ALL
 } msg_level_t;
 
-/* [any] In a cycle the text waits in a queue (128 lines of 240 characters) and an ordinary thread prints it. */
+/* [any] In a cycle the text waits in a queue (128 lines of 240 characters) and an ordinary thread
+ * prints it. */
 void rtapi_print(const char* format, ...) __attribute__((format(printf, 1, 2)));
 void rtapi_print_msg(msg_level_t level, const char* format, ...)
     __attribute__((format(printf, 2, 3)));
@@ -61,7 +63,7 @@ int rtapi_prio_next_lower(int priority);
 long rtapi_clock_set_period(
     long ns); /* 0 asks; periods are made by `loadrt threads` and newthread */
 
-/* --- module parameters: load arguments, found in a section of the plugin -------------------------------------------- */
+/* --- module parameters: load arguments, found in a section of the plugin --- */
 
 struct halcyon_parameter {
     const char *name, *doc;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* I/O ports of the PC. The process needs the right to use them (CAP_SYS_RAWIO and ioperm() or iopl()); without it, SIGSEGV. */
+/* I/O ports of the PC. The process needs the right to use them (CAP_SYS_RAWIO and ioperm() or
+ * iopl()); without it, SIGSEGV. */
 #ifndef HALCYON_RTAPI_IO_H
 #define HALCYON_RTAPI_IO_H
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Circular doubly linked lists: a head, and a link in each element. Nothing is allocated. [any], not synchronised */
+/* Circular doubly linked lists: a head, and a link in each element. Nothing is allocated. [any],
+ * not synchronised */
 #ifndef HALCYON_RTAPI_LIST_H
 #define HALCYON_RTAPI_LIST_H
 
