@@ -162,7 +162,7 @@ ROWS = {
         "runtime/text",
         "drivers/link",
     ],
-    "components/modbus/master": ["components/modbus/config"],
+    "components/modbus/master": ["components/modbus/config", "components/bus/events", "runtime/sdk"],
     "components/modbus/device": ["components/modbus/config"],
     "components/modbus/guardian": ["components/modbus/master", "runtime/sdk"],
     "components/modbus/plugins": [
