@@ -17,29 +17,52 @@ UnknownName unknown(const Context& context, const std::string& name, NameGroup g
             .before = context.session.model().next_id};
 }
 
+/// One of the two kinds of names that these commands take.
+struct NameKind {
+    Code code;
+    const char* text;
+    NameGroup group;
+    Absences::Kind absence;
+    const char* other;  ///< the other kind
+    const char* value_command;  ///< these two of the other kind
+    const char* type_command;
+};
+constexpr NameKind pin_names{
+    "no-such-pin", "pin or parameter", NameGroup::pins, Absences::Kind::pin, "signal", "gets",
+    "stype"};
+constexpr NameKind signal_names{
+    "no-such-signal", "signal", NameGroup::signals, Absences::Kind::signal, "pin", "getp", "ptype"};
+
+/// Reports that there is nothing of this name, unless that is known; `is_other`: the other kind has
+/// one.
+void report_unknown(Context& context, const NameKind& kind, bool is_other) {
+    const std::string& name = context.argument(0);
+    if (context.is_absent(name, kind.absence)) return;
+    const std::string_view command = context.command.name.text;
+    const bool wants_value = command == "getp" || command == "gets";
+    const std::string help = std::string("it is a ") + kind.other + ": " +
+                             (wants_value ? kind.value_command : kind.type_command) + " " + name;
+    context.diagnostics.error(kind.code, context.span(0),
+                              std::string("unknown ") + kind.text + " '" + name + "'",
+                              unknown(context, name, kind.group), is_other ? help : "");
+}
+
 const Pin* pin_named(Context& context) {
-    const auto& name = context.argument(0);
-    if (const Pin* const pin = context.session.model().find_pin(name)) return pin;
-    if (context.is_absent(name, Absences::Kind::pin)) return nullptr;
-    const bool signal = context.session.model().find_signal(name) != nullptr;
-    const char* const other = context.command.name.text == "getp" ? "gets" : "stype";
-    context.diagnostics.error("no-such-pin", context.span(0),
-                              "unknown pin or parameter '" + name + "'",
-                              unknown(context, name, NameGroup::pins),
-                              signal ? "it is a signal: " + std::string(other) + " " + name : "");
-    return nullptr;
+    const Model& model = context.session.model();
+    const Pin* const pin = model.find_pin(context.argument(0));
+    if (pin == nullptr) {
+        report_unknown(context, pin_names, model.find_signal(context.argument(0)) != nullptr);
+    }
+    return pin;
 }
 
 const Signal* signal_named(Context& context) {
-    const auto& name = context.argument(0);
-    if (const Signal* const signal = context.session.model().find_signal(name)) return signal;
-    if (context.is_absent(name, Absences::Kind::signal)) return nullptr;
-    const bool pin = context.session.model().find_pin(name) != nullptr;
-    const char* const other = context.command.name.text == "gets" ? "getp" : "ptype";
-    context.diagnostics.error("no-such-signal", context.span(0), "unknown signal '" + name + "'",
-                              unknown(context, name, NameGroup::signals),
-                              pin ? "it is a pin: " + std::string(other) + " " + name : "");
-    return nullptr;
+    const Model& model = context.session.model();
+    const Signal* const signal = model.find_signal(context.argument(0));
+    if (signal == nullptr) {
+        report_unknown(context, signal_names, model.find_pin(context.argument(0)) != nullptr);
+    }
+    return signal;
 }
 
 void print_value(Context& context, hal_type type, const hal_value& value) {

@@ -21,13 +21,7 @@ bool output_lost = false;
 }  // namespace
 
 bool write_all(int descriptor, std::string_view text) {
-    while (!text.empty()) {
-        const ssize_t n = ::write(descriptor, text.data(), text.size());
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) return false;
-        text.remove_prefix(static_cast<std::size_t>(n));
-    }
-    return true;
+    return hal::detail::write_whole(descriptor, text);
 }
 
 int fail(const Options& options, std::string_view sentence) {

@@ -23,6 +23,24 @@ std::uint16_t in_state(std::uint16_t right, State state) noexcept {
     }
 }
 
+/// The access rights of a service, and the reply when an entry never has them.
+struct Service {
+    std::uint16_t right;
+    std::uint16_t right_in_preop;
+    coe::Abort refusal;
+};
+constexpr Service read_service{coe::access::read, coe::access::read_preop, coe::Abort::write_only};
+constexpr Service write_service{coe::access::write, coe::access::write_preop,
+                                coe::Abort::read_only};
+
+/// Returns why a service cannot access an entry in a state; none: it can.
+coe::Abort check_access(const DictionaryEntry* e, const Service& service, State state) noexcept {
+    if (e == nullptr) return coe::Abort::no_sub;
+    if ((e->access & service.right) == 0) return service.refusal;
+    const bool is_allowed = (e->access & in_state(service.right_in_preop, state)) != 0;
+    return is_allowed ? coe::Abort::none : coe::Abort::device_state;
+}
+
 /// Returns the bits of a basic type; 0 for texts and unknown types.
 std::uint16_t bits_of(std::uint16_t type) noexcept {
     return static_cast<std::uint16_t>(cia301::bits_of(static_cast<cia301::Type>(type)));
@@ -192,11 +210,8 @@ coe::Abort Dictionary::read(std::uint16_t index, std::uint8_t sub, bool complete
         return read_complete(*o, sub, state, to, length);
     }
     const auto* e = find(index, sub);
-    if (e == nullptr) return coe::Abort::no_sub;
-    if ((e->access & coe::access::read) == 0) return coe::Abort::write_only;
-    if ((e->access & in_state(coe::access::read_preop, state)) == 0) {
-        return coe::Abort::device_state;
-    }
+    const coe::Abort refusal = check_access(e, read_service, state);
+    if (refusal != coe::Abort::none) return refusal;
     if (e->bytes() > to.size()) return coe::Abort::memory;
     length = e->bytes();
     std::memcpy(to.data(), data(*e), length);
@@ -233,11 +248,8 @@ coe::Abort Dictionary::check_write(std::uint16_t index, std::uint8_t sub, bool c
         return sub > 1 ? coe::Abort::no_complete_access : coe::Abort::none;
     }
     const auto* e = find(index, sub);
-    if (e == nullptr) return coe::Abort::no_sub;
-    if ((e->access & coe::access::write) == 0) return coe::Abort::read_only;
-    if ((e->access & in_state(coe::access::write_preop, state)) == 0) {
-        return coe::Abort::device_state;
-    }
+    const coe::Abort refusal = check_access(e, write_service, state);
+    if (refusal != coe::Abort::none) return refusal;
     if (bytes > e->bytes()) return coe::Abort::too_long;
     if (bytes < e->bytes() && !e->text()) return coe::Abort::too_short;
     return coe::Abort::none;

@@ -46,6 +46,31 @@ std::size_t encode(const Frame& f, Line& out) noexcept {
     return size;
 }
 
+/// Sets the frame to an empty one of the kind that a letter begins. Returns false for any other
+/// letter.
+static bool set_kind(char letter, Frame& f) noexcept {
+    f = {};
+    f.extended = letter < 'a';
+    const char kind = f.extended ? static_cast<char>(letter - 'A' + 'a') : letter;
+    f.remote = kind == 'r';
+    f.bit_rate_switch = kind == 'b';
+    f.fd = kind == 'd' || f.bit_rate_switch;
+    return f.remote || f.fd || kind == 't';
+}
+
+/// Parses the data, which a timestamp of 4 or 8 digits may follow. Returns false when invalid.
+static bool set_data(std::string_view text, Frame& f) noexcept {
+    const std::size_t digits_of_data = f.bytes().size() * 2;
+    const std::size_t digits_of_time = text.size() - digits_of_data;
+    if (digits_of_time != 0 && digits_of_time != 4 && digits_of_time != 8) return false;
+    for (std::size_t i = 0; i < digits_of_data; i += 2) {
+        std::uint32_t byte = 0;
+        if (!number(text.substr(i, 2), byte)) return false;
+        f.data[i / 2] = static_cast<std::uint8_t>(byte);
+    }
+    return true;
+}
+
 Decoder::Found Decoder::take(char c) noexcept {
     if (c == '\a') {
         size_ = 0;
@@ -78,37 +103,14 @@ Decoder::Found Decoder::line(std::string_view text) noexcept {
     if (letter == 'F' && text.size() == 3) {
         return number(text.substr(1), status_) ? Found::status : Found::error;
     }
-    const std::string_view letters = "tTrRdDbB";
-    if (letters.find(letter) == letters.npos) {
-        return Found::nothing;  // a command or its response
-    }
-    Frame& f = frame_;
-    f = {};
-    f.extended = letter < 'a';
-    const char kind = f.extended ? static_cast<char>(letter - 'A' + 'a') : letter;
-    f.remote = kind == 'r';
-    f.fd = kind == 'd' || kind == 'b';
-    f.bit_rate_switch = kind == 'b';
-    const std::size_t width = f.extended ? 8 : 3;
+    if (!set_kind(letter, frame_)) return Found::nothing;  // a command or its response
+    const std::size_t width = frame_.extended ? 8 : 3;
     std::uint32_t code = 0;
-    if (text.size() < width + 2 || !number(text.substr(1, width), f.id) ||
-        !number(text.substr(1 + width, 1), code)) {
-        return Found::error;
-    }
-    if (!f.fd && code > 8) return Found::error;
-    f.length = length_of_code(code);
-    auto data = text.substr(width + 2);
-    const std::size_t wanted = f.bytes().size() * 2;
-    // optionally with a timestamp
-    if (data.size() != wanted && data.size() != wanted + 4 && data.size() != wanted + 8) {
-        return Found::error;
-    }
-    for (std::size_t i = 0; i < wanted; i += 2) {
-        std::uint32_t byte = 0;
-        if (!number(data.substr(i, 2), byte)) return Found::error;
-        f.data[i / 2] = static_cast<std::uint8_t>(byte);
-    }
-    return f.valid() ? Found::frame : Found::error;
+    const bool has_head = text.size() >= width + 2 && number(text.substr(1, width), frame_.id) &&
+                          number(text.substr(1 + width, 1), code);
+    if (!has_head || (!frame_.fd && code > 8)) return Found::error;
+    frame_.length = length_of_code(code);
+    return set_data(text.substr(width + 2), frame_) && frame_.valid() ? Found::frame : Found::error;
 }
 
 const char* rate_command(std::uint32_t bit_rate) noexcept {

@@ -130,6 +130,12 @@ std::uintptr_t end_of_block(const volatile void* address) noexcept {
     return at < after->first + after->second ? after->first + after->second : 0;
 }
 
+/// Returns what is wrong with a name that a module gives, "" when nothing is.
+static std::string name_problem(const char* name) {
+    if (!name || !*name) return "the name is empty";
+    return std::strlen(name) > longest_name() ? too_long() : std::string();
+}
+
 int declaring(const char* function, const char* name, int comp) {
     if (!Module::current()) {
         fail(function, name, "only while a module is loaded");
@@ -138,8 +144,8 @@ int declaring(const char* function, const char* name, int comp) {
     const auto component = components.find(comp);
     if (component == components.end()) return fail(function, name, "unknown component");
     if (component->second.ready) return fail(function, name, "the component is ready already");
-    if (!name || !*name) return fail(function, name, "the name is empty");
-    return std::strlen(name) > longest_name() ? fail(function, name, too_long().c_str()) : 0;
+    const std::string problem = name_problem(name);
+    return problem.empty() ? 0 : fail(function, name, problem.c_str());
 }
 
 std::size_t longest_name() noexcept {
@@ -160,8 +166,8 @@ int hal_init(const char* name) {
     return guarded([&] {
         Module* const module = Module::current();
         if (!module) return fail("hal_init", name, "only while a module is loaded");
-        if (!name || !*name) return fail("hal_init", name, "the name is empty");
-        if (std::strlen(name) > longest_name()) return fail("hal_init", name, too_long().c_str());
+        const std::string problem = name_problem(name);
+        if (!problem.empty()) return fail("hal_init", name, problem.c_str());
         for (const auto& [id, component] : components) {
             if (component.name == name) return fail("hal_init", name, "duplicate component name");
         }
@@ -265,10 +271,8 @@ int hal_create_thread(const char* name, unsigned long period_ns, int) {
     return guarded([&] {
         Module* const module = Module::current();
         if (!module) return fail("hal_create_thread", name, "only while a module is loaded");
-        if (!name || !*name) return fail("hal_create_thread", name, "the name is empty");
-        if (std::strlen(name) > longest_name()) {
-            return fail("hal_create_thread", name, too_long().c_str());
-        }
+        const std::string problem = name_problem(name);
+        if (!problem.empty()) return fail("hal_create_thread", name, problem.c_str());
         if (period_ns == 0) return fail("hal_create_thread", name, "the period is 0");
         if (!module->extension().thread(module->host(), name,
                                         static_cast<std::int64_t>(clock_multiple(period_ns)))) {

@@ -40,10 +40,13 @@ bool moves(std::uint16_t index) {
 /// device, or is a program.
 bool is_setting(std::uint16_t index, const eds::Entry& entry) {
     constexpr std::uint32_t refused_by_scans = 1;  // ObjFlags
-    const bool acts = index == 0x1003 || index == 0x1010 || index == 0x1011 || index == 0x1f82 ||
-                      (index >= 0x1f50 && index <= 0x1f57);
-    return entry.readable() && entry.writable() && entry.access != eds::Access::rww && !acts &&
-           !moves(index) && entry.data_type != 0x000f && (entry.flags & refused_by_scans) == 0;
+    constexpr std::uint16_t domain = 0x000f;
+    constexpr std::uint16_t acting[] = {0x1003, 0x1010, 0x1011, 0x1f50, 0x1f51, 0x1f52,
+                                        0x1f53, 0x1f54, 0x1f55, 0x1f56, 0x1f57, 0x1f82};
+    const bool acts = std::ranges::find(acting, index) != std::end(acting) || moves(index);
+    const bool is_program = entry.data_type == domain;
+    const bool is_kept = entry.readable() && entry.writable() && entry.access != eds::Access::rww;
+    return is_kept && !acts && !is_program && (entry.flags & refused_by_scans) == 0;
 }
 
 enum class Read { value, refused, failed };
@@ -81,16 +84,10 @@ int run_can_dcf_read(const DcfReadOptions& options) {
             options,
             "expected ADDRESS NODE; type: hal can dcf read ADDRESS NODE --eds FILE -o NODE.dcf");
     }
-    if (options.eds.empty()) {
-        return fail(options, "missing --eds FILE: the description lists the objects of the node");
-    }
     std::uint8_t node = 0;
     ObjectNames names;
-    if (!node_of(options, options.words[1], node) || !names.load(options, options.eds)) return 1;
-    if (names.description()->objects.empty()) {
-        return fail(options, fmt::format("'{}' describes no object: nothing to read; give the "
-                                         "whole EDS of the device",
-                                         options.eds));
+    if (!node_of(options, options.words[1], node) || !names.load_objects(options, options.eds)) {
+        return 1;
     }
     eds::DeviceDescription description = *names.description();
     NodeClient station(options, options.timeout_ns);

@@ -117,6 +117,19 @@ bool ObjectNames::load(const Options& options, const std::string& file) {
     return true;
 }
 
+bool ObjectNames::load_objects(const Options& options, const std::string& file) {
+    if (file.empty()) {
+        fail(options, "missing --eds FILE: the description lists the objects of the node");
+        return false;
+    }
+    if (!load(options, file)) return false;
+    if (!description_->objects.empty()) return true;
+    fail(options, fmt::format("'{}' describes no object: nothing to read; give the whole EDS of "
+                              "the device",
+                              file));
+    return false;
+}
+
 void ObjectNames::print_doubts(const Options& options) const {
     constexpr std::size_t max_printed = 3;
     for (std::size_t n = 0; n < doubts_.size() && n < max_printed; ++n) {

@@ -30,6 +30,8 @@ public:
     /// Reads an EDS; does nothing when `file` is empty. Prints the problems that make values of the
     /// file unreliable, the first ones with their lines. Returns false after printing the reason.
     bool load(const Options&, const std::string& file);
+    /// The same; the file is required, and describes objects.
+    bool load_objects(const Options&, const std::string& file);
     /// False when load() has printed such problems.
     bool reliable() const { return doubts_.empty(); }
     /// Finds `6041`, `0x1018:1`, `Statusword`, `Identity Object/Vendor-ID`, `vendor-id`. Returns

@@ -84,19 +84,13 @@ int run_can_read_all(const ReadAllOptions& options) {
         return fail(options,
                     "expected ADDRESS NODE; type: hal can read-all ADDRESS NODE --eds FILE");
     }
-    if (options.eds.empty()) {
-        return fail(options, "missing --eds FILE: the description lists the objects of the node");
-    }
     if (options.json && !options.output.empty()) {
         return fail(options, "--json and -o exclude each other: -o writes CSV");
     }
     std::uint8_t node = 0;
     ObjectNames names;
-    if (!node_of(options, options.words[1], node) || !names.load(options, options.eds)) return 1;
-    if (names.description()->objects.empty()) {
-        return fail(options, fmt::format("'{}' describes no object: nothing to read; give the "
-                                         "whole EDS of the device",
-                                         options.eds));
+    if (!node_of(options, options.words[1], node) || !names.load_objects(options, options.eds)) {
+        return 1;
     }
     NodeClient station(options, options.timeout_ns);
     if (!station.open(options.words[0])) return 1;

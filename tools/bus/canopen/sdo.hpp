@@ -30,6 +30,8 @@ public:
     void handle(const can::Frame&);
 
 private:
+    static bool decode(const can::Frame&, Answer&);
+
     struct Question {
         std::uint16_t index;
         std::uint8_t sub;

@@ -129,6 +129,26 @@ bool request(EthercatWire& wire, BusSlave& s, State state) {
     return false;
 }
 
+/// Returns the states that lead from one to another: up step by step, down at once. BOOT is entered
+/// and left by INIT.
+std::vector<State> steps_to(State from, State target) {
+    std::vector<State> steps;
+    const bool by_init = target == State::boot || from == State::boot || from == State::none;
+    if (by_init || target == State::init) {
+        steps.push_back(State::init);
+        from = State::init;
+    }
+    if (target == State::boot || target < from) {
+        steps.push_back(target);
+    }
+    for (const State step : {State::preop, State::safeop, State::op}) {
+        if (target != State::boot && step > from && step <= target) {
+            steps.push_back(step);
+        }
+    }
+    return steps.empty() ? std::vector{target} : steps;
+}
+
 /// Brings a slave to a state step by step; returns the state that it did not reach.
 std::optional<State> bring(EthercatWire& wire, BusSlave& s, State target) {
     if (s.al_failed) {
@@ -137,25 +157,7 @@ std::optional<State> bring(EthercatWire& wire, BusSlave& s, State target) {
         wire.read_state(s);
     }
     if (s.state == target && !s.al_failed) return std::nullopt;
-    std::vector<State> way;
-    if (target == State::init || target == State::boot || s.state == State::boot ||
-        s.state == State::none) {
-        way.push_back(State::init);
-    }
-    if (target == State::boot) {
-        way.push_back(State::boot);
-    }
-    const bool up = target != State::boot && (!way.empty() || target > s.state);
-    const State from = way.empty() ? s.state : State::init;
-    for (const State step : {State::preop, State::safeop, State::op}) {
-        if (up && step > from && step <= target) {
-            way.push_back(step);
-        }
-    }
-    if (way.empty()) {
-        way.push_back(target);
-    }
-    for (const State step : way) {
+    for (const State step : steps_to(s.state, target)) {
         if (!request(wire, s, step)) return step;
     }
     return std::nullopt;
