@@ -38,9 +38,10 @@ private:
         }
         // a bare loadrt: a ground of one millimetre per pixel, so that the component can be
         // inspected
-        const std::string text = !file.empty()    ? texts.read("file", file)
-                                 : points.empty() ? "0 0 0 0; 1 0 1 0; 1 1 1 1; 0 1 0 1"
-                                                  : points;
+        std::string text = points.empty() ? "0 0 0 0; 1 0 1 0; 1 1 1 1; 0 1 0 1" : points;
+        if (!file.empty()) {
+            text = texts.read("file", file);
+        }
         GroundText read = read_ground(text);
         Ground ground(read, camera);
         if (!read.problems.empty() && file.empty()) {

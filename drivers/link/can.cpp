@@ -41,6 +41,16 @@ const char* to_string(Sent sent) noexcept {
     return words[static_cast<std::size_t>(sent)];
 }
 
+/// Names a frame that only a master sends, by its identifier (CiA 301).
+static const char* name_of_command(std::uint32_t id) noexcept {
+    switch (id) {
+    case 0x000: return "NMT command";
+    case 0x080: return "SYNC";
+    case 0x100: return "TIME";
+    default: return "set-point";
+    }
+}
+
 std::string to_string(const Rejected& r) {
     char address[18];
     std::snprintf(
@@ -50,11 +60,7 @@ std::string to_string(const Rejected& r) {
         static_cast<unsigned>(r.from >> 8 & 0xff), static_cast<unsigned>(r.from & 0xff));
     const std::string who = address;
     char command[40];
-    std::snprintf(command, sizeof command, "%s (%03Xh)",
-                  r.id == 0x000   ? "NMT command"
-                  : r.id == 0x080 ? "SYNC"
-                  : r.id == 0x100 ? "TIME"
-                                  : "set-point",
+    std::snprintf(command, sizeof command, "%s (%03Xh)", name_of_command(r.id),
                   static_cast<unsigned>(r.id));
     std::string sentence;
     switch (r.why) {

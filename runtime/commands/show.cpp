@@ -44,20 +44,22 @@ std::string value_text(const Request& request, hal_type type, const hal_value& v
     return request.script() ? format_value(type, value) : table_value(type, value);
 }
 
+std::string state_of(const Request& request, const LoadedComponent& component) {
+    if (component.process == 0) return "ready";
+    const auto* const program = request.context.programs.find(component.name);
+    return program != nullptr ? program->state() : "initializing";
+}
+
 void show_comp(Request& request) {
     request.title(
         "Loaded HAL Components:\nID      Type  Name                                            PID "
         "  State\n");
     for (const LoadedComponent* const component :
          components_newest_first(request.model(), request.patterns)) {
-        const auto* const program =
-            component->process ? request.context.programs.find(component->name) : nullptr;
         const std::string pid = component->process ? std::to_string(component->process) : "";
         request.add("{:>6}  {:<4}  {:<47} {:>5} {}\n", component->id,
                     component->process ? "User" : "RT", component->name, pid,
-                    component->process == 0 ? "ready"
-                    : program               ? program->state()
-                                            : "initializing");
+                    state_of(request, *component));
     }
     request.text += '\n';
 }

@@ -77,9 +77,10 @@ public:
                 at = std::min(text_.find(c, at + 1), end - 1) + 1;
                 continue;
             }
-            const std::size_t close = c == '['   ? text_.find_first_of("[]", at + 1)
-                                      : c == '{' ? text_.find_first_of("{}", at + 1)
-                                                 : at;
+            std::size_t close = at;
+            if (c == '[' || c == '{') {
+                close = text_.find_first_of(c == '[' ? "[]" : "{}", at + 1);
+            }
             const bool range = c == '[' && close < end && text_[close] == ']' &&
                                text_.substr(at, close - at).find("..") != text_.npos;
             if (!range && c != '{') {

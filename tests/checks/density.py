@@ -7,6 +7,7 @@ usage: density.py ROOT [BUILD] [--worst N] [--folders FOLDER...]
   branches/100  branches (cyclomatic complexity - 1) per 100 lines of function bodies; needs lizard
   tokens/line   words, numbers and operators per line that is neither empty nor a comment
   two '?'       lines with two or more conditional operators
+  nested '?'    statements with a conditional operator in the result of another one
   comma         statements that join assignments by a comma, and `return a = b, c;`
   wide          lines of more than 100 columns
   split         classes whose member functions are defined in more than one .cpp
@@ -47,12 +48,30 @@ def outside_parentheses(line):
     return "".join(kept)
 
 
+def has_nested_conditional(statement):
+    """Whether a `?` follows another one at the same depth of brackets, without a comma between."""
+    depth, conditional_at = 0, set()
+    for character in statement:
+        if character in "([":
+            depth += 1
+        elif character in ")]":
+            conditional_at.discard(depth)
+            depth -= 1
+        elif character == ",":
+            conditional_at.discard(depth)
+        elif character == "?":
+            if depth in conditional_at:
+                return True
+            conditional_at.add(depth)
+    return False
+
+
 class Measures:
     """Totals of a tree, and its worst places."""
 
     def __init__(self):
         self.files = self.code = self.tokens = 0
-        self.two = self.comma = self.wide = 0
+        self.two = self.nested = self.comma = self.wide = 0
         self.branches = self.function_lines = 0
         self.functions = []
         self.owners = collections.defaultdict(set)
@@ -61,6 +80,7 @@ class Measures:
         text = path.read_text(encoding="utf-8", errors="replace")
         stripped = plain(text)
         self.files += 1
+        self.nested += sum(map(has_nested_conditional, re.split("[;{}]", stripped)))
         self.wide += sum(len(line) > 100 for line in text.splitlines())
         for line in filter(str.strip, stripped.splitlines()):
             self.code += 1
@@ -91,6 +111,7 @@ class Measures:
         print(f"tokens/line   {self.tokens / max(self.code, 1):6.1f}")
         for label, value in (
             ("two '?'", self.two),
+            ("nested '?'", self.nested),
             ("comma", self.comma),
             ("wide", self.wide),
             ("split", len(split)),

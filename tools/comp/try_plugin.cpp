@@ -77,9 +77,12 @@ enum class Stage : int { load, construct, destroy, run };
 
 /// "its constructor does not return within 20 s", "its destructor crashes (Segmentation fault)".
 std::string end_in(Stage stage, int signal) {
-    const std::string how = signal == SIGALRM ? fmt::format("does not return within {} s", max_s)
-                            : signal != 0     ? fmt::format("crashes ({})", ::strsignal(signal))
-                                              : "ends the process";
+    std::string how = "ends the process";
+    if (signal == SIGALRM) {
+        how = fmt::format("does not return within {} s", max_s);
+    } else if (signal != 0) {
+        how = fmt::format("crashes ({})", ::strsignal(signal));
+    }
     switch (stage) {
     case Stage::load: return "the constructor of a static object of it " + how;
     case Stage::construct: return "its constructor " + how;

@@ -83,9 +83,12 @@ Finding kernel() {
     if (rt) {
         return {Verdict::good, "kernel", fmt::format("{} with PREEMPT_RT", about.release)};
     }
-    const char* kind = version.find("PREEMPT_DYNAMIC") != std::string::npos ? "PREEMPT_DYNAMIC"
-                       : version.find("PREEMPT") != std::string::npos       ? "PREEMPT"
-                                                                            : "no preemption";
+    const char* kind = "no preemption";
+    for (const char* const name : {"PREEMPT", "PREEMPT_DYNAMIC"}) {
+        if (version.find(name) != std::string::npos) {
+            kind = name;
+        }
+    }
     return {Verdict::fair,
             "kernel",
             fmt::format("{} ({}), not PREEMPT_RT: occasional wake-up latencies of milliseconds",

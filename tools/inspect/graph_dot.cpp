@@ -124,10 +124,12 @@ private:
             item.component->name == item.name ? "" : " (" + xml_escape(item.component->name) + ")");
         for (const LoadedFunction* function : item.functions) {
             const std::size_t order = place(*function);
-            const std::string where =
-                order != 0 ? fmt::format("{}. in {}", order, xml_escape(function->thread->name))
-                : function->init ? fmt::format("once in {}", xml_escape(function->thread->name))
-                                 : "in no thread";
+            std::string where = "in no thread";
+            if (order != 0) {
+                where = fmt::format("{}. in {}", order, xml_escape(function->thread->name));
+            } else if (function->init) {
+                where = fmt::format("once in {}", xml_escape(function->thread->name));
+            }
             text_ += fmt::format("<tr><td colspan=\"2\" bgcolor=\"{}\">{}: {}</td></tr>",
                                  function->thread ? colours_.at(function->thread) : "#f4f4f4",
                                  xml_escape(below(function->name, item.name)), where);

@@ -67,17 +67,18 @@ std::string rows(const std::string& instance, const Pins& pins) {
     for (const auto& [name, value] : pins) {
         if (!name.ends_with(".online")) continue;
         const std::string station = name.substr(0, name.size() - 7);
-        const bool online = value.is_boolean() && value.get<bool>();
-        text += fmt::format("{:<16} {:<8} {:>9} {:>12.0f} {:>8.0f} {:>10}  {}\n", station,
-                            online                                     ? "online"
-                            : number(pins, station + ".frames") == 0.0 ? "unheard"
-                                                                       : "offline",
-                            since(number(pins, station + ".since")),
-                            number(pins, station + ".frames"), number(pins, station + ".late"),
-                            is_on(pins, station + ".drift-known")
-                                ? fmt::format("{:+.1f} ppm", number(pins, station + ".drift"))
-                                : std::string("-"),
-                            slots_of(pins, station));
+        const double frames = number(pins, station + ".frames");
+        const char* state = frames == 0.0 ? "unheard" : "offline";
+        if (value.is_boolean() && value.get<bool>()) {
+            state = "online";
+        }
+        std::string drift = "-";
+        if (is_on(pins, station + ".drift-known")) {
+            drift = fmt::format("{:+.1f} ppm", number(pins, station + ".drift"));
+        }
+        text += fmt::format("{:<16} {:<8} {:>9} {:>12.0f} {:>8.0f} {:>10}  {}\n", station, state,
+                            since(number(pins, station + ".since")), frames,
+                            number(pins, station + ".late"), drift, slots_of(pins, station));
     }
     return text;
 }

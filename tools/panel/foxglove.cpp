@@ -25,10 +25,11 @@ std::string text_of(const Json& json) {
 }
 
 std::string schema_of(const std::string& type) {
-    return fmt::format(R"({{"type":"object","properties":{{"value":{{"type":"{}"}}}}}})",
-                       type == "bit"     ? "boolean"
-                       : type == "float" ? "number"
-                                         : "integer");
+    const char* name = type == "float" ? "number" : "integer";
+    if (type == "bit") {
+        name = "boolean";
+    }
+    return fmt::format(R"({{"type":"object","properties":{{"value":{{"type":"{}"}}}}}})", name);
 }
 
 /// Appends an integer, little-endian.

@@ -181,12 +181,8 @@ private:
             return error(element, "elements are nested more than 60 deep");
         }
         const std::string_view owner = element.name();
-        const bool horizontal = owner == "hbox";
-        Json pack{{"fill", top          ? "both"
-                           : horizontal ? "y"
-                                        : "x"},
-                  {"expand", true},
-                  {"anchor", "center"}};
+        const char* const fill = owner == "hbox" ? "y" : "x";
+        Json pack{{"fill", top ? "both" : fill}, {"expand", true}, {"anchor", "center"}};
         Json options = Json::object();
         Json cell = Json::object();
         if (!top) {
@@ -284,9 +280,10 @@ private:
                 element,
                 fmt::format("cannot read the image '{}' (at most 100 images of 200 kB)", file));
         }
-        const std::string kind = bytes.starts_with("GIF8")      ? "gif"
-                                 : bytes.starts_with("\x89PNG") ? "png"
-                                                                : "";
+        std::string kind = bytes.starts_with("GIF8") ? "gif" : "";
+        if (bytes.starts_with("\x89PNG")) {
+            kind = "png";
+        }
         if (kind.empty()) {
             return error(element, fmt::format("the image '{}' is neither GIF nor PNG", file));
         }

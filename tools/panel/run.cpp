@@ -44,9 +44,10 @@ std::string announcement(const PanelOptions& options, const Access& access,
                          const std::string& instance, int port) {
     std::string text;
     const bool all = options.listen == "0.0.0.0";
-    const std::string host = options.listen.empty() ? "localhost"
-                             : all                  ? host_name()
-                                                    : options.listen;
+    std::string host = options.listen.empty() ? "localhost" : options.listen;
+    if (all) {
+        host = host_name();
+    }
     if (!options.listen.empty()) {
         text += fmt::format(
             "warning: listening on {}, port {}: every computer that reaches it and has the token "

@@ -160,10 +160,12 @@ private:
     }
 
     void nothing_written() {
-        const std::string trigger =
-            what_.trigger.empty() ? ""
-            : was_on_ ? fmt::format(", and '{}' was TRUE or non-zero all the time", what_.trigger)
-                      : fmt::format(", and '{}' did not become TRUE or non-zero", what_.trigger);
+        std::string trigger;
+        if (!what_.trigger.empty()) {
+            trigger = fmt::format(
+                ", and '{}' {}", what_.trigger,
+                was_on_ ? "was TRUE or non-zero all the time" : "did not become TRUE or non-zero");
+        }
         print(fmt::format("nothing was written: there was no fault{}\n", trigger));
     }
 
@@ -299,17 +301,22 @@ std::string problem_of(const Recording& what) {
     if (!problem.empty()) return problem;
     const bool last = what.last_ns >= 0;
     const bool rotate = what.rotate_ns >= 0;
-    if (what.names.empty() && what.groups.empty() && !what.all) {
-        return "missing names of values; or --group NAME; or --all";
-    }
-    if (what.all && !what.groups.empty()) return "--all has every --group; leave one out";
-    if (last && rotate) return "--last and --rotate exclude each other; leave one out";
-    if (!last && what.after_ns >= 0) return "--after needs --last TIME";
-    if (!last && !rotate && what.keep != 0) return "--keep needs --rotate TIME or --last TIME";
-    if (!last && !what.trigger.empty()) {
-        return "--trigger needs --last TIME: what is kept until it comes";
-    }
-    return "";
+    const struct {
+        bool applies;
+        const char* problem;
+    } rules[] = {
+        {what.names.empty() && what.groups.empty() && !what.all,
+         "missing names of values; or --group NAME; or --all"},
+        {what.all && !what.groups.empty(), "--all has every --group; leave one out"},
+        {last && rotate, "--last and --rotate exclude each other; leave one out"},
+        {!last && what.after_ns >= 0, "--after needs --last TIME"},
+        {!last && !rotate && what.keep != 0, "--keep needs --rotate TIME or --last TIME"},
+        {!last && !what.trigger.empty(),
+         "--trigger needs --last TIME: what is kept until it comes"},
+    };
+    const auto* const broken =
+        std::ranges::find_if(rules, [](const auto& rule) { return rule.applies; });
+    return broken != std::end(rules) ? broken->problem : "";
 }
 
 void add_new(std::vector<std::string>& names, std::vector<std::string> more) {

@@ -142,11 +142,13 @@ std::string no_record(const ScopeOptions& options, Source& source) {
             "triggered, but the record is not complete after {}; type a longer --timeout",
             duration);
     }
-    const std::string range =
-        search.min() > search.max() ? fmt::format("'{}' had no value", name)
-        : search.min() == search.max()
-            ? fmt::format("{} was {:g}", name, search.min())
-            : fmt::format("{} was between {:g} and {:g}", name, search.min(), search.max());
+    std::string range =
+        fmt::format("{} was between {:g} and {:g}", name, search.min(), search.max());
+    if (search.min() > search.max()) {
+        range = fmt::format("'{}' had no value", name);
+    } else if (search.min() == search.max()) {
+        range = fmt::format("{} was {:g}", name, search.min());
+    }
     return fmt::format("no trigger '{}' in {}: {}; type another level, or a longer --timeout",
                        format_trigger(trigger, acquisition.channels()), duration, range);
 }

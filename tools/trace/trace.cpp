@@ -144,6 +144,7 @@ private:
     void begin_file();
     int finish();
     int fail_to_write();
+    std::string ending(InstanceEnd end) const;
     bool remove_if_empty();
 
     const TraceOptions& options_;
@@ -310,12 +311,26 @@ bool Tracer::remove_if_empty() {
 /// What is in the file ends with a whole packet then.
 int Tracer::fail_to_write() {
     const bool cut = ::ftruncate(file_, static_cast<off_t>(written_)) == 0;
+    const char* content = cut ? "the file is complete up to there" : "its last packet is damaged";
+    if (remove_if_empty()) {
+        content = "nothing was written";
+    } else if (written_ == 0) {
+        content = "the file is empty";
+    }
     return fail(options_, fmt::format("cannot write '{}': {}; {}", options_.words.front(),
-                                      std::strerror(error_),
-                                      remove_if_empty() ? "nothing was written"
-                                      : written_ == 0   ? "the file is empty"
-                                      : cut             ? "the file is complete up to there"
-                                                        : "its last packet is damaged"));
+                                      std::strerror(error_), content));
+}
+
+/// How the connection to the machine ended, as a sentence.
+std::string Tracer::ending(InstanceEnd end) const {
+    const std::string who = fmt::format("instance '{}'", client_->instance());
+    const std::string& why = client_->closed_because();
+    if (!why.empty()) return fmt::format("{} closed the connection: {}", who, why);
+    switch (end) {
+    case InstanceEnd::killed: return who + " was killed";
+    case InstanceEnd::running: return who + " closed the connection, and runs on";
+    default: return who + " has ended";
+    }
 }
 
 int Tracer::finish() {
@@ -325,13 +340,7 @@ int Tracer::finish() {
         const InstanceEnd end = client_->instance_end();
         const bool killed = end == InstanceEnd::killed;
         const bool runs = end == InstanceEnd::running;
-        const std::string ended =
-            !why.empty()
-                ? fmt::format("instance '{}' closed the connection: {}", client_->instance(), why)
-            : killed ? fmt::format("instance '{}' was killed", client_->instance())
-            : runs   ? fmt::format("instance '{}' closed the connection, and runs on",
-                                   client_->instance())
-                     : fmt::format("instance '{}' has ended", client_->instance());
+        const std::string ended = ending(end);
         if (ring() && fired_ns_ == 0 && killed) {
             fired_ns_ = now_ns(CLOCK_MONOTONIC);
             cause_ = ended;

@@ -81,10 +81,8 @@ public:
             stale_fault_.end(faults_, this);
         }
         valid = good;
-        state_.store(!have_ ? State::waiting
-                     : good ? State::valid
-                            : State::stale,
-                     std::memory_order_relaxed);
+        const State sample_state = good ? State::valid : State::stale;
+        state_.store(have_ ? sample_state : State::waiting, std::memory_order_relaxed);
         matched = connection_.matched();
         malformed = malformed_.load(std::memory_order_relaxed);
         wrong_type = connection_.wrong_type();

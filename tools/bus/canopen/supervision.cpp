@@ -264,9 +264,12 @@ bool Supervision::set_reaction(unsigned axis) {
         std::uint32_t behaviour = 0;
         const Read has = read(0x1029, 1, behaviour);
         if (has == Read::failed) return false;
-        const char* state = has == Read::missing || (behaviour & 0xff) == 0 ? "leaves operational"
-                            : (behaviour & 0xff) == 2                       ? "enters stopped"
-                                                                            : "keeps its NMT state";
+        const char* state = "keeps its NMT state";
+        if (has == Read::missing || (behaviour & 0xff) == 0) {
+            state = "leaves operational";
+        } else if ((behaviour & 0xff) == 2) {
+            state = "enters stopped";
+        }
         warn(
             fmt::format("{}: no abort connection option, {:04X}h: on loss of our {} node {} {} "
                         "(1029h:1); whether that stops the motor is in "

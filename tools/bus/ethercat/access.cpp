@@ -36,10 +36,12 @@ bool EthercatAccess::emulate(const EthercatOptions& options) {
     bool good = true;
     for (const auto& m : description.messages) {
         const bool is_error = m.severity == Severity::error;
-        const std::string location =
-            in_file          ? fmt::format("{}:{}:{}", options.emulate, m.at.line, m.at.column)
-            : m.at.line == 0 ? "--emulate"
-                             : fmt::format("--emulate, device {}", m.at.line);
+        std::string location = "--emulate";
+        if (in_file) {
+            location = fmt::format("{}:{}:{}", options.emulate, m.at.line, m.at.column);
+        } else if (m.at.line != 0) {
+            location = fmt::format("--emulate, device {}", m.at.line);
+        }
         fail(options, fmt::format("{}: {}{}{}{}", location, is_error ? "" : "warning: ", m.sentence,
                                   m.help.empty() ? "" : "; ", m.help));
         good = good && !is_error;

@@ -143,9 +143,10 @@ std::string topology_svg(EthercatWire& wire) {
             text += fmt::format("<text x=\"{}\" y=\"{}\">{}</text>\n", from + 3,
                                 y + box_height / 2 - 3, s.parent_port);
         }
-        const char* fill = s.al_failed                      ? "#f4b6b6"
-                           : s.state == ethercat::State::op ? "#bfe5bf"
-                                                            : "#e6e6e6";
+        const char* fill = s.state == ethercat::State::op ? "#bfe5bf" : "#e6e6e6";
+        if (s.al_failed) {
+            fill = "#f4b6b6";
+        }
         text += fmt::format(
             "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{}\" stroke=\"#333\"/>\n", x,
             y, box_width, box_height, fill);
