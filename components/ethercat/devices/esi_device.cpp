@@ -508,21 +508,8 @@ std::unique_ptr<MailboxService> service_of(MailboxType type, const esi::Device& 
     }
 }
 
-}  // namespace
-
-std::string not_emulated(const esi::Device& d) {
-    if (!d.mailbox) return {};
-    std::string protocols;
-    for (const MailboxProtocol& protocol : ethercat::mailbox_protocols) {
-        if (is_emulated(protocol.type) || !d.mailbox->has(protocol.type)) continue;
-        protocols += (protocols.empty() ? "" : ", ") + std::string(protocol.name);
-    }
-    return protocols.empty() ? "" : "its mailbox protocol " + protocols;
-}
-
-Parts make_esi_device(const DeviceOptions& o) {
-    esi::Device device = esi::with_modules(*o.description, *o.described, o.module_idents);
-    assign_by_mode(device);
+/// Returns the design without its objects.
+Design design_of(const esi::Device& device, const DeviceOptions& o) {
     Design design;
     design.name = device.order;
     design.sii = esi::sii_contents(device);
@@ -544,56 +531,90 @@ Parts make_esi_device(const DeviceOptions& o) {
     if (!design.sampled.indices.empty()) {
         design.shortest_cycle_ns = 10'000;
     }
-    const bool configurable =
-        design.coe && ((s.general.coe_details & sii::coe_pdo_config) != 0 ||
-                       is_commanded(device, coe::rx_pdo, coe::tx_pdo + 0x1ff));
-    const bool assignable =
-        design.coe && ((s.general.coe_details & sii::coe_pdo_assign) != 0 ||
-                       is_commanded(device, coe::assignment, coe::assignment + sync_manager_count));
     for (const MailboxProtocol& protocol : ethercat::mailbox_protocols) {
         if (!s.has_mailbox() || (s.protocols & protocol.bit) == 0) continue;
         if (auto service = service_of(protocol.type, device, design.dictionary)) {
             design.services.push_back(std::move(service));
         }
     }
+    return design;
+}
 
+/// What a master can change of the process data.
+struct Adaptable {
+    bool mapping = false;
+    bool assignment = false;
+};
+Adaptable adaptable_parts(const esi::Device& device, const Design& design) {
+    if (!design.coe) return {};
+    const auto details = design.sii.general.coe_details;
+    return {
+        .mapping = (details & sii::coe_pdo_config) != 0 ||
+                   is_commanded(device, coe::rx_pdo, coe::tx_pdo + 0x1ff),
+        .assignment = (details & sii::coe_pdo_assign) != 0 ||
+                      is_commanded(device, coe::assignment, coe::assignment + sync_manager_count)};
+}
+
+/// Adds the PDOs and their assignment to the dictionary, and the lengths of the sync managers.
+void add_process_data(const esi::Device& device, const Adaptable& adaptable, Design& design) {
+    Dictionary& d = *design.dictionary;
+    std::set<std::uint16_t> done;
+    add_pdos(device.rx, adaptable.mapping, d, done);
+    add_pdos(device.tx, adaptable.mapping, d, done);
+    if (design.coe) {
+        add_commanded_pdos(device, d, done);
+    }
+    sii::Contents& s = design.sii;
+    for (unsigned n = 0; n < s.sync_managers.size(); ++n) {
+        const bool output = s.sync_managers[n].type == sii::SmType::outputs;
+        if (!output && s.sync_managers[n].type != sii::SmType::inputs) continue;
+        const auto& pdos = output ? device.rx : device.tx;
+        const std::size_t bytes = add_assignment(pdos, n, adaptable.assignment, d);
+        s.sync_managers[n].length = static_cast<std::uint16_t>(bytes);
+        const bool changes = adaptable.mapping || adaptable.assignment;
+        std::size_t& max_bytes = output ? design.max_output_bytes : design.max_input_bytes;
+        max_bytes = std::max({max_bytes, bytes, max_sampled_bytes(pdos, n),
+                              std::size_t{device.sync_managers[n].max_size},
+                              changes ? usual_max_bytes : std::size_t{0}});
+    }
+    if (design.coe) {
+        add_empty_assignments(s, d);
+    }
+}
+
+}  // namespace
+
+std::string not_emulated(const esi::Device& d) {
+    if (!d.mailbox) return {};
+    std::string protocols;
+    for (const MailboxProtocol& protocol : ethercat::mailbox_protocols) {
+        if (is_emulated(protocol.type) || !d.mailbox->has(protocol.type)) continue;
+        protocols += (protocols.empty() ? "" : ", ") + std::string(protocol.name);
+    }
+    return protocols.empty() ? "" : "its mailbox protocol " + protocols;
+}
+
+Parts make_esi_device(const DeviceOptions& o) {
+    esi::Device device = esi::with_modules(*o.description, *o.described, o.module_idents);
+    assign_by_mode(device);
+    Design design = design_of(device, o);
     Plan plan;
     add_objects(device, plan);
     add_mapped(device.rx, true, plan);
     add_mapped(device.tx, false, plan);
     add_commands(device, plan);
-    if (design.coe && !o.module_idents.empty()) {
-        add_module_lists(o.module_idents, plan);
-    }
     // without CoE there are only the objects of the process data, whose numbers may be any
     if (design.coe) {
-        add_identity(s, plan);
-        add_sync_manager_types(s, plan);
+        if (!o.module_idents.empty()) {
+            add_module_lists(o.module_idents, plan);
+        }
+        add_identity(design.sii, plan);
+        add_sync_manager_types(design.sii, plan);
     }
-    Dictionary& d = *design.dictionary;
-    write_dictionary(plan, d);
-    std::set<std::uint16_t> done;
-    add_pdos(device.rx, configurable, d, done);
-    add_pdos(device.tx, configurable, d, done);
-    if (design.coe) {
-        add_commanded_pdos(device, d, done);
-    }
-    for (unsigned n = 0; n < s.sync_managers.size(); ++n) {
-        const bool output = s.sync_managers[n].type == sii::SmType::outputs;
-        if (!output && s.sync_managers[n].type != sii::SmType::inputs) continue;
-        const std::size_t bytes = add_assignment(output ? device.rx : device.tx, n, assignable, d);
-        s.sync_managers[n].length = static_cast<std::uint16_t>(bytes);
-        const std::size_t sampled = max_sampled_bytes(output ? device.rx : device.tx, n);
-        const std::size_t max =
-            std::max({bytes, sampled, std::size_t{device.sync_managers[n].max_size}});
-        std::size_t& max_bytes = output ? design.max_output_bytes : design.max_input_bytes;
-        const bool changes = configurable || assignable;
-        max_bytes = std::max({max_bytes, max, changes ? usual_max_bytes : std::size_t{0}});
-    }
-    if (design.coe) {
-        add_empty_assignments(s, d);
-    }
-    d.finish();
+    write_dictionary(plan, *design.dictionary);
+    const Adaptable adaptable = adaptable_parts(device, design);
+    add_process_data(device, adaptable, design);
+    design.dictionary->finish();
     auto behaviour = behaviour_of(device, design);
     return {std::move(design), std::move(behaviour)};
 }

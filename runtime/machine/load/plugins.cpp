@@ -221,9 +221,56 @@ std::optional<Plugin> Plugins::open(std::string_view name, Span at,
     return open_component(*this, name, Origin::any, at, diagnostics);
 }
 
+/// Reports that no component has this name, with the reason or a similar name.
+static void report_unknown(const Plugins& plugins, std::string_view name, Origin origin, Span at,
+                           Diagnostics& diagnostics) {
+    const std::string why = left_out_for(underlined(name), plugins.path());
+    if (!why.empty()) return report_left_out(name, why, at, diagnostics);
+    const std::string similar = did_you_mean(name, plugins.available());
+    std::error_code none;
+    const bool may_be_linuxcncs =
+        origin == Origin::any && similar.empty() && !fs::is_directory(module_folder(), none);
+    diagnostics.error("no-such-component", at, "unknown component '" + std::string(name) + "'",
+                      similar,
+                      std::string("hal doc lists all components") +
+                          (may_be_linuxcncs ? "; if it is a module of LinuxCNC, which is not "
+                                              "installed: sudo apt-get install linuxcnc-uspace"
+                                            : ""));
+}
+
+/// Loads a plugin from its file.
+static std::optional<Plugin> load_plugin(const std::string& path, Span at,
+                                         Diagnostics& diagnostics) {
+    const auto bad = [&](const PluginProblem& problem) {
+        diagnostics.error("bad-plugin", at,
+                          "'" + path + "' is not a usable component: " + problem.why, "",
+                          problem.help);
+        return std::nullopt;
+    };
+    const PluginFile file = read_plugin_file(path);
+    if (!file.problem.empty()) return bad({file.problem});
+    const ForeignCode loading;
+    load_own_libraries(file.needed, fs::path(path).parent_path().string());
+    std::shared_ptr<void> library = open_copy(path);
+    if (!library) {
+        void* const direct = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
+        if (!direct) return bad(explain_loader_error(dlerror(), path));
+        library = {direct, [](void* handle) { dlclose(handle); }};
+    }
+    Plugin plugin{nullptr, library, path};
+    plugin.component = static_cast<const hal_component*>(dlsym(library.get(), "hal_plugin"));
+    if (!plugin.component) {
+        return bad(
+            {"it exports no symbol hal_plugin, which HAL_COMPONENT(Type, \"name\", \"summary\") "
+             "makes"});
+    }
+    const std::string why = problem_of(*plugin.component);
+    if (!why.empty()) return bad({why});
+    return plugin;
+}
+
 std::optional<Plugin> open_component(const Plugins& plugins, std::string_view name, Origin origin,
                                      Span at, Diagnostics& diagnostics) {
-    const std::vector<std::string>& path = plugins.path();
     const bool prefers_module =
         origin == Origin::linuxcnc || (origin == Origin::any && yields_to_module(name));
     std::string found = prefers_module ? "" : plugins.find(name);
@@ -232,66 +279,24 @@ std::optional<Plugin> open_component(const Plugins& plugins, std::string_view na
         report_missing_module(name, at, diagnostics);
         return std::nullopt;
     }
-    if (!module.empty() &&
-        (prefers_module || !listed_components(path).contains(underlined(name)))) {
+    const std::string own_name = underlined(name);
+    const auto is_listed = [&] { return listed_components(plugins.path()).contains(own_name); };
+    if (!module.empty() && (prefers_module || !is_listed())) {
         return open_module(module, at, diagnostics);
     }
-    const bool unbuilt = found.empty() && listed_components(path).contains(underlined(name));
-    if (unbuilt && build_on_demand(underlined(name))) {
+    const bool unbuilt = found.empty() && is_listed();
+    if (unbuilt && build_on_demand(own_name)) {
         found = plugins.find(name);
     }
-    if (found.empty() && unbuilt) {
-        diagnostics.error("no-such-component", at,
-                          "component '" + std::string(name) + "' is not built yet", "",
-                          "in the source tree, type: ./hal build " + underlined(name));
-        return {};
-    }
-    if (found.empty()) {
-        if (const std::string why = left_out_for(underlined(name), path); !why.empty()) {
-            report_left_out(name, why, at, diagnostics);
-            return {};
-        }
-        const std::string similar = did_you_mean(name, plugins.available());
-        std::error_code none;
-        const bool may_be_linuxcncs =
-            origin == Origin::any && similar.empty() && !fs::is_directory(module_folder(), none);
-        diagnostics.error("no-such-component", at, "unknown component '" + std::string(name) + "'",
-                          similar,
-                          std::string("hal doc lists all components") +
-                              (may_be_linuxcncs ? "; if it is a module of LinuxCNC, which is not "
-                                                  "installed: sudo apt-get install linuxcnc-uspace"
-                                                : ""));
-        return {};
-    }
-    const auto bad = [&](const PluginProblem& problem) {
-        diagnostics.error("bad-plugin", at,
-                          "'" + found + "' is not a usable component: " + problem.why, "",
-                          problem.help);
+    if (!found.empty()) return load_plugin(found, at, diagnostics);
+    if (!unbuilt) {
+        report_unknown(plugins, name, origin, at, diagnostics);
         return std::nullopt;
-    };
-    const PluginFile file = read_plugin_file(found);
-    if (!file.problem.empty()) {
-        return bad({file.problem});
     }
-    const ForeignCode loading;
-    load_own_libraries(file.needed, fs::path(found).parent_path().string());
-    std::shared_ptr<void> library = open_copy(found);
-    if (!library) {
-        void* const direct = dlopen(found.c_str(), RTLD_NOW | RTLD_LOCAL);
-        if (!direct) return bad(explain_loader_error(dlerror(), found));
-        library = {direct, [](void* handle) { dlclose(handle); }};
-    }
-    Plugin plugin{nullptr, library, found};
-    plugin.component = static_cast<const hal_component*>(dlsym(library.get(), "hal_plugin"));
-    if (!plugin.component) {
-        return bad(
-            {"it exports no symbol hal_plugin, which HAL_COMPONENT(Type, \"name\", \"summary\") "
-             "makes"});
-    }
-    if (const std::string why = problem_of(*plugin.component); !why.empty()) {
-        return bad({why});
-    }
-    return plugin;
+    diagnostics.error("no-such-component", at,
+                      "component '" + std::string(name) + "' is not built yet", "",
+                      "in the source tree, type: ./hal build " + own_name);
+    return std::nullopt;
 }
 
 std::vector<std::string> Plugins::available() const {
