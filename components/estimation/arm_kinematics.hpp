@@ -210,9 +210,9 @@ private:
             for (Eigen::Index i = 0; i < 3; ++i) {
                 residual(3 + i) = weight * 0.5 * axis(i) / sine * angle;
             }
-        } else if (
-            cosine <
-            0.0) {  // half a turn is 2 a a' - 1; each column that is not 0 is along the axis a after adding 1
+        } else if (cosine < 0.0) {
+            // half a turn is 2 a a' - 1; each column that is not 0 is along the axis a after
+            // adding 1
             Eigen::Index k = 0;
             for (Eigen::Index i = 1; i < 3; ++i) {
                 if (turn(i, i) > turn(k, k)) {

@@ -61,8 +61,8 @@ struct SavgolDiff : hal::Component {
         for (std::size_t age = 0, at = newest_; age < size();
              ++age, at = at == 0 ? size() - 1 : at - 1) {
             for (std::size_t d = 0; d < 3; ++d) {
-                sums[d] +=
-                    weights_[d][age] * (past_[at] - last_);  // small differences avoid cancellation
+                // small differences avoid cancellation
+                sums[d] += weights_[d][age] * (past_[at] - last_);
             }
         }
         const double dt = cycle.seconds();

@@ -64,8 +64,8 @@ struct Quantizer : hal::Component {
     }
 
 private:
-    static constexpr double max_exact =
-        9007199254740992.0;  // 2^53: whole numbers are exact up to here
+    // 2^53: whole numbers are exact up to here
+    static constexpr double max_exact = 9007199254740992.0;
     double rounded(double exact) const noexcept {
         switch (mode) {
         case down: return std::floor(exact);

@@ -102,7 +102,8 @@ Server::~Server() {
 
 bool Server::start(Diagnostics& diagnostics) {
     State& s = *state_;
-    if (!s.endpoint.open(s.shell.session().options().name, s.options.group, diagnostics)) return false;
+    const std::string& name = s.shell.session().options().name;
+    if (!s.endpoint.open(name, s.options.group, diagnostics)) return false;
     s.wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     list_descriptor(s.wake, "the wake-up of the control server");
     // Signals are for the program's own thread.

@@ -22,8 +22,8 @@ namespace hal {
 namespace {
 
 #if defined(__SANITIZE_THREAD__)
-constexpr std::size_t stack_bytes =
-    1 << 22;  // the sanitizer keeps more than half a megabyte of its own on each stack
+// the sanitizer keeps more than half a megabyte of its own on each stack
+constexpr std::size_t stack_bytes = 1 << 22;
 #else
 constexpr std::size_t stack_bytes = 1 << 20;
 #endif

@@ -76,7 +76,8 @@ std::vector<StateHandover> state_handovers(EditLog& edit) {
         for (EditLog::Replaced::Pair& pair : one.pairs) {
             // a handover was made only to the version in the model, and is rolled back with it
             if (known_pair(edit, *pair.kept) != &pair || pair.handed != one.undone) continue;
-            all.push_back({pair.kept, copies(*pair.other, *pair.kept), {&pair.handed, !one.undone}});
+            const bool is_kept = !one.undone;
+            all.push_back({pair.kept, copies(*pair.other, *pair.kept), {&pair.handed, is_kept}});
         }
     }
     return all;

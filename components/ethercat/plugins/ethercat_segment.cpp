@@ -87,9 +87,8 @@ public:
         silent_ = line_->frames() == frames_ ? silent_ + 1 : 0;
         frames_ = line_->frames();
         if (silent_ >= silent_cycles) {
-            line_->advance(
-                cycle
-                    .start_ns());  // frames move its time; without them its watchdogs run all the same
+            // frames move its time; without them its watchdogs run all the same
+            line_->advance(cycle.start_ns());
         }
         bool disturbed = unposted_;
         for (unsigned n = 0; n < slaves_.size(); ++n) {

@@ -106,8 +106,9 @@ private:
     }
     const Address address_;
     VideoSystem& system_;
-    const std::unique_ptr<Source>
-        model_;  // never opened: rejects invalid options when the netlist is checked, and has the camera's constants
+    // never opened: rejects invalid options when the netlist is checked, and has the constants of
+    // the camera
+    const std::unique_ptr<Source> model_;
     std::shared_ptr<Hub> hub_;
     std::uint64_t seen_ = 0;
     std::uint64_t last_ = 0;

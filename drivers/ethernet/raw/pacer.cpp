@@ -16,7 +16,8 @@ namespace hal::ethernet::rawether {
 
 namespace {
 
-#ifdef SYS_futex_time64  // on 32-bit machines: the call that takes seconds of 64 bits, as this build has them
+// on 32-bit machines: the call that takes seconds of 64 bits, as this build has them
+#ifdef SYS_futex_time64
 constexpr long futex_call = SYS_futex_time64;
 #else
 constexpr long futex_call = SYS_futex;

@@ -36,7 +36,8 @@ void Sender::await(std::int64_t time_ns) noexcept {
     constexpr std::int64_t min_lead = 4'000;
     static constexpr std::array<std::uint8_t, header_bytes - 1> runt{};
     auto now = link::monotonic_ns();
-    if (time_ns - now > min_lead && time_ns - last_ns_.load(std::memory_order_relaxed) > cold_after) {
+    const bool is_cold = time_ns - last_ns_.load(std::memory_order_relaxed) > cold_after;
+    if (time_ns - now > min_lead && is_cold) {
         for (; now < time_ns - ahead; now = link::monotonic_ns()) {
             pause_processor();
         }

@@ -178,8 +178,8 @@ void start_printer() noexcept {
     }
     lines_ready = true;
     printing = true;
-    printer_made = pthread_create(&printer, nullptr, print_until_stopped, nullptr) ==
-                   0;  // without it the last lines are printed at the end
+    // without it the last lines are printed at the end
+    printer_made = pthread_create(&printer, nullptr, print_until_stopped, nullptr) == 0;
 }
 
 void stop_printer() noexcept {

@@ -21,8 +21,8 @@
 #include "linuxcnc/binary/module.hpp"
 #include "linuxcnc/binary/tasks.hpp"
 
-extern "C" [[gnu::weak, gnu::visibility("default")]] void halcyon_guard_module_task(
-    bool runs);  // guard/module_calls.cpp
+// guard/module_calls.cpp
+extern "C" [[gnu::weak, gnu::visibility("default")]] void halcyon_guard_module_task(bool runs);
 
 namespace hal::modules {
 namespace {

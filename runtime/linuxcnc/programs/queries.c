@@ -62,8 +62,8 @@ static int look_up(struct query* q, bool signal) {
     memset(&q->is, 0, sizeof q->is);
     if (signal) {
         q->is.signal.writers = found.has_writer;
-        q->is.signal.readers =
-            found.pins - found.has_writer; /* those in both directions among them */
+        /* those in both directions among them */
+        q->is.signal.readers = found.pins - found.has_writer;
     } else {
         q->is.pin.dir = found.dir;
         q->is.pin.signal = *found.signal ? found.signal : NULL;

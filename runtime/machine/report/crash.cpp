@@ -147,7 +147,8 @@ void install_crash_handler(int signal) noexcept {
     sigaction(signal, &action, nullptr);
 }
 
-std::atomic<pid_t> machine_process{0};  // the process of the machines; one that it forks ends without a word
+// the process of the machines; one that it forks ends without a message
+std::atomic<pid_t> machine_process{0};
 
 bool has_machine() noexcept {
     return std::any_of(std::begin(watched), std::end(watched),

@@ -103,8 +103,8 @@ void* __cxa_allocate_exception(size_t bytes) {
 void __cxa_throw(void* object, void* type, void (*destroy)(void*)) {
     const bool before = in_cycle;
     in_cycle = false;
-    const char* const mangled =
-        ((const char**)type)[1]; /* std::type_info: its table of functions, then its name */
+    /* std::type_info: its table of functions, then its name */
+    const char* const mangled = ((const char**)type)[1];
     char* (*const demangle)(const char*, char*, size_t*, int*) =
         (char* (*)(const char*, char*, size_t*, int*))of_cxx("__cxa_demangle");
     const char* const name =

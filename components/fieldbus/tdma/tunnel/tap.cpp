@@ -21,6 +21,8 @@ namespace {
 // pass.
 constexpr int busy_ms = 1;
 constexpr int idle_ms = 5;
+// an error may be transient; after so many polls the interface is lost for this descriptor
+constexpr unsigned max_errors = 200;
 constexpr Time busy_for = 200'000'000;
 constexpr std::size_t at_once = 64;  // packets in one direction before the other is served
 
@@ -115,9 +117,7 @@ private:
             ::poll(&source, 1, now < busy_until ? busy_ms : idle_ms);
             if ((source.revents & (POLLERR | POLLHUP | POLLNVAL)) == 0) {
                 gone_ = 0;
-            } else if (
-                ++gone_ ==
-                200) {  // a transient error for a moment; later the interface is lost for this descriptor
+            } else if (++gone_ == max_errors) {
                 log("interface " + name() +
                     " was deleted; ordinary packets pass again after unloadrt and loadrt");
                 return;

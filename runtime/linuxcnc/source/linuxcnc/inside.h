@@ -19,12 +19,12 @@ enum { component_id = 1 }; /* in a plugin */
 /* Names the host of the instance that is being created, else NULL; a program has the same host all
  * the time. plugin.c, program.c */
 extern const hal_host* halcyon_current_host;
-const hal_host* halcyon_host_of(
-    int comp); /* of a component that hal_init() made; NULL: none, or not while an instance is created */
+/* of a component that hal_init() made; NULL: none, or not while an instance is created */
+const hal_host* halcyon_host_of(int comp);
 
 /* declare.c: pins, parameters, functions */
-void halcyon_set_instance(
-    const char* name); /* of a .comp file; the runtime takes names below it. "": names are whole */
+/* of a .comp file; the runtime takes names below it. "": names are whole */
+void halcyon_set_instance(const char* name);
 void halcyon_sync_parameters(void); /* copies those declared by pointer from and to their pins */
 void halcyon_mark_pins(void); /* those declared later can be dropped */
 void halcyon_drop_marked_pins(void);

@@ -21,8 +21,8 @@
 const hal_host* halcyon_current_host; /* set by hal_init() */
 struct halcyon_program halcyon_programs[halcyon_most_programs];
 static hal_host hosts[halcyon_most_programs]; /* `data` is the program */
-static pthread_mutex_t mutex =
-    PTHREAD_MUTEX_INITIALIZER; /* of the programs and of the connection; never held while the program's code runs */
+/* of the programs and of the connection; never held while the program's code runs */
+static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
 
 static struct halcyon_program* program_of(int comp) {
     const int place = comp - halcyon_first_id;

@@ -39,8 +39,8 @@ extern struct halcyon_program halcyon_programs[halcyon_most_programs];
 const char* halcyon_program_name(void); /* of the first, for messages about all of them */
 extern char halcyon_program_prefix[256]; /* of a .comp file's instance; "": names are whole */
 
-locale_t halcyon_lock(
-    void); /* numbers have a point until halcyon_unlock() restores the locale that this returns */
+/* numbers have a point until halcyon_unlock() restores the locale that this returns */
+locale_t halcyon_lock(void);
 void halcyon_unlock(locale_t before);
 
 /* --- program_exchange.c: what the machine and this process exchange; all under the lock --- */
@@ -55,8 +55,8 @@ void halcyon_exchange(struct halcyon_program*);
 bool halcyon_start_helper(void); /* false when the thread cannot be made */
 void halcyon_stop_helper(void); /* not under the lock */
 void halcyon_catch_end_signals(void);
-__attribute__((weak)) void halcyon_begins(
-    void); /* ../../programs: called by hal_init() */
+/* ../../programs: called by hal_init() */
+__attribute__((weak)) void halcyon_begins(void);
 
 /* --- program_protocol.c: requests and replies --- */
 
@@ -78,11 +78,11 @@ void halcyon_drop_request(void);
  * were transferred; sets number to the value of the reply's key. Under the lock. */
 bool halcyon_use_port(const struct halcyon_link* port, const char* verb, char* to, const char* from,
                       unsigned count, const char* key, unsigned* number);
-char* halcyon_ask(
-    void); /* sends the request and returns the reply; NULL when it was rejected or the connection is lost */
+/* sends the request and returns the reply; NULL when it was rejected or the connection is lost */
+char* halcyon_ask(void);
 
-uint64_t halcyon_significant(
-    hal_type type, uint64_t raw); /* clears the bytes of a slot that the type does not use */
+/* clears the bytes of a slot that the type does not use */
+uint64_t halcyon_significant(hal_type type, uint64_t raw);
 hal_value halcyon_take_value(const char** at,
                              hal_type type); /* reads a value of a reply and moves `at` behind it */
 

@@ -28,8 +28,8 @@ static int note_segments(struct dl_phdr_info* info, size_t size, void* inside) {
                         (const char*)inside < begin + info->dlpi_phdr[i].p_memsz);
     }
     if (!mine) return 0;
-    const char* read_only =
-        NULL; /* end of what the loader protects after relocating: the begin of a writable segment */
+    /* end of what the loader protects after relocating: the begin of a writable segment */
+    const char* read_only = NULL;
     for (int i = 0; i < info->dlpi_phnum; ++i) {
         if (info->dlpi_phdr[i].p_type == PT_GNU_RELRO) {
             read_only = (const char*)info->dlpi_addr + info->dlpi_phdr[i].p_vaddr +

@@ -140,8 +140,8 @@ void halcyon_print_messages(void) {
 }
 void halcyon_start_printing(void) {
     printing = true;
-    printer_made = pthread_create(&printer, NULL, print_until_stopped, NULL) ==
-                   0; /* without it the last lines are printed at the end */
+    /* without it the last lines are printed at the end */
+    printer_made = pthread_create(&printer, NULL, print_until_stopped, NULL) == 0;
     in_cycles = true;
 }
 void halcyon_stop_printing(void) {

@@ -60,8 +60,8 @@ int rtapi_prio_highest(void);
 int rtapi_prio_lowest(void);
 int rtapi_prio_next_higher(int priority);
 int rtapi_prio_next_lower(int priority);
-long rtapi_clock_set_period(
-    long ns); /* 0 asks; periods are made by `loadrt threads` and newthread */
+/* 0 asks; periods are made by `loadrt threads` and newthread */
+long rtapi_clock_set_period(long ns);
 
 /* --- module parameters: load arguments, found in a section of the plugin --- */
 

@@ -7,8 +7,8 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-int rtapi_app_main(
-    void);  /* [setup] makes pins and functions; negative: the instance cannot be made */
+/* [setup] makes pins and functions; negative: the instance cannot be made */
+int rtapi_app_main(void);
 void rtapi_app_exit(void); /* [setup] */
 #ifdef __cplusplus
 }
