@@ -52,11 +52,13 @@ struct Recording {
         set.duration("--after", after_ns,
                      "with --last: what to record after the event (default 5s)");
     }
-    /// Something of it was given: the words are FILE NAMES.
+    bool operator==(const Recording&) const = default;
+    /// Returns whether an option was given: then the words are FILE NAMES.
     bool asked() const {
-        return all || !groups.empty() || every != 1 || for_ns >= 0 || max_mb > 0 ||
-               rotate_ns >= 0 || last_ns >= 0 || keep != 0 || !trigger.empty() || after_ns >= 0 ||
-               !profile.empty();
+        Recording without_names = *this;
+        without_names.file.clear();
+        without_names.names.clear();
+        return without_names != Recording();
     }
 };
 

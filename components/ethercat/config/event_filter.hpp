@@ -3,8 +3,10 @@
 // reason.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <iterator>
 #include <vector>
 
 #include "ethercat/master/events.hpp"
@@ -49,25 +51,14 @@ private:
     }
     static bool is_cause(master::Event event) noexcept {
         using master::Event;
-        switch (event) {
-        case Event::no_mailbox:
-        case Event::too_few_fmmus:
-        case Event::too_few_sync_managers:
-        case Event::state_refused:
-        case Event::state_timeout:
-        case Event::startup_write_failed:
-        case Event::no_eoe:
-        case Event::eoe_failed:
-        case Event::mapping_failed:
-        case Event::mapping_differs:
-        case Event::too_many_entries:
-        case Event::fixed_size:
-        case Event::dc_unsupported:
-        case Event::dc_timeout:
-        case Event::dc_not_set:
-        case Event::start_up_failed: return true;
-        default: return false;
-        }
+        constexpr Event causes[] = {
+            Event::no_mailbox,      Event::too_few_fmmus,    Event::too_few_sync_managers,
+            Event::state_refused,   Event::state_timeout,    Event::startup_write_failed,
+            Event::no_eoe,          Event::eoe_failed,       Event::mapping_failed,
+            Event::mapping_differs, Event::too_many_entries, Event::fixed_size,
+            Event::dc_unsupported,  Event::dc_timeout,       Event::dc_not_set,
+            Event::start_up_failed};
+        return std::ranges::find(causes, event) != std::end(causes);
     }
     struct Cause {
         master::Event event = master::Event::scanned;  // is none
