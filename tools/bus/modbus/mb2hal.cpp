@@ -58,8 +58,7 @@ public:
 
     void print_events() const {
         for (EventRecord record; image_.pop(record);) {
-            write_all(STDERR_FILENO,
-                      fmt::format("mb2hal: {}: {}\n", bus_.link, texts_.line(record)));
+            write_all(STDERR_FILENO, fmt::format("mb2hal: {}\n", texts_.line(record)));
         }
     }
 
