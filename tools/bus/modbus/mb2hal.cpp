@@ -6,6 +6,7 @@
 #include <cmath>
 #include <deque>
 #include <fmt/core.h>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -100,6 +101,7 @@ struct Element {
     std::uint32_t value = 0;  ///< index in the plan
     bool is_bit = false;
     bool is_output = false;  ///< written to the slave
+    bool is_single = false;  ///< by function 05 or 06
     std::size_t first = 0;  ///< number of its first pin; of an output: its index in what is read
 };
 
@@ -162,8 +164,9 @@ public:
             const Image& image = links_[t.link].image();
             for (const Element& element : t.elements) {
                 if (!element.is_output) continue;
-                image.value(element.value)
-                    .store(output_of(element, values), std::memory_order_relaxed);
+                if (const auto number = output_of(element, values)) {
+                    image.value(element.value).store(*number, std::memory_order_relaxed);
+                }
             }
         }
         for (const LinkThread& link : links_) {
@@ -202,6 +205,7 @@ private:
             element.value = buses_[link].plan.telegrams[telegram].values[n];
             element.is_bit = is_bits(of.table);
             element.is_output = of.is_output;
+            element.is_single = of.is_single;
             element.first = of.is_output ? inputs_ : pins.size();
             declare_element(of, prefix + of.elements[n], element, pins);
             t.elements.push_back(element);
@@ -281,16 +285,33 @@ private:
     }
 
     /// Returns the register: both pins are added, the first without its fraction. As in mb2hal,
-    /// the sum is limited above, and a negative one wraps.
-    std::uint64_t output_of(const Element& element, const json& values) const {
+    /// the sum is limited above, a negative one wraps, and for function 16 the first number wraps.
+    /// Nothing for NaN: the register keeps its value.
+    std::optional<std::uint64_t> output_of(const Element& element, const json& values) const {
         const json& first = values[element.first];
-        if (element.is_bit) return first.get<bool>() ? 1 : 0;
-        double sum = first.is_number() ? std::trunc(first.get<double>()) : 0.0;
+        if (element.is_bit) return std::uint64_t{first.get<bool>()};
+        double sum = std::trunc(number_of(first));
+        if (std::isnan(sum)) return std::nullopt;
+        if (!element.is_single) {
+            sum = register_of(sum);
+        }
         if (file_.has_new_names) {
             sum += values[element.first + 1].get<double>();
         }
-        sum = std::clamp(sum, -2147483648.0, max_register);
-        return static_cast<std::uint16_t>(static_cast<std::int64_t>(sum));
+        return register_of(std::min(sum, max_register));
+    }
+    /// Numbers that are not finite are strings (docs/protocol.md).
+    static double number_of(const json& value) {
+        constexpr double infinity = std::numeric_limits<double>::infinity();
+        if (value.is_number()) return value.get<double>();
+        if (value == "inf") return infinity;
+        if (value == "-inf") return -infinity;
+        return std::numeric_limits<double>::quiet_NaN();
+    }
+    static std::uint16_t register_of(double number) {
+        constexpr double limit = 2147483648.0;
+        return static_cast<std::uint16_t>(
+            static_cast<std::int64_t>(std::clamp(number, -limit, limit)));
     }
 
     const Mb2halFile& file_;

@@ -163,9 +163,8 @@ private:
         } else if (number_of_it == 0) {
             return miss("FIRST_ELEMENT", "the address of the first element: FIRST_ELEMENT = 0");
         }
-        bool is_single = false;
-        if (!read_function(t, number_of_it == 0, is_single)) return;
-        read_elements(t, is_single, number_of_it == 0);
+        if (!read_function(t, number_of_it == 0)) return;
+        read_elements(t, number_of_it == 0);
         t.timeout_ns = whole("MB_RESPONSE_TIMEOUT_MS", static_cast<int>(t.timeout_ns / millisecond),
                              1, 60000) *
                        millisecond;
@@ -233,7 +232,7 @@ private:
         }
     }
 
-    bool read_function(Mb2halTransaction& t, bool is_first, bool& is_single) {
+    bool read_function(Mb2halTransaction& t, bool is_first) {
         if (!entry("MB_TX_CODE")) {
             if (is_first) {
                 miss("MB_TX_CODE", "the function: MB_TX_CODE = fnct_03_read_holding_registers");
@@ -247,11 +246,11 @@ private:
         }
         t.table = row->table;
         t.is_output = row->is_output;
-        is_single = row->is_single;
+        t.is_single = row->is_single;
         return true;
     }
 
-    void read_elements(Mb2halTransaction& t, bool is_single, bool is_first) {
+    void read_elements(Mb2halTransaction& t, bool is_first) {
         const bool has_names = entry("PIN_NAMES") != nullptr;
         if (has_names && entry("NELEMENTS")) {
             return reject("NELEMENTS", "either NELEMENTS or PIN_NAMES");
@@ -272,7 +271,7 @@ private:
         }
         if (t.elements.size() > max_elements) {
             reject("PIN_NAMES", fmt::format("at most {} names", max_elements));
-        } else if (is_single && t.elements.size() != 1) {
+        } else if (t.is_single && t.elements.size() != 1) {
             reject(has_names ? "PIN_NAMES" : "NELEMENTS", "one element for functions 05 and 06");
         } else if (t.address + t.elements.size() > 65536) {
             reject("FIRST_ELEMENT", "an address whose last element is at most 65535");

@@ -20,6 +20,7 @@ struct Mb2halTransaction {
     std::uint8_t unit = 0;
     modbus::Table table = modbus::Table::none;
     bool is_output = false;
+    bool is_single = false;  ///< functions 05 and 06, of one element
     std::uint16_t address = 0;
     std::vector<std::string> elements;  ///< names: "00", "01" … or those of PIN_NAMES
     double max_rate_hz = 0.0;  ///< 0: as often as the line allows
