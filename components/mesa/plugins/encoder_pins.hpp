@@ -15,6 +15,7 @@
 #include "mesa/hostmot2/formulas.hpp"
 #include "mesa/hostmot2/registers.hpp"
 #include "module_pins.hpp"
+#include "scale_param.hpp"
 
 namespace hal::mesa {
 
@@ -48,6 +49,11 @@ public:
                         {.safe = 0.0}),
           quad_error_(o.component, o.read, named(unit, "quad-error"),
                       "A and B have changed at the same time"),
+          position_valid_(o.component, o.read, named(unit, "position-valid"),
+                          "FALSE: counts may be lost, because the card was lost while the encoder "
+                          "turned fast, or for longer than 1 s; TRUE again after reset or an index "
+                          "that clears the count",
+                          {.initial = true, .safe = false}),
           input_a_(o.component, o.read, named(unit, "input-a"), "level of A"),
           input_b_(o.component, o.read, named(unit, "input-b"), "level of B"),
           input_index_(o.component, o.read, named(unit, "input-index"), "level of the index"),
@@ -58,7 +64,7 @@ public:
                              "TRUE: quad-error is shown"),
           index_enable_(o.component, named(unit, "index-enable"),
                         "TRUE: the next index makes the count 0 and this FALSE"),
-          scale_(o.component, named(unit, "scale"), "counts per unit", {.initial = 1.0}),
+          scale_(o.component, named(unit, "scale"), "counts per unit"),
           index_invert_(o.component, named(unit, "index-invert"),
                         "TRUE: the rising edge of the index counts"),
           index_mask_(o.component, named(unit, "index-mask"),
@@ -75,6 +81,7 @@ public:
         // one at a time: a name lasts until the next one
         hal::Retained(o.component, {{named(unit, "counter"), counter_}});
         hal::Retained(o.component, {{named(unit, "zero"), zero_}});
+        hal::Retained(o.component, {{named(unit, "is-uncertain"), is_uncertain_}});
     }
 
     /// `count`: count and time of its edge; `control`: control and latch. [realtime] read
@@ -90,7 +97,9 @@ public:
         const double in_gap = speed_.velocity() * reading.gap_s;
         counter_.update(value, std::llround(in_gap));
         if (reading.is_after_gap) {
-            may_have_lost_ = reading.has_lost_power || std::abs(in_gap) > max_known;
+            may_have_lost_ =
+                reading.has_lost_power || std::abs(in_gap) > max_known || reading.gap_s > max_gap_s;
+            is_uncertain_ = is_uncertain_ || may_have_lost_;
             speed_.restart(now_ticks);
         } else {
             speed_.update({counter_.position() - before, edge_ticks, now_ticks}, ticks_hz,
@@ -123,6 +132,8 @@ public:
 private:
     /// counts that may pass in a gap without a doubt about wraps of the register
     static constexpr double max_known = 8192.0;
+    /// s; in a longer gap it may have begun to turn, so far that the register has wrapped
+    static constexpr double max_gap_s = 1.0;
     static constexpr std::uint32_t setting_bits = encoder::index_polarity | encoder::mask_polarity |
                                                   encoder::use_mask | encoder::count_up_down |
                                                   encoder::filter_15;
@@ -159,14 +170,17 @@ private:
         latched_ = raw - zero_;
         if (!no_clear_on_index_) {
             zero_ = raw;
+            is_uncertain_ = false;
         }
         index_enable_ = false;
     }
     void show() noexcept {
         if (reset_) {
             zero_ = counter_.position();
+            is_uncertain_ = false;
         }
-        const double by = scale_ == 0.0 || !std::isfinite(scale_) ? 1.0 : scale_.get();
+        position_valid_ = !is_uncertain_;
+        const double by = scale_;
         const std::int64_t count = counter_.position() - zero_;
         const double velocity = speed_.velocity() / by;
         rawcounts_ = static_cast<std::int32_t>(counter_.position());
@@ -187,14 +201,15 @@ private:
     std::uint32_t control_ = 0;
     bool is_read_ = false;
     bool may_have_lost_ = false;
+    bool is_uncertain_ = false;  ///< until the count has a new zero
     bool is_done_ = false;  ///< the event that the register shows has been handled
 
     hal::Out<std::int32_t> count_, rawcounts_, rawlatch_, count_latched_;
     hal::Out<double> position_, position_latched_, position_interpolated_, velocity_, velocity_rpm_;
-    hal::Out<bool> quad_error_, input_a_, input_b_, input_index_;
+    hal::Out<bool> quad_error_, position_valid_, input_a_, input_b_, input_index_;
     hal::In<bool> reset_, no_clear_on_index_, quad_error_enable_;
     hal::Io<bool> index_enable_;
-    hal::Param<double> scale_;
+    ScaleParam scale_;
     hal::Param<bool> index_invert_, index_mask_, index_mask_invert_, counter_mode_, filter_;
     hal::Param<double> vel_timeout_;
 };

@@ -22,6 +22,7 @@ enum class Event : std::uint8_t {
     encoder_gap,
     remote_lost,
     remote_online,
+    hold_too_long,
 };
 
 struct EventRecord {
@@ -54,6 +55,9 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
     {Event::remote_lost, bus::Effect::raises,
      "{remote} does not answer[; check its cable and its field power]"},
     {Event::remote_online, bus::Effect::ends, "{remote} answers again"},
+    {Event::hold_too_long, bus::Effect::none,
+     "hold-cycles is {value} ms, longer than watchdog.timeout_ns: the watchdog of {card} bites "
+     "before the card counts as lost; lower hold-cycles"},
 };
 static_assert(bus::in_order(event_rows));
 

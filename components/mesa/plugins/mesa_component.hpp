@@ -102,6 +102,7 @@ struct MesaComponent : LoadedCard, hal::bus::BusComponent {
         const Answer answer = link_->receive(now, wait_limit(cycle));
         const bool is_fresh = answer == Answer::fresh;
         is_fresh_ = is_fresh;
+        check_hold(cycle.period_ns());
         const CardState before = monitor_.state();
         const CardEvent event = monitor_.step(report(is_fresh), hold_cycles_, cycle.period_ns());
         rewrites_ = rewrites_ || (monitor_.state() != before && !monitor_.drives_outputs());
@@ -261,6 +262,15 @@ private:
             link_->age_ns(cycle.start_ns()) < std::int64_t{timeout_ns_};
         writing.may_move = writing.outputs_on && ports_->modules_are_released();
         return writing;
+    }
+    /// Reports once that the outputs are off before the card counts as lost.
+    void check_hold(std::int64_t period_ns) noexcept {
+        const std::int64_t hold_ns = period_ns * std::int64_t{hold_cycles_};
+        const bool is_too_long = hold_ns > std::int64_t{timeout_ns_};
+        if (is_too_long && !holds_too_long_) {
+            tell({Event::hold_too_long, 0, hold_ns / 1'000'000});
+        }
+        holds_too_long_ = is_too_long;
     }
     void handle(CardEvent event, std::int64_t now) noexcept {
         switch (event) {
@@ -578,6 +588,7 @@ private:
     bool hides_reset_ = false;  // the newest datagram has the timeout that shows a reset
     bool may_have_reset_ = false;  // such a datagram had no answer
     bool was_lost_ = false;
+    bool holds_too_long_ = false;
     bool is_after_gap_ = false;  // these three are for the next answer
     bool has_lost_power_ = false;
     bool is_after_reset_ = false;

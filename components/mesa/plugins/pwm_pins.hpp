@@ -9,6 +9,7 @@
 #include "mesa/hostmot2/formulas.hpp"
 #include "mesa/hostmot2/registers.hpp"
 #include "module_pins.hpp"
+#include "scale_param.hpp"
 
 namespace hal::mesa {
 
@@ -48,7 +49,7 @@ private:
         return brief_name("pwmgen.%02u.%s", unit, name);
     }
     double duty() const noexcept {
-        const double by = scale_ == 0.0 || !std::isfinite(scale_) ? 1.0 : scale_.get();
+        const double by = scale_;
         double duty = value_ / by;
         if (!std::isfinite(duty)) return 0.0;
         duty = std::clamp(duty, -1.0, 1.0);
@@ -73,7 +74,7 @@ private:
     const bool has_dither_;
     hal::In<double> value_;
     hal::In<bool> enable_, offset_mode_, dither_;
-    hal::Param<double> scale_;
+    ScaleParam scale_;
     hal::Param<std::int32_t> output_type_;
 };
 

@@ -11,6 +11,7 @@
 #include "mesa/driver/position_counter.hpp"
 #include "mesa/driver/remote.hpp"
 #include "module_pins.hpp"
+#include "scale_param.hpp"
 
 namespace hal::mesa {
 
@@ -123,9 +124,9 @@ private:
             o.component, o.read, (name + ".position").c_str(), "position, count / scale");
         reset_ = std::make_unique<hal::In<bool>>(o.component, o.read, (name + ".reset").c_str(),
                                                  "TRUE: count and position are 0");
-        scale_ = std::make_unique<hal::Param<double>>(o.component, (name + ".scale").c_str(),
-                                                      "counts per unit",
-                                                      hal::PinOptions<double>{.initial = 1.0});
+        scale_ =
+            std::make_unique<ScaleParam>(o.component, (name + ".scale").c_str(), "counts per unit",
+                                         hal::PinOptions<double>{.initial = 1.0});
     }
 
     std::uint64_t take(std::span<const std::uint32_t> words) const noexcept {
@@ -175,7 +176,7 @@ private:
         if (*reset_) {
             zero_ = position;
         }
-        const double scale = *scale_ == 0.0 ? 1.0 : scale_->get();
+        const double scale = *scale_;
         *raw_count_ = static_cast<std::int32_t>(position);
         *count_ = static_cast<std::int32_t>(position - zero_);
         *position_ = static_cast<double>(position - zero_) / scale;
@@ -187,7 +188,8 @@ private:
     std::vector<std::unique_ptr<hal::Out<bool>>> bits_out_, bits_not_;
     std::unique_ptr<hal::In<double>> number_in_;
     std::unique_ptr<hal::Out<double>> number_out_;
-    std::unique_ptr<hal::Param<double>> scale_max_, max_limit_, min_limit_, scale_;
+    std::unique_ptr<hal::Param<double>> scale_max_, max_limit_, min_limit_;
+    std::unique_ptr<ScaleParam> scale_;
     std::unique_ptr<hal::Out<std::int32_t>> count_, raw_count_;
     std::unique_ptr<hal::Out<double>> position_;
     std::unique_ptr<hal::In<bool>> reset_;

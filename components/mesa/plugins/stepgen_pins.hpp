@@ -18,6 +18,7 @@
 #include "mesa/hostmot2/formulas.hpp"
 #include "mesa/hostmot2/registers.hpp"
 #include "module_pins.hpp"
+#include "scale_param.hpp"
 
 namespace hal::mesa {
 
@@ -54,8 +55,7 @@ public:
                           "FALSE: steps were made that the motor may not have followed; TRUE again "
                           "when enable becomes TRUE after it was FALSE",
                           {.initial = true, .safe = false}),
-          position_scale_(o.component, named(unit, "position-scale"), "steps per unit",
-                          {.initial = 1.0}),
+          position_scale_(o.component, named(unit, "position-scale"), "steps per unit"),
           maxvel_(o.component, named(unit, "maxvel"),
                   "maximum velocity, units/s; 0: what the times of the pulses allow"),
           maxaccel_(o.component, named(unit, "maxaccel"),
@@ -191,10 +191,7 @@ private:
     bool is_moving(std::int32_t rate) const noexcept {
         return std::abs(steps_per_s(rate, clock_hz_)) > 1.0;
     }
-    double scale() const noexcept {
-        const double value = position_scale_;
-        return value == 0.0 || !std::isfinite(value) ? 1.0 : value;
-    }
+    double scale() const noexcept { return position_scale_; }
     /// Returns the rate in 1/65536 steps per second.
     double rate_per_s() const noexcept {
         return steps_per_s(rate_, clock_hz_) * accumulator_per_step;
@@ -280,7 +277,7 @@ private:
     hal::Out<std::int32_t> counts_;
     hal::Out<double> position_fb_, velocity_fb_;
     hal::Out<bool> position_valid_;
-    hal::Param<double> position_scale_;
+    ScaleParam position_scale_;
     hal::OptionalLimitParam maxvel_, maxaccel_;
     hal::Param<std::uint32_t> steplen_, stepspace_, dirsetup_, dirhold_, step_type_;
     hal::Out<double> dbg_pos_minus_prev_cmd_, dbg_ff_vel_, dbg_vel_error_, dbg_s_to_match_,

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+// The factor between the units of a user and those of the card.
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include "hal/component.hpp"
+#include "hal/retained.hpp"
+
+namespace hal::mesa {
+
+/// A scale. While its value is 0, NaN or infinite, the last valid one applies, 1 before there is
+/// one, and a fault is raised once: another factor would stop a motor at once, or move its position.
+class ScaleParam : public hal::Param<double> {
+public:
+    ScaleParam(hal::Component& component, const char* name, const char* doc,
+               hal::PinOptions<double> options = {.initial = 1.0})
+        : Param(component, name, doc, options),
+          valid_(is_valid(options.initial) ? options.initial : 1.0),
+          self_(&component),
+          faults_(hal::extension<hal_faults>("hal.faults/1")),
+          retained_(component, {{name, valid_}, {name, is_reported_}}) {}
+
+    /// Returns the scale, which is neither 0 nor NaN nor infinite. [realtime]
+    double get() const noexcept {
+        const double value = Param::get();
+        if (!is_valid(value)) [[unlikely]]
+            return last_valid();
+        valid_ = value;
+        is_reported_ = false;
+        return value;
+    }
+    operator double() const noexcept { return get(); }
+
+private:
+    static bool is_valid(double value) noexcept { return value != 0.0 && std::isfinite(value); }
+    double last_valid() const noexcept {
+        if (!is_reported_ && faults_ != nullptr) {
+            faults_->raise(faults_, self_,
+                           "a scale is 0 or not a number; its last valid value applies",
+                           std::numeric_limits<double>::quiet_NaN());
+        }
+        is_reported_ = true;
+        return valid_;
+    }
+
+    mutable double valid_;
+    mutable bool is_reported_ = false;
+    const hal::Component* self_;
+    const hal_faults* faults_;
+    [[no_unique_address]] hal::Retained retained_;
+};
+
+}  // namespace hal::mesa
