@@ -23,7 +23,7 @@ struct Kind {
 };
 constexpr Kind kinds[] = {{"sync", 0x0000}, {"request", 0x0010}, {"reply", 0x0011}};
 constexpr std::uint16_t kind_at = 20;
-const Kind* kind_of(std::string_view name) { return find_row(kinds, name, &Kind::name); }
+const Kind* kind_of(std::string_view name) { return hal::find_row(kinds, name, &Kind::name); }
 
 /// "loss:every=50:from=1s:until=2s".
 Disturbance parse_segment_fault(std::string_view part) {
