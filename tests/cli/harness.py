@@ -253,19 +253,23 @@ class Case(unittest.TestCase):
 
 
 class Terminal:
-    """A process on a terminal of 100 x 30 characters."""
+    """A process on a terminal, usually of 100 x 30 characters."""
 
-    def __init__(self, case, *words, name="hal", environment=None):
+    def __init__(self, case, *words, name="hal", environment=None, columns=100, rows=30):
         self.process, self.descriptor = pty.fork()
         if self.process == 0:
             os.chdir(case.folder)
             os.execve(
                 str(HAL), [name, *map(str, words)], {**case.environment, **(environment or {})}
             )
-        fcntl.ioctl(self.descriptor, termios.TIOCSWINSZ, struct.pack("HHHH", 30, 100, 0, 0))
+        self.resize(columns, rows)
         self.seen = ""
         self.status = None
         case.addCleanup(self.close)
+
+    def resize(self, columns, rows):
+        size = struct.pack("HHHH", rows, columns, 0, 0)
+        fcntl.ioctl(self.descriptor, termios.TIOCSWINSZ, size)
 
     def send(self, text):
         os.write(self.descriptor, text.encode())

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: MIT
 """hal run: loading, the summary and the report, the ends a run can come to, several instances."""
+
 import os
 import signal
 import unittest
 
 from harness import SANITIZED, SERVO, Case, Terminal, wait_until
+from virtual_terminal import ShownTerminal
 
 FURUTA_SIGNALS = """loadrt threads name1=servo period1=1000000
 loadrt siggen
@@ -157,6 +159,58 @@ class Picture(Case):
         self.assertEqual(0, terminal.wait())
         self.assertIn("slowest functions", terminal.seen)
         self.assertNotIn("\033[?25l", terminal.seen)
+
+    def shown(self, reflow=False, **size):
+        netlist = FURUTA_SIGNALS + "loadrt stall\naddf stall.0 servo\n"
+        path = self.write("a.hal", netlist)
+        shown = ShownTerminal(self, "run", "--name", "drawn", path, reflow=reflow, **size)
+        shown.wait_for(lambda rows: self.pictures(rows) == 1, "a picture")
+        return shown
+
+    def pictures(self, rows):
+        return sum("arm, from above" in row for row in rows)
+
+    def frames(self, shown, count=3):
+        """Waits until the picture was drawn again."""
+        for _ in range(count):
+            before = shown.screen()
+            shown.wait_for(lambda rows: rows != before, "the picture is drawn again")
+
+    def test_a_fault_is_printed_above_the_picture(self):
+        shown = self.shown()
+        for mode in (4, 3):
+            self.good("shell", "--name", "drawn", "setp stall.0.ms 60")
+            self.good("shell", "--name", "drawn", f"setp stall.0.mode {mode}")
+            shown.wait_for(
+                lambda rows: any(row.startswith("  faults ") for row in rows), "a line of faults"
+            )
+            self.frames(shown)
+        rows = shown.everything()
+        self.assertEqual(1, self.pictures(rows), rows)
+        fault = next(i for i, row in enumerate(rows) if row.startswith("fault: "))
+        picture = next(i for i, row in enumerate(rows) if "arm, from above" in row)
+        self.assertLess(fault, picture)
+        self.assertFalse(any(row.startswith("fault: ") for row in rows[picture:]), rows)
+        self.assertTrue(all(len(row) < 80 for row in rows[picture:]), rows)
+        self.assertEqual(set(), shown.unknown)
+
+    def test_the_picture_follows_the_size_of_the_terminal(self):
+        for reflow in (False, True):
+            with self.subTest(reflow=reflow):
+                shown = self.shown(reflow)
+                sizes = [(60, 24), (100, 30), (75, 20), (80, 24)]
+                if not reflow:  # it would scroll the wrapped picture out of the screen
+                    sizes.insert(2, (40, 20))
+                for columns, rows in sizes:
+                    shown.resize_both(columns, rows)
+                    self.frames(shown)
+                    self.assertEqual(1, self.pictures(shown.screen()), shown.screen())
+                shown.resize_both(70, 10)  # lower than the picture: its last lines
+                self.frames(shown)
+                drawn = [row for row in shown.screen() if "wake-up latency" in row]
+                self.assertEqual(1, len(drawn), shown.screen())
+                os.kill(shown.terminal.process, signal.SIGINT)
+                shown.terminal.wait()
 
     def test_axis_is_drawn(self):
         terminal = Terminal(

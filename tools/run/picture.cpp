@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
 #include "run/picture.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <condition_variable>
 #include <cstdlib>
 #include <fmt/core.h>
 #include <mutex>
 #include <numbers>
-#include <sys/ioctl.h>
 #include <thread>
 #include <unistd.h>
 
 #include "base/types.hpp"
+#include "cli/drawn_lines.hpp"
 #include "cli/output.hpp"
 #include "cli/screen.hpp"
 #include "execute/process_setup.hpp"
@@ -23,6 +24,8 @@ namespace {
 
 constexpr std::size_t side_columns = 24;
 constexpr std::size_t side_rows = 11;
+constexpr std::size_t min_columns = 60;  // of the terminal at the start
+constexpr std::size_t min_rows = 16;
 
 /// Side by side, with a title above each.
 std::vector<std::string> beside(const char* left_title, const Canvas& left, const char* right_title,
@@ -43,12 +46,16 @@ std::string degrees(double radians) {
                        " deg");
 }
 
-std::string status_line(const Scene& scene) {
-    return fmt::format(
-        "  t {:6.1f} s   {} wake-up latency p50 {} p99 {}   missed {}{}", scene.seconds,
-        scene.thread.name, format_duration(scene.thread.wakeup_p50_ns),
-        format_duration(scene.thread.wakeup_p99_ns), scene.missed,
-        scene.faults != 0 ? fmt::format("   faults {}: show fault", scene.faults) : "");
+/// The time and the thread, and a line about faults.
+std::vector<std::string> status_lines(const Scene& scene) {
+    std::vector<std::string> lines{
+        fmt::format("  t {:6.1f} s   {} wake-up latency p50 {} p99 {}   missed {}", scene.seconds,
+                    scene.thread.name, format_duration(scene.thread.wakeup_p50_ns),
+                    format_duration(scene.thread.wakeup_p99_ns), scene.missed)};
+    if (scene.faults != 0) {
+        lines.push_back(fmt::format("  faults {}: show fault", scene.faults));
+    }
+    return lines;
 }
 
 /// Angles in rad: the arm's from straight ahead, seen from above; the pendulum's from hanging, seen
@@ -124,7 +131,7 @@ struct Picture::State {
     State(Session& s, const Motif& m) : session(s), motif(m) {}
     const bool unicode = unicode_terminal();
     std::int64_t start_ns = 0;
-    std::size_t drawn = 0;  // lines of the last picture
+    DrawnLines drawn;
     std::mutex mutex;
     std::condition_variable wake;
     bool ending = false;
@@ -153,13 +160,10 @@ struct Picture::State {
         const auto scene = look();
         if (!scene) return;
         std::vector<std::string> lines = motif.draw(*scene, unicode);
-        lines.push_back(status_line(*scene));
-        std::string frame = drawn != 0 ? fmt::format("\033[{}A", drawn) : "";
-        for (const std::string& line : lines) {
-            frame += "\r" + line + "\033[K\n";
+        for (std::string& line : status_lines(*scene)) {
+            lines.push_back(std::move(line));
         }
-        drawn = lines.size();
-        print(frame);
+        print(drawn.replaced_by(std::move(lines), terminal_size()));
     }
 
     void loop() {
@@ -190,24 +194,19 @@ Picture::~Picture() {
     state_->thread.join();
 }
 
-void Picture::print_below(const std::string& line) {
+void Picture::print_above(const std::string& line) {
     const std::lock_guard lock(state_->mutex);
-    write_all(STDERR_FILENO, line);
     if (::isatty(STDERR_FILENO)) {
-        state_->drawn = 0;
+        print(state_->drawn.erased(terminal_size()));
     }
+    write_all(STDERR_FILENO, line);
 }
 
 std::unique_ptr<Picture> Picture::start(Session& session) {
-    winsize size{};
     const char* term = std::getenv("TERM");
-    if (!::isatty(STDOUT_FILENO) || !term || std::string_view(term) == "dumb" ||
-        ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0) {
-        return nullptr;
-    }
-    if ((size.ws_col != 0 && size.ws_col < 80) || (size.ws_row != 0 && size.ws_row < 16)) {
-        return nullptr;
-    }
+    if (!::isatty(STDOUT_FILENO) || !term || std::string_view(term) == "dumb") return nullptr;
+    const TerminalSize size = terminal_size();
+    if (size.columns < min_columns || size.rows < min_rows) return nullptr;
     const Motif* motif = nullptr;
     {
         const auto lock = session.lock();

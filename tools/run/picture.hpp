@@ -31,17 +31,19 @@ struct Motif {
 const Motif* motif_for(const Model& model);
 
 /// Draws about 20 times a second on standard output, from a thread of its own, until destroyed;
-/// then the cursor stands below the last picture. Changes no mode of the terminal, so there is
-/// nothing to restore whatever happens.
+/// then the cursor is below the last picture. Lines are cut to the width of the terminal, and the
+/// picture stays in its place when the terminal is resized, except for what the terminal has scrolled
+/// out of view while it was smaller. Changes no mode of the terminal, so there is nothing to
+/// restore whatever happens.
 class Picture {
 public:
     /// Returns nullptr when standard output is not a terminal, it is too small, or the netlist has
     /// no motif.
     static std::unique_ptr<Picture> start(Session& session);
     ~Picture();
-    /// Writes a line to standard error, in the terminal below the last picture; the next picture is
-    /// drawn below it. [any]
-    void print_below(const std::string& line);
+    /// Writes a line to standard error. In the terminal it replaces the picture, which is drawn
+    /// again below it. [any]
+    void print_above(const std::string& line);
 
 private:
     Picture(Session& session, const Motif& motif);

@@ -86,7 +86,7 @@ int run_plain(HostedMachine& machine, const RunOptions& options, std::vector<Nod
         const auto picture = options.no_picture ? nullptr : Picture::start(machine.session);
         const FaultLines faults(machine.session, [&picture](const std::string& line) {
             if (picture) {
-                picture->print_below(line);
+                picture->print_above(line);
             } else {
                 write_all(STDERR_FILENO, line);
             }
