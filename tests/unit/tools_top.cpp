@@ -61,6 +61,24 @@ TEST(TopTest, json_has_all_of_it_and_survives_broken_utf8) {
     EXPECT_EQ(top_json({}), "[]\n");
 }
 
+TEST(TopTest, a_narrow_table_leaves_out_what_is_the_same_everywhere) {
+    SeenInstance one;
+    ASSERT_TRUE(
+        read_status("instance lathe\nhost lab\nrunning 1\nthread servo 1000000 5 0 0\n", one));
+    SeenInstance other = one;
+    other.instance = "mill";
+    const auto narrow = top_lines({one, other}, 80);
+    EXPECT_EQ(narrow[0], "INSTANCE         THREAD            PERIOD       CYCLES   MISSED FAULTS");
+    EXPECT_EQ(narrow[1], "lathe            servo               1 ms            5        0      0");
+    const auto narrower = top_lines({one, other}, 50);
+    EXPECT_EQ(narrower[0], "INSTANCE THREAD PERIOD CYCLES   MISSED FAULTS");
+    other.host = "hall";
+    EXPECT_NE(top_lines({one, other}, 80)[0].find("HOST"), std::string::npos);
+    other.node = "left";
+    other.cell = "line";
+    EXPECT_NE(top_lines({one, other}, 80)[2].find("line/left"), std::string::npos);
+}
+
 TEST(TopTest, reports_offline_instances_and_an_empty_list) {
     EXPECT_EQ(top_table({}), "no instance is running; start one: hal run FILE.hal\n");
     SeenInstance gone;

@@ -35,7 +35,10 @@ struct SeenInstance {
 /// Parses a status text. Returns false when it is invalid.
 bool read_status(std::string_view text, SeenInstance& seen);
 
-/// Returns a table, in the given order.
+/// Returns the lines of a table, in the given order. Columns without information are left out, and
+/// columns are narrower, if it is wider than `columns`.
+std::vector<std::string> top_lines(const std::vector<SeenInstance>& all, std::size_t columns);
+/// Returns the whole table as a text.
 std::string top_table(const std::vector<SeenInstance>& all);
 /// Returns an array of JSON objects, one line.
 std::string top_json(const std::vector<SeenInstance>& all);

@@ -12,12 +12,14 @@
 #include <fmt/core.h>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 #include <unistd.h>
 
-#include "base/types.hpp"
 #include "cli/output.hpp"
+#include "cli/screen.hpp"
 #include "control/client.hpp"
+#include "inspect/live_top.hpp"
 #include "inspect/seen_instance.hpp"
 #include "paths.hpp"
 #include "text/glyphs.hpp"
@@ -212,50 +214,6 @@ bool read_status(std::string_view text, SeenInstance& seen) {
     return !seen.instance.empty();
 }
 
-static std::string instance_columns(const SeenInstance& one) {
-    const std::string node = one.node.empty() ? "" : one.cell + "/" + one.node;
-    return fmt::format("{:<16} {:<12} {:<20}", one.instance, one.host, node);
-}
-
-static std::string state_text(const SeenInstance& one) {
-    if (one.silent_s > silent_after_s) return fmt::format("  offline for {:.0f} s", one.silent_s);
-    return one.running ? "" : "  stopped";
-}
-
-/// An instance without threads has a row, too.
-static std::vector<SeenThread> rows_of(const SeenInstance& one) {
-    if (one.threads.empty()) return {SeenThread{"-", 0, 0, 0, false}};
-    return one.threads;
-}
-
-std::string top_table(const std::vector<SeenInstance>& all) {
-    if (all.empty()) return "no instance is running; start one: hal run FILE.hal\n";
-    std::string text =
-        fmt::format("{:<16} {:<12} {:<20} {:<14} {:>9} {:>12} {:>8} {:>6}\n", "INSTANCE", "HOST",
-                    "NODE", "THREAD", "PERIOD", "CYCLES", "MISSED", "FAULTS");
-    for (const SeenInstance& one : all) {
-        std::string head = instance_columns(one);
-        std::string faults = std::to_string(one.faults);
-        std::string state = state_text(one);
-        for (const SeenThread& thread : rows_of(one)) {
-            const std::string period = thread.period_ns == 0
-                                           ? "-"
-                                           : format_duration(static_cast<double>(thread.period_ns));
-            text += fmt::format("{} {:<14} {:>9} {:>12} {:>8} {:>6}{}{}\n", head, thread.name,
-                                period, thread.cycles, thread.missed, faults,
-                                thread.faulted ? "  stopped by a fault" : "", state);
-            // the instance is named once
-            head = fmt::format("{:50}", "");
-            faults.clear();
-            state.clear();
-        }
-        if (!one.fault.empty()) {
-            text += fmt::format("{:<16} newest fault: {}\n", "", one.fault);
-        }
-    }
-    return text;
-}
-
 std::string top_json(const std::vector<SeenInstance>& all) {
     nlohmann::json list = nlohmann::json::array();
     for (const SeenInstance& one : all) {
@@ -287,11 +245,15 @@ int run_top(const TopOptions& options) {
         settings.empty() && usual != nullptr) {
         settings = usual;
     }
+    const bool live = has_screen() && !options.json && !options.once;
+    std::optional<StopRequest> stop;
+    if (live) {
+        stop.emplace();  // before the threads of DDS
+    }
     Network network;
     const bool there = network.open(settings, problem);
     if (!there && (!network.absent() || !options.dds.empty())) return fail(options, problem);
     Network* const over = there ? &network : nullptr;
-    const bool live = ::isatty(STDOUT_FILENO) != 0 && !options.json && !options.once;
     // every instance has published its status by then
     if (there && !live) {
         std::this_thread::sleep_for(3 * status_period);
@@ -301,13 +263,10 @@ int run_top(const TopOptions& options) {
         const std::string text = options.json ? top_json(seen) : top_table(seen);
         return exit_code(print(text));
     }
-    const auto end = options.for_ns >= 0 ? Clock::now() + std::chrono::nanoseconds(options.for_ns)
-                                         : Clock::time_point::max();
-    while (Clock::now() < end) {
-        if (!print("\x1b[H\x1b[2J" + top_table(everybody(over)) + "\nCtrl-C ends this\n")) return 1;
-        std::this_thread::sleep_for(status_period);
-    }
-    return 0;
+    const std::optional<std::chrono::nanoseconds> duration =
+        options.for_ns >= 0 ? std::optional(std::chrono::nanoseconds(options.for_ns))
+                            : std::nullopt;
+    return exit_code(LiveTop([over] { return everybody(over); }).run(*stop, duration));
 }
 
 }  // namespace hal::tools

@@ -15,7 +15,7 @@ struct TopOptions : Options {
     bool json = false;
 
     void declare(OptionSet& set) override {
-        set.for_how_long(for_ns, "end after 10s … in a terminal; default: run until Ctrl-C");
+        set.for_how_long(for_ns, "end after 10s … in a terminal; default: run until q or Ctrl-C");
         set.flag("--once", once,
                  "print the table once (the default when the output is not a terminal)");
         set.flag("--json", json, "print once, as JSON");
