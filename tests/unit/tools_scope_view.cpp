@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
+#include <numbers>
 
 #include "tools/scope/chart.hpp"
 #include "tools/scope/view.hpp"
@@ -162,6 +163,112 @@ TEST(ScopeView, every_key_works_without_any_sample) {
         }
         EXPECT_EQ(view.frame(80, 24).size(), 24u) << c;
     }
+}
+
+// A sine of 0.1 Hz and amplitude 3, sampled every 10 ms.
+struct SlowBench {
+    Acquisition acquisition{{{"x", "mm", false, false}}, 20 * ms, 80 * ms};
+    ScopeView view{acquisition, false, false};
+    std::int64_t now_ms = 0;
+    void run(int seconds) {
+        for (const std::int64_t until = now_ms + seconds * 1000; now_ms < until; now_ms += 10) {
+            const double x = 3 * std::sin(2 * std::numbers::pi * 0.1 * static_cast<double>(now_ms) / 1000);
+            acquisition.feed(0, {now_ms * ms, x});
+            acquisition.progress(now_ms * ms);
+            if (now_ms % 100 == 0) {
+                view.frame(80, 24);
+            }
+        }
+    }
+    void type(char letter) { view.key({Code::character, letter, false}); }
+    /// The number of different heights of the trace in the picture.
+    std::size_t drawn_rows() {
+        const auto lines = view.frame(80, 24);
+        return static_cast<std::size_t>(std::count_if(
+            lines.begin() + 1, lines.begin() + 21,
+            [](const std::string& line) { return std::count(line.begin(), line.end(), ':') > 0; }));
+    }
+    /// Whether the whole signal is within the picture.
+    bool is_visible() const {
+        const ChannelView& trace = view.traces()[0];
+        const double half = divisions_y / 2.0 * trace.per_division;
+        return trace.centre - half <= -3 + 1e-9 && trace.centre + half >= 3 - 1e-9;
+    }
+};
+
+TEST(ScopeView, the_scale_grows_with_a_slow_signal) {
+    SlowBench bench;
+    bench.acquisition.set_mode(Mode::automatic);
+    bench.run(1);  // fitted to a part of the rising edge
+    EXPECT_FALSE(bench.is_visible());
+    bench.run(10);
+    EXPECT_TRUE(bench.is_visible());
+    EXPECT_LE(bench.view.traces()[0].per_division, 2);
+    const double scale = bench.view.traces()[0].per_division;
+    bench.run(20);  // it is stable then
+    EXPECT_EQ(bench.view.traces()[0].per_division, scale);
+}
+
+TEST(ScopeView, roll_shows_periods_of_a_slow_signal_and_another_mode_the_window_of_before) {
+    SlowBench bench;
+    bench.acquisition.set_mode(Mode::automatic);
+    bench.run(1);
+    bench.type('r');
+    EXPECT_TRUE(bench.view.rolls());
+    bench.run(25);
+    EXPECT_TRUE(has(bench.view.frame(80, 24)[0], "2 s/div"));
+    EXPECT_TRUE(bench.is_visible());
+    EXPECT_GE(bench.drawn_rows(), 8u);
+    bench.type('n');
+    EXPECT_TRUE(has(bench.view.frame(80, 24)[0], "10 ms/div"));
+    EXPECT_FALSE(bench.view.rolls());
+}
+
+TEST(ScopeView, automatic_mode_rolls_with_a_long_window_until_a_trigger_comes) {
+    SlowBench bench;
+    bench.acquisition.set_mode(Mode::automatic);
+    bench.acquisition.set_trigger(read_trigger("x > 5").trigger);
+    bench.acquisition.set_window(2000 * ms, 8000 * ms);
+    bench.run(3);
+    EXPECT_TRUE(bench.view.rolls());
+    EXPECT_TRUE(has(bench.view.frame(80, 24)[0], "rolls"));
+    EXPECT_EQ(bench.view.shown().end_ns, (bench.now_ms - 10) * ms);
+    bench.acquisition.set_trigger(read_trigger("x > 1").trigger);
+    bench.run(25);
+    EXPECT_FALSE(bench.view.rolls());
+    EXPECT_TRUE(bench.view.shown().triggered);
+}
+
+TEST(ScopeView, a_scale_that_a_key_has_set_stays) {
+    SlowBench bench;
+    bench.acquisition.set_mode(Mode::automatic);
+    bench.run(1);
+    bench.type('+');
+    const double scale = bench.view.traces()[0].per_division;
+    bench.run(10);
+    EXPECT_EQ(bench.view.traces()[0].per_division, scale);
+    bench.type('a');
+    bench.run(10);
+    EXPECT_TRUE(bench.is_visible());
+}
+
+TEST(ScopeView, arrows_point_to_what_is_off_the_screen) {
+    Bench bench;
+    const auto lines = bench.view.frame(80, 24);
+    EXPECT_FALSE(has(lines[1], "1^"));
+    for (int i = 0; i < 12; ++i) {
+        bench.view.key({Code::page_up, 0, false});
+    }
+    const auto above = bench.view.frame(80, 24);
+    EXPECT_EQ(above[1].substr(78), "1^");
+    for (int i = 0; i < 24; ++i) {
+        bench.view.key({Code::page_down, 0, false});
+    }
+    const auto below = bench.view.frame(80, 24);
+    EXPECT_FALSE(has(below[1], "1^"));
+    const auto last = std::find_if(below.rbegin(), below.rend(),
+                                   [](const std::string& line) { return line.substr(78) == "1v"; });
+    EXPECT_NE(last, below.rend());
 }
 
 TEST(ScopeView, steps_are_1_2_5) {

@@ -2,6 +2,7 @@
 #include "cli/raster.hpp"
 
 #include <fmt/core.h>
+#include <utility>
 
 namespace hal::tools {
 
@@ -26,26 +27,37 @@ void Raster::set(std::size_t x, std::size_t y, std::uint8_t colour) {
     colours_[at] = colour;
 }
 
+void Raster::write(std::size_t column, std::size_t row, std::string sign, std::uint8_t colour) {
+    if (column >= columns_ || row >= dots_.size() / columns_) return;
+    const std::size_t at = row * columns_ + column;
+    signs_[at] = std::move(sign);
+    colours_[at] = colour;
+}
+
 bool Raster::taken(std::size_t x, std::size_t y) const {
     return x < width_ && y < height_ && dots_[cell(x, y)] != 0;
 }
 
-void Raster::append(std::string& to, unsigned dots) const {
-    static constexpr char marks[] = {' ', '\'', '.', ':'};
+void Raster::append(std::string& to, std::size_t cell) const {
+    if (const auto sign = signs_.find(cell); sign != signs_.end()) {
+        to += sign->second;
+        return;
+    }
+    const unsigned dots = dots_[cell];
     if (!unicode_) {
+        static constexpr char marks[] = {' ', '\'', '.', ':'};
         to += marks[dots & 3];
+        return;
     }
     // U+2800 + dots
-    else {
-        to += {static_cast<char>(0xE2), static_cast<char>(0xA0 | dots >> 6),
-               static_cast<char>(0x80 | (dots & 0x3F))};
-    }
+    to += {static_cast<char>(0xE2), static_cast<char>(0xA0 | dots >> 6),
+           static_cast<char>(0x80 | (dots & 0x3F))};
 }
 
 std::vector<std::string> Raster::rows() const {
     std::vector<std::string> text(columns_ == 0 ? 0 : dots_.size() / columns_);
     for (std::size_t i = 0; i < dots_.size(); ++i) {
-        append(text[i / columns_], dots_[i]);
+        append(text[i / columns_], i);
     }
     return text;
 }
@@ -55,11 +67,12 @@ std::vector<std::string> Raster::coloured_rows() const {
     for (std::size_t row = 0; row < text.size(); ++row) {
         std::uint8_t colour = 0;
         for (std::size_t i = row * columns_; i < (row + 1) * columns_; ++i) {
-            if (dots_[i] != 0 && colours_[i] != colour) {
+            const bool is_visible = dots_[i] != 0 || signs_.contains(i);
+            if (is_visible && colours_[i] != colour) {
                 colour = colours_[i];
                 text[row] += colour == 0 ? "\033[39m" : fmt::format("\033[38;5;{}m", colour);
             }
-            append(text[row], dots_[i]);
+            append(text[row], i);
         }
         if (colour != 0) {
             text[row] += "\033[39m";

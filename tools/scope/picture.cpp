@@ -6,8 +6,8 @@
 #include <fmt/core.h>
 #include <optional>
 
+#include "cli/cut_text.hpp"
 #include "scope/measure.hpp"
-#include "text/glyphs.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::tools {
@@ -24,7 +24,7 @@ constexpr const char* help_text[] = {
     "u          auto: free without trigger   + -        scale of the channel",
     "n          normal: only by the trigger  PgUp PgDn  move the channel",
     "s          single: one record           a  A       fit the channel, all channels",
-    "r          roll                         x          hide or show the channel",
+    "r          roll, through 20 s or more   x          hide or show the channel",
     "f          force a record               [ ]        time per division",
     "t          next kind of trigger         < >        time before the trigger",
     "o          trigger on this channel      c          cursors: first, second, off",
@@ -32,20 +32,6 @@ constexpr const char* help_text[] = {
     "m          measurements on, off         w          write CSV and SVG",
     "q          quit",
 };
-
-/// Cuts to `width` terminal columns, and fills.
-std::string fitted(std::string_view text, std::size_t width) {
-    std::string out;
-    std::size_t used = 0;
-    for (std::size_t at = 0; at < text.size();) {
-        const Glyph glyph = glyph_at(text, at);
-        if (used + glyph.columns > width) break;
-        append_glyph(out, text, at, glyph);
-        used += glyph.columns;
-        at += glyph.bytes;
-    }
-    return out + std::string(width - used, ' ');
-}
 
 const char* name_of(Mode mode) {
     static constexpr const char* names[] = {"auto", "normal", "single", "roll"};
@@ -87,7 +73,9 @@ std::string ScopePicture::status_line(const Record& record, std::uint64_t lost) 
         " {} {}  {}/div  trigger {}", name_of(acquisition_.mode()), name_of(acquisition_.state()),
         format_duration(static_cast<double>(total) / divisions_x),
         trigger ? format_trigger(*trigger, acquisition_.channels()) : "none");
-    if (acquisition_.record() && acquisition_.mode() != Mode::roll) {
+    if (view_.rolls()) {
+        text += acquisition_.mode() == Mode::roll ? "" : "  rolls";
+    } else if (acquisition_.record() && acquisition_.mode() != Mode::roll) {
         if (record.triggered) {
             const auto age_ns =
                 std::max<std::int64_t>(acquisition_.now_ns() - record.trigger_ns, 0);
@@ -238,11 +226,47 @@ void ScopePicture::draw_trace(Raster& raster, const Record& record, std::size_t 
     }
 }
 
+/// An arrow with the number of each channel that leaves the picture, at the right of its upper or
+/// lower edge.
+void ScopePicture::draw_arrows(Raster& raster, const Record& record, std::size_t columns,
+                               std::size_t rows) const {
+    constexpr double half = divisions_y / 2.0;
+    const auto draw = [&](std::size_t channel, std::size_t row, const char* sign,
+                          std::size_t& column) {
+        const std::string text = std::to_string(channel + 1);
+        if (column < text.size() + 2) return;
+        raster.write(--column, row, sign, colour_of(channel));
+        for (std::size_t i = text.size(); i-- > 0;) {
+            raster.write(--column, row, std::string(1, text[i]), colour_of(channel));
+        }
+        --column;
+    };
+    std::size_t above_column = columns;
+    std::size_t below_column = columns;
+    for (std::size_t i = 0; i < view_.traces().size(); ++i) {
+        const ChannelView& trace = view_.traces()[i];
+        if (!trace.shown) continue;
+        bool above = false;
+        bool below = false;
+        for (const Sample& sample : record.samples[i]) {
+            const double divisions = (sample.value - trace.centre) / trace.per_division;
+            above = above || divisions > half;
+            below = below || divisions < -half;
+        }
+        if (above) {
+            draw(i, 0, unicode_ ? "\u25b2" : "^", above_column);
+        }
+        if (below) {
+            draw(i, rows - 1, unicode_ ? "\u25bc" : "v", below_column);
+        }
+    }
+}
+
 std::vector<std::string> ScopePicture::help(std::size_t columns, std::size_t rows) const {
     std::vector<std::string> lines;
     for (const char* text : help_text) {
         if (lines.size() == rows) break;
-        lines.push_back(fitted(text, columns));
+        lines.push_back(fit_text(text, columns));
     }
     lines.resize(rows);
     return lines;
@@ -266,6 +290,7 @@ std::vector<std::string> ScopePicture::traces(const Record& record, std::size_t 
     if (view_.traces()[selected].shown) {
         draw_trace(raster, record, selected);
     }
+    draw_arrows(raster, record, columns, rows);
     return colour_ ? raster.coloured_rows() : raster.rows();
 }
 
@@ -293,12 +318,12 @@ std::string ScopePicture::last_line() const {
 std::vector<std::string> ScopePicture::lines(std::size_t columns, std::size_t rows,
                                              std::uint64_t lost) const {
     if (columns < min_columns || rows < min_rows) {
-        return {fitted(fmt::format("too small: {} x {}, the scope needs {} x {}", columns, rows,
-                                   min_columns, min_rows),
-                       columns)};
+        return {fit_text(fmt::format("too small: {} x {}, the scope needs {} x {}", columns, rows,
+                                     min_columns, min_rows),
+                         columns)};
     }
     const Record record = view_.shown();
-    std::vector<std::string> lines{fitted(status_line(record, lost), columns)};
+    std::vector<std::string> lines{fit_text(status_line(record, lost), columns)};
     if (colour_) {
         lines[0] = "\033[7m" + lines[0];
     }
@@ -310,10 +335,10 @@ std::vector<std::string> ScopePicture::lines(std::size_t columns, std::size_t ro
     const std::size_t selected = view_.selected();
     const std::size_t first = selected >= listed ? selected + 1 - listed : 0;
     for (std::size_t i = first; i < first + listed; ++i) {
-        const std::string text = fitted(channel_line(record, i), columns);
+        const std::string text = fit_text(channel_line(record, i), columns);
         lines.push_back(colour_ ? fmt::format("\033[38;5;{}m{}", colour_of(i), text) : text);
     }
-    lines.push_back(fitted(last_line(), columns));
+    lines.push_back(fit_text(last_line(), columns));
     return lines;
 }
 

@@ -39,6 +39,7 @@ private:
                    std::uint8_t colour) const;
     void draw_cursors(Raster&, const Record&) const;
     void draw_trace(Raster&, const Record&, std::size_t channel) const;
+    void draw_arrows(Raster&, const Record&, std::size_t columns, std::size_t rows) const;
     std::uint8_t colour_of(std::size_t channel) const;
 
     const ScopeView& view_;

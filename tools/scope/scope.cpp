@@ -204,6 +204,11 @@ int run_interactive(const ScopeOptions& options, Source& source) {
     StopRequest stop;
     Acquisition& acquisition = source.acquisition();
     ScopeView view(acquisition, unicode_terminal(), colours(STDOUT_FILENO));
+    const ScopeOptions usual;
+    if (options.mode == "roll" && options.pre_ns == usual.pre_ns &&
+        options.post_ns == usual.post_ns) {
+        view.key({Code::character, 'r', false});
+    }
     std::string ended;
     {
         Screen screen;

@@ -33,7 +33,8 @@ struct ScopeOptions : Options {
                      "with a file: the longest wait for the trigger (default 10 s)", 1'000'000,
                      "10s or 500ms");
         set.value("--mode", mode, "MODE",
-                  "in the terminal: auto (default), normal, single or roll");
+                  "in the terminal: auto (default), normal, single or roll (20 s, unless --pre or "
+                  "--post is given)");
         set.value("--name", name, "NAME", "instance");
     }
 };

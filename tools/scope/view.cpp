@@ -12,6 +12,10 @@ namespace {
 
 constexpr double min_division_ns = 1e3;
 constexpr double max_division_ns = 100e9;
+// automatic mode rolls with a window of at least this: a picture per window would be too rare
+constexpr std::int64_t min_rolling_ns = 1'000'000'000;
+// roll mode makes a shorter window this long: nothing is to be seen in one that passes in 100 ms
+constexpr std::int64_t roll_window_ns = 20'000'000'000;
 
 /// Returns the smallest and the largest finite value; the first is larger than the second when no
 /// value is finite.
@@ -48,13 +52,20 @@ ScopeView::ScopeView(Acquisition& acquisition, bool unicode, bool colour)
       colour_(colour),
       traces_(acquisition.channels().size()) {}
 
-Record ScopeView::shown() const {
-    const bool rolling =
-        acquisition_.mode() == Mode::roll && acquisition_.state() != State::stopped;
-    return !rolling && acquisition_.record() ? *acquisition_.record() : acquisition_.newest();
+bool ScopeView::rolls() const {
+    if (acquisition_.state() == State::stopped) return false;
+    if (acquisition_.mode() == Mode::roll) return true;
+    const bool is_long = acquisition_.pre_ns() + acquisition_.post_ns() >= min_rolling_ns;
+    const bool has_trigger = acquisition_.record() && acquisition_.record()->triggered;
+    return acquisition_.mode() == Mode::automatic && is_long && !has_trigger;
 }
 
-void ScopeView::fit_lane(std::size_t channel, double lane_divisions, double above_centre) {
+Record ScopeView::shown() const {
+    return !rolls() && acquisition_.record() ? *acquisition_.record() : acquisition_.newest();
+}
+
+/// Sets the scale of a channel so that what is shown of it fills its lane.
+void ScopeView::fit_lane(std::size_t channel) {
     const Record record = shown();
     auto [min, max] = range_of(record.samples[channel]);
     if (min > max) return;
@@ -62,18 +73,26 @@ void ScopeView::fit_lane(std::size_t channel, double lane_divisions, double abov
         min = 0;
         max = 1;
     }
+    ChannelView& trace = traces_[channel];
     const double range = max > min ? max - min : std::max(std::abs(max), 1.0) * 0.1;
-
-    const double fine = range / (lane_divisions * 0.9);
+    const double fine = range / (trace.lane_divisions * 0.9);
     double step = std::pow(10.0, std::floor(std::log10(fine)));
     while (step < fine * (1 - 1e-9)) {
         step = next_step(step, true);
     }
-    traces_[channel].per_division = step;
-    traces_[channel].centre = (min + max) / 2 - above_centre * step;
+    trace.per_division = step;
+    trace.centre = (min + max) / 2 - trace.lane_centre * step;
 }
 
-void ScopeView::fit(std::size_t channel) { fit_lane(channel, divisions_y, 0); }
+void ScopeView::set_lane(std::size_t channel, double divisions, double centre) {
+    ChannelView& trace = traces_[channel];
+    trace.automatic = true;
+    trace.lane_divisions = divisions;
+    trace.lane_centre = centre;
+    fit_lane(channel);
+}
+
+void ScopeView::fit(std::size_t channel) { set_lane(channel, divisions_y, 0); }
 
 void ScopeView::fit_all() {
     const auto count = static_cast<double>(std::count_if(
@@ -82,10 +101,58 @@ void ScopeView::fit_all() {
     double above = divisions_y / 2.0 - lane / 2;
     for (std::size_t i = 0; i < traces_.size(); ++i) {
         if (traces_[i].shown) {
-            fit_lane(i, lane, above);
+            set_lane(i, lane, above);
             above -= lane;
         }
     }
+}
+
+/// Extends the automatic scales of signals that have left their lanes. They never shrink: a slow
+/// signal would fill its lane at any time, whatever its size.
+void ScopeView::grow_scales() {
+    const bool free = acquisition_.mode() == Mode::automatic || acquisition_.mode() == Mode::roll;
+    if (!free || acquisition_.state() == State::stopped) return;
+    const Record record = shown();
+    for (std::size_t i = 0; i < traces_.size(); ++i) {
+        ChannelView& trace = traces_[i];
+        if (!trace.automatic) continue;
+        const auto [min, max] = range_of(record.samples[i]);
+        const double middle = trace.centre + trace.lane_centre * trace.per_division;
+        const double half = trace.lane_divisions / 2 * trace.per_division;
+        if (min > max || (min >= middle - half && max <= middle + half)) continue;
+        const double low = std::min(min, middle - half);
+        const double high = std::max(max, middle + half);
+        while (trace.per_division * trace.lane_divisions < high - low) {
+            trace.per_division = next_step(trace.per_division, true);
+        }
+        trace.centre = (low + high) / 2 - trace.lane_centre * trace.per_division;
+    }
+}
+
+/// Moves the selected channel in the picture.
+void ScopeView::move_by(double divisions) {
+    ChannelView& trace = traces_[selected_];
+    trace.centre -= trace.per_division * divisions;
+    trace.automatic = false;
+}
+
+/// Rolls through a window in which slow signals are to be seen.
+void ScopeView::roll() {
+    const std::int64_t total = acquisition_.pre_ns() + acquisition_.post_ns();
+    if (total < min_rolling_ns) {
+        before_roll_ = {total, acquisition_.pre_ns()};
+        change_window(roll_window_ns, roll_window_ns * acquisition_.pre_ns() / total);
+    }
+    acquisition_.set_mode(Mode::roll);
+}
+
+/// Sets another mode, with the window from before the roll.
+void ScopeView::leave_roll(Mode mode) {
+    if (before_roll_.total_ns != 0) {
+        change_window(before_roll_.total_ns, before_roll_.pre_ns);
+        before_roll_ = {};
+    }
+    acquisition_.set_mode(mode);
 }
 
 void ScopeView::select(std::size_t channel) {
@@ -106,8 +173,8 @@ ScopeView::Action ScopeView::key(const Key& key) {
     case Code::down:
     case Code::left:
     case Code::right: arrow(key); break;
-    case Code::page_up: traces_[selected_].centre -= traces_[selected_].per_division / 2; break;
-    case Code::page_down: traces_[selected_].centre += traces_[selected_].per_division / 2; break;
+    case Code::page_up: move_by(0.5); break;
+    case Code::page_down: move_by(-0.5); break;
     case Code::tab: select((selected_ + 1) % traces_.size()); break;
     default: break;
     }
@@ -128,10 +195,10 @@ ScopeView::Action ScopeView::letter(char c) {
     static constexpr Row rows[] = {
         {'?', [](ScopeView& v) { v.help_ = true; }},
         {' ', [](ScopeView& v) { v.toggle_run(); }},
-        {'s', [](ScopeView& v) { v.acquisition_.set_mode(Mode::single); }},
-        {'n', [](ScopeView& v) { v.acquisition_.set_mode(Mode::normal); }},
-        {'u', [](ScopeView& v) { v.acquisition_.set_mode(Mode::automatic); }},
-        {'r', [](ScopeView& v) { v.acquisition_.set_mode(Mode::roll); }},
+        {'s', [](ScopeView& v) { v.leave_roll(Mode::single); }},
+        {'n', [](ScopeView& v) { v.leave_roll(Mode::normal); }},
+        {'u', [](ScopeView& v) { v.leave_roll(Mode::automatic); }},
+        {'r', [](ScopeView& v) { v.roll(); }},
         {'f', [](ScopeView& v) { v.acquisition_.force(); }},
         {'t', [](ScopeView& v) { v.next_edge(); }},
         {'o', [](ScopeView& v) { v.trigger_on_selected(); }},
@@ -173,10 +240,12 @@ void ScopeView::trigger_on_selected() {
 void ScopeView::zoom(bool out) {
     ChannelView& trace = traces_[selected_];
     trace.per_division = next_step(trace.per_division, out);
+    trace.automatic = false;
 }
 
 /// Takes the next time per division; the trigger stays at its share of the window.
 void ScopeView::change_time(bool longer) {
+    before_roll_ = {};
     const auto pre = static_cast<double>(acquisition_.pre_ns());
     const auto total = static_cast<double>(acquisition_.pre_ns() + acquisition_.post_ns());
     const double division =
@@ -263,7 +332,7 @@ void ScopeView::fit_first_record() {
     const bool has_trace = std::any_of(record.samples.begin(), record.samples.end(),
                                        [](const Samples& samples) { return samples.size() > 1; });
     const bool ready = acquisition_.record() || acquisition_.state() == State::armed;
-    if (!has_trace || !ready) return;
+    if (!has_trace || (!ready && !rolls())) return;
     fit_all();
     fitted_ = true;
 }
@@ -272,6 +341,7 @@ std::vector<std::string> ScopeView::frame(std::size_t columns, std::size_t rows,
                                           std::uint64_t lost) {
     if (columns >= ScopePicture::min_columns && rows >= ScopePicture::min_rows) {
         fit_first_record();
+        grow_scales();
     }
     return ScopePicture(*this, acquisition_, unicode_, colour_).lines(columns, rows, lost);
 }

@@ -20,6 +20,10 @@ struct ChannelView {
     double per_division = 1;  ///< of the channel's unit
     double centre = 0;  ///< the value in the middle of the picture
     bool shown = true;
+    /// The scale grows with the signal, until a key sets it.
+    bool automatic = true;
+    double lane_divisions = divisions_y;  ///< height of its part of the picture
+    double lane_centre = 0;  ///< middle of that part, in divisions above that of the picture
 };
 
 class ScopeView {
@@ -34,16 +38,20 @@ public:
     /// Shows a sentence below the picture until the next key.
     void say(std::string sentence) { message_ = std::move(sentence); }
 
-    /// Fits all channels into lanes, one above the other.
+    /// Fits all channels into lanes, one above the other. In automatic and roll mode their scales
+    /// grow with the signals from then on.
     void fit_all();
-    /// Fits a channel into the whole height.
+    /// Fits a channel into the whole height; its scale is automatic again.
     void fit(std::size_t channel);
 
     const std::vector<ChannelView>& traces() const { return traces_; }
     std::size_t selected() const { return selected_; }
     /// Returns the record that is drawn: the newest one of a trigger, or the newest samples before
-    /// the first record and in roll mode.
+    /// the first record, in roll mode, and in automatic mode with a long window while no trigger
+    /// comes.
     Record shown() const;
+    /// Returns true while the newest samples move through the picture.
+    bool rolls() const;
     struct Cursors {
         bool on = false;
         int active = 0;
@@ -67,7 +75,12 @@ private:
     void move_level(double divisions);
     void move_cursor(int samples);
     void change_window(std::int64_t total_ns, std::int64_t pre_ns);
-    void fit_lane(std::size_t channel, double lane_divisions, double above_centre);
+    void roll();
+    void leave_roll(Mode mode);
+    void fit_lane(std::size_t channel);
+    void set_lane(std::size_t channel, double divisions, double centre);
+    void grow_scales();
+    void move_by(double divisions);
     void select(std::size_t channel);
     void fit_first_record();
 
@@ -79,6 +92,12 @@ private:
     bool measures_ = true;
     bool help_ = false;
     bool fitted_ = false;
+    /// The window before it was made longer for roll mode; total 0: it was not.
+    struct Window {
+        std::int64_t total_ns = 0;
+        std::int64_t pre_ns = 0;
+    };
+    Window before_roll_;
     std::string message_;
 };
 
