@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What the tests of the program share: a sandbox, running machines, a terminal."""
 
+import codecs
 import fcntl
 import functools
 import json
@@ -263,6 +264,7 @@ class Terminal:
                 str(HAL), [name, *map(str, words)], {**case.environment, **(environment or {})}
             )
         self.resize(columns, rows)
+        self.decoder = codecs.getincrementaldecoder("utf-8")("replace")
         self.seen = ""
         self.status = None
         case.addCleanup(self.close)
@@ -281,7 +283,7 @@ class Terminal:
             data = os.read(self.descriptor, 65536)
         except OSError:  # the other side has gone
             return None
-        self.seen += data.decode(errors="replace")
+        self.seen += self.decoder.decode(data)
         return True if data else None
 
     def expect(self, text):
