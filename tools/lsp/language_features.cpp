@@ -9,14 +9,15 @@
 #include <utility>
 
 #include "commands/files.hpp"
-#include "lsp/applied_changes.hpp"
 #include "lsp/completion_items.hpp"
 #include "lsp/hover_text.hpp"
 #include "lsp/outline.hpp"
 #include "lsp/quick_fixes.hpp"
 #include "lsp/semantic_tokens.hpp"
+#include "lsp/text_document.hpp"
 #include "netlist/line.hpp"
 #include "netlist/netlist.hpp"
+#include "run/applied_changes.hpp"
 
 namespace hal::tools {
 

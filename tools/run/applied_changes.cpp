@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include "lsp/applied_changes.hpp"
+#include "run/applied_changes.hpp"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -58,16 +58,43 @@ std::string shown(const std::string& text) {
     return first.substr(std::min(first.find_first_not_of(" \t"), first.size()));
 }
 
+/// The physical lines of a text.
+class TextLines {
+public:
+    explicit TextLines(std::string_view text) : text_(text) {
+        for (std::size_t at = text.find_first_of("\r\n"); at != text.npos;
+             at = text.find_first_of("\r\n", at)) {
+            const bool pair = text.substr(at, 2) == "\r\n";
+            at += pair ? 2 : 1;
+            starts_.push_back(at);
+        }
+    }
+    std::uint32_t number_at(std::size_t offset) const {
+        const auto next = std::ranges::upper_bound(starts_, offset);
+        return static_cast<std::uint32_t>(next - starts_.begin() - 1);
+    }
+    /// Returns a line without its end.
+    std::string_view line(std::uint32_t number) const {
+        const std::size_t begin = starts_[number];
+        const std::string_view rest = text_.substr(begin);
+        return rest.substr(0, rest.find_first_of("\r\n"));
+    }
+
+private:
+    std::string_view text_;
+    std::vector<std::size_t> starts_ = {0};
+};
+
 std::vector<Line> parsed(const std::string& text, const Ini& ini) {
     Sources sources;
     Diagnostics ignored;
     const std::uint32_t source = sources.add("netlist", text);
     std::vector<Line> lines;
-    const TextDocument document(text);
+    const TextLines document(text);
     for (const Command& command : parse(sources, source, {&ini, {}}, ignored)) {
         Line line;
-        line.number = document.position(command.span.begin).line;
-        const std::uint32_t last = document.position(command.span.end).line;
+        line.number = document.number_at(command.span.begin);
+        const std::uint32_t last = document.number_at(command.span.end);
         for (std::uint32_t number = line.number; number <= last; ++number) {
             line.text += std::string(document.line(number)) + "\n";
         }

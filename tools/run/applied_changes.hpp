@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "lsp/text_document.hpp"
 #include "netlist/netlist.hpp"
 
 namespace hal::tools {
