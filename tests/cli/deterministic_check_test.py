@@ -5,7 +5,7 @@ import re
 import unittest
 from pathlib import Path
 
-from harness import SANITIZED, Case, needs_package
+from harness import ROOT, SANITIZED, Case, needs_package
 
 KINDS = ["address", "clock", "time", "memory", "thread", "process", "hash", "random"]
 SEEDS = (
@@ -89,6 +89,22 @@ class DeterministicCheck(Case):
         )
         done = self.run_program("check", "--deterministic", "--for", "100ms", netlist)
         self.assertEqual(0, done.returncode, done.stderr)
+
+    @needs_package("scocan")
+    @needs_package("canopen")
+    def test_machines_on_buses_need_their_ini_file(self):
+        load = self.write("load.ini", "[LOAD]\nCOUNT = 24\n")
+        yair = ROOT / "halfiles" / "yair"
+        for ini, netlist in [
+            (load, ROOT / "halfiles" / "jitter" / "plain.hal"),
+            (load, ROOT / "halfiles" / "jitter" / "scocan.hal"),
+            (yair / "yair.ini", yair / "yair.hal"),
+        ]:
+            words = ["check", "--deterministic", "--for", "100ms", netlist]
+            self.assertIn("has no value: no INI file was given", self.run_program(*words).stderr)
+            done = self.run_program(*words, "-i", ini)
+            self.assertEqual(0, done.returncode, done.stderr)
+            self.assertRegex(done.stdout, r"two simulations are equal in \d{5,} values")
 
     def test_an_error_of_the_netlist_comes_first(self):
         netlist = self.write("a.hal", "loadrt nothing-like-this\n")
