@@ -55,6 +55,7 @@
 #include "run/determinism_check.hpp"
 #include "run/examples.hpp"
 #include "run/fmt.hpp"
+#include "run/journal_option.hpp"
 #include "run/replay.hpp"
 #include "run/run.hpp"
 #include "run/run_journal.hpp"
@@ -95,7 +96,9 @@ constexpr Subcommand run_command() {
     };
 #else
     row.needs_tools = [](const Options& options) {
-        return !static_cast<const RunOptions&>(options).journal.empty();
+        RunOptions own = static_cast<const RunOptions&>(options);
+        add_journal_of_netlists(own);
+        return !own.journal.empty();
     };
 #endif
     return row;

@@ -20,9 +20,9 @@ constexpr std::size_t max_name_length = 47;
 constexpr std::string_view time_suffix = ".time";
 
 /// Commands of ours that halcmd 2.9 does not have.
-constexpr std::array<std::string_view, 11> own_commands{
+constexpr std::array<std::string_view, 12> own_commands{
     "abort", "advance",   "begin", "commit", "delthread", "explain",
-    "fault", "newthread", "node",  "initf",  "reload"};
+    "fault", "newthread", "node",  "initf",  "journal",   "reload"};
 /// What stands in the place of some of them.
 std::string replacement_of(std::string_view command) {
     if (command == "newthread") return "loadrt threads name1=NAME period1=NS";

@@ -7,6 +7,7 @@
 #include "commands/files.hpp"
 #include "commands/script.hpp"
 #include "machine/load/elaborate.hpp"
+#include "netlist/journal_line.hpp"
 #include "netlist/nodes.hpp"
 
 namespace hal {
@@ -31,6 +32,7 @@ constexpr Behaviour grouping{.timing = Timing::group};
 constexpr Behaviour reading{.effect = Effect::reading};
 constexpr Behaviour reading_each{.effect = Effect::reading, .operands = Operands::ranges};
 constexpr Behaviour reading_to_file{.effect = Effect::reading, .operands = Operands::paths};
+constexpr Behaviour saving{.operands = Operands::paths};
 constexpr Behaviour nothing{.effect = Effect::nothing};
 constexpr Behaviour output{.effect = Effect::output};
 constexpr Behaviour sourcing{.effect = Effect::nothing,
@@ -202,6 +204,14 @@ constexpr CommandRow rows[] = {
      "A fault whose condition lasts, such as a thread that hangs or a node that is offline, stays "
      "a fault: the command names it.",
      command_fault, 0, kind::deferred},
+    {"journal", "", journal_usage,
+     "in a netlist: write a journal of the run; save writes what it has so far",
+     "`journal FILE.mcap` in a netlist is `hal run --journal FILE.mcap`, and keep=10min keeps the "
+     "last 10 minutes: --journal-keep.\n"
+     "`journal save FILE.mcap` writes the journal of the running machine so far. To execute its "
+     "cycles again, type:\n"
+     "hal replay --exact FILE.mcap.",
+     command_journal, 0, kind::saving},
     // --- locks
     {"lock", "", "[none|tune|all]",
      "forbid changes: tune still allows values, start and stop; all (the default) forbids "

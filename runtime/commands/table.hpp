@@ -159,6 +159,7 @@ void command_list(Context&);
 // report.cpp
 void command_status(Context&);
 void command_fault(Context&);
+void command_journal(Context&);
 void show_timing(Context&);
 void show_latency(Context&);
 void show_faults(Context&);

@@ -80,6 +80,13 @@ struct Guard {
     const bool on;
 };
 
+/// Returns true when an edit that the journal does not have has changed from which threads this one
+/// reads: it reads the newest finished cycles then.
+bool reads_other_channels(const CycleInputs* inputs, const plan::Plan& plan) noexcept {
+    return inputs && inputs->replays() && !inputs->has_state() &&
+           inputs->record().imports != plan.imports.size();
+}
+
 /// values that the checksum of one cycle covers
 constexpr std::size_t checked_values = 256;
 }  // namespace
@@ -367,8 +374,14 @@ void Core::import() noexcept {
     if (inputs_) {
         inputs_->reads(plan_->imports.size());
     }
+    const bool is_other_plan = reads_other_channels(inputs_, *plan_);
+    for (std::uint64_t i = 0; is_other_plan && i < inputs_->record().imports; ++i) {
+        inputs_->note(0);
+    }
     for (plan::Import& from : plan_->imports) {
-        if (!inputs_) {
+        if (is_other_plan) {
+            import(*from.channel, from.to, from.channel->published);
+        } else if (!inputs_) {
             import(*from.channel, from.to);
         } else if (inputs_->replays()) {
             import(*from.channel, from.to, inputs_->note(0));
@@ -507,7 +520,8 @@ Core::Missing Core::missing() const noexcept {
         const Observation* const asked = observation_.load(std::memory_order_acquire);
         if (!asked || asked->number != record.observation) return Missing::edit;
     }
-    const std::size_t imports = plan ? plan->imports.size() : 0;
+    if (!plan || reads_other_channels(inputs_, *plan)) return Missing::nothing;
+    const std::size_t imports = plan->imports.size();
     for (std::size_t i = 0; i < imports && i < record.imports; ++i) {
         if (plan->imports[i].channel->published < inputs_->notes()[i]) return Missing::cycle;
     }
@@ -535,6 +549,72 @@ void Core::serve_at_rest() noexcept {
     }
     request->cycle = info_.number;
     request->done.store(true, std::memory_order_release);
+}
+
+bool Core::catch_up() {
+    const plan::Plan* const before = plan_;
+    const std::uint64_t applied = applied_.load();
+    const plan::Plan* const offered = inbox_.load(std::memory_order_acquire);
+    const Observation* const asked = observation_.load(std::memory_order_acquire);
+    CycleRecord record;
+    record.kind = CycleRecord::service;
+    record.number = info_.number;
+    record.epoch = offered ? offered->epoch : 0;
+    record.writes_before = pushed_;
+    record.writes_after = pushed_;
+    record.observation = asked ? asked->number : 0;
+    inputs_->load(record, {});
+    service();
+    return plan_ != before || applied_.load() != applied || observation_.load() != asked;
+}
+
+bool Core::at_rest() const noexcept {
+    return !inbox_.load() && !observation_.load() && applied_.load() == pushed_;
+}
+
+namespace {
+
+/// Calls `use` with the finite checks of a plan, in order.
+template <class Use>
+void each_check(const plan::Plan* plan, Use use) {
+    if (!plan) return;
+    for (const std::vector<plan::Step>* const steps : {&plan->init_steps, &plan->steps}) {
+        for (const plan::Step& step : *steps) {
+            if (step.step == check_finite) {
+                use(*static_cast<plan::FiniteCheck*>(step.self));
+            }
+        }
+    }
+}
+
+}  // namespace
+
+Core::Remains Core::remains() const {
+    Remains remains{.writes = pushed_,
+                    .sampled = sampled_,
+                    .safe = safe_,
+                    .in_budget = in_budget_,
+                    .passed = passed_.load(),
+                    .stopped = stopped_.load(std::memory_order_acquire)};
+    each_check(plan_,
+               [&](const plan::FiniteCheck& check) { remains.bad_outputs.push_back(check.bad); });
+    return remains;
+}
+
+void Core::set_remains(const Remains& remains) {
+    pushed_ = remains.writes;
+    applied_ = remains.writes;
+    const std::size_t functions = plan_ ? plan_->functions.size() : 0;
+    sampled_ = remains.sampled < functions ? remains.sampled : 0;
+    safe_ = remains.safe;
+    in_budget_ = remains.in_budget;
+    passed_ = remains.passed;
+    stopped_.store(remains.stopped, std::memory_order_release);
+    std::size_t at = 0;
+    each_check(plan_, [&](plan::FiniteCheck& check) {
+        check.bad = at < remains.bad_outputs.size() && remains.bad_outputs[at];
+        ++at;
+    });
 }
 
 void Core::run() noexcept {

@@ -8,6 +8,7 @@
 #include <csetjmp>
 #include <cstdint>
 #include <utility>
+#include <vector>
 
 #include "execute/cycle_inputs.hpp"
 #include "execute/cycle_mark.hpp"
@@ -123,6 +124,23 @@ public:
     void continue_in_copy() noexcept { stopped_.continue_in_copy(); }
     /// Takes offered probes, and answers an observation without a number.
     void serve_at_rest() noexcept;
+    /// Takes what the session offers, without a cycle. Returns false when there was nothing.
+    bool catch_up();
+    /// Returns true when the thread has taken all that the session has offered.
+    bool at_rest() const noexcept;
+    /// What the next cycle depends on, besides the memory of the plan and of the instances.
+    struct Remains {
+        std::uint64_t writes = 0;  ///< total, all of which have been applied
+        std::uint64_t sampled = 0;  ///< the function whose time is measured next
+        bool safe = true;
+        bool in_budget = true;
+        bool passed = false;
+        bool stopped = false;
+        std::vector<bool> bad_outputs = {};  ///< of the finite checks, in order
+    };
+    Remains remains() const;
+    void set_remains(const Remains& remains);
+    plan::Plan* plan() const noexcept { return plan_; }
 
     // --- by the session --------------------------------------------------------------------------
     /// Puts a plan in the inbox; the thread answers by storing its epoch in taken().

@@ -108,6 +108,12 @@ public:
     const Timeline& timeline() const { return timeline_; }
     hal_clock& clock() { return timeline_.shared; }
     const hal_background& background() const { return background_.shared(); }
+    /// Returns the memory that components read: faults, adjustments, the supervisor's progress.
+    std::vector<plan::Memory> seen_by_components() const {
+        return {{&board_, sizeof board_},
+                {&timeline_.shared, sizeof timeline_.shared},
+                {&seen_supervision_, sizeof seen_supervision_}};
+    }
     /// Enables external clock adjustment: from now on threads poll for adjustments while they
     /// sleep; those in a long sleep do so at once.
     void lead();

@@ -9,6 +9,7 @@
 #include "hal/clock.hpp"
 #include "journal/file_hash.hpp"
 #include "journal/journal_format.hpp"
+#include "journal/journal_join.hpp"
 #include "model/model.hpp"
 #include "recording/mcap/bytes.hpp"
 
@@ -39,25 +40,67 @@ std::size_t ring_words(std::int64_t period_ns) {
 }  // namespace
 
 ExecutionJournal::ExecutionJournal(const std::string& path, const JournalOrigin& origin)
-    : writer_(path), unix_offset_ns_(offset_to_unix_ns()) {
-    if (writer_.error() != 0) return;
-    writer_.metadata("halcyon", {{"instance", origin.instance},
-                                 {"version", origin.version},
-                                 {"unix_offset_ns", std::to_string(unix_offset_ns_)}});
-    writer_.metadata(journal_format::head, {{"format", std::string(journal_format::version)},
-                                            {"version", origin.version},
-                                            {"commit", origin.commit},
-                                            {"program", file_hash("/proc/self/exe")},
-                                            {"unix_offset_ns", std::to_string(unix_offset_ns_)}});
-    entries_ = writer_.add_channel(
-        writer_.add_schema("halcyon.JournalEntry", "jsonschema", journal_format::entry_schema),
+    : origin_(origin), unix_offset_ns_(offset_to_unix_ns()) {
+    open(path);
+    if (writer_->error() != 0) return;
+    worker_ = std::thread([this] { work(); });
+}
+
+void ExecutionJournal::open(const std::string& path) {
+    writer_ = std::make_unique<mcap::Writer>(path);
+    if (writer_->error() != 0) return;
+    writer_->metadata("halcyon", {{"instance", origin_.instance},
+                                  {"version", origin_.version},
+                                  {"unix_offset_ns", std::to_string(unix_offset_ns_)}});
+    writer_->metadata(journal_format::head, {{"format", std::string(journal_format::version)},
+                                             {"version", origin_.version},
+                                             {"commit", origin_.commit},
+                                             {"program", file_hash("/proc/self/exe")},
+                                             {"unix_offset_ns", std::to_string(unix_offset_ns_)}});
+    entries_ = writer_->add_channel(
+        writer_->add_schema("halcyon.JournalEntry", "jsonschema", journal_format::entry_schema),
         journal_format::entries_topic, "json", {});
-    setup_ = writer_.add_channel(
-        writer_.add_schema(journal_format::setup_type, "ros2msg", journal_format::setup_schema),
+    setup_ = writer_->add_channel(
+        writer_->add_schema(journal_format::setup_type, "ros2msg", journal_format::setup_schema),
         journal_format::setup_topic, "cdr", {});
     cycles_schema_ =
-        writer_.add_schema(journal_format::cycles_type, "ros2msg", journal_format::cycles_schema);
-    worker_ = std::thread([this] { work(); });
+        writer_->add_schema(journal_format::cycles_type, "ros2msg", journal_format::cycles_schema);
+    for (const auto& thread : threads_) {
+        declare(*thread);
+    }
+}
+
+void ExecutionJournal::declare(Thread& thread) {
+    thread.channel = writer_->add_channel(
+        cycles_schema_, std::string(journal_format::cycles_topic) + std::to_string(thread.id),
+        "cdr",
+        {{"journaled_thread", thread.name},
+         {"number", std::to_string(thread.id)},
+         {"journaled_period_ns", std::to_string(thread.period_ns)}});
+}
+
+ExecutionJournal::FastestThread ExecutionJournal::continue_in(const std::string& path) {
+    const std::scoped_lock own(mutex_);
+    FastestThread fastest;
+    for (const auto& thread : threads_) {
+        write_batch(*thread);
+        if (fastest.period_ns == 0 || thread->period_ns < fastest.period_ns) {
+            fastest = {thread->period_ns, thread->newest};
+        }
+    }
+    writer_->close();
+    if (writer_->error() == 0) {
+        open(path);
+    }
+    return fastest;
+}
+
+void ExecutionJournal::flush() {
+    const std::scoped_lock own(mutex_);
+    for (const auto& thread : threads_) {
+        write_batch(*thread);
+    }
+    writer_->flush();
 }
 
 ExecutionJournal::~ExecutionJournal() { close(); }
@@ -71,19 +114,17 @@ CycleInputs* ExecutionJournal::thread_made(const std::string& name, std::int64_t
     const std::scoped_lock own(mutex_);
     auto thread = std::make_unique<Thread>();
     thread->name = name;
+    thread->id = id;
+    thread->period_ns = period_ns;
     thread->inputs = std::make_unique<CycleInputs>(ring_words(period_ns));
-    thread->channel = writer_.add_channel(
-        cycles_schema_, std::string(journal_format::cycles_topic) + std::to_string(id), "cdr",
-        {{"journaled_thread", name},
-         {"number", std::to_string(id)},
-         {"journaled_period_ns", std::to_string(period_ns)}});
+    declare(*thread);
     threads_.push_back(std::move(thread));
     return threads_.back()->inputs.get();
 }
 
 void ExecutionJournal::add(ExecutionEntry entry) {
     const std::scoped_lock own(mutex_);
-    writer_.message(entries_, entry_count_++, unix_ns(monotonic_ns()), to_json(entry));
+    writer_->message(entries_, entry_count_++, unix_ns(monotonic_ns()), to_json(entry));
 }
 
 void ExecutionJournal::edited(std::uint64_t epoch, std::vector<std::vector<std::string>> commands,
@@ -120,7 +161,7 @@ void ExecutionJournal::switched(bool running) {
 
 void ExecutionJournal::add(const SetupRecord& record) {
     const std::scoped_lock own(mutex_);
-    writer_.message(setup_, setup_count_++, unix_ns(monotonic_ns()), to_cdr(record));
+    writer_->message(setup_, setup_count_++, unix_ns(monotonic_ns()), to_cdr(record));
 }
 
 void ExecutionJournal::called(const SetupResults& results) {
@@ -156,6 +197,17 @@ void ExecutionJournal::opened(const std::string& instance, const std::string& co
     add(std::move(entry));
 }
 
+std::string ExecutionJournal::save(const std::string& path) {
+    std::function<std::string(const std::string& path)> call;
+    {
+        const std::scoped_lock own(mutex_);
+        call = save_;
+    }
+    if (call) return call(path);
+    flush();
+    return join_journals({where()}, path);
+}
+
 void ExecutionJournal::sampled(std::vector<std::string> names) {
     ExecutionEntry entry{.kind = ExecutionEntry::Kind::sampled};
     entry.names = std::move(names);
@@ -164,7 +216,7 @@ void ExecutionJournal::sampled(std::vector<std::string> names) {
 
 void ExecutionJournal::attach(const std::string& name, const std::string& text) {
     const std::scoped_lock own(mutex_);
-    writer_.attachment(name, "text/plain", text, unix_ns(monotonic_ns()));
+    writer_->attachment(name, "text/plain", text, unix_ns(monotonic_ns()));
 }
 
 void ExecutionJournal::work() {
@@ -197,7 +249,7 @@ void ExecutionJournal::drain() {
     }
     if (now_ns - flushed_ns_ > flush_every_ns) {
         flushed_ns_ = now_ns;
-        writer_.flush();
+        writer_->flush();
     }
 }
 
@@ -210,6 +262,7 @@ void ExecutionJournal::encode(Thread& thread) {
             thread.batch_begin_ns = record.woke_ns;
         }
         thread.newest_ns = record.woke_ns;
+        thread.newest = record.number;
         thread.encoder.add(record, {words.data() + at, record.notes});
         at += record.notes;
         ++cycles_;
@@ -225,7 +278,7 @@ void ExecutionJournal::write_batch(Thread& thread) {
     std::string payload("\0\1\0\0", 4);  // CDR, little-endian
     mcap::put(payload, static_cast<std::uint32_t>(thread.encoder.records()));
     mcap::put_text(payload, thread.encoder.take());
-    writer_.message(thread.channel, thread.batches++, unix_ns(thread.newest_ns), payload);
+    writer_->message(thread.channel, thread.batches++, unix_ns(thread.newest_ns), payload);
 }
 
 bool ExecutionJournal::close() {
@@ -241,9 +294,9 @@ bool ExecutionJournal::close() {
     const std::scoped_lock own(mutex_);
     if (!closed_) {
         closed_ = true;
-        writer_.close();
+        writer_->close();
     }
-    return writer_.error() == 0;
+    return writer_->error() == 0;
 }
 
 std::string ExecutionJournal::problem() const {
@@ -252,8 +305,8 @@ std::string ExecutionJournal::problem() const {
 }
 
 std::string ExecutionJournal::reason() const {
-    if (!writer_.problem().empty()) return writer_.problem();
-    if (writer_.error() != 0) return std::strerror(writer_.error());
+    if (!writer_->problem().empty()) return writer_->problem();
+    if (writer_->error() != 0) return std::strerror(writer_->error());
     return "";
 }
 

@@ -52,6 +52,13 @@ public:
     void file_read(const SetupFile& file) override;
     void opened(const std::string& instance, const std::string& component,
                 const OutsideWorld& outside) override;
+    std::string save(const std::string& path) override;
+
+    /// Sets what save() calls in the place of a copy of the file. [setup]
+    void on_save(std::function<std::string(const std::string& path)> call) {
+        const std::scoped_lock own(mutex_);
+        save_ = std::move(call);
+    }
 
     /// Sets what is called once, in the journal's own thread, when nothing more can be written: with
     /// the reason. [setup]
@@ -67,8 +74,16 @@ public:
     template <class Use>
     void with_writer(Use use) {
         const std::scoped_lock own(mutex_);
-        use(writer_);
+        use(*writer_);
     }
+    struct FastestThread {
+        std::int64_t period_ns = 0;  ///< 0: the machine has no threads
+        std::uint64_t newest = 0;  ///< number of its newest cycle in the file
+    };
+    /// Completes the file and continues in another one. [any]
+    FastestThread continue_in(const std::string& path);
+    /// Writes what has been taken from the threads so far to the disk. [any]
+    void flush();
     std::int64_t unix_offset_ns() const { return unix_offset_ns_; }
 
     /// Completes the file, once no thread of the machine runs. Returns false when something could
@@ -78,8 +93,8 @@ public:
     /// when nothing failed. [any]
     std::string problem() const;
     /// Returns the path of the written file, valid after close(); empty if nothing was written.
-    std::string where() const { return writer_.where(); }
-    const std::string& kept() const { return writer_.kept(); }
+    std::string where() const { return writer_->where(); }
+    const std::string& kept() const { return writer_->kept(); }
     std::uint64_t cycles() const { return cycles_; }  ///< after close()
     /// Returns the names of threads whose ring was full, with the number of cycles that were lost.
     std::vector<std::pair<std::string, std::uint64_t>> lost() const;
@@ -87,6 +102,9 @@ public:
 private:
     struct Thread {
         std::string name;
+        std::uint32_t id = 0;
+        std::int64_t period_ns = 0;
+        std::uint64_t newest = 0;  // number of the newest cycle
         std::uint16_t channel = 0;
         std::unique_ptr<CycleInputs> inputs;
         std::vector<std::uint64_t> words;  // taken out of the ring
@@ -95,6 +113,8 @@ private:
         std::int64_t batch_begin_ns = 0;
         std::uint32_t batches = 0;
     };
+    void open(const std::string& path);
+    void declare(Thread& thread);
     void add(ExecutionEntry entry);
     void add(const SetupRecord& record);
     void work();
@@ -108,7 +128,9 @@ private:
 
     mutable std::mutex mutex_;  // of all below
     std::function<void(const std::string& reason)> failed_;
-    mcap::Writer writer_;
+    std::function<std::string(const std::string& path)> save_;
+    const JournalOrigin origin_;
+    std::unique_ptr<mcap::Writer> writer_;
     const std::int64_t unix_offset_ns_;
     std::uint16_t entries_ = 0;
     std::uint16_t cycles_schema_ = 0;

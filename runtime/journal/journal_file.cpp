@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "journal/journal_file.hpp"
 
+#include <algorithm>
 #include <charconv>
+#include <filesystem>
 #include <fmt/core.h>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "journal/journal_format.hpp"
@@ -28,21 +31,20 @@ std::string text_in(const std::map<std::string, std::string>& texts, const std::
     return found == texts.end() ? "" : found->second;
 }
 
-/// Returns the records of a message of cycles; nothing when it is damaged.
-std::optional<std::string> records_of(std::string_view payload) {
-    mcap::Fields fields(payload);
+JournaledBatch batch_of(const mcap::Message& message) {
+    mcap::Fields fields(message.payload);
     fields.take(4);  // the representation
-    fields.get<std::uint32_t>();
-    const std::string_view records = fields.text();
-    if (!fields.good()) return std::nullopt;
-    return std::string(records);
+    JournaledBatch batch{.sequence = message.sequence,
+                         .count = fields.get<std::uint32_t>(),
+                         .unix_ns = message.log_time,
+                         .records = std::string(fields.text())};
+    if (!fields.good()) {
+        batch.records = '\x80';  // damaged
+    }
+    return batch;
 }
 
 }  // namespace
-
-void JournaledThread::add_batch(std::uint32_t sequence, std::string records) {
-    batches_.push_back({sequence, std::move(records)});
-}
 
 void JournaledThread::next() {
     const bool had_one = std::exchange(valid_, false);
@@ -58,13 +60,16 @@ void JournaledThread::next() {
             return;
         }
         if (batch_ == batches_.size()) return;
-        Batch& batch = batches_[batch_];
-        if (batch.sequence != batch_) {
+        JournaledBatch& batch = batches_[batch_];
+        if (batch.sequence != first_sequence_ + batch_) {
             gap_ = fmt::format("thread '{}': cycles are missing in the file{}", name, after());
             return;
         }
         ++batch_;
         decoder_.emplace(std::move(batch.records));
+    }
+    if (is_cut_ && !had_one && newest == 0) {
+        lost_ = record_.lost;
     }
     if (record_.lost != lost_) {
         gap_ = fmt::format(
@@ -76,14 +81,64 @@ void JournaledThread::next() {
     valid_ = true;
 }
 
+std::vector<JournaledBatch> JournaledThread::take_remaining() {
+    std::vector<JournaledBatch> remaining;
+    if (valid_) {
+        JournaledBatch& rest = remaining.emplace_back();
+        rest.sequence = sequence();
+        rest.unix_ns = batches_[batch_ - 1].unix_ns;
+        CycleEncoder encoder;
+        do {
+            encoder.add(record_, notes_);
+            ++rest.count;
+        } while (decoder_->next(record_, notes_));
+        rest.records = encoder.take();
+    }
+    valid_ = false;
+    for (; batch_ < batches_.size(); ++batch_) {
+        remaining.push_back(std::move(batches_[batch_]));
+    }
+    return remaining;
+}
+
 bool JournalFile::open(const std::string& path) {
-    auto source = mcap::open_file(path, problem_);
-    if (!source) return false;
-    mcap::Reader reader;
-    if (!reader.open(std::move(source))) {
-        problem_ = reader.problem();
+    std::error_code ignored;
+    if (!std::filesystem::is_directory(path, ignored)) return open(std::vector{path});
+    std::vector<std::string> paths;
+    for (const auto& entry : std::filesystem::directory_iterator(path, ignored)) {
+        const std::string name = entry.path().filename().string();
+        const bool is_part = name.find_first_not_of("0123456789") == name.find(".mcap");
+        if (is_part && name.front() != '.') {
+            paths.push_back(entry.path().string());
+        }
+    }
+    std::ranges::sort(paths);  // their names have their numbers
+    if (paths.empty()) {
+        problem_ = "the folder has no journal";
         return false;
     }
+    return open(paths);
+}
+
+bool JournalFile::open(const std::vector<std::string>& paths) {
+    paths_ = paths;
+    for (const std::string& path : paths) {
+        if (!add(path)) return false;
+    }
+    if (entries_end_) {
+        notes_.push_back(fmt::format("an entry of the journal is missing or damaged: entry {}",
+                                     entries_.size() + 1));
+    }
+    for (auto& [number, thread] : threads_) {
+        if (begin_ && begin_->batches.contains(number)) {
+            thread.begin_with(begin_->batches[number]);
+        }
+        thread.next();
+    }
+    return true;
+}
+
+bool JournalFile::add_head(mcap::Reader& reader) {
     const auto head = reader.metadata(journal_format::head);
     if (head.empty()) {
         problem_ = "it is not a journal: hal run --journal writes one";
@@ -94,18 +149,42 @@ bool JournalFile::open(const std::string& path) {
                                text_in(head, "format"), journal_format::version);
         return false;
     }
+    if (!head_.empty()) return true;
     head_ = head;
     version_ = text_in(head, "version") + " " + text_in(head, "commit");
     program_ = text_in(head, "program");
     unix_offset_ns_ = number_in<std::int64_t>(head, "unix_offset_ns");
+    return true;
+}
+
+void JournalFile::add_entry(std::uint32_t sequence, std::string_view payload) {
+    auto entry = execution_entry(payload);
+    entries_end_ = entries_end_ || !entry || sequence != sequence_of(entries_.size());
+    if (!entries_end_) {
+        entries_.push_back(std::move(*entry));
+    }
+}
+
+bool JournalFile::add(const std::string& path) {
+    auto source = mcap::open_file(path, problem_);
+    if (!source) return false;
+    mcap::Reader reader;
+    if (!reader.open(std::move(source))) {
+        problem_ = reader.problem();
+        return false;
+    }
+    if (!add_head(reader)) return false;
     std::map<std::uint16_t, std::uint32_t> thread_of;
     std::optional<std::uint16_t> entries;
     std::optional<std::uint16_t> setup;
+    std::optional<std::uint16_t> state;
     for (const auto& [id, channel] : reader.channels()) {
         if (channel.topic == journal_format::entries_topic) {
             entries = id;
         } else if (channel.topic == journal_format::setup_topic) {
             setup = id;
+        } else if (channel.topic == journal_format::state_topic) {
+            state = id;
         } else if (channel.topic.starts_with(journal_format::cycles_topic)) {
             const auto number = number_in<std::uint32_t>(channel.metadata, "number");
             thread_of[id] = number;
@@ -115,36 +194,37 @@ bool JournalFile::open(const std::string& path) {
             thread.period_ns = number_in<std::int64_t>(channel.metadata, "journaled_period_ns");
         }
     }
-    bool entries_end = false;
+    if (state) {  // the files before it are not needed
+        entries_.clear();
+        entries_end_ = false;
+        setup_ = {};
+        for (auto& [number, thread] : threads_) {
+            thread.forget();
+        }
+    }
     const bool all = reader.each([&](const mcap::Message& message) {
         if (entries == message.channel) {
-            auto entry = execution_entry(message.payload);
-            entries_end = entries_end || !entry || message.sequence != entries_.size();
-            if (!entries_end) {
-                entries_.push_back(std::move(*entry));
-            }
+            add_entry(message.sequence, message.payload);
         } else if (setup == message.channel) {
             if (auto record = setup_record(message.payload)) {
                 setup_.add(std::move(*record));
             }
+        } else if (state == message.channel) {
+            begin_ = journal_begin(message.payload);
         } else if (const auto thread = thread_of.find(message.channel); thread != thread_of.end()) {
-            threads_[thread->second].add_batch(
-                message.sequence, records_of(message.payload).value_or(std::string(1, '\x80')));
+            threads_[thread->second].add(batch_of(message));
         }
         return true;
     });
+    if (state && !begin_) {
+        problem_ = "the state that it begins with is missing or damaged";
+        return false;
+    }
     if (reader.unfinished()) {
         notes_.push_back("the file has no end: it is read up to its last complete chunk");
     }
     if (!all) {
         notes_.push_back(reader.problem() + "; the cycles before the damage are executed");
-    }
-    if (entries_end) {
-        notes_.push_back(fmt::format("an entry of the journal is missing or damaged: entry {}",
-                                     entries_.size() + 1));
-    }
-    for (auto& [number, thread] : threads_) {
-        thread.next();
     }
     return true;
 }

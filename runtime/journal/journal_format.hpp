@@ -19,6 +19,10 @@ inline constexpr std::string_view setup_topic = "/hal/journal/setup";
 inline constexpr std::string_view setup_type = "halcyon_msgs/msg/JournaledSetup";
 inline constexpr std::string_view setup_schema =
     "uint32 kind\nuint32 error\nuint8[] name\nuint8[] hash\nuint8[] results\nuint8[] readings\n";
+/// The state of the machine where a journal begins that was cut: JournalBegin, as CDR.
+inline constexpr std::string_view state_topic = "/hal/journal/state";
+inline constexpr std::string_view state_type = "halcyon_msgs/msg/JournaledState";
+inline constexpr std::string_view state_schema = "uint8[] begin\n";
 /// A batch of records of CycleEncoder, as CDR.
 inline constexpr std::string_view cycles_type = "halcyon_msgs/msg/JournaledCycles";
 inline constexpr std::string_view cycles_schema = "uint32 count\nuint8[] records\n";

@@ -7,9 +7,12 @@
 #include <string_view>
 #include <utility>
 
+#include "journal/heap_blocks.hpp"
+#include "journal/machine_state.hpp"
 #include "machine/processes/programs.hpp"
 #include "machine/report/crash.hpp"
 #include "machine/session.hpp"
+#include "recording/mcap/bytes.hpp"
 
 namespace hal {
 namespace {
@@ -60,6 +63,9 @@ ReExecution::ReExecution(JournalFile& file) : file_(file) {
         }
     }
     now_ns_ = begin_ns_.value_or(0);
+    if (file.begin() && !heap_blocks::track()) {
+        fail(State::fails, "a build with a sanitizer cannot restore the state that it begins with");
+    }
 }
 
 ReExecution::~ReExecution() = default;
@@ -105,6 +111,7 @@ void ReExecution::end(Core& core) {
 
 /// Executed inside an edit that waits for its threads.
 bool ReExecution::step() {
+    if (catches_up_) return catch_up();
     if (state_ != State::goes_on || finished_) return false;
     bool needs_edit = false;
     Cursor* const cursor = next(needs_edit, true);
@@ -251,7 +258,138 @@ void ReExecution::note_overlap(Cursor& cursor, std::uint64_t ticket, bool covere
     }
 }
 
+// --- a journal that begins with a state ---
+
+bool ReExecution::at_rest() const {
+    return std::ranges::all_of(cursors_, [](const auto& one) {
+        return !one.second.suspended && (!one.second.core || one.second.core->at_rest());
+    });
+}
+
+/// In the order of their numbers.
+std::vector<Core*> ReExecution::cores() const {
+    std::vector<Core*> cores;
+    for (const auto& [number, cursor] : cursors_) {
+        if (cursor.core) {
+            cores.push_back(cursor.core);
+        }
+    }
+    return cores;
+}
+
+std::string ReExecution::state(std::string& problem) {
+    MachineState machine(*session_, cores());
+    const std::string memory = machine.capture();
+    if (memory.empty()) {
+        problem = machine.problem();
+        return "";
+    }
+    std::string state;
+    mcap::put(state, next_ticket_);
+    mcap::put(state, next_call_);
+    return state + memory;
+}
+
+/// Returns false when no thread had to do anything.
+bool ReExecution::catch_up() {
+    bool any = false;
+    for (Core* const core : cores()) {
+        any = core->catch_up() || any;
+    }
+    return any;
+}
+
+namespace {
+
+/// What the threads have published stays when an edit that the journal does not have gives
+/// them other plans: the records count on.
+class KeptChannels {
+public:
+    explicit KeptChannels(Core& core) : core_(core), remains_(core.remains()) {
+        if (!core.plan()) return;
+        for (const plan::Import& import : core.plan()->imports) {
+            channels_.push_back(import.channel);
+        }
+    }
+    void restore() const {
+        Core::Remains remains = core_.remains();
+        remains.writes = remains_.writes;
+        remains.sampled = remains_.sampled;
+        core_.set_remains(remains);
+        const std::size_t imports = core_.plan() ? core_.plan()->imports.size() : 0;
+        for (std::size_t i = 0; i < std::min(imports, channels_.size()); ++i) {
+            plan::Channel& now = *core_.plan()->imports[i].channel;
+            plan::Channel& before = *channels_[i];
+            if (&now == &before) continue;
+            now.published = before.published;
+            if (now.size == before.size) {
+                now.history = std::move(before.history);
+            }
+        }
+    }
+
+private:
+    Core& core_;
+    const Core::Remains remains_;
+    std::vector<std::shared_ptr<plan::Channel>> channels_;
+};
+
+}  // namespace
+
+std::string ReExecution::edit_at_rest(const std::function<std::string()>& edit) {
+    std::vector<KeptChannels> kept;
+    for (Core* const core : cores()) {
+        kept.emplace_back(*core);
+    }
+    catches_up_ = true;
+    session_->threads().continue_after(0);  // epochs that no later edit of the journal has
+    std::string problem = edit();
+    while (catch_up()) {
+    }
+    catches_up_ = false;
+    for (const KeptChannels& one : kept) {
+        one.restore();
+    }
+    for (auto& [number, cursor] : cursors_) {
+        if (cursor.thread) {
+            load(cursor);
+        }
+    }
+    return problem;
+}
+
+/// Makes the machine that it was, and gives it the state.
+bool ReExecution::begin_at_state() {
+    const JournalBegin& begin = *file_.begin();
+    catches_up_ = true;
+    const std::vector<ExecutionEntry>& entries = file_.entries();
+    while (entry_ < std::min<std::size_t>(begin.entries, entries.size())) {
+        if (!make(entries[entry_++])) return false;
+    }
+    while (catch_up()) {
+    }
+    catches_up_ = false;
+    for (auto& [number, cursor] : cursors_) {
+        if (cursor.thread) {
+            load(cursor);
+        }
+    }
+    mcap::Fields fields(begin.state);
+    next_ticket_ = fields.get<std::uint64_t>();
+    next_call_ = fields.get<std::uint64_t>();
+    MachineState machine(*session_, cores());
+    if (!machine.restore(fields.rest())) {
+        return fail(State::fails, "the state that the journal begins with cannot be restored: " +
+                                      machine.problem());
+    }
+    edits_ = 0;
+    return true;
+}
+
 ReExecution::State ReExecution::advance() {
+    if (state_ == State::goes_on && file_.begin() && !std::exchange(begun_, true) &&
+        !begin_at_state())
+        return state_;
     while (state_ == State::goes_on) {
         bool needs_edit = false;
         if (Cursor* const cursor = next(needs_edit, false)) {
@@ -348,7 +486,11 @@ bool ReExecution::make(const ExecutionEntry& entry) {
         return fail(State::ends,
                     "an edit was rolled back after threads had taken it: its cycles "
                     "cannot be executed again");
-    case ExecutionEntry::Kind::sampled: sampled_(entry.names); return true;
+    case ExecutionEntry::Kind::sampled:
+        if (!entry.names.empty()) {
+            sampled_(entry.names);
+        }
+        return true;
     case ExecutionEntry::Kind::opened:
         outside_ = outside_ || !entry.resources.empty() || entry.threads > 0;
         return true;

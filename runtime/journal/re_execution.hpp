@@ -67,6 +67,12 @@ public:
     bool has_outside() const { return outside_; }
     /// Returns how much of the journal has been executed.
     JournalProgress progress() const;
+    /// Returns true when a journal may begin here: between the cycles of all threads.
+    bool at_rest() const;
+    /// Returns the state of this moment for JournalBegin; "" after setting `problem`.
+    std::string state(std::string& problem);
+    /// Edits the machine at_rest(), without a cycle. Returns what `edit` does: why it cannot, or "".
+    std::string edit_at_rest(const std::function<std::string()>& edit);
     /// From now on cycles may differ from the journaled ones, and only the first one is noted.
     void accept_differences() { accepts_differences_ = true; }
     /// The machine has been changed: what the journal has of its state is of another one.
@@ -127,6 +133,9 @@ private:
     JournaledCycle cycle_of(const Cursor& cursor) const;
     void load(Cursor& cursor);
     State end_of_journal();
+    bool begin_at_state();
+    bool catch_up();
+    std::vector<Core*> cores() const;
     bool make_next_edit();
     bool make(const ExecutionEntry& entry);
     bool make_edit(const ExecutionEntry& entry);
@@ -149,6 +158,8 @@ private:
     std::size_t entry_ = 0;  // the next one
     State state_ = State::goes_on;
     bool finished_ = false;
+    bool begun_ = false;
+    bool catches_up_ = false;  // executes the edits before the state, without cycles
     bool outside_ = false;
     bool accepts_differences_ = false;
     std::optional<JournaledCycle> diverged_;

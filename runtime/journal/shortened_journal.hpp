@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A copy of a journal that ends where a re-execution has stopped.
+// Copies of a journal that end, or begin, where a re-execution has stopped.
 #pragma once
 
 #include <cstddef>
@@ -8,6 +8,8 @@
 #include <string>
 
 namespace hal {
+
+class JournalFile;
 
 /// How much of a journal has been executed.
 struct JournalProgress {
@@ -19,5 +21,11 @@ struct JournalProgress {
 /// why not; "" when it is written. [setup]
 std::string write_shortened(const std::string& from, const std::string& to,
                             const JournalProgress& progress);
+
+/// Writes what remains of `file`, which has been executed up to `progress`, to the file `to`,
+/// without recorded values. It begins with `state`. Nothing of `file` can be executed after it.
+/// Returns why not; "" when it is written. [setup]
+std::string write_remaining(JournalFile& file, const std::string& to,
+                            const JournalProgress& progress, std::string state);
 
 }  // namespace hal

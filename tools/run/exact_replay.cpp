@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cli/output.hpp"
+#include "journal/heap_blocks.hpp"
 #include "run/chosen_values.hpp"
 #include "run/difference_inputs.hpp"
 #include "run/journal_test.hpp"
@@ -50,6 +51,9 @@ public:
         if (!options_.as_test.empty() && status == 0) {
             status = write_journal_test(options_, file_, machine_);
         }
+        if (!options_.cut.empty() && status == 0) {
+            status = cut();
+        }
         execution_.finish();
         return status;
     }
@@ -62,12 +66,35 @@ public:
 private:
     /// Returns true when a rule or the user has stopped it before the end.
     bool execute() {
+        bool reached = false;
         while (machine_.advance()) {
             if (machine_.host().stop.requested()) return true;
-            if (until_.reached(execution_.newest(), machine_.fastest())) return true;
-            if (!condition_.empty() && condition_.holds(machine_.session())) return true;
+            reached = reached || until_.reached(execution_.newest(), machine_.fastest()) ||
+                      (!condition_.empty() && condition_.holds(machine_.session()));
+            const bool may_stop = options_.cut.empty() || execution_.at_rest();
+            if (reached && may_stop) return true;
         }
         return false;
+    }
+
+    /// Writes the rest of the journal.
+    int cut() {
+        std::string problem;
+        std::string state = execution_.state(problem);
+        if (state.empty()) {
+            return fail(
+                options_,
+                fmt::format("--cut: the state of the machine cannot be written: {}", problem));
+        }
+        problem = write_remaining(file_, options_.cut, execution_.progress(), std::move(state));
+        if (!problem.empty()) {
+            return fail(options_, fmt::format("cannot write '{}': {}", options_.cut, problem));
+        }
+        print(
+            fmt::format("{}: the journal from here on; to execute it, type: hal replay --exact "
+                        "{}\n",
+                        options_.cut, options_.cut));
+        return 0;
     }
 
     int report(bool stopped, std::chrono::steady_clock::duration took) {
@@ -93,7 +120,9 @@ private:
             text += difference;
         } else if (!machine_.change_problem().empty()) {
             good = false;
-            text += "--edit: " + machine_.change_problem() + "\n";
+            text += fmt::format("{}: {}\n",
+                                machine_.change().netlist().empty() ? "--edit" : "--netlist",
+                                machine_.change_problem());
         } else if (execution_.state() == ReExecution::State::fails) {
             good = false;
             text += execution_.reason() + "\n";
@@ -180,10 +209,32 @@ private:
     ReExecution& execution_;
 };
 
+/// Several ones are parts of a ring.
+bool has_only_journals(const std::vector<std::string>& words) {
+    if (words.size() < 2) return words.size() == 1;
+    return std::ranges::all_of(words, [](const std::string& path) {
+        return path.ends_with(".mcap") || path.ends_with(".mcap.part");
+    });
+}
+
+std::string cut_problem(const ReplayOptions& options) {
+    if (!options.edits.empty() || !options.netlist.empty() || options.shell) {
+        return "it is for the journal as it is: without --edit, --netlist and --shell";
+    }
+    if (options.until.empty() && options.break_condition.empty()) {
+        return "name the moment with --until or --break";
+    }
+    if (!options.cut.ends_with(".mcap")) {
+        return fmt::format("unknown format of '{}'; name the file .mcap", options.cut);
+    }
+    if (!heap_blocks::track()) return "a build with a sanitizer cannot read the state";
+    return "";
+}
+
 }  // namespace
 
 int run_exact_replay(const ReplayOptions& options) {
-    if (options.words.size() != 1) {
+    if (!has_only_journals(options.words)) {
         return fail(options, "--exact takes one journal and no netlist: the journal has the edits");
     }
     JournalPosition until;
@@ -197,20 +248,27 @@ int run_exact_replay(const ReplayOptions& options) {
         return fail(options, fmt::format("--break: invalid condition '{}'; {}",
                                          options.break_condition, ValueCondition::form));
     }
-    if (!options.as_test.empty() && (!options.edits.empty() || options.shell)) {
-        return fail(options, "--as-test is for the journal as it is: without --edit and --shell");
+    WhatIf change;
+    if (const std::string problem = change.parse(options); !problem.empty()) {
+        return fail(options, problem);
+    }
+    if (!options.as_test.empty() && (!change.empty() || options.shell)) {
+        return fail(options,
+                    "--as-test is for the journal as it is: without --edit, --netlist and --shell");
+    }
+    if (!options.cut.empty()) {
+        if (const std::string problem = cut_problem(options); !problem.empty()) {
+            return fail(options, "--cut: " + problem);
+        }
     }
     if (!options.as_test.empty() && is_occupied(options.as_test)) {
         return fail(options, fmt::format("--as-test: '{}' exists already; name another folder, or "
                                          "remove it",
                                          options.as_test));
     }
-    WhatIf change;
-    if (const std::string problem = change.parse(options); !problem.empty()) {
-        return fail(options, problem);
-    }
     JournalFile file;
-    if (!file.open(options.words[0])) {
+    const bool is_one = options.words.size() == 1;
+    if (!(is_one ? file.open(options.words[0]) : file.open(options.words))) {
         return fail(options,
                     fmt::format("cannot execute '{}': {}", options.words[0], file.problem()));
     }

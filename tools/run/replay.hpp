@@ -20,7 +20,9 @@ struct ReplayOptions : NetlistOptions {
     bool anyway = false;
     bool shell = false;
     std::string as_test;  ///< a folder
+    std::string cut;      ///< a file
     std::vector<std::string> edits;  ///< setp NAME VALUE, sets NAME VALUE
+    std::string netlist;             ///< a file
     std::string at;                  ///< a time or a cycle number
     std::string until;              ///< a time or a cycle number
     std::string break_condition;    ///< NAME > VALUE
@@ -55,11 +57,18 @@ struct ReplayOptions : NetlistOptions {
         set.values("--edit", edits, "EDIT",
                    "with --exact: from --at on, execute with another value: 'setp NAME VALUE' or "
                    "'sets SIGNAL VALUE'; may be repeated");
+        set.value("--netlist", netlist, "FILE",
+                  "with --exact: from --at on, execute with the machine of this netlist");
         set.value("--at", at, "CYCLE|TIME",
-                  "with --exact: the cycle of the fastest thread, or the time, of --edit");
+                  "with --exact: the cycle of the fastest thread, or the time, of --edit and "
+                  "--netlist");
         set.value("--as-test", as_test, "DIR",
                   "with --exact: write a test of the journal up to here, whose --show values are "
                   "expected; run it with: hal replay DIR");
+        set.value(
+            "--cut", cut, "FILE",
+            "with --exact: write the rest of the journal to FILE, which begins with the state "
+            "of the machine here");
         set.flag("--anyway", anyway,
                  "with --exact: also with another program or plugin, and when instances open "
                  "devices or sockets again");

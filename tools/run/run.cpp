@@ -133,6 +133,9 @@ int run_machine(const RunOptions& options, RunJournal* journal) {
     if (!options.values.empty() && options.journal.empty()) {
         return fail(options, "--values needs --journal FILE; hal record records a running machine");
     }
+    if (options.keep_ns > 0 && options.journal.empty()) {
+        return fail(options, "--journal-keep needs --journal FILE");
+    }
     if (options.interactive && options.for_ns >= 0) {
         return fail(options, "-I and --for exclude each other; leave one out");
     }

@@ -17,6 +17,7 @@ struct RunOptions : NetlistOptions {
     std::int64_t for_ns = -1;  ///< -1: not given
     std::string watchdog;      ///< a device of the Linux watchdog API
     std::string journal;       ///< file
+    std::int64_t keep_ns = 0;  ///< of the journal; 0: all of it
     std::vector<std::string> values;  ///< to be recorded with it: names and patterns
     std::string dds;  ///< arguments of the DDS participant: "interfaces=10.0.0.1 domain=3"
     bool interactive = false;
@@ -38,6 +39,10 @@ struct RunOptions : NetlistOptions {
         set.value("--journal", journal, "FILE",
                   "write the inputs of every cycle and all edits to FILE.mcap, for hal replay "
                   "--exact");
+        set.duration("--journal-keep", keep_ns,
+                     "with --journal: keep the last 10min, 90s …; FILE is written at the end, on a "
+                     "fault as FILE-fault-1, and by journal save",
+                     1);
         set.values("--values", values, "NAMES",
                    "with --journal: record these pins, parameters and signals in every cycle, too; "
                    "patterns; may be repeated");

@@ -5,15 +5,18 @@
 #include <chrono>
 #include <fmt/core.h>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "cli/output.hpp"
 #include "commands/files.hpp"
 #include "journal/execution_journal.hpp"
+#include "journal/journal_ring.hpp"
 #include "paths.hpp"
 #include "recording/mcap/held_file.hpp"
 #include "run/chosen_values.hpp"
 #include "run/hosted_machine.hpp"
+#include "run/journal_option.hpp"
 #include "run/sim_summary.hpp"
 #include "text/quoting.hpp"
 
@@ -93,11 +96,17 @@ class FileOfRun final : public RunJournal {
 public:
     explicit FileOfRun(const RunOptions& options)
         : options_(options),
-          journal_(options.journal,
+          ring_(ring_of(options)),
+          journal_(ring_ ? ring_->first() : options.journal,
                    {own_name(options), std::string(paths::version), std::string(paths::commit)}) {}
 
     /// Returns an exit status after printing why the file cannot be written.
     int check() {
+        if (ring_ && !ring_->problem().empty()) return fail(options_, ring_->problem());
+        if (ring_ && !ring_->kept().empty()) {
+            note(
+                fmt::format("the journal of a machine that was killed is now '{}'", ring_->kept()));
+        }
         if (const std::string problem = journal_.problem(); !problem.empty()) {
             return fail(options_, fmt::format("cannot write '{}': {}", options_.journal, problem));
         }
@@ -116,6 +125,9 @@ public:
                                      "journal\n",
                                      options_.program, options_.journal, reason));
         });
+        if (ring_) {
+            begin_ring(machine.session);
+        }
         std::vector<std::string> files = options_.words;
         if (!options_.ini.empty()) {
             files.push_back(options_.ini);
@@ -137,6 +149,9 @@ public:
     void end_values() override { values_.reset(); }
 
     int end() override {
+        if (ring_) {
+            ring_->end();
+        }
         const bool written = journal_.close();
         for (const auto& [thread, lost] : journal_.lost()) {
             write_all(2, fmt::format("{}: thread '{}': {} did not fit the buffer of the journal; "
@@ -148,20 +163,51 @@ public:
                         fmt::format("cannot write '{}': {}; what was written is in '{}'",
                                     options_.journal, journal_.problem(), journal_.where()));
         }
-        write_all(2,
-                  fmt::format("{}: {}\n", options_.journal, counted(journal_.cycles(), "cycle")));
+        if (!ring_) {
+            write_all(
+                2, fmt::format("{}: {}\n", options_.journal, counted(journal_.cycles(), "cycle")));
+            return 0;
+        }
+        const std::string problem = ring_->finish();
+        if (!problem.empty()) {
+            return fail(options_, fmt::format("cannot write '{}': {}; what was written is in '{}'",
+                                              options_.journal, problem, ring_->folder()));
+        }
+        write_all(2, fmt::format("{}: the last {} of {}\n", options_.journal,
+                                 format_duration(static_cast<double>(options_.keep_ns)),
+                                 counted(journal_.cycles(), "cycle")));
         return 0;
     }
 
 private:
+    static std::unique_ptr<JournalRing> ring_of(const RunOptions& options) {
+        return options.keep_ns > 0 ? std::make_unique<JournalRing>(options.journal, options.keep_ns)
+                                   : nullptr;
+    }
+    void note(const std::string& text) const {
+        write_all(2, fmt::format("{}: {}\n", options_.program, text));
+    }
+    void begin_ring(Session& session) {
+        const auto faults = [&session]() -> std::optional<std::uint64_t> {
+            const auto lock = session.try_lock();
+            if (!lock.owns_lock()) return std::nullopt;
+            return session.reports().fault_count();
+        };
+        ring_->begin(journal_, {[this](const std::string& text) { note(text); }, faults});
+        journal_.on_save([this](const std::string& path) { return ring_->save(path); });
+    }
+
     const RunOptions& options_;
+    const std::unique_ptr<JournalRing> ring_;  // nullptr: the journal is kept whole
     ExecutionJournal journal_;
     std::unique_ptr<RecordedValues> values_;
 };
 
 }  // namespace
 
-int run_journaled(const RunOptions& options) {
+int run_journaled(const RunOptions& given) {
+    RunOptions options = given;
+    add_journal_of_netlists(options);
     if (options.journal.empty()) return run_run(options);
     if (!options.journal.ends_with(".mcap")) {
         return fail(options, fmt::format("--journal: unknown format of '{}'; name the file .mcap",
@@ -169,6 +215,11 @@ int run_journaled(const RunOptions& options) {
     }
     if (const std::string problem = mcap::unwritable(options.journal); !problem.empty()) {
         return fail(options, fmt::format("cannot write '{}': {}", options.journal, problem));
+    }
+    if (options.keep_ns > 0 && !options.values.empty()) {
+        return fail(options,
+                    "--journal-keep and --values exclude each other: a journal that begins "
+                    "later has no recorded values");
     }
     FileOfRun journal(options);
     if (const int status = journal.check(); status != 0) return status;

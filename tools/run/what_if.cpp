@@ -49,9 +49,17 @@ std::vector<hal_value*> slots_of(Session& session, bool of_signal, const std::st
 }  // namespace
 
 std::string WhatIf::parse(const ReplayOptions& options) {
-    if (options.edits.empty() && options.at.empty()) return "";
-    if (options.edits.empty()) return "--at needs --edit 'setp NAME VALUE'";
-    if (options.at.empty()) return "--edit needs --at CYCLE|TIME";
+    const bool has_change = !options.edits.empty() || !options.netlist.empty();
+    if (!has_change && options.at.empty()) return "";
+    if (!has_change) return "--at needs --edit 'setp NAME VALUE' or --netlist FILE";
+    if (options.at.empty()) {
+        return fmt::format("{} needs --at CYCLE|TIME",
+                           options.edits.empty() ? "--netlist" : "--edit");
+    }
+    if (!options.netlist.empty()) {
+        const std::string problem = netlist_.read(options.netlist, options.ini);
+        if (!problem.empty()) return "--netlist: " + problem;
+    }
     if (!at_.parse(options.at)) {
         return fmt::format("--at: invalid cycle or time '{}'; write 12000, 3.5s or 250ms",
                            options.at);
@@ -75,8 +83,18 @@ std::string WhatIf::parse(const ReplayOptions& options) {
     return "";
 }
 
-std::string WhatIf::apply(Session& session, const JournaledCycle& newest) {
-    done_ = newest;
+std::string WhatIf::apply(Session& session, ReExecution& execution, const JournalFile& file) {
+    done_ = execution.newest();
+    if (!netlist_.empty()) {
+        const std::size_t entries = execution.progress().entries;
+        const std::string problem =
+            execution.edit_at_rest([&] { return netlist_.apply(session, file, entries); });
+        if (!problem.empty()) return problem;
+    }
+    return set_values(session);
+}
+
+std::string WhatIf::set_values(Session& session) const {
     for (const Assignment& edit : edits_) {
         hal_type type = HAL_TYPE_BIT;
         std::string problem;

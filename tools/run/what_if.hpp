@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// `hal replay --exact FILE --edit 'setp NAME VALUE' --at CYCLE`: the same inputs, another value.
+// `hal replay --exact FILE --edit 'setp NAME VALUE' --at CYCLE`: the same inputs, another value; or
+// another netlist.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +11,7 @@
 #include "journal/journal_file.hpp"
 #include "journal/re_execution.hpp"
 #include "machine/session.hpp"
+#include "run/netlist_change.hpp"
 #include "run/replay.hpp"
 #include "run/stop_rule.hpp"
 
@@ -20,14 +22,17 @@ class WhatIf {
 public:
     /// Returns why --edit or --at is invalid; "" when both are good, or missing.
     std::string parse(const ReplayOptions& options);
-    bool empty() const { return edits_.empty(); }
+    bool empty() const { return edits_.empty() && netlist_.empty(); }
+    /// Returns the netlist that the machine changes to; empty: it stays.
+    const NetlistChange& netlist() const { return netlist_; }
 
     /// Returns true when the values are to be set before the next cycle: once.
     bool is_due(const JournaledCycle& newest, const std::string& fastest) const {
         return !empty() && !done_ && at_.reached(newest, fastest);
     }
-    /// Sets the values, between two cycles. Returns why one cannot be set; "" when all are.
-    std::string apply(Session& session, const JournaledCycle& newest);
+    /// Changes the machine and sets the values, between two cycles; a netlist needs a machine at
+    /// rest. Returns why not; "" when it is done.
+    std::string apply(Session& session, ReExecution& execution, const JournalFile& file);
     bool done() const { return done_.has_value(); }
     /// Returns the newest cycle before the values were set.
     const JournaledCycle& since() const { return *done_; }
@@ -38,7 +43,10 @@ private:
         std::string name;
         std::string value;
     };
+    std::string set_values(Session& session) const;
+
     std::vector<Assignment> edits_;
+    NetlistChange netlist_;
     JournalPosition at_;
     std::optional<JournaledCycle> done_;
 };

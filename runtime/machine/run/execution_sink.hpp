@@ -59,6 +59,8 @@ public:
     /// The transaction that takes effect next has made this call, or opened this file.
     virtual void called(const SetupResults& results) = 0;
     virtual void file_read(const SetupFile& file) = 0;
+    /// Writes what has been recorded so far to a file. Returns why not; "" when it is written.
+    virtual std::string save(const std::string& path) = 0;
     /// An instance has started, and depends on what is outside of the process.
     virtual void opened(const std::string& instance, const std::string& component,
                         const OutsideWorld& outside) = 0;

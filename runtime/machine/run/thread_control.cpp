@@ -36,6 +36,10 @@ bool ThreadControl::start(Diagnostics* diagnostics) {
     return all;
 }
 
+std::vector<plan::Memory> ThreadControl::seen_by_components() const {
+    return state_.executor->seen_by_components();
+}
+
 bool ThreadControl::report_hung(Diagnostics& diagnostics) const {
     bool any = false;
     for (const auto& thread : state_.model.threads) {

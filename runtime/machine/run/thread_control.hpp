@@ -5,7 +5,9 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
+#include "plan/plan.hpp"
 #include "text/source.hpp"
 
 namespace hal {
@@ -30,6 +32,8 @@ public:
     /// Makes the plans of the next edit have the epochs that they had in a journaled machine;
     /// `epoch` is that of the plans before it.
     void continue_after(std::uint64_t epoch);
+    /// Returns the memory of the machine that components read.
+    std::vector<plan::Memory> seen_by_components() const;
     /// Returns true when start() was successful once.
     bool was_started() const { return was_started_; }
     /// Notes a command that lets time pass. Returns true for the first one, whose text is needed

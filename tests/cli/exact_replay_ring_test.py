@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: MIT
+# packages: canopen
+"""Journals that begin later than their machine: hal replay --cut, hal run --journal-keep, journal save."""
+
+import re
+import shutil
+import signal
+import unittest
+
+import exact_replay_test
+from harness import ROOT, SANITIZED, Case, wait_until
+
+AXIS = ROOT / "halfiles" / "canopen-axis"
+
+# Components with memory on the heap: a delay line and a stream of records.
+HEAP = """loadrt threads name1=servo period1=1000000 name2=slow period2=4000000
+loadrt siggen
+loadrt delay names=late depth=100
+loadrt sampler depth=100 cfg=f
+loadrt lowpass names=calm
+loadrt integ names=sum
+addf siggen.0.update servo
+addf late servo
+addf calm servo
+addf sampler.0 servo
+addf sum slow
+net sine siggen.0.sine => late.in
+net delayed late.out => calm.in sampler.0.pin.0
+net smooth calm.out => sum.in
+setp siggen.0.frequency 3
+setp late.cycles 50
+setp calm.gain 0.1
+start
+"""
+
+# The first cycle is a fault.
+FAULT = """newthread servo 1000000 budget=1ns
+loadrt siggen
+addf siggen.0.update servo
+start
+"""
+
+
+@unittest.skipIf(SANITIZED, "a sanitizer has its own operator new")
+class ExactReplayRing(Case):
+    def run_journaled(self, text, *options, name="run.mcap"):
+        return self.start("run", self.write("a.hal", text), "--journal", name, *options)
+
+    def finish(self, machine):
+        out, error = self.end(machine)
+        self.assertEqual(0, machine.returncode, out + error)
+        return error
+
+    def wait_for_cycles(self, count):
+        start = int(self.shell("getp", "servo.threadbeat").stdout)
+        wait_until(
+            lambda: int(self.shell("getp", "servo.threadbeat").stdout) >= start + count,
+            f"{count} cycles",
+        )
+
+    def replay(self, name, *options, status=0):
+        done = self.run_program("replay", "--exact", name, *options)
+        self.assertEqual(status, done.returncode, done.stdout + done.stderr)
+        return done.stdout + done.stderr
+
+    def cut_and_compare(self, show, *until):
+        """Executes the rest from its state, and the whole, to the same end."""
+        text = self.replay("run.mcap", *until, "--cut", "rest.mcap")
+        self.assertIn("\nrest.mcap: the journal from here on", text)
+        rest = self.replay("rest.mcap", "--show", show)
+        whole = self.replay("run.mcap", "--show", show)
+        self.assertRegex(rest, r"\nno difference\n")
+        lines = rest.splitlines()[2:]
+        self.assertEqual(whole.splitlines()[2:], lines)
+        self.assertGreater(len(lines), 0)
+        count = re.compile(r"(?m)^(\d+) cycles")
+        self.assertLess(int(count.search(rest)[1]), int(count.search(whole)[1]) - 100)
+        return rest
+
+    def test_a_journal_is_cut_under_load_and_edits(self):
+        with exact_replay_test.load(2):
+            machine = self.run_journaled(exact_replay_test.MACHINE)
+            lines = exact_replay_test.edits(60, 200)
+            self.run_program("shell", given="\n".join(lines[: len(lines) // 2]) + "\n")
+            self.wait_for_cycles(500)
+            self.run_program("shell", given="\n".join(lines[len(lines) // 2 :]) + "\n")
+            self.wait_for_cycles(500)
+            self.finish(machine)
+        for until in ("0.3s", "0.9s"):
+            self.cut_and_compare("position,sum,total,effort,servo.time", "--until", until)
+        # a rest can be cut again
+        shutil.copy(self.folder / "rest.mcap", self.folder / "run.mcap")
+        self.cut_and_compare("position,sum,total,effort", "--until", "0.2s")
+
+    def test_functions_that_share_state_and_streams_go_on(self):
+        machine = self.run_journaled(exact_replay_test.SHARED)
+        self.wait_for_cycles(1500)
+        self.finish(machine)
+        self.cut_and_compare("turns.position,turns.velocity,speed", "--until", "0.7s")
+
+    def test_heap_memory_of_components_is_in_the_state(self):
+        machine = self.run_journaled(HEAP)
+        self.wait_for_cycles(1500)
+        self.finish(machine)
+        self.cut_and_compare("delayed,smooth,sum.out", "--until", "0.7s")
+
+    def test_a_component_whose_memory_has_grown_is_named(self):
+        shutil.copy(AXIS / "axis.canopen", self.folder)
+        machine = self.run_journaled("""loadrt threads name1=servo period1=1000000
+loadrt canopen config=axis.canopen
+loadrt canopen_drive link=sim:axis id=2
+addf canopen.0.receive servo
+addf canopen.0.transmit servo
+addf canopen-drive.0.update servo
+start
+""")
+        wait_until(
+            lambda: self.shell("getp", "canopen.0.nodes-operational").stdout.strip() == "1",
+            "the node is operational",
+        )
+        self.wait_for_cycles(1000)
+        self.finish(machine)
+        text = self.replay("run.mcap", "--until", "0.9s", "--cut", "rest.mcap", status=1)
+        self.assertIn(
+            "--cut: the state of the machine cannot be written: 'canopen.0' (canopen) has memory that "
+            "it has allocated after its start",
+            text,
+        )
+        self.assertFalse((self.folder / "rest.mcap").exists())
+
+    def test_a_cut_needs_a_moment_and_a_name(self):
+        machine = self.run_journaled(HEAP)
+        self.wait_for_cycles(100)
+        self.finish(machine)
+        for words, problem in [
+            (["--cut", "rest.mcap"], "--cut: name the moment with --until or --break"),
+            (["--cut", "rest.csv", "--until", "9"], "--cut: unknown format of 'rest.csv'"),
+            (["--cut", "rest.mcap", "--until", "9", "--shell"], "--cut: it is for the journal as"),
+            (["--cut", "no/rest.mcap", "--until", "9"], "cannot write 'no/rest.mcap'"),
+        ]:
+            self.assertIn(problem, self.replay("run.mcap", *words, status=1))
+
+    def test_the_last_seconds_are_kept(self):
+        machine = self.run_journaled(exact_replay_test.MACHINE, "--journal-keep", "4s")
+        ring = self.folder / "run.mcap.ring"
+        wait_until(lambda: (ring / "000004.mcap").exists(), "four parts")
+        self.good("shell", "setp", "pid.x.Pgain", "3")
+        wait_until(lambda: not (ring / "000002.mcap").exists(), "the second part was cut")
+        self.good("shell", "setp", "pid.x.Pgain", "2")
+        self.good("shell", "journal", "save", "now.mcap")
+        self.wait_for_cycles(300)
+        error = self.finish(machine)
+        self.assertIn("run.mcap: the last 4 s of ", error)
+        self.assertNotIn("kept whole", error)
+        self.assertFalse(ring.exists())
+        for name in ("now.mcap", "run.mcap"):
+            text = self.replay(name, "--show", "pid.x.Pgain")
+            self.assertIn("\npid.x.Pgain 2\n", text)
+            seconds = float(re.search(r"and ([0-9.]+) s executed", text)[1])
+            self.assertGreater(seconds, 4)
+        self.assertGreater(int(re.search(r"newest: cycle (\d+)", text)[1]), 6000)
+
+    def test_a_killed_machine_leaves_its_ring(self):
+        machine = self.run_journaled(HEAP, "--journal-keep", "4s")
+        ring = self.folder / "run.mcap.ring"
+        wait_until(lambda: (ring / "000003.mcap.part").exists(), "three parts")
+        self.wait_for_cycles(500)
+        machine.send_signal(signal.SIGKILL)
+        machine.wait()
+        self.assertNotIn("first difference", self.replay("run.mcap.ring"))
+        again = self.run_journaled(HEAP, "--journal-keep", "4s")
+        self.wait_for_cycles(10)
+        self.assertIn("is now 'run.mcap.ring.1'", self.finish(again))
+
+    def test_a_fault_writes_the_journal(self):
+        machine = self.run_journaled(FAULT, "--journal-keep", "1min")
+        written = self.folder / "run-fault-1.mcap"
+        wait_until(written.exists, "the file of the fault")
+        self.assertIn(
+            "'run-fault-1.mcap' has the journal up to 2 s after a fault", self.finish(machine)
+        )
+        self.assertNotIn("first difference", self.replay("run-fault-1.mcap"))
+
+    def test_a_line_of_the_netlist_writes_a_journal(self):
+        path = self.write("a.hal", "journal own.mcap keep=5s\n" + HEAP)
+        self.assertEqual(0, self.run_program("check", path).returncode)
+        self.assertEqual(0, self.run_program("sim", path, "--for", "10ms").returncode)
+        machine = self.start("run", path)
+        self.wait_for_cycles(200)
+        self.good("shell", "journal", "save", "now.mcap")
+        self.assertIn("own.mcap: the last 5 s of ", self.finish(machine))
+        for name in ("own.mcap", "now.mcap"):
+            self.assertIn("no difference", self.replay(name))
+        for line, problem in [
+            ("journal own.csv", "'own.csv' is not a valid name of a journal"),
+            ("journal own.mcap keep=0.1s", "'keep=0.1s' is not a valid duration of a journal"),
+            ("journal own.mcap last=5s", "'last=5s' is not a valid duration of a journal"),
+            ("journal save", "journal save needs a file"),
+        ]:
+            self.assertIn(problem, self.bad("check", self.write("b.hal", line + "\n")))
+
+    def test_what_cannot_be_saved_is_named(self):
+        for words, problem in [
+            (["--journal-keep", "4s"], "--journal-keep needs --journal FILE"),
+            (
+                ["--journal", "a.mcap", "--journal-keep", "4s", "--values", "*"],
+                "--journal-keep and --values exclude each other",
+            ),
+        ]:
+            self.assertIn(problem, self.bad("run", self.write("a.hal", HEAP), *words))
+        machine = self.start("run", self.write("a.hal", HEAP))
+        for words, problem in [
+            (["save", "a.mcap"], "'a.mcap' cannot be written: this machine has no journal"),
+            (["save", "a.csv"], "'a.csv' cannot be written: its format is unknown"),
+            (["show", "a.mcap"], "'show' is not a valid name of a journal"),
+        ]:
+            self.assertIn(problem, self.bad("shell", "journal", *words))
+        self.end(machine)
+
+
+if __name__ == "__main__":
+    unittest.main()
