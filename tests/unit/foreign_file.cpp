@@ -29,6 +29,10 @@ TEST_P(ForeignFiles, Are_named_with_the_command_for_them) {
 INSTANTIATE_TEST_SUITE_P(
     Kinds, ForeignFiles,
     testing::Values(
+        Case{"m.hal", "net 123 a.out [2]\n", nullptr, ""},
+        Case{"c.log", "  can0  123   [2]  01 02\n",
+             "'c.log' is not a netlist but the output of candump without times",
+             "record the bus with times, for `hal can dump replay:FILE`: candump -L"},
         Case{"m.hal", "loadrt not\n", nullptr, ""}, Case{"m", "# <xml>\n", nullptr, ""},
         Case{"/dev/stdin", "", nullptr, ""}, Case{"m.hal", "(none)\n", nullptr, ""},
         Case{"a/M.EDS", "[FileInfo]\n",

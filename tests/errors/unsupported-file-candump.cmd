@@ -1,0 +1,1 @@
+hal check unsupported-file-candump.log

@@ -1,0 +1,1 @@
+hal check modbus-value.modbus mesa-value.mesa
