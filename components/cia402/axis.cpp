@@ -442,7 +442,14 @@ void Axis::queue_set_point(const AxisCommand& command, const AxisRules& rules) n
     p.relative = command.relative;
     p.immediate = command.immediate;
     p.blend = command.blend;
-    set_points_.push(p);
+    if (set_points_.push(p)) return;
+    if (p.immediate) {  // the sum of the distances is out of range
+        fail(Cause::bad_command, command.position, 0.0);
+        failure_.request = Request::go;
+    } else {
+        fail(Cause::set_point_lost, Request::go);
+    }
+    active_ = false;
 }
 
 /// Exchanges set-points with the drive in profile position mode.
@@ -451,7 +458,8 @@ void Axis::move_by_set_points(const AxisCommand& command, const AxisRules& rules
     const bool by_set_points = orders_.mode == Mode::profile_position;
     if (!by_set_points || !active_) {
         set_points_.clear();
-        target_reached_ = (in_.statusword & status::target_reached) != 0;
+        const bool is_reached = (in_.statusword & status::target_reached) != 0;
+        target_reached_ = is_reached && !(by_set_points && set_points_.discarded());
     }
     const bool later = enabled_ && !active_;  // during a mode change or homing
     const bool begins = command.go && !was_go_;

@@ -73,6 +73,7 @@ constexpr CauseRow cause_rows[] = {
     {Number::none, "", "the axis is not enabled"},  // not_enabled
     {Number::none, "", "function write-all does not run"},  // unwritten
     {Number::none, "", "function read-all does not run"},  // unread
+    {Number::none, "", "more than 16 set-points queued"},  // set_point_lost
 };
 static_assert(std::size(cause_rows) == causes);
 
@@ -230,9 +231,9 @@ Sentences::Sentences() {
     constexpr unsigned steps = static_cast<unsigned>(Step::fault_reset) + 1;
     for (unsigned r = 0; r <= static_cast<unsigned>(Request::go); ++r) {
         const auto request = static_cast<Request>(r);
-        for (const Cause cause :
-             {Cause::lost, Cause::following_error, Cause::bad_command, Cause::bad_factor,
-              Cause::homing_timeout, Cause::not_enabled, Cause::unwritten, Cause::unread}) {
+        for (const Cause cause : {Cause::lost, Cause::following_error, Cause::bad_command,
+                                  Cause::bad_factor, Cause::homing_timeout, Cause::not_enabled,
+                                  Cause::unwritten, Cause::unread, Cause::set_point_lost}) {
             add(cause, request);
         }
         for (unsigned step = 0; step < steps; ++step) {

@@ -50,8 +50,9 @@ enum class Cause : std::uint8_t {
     not_enabled = 13,     ///< commanded to move while not enabled
     unwritten = 14,       ///< the function that sends the orders does not run
     unread = 15,          ///< the function that reads the feedback does not run
+    set_point_lost = 16,  ///< pp: no space for another set-point
 };
-inline constexpr unsigned causes = 16;
+inline constexpr unsigned causes = 17;
 
 /// A failure, as stored in the cycle.
 struct Failure {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "axis_motion.hpp"
 
+#include <cstdint>
+
 namespace hal::cia402 {
 
 namespace {
@@ -9,12 +11,30 @@ constexpr unsigned settling_cycles = 3;
 }  // namespace
 
 bool SetPoints::push(const SetPoint& p) noexcept {
+    SetPoint added = p;
     if (p.immediate) {
+        if (p.relative && !combine(added)) return false;
         count_ = 0;
     }
     if (count_ == capacity) return false;
-    queue_[(first_ + count_++) % capacity] = p;
-    done_ = false;
+    queue_[(first_ + count_++) % capacity] = added;
+    done_ = discarded_ = false;
+    return true;
+}
+
+/// Adds a relative set-point to those that the drive has not taken yet, which it replaces: the sum
+/// of the distances, from the last absolute one if there is one. Returns false when the sum is out
+/// of range.
+bool SetPoints::combine(SetPoint& p) const noexcept {
+    std::int64_t sum = 0;
+    for (std::size_t i = 0; i < count_; ++i) {
+        const SetPoint& queued = queue_[(first_ + i) % capacity];
+        sum = queued.relative ? sum + queued.target : queued.target;
+        p.relative = p.relative && queued.relative;
+    }
+    sum += p.target;
+    if (sum < INT32_MIN || sum > INT32_MAX) return false;
+    p.target = static_cast<std::int32_t>(sum);
     return true;
 }
 

@@ -22,10 +22,13 @@ class SetPoints {
 public:
     static constexpr std::size_t capacity = 16;
 
-    /// Queues a set-point; an immediate one replaces all queued ones. Returns false when the queue
-    /// is full. [realtime]
+    /// Queues a set-point; an immediate one replaces all queued ones, a relative one by their sum.
+    /// Returns false when the queue is full, or the sum out of range. [realtime]
     bool push(const SetPoint&) noexcept;
+    /// Discards the set-points that are not reached yet: done() is false until a later one is.
+    /// [realtime]
     void clear() noexcept {
+        discarded_ = discarded_ || !done_;
         count_ = 0;
         phase_ = Phase::idle;
         failure_ = {};
@@ -37,7 +40,9 @@ public:
     std::size_t waiting() const noexcept { return count_; }
     /// Returns true when all set-points are passed to the drive and it has reached the last.
     /// [realtime]
-    bool done() const noexcept { return done_; }
+    bool done() const noexcept { return done_ && !discarded_; }
+    /// Returns true after clear() discarded a set-point, until the next push(). [realtime]
+    bool discarded() const noexcept { return discarded_; }
     /// Returns the failure of the handshake; cleared by clear().
     const Failure& failure() const noexcept { return failure_; }
 
@@ -49,6 +54,7 @@ private:
         cycles_ = 0;
     }
     void check(std::uint16_t statusword, Time now, Time limit) noexcept;
+    bool combine(SetPoint&) const noexcept;
 
     std::array<SetPoint, capacity> queue_{};
     std::size_t first_ = 0;
@@ -58,6 +64,7 @@ private:
     Time since_ = 0;
     unsigned cycles_ = 0;
     bool done_ = true;
+    bool discarded_ = false;
     Failure failure_;
 };
 

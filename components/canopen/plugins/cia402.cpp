@@ -47,7 +47,8 @@ struct Cia402 : hal::Component {
                      "until the drive takes them"};
     hal::In<bool> relative{*this, "relative", "pp: the set-point is relative to the previous one"};
     hal::In<bool> immediate{*this, "immediate",
-                            "pp: the set-point replaces the current move at once"};
+                            "pp: the set-point replaces the current move at once; those that the "
+                            "drive has not taken yet are dropped, or added to a relative one"};
     hal::In<bool> blend{*this, "blend",
                         "pp: the drive passes this set-point without stopping if another follows"};
     hal::Limit max_velocity{*this,
@@ -144,9 +145,9 @@ struct Cia402 : hal::Component {
                                      "following-error",
                                      "csp, ip: position sent to the drive - position-fb",
                                      {.finite = true}};
-    hal::Out<bool> target_reached{
-        *this, "target-reached",
-        "pp: all set-points are reached; other modes: target reached bit of the drive"};
+    hal::Out<bool> target_reached{*this, "target-reached",
+                                  "pp: all set-points are reached, and none was discarded by a "
+                                  "stop; other modes: target reached bit of the drive"};
     hal::Out<std::uint32_t> set_points{*this, "set-points",
                                        "pp: set-points queued until the drive takes them"};
     hal::Out<bool> homed{*this, "homed", "homed since the node was last lost"};
@@ -404,7 +405,8 @@ state, one transition per cycle.
   `keeps-power` stays TRUE until the drive is seen without power or is enabled again.
 * When the thread is stopped (`stop`, an exception, a hang, a suspended process), the axis is
   disabled without a fault. When the thread runs again, the axis stays off until `enable` has
-  another rising edge. `reload cia402` acts like such a stop and keeps a fault.
+  another rising edge. An edge while the thread is stopped counts: the axis is enabled when it runs
+  again. `reload cia402` acts like such a stop and keeps a fault.
 * `mode` may change at any time; the command is followed once the drive displays the new mode.
 * `halt` brakes on the drive's ramp in modes 1 to 7. In the cyclic modes the target freezes, or
   drops to 0, at once: bring the command to rest first.
@@ -461,6 +463,7 @@ sends, with the controller of the axis between the two.
 | 13 | `home` or `go` without `enabled` |
 | 14 | `write-all` does not run |
 | 15 | `read-all` does not run |
+| 16 | pp: 16 set-points were queued already; the new one is lost |
 
 `failed-step`: 0 wait, 1 shutdown, 2 switch on, 3 enable operation, 4 disable operation, 5 disable
 voltage, 6 quick stop, 7 fault reset. `state`: 0 not ready to switch on, 1 switch on disabled, 2

@@ -127,6 +127,30 @@ TEST(Axis, Set_points_wait_while_the_drive_has_no_room) {
               text(s.failure()));
 }
 
+TEST(Axis, An_immediate_relative_set_point_adds_those_that_it_replaces) {
+    const auto passed = [](std::initializer_list<SetPoint> points) {
+        SetPoints s;
+        for (const SetPoint& p : points) {
+            EXPECT_TRUE(s.push(p));
+        }
+        EXPECT_EQ(1u, s.waiting());
+        std::int32_t target = 0;
+        const std::uint16_t bits = s.step(0x0237, millisecond, second, target);
+        return std::pair(target, (bits & control::relative) != 0);
+    };
+    const SetPoint by_1{.target = 1, .relative = true, .immediate = true};
+    const SetPoint by_5{.target = 5, .relative = true};
+    const SetPoint to_100{.target = 100};
+    EXPECT_EQ(std::pair(3, true), passed({by_1, by_1, by_1}));
+    EXPECT_EQ(std::pair(6, true), passed({by_5, by_1}));
+    EXPECT_EQ(std::pair(106, false), passed({by_5, to_100, by_5, by_1}));
+    EXPECT_EQ(std::pair(7, false), passed({by_5, {.target = 7, .immediate = true}}));
+    SetPoints far;
+    EXPECT_TRUE(far.push({.target = INT32_MAX, .relative = true}));
+    EXPECT_FALSE(far.push(by_1));
+    EXPECT_EQ(1u, far.waiting());
+}
+
 struct HomingPair : Pair {
     HomingPair() {
         drive.follows = false;
