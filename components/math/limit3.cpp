@@ -110,8 +110,10 @@ struct Limit3 : hal::Component {
                          "enable",
                          "TRUE: out follows in; FALSE: out returns to 0 within the limits",
                          {.initial = true}};
-    hal::In<bool> load{*this, "load",
-                       "TRUE sets out to in immediately, regardless of maxv and maxa"};
+    hal::In<bool> load{
+        *this, "load",
+        "TRUE sets out to in immediately, to 0 while enable is FALSE, regardless of maxv "
+        "and maxa"};
     hal::Limit min{*this, "min", "lowest output", {.initial = -1e20}};
     hal::Limit max{*this, "max", "highest output", {.initial = 1e20}};
     hal::Limit maxv{*this, "maxv", "largest first derivative of out", {.initial = 1e20}};
@@ -165,11 +167,11 @@ private:
     // Keeps the speed of the input for the cycle after load, as far as a stop from it fits between
     // min and max. A step has no speed.
     void carry(double a, double input_speed) noexcept {
-        position_ = std::clamp(input_, low_now_, high_);
+        position_ = std::clamp(enable ? input_ : 0.0, low_now_, high_);
         rest_ = 0.0;
         arrived_ = true;
         speed_ = 0.0;
-        if (position_ == input_ && a > 1.0 / max_magnitude) {
+        if (enable && position_ == input_ && a > 1.0 / max_magnitude) {
             speed_ = std::clamp(input_speed, stopping_speed(low_now_ - position_, a, 1.0),
                                 stopping_speed(high_ - position_, a, 1.0));
         }
@@ -263,9 +265,9 @@ full `maxa` or the full `maxv` until a few cycles before a stop. With `smooth-st
 acceleration fades out over that many cycles: this takes slightly longer and is smoother with a
 jittering input.
 
-`out` starts at 0; `load` sets it to the input. While the input or a limit is NaN its last valid
-value applies; for a limit a fault is raised. If `maxa` is not positive, `out` does not move. If
-`min` is above `max`, `max` applies.
+`out` starts at 0; `load` sets it to the input, or to 0 while `enable` is FALSE. While the input or
+a limit is NaN its last valid value applies; for a limit a fault is raised. If `maxa` is not
+positive, `out` does not move. If `min` is above `max`, `max` applies.
 
 **Differences from LinuxCNC:** acceleration and cruising are the same. Halcyon's `limit3` stops with
 `maxa` exactly at the target (LinuxCNC halves the remaining distance in each of about 30 last
