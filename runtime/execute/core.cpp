@@ -88,7 +88,7 @@ bool reads_other_channels(const CycleInputs* inputs, const plan::Plan& plan) noe
 }
 
 /// values that the checksum of one cycle covers
-constexpr std::size_t checked_values = 256;
+constexpr std::size_t checked_values = 64;
 }  // namespace
 
 Core* Core::current() noexcept { return current_core; }
