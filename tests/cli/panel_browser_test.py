@@ -254,6 +254,20 @@ class Views(Page):
         self.assertEqual((-1, 1, 1), (low, high, rms))
         self.assertAlmostEqual(1, mean**2 + deviation**2, places=2)
 
+    def test_the_scope_shows_the_spectrum_of_the_selected_channel(self):
+        self.begin(view="scope?ch=sine:0.5:0&base=0.2&spectrum=1")
+        self.browser.wait("window.halcyonScope?.rows > 2200")
+        peak = self.browser.wait("halcyonScope.peak")
+        self.assertAlmostEqual(5, peak["frequency"], delta=0.1)
+        self.assertAlmostEqual(1, peak["amplitude"], delta=0.05)
+        shown = "getComputedStyle(document.querySelector('.spectrum')).display"
+        self.assertEqual("block", self.browser.evaluate(shown))
+        self.browser.evaluate(
+            "[...document.querySelectorAll('button')].find(b => b.textContent === 'Spectrum').click()"
+        )
+        self.assertEqual("none", self.browser.evaluate(shown))
+        self.assertNotIn("spectrum", self.browser.evaluate("location.hash + location.search"))
+
     def test_a_stopped_machine_looks_stopped(self):
         self.begin(view="scope?ch=sine&base=0.1")
         self.browser.wait("window.halcyonScope?.rows > 50")

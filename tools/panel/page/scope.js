@@ -10,6 +10,8 @@ import {Store, Trigger, measure, valueAt} from './scope_data.js';
 import {csv, download} from './scope_export.js';
 import {Labels, write} from './scope_labels.js';
 import {Picture} from './scope_picture.js';
+import {spectrum} from './scope_spectrum.js';
+import {SpectrumPane} from './scope_spectrum_pane.js';
 import {stepResponse} from './scope_step.js';
 import {remember} from './place.js';
 import {nice} from './widget_values.js';
@@ -79,6 +81,7 @@ export class View {
         this.level = Number(query.get('level')) || 0;
         this.useCursors = query.get('cursors') === '1';
         this.useSteps = query.get('step') === '1';
+        this.useSpectrum = query.get('spectrum') === '1';
         this.cursors = [.3, .7];
         this.selected = 0;
         this.dragging = null;  // 'move', or the number of a cursor
@@ -110,6 +113,7 @@ export class View {
         this.since = performance.now();
 
         this.makeControls();
+        this.spectrumPane = new SpectrumPane();
         this.table = h('tbody');
         this.canvas = h('canvas', {
             tabindex: 0,
@@ -124,21 +128,23 @@ export class View {
                 h('tr', {}, columns.map(([title, kind]) => h('th', {class: kind}, title)),
                   h('th', {}, h('span', {class: 'unseen'}, 'Remove')))),
               this.table);
-        main.append(h(
-            'div', {class: 'column'},
-            h('div', {class: 'bar'}, this.add, this.names, this.timeBase, this.modes,
-              this.triggerSource, this.edges, h('label', {class: 'tied'}, 'at', this.levelInput),
-              this.stop, h('button', {onclick: () => this.autoscale()}, 'Auto scale'),
-              this.cursorButton, this.stepButton,
-              h('button', {onclick: () => this.saveTable()}, 'CSV'),
-              h('button', {onclick: () => this.savePicture()}, 'PNG'), this.status, this.problem),
-            h('div', {class: 'fill high'}, this.canvas), h('div', {class: 'scroll'}, this.whole)));
+        main.append(
+            h('div', {class: 'column'},
+              h('div', {class: 'bar'}, this.add, this.names, this.timeBase, this.modes,
+                this.triggerSource, this.edges, h('label', {class: 'tied'}, 'at', this.levelInput),
+                this.stop, h('button', {onclick: () => this.autoscale()}, 'Auto scale'),
+                this.cursorButton, this.stepButton, this.spectrumButton,
+                h('button', {onclick: () => this.saveTable()}, 'CSV'),
+                h('button', {onclick: () => this.savePicture()}, 'PNG'), this.status, this.problem),
+              h('div', {class: 'fill high'}, this.canvas), this.spectrumPane.element,
+              h('div', {class: 'scroll'}, this.whole)));
         this.surface = surface(
             this.canvas,
             (context, width, height, ratio) => this.paint(context, width, height, ratio), true);
         this.listen();
         this.suggest();
         this.showCursors();
+        this.showSpectrum();
         this.drawChannels();
         this.redraw = () => this.drawChannels();
         dark.addEventListener('change', this.redraw);
@@ -163,6 +169,7 @@ export class View {
         this.subscriptions.forEach(unsubscribe => unsubscribe());
         this.stopFollowing();
         this.surface.end();
+        this.spectrumPane.end();
     }
 
     makeControls() {
@@ -208,6 +215,14 @@ export class View {
                 onclick: () => this.toggleSteps()
             },
               'Step');
+        this.spectrumButton =
+            h('button', {
+                'aria-pressed': String(this.useSpectrum),
+                title: 'Amplitude spectrum of the selected channel, between the cursors or over ' +
+                    'the whole picture',
+                onclick: () => this.toggleSpectrum()
+            },
+              'Spectrum');
         this.problem = h('span', {class: 'bad', id: 'scope-problem', role: 'status'});
         this.status = h('span', {class: 'dim', id: 'scope-status'});
     }
@@ -236,6 +251,30 @@ export class View {
         this.stepButton.setAttribute('aria-pressed', String(this.useSteps));
         this.showCursors();
         this.save();
+    }
+
+    toggleSpectrum() {
+        this.useSpectrum = !this.useSpectrum;
+        this.spectrumButton.setAttribute('aria-pressed', String(this.useSpectrum));
+        this.showSpectrum();
+        this.save();
+    }
+
+    showSpectrum() {
+        this.spectrumPane.element.hidden = !this.useSpectrum;
+        this.measureSpectrum();
+    }
+
+    /// The spectrum of the selected channel, between the cursors if there are any.
+    measureSpectrum() {
+        const channel = this.channels[this.selected];
+        if (!this.useSpectrum || !channel) return null;
+        const [from, to] = this.range(),
+                     times = this.cursors.map(at => from + (to - from) * at).sort((a, b) => a - b),
+                     [begin, end] = this.useCursors ? times : [from, to];
+        const found = spectrum(this.store, channel.name, begin, end);
+        this.spectrumPane.show(found, channel.name, channel.unit, paint(this.selected));
+        return found?.peak ?? null;
     }
 
     showCursors() {
@@ -272,7 +311,8 @@ export class View {
             edge: this.edge,
             level: this.level,
             cursors: this.useCursors ? '1' : '',
-            step: this.useSteps ? '1' : ''
+            step: this.useSteps ? '1' : '',
+            spectrum: this.useSpectrum ? '1' : ''
         });
         this.draw();
     }
@@ -661,6 +701,7 @@ export class View {
             store,
             range: this.range(),
             notice: this.notice(),
+            peak: this.measureSpectrum(),
             faults: this.faults(),
             stops: this.stops.map(({from, to}) => ({from, to: to === Infinity ? null : to}))
         };
