@@ -7,6 +7,7 @@
 #include <functional>
 #include <link.h>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <new>
 #include <string_view>
@@ -196,7 +197,11 @@ bool hal::heap_blocks::track() {
     void* const memory = std::malloc(sizeof(HeapTable));
     if (!memory) return false;
     table.store(::new (memory) HeapTable, std::memory_order_release);  // for good
-    return true;
+    // a program with an `operator new` of its own does not use the ones below
+    const std::unique_ptr<char> probe(new char);
+    if (find(probe.get())) return true;
+    table.store(nullptr, std::memory_order_release);
+    return false;
 }
 
 namespace {
@@ -226,14 +231,14 @@ void release(void* memory) noexcept {
 
 }  // namespace
 
-// The other forms of the library call these.
+// The other forms of the library call these. Weak: a program may have its own.
 
-void* operator new(std::size_t bytes) {
+[[gnu::weak]] void* operator new(std::size_t bytes) {
     return allocated(bytes, __builtin_return_address(0),
                      [bytes] { return std::malloc(std::max<std::size_t>(bytes, 1)); });
 }
 
-void* operator new(std::size_t bytes, std::align_val_t alignment) {
+[[gnu::weak]] void* operator new(std::size_t bytes, std::align_val_t alignment) {
     const auto boundary = static_cast<std::size_t>(alignment);
     const std::size_t whole =
         (std::max<std::size_t>(bytes, 1) + boundary - 1) / boundary * boundary;
@@ -241,9 +246,11 @@ void* operator new(std::size_t bytes, std::align_val_t alignment) {
                      [=] { return std::aligned_alloc(boundary, whole); });
 }
 
-void operator delete(void* memory) noexcept { release(memory); }
-void operator delete(void* memory, std::size_t) noexcept { release(memory); }
-void operator delete(void* memory, std::align_val_t) noexcept { release(memory); }
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { release(memory); }
+[[gnu::weak]] void operator delete(void* memory) noexcept { release(memory); }
+[[gnu::weak]] void operator delete(void* memory, std::size_t) noexcept { release(memory); }
+[[gnu::weak]] void operator delete(void* memory, std::align_val_t) noexcept { release(memory); }
+[[gnu::weak]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+    release(memory);
+}
 
 #endif
