@@ -2,6 +2,7 @@
 #include <optional>
 
 #include "hal/component.hpp"
+#include "hal/retained.hpp"
 #include "stream_columns.hpp"
 
 namespace {
@@ -36,8 +37,10 @@ struct Sampler : hal::Component {
         *this, "curr-depth", "records in the FIFO; depth if the record of this cycle is lost"};
     hal::Out<bool> full{*this, "full",
                         "TRUE: the FIFO was full, and the record of this cycle is lost"};
-    hal::Io<std::int32_t> overruns{*this, "overruns",
-                                   "records lost because the FIFO was full; may be set"};
+    hal::Io<std::int32_t> overruns{
+        *this, "overruns",
+        "records lost because the FIFO was full, or reloaded with records in it; may be "
+        "set"};
     hal::Io<std::int32_t> sample_number{*this, "sample-num",
                                         "number of the next record; may be set"};
 
@@ -54,6 +57,9 @@ struct Sampler : hal::Component {
         hal_stream& fifo = columns.fifo();
         const std::uint64_t head = fifo.head;
         const std::uint64_t count = columns.samples();
+        if (head == 0 && fifo.lost == 0) {
+            count_discarded(fifo);
+        }
         std::uint64_t held = head - __atomic_load_n(&fifo.tail, __ATOMIC_ACQUIRE);
         const bool no_space = held + count > fifo.depth;
         const bool wanted = enable && is_new();
@@ -62,6 +68,7 @@ struct Sampler : hal::Component {
             __atomic_store_n(&fifo.head, head + count, __ATOMIC_RELEASE);
             sample_number = later(sample_number, count);
             held += count;
+            held_ = held;
         } else if (wanted) {
             overruns = later(overruns, count);
             __atomic_store_n(&fifo.lost, fifo.lost + count, __ATOMIC_RELAXED);
@@ -79,6 +86,14 @@ private:
             "when the first sample was taken, on the clock of the machine; 0: at the start of the "
             "cycle. A cycle with the time of the cycle before it writes no record",
             hal::PinOptions<std::int64_t>{.unit = "ns"});
+    }
+
+    /// A reload begins with an empty FIFO: the records that were in the one before it are lost.
+    void count_discarded(hal_stream& fifo) noexcept {
+        if (held_ == 0) return;
+        overruns = later(overruns, held_);
+        __atomic_store_n(&fifo.lost, held_, __ATOMIC_RELAXED);
+        held_ = 0;
     }
 
     static std::int32_t later(std::int32_t number, std::uint64_t count) noexcept {
@@ -110,6 +125,8 @@ private:
     }
 
     std::int64_t last_time_ns_ = 0;
+    std::uint64_t held_ = 0;  // records in the FIFO, after the last one that was written
+    hal::Retained retained_{*this, {{"held", held_}}};
 };
 
 }  // namespace
@@ -118,8 +135,8 @@ HAL_COMPONENT(Sampler, "sampler", "Records pins into a FIFO for external program
 In each cycle in which `enable` is TRUE, the values of all pins are written to the FIFO with a
 sequence number. `hal record` and LinuxCNC-style `halsampler` read it while the machine runs. A FIFO
 of `depth=N` holds N - 1 records. If it is full, the new record is lost, never an old one:
-`overruns` counts it, and `hal record` prints `overrun` at this place; the numbers have no gap. The
-number of pins is not limited.
+`overruns` counts it, and the records that a `reload` of the component discards, and `hal record`
+prints `overrun` at this place; the numbers have no gap. The number of pins is not limited.
 
 With both arguments, there are as many instances as the shorter list has values:
 `depth=100,50 cfg=ff,b` makes `sampler.0` and `sampler.1`, `depth=100 cfg=ff,b` only `sampler.0`, as
