@@ -221,7 +221,8 @@ The netlist puts both on a line in memory:
     addf modbus.0.transmit servo-thread
 
 On the virtual clock the line works once in each cycle of the fastest thread: a telegram takes at
-least two of them.
+least two of them. The slaves answer also while `modbus-node.0` is in no thread, or stopped: then
+their pins stand, and the registers keep their values.
 
 What the master reads is an input pin here, and what it writes is an output pin. The inputs
 `silence`, `late`, `corrupt`, `wrong-unit`, `exception` and `half` make the faults of a slave.
