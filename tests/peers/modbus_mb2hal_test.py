@@ -129,7 +129,7 @@ def exchanged(machine, step):
     """The values of all pins that are read, after inputs were set."""
     for name, values in INPUTS.items():
         machine.shell("setp", f"mb2hal.{name}", values[step])
-    # a marker, behind which all values are new: the torque comes back last of all registers
+    # a marker, behind which all values are new: the torque is read as the last of all registers
     read = [name for name, (_, direction) in machine.pins().items() if direction == "OUT"]
     last = {}
 
