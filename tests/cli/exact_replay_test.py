@@ -310,6 +310,24 @@ class ExactReplay(Case):
             self.shell_in_the_past(["continue"], "--break", "wheel > 3")[0],
         )
 
+        self.assertIn(
+            "break: the machine has no 'wheel' in this cycle",
+            self.shell_in_the_past(["goto 0.1s", "break wheel > 3"])[0],
+        )
+        self.assertIn(
+            "break: the machine has no 'wheel'",
+            self.shell_in_the_past(["goto 0.1s", "break wheel > 3", "reverse"])[0],
+        )
+
+    def test_the_journal_of_an_earlier_run_is_kept(self):
+        for _ in range(3):
+            machine = self.run_journaled(MACHINE)
+            self.wait_for_cycles(100)
+            self.finish(machine)
+        journals = sorted(path.name for path in self.folder.glob("*.mcap"))
+        self.assertEqual(2, len(journals), journals)
+        self.assertTrue(journals[0].endswith("-previous.mcap"), journals)
+
     def test_another_value_changes_what_follows(self):
         machine = self.run_journaled(MACHINE, "--values", "*")
         self.wait_for_cycles(800)

@@ -45,7 +45,9 @@ struct ReplayOptions : NetlistOptions {
         set.flag("--exact", exact,
                  "execute the journal of hal run --journal again, cycle by cycle, and compare");
         set.value("--until", until, "CYCLE|TIME",
-                  "with --exact: stop after this cycle of the fastest thread, or this time");
+                  "with --exact: stop after this cycle of the fastest thread, or after the first "
+                  "cycle at "
+                  "this time or later");
         set.value("--break", break_condition, "CONDITION",
                   "with --exact: stop after the first cycle with 'NAME > VALUE' (< >= <= == !=)");
         set.values("--show", show, "NAMES",

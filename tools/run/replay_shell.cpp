@@ -211,7 +211,9 @@ int ReplayShell::set_break(Words words) {
             fmt::format("break: invalid condition '{}'; {}", text, ValueCondition::form));
     }
     condition_ = text;
-    return 0;
+    if (text.empty()) return 0;
+    errand.kind = Errand::Kind::check;
+    return send(errand);
 }
 
 int ReplayShell::where(Words) { return send({}); }

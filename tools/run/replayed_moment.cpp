@@ -94,6 +94,7 @@ void ReplayedMoment::carry_out(Errand errand) {
         break;
     case Errand::Kind::search: search(errand); break;
     case Errand::Kind::position: go_to(errand); break;
+    case Errand::Kind::check: check(condition); break;
     default: tell();
     }
 }
@@ -220,6 +221,9 @@ void ReplayedMoment::search(const Errand& errand) {
         return seek(found[found.size() - errand.count], errand.condition);
     }
     if (begin == 0) {
+        if (condition.is_unknown(machine_.session())) {
+            print(fmt::format("break: the machine has no '{}'\n", condition.name()));
+        }
         print(condition.empty() ? "no earlier cycle of this thread\n"
                                 : "the condition begins to hold in no earlier cycle\n");
         return seek(0);
@@ -245,6 +249,15 @@ void ReplayedMoment::go_to(const Errand& errand) {
     if (!resumed_) {
         tell();
     }
+}
+
+/// A name that is unknown now may be that of an instance that is loaded later; before the first
+/// cycle nothing is loaded.
+void ReplayedMoment::check(const ValueCondition& condition) {
+    if (cycles() != 0 && condition.is_unknown(machine_.session())) {
+        print(fmt::format("break: the machine has no '{}' in this cycle\n", condition.name()));
+    }
+    answer(0);
 }
 
 // --- what is printed ---

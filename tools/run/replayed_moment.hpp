@@ -25,6 +25,7 @@ struct Errand {
         back,  ///< the same, before the present cycle
         position,  ///< to `text`: a cycle or a time
         where,  ///< print the position
+        check,  ///< report a missing name in `condition`
         command,  ///< execute `text` in the shell
         complete,  ///< answer the candidates for `text` at byte `count`
     };
@@ -56,6 +57,7 @@ private:
     void search(const Errand& errand);
     void go_to(const Errand& errand);
     void complete(const Errand& errand);
+    void check(const ValueCondition& condition);
     int execute(const std::string& line);
     bool next();
     void keep();

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <filesystem>
 #include <fmt/core.h>
 #include <memory>
 #include <optional>
@@ -114,6 +115,7 @@ public:
             write_all(2, fmt::format("{}: the unfinished journal of an earlier run is now '{}'\n",
                                      options_.program, journal_.kept()));
         }
+        keep_previous();
         return 0;
     }
 
@@ -195,6 +197,23 @@ private:
         };
         ring_->begin(journal_, {[this](const std::string& text) { note(text); }, faults});
         journal_.on_save([this](const std::string& path) { return ring_->save(path); });
+    }
+    /// The complete journal of an earlier run is kept, one of them: a machine that starts again
+    /// after a fault must not replace what happened before it.
+    void keep_previous() const {
+        const std::filesystem::path path = options_.journal;
+        std::error_code error;
+        if (!std::filesystem::is_regular_file(std::filesystem::symlink_status(path, error))) return;
+        std::filesystem::path previous = path;
+        previous.replace_filename(path.stem().string() + "-previous.mcap");
+        std::filesystem::rename(path, previous, error);
+        const std::string result =
+            error ? fmt::format(
+                        "'{}' of an earlier run is replaced at the end of this one, because "
+                        "it cannot be renamed: {}",
+                        options_.journal, error.message())
+                  : fmt::format("the journal of an earlier run is now '{}'", previous.string());
+        write_all(2, fmt::format("{}: {}\n", options_.program, result));
     }
 
     const RunOptions& options_;
