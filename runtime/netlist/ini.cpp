@@ -46,6 +46,11 @@ public:
                                           "this is not a text file", "a control character",
                                           "an INI file is plain text in UTF-8");
             }
+            if (const auto at = reader.carriage_return()) {
+                return diagnostics_.error("lone-carriage-return", line.span(*at, *at + 1),
+                                          "carriage return without a line feed", "",
+                                          line_ends_help);
+            }
             entry(line, path, depth);
         }
     }

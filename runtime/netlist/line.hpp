@@ -49,6 +49,10 @@ private:
     mutable std::size_t last_piece_ = 0;  ///< places are asked for in rising order
 };
 
+/// Help for a carriage return that ends no line.
+inline constexpr const char* line_ends_help =
+    "end lines with LF (or CR LF); `tr '\\r' '\\n'` converts a file with CR line endings";
+
 /// The logical lines of a source, in order.
 class LineReader {
 public:

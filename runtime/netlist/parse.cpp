@@ -104,9 +104,7 @@ private:
         if (const auto at = reader_.carriage_return()) {
             if (!carriage_return_said_) {
                 error("lone-carriage-return", line_.span(*at, *at + 1),
-                      "carriage return without a line feed", "",
-                      "end lines with LF (or CR LF); `tr '\\r' '\\n'` converts a file with CR line "
-                      "endings");
+                      "carriage return without a line feed", "", line_ends_help);
             }
             carriage_return_said_ = true;
             return false;

@@ -325,7 +325,7 @@ inline constexpr CodePage code_pages[] = {
      "tune."},
     {"lone-carriage-return",
      "A line contains a carriage return that is not at its end. An editor may show such a line as "
-     "several lines, but for the netlist "
+     "several lines, but for the netlist or the INI file "
      "it is one, so it is rejected. Further lines with the same error are not listed.\n\n"
      "`tr '\\r' '\\n' < OLD > NEW` converts a file whose lines end in CR only."},
     {"matrix-text",
@@ -610,6 +610,13 @@ inline constexpr CodePage code_pages[] = {
      "`hal run FILE --node NAME` loads one part. `hal check FILE` checks all of them, `hal sim "
      "FILE` runs them together in one "
      "process."},
+    {"short-list",
+     "An argument with a value per instance lists fewer values than there are instances. Those "
+     "beyond "
+     "the end of the list have the default, as the arrays of LinuxCNC's components do: `loadrt "
+     "can_receive names=a,b id=0x101` gives `b` the identifier of the default. List a value for "
+     "each "
+     "instance if that is not what you mean."},
     {"signal-named-like-pin",
      "net takes the name of the signal first, then pins. The first name is the name of a pin, so "
      "the signal name is probably missing.\n\n"

@@ -366,6 +366,7 @@ public:
             if (!total) {
                 total = declared_count(c);
             }
+            note_short_lists(c, *total);
             if (*total > 1) {
                 if (!given) {
                     new_block(*total - 1);
@@ -435,6 +436,21 @@ private:
                                std::to_string(first.list_length) + " values for " +
                                counted(total, "instance"));
         return false;
+    }
+
+    /// The instances beyond the end of a list have the default, as in LinuxCNC's arrays.
+    void note_short_lists(const Construction& first, std::size_t total) {
+        for (const auto& [name, list] : first.lists) {
+            const auto given = request_.arguments.find(name);
+            if (list.length >= total || given == request_.arguments.end()) continue;
+            const std::string others =
+                list.fallback.empty() ? "no value" : "the default, " + list.fallback;
+            diagnostics_.note("short-list", given->second.at,
+                              "argument '" + name + "' lists " + counted(list.length, "value") +
+                                  " for " + counted(total, "instance") + "; the others have " +
+                                  others,
+                              "", "list a value for each instance: " + name + "=VALUE,VALUE,...");
+        }
     }
 
     Model& model_;

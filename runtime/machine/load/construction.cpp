@@ -122,6 +122,7 @@ const char* find_argument(const hal_host* host, const hal_argument_decl* decl) {
     const auto elements = split(given->second.value, ',');
     c.uses[decl->name] = LoadArgument::Use::per_instance;
     note_list(c, decl->name, elements.size());
+    c.lists[decl->name] = {elements.size(), decl->fallback ? decl->fallback : ""};
     if (c.number >= elements.size()) return decl->fallback;
     c.texts.push_back(elements[c.number]);
     return c.texts.back().c_str();

@@ -35,6 +35,12 @@ struct DeclaredFunction {
     bool required;
 };
 
+/// How many values a list has, and what an instance beyond them gets.
+struct ShortList {
+    std::size_t length = 0;
+    std::string fallback;
+};
+
 /// What one constructor declares while it runs.
 struct Construction {
     Model& model;
@@ -49,6 +55,7 @@ struct Construction {
     std::size_t list_length = 0;         // of the longest list among them
     std::string max_list = {};       // its argument
     std::map<std::string, LoadArgument::Use> uses = {};  // of those that are not common
+    std::map<std::string, ShortList> lists = {};  // of arguments with a value per instance
     std::size_t declared_count = 0;  ///< instances by hal_naming::count; precedes the lists
     std::vector<std::string> texts = {};  // keeps what argument() gave
     Failure failure = {};

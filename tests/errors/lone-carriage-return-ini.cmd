@@ -1,0 +1,1 @@
+hal check --ini lone-carriage-return-ini.ini lone-carriage-return-ini.hal
