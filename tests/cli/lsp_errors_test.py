@@ -54,7 +54,7 @@ def tests():
             continue
         words = ["check", expected.with_suffix(".hal").name]
         if command.exists():
-            words = shlex.split(command.read_text())[1:]
+            words = shlex.split(command.read_text(), comments=True)[1:]
         if words[0] == "check" and not {"--linuxcnc", "--deterministic"} & set(words):
             yield expected, words[1:]
 

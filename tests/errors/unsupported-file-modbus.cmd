@@ -1,1 +1,0 @@
-hal check modbus-value.modbus mesa-value.mesa
