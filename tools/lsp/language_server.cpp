@@ -147,7 +147,7 @@ void LanguageServer::notify(const char* method, Json params) {
 }
 
 int LanguageServer::idle_ms() const {
-    if (unpublished_ || workspace_.has_work() || workspace_.has_garbage()) return 0;
+    if (unpublished_ || workspace_.has_work()) return 0;
     return can_refresh_hints_ && features_.has_hints() ? refresh_ms : -1;
 }
 
@@ -155,8 +155,6 @@ void LanguageServer::work() {
     if (unpublished_ || workspace_.has_work()) {
         workspace_.work();
         publish();
-    } else if (workspace_.has_garbage()) {
-        workspace_.clean_up();
     } else {
         refresh_hints();
     }

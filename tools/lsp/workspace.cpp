@@ -216,8 +216,11 @@ void Workspace::work() {
 }
 
 void Workspace::load(const NetlistRoot& root, Netlist& netlist) {
-    replaced_.push_back(
-        {std::move(netlist.checked), std::move(netlist.tolerant), std::move(netlist.index), false});
+    // The old model is freed first, so that the new one takes its memory in order. Beside the old
+    // one it would be scattered over what was freed before, and take half as long again.
+    netlist.index.reset();
+    netlist.tolerant.reset();
+    netlist.checked.reset();
     netlist.checked = std::make_unique<CheckedNetlist>(root);
     netlist.changed = false;
     update_roots();

@@ -53,11 +53,8 @@ public:
 
     /// True while a netlist has changed since it was loaded.
     bool has_work() const;
-    /// Loads one such netlist. What it replaces is kept until clean_up(), because freeing the model
-    /// of a large netlist takes as long as half of loading it.
+    /// Loads one such netlist.
     void work();
-    bool has_garbage() const { return !replaced_.empty(); }
-    void clean_up() { replaced_.clear(); }
     /// Returns the diagnostics of all netlists by path. Each open document has an entry.
     std::map<std::string, std::vector<FileDiagnostic>> diagnostics() const;
 
@@ -87,7 +84,6 @@ private:
     std::map<std::string, NetlistRoot> static_roots_;  // by path: of find_root()
     std::map<std::string, NetlistRoot> roots_;  // by path
     std::map<NetlistRoot, Netlist> netlists_;
-    std::vector<Netlist> replaced_;
     std::string ini_;
     std::vector<std::string> assumed_;
     std::string last_changed_;
