@@ -98,6 +98,8 @@ ExecutionJournal::FastestThread ExecutionJournal::continue_in(const std::string&
 void ExecutionJournal::flush() {
     const std::scoped_lock own(mutex_);
     for (const auto& thread : threads_) {
+        thread->inputs->take(thread->words);
+        encode(*thread);
         write_batch(*thread);
     }
     writer_->flush();

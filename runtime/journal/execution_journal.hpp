@@ -82,7 +82,7 @@ public:
     };
     /// Completes the file and continues in another one. [any]
     FastestThread continue_in(const std::string& path);
-    /// Writes what has been taken from the threads so far to the disk. [any]
+    /// Writes what the threads have recorded so far to the disk. [any]
     void flush();
     std::int64_t unix_offset_ns() const { return unix_offset_ns_; }
 

@@ -147,6 +147,7 @@ start
         self.good("shell", "setp", "pid.x.Pgain", "3")
         wait_until(lambda: not (ring / "000002.mcap").exists(), "the second part was cut")
         self.good("shell", "setp", "pid.x.Pgain", "2")
+        self.wait_for_cycles(100)
         self.good("shell", "journal", "save", "now.mcap")
         self.wait_for_cycles(300)
         error = self.finish(machine)
