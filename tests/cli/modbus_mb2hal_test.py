@@ -152,7 +152,7 @@ class Mb2hal(Case):
         self.shell("setp", "shop.command.00.float", "1e300")
         wait_until(lambda: self.pin(back) == "65535", "the limit again")
         self.shell("setp", "shop.command.00.float", "nan")
-        self.shell("setp", "shop.command.00.int", "5")  # nothing is written while one is no number
+        self.shell("setp", "shop.command.00.int", "5")  # nothing is written while one is invalid
         self.shell("setp", "shop.04.pump.bit", "TRUE")
         wait_until(lambda: self.pin("shop.coils.01.bit") == "TRUE", "the pump")
         self.assertEqual("65535", self.pin(back))
