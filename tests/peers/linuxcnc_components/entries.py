@@ -26,6 +26,7 @@ inventory(
 inventory(
     "watchdog", "tripped-by", "the number of the input that timed out", "missing", "an addition"
 )
+inventory("estop_latch", "reason", "what tripped the latch", "missing", "an addition")
 
 behaviour(
     "wcomp",
