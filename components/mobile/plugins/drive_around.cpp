@@ -182,8 +182,6 @@ private:
     double choose(double wanted, double left) noexcept {
         const double before = std::remainder(last_ - go.heading, 2 * pi);
         if (is_free(wanted, left)) {
-            // Around a convex obstacle: the direct way counts as free when the old direction agrees
-            // with it.
             avoiding = false;
             blocked = false;
             direction = wanted;

@@ -34,6 +34,14 @@ TEST(CanopenConfig, a_TPDO_can_be_requested) {
               "10ms or 0.5s");
 }
 
+TEST(CanopenConfig, a_PDO_is_not_assigned_the_identifier_of_the_SYNC) {
+    const std::string node = "[node 5 x]\ndevice = cia402\ntpdo5 = statusword\n";
+    const auto usual = good("[bus]\nsync = cycle\n" + node);
+    EXPECT_EQ(find(usual.nodes[0], false, 5)->cob, 0x181U);
+    const auto moved = good("[bus]\nsync = cycle\nsync-cob-id = 0x181\n" + node);
+    EXPECT_EQ(find(moved.nodes[0], false, 5)->cob, 0x182U);
+}
+
 TEST(CanopenConfig, a_multiplexed_PDO_carries_its_objects_one_at_a_time) {
     const auto c = good(
         "[bus]\nsync = cycle\n[node 3 panel]\ndevice = cia401\ntpdo2 = mpdo read-inputs-1, "

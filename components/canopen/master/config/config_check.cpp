@@ -50,7 +50,7 @@ std::string why_not_shared(const Pdo& a, const Pdo& b) {
 }  // namespace
 
 void assign_identifiers(MasterConfig& config, Report& report) {
-    std::set<std::uint32_t> taken;
+    std::set<std::uint32_t> taken{cob_id(config.sync_cob)};
     for (const Node& n : config.nodes) {
         for (unsigned k = 0; k < 8; ++k) {
             taken.insert(0x180 + 0x80 * k + n.setup.id);

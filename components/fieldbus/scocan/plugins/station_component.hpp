@@ -211,8 +211,8 @@ protected:
         begin(fault_, fault->text, fault->detail(value));
     }
 
-    /// Claims the clock of the threads. Last in start(): a claim is not given back when the start
-    /// fails. [setup]
+    /// Claims the clock of the threads. In start() behind what can fail: a claim is not given back.
+    /// [setup]
     void claim_clock() {
         if (arguments_.follow == 0) return;
         try {
