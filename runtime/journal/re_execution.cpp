@@ -342,7 +342,10 @@ std::string ReExecution::edit_at_rest(const std::function<std::string()>& edit) 
         kept.emplace_back(*core);
     }
     catches_up_ = true;
-    session_->threads().continue_after(0);  // epochs that no later edit of the journal has
+    // epochs that no edit of the journal has, nor an earlier one at rest: a thread that had taken
+    // one of this number would count as one that has taken the new plan
+    session_->threads().continue_after(epoch_at_rest_);
+    epoch_at_rest_ += std::uint64_t{1} << 32;
     std::string problem = edit();
     while (catch_up()) {
     }

@@ -160,6 +160,7 @@ private:
     bool finished_ = false;
     bool begun_ = false;
     bool catches_up_ = false;  // executes the edits before the state, without cycles
+    std::uint64_t epoch_at_rest_ = std::uint64_t{1} << 62;  // of the plans of the next edit at rest
     bool outside_ = false;
     bool accepts_differences_ = false;
     std::optional<JournaledCycle> diverged_;
