@@ -85,8 +85,8 @@ private:
 }  // namespace
 
 HAL_COMPONENT(Streamer, "streamer", "Plays records that external programs write to a FIFO", R"(
-In each cycle in which a record is due, the next one is copied from the FIFO to the pins; if there
-is none, the pins are held and `underruns` increases. `clock-mode` selects when a record is due: 0
+In each cycle in which a record is due, the next one is copied from the FIFO to the pins. If the FIFO
+is empty, the pins keep their values and `underruns` increases. `clock-mode` selects when a record is due: 0
 in every cycle, 1 at falling, 2 at rising, 3 at both edges of `clock`. A FIFO of `depth=N` holds N -
 1 records. The number of pins is not limited.
 

@@ -24,7 +24,10 @@ void save_journal(Context& context) {
     if (context.checking()) return;
     ExecutionSink* const sink = context.session.options().sink;
     if (!sink) return report(context, "this machine has no journal", start_help);
-    const std::string problem = sink->save(context.path(context.argument(1)));
+    const std::string path = context.path(context.argument(1));
+    context.lock.unlock();  // a long journal takes seconds, and nobody waits for it
+    const std::string problem = sink->save(path);
+    context.lock.lock();
     if (!problem.empty()) {
         report(context, problem);
     }

@@ -33,6 +33,7 @@ constexpr Behaviour reading{.effect = Effect::reading};
 constexpr Behaviour reading_each{.effect = Effect::reading, .operands = Operands::ranges};
 constexpr Behaviour reading_to_file{.effect = Effect::reading, .operands = Operands::paths};
 constexpr Behaviour saving{.operands = Operands::paths};
+constexpr Behaviour saving_apart{.waiting = Waiting::possible, .operands = Operands::paths};
 constexpr Behaviour nothing{.effect = Effect::nothing};
 constexpr Behaviour output{.effect = Effect::output};
 constexpr Behaviour sourcing{.effect = Effect::nothing,
@@ -211,7 +212,7 @@ constexpr CommandRow rows[] = {
      "`journal save FILE.mcap` writes the journal of the running machine so far. To execute its "
      "cycles again, type:\n"
      "hal replay --exact FILE.mcap.",
-     command_journal, 0, kind::saving},
+     command_journal, 0, kind::saving_apart},
     // --- locks
     {"lock", "", "[none|tune|all]",
      "forbid changes: tune still allows values, start and stop; all (the default) forbids "

@@ -206,6 +206,7 @@ std::string ExecutionJournal::save(const std::string& path) {
         call = save_;
     }
     if (call) return call(path);
+    const std::scoped_lock one_at_a_time(saving_);
     flush();
     return join_journals({where()}, path);
 }

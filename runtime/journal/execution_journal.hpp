@@ -126,6 +126,7 @@ private:
 
     std::string reason() const;
 
+    std::mutex saving_;  // of save(), before mutex_
     mutable std::mutex mutex_;  // of all below
     std::function<void(const std::string& reason)> failed_;
     std::function<std::string(const std::string& path)> save_;

@@ -44,6 +44,28 @@ std::string last_line(const std::string& path) {
     return last;
 }
 
+/// Returns why the process that has ended with `status` has not written the journal again, or "".
+std::string why_cut_failed(int status, const std::string& log) {
+    if (WIFSIGNALED(status)) {
+        return fmt::format("its re-execution was terminated by signal {}", WTERMSIG(status));
+    }
+    if (WEXITSTATUS(status) == 0) return "";
+    const std::string why = last_line(log);
+    return why.empty()
+               ? fmt::format("its re-execution ended with exit status {}", WEXITSTATUS(status))
+               : why;
+}
+
+/// Returns the first of the names NAME(1), NAME(2) … that nothing has.
+template <class Name>
+std::string free_name(Name name) {
+    std::error_code ignored;
+    for (int number = 1;; ++number) {
+        std::string found = name(number);
+        if (!fs::exists(found, ignored)) return found;
+    }
+}
+
 /// Starts a program that has the CPUs only when nothing else wants them. Returns its process, 0 if
 /// it cannot be started.
 pid_t start_idle(const std::vector<std::string>& words, const std::string& log) {
@@ -88,11 +110,14 @@ JournalRing::JournalRing(std::string path, std::int64_t keep_ns)
       keep_ns_(keep_ns),
       part_ns_(std::max(keep_ns / parts_per_keep, min_part_ns)) {
     std::error_code error;
-    for (int number = 1; fs::exists(folder_, error) && kept_.empty(); ++number) {
-        const std::string free = fmt::format("{}.{}", folder_, number);
-        if (fs::exists(free, error)) continue;
-        fs::rename(folder_, free, error);
-        kept_ = free;
+    if (fs::exists(folder_, error)) {
+        kept_ = free_name([this](int number) { return fmt::format("{}.{}", folder_, number); });
+        fs::rename(folder_, kept_, error);
+        if (error) {
+            problem_ =
+                fmt::format("cannot rename '{}' to '{}': {}", folder_, kept_, error.message());
+            return;
+        }
     }
     fs::create_directory(folder_, error);
     if (error) {
@@ -156,30 +181,28 @@ void JournalRing::start_cut(std::int64_t now_ns) {
          "--until", std::to_string(second.last_cycle), "--cut", cut_path() + ".mcap"},
         log_path());
     if (cut_ == 0) {
-        fail(-1);
+        fail("its re-execution cannot be started");
     }
 }
 
 void JournalRing::look_at_cut() {
     if (cut_ == 0) return;
     int status = 0;
-    if (::waitpid(cut_, &status, WNOHANG) != cut_) return;
+    const pid_t ended = ::waitpid(cut_, &status, WNOHANG);
+    if (ended == 0) return;
     cut_ = 0;
+    if (ended < 0) return fail("the end of its re-execution was not seen");
+    if (const std::string why = why_cut_failed(status, log_path()); !why.empty()) return fail(why);
     const std::string cut = cut_path() + ".mcap";
-    const bool is_good = WIFEXITED(status) && WEXITSTATUS(status) == 0;
-    if (!is_good || ::rename(cut.c_str(), path_of(parts_[1].number).c_str()) != 0) {
-        return fail(status);
+    if (::rename(cut.c_str(), path_of(parts_[1].number).c_str()) != 0) {
+        return fail(fmt::format("cannot rename '{}': {}", cut, std::strerror(errno)));
     }
     ::unlink(path_of(parts_[0].number).c_str());
     parts_.erase(parts_.begin());
 }
 
-void JournalRing::fail(int status) {
+void JournalRing::fail(const std::string& why) {
     keeps_all_ = true;
-    std::string why = last_line(log_path());
-    if (why.empty()) {
-        why = fmt::format("its re-execution ended with status {}", status);
-    }
     machine_.note("the journal cannot begin later than the machine and is kept whole: " + why);
 }
 
@@ -205,7 +228,9 @@ void JournalRing::look_at_faults(std::int64_t now_ns) {
     if (fault_ns_ == 0 || now_ns - fault_ns_ < after_fault_ns) return;
     fault_ns_ = 0;
     const std::string stem = path_.substr(0, path_.rfind(".mcap"));
-    const std::string file = fmt::format("{}-fault-{}.mcap", stem, ++fault_files_);
+    ++fault_files_;
+    const std::string file =  // that of an earlier run stays
+        free_name([&](int number) { return fmt::format("{}-fault-{}.mcap", stem, number); });
     const std::string problem = save_now(file);
     machine_.note(problem.empty() ? fmt::format("'{}' has the journal up to {} s after a fault",
                                                 file, after_fault_ns / 1'000'000'000)

@@ -73,7 +73,7 @@ private:
     void rotate(std::int64_t now_ns);
     void start_cut(std::int64_t now_ns);
     void look_at_cut();
-    void fail(int status);
+    void fail(const std::string& why);
     void look_at_faults(std::int64_t now_ns);
     std::string save_now(const std::string& to);
 

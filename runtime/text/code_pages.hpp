@@ -96,8 +96,9 @@ inline constexpr CodePage code_pages[] = {
      "from the top, position in mm.\n\n"
      "`hal doc vision_marker` and `hal doc vision_homography` have examples."},
     {"cannot-write",
-     "`save` could not write the file; nothing else was changed. The message includes the reason "
-     "that the system reports.\n\n"
+     "`save` or `journal save` could not write the file; nothing else was changed. The message "
+     "includes the reason: that of the system, or that the machine has no journal (hal run --journal "
+     "FILE.mcap).\n\n"
      "Without a file name `save` prints to the terminal."},
     {"canopen-line",
      "A line of a CANopen configuration (`NAME.canopen`) is invalid at its position: it is neither "

@@ -181,6 +181,22 @@ start
             "'run-fault-1.mcap' has the journal up to 2 s after a fault", self.finish(machine)
         )
         self.assertNotIn("first difference", self.replay("run-fault-1.mcap"))
+        # another run keeps it
+        before = written.read_bytes()
+        machine = self.run_journaled(FAULT, "--journal-keep", "1min")
+        wait_until((self.folder / "run-fault-2.mcap").exists, "the file of the second run")
+        self.assertIn("'run-fault-2.mcap' has the journal", self.finish(machine))
+        self.assertEqual(before, written.read_bytes())
+
+    def test_a_journal_that_cannot_be_saved_leaves_the_machine_as_it_is(self):
+        machine = self.run_journaled(HEAP)
+        self.wait_for_cycles(100)
+        text = self.bad("shell", "journal", "save", "none/a.mcap")
+        self.assertIn("'none/a.mcap' cannot be written: No such file or directory", text)
+        self.wait_for_cycles(10)
+        self.good("shell", "journal", "save", "a.mcap")
+        self.finish(machine)
+        self.assertIn("no difference", self.replay("a.mcap"))
 
     def test_a_line_of_the_netlist_writes_a_journal(self):
         path = self.write("a.hal", "journal own.mcap keep=5s\n" + HEAP)

@@ -11,6 +11,7 @@
 
 #include "cli/output.hpp"
 #include "journal/shortened_journal.hpp"
+#include "netlist/netlist.hpp"
 #include "run/chosen_values.hpp"
 #include "run/journaled_program.hpp"
 #include "run/replay_note.hpp"
@@ -42,8 +43,7 @@ std::string netlist(const JournalFile& file, std::size_t entries) {
             if (words.empty() || words.front().starts_with(':')) continue;  // pins of a program
             std::string line;
             for (const std::string& word : words) {
-                const bool is_plain = word.find_first_of(" \t\"#") == std::string::npos;
-                append_item(line, is_plain ? word : "\"" + word + "\"", " ");
+                append_item(line, written(word), " ");
             }
             text += line + "\n";
         }

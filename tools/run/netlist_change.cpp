@@ -11,6 +11,7 @@
 #include "commands/table.hpp"
 #include "netlist/netlist.hpp"
 #include "run/applied_changes.hpp"
+#include "text/quoting.hpp"
 
 namespace hal::tools {
 namespace {
@@ -20,8 +21,7 @@ constexpr int max_depth = 20;  // of sourced files
 std::string line_of(const std::vector<std::string>& words) {
     std::string line;
     for (const std::string& word : words) {
-        const bool is_plain = word.find_first_of(" \t\"#") == std::string::npos;
-        line += (line.empty() ? "" : " ") + (is_plain ? word : "\"" + word + "\"");
+        append_item(line, written(word), " ");
     }
     return line + "\n";
 }

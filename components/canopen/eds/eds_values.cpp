@@ -58,16 +58,22 @@ constexpr TypeWord object_types[] = {
     {"RECORD", ObjectType::record},
 };
 
+/// Returns the word of the row whose member equals `key`; "?" without one.
+template <class Rows, class Key, class Member>
+std::string_view word_of(const Rows& rows, Key key, Member member) {
+    const auto* const row = find_row(rows, key, member);
+    if (row == nullptr) return "?";
+    return row->word;
+}
+
 }  // namespace
 
 std::string_view name_of(ObjectType type) {
-    const TypeWord* const row = find_row(object_types, type, &TypeWord::type);
-    return row != nullptr ? row->word : "?";
+    return word_of(object_types, type, &TypeWord::type);
 }
 
 std::string_view name_of(Access access) {
-    const AccessWord* const row = find_row(access_words, access, &AccessWord::access);
-    return row != nullptr ? row->word : "?";
+    return word_of(access_words, access, &AccessWord::access);
 }
 
 ObjectType EntryReader::object_type(IniSection& section, const std::string& what, bool& given) {

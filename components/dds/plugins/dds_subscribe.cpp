@@ -2,12 +2,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <mutex>
 
 #include "dds/field_pins.hpp"
 #include "dds/topic_connection.hpp"
+#include "hal/age.hpp"
 #include "hal/lasting_fault.hpp"
 #include "hal/queue.hpp"
 
@@ -286,14 +286,13 @@ private:
     FieldPins<HAL_DIR_OUT> fields_{*this, take_, schema_, "field of the topic"};
     hal::Out<std::uint64_t> seq{*this, take_, "seq",
                                 "sequence number of the sample, counted by its publisher"};
-    static constexpr double infinite = std::numeric_limits<double>::infinity();
     hal::Out<double> age{
         *this,
         take_,
         pin::age_ms,
         "age of the sample, by the publisher's clock; infinite without one, and while the thread "
         "is stopped",
-        {.initial = infinite, .unit = "ms", .safe = infinite}};
+        {.initial = hal::infinite_age, .unit = "ms", .safe = hal::infinite_age}};
     hal::Out<bool> valid{
         *this, take_, pin::valid, "a sample was received within the timeout", {.safe = false}};
     hal::Out<std::uint64_t> lost{*this, take_, "lost", "gaps in the sequence numbers"};

@@ -6,7 +6,6 @@
 #include <condition_variable>
 #include <cstdio>
 #include <deque>
-#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -17,6 +16,7 @@
 
 #include <unistd.h>
 
+#include "hal/age.hpp"
 #include "dds/arguments.hpp"
 #include "dds/status.hpp"
 
@@ -24,7 +24,6 @@ namespace {
 
 using namespace hal::dds;
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
 
 /// Another node, as its cycle and the engine's threads know it.
 struct Other {
@@ -44,7 +43,7 @@ struct Other {
                  {.safe = false}),
           age(c, f, age_ms_name.c_str(),
               "age of its signals, or of its status; infinite: none yet, or the thread is stopped",
-              {.initial = infinite, .unit = "ms", .safe = infinite}),
+              {.initial = hal::infinite_age, .unit = "ms", .safe = hal::infinite_age}),
           incompatible(c, f, incompatible_name.c_str(),
                        "it runs another version of the netlist; its signals are ignored") {}
 

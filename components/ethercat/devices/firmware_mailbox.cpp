@@ -39,8 +39,8 @@ void FirmwareMailbox::run(esc::Pdi& pdi, State state, std::int64_t now_ns) noexc
     send(pdi, now_ns);
 }
 
-/// Queues the next part of a long answer. A request begins it; when no protocol has a part, there
-/// is none until the next request.
+/// Queues the next part of a long answer, which a request begins. When no protocol has a part,
+/// the next one comes with the next request.
 void FirmwareMailbox::pump() noexcept {
     if (!has_parts_) return;
     for (auto& service : services_) {

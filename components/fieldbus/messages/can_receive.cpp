@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include <limits>
 #include <memory>
 #include <stdexcept>
 
+#include "hal/age.hpp"
 #include "hal/component.hpp"
 #include "link/can.hpp"
 #include "message_fields.hpp"
@@ -11,7 +11,6 @@ namespace {
 
 using namespace hal::messages;
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
 
 struct CanReceive : hal::Component {
     using Component::Component;
@@ -52,7 +51,7 @@ struct CanReceive : hal::Component {
         "age",
         "time since the end of the newest message; infinite without one, and while the thread is "
         "stopped",
-        {.initial = infinite, .unit = "s", .safe = infinite}};
+        {.initial = hal::infinite_age, .unit = "s", .safe = hal::infinite_age}};
     hal::Out<std::uint64_t> received{*this, "received", "messages received"};
     hal::Out<std::uint64_t> overwritten{*this, "overwritten",
                                         "messages that a later one of the same cycle replaced"};
@@ -99,7 +98,7 @@ struct CanReceive : hal::Component {
         link_->flush(now);
         fresh = any;
         ever_ = ever_ || any;
-        age = ever_ ? 1e-9 * static_cast<double>(now - newest_) : infinite;
+        age = ever_ ? 1e-9 * static_cast<double>(now - newest_) : hal::infinite_age;
         valid = ever_ && !(timeout > 0.0 && age > timeout);
     }
 

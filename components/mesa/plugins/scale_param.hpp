@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include "hal/component.hpp"
 #include "hal/retained.hpp"
@@ -19,6 +20,7 @@ public:
         : Param(component, name, doc, options),
           valid_(is_valid(options.initial) ? options.initial : 1.0),
           self_(&component),
+          fault_(std::string(name) + " is 0, NaN or infinite; its last valid value applies"),
           faults_(hal::extension<hal_faults>("hal.faults/1")),
           retained_(component, {{name, valid_}, {name, is_reported_}}) {}
 
@@ -37,8 +39,7 @@ private:
     static bool is_valid(double value) noexcept { return value != 0.0 && std::isfinite(value); }
     double last_valid() const noexcept {
         if (!is_reported_ && faults_ != nullptr) {
-            faults_->raise(faults_, self_,
-                           "a scale is 0 or not a number; its last valid value applies",
+            faults_->raise(faults_, self_, fault_.c_str(),
                            std::numeric_limits<double>::quiet_NaN());
         }
         is_reported_ = true;
@@ -48,6 +49,7 @@ private:
     mutable double valid_;
     mutable bool is_reported_ = false;
     const hal::Component* self_;
+    const std::string fault_;
     const hal_faults* faults_;
     [[no_unique_address]] hal::Retained retained_;
 };

@@ -58,7 +58,7 @@ struct DriveAround : hal::Component {
 
     hal::Out<double> nearest{*this,
                              "nearest",
-                             "distance of the nearest obstacle from the centre; 1000: none",
+                             "distance of the nearest obstacle of the infrared ring from the centre; 1000: none",
                              {.unit = "m", .finite = true}};
     hal::Out<double> direction{*this,
                                "direction",

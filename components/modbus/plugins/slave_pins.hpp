@@ -2,12 +2,12 @@
 // The pins of a slave, and what copies them to and from the image.
 #pragma once
 
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "hal/age.hpp"
 #include "hal/any_pin.hpp"
 #include "modbus/master/drive_axis.hpp"
 #include "modbus/master/value_codec.hpp"
@@ -153,10 +153,10 @@ public:
     }
     /// Shows how old the values are, in each cycle. [realtime]
     void show_ages(const Image& image, std::int64_t now_ns) noexcept {
-        age_ = oldest_ns_ == 0 ? infinite : seconds_between(oldest_ns_, now_ns);
+        age_ = oldest_ns_ == 0 ? infinite_age : seconds_between(oldest_ns_, now_ns);
         for (AgePin& age : ages_) {
             const std::int64_t stamp = image.stamp(age.telegram).load(std::memory_order_relaxed);
-            *age.pin = stamp == 0 ? infinite : seconds_between(stamp, now_ns);
+            *age.pin = stamp == 0 ? infinite_age : seconds_between(stamp, now_ns);
         }
     }
 
@@ -189,9 +189,8 @@ private:
         std::uint32_t telegram;
     };
     static constexpr std::uint32_t no_value = UINT32_MAX;
-    static constexpr double infinite = std::numeric_limits<double>::infinity();
     static constexpr hal::PinOptions<double> age_options{
-        .initial = infinite, .unit = "s", .safe = infinite};
+        .initial = infinite_age, .unit = "s", .safe = infinite_age};
 
     static const std::string& name_of(const Bus& bus, std::size_t index) {
         return bus.slaves[index].name;

@@ -154,18 +154,16 @@ int run_ethercat_dc(const EthercatOptions& options) {
             continue;
         }
         const auto delay = wire.read(n, reg::dc_system_time_delay, 4);
-
         const auto difference = wire.read(n, reg::dc_system_time_difference, 4);
         const auto activation = wire.read(n, reg::dc_activation, 1);
-        if (!delay || !difference) {
+        if (!delay || !difference || !activation) {
             return fail(options,
                         fmt::format("slave {} no longer responds; check its supply and cable", n));
         }
         const auto raw = ethercat::get<std::uint32_t>(difference->data());
         const auto magnitude = static_cast<std::int64_t>(raw & 0x7fffffff);
-
         const auto deviation = raw >> 31 != 0 ? -magnitude : magnitude;
-        const bool sync = activation && ((*activation)[0] & 0x01) != 0;
+        const bool sync = ((*activation)[0] & 0x01) != 0;
         text += fmt::format("{}  deviation {} ns  delay {} ns  SYNC {}  {}\n", n, deviation,
                             ethercat::get<std::uint32_t>(delay->data()), sync ? "on" : "off",
                             wire.name(n));

@@ -100,8 +100,8 @@ std::optional<std::string> key_of(const ethercat::esi::File& file,
                    {device.order, device.name, ""}, fits_configuration);
 }
 
-/// Lets a description replace what the EEPROM of a slave has. Returns why there is none, as what
-/// the process data of the slave is taken from its EEPROM for; empty: it has been replaced.
+/// Replaces what the EEPROM of a slave has by its description. Returns why no description fits: the
+/// reason why its process data is taken from the EEPROM; empty: it has been replaced.
 std::string describe(const DescriptionFolder& descriptions, const std::filesystem::path& folder,
                      config::Found& found) {
     const auto [file, path, match] = descriptions.find(found.vendor, found.product, found.revision);

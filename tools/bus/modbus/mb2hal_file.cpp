@@ -38,6 +38,13 @@ constexpr Function functions[] = {
     {"fnct_16_write_multiple_registers", Table::holding, true, false},
 };
 
+/// The numbers of slaves. 0 on a serial line: all slaves, and none answers.
+struct Units {
+    int min, max;
+};
+constexpr Units serial_units{1, 247};
+constexpr Units tcp_units{0, 255};
+
 struct ParityName {
     std::string_view name;
     line::Parity parity;
@@ -115,6 +122,13 @@ private:
     void miss(std::string_view key, const std::string& what) {
         error(section_at(), fmt::format("[{}]{} is missing", section_, key), "add " + what);
     }
+    bool has_section() const {
+        return std::ranges::find(ini_.entries(), section_, &Ini::Entry::section) !=
+               ini_.entries().end();
+    }
+    std::string text_of(std::string_view section, std::string_view key) const {
+        return ini_.get(section, key).value_or("");
+    }
     /// Returns the place of the first key of the section.
     Span section_at() const {
         const auto found = std::ranges::find(ini_.entries(), section_, &Ini::Entry::section);
@@ -146,15 +160,19 @@ private:
     void read_transaction(std::size_t number_of_it, std::int64_t slowdown_ns) {
         Mb2halTransaction t =
             file_.transactions.empty() ? Mb2halTransaction{} : file_.transactions.back();
+        if (!has_section()) {
+            return error(at_,
+                         fmt::format("[{}] is missing: TOTAL_TRANSACTIONS is {}", section_,
+                                     text_of("MB2HAL_INIT", "TOTAL_TRANSACTIONS")),
+                         "add the section, or lower TOTAL_TRANSACTIONS");
+        }
         t.name = text("HAL_TX_NAME", fmt::format("{:02}", number_of_it));
         t.line = sources_.place(section_at()).line;
         read_link(t);
         if (diagnostics_.failed()) return;
         if (entry("MB_SLAVE_ID")) {
-            // 0 on a serial line: all slaves, and none answers
-            const bool is_serial = file_.links[t.link].is_serial;
-            t.unit = static_cast<std::uint8_t>(
-                whole("MB_SLAVE_ID", 1, is_serial ? 1 : 0, is_serial ? 247 : 255));
+            const Units units = file_.links[t.link].is_serial ? serial_units : tcp_units;
+            t.unit = static_cast<std::uint8_t>(whole("MB_SLAVE_ID", 1, units.min, units.max));
         } else if (number_of_it == 0) {
             return miss("MB_SLAVE_ID", "the number of the slave: MB_SLAVE_ID = 1");
         }

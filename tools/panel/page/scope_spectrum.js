@@ -35,9 +35,11 @@ function transform(real, imaginary) {
 /// The place of the sine whose largest line is `k`, and its amplitude: exact under a Hann window,
 /// whose lines are sin(pi d) / (pi d (1 - d^2)) at the distance d (Rife and Vincent, 1970).
 function refined(amplitudes, k) {
-    const side = amplitudes[k + 1] > amplitudes[k - 1] ? 1 : -1,
-          ratio = amplitudes[k + side] / amplitudes[k], distance = (2 * ratio - 1) / (ratio + 1);
-    const angle = Math.PI * distance, shape = Math.sin(angle) / (angle * (1 - distance ** 2));
+    const side = amplitudes[k + 1] > amplitudes[k - 1] ? 1 : -1;
+    const ratio = amplitudes[k + side] / amplitudes[k];
+    const distance = (2 * ratio - 1) / (ratio + 1);
+    const angle = Math.PI * distance;
+    const shape = Math.sin(angle) / (angle * (1 - distance ** 2));
     return {
         place: k + side * distance,
         amplitude: Math.abs(distance) < 1e-6 ? amplitudes[k] : amplitudes[k] / shape

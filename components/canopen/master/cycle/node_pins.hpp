@@ -5,11 +5,11 @@
 #include <atomic>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "hal/age.hpp"
 #include "hal/any_pin.hpp"
 #include "hal/pin_codec.hpp"
 #include "runner.hpp"
@@ -171,7 +171,6 @@ private:
 
 /// What is known of a node.
 struct NodePins {
-    static constexpr double infinite = std::numeric_limits<double>::infinity();
     hal::Out<bool> online, operational, fault;
     hal::Out<std::uint32_t> state, step, error_register, emcy, emcy_count, retries, boot_result;
     hal::Out<double> age;
@@ -205,7 +204,7 @@ struct NodePins {
               "0 not finished, 1 booted, else the character of CiA 302's letter, 65 (A) to 79 (O)"),
           age(c, f, (n + ".heartbeat-age-ms").c_str(),
               "since its last sign of life; infinite: none yet, or the thread is stopped",
-              {.initial = infinite, .unit = "ms", .safe = infinite}),
+              {.initial = infinite_age, .unit = "ms", .safe = infinite_age}),
           restart(c, (n + ".restart").c_str(), "rising edge: resets it and boots it anew") {}
 
     /// [realtime]
@@ -230,7 +229,7 @@ struct NodePins {
         } else {
             boot_result = static_cast<std::uint32_t>(s.result);
         }
-        age = s.last_heard == 0 ? infinite : static_cast<double>(now - s.last_heard) * 1e-6;
+        age = s.last_heard == 0 ? infinite_age : static_cast<double>(now - s.last_heard) * 1e-6;
         if (restart && !was_restart) {
             runner.restart_node(position, now);
         }
@@ -242,7 +241,7 @@ struct NodePins {
         operational = false;
         state = 0U;
         step = 0U;
-        age = infinite;
+        age = infinite_age;
     }
 };
 

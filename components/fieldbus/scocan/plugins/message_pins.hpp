@@ -4,11 +4,11 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
 #include <memory>
 
 #include "fieldbus/messages/field_pins.hpp"
 #include "fieldbus/scocan/station/station.hpp"
+#include "hal/age.hpp"
 #include "hal/component.hpp"
 
 namespace hal::scocan {
@@ -135,7 +135,7 @@ public:
           age_(
               c, f, (m.name + ".age").c_str(),
               "time since the message was sent; infinite: never received, or the thread is stopped",
-              {.initial = infinite, .unit = "s", .safe = infinite}),
+              {.initial = infinite_age, .unit = "s", .safe = infinite_age}),
           interval_(c, f, (m.name + ".interval").c_str(),
                     "time between the begins of the last two frames", {.unit = "us"}) {
         declare_fields(fields_, c, f, m);
@@ -176,7 +176,6 @@ public:
     }
 
 private:
-    static constexpr double infinite = std::numeric_limits<double>::infinity();
 
     const Message& message_;
     hal::Out<bool> fresh_;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Vectors, rotations and poses of three dimensions, as plain C; included at the end:
  * gomath_geometry.h (lines, planes, links) and gomath_matrix.h (matrices, polynomials). Functions
- * return GO_RESULT_OK, or another result when there is none (a unit vector of nothing); those that
+ * return GO_RESULT_OK, or another result when a result does not exist (a unit vector of the length 0); those that
  * return go_flag return whether something is so, within GO_REAL_EPSILON. Results may be written
  * over arguments. Angles in rad. [any] */
 #ifndef HALCYON_GOMATH_H

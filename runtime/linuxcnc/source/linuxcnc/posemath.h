@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Vectors, rotations and poses of three dimensions, as plain C. Functions return 0, or -1 when the
- * result does not exist (a unit vector of nothing, a division by 0); results may be written over
+ * result does not exist (a unit vector of the length 0, a division by 0); results may be written over
  * arguments. Angles in rad. [any] */
 #ifndef HALCYON_POSEMATH_H
 #define HALCYON_POSEMATH_H
