@@ -96,7 +96,9 @@ void CycleLink::note_counts() noexcept {
     const bool is_foreign = count != 0 && count >> 16 != session_;
     has_foreign_writes_ = is_foreign && count != card_write_count_;
     const bool is_expected = count == number(expected_write_count_);
-    writes_arrived_ = is_joined_ || is_expected;
+    has_forgotten_count_ = keeps_count_ && count == 0;
+    writes_arrived_ = is_joined_ || (is_expected && !keeps_count_);
+    keeps_count_ = false;
     if (!is_expected && !is_foreign && count != 0) {
         ++counts_.lost_writes;
     }
@@ -114,7 +116,9 @@ bool CycleLink::begin_send(std::int64_t now_ns, bool requests, std::size_t late_
 
 void CycleLink::end_send(std::int64_t now_ns, bool requests) noexcept {
     // behind the reads, which so show a count that another master has written
-    put_count(writes_, timers::write_count, number(++write_count_));
+    if (!keeps_count_) {
+        put_count(writes_, timers::write_count, number(++write_count_));
+    }
     port_.send(writes_.bytes(), now_ns);
     if (requests) {
         request(now_ns);

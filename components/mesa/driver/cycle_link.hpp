@@ -58,6 +58,12 @@ public:
         writes_.clear();
         return writes_;
     }
+    /// Leaves out the write counts of the coming cycles, up to the next answer: if the card is reset
+    /// among them, that answer shows the count 0. Returns false if the card has no count to forget.
+    bool keep_count() noexcept {
+        keeps_count_ = card_write_count_ != 0;
+        return keeps_count_;
+    }
     /// Sends the writes, with the reads for the next cycle if `requests`. `late(request)` appends
     /// the writes that are executed behind the reads, of at most `late_size` bytes.
     template <class Late>
@@ -73,6 +79,9 @@ public:
     /// Returns whether the newest answer has another write count of another master than the one
     /// before.
     bool has_foreign_writes() const noexcept { return has_foreign_writes_; }
+    /// Returns whether the newest answer shows that the card has forgotten a count that was kept: it
+    /// was reset.
+    bool has_forgotten_count() const noexcept { return has_forgotten_count_; }
     /// Returns how old the newest answer is at `now_ns`, from the cycle of its request, ns.
     std::int64_t age_ns(std::int64_t now_ns) const noexcept { return now_ns - requested_ns_; }
     const LinkCounts& counts() const noexcept { return counts_; }
@@ -110,6 +119,8 @@ private:
     std::int64_t requested_ns_ = 0;
     bool writes_arrived_ = true;
     bool has_foreign_writes_ = false;
+    bool has_forgotten_count_ = false;
+    bool keeps_count_ = false;
     std::uint32_t card_write_count_ = 0;
     std::array<std::array<std::uint8_t, datagram::max_size>, 2> buffers_{};
     std::size_t newest_ = 0;

@@ -246,7 +246,8 @@ private:
         report.writes_arrived =
             link_->writes_arrived() && reply.at(watchdog_timeout_) == sent_timeout_;
         report.has_foreign_writes = link_->has_foreign_writes();
-        report.is_reset = (reply.at(watchdog_timeout_) & watchdog::off) != 0;
+        report.is_reset =
+            (reply.at(watchdog_timeout_) & watchdog::off) != 0 || link_->has_forgotten_count();
         report.has_bitten = (reply.at(watchdog_status_) & watchdog::has_bitten) != 0;
         return report;
     }
@@ -436,15 +437,16 @@ private:
     /// behind an answer that shows another value, and never on suspicion.
     void write_watchdog(Outgoing& out) noexcept {
         sent_timeout_ = watchdog_timeout(timeout_ns_, watchdog_clock_hz_);
-        const bool is_configuring = monitor_.state() == CardState::configuring;
-        if (is_configuring) {
+        if (monitor_.state() == CardState::configuring) {
             out.put(watchdog_.at(watchdog::status), 0);
         }
         const bool writes_timeout =
             is_fresh_ && link_->reply().at(watchdog_timeout_) != sent_timeout_;
-        hides_reset_ = writes_timeout && is_configuring;
+        hides_reset_ = false;
         if (writes_timeout) {
             out.put(watchdog_.at(watchdog::timeout), sent_timeout_);
+            hides_reset_ = !link_->keep_count();
+            rewrites_ = true;  // without a count, a loss of these writes is not seen
         }
         out.put(watchdog_.at(watchdog::reset), watchdog::reload);
     }
