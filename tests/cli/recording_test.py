@@ -146,6 +146,23 @@ setp io.fault-emcy-storm 1
         self.assertIn("cannot read 'x.mcap': No such file", self.bad("plot", "x.mcap"))
         self.assertIn("missing netlist", self.bad("replay", "x.mcap"))
 
+    def test_values_that_cannot_be_recorded_are_rejected_before_anything_runs(self):
+        self.write("a.hal", NETLIST + "loadrt sum2 count=500\nstart\nprint started\n")
+        record = {"sim": ("--for", "1s", "--record", "x.mcap"), "run": ("--journal", "x.mcap")}
+        for command, options in record.items():
+            for name, reason in (
+                (
+                    "sum2.*",
+                    "4500 values are more than the 4096 that a probe can sample; name fewer",
+                ),
+                ("sin", "no pin, parameter or signal matches 'sin'; did you mean 'sine'?"),
+            ):
+                self.assertEqual(
+                    f"hal {command}: --values: {reason}\n",
+                    self.bad(command, "a.hal", *options, "--values", name),
+                )
+                self.assertEqual(["a.hal"], sorted(os.listdir(self.folder)))
+
     def test_a_plot_has_the_values_it_was_asked_for(self):
         self.sim(NETLIST, "--for", "1s", "--record", "run.mcap")
         self.assertEqual("run.svg\n", self.good("plot", "run.mcap", "sine", "high"))

@@ -19,6 +19,7 @@
 #include "run/hosted_machine.hpp"
 #include "run/journal_option.hpp"
 #include "run/sim_summary.hpp"
+#include "run/values_check.hpp"
 #include "text/quoting.hpp"
 
 namespace hal::tools {
@@ -239,6 +240,11 @@ int run_journaled(const RunOptions& given) {
         return fail(options,
                     "--journal-keep and --values exclude each other: a journal that begins "
                     "later has no recorded values");
+    }
+    if (!options.values.empty()) {
+        const auto buffer_ns = [](std::int64_t) { return ProbeRequest().buffer_ns; };
+        const std::string problem = problem_of_values(options, options.values, buffer_ns);
+        if (!problem.empty()) return fail(options, "--values: " + problem);
     }
     FileOfRun journal(options);
     if (const int status = journal.check(); status != 0) return status;

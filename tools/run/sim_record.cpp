@@ -11,10 +11,34 @@
 #include "run/chosen_values.hpp"
 #include "run/hosted_machine.hpp"
 #include "run/sim_summary.hpp"
+#include "run/values_check.hpp"
 #include "text/quoting.hpp"
 
 namespace hal::tools {
 namespace {
+
+/// How far the simulation goes until its rows are written: 100 cycles of the fastest thread, and not
+/// further than 100 ms. A step of few rows needs little memory for thousands of values.
+struct Step {
+    std::uint64_t cycles = 100;
+    std::int64_t ns = 100'000'000;
+    std::int64_t buffered_ns = 200'000'000;  ///< the rows that a probe keeps: of two steps
+};
+
+/// `period_ns`: the shortest one; 0: the netlist has no thread.
+Step step_of(std::int64_t period_ns, const SimOptions& options) {
+    Step step;
+    if (period_ns == 0) return step;
+    const std::int64_t cycles_ns = static_cast<std::int64_t>(step.cycles) * period_ns;
+    step.ns = std::min(step.ns, cycles_ns);
+    step.buffered_ns = 2 * (options.cycles > 0 ? cycles_ns : step.ns);
+    return step;
+}
+
+std::int64_t shortest_period_ns(Session& session) {
+    const auto threads = session.reports().threads();
+    return threads.empty() ? 0 : std::ranges::min(threads, {}, &ThreadReport::period_ns).period_ns;
+}
 
 int check_recording(const SimOptions& options) {
     if (!options.record.ends_with(".mcap") && !options.record.ends_with(".csv")) {
@@ -25,30 +49,14 @@ int check_recording(const SimOptions& options) {
         !unsupported.empty()) {
         return fail(options, unsupported);
     }
-    const std::string problem = mcap::unwritable(options.record);
-    return problem.empty()
-               ? 0
-               : fail(options, fmt::format("cannot write '{}': {}", options.record, problem));
-}
-
-/// How far the simulation goes until its rows are written: 100 cycles of the fastest thread, and not
-/// further than 100 ms. A step of few rows needs little memory for thousands of values.
-struct Step {
-    std::uint64_t cycles = 100;
-    std::int64_t ns = 100'000'000;
-    std::int64_t buffered_ns = 200'000'000;  ///< the rows that a probe keeps: of two steps
-};
-
-Step step_of(Session& session, const SimOptions& options) {
-    Step step;
-    const auto threads = session.reports().threads();
-    if (threads.empty()) return step;
-    const std::int64_t period_ns =
-        std::ranges::min(threads, {}, &ThreadReport::period_ns).period_ns;
-    const std::int64_t cycles_ns = static_cast<std::int64_t>(step.cycles) * period_ns;
-    step.ns = std::min(step.ns, cycles_ns);
-    step.buffered_ns = 2 * (options.cycles > 0 ? cycles_ns : step.ns);
-    return step;
+    if (const std::string problem = mcap::unwritable(options.record); !problem.empty()) {
+        return fail(options, fmt::format("cannot write '{}': {}", options.record, problem));
+    }
+    const auto buffer_ns = [&options](std::int64_t period_ns) {
+        return step_of(period_ns, options).buffered_ns;
+    };
+    const std::string problem = problem_of_values(options, options.values, buffer_ns);
+    return problem.empty() ? 0 : fail(options, "--values: " + problem);
 }
 
 std::uint64_t lost_rows(const ProbeRows& batch) {
@@ -73,17 +81,17 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
             !unknown.empty()) {
             return fail(options, "--values: " + unknown);
         }
-        step = step_of(session, options);
-        probe = session.probes().attach({.names = chosen_values(session.model(), patterns),
-                                         .buffer_ns = step.buffered_ns},
-                                        problem);
-        if (!probe) return fail(options, "--record: " + problem);
+        step = step_of(shortest_period_ns(session), options);
+        probe = session.probes().attach(
+            {.names = chosen_values(session.model(), patterns), .buffer_ns = step.buffered_ns},
+            problem);
+        if (!probe) return fail(options, "--values: " + problem);
         layout = Probes::layout(*probe);
         journal = session.event_log().begin();
     }
-    const auto sink = make_sink(
-        options.record, Probes::columns(*probe),
-        {options.name.empty() ? "sim" : options.name, std::string(paths::version), "", "", 0, options.profile});
+    const auto sink = make_sink(options.record, Probes::columns(*probe),
+                                {options.name.empty() ? "sim" : options.name,
+                                 std::string(paths::version), "", "", 0, options.profile});
     if (!sink->kept().empty()) {
         write_all(2, kept_line(*sink, options.record));
     }
@@ -104,7 +112,8 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
         for (const LoggedEvent& entry : session.event_log().after(journal)) {
             good = good && sink->event({entry.time_ns, entry.kind, entry.text});
         }
-        for (const ProbeRows& batch : session.probes().take(*probe, max_taken, Probes::Rest::taken)) {
+        for (const ProbeRows& batch :
+             session.probes().take(*probe, max_taken, Probes::Rest::taken)) {
             good = good && add_rows(*sink, batch, layout, rows);
             lost += lost_rows(batch);
         }

@@ -216,7 +216,8 @@ std::shared_ptr<LiveProbe> Probes::attach(const ProbeRequest& request, std::stri
     };
     if (request.names.empty()) return reject("a probe needs at least one name");
     if (request.names.size() > max_names) {
-        return reject("a probe has at most " + std::to_string(max_names) + " names");
+        return reject(std::to_string(request.names.size()) + " values are more than the " +
+                      std::to_string(max_names) + " that a probe can sample; name fewer");
     }
     auto probe = std::make_shared<LiveProbe>();
     probe->request = request;
