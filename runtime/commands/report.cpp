@@ -74,12 +74,19 @@ void memory_status(std::string& text, const Model& model) {
     add("threads", counts.threads);
 }
 
-std::string status_json(const Session& session) {
+/// Returns the number of faults that are not acknowledged when the open transaction takes effect.
+std::uint64_t unacknowledged(const Context& context) {
+    const Reports& reports = context.session.reports();
+    return context.script.clears_faults() ? reports.lasting_count() : reports.fault_count();
+}
+
+std::string status_json(const Context& context) {
+    const Session& session = context.session;
     const Counts c = count(session.model());
     return json_text({{"instance", session.options().name},
                       {"running", session.threads().running()},
-                      {"lock", session.locked.load()},
-                      {"faults", session.reports().fault_count()},
+                      {"lock", context.script.locks()},
+                      {"faults", unacknowledged(context)},
                       {"components", c.components},
                       {"instances", c.instances},
                       {"pins", c.pins},
@@ -122,7 +129,7 @@ void command_status(Context& context) {
     }
     if (context.checking()) return;
     if (what == "instance") return context.output.out(context.session.reports().status_text());
-    if (context.options().json) return context.output.out(status_json(context.session));
+    if (context.options().json) return context.output.out(status_json(context));
     std::string text;
     if (what != "mem") {
         lock_status(text, context.script.locks());
@@ -201,9 +208,9 @@ void show_latency(Context& context) {
 namespace {
 
 /// How many faults are not acknowledged, and which of them can be.
-std::string acknowledgement_text(const Reports& reports) {
-    const std::uint64_t count = reports.fault_count();
-    const std::uint64_t lasting = std::min(count, reports.lasting_count());
+std::string acknowledgement_text(const Context& context) {
+    const std::uint64_t count = unacknowledged(context);
+    const std::uint64_t lasting = std::min(count, context.session.reports().lasting_count());
     if (lasting == 0) {
         return fmt::format("{} not acknowledged; `fault clear` acknowledges them\n", count);
     }
@@ -220,7 +227,9 @@ std::string acknowledgement_text(const Reports& reports) {
 }  // namespace
 
 void show_faults(Context& context) {
-    const auto records = context.session.reports().faults();
+    const Reports& reports = context.session.reports();
+    const auto records =
+        context.script.clears_faults() ? reports.lasting_faults() : reports.faults();
     std::string text;
     if (context.options().json) {
         auto rows = nlohmann::ordered_json::array();
@@ -245,7 +254,7 @@ void show_faults(Context& context) {
     if (records.empty()) {
         text = "no faults\n";
     } else {
-        text += acknowledgement_text(context.session.reports());
+        text += acknowledgement_text(context);
     }
     context.output.out(text);
 }
@@ -276,6 +285,7 @@ void command_fault(Context& context) {
     Session& session = context.session;
     if (context.argument(0) == "clear") {
         if (context.checking()) return;
+        context.script.note_fault_clear();
         return context.transaction->when_committed(
             [&session, &diagnostics = context.diagnostics, span = context.command.span] {
             report_lasting(session.reports().clear_faults(), span, diagnostics);

@@ -529,6 +529,7 @@ void Script::finish() {
     const bool took_effect = open && transaction_->commit(pending_);
     transaction_.reset();
     locks_.reset();
+    clears_faults_ = false;
     Diagnostics found;
     found.take(pending_);
     const bool failed = found.failed() || (open && !took_effect);

@@ -28,6 +28,9 @@ public:
     /// The locks as the commands carried out so far leave them: `lock` and `unlock` take effect
     /// with their transaction.
     unsigned locks() const { return locks_.value_or(session_.locked); }
+    /// True when the open transaction acknowledges the faults that are over.
+    bool clears_faults() const { return clears_faults_; }
+    void note_fault_clear() { clears_faults_ = true; }
     Script(Shell& shell, Shell::State& state, Output& output);
     ~Script();
     Script(const Script&) = delete;
@@ -106,6 +109,7 @@ private:
     std::size_t edits_ = 0;  ///< in it
     /// Session::locked when it has taken effect, if it has `lock` or `unlock`
     std::optional<unsigned> locks_;
+    bool clears_faults_ = false;  ///< it has `fault clear`
     struct Row {
         const std::vector<Command>* commands;
         std::size_t next, end;

@@ -63,6 +63,11 @@ std::vector<FaultRecord> Reports::clear_faults() {
     return faults_.lasting(machine_.executor.now_ns());
 }
 
+std::vector<FaultRecord> Reports::lasting_faults() const {
+    faults_.collect();
+    return faults_.lasting(machine_.executor.now_ns());
+}
+
 ThreadReport Reports::thread(const Thread& thread) const {
     ThreadReport report;
     report.name = thread.name;

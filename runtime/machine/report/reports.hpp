@@ -101,6 +101,8 @@ public:
     /// Acknowledges all faults whose condition is over, and forgets their records. Returns those
     /// that last.
     std::vector<FaultRecord> clear_faults();
+    /// Returns the faults that clear_faults() would leave, the oldest first.
+    std::vector<FaultRecord> lasting_faults() const;
     /// Returns the number of faults that cannot be acknowledged, because their condition lasts.
     /// [any]
     std::uint64_t lasting_count() const;
