@@ -95,6 +95,7 @@ function drawState() {
     banner.classList.toggle('stopped', pause !== '');
     drawFaults(state);
     document.body.classList.toggle('stale', problem !== '');
+    document.body.classList.toggle('paused', pause !== '');
     if (problem === '' && lastBanner !== '') announce(`Machine '${state.instance}' is running`);
     lastBanner = problem;
     const button = document.getElementById('control');

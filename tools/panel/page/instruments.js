@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Widgets that are drawn: bar, meter, chart, dial and jog wheel.
 import {colour, h, number, surface} from './dom.js';
+import {isLive} from './link.js';
 import {follow, formatted, nice} from './widget_values.js';
 
 /// The ranges of a bar or meter as [low, high, colour]: PyVCP's, or from `warn` and `alarm` of a
@@ -141,39 +142,53 @@ export function makeChart(node, pins) {
         const now = performance.now();
         while (points.length > 2 && points[1][0] < now - keep)
             points.shift();
-        const values = points.map(point => point[1]);
+        const values = points.map(point => point[1]).filter(value => value !== null);
         let low = options.min ?? Math.min(...values), high = options.max ?? Math.max(...values);
         if (!(high > low)) {
             low -= 1;
             high += 1;
         }
         const y = value => height - 4 - (height - 8) * (value - low) / (high - low);
+        const across = time => width * (1 - (now - time) / keep);
         context.strokeStyle = colour('--accent');
+        context.fillStyle = colour('--line');
         context.lineWidth = 1.5;
         context.beginPath();
         points.forEach(([time, value], i) => {
-            const x = width * (1 - (now - time) / keep);
-            if (i === 0)
+            const x = across(time), end = across(points[i + 1]?.[0] ?? now);
+            if (value === null) return context.fillRect(x, 0, end - x, height);
+            const before = points[i - 1]?.[1] ?? null;
+            if (before === null)
                 context.moveTo(x, y(value));
-            else {
-                context.lineTo(x, y(points[i - 1][1]));
+            else
                 context.lineTo(x, y(value));
-            }
+            context.lineTo(end, y(value));
         });
-        if (points.length > 0) context.lineTo(width, y(points[points.length - 1][1]));
         context.stroke();
+        if (values.length === 0) return;
         context.font = '11px system-ui, sans-serif';
         context.fillStyle = colour('--dim');
         context.fillText(number(Number(high.toPrecision(4))), 2, 12);
         context.fillText(number(Number(low.toPrecision(4))), 2, height - 4);
     });
-    follow(node, pins, value => {
-        points.push([performance.now(), Number(value)]);
+    let last = null;
+    /// Adds a value; null: the machine does not run from now on.
+    const add = value => {
+        points.push([performance.now(), value]);
         if (points.length > 4000) points.shift();
+    };
+    const look = () => {
+        const isPaused = (points[points.length - 1]?.[1] ?? null) === null;
+        if (last !== null && isLive() === isPaused) add(isPaused ? last : null);
+        picture.request();
+    };
+    follow(node, pins, value => {
+        last = Number(value);
+        if (isLive()) add(last);
         canvas.setAttribute(
             'aria-label', `${options.text ?? node.pin}: ${number(Number(value))} ${unit}`);
     });
-    const clock = setInterval(picture.request, 100);
+    const clock = setInterval(look, 100);
     pins.ends.push(() => clearInterval(clock));
     return h(
         'div', {class: 'w-gauge'},

@@ -33,6 +33,10 @@ export const state = {
     stats: {messages: 0, bytes: 0}
 };
 
+/// Whether values are those of a machine whose functions run.
+export const isLive = () =>
+    state.server === 'up' && state.machine && state.responding && state.running;
+
 let socket = null, nextId = 1, replies = new Map(), samples = null, lastReply = 0;
 const subscriptions = new Set(), probes = new Set();
 

@@ -58,6 +58,7 @@ function stateOf(thread) {
             'bad'
         ];
     if (thread.faulted) return ['stopped by a fault', 'bad'];
+    if (!state.running) return ['stopped: functions do not run', 'warn'];
     if (thread.missed > 0) return [`running; ${thread.missed} periods missed`, 'warn'];
     return ['running, no period missed', 'good'];
 }

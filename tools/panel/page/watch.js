@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A tree of all names, watch lists, set.
-import {on, request, state, subscribe} from './link.js';
+import {isLive, on, request, state, subscribe} from './link.js';
 import {announce, colour, h, number, surface, text} from './dom.js';
 import {compareNames} from './names.js';
 import {objects, settable} from './objects.js';
@@ -8,10 +8,16 @@ import {remember} from './place.js';
 import {rangeOf, typedValue} from './typed_value.js';
 import {keep, lists} from './watch_lists.js';
 
-const history = 150;  // values of a sparkline: 15 s
+const history = 150, period = 100;  // values of a sparkline, ms between two: 15 s
 
+/// Draws values; null is a time without a value of a running machine, which is shaded.
 function sparkline(context, width, height, values) {
-    const numbers = values.map(Number).filter(Number.isFinite);
+    const numbers = values.filter(value => value !== null).map(Number).filter(Number.isFinite);
+    const across = i => width * (i + history - values.length) / (history - 1);
+    context.fillStyle = colour('--line');
+    values.forEach((value, i) => {
+        if (value === null) context.fillRect(across(i - 1), 0, across(i) - across(i - 1), height);
+    });
     if (numbers.length < 2) return;
     let low = Math.min(...numbers), high = Math.max(...numbers);
     if (low === high) {
@@ -21,12 +27,12 @@ function sparkline(context, width, height, values) {
     context.strokeStyle = colour('--accent');
     context.beginPath();
     values.forEach((value, i) => {
-        const x = width * (i + history - values.length) / (history - 1),
-              y = height - 2 - (height - 4) * (Number(value) - low) / (high - low);
-        if (i === 0)
-            context.moveTo(x, y);
+        if (value === null) return;
+        const y = height - 2 - (height - 4) * (Number(value) - low) / (high - low);
+        if (i === 0 || values[i - 1] === null)
+            context.moveTo(across(i), y);
         else
-            context.lineTo(x, y);
+            context.lineTo(across(i), y);
     });
     context.stroke();
 }
@@ -112,6 +118,11 @@ class Row {
             this.showLamp(value);
         else
             text(this.value, number(value));
+        if (isLive()) this.keep(value ?? null);
+    }
+
+    /// Adds a value to the last 15 s; null: the machine does not run.
+    keep(value) {
         this.values.push(value);
         if (this.values.length > history) this.values.shift();
         this.surface.request();
@@ -172,11 +183,13 @@ export class View {
                 this.note, this.problem, h('div', {class: 'scroll'}, table))));
         this.load();
         this.follow();
+        this.pausing = setInterval(() => this.notePause(), period);
         this.subscriptions = [on('machine', () => this.load()), on('state', () => this.enable())];
     }
 
     end() {
         this.open = false;
+        clearInterval(this.pausing);
         this.subscriptions.forEach(unsubscribe => unsubscribe());
         this.stopFollowing();
         this.rows.forEach(row => row.end());
@@ -367,8 +380,12 @@ export class View {
         const names = this.names;
         if (names.length > 0)
             this.stopFollowing = subscribe(
-                names, 100,
+                names, period,
                 values => names.forEach((name, i) => this.rows.get(name)?.update(values[i])));
+    }
+
+    notePause() {
+        if (!isLive()) this.rows.forEach(row => row.keep(null));
     }
 
     change(names) {
