@@ -289,6 +289,25 @@ class Views(Page):
             self.machine.send_signal(18)
         self.browser.wait("halcyonScope.notice === ''")
 
+    def test_a_stopped_machine_looks_stopped_in_other_views(self):
+        self.begin(view="watch?names=sine")
+        # The right end of the picture of the last 15 s: shaded from top to bottom?
+        corner = "(() => { const c = document.querySelector('canvas.spark'); return c.getContext('2d').getImageData(c.width - 2, 0, 1, 1).data[3]; })()"
+        self.browser.wait("document.querySelector('[data-value=sine]').textContent !== '–'")
+        self.assertEqual(0, self.browser.evaluate(corner))
+        self.good("shell", "stop")
+        self.browser.wait(f"document.body.classList.contains('paused') && {corner} > 0")
+        self.browser.evaluate("location.hash = '#/overview'")
+        self.browser.wait(
+            "/stopped: functions do not run/.test(document.querySelector('[data-thread=servo]').textContent)"
+        )
+        self.good("shell", "start")
+        self.browser.wait(
+            "/running/.test(document.querySelector('[data-thread=servo]').textContent) && !document.body.classList.contains('paused')"
+        )
+        self.browser.evaluate("location.hash = '#/watch?names=sine'")
+        self.browser.wait(f"document.querySelector('canvas.spark') && {corner} === 0")
+
     def test_faults_are_marked_in_every_view_and_in_the_trace(self):
         self.write(
             "bus.canopen", "[bus]\nlink = sim:faulty\nbitrate = 1M\n[node 3 io]\ndevice = cia401\n"
@@ -306,6 +325,94 @@ class Views(Page):
         for view in ("watch", "graph", "log", "overview"):
             self.browser.evaluate(f"location.hash = '#/{view}'")
             self.assertFalse(self.browser.evaluate(f"{mark}.hidden"))
+
+    def test_a_fault_triggers_the_scope(self):
+        self.write(
+            "bus.canopen", "[bus]\nlink = sim:faulty\nbitrate = 1M\n[node 3 io]\ndevice = cia401\n"
+        )
+        self.begin(view="scope?ch=sine&base=0.02&mode=single&trigger=fault:canopen.0")
+        self.browser.wait("window.halcyonScope?.rows > 300")
+        self.assertTrue(
+            self.browser.evaluate(
+                "document.querySelector('[aria-label=Edge]').hidden && document.querySelector('[aria-label^=Instance]').value === 'canopen.0'"
+            )
+        )
+        self.good("shell", "loadrt", "canopen", "config=bus.canopen")
+        self.good("shell", "addf", "canopen.0.transmit", "servo")
+        self.browser.wait(
+            "/single record/.test(document.getElementById('scope-status').textContent)"
+        )
+        at, begin, end = self.browser.wait(
+            "halcyonScope.faults.length > 0 && [halcyonScope.faults[0].at, ...halcyonScope.range]"
+        )
+        self.assertAlmostEqual(begin + 0.2 * (end - begin), at, places=6)
+
+    def test_the_scope_scrolls_back_and_returns(self):
+        self.begin(view="scope?ch=sine:0.5:0&base=0.01")
+        self.browser.wait("window.halcyonScope?.rows > 1500")
+        canvas = "document.querySelector('.fill.high canvas')"
+        press = canvas + ".dispatchEvent(new KeyboardEvent('keydown', {{key: '{}'}}))"
+        self.browser.evaluate(press.format("PageUp"))
+        self.browser.wait("/back of/.test(document.querySelector('.history').textContent)")
+        more = "halcyonScope.rows > {} + 200 && halcyonScope.range"
+        rows = self.browser.evaluate("halcyonScope.rows")
+        begin, end = self.browser.wait(more.format(rows))
+        rows = self.browser.evaluate("halcyonScope.rows")
+        self.browser.wait(more.format(rows))
+        self.assertEqual([begin, end], self.browser.evaluate("halcyonScope.range"))
+        self.browser.evaluate(press.format("Home"))
+        self.browser.wait("halcyonScope.range[0] <= 0.001 && halcyonScope.range[1] < 0.2")
+        self.browser.evaluate(press.format(" "))
+        self.browser.wait("halcyonScope.store.newest - halcyonScope.range[1] < 0.5")
+
+    def test_the_xy_view_draws_a_channel_over_another(self):
+        self.begin(
+            netlist=WAVE + "net cosine wave.cosine\n",
+            view="scope?ch=sine:0.5:0,cosine:0.5:0&base=0.05&x=cosine",
+        )
+        self.browser.wait("window.halcyonScope?.rows > 600")
+        pane = "document.querySelector('.xy')"
+        self.browser.wait(f"!{pane}.hidden && halcyonScope.xy.length > 400")
+        radii = self.browser.evaluate("halcyonScope.xy.map(([x, y]) => Math.hypot(x, y))")
+        self.assertTrue(all(abs(radius - 1) < 1e-6 for radius in radii))
+        self.browser.evaluate(
+            "(() => { const s = document.querySelector('[aria-label^=\"X axis\"]'); s.value = ''; s.dispatchEvent(new Event('change')); })()"
+        )
+        self.assertTrue(self.browser.evaluate(f"{pane}.hidden"))
+        self.assertNotIn("x=cosine", self.browser.evaluate("location.hash"))
+
+    def test_the_scope_saves_a_recording_that_hal_plays(self):
+        self.begin(view="scope?ch=sine:0.5:0,total:2:0&base=0.01")
+        self.browser.wait("window.halcyonScope?.rows > 600")
+        self.good("shell", "setp", "adder.in0", "2")
+        self.browser.wait("halcyon.log.some(one => /adder.in0/.test(one.text))")
+        self.browser.evaluate("""window.saved = null;
+            URL.createObjectURL = blob => { blob.arrayBuffer().then(b => { saved = [...new Uint8Array(b)]; }); return 'blob:none'; };
+            HTMLAnchorElement.prototype.click = () => {};
+            const press = label => [...document.querySelectorAll('button')].find(b => b.textContent === label).click();
+            press('Stop'); press('MCAP');""")
+        file = self.folder / "scope.mcap"
+        file.write_bytes(bytes(self.browser.wait("saved")))
+        netlist = self.write(
+            "play.hal",
+            "loadrt threads name1=servo period1=1000000\nloadrt sum2 names=adder,copy\n"
+            "addf adder servo\naddf copy servo\nsetp adder.in0 2\nsetp adder.in1 3\nnet total adder.out\n"
+            "net sine copy.in0\n",
+        )
+        out = self.good("replay", str(file), netlist, "--tolerance", "0")
+        self.assertRegex(out, r"total +equal in \d{3,} rows")
+        self.good("plot", str(file), "sine", "-o", "scope.svg")
+        self.assertIn("setp adder.in0 2", (self.folder / "scope.svg").read_text())
+        try:
+            from mcap.reader import make_reader
+            from mcap_ros2.decoder import DecoderFactory
+        except ImportError:
+            return
+        with file.open("rb") as opened:
+            reader = make_reader(opened, decoder_factories=[DecoderFactory()])
+            rows = [m for _, c, _, m in reader.iter_decoded_messages(topics=["/hal/servo"])]
+            self.assertEqual({5.0}, {row.total for row in rows})
+            self.assertGreater(len(rows), 600)
 
     def test_a_batch_of_a_probe_is_read_to_the_last_bit(self):
         self.begin()

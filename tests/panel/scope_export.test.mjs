@@ -63,4 +63,5 @@ test('the axis of time has one unit, and 0 at the trigger or the newest sample',
     assert.deepEqual(words(.01, 10, 2), ['-10', '0', '10', '20', '30', '40', '50', '60', '70 ms']);
     assert.equal(words(.5, 10, 10)[8], '-0.5 s');
     assert.equal(words(1e-4, 10, 10)[8], '-100 µs');
+    assert.deepEqual(words(.1, 10, 10, 3), ['-900', '-600', '-300 ms']);
 });

@@ -8,18 +8,24 @@ import {objects} from './objects.js';
 import {timeLabels, valueLabels} from './scope_axes.js';
 import {Store, Trigger, measure, valueAt} from './scope_data.js';
 import {csv, download} from './scope_export.js';
+import {FaultTrigger, faultSource, isFaultSource, nameOfFaults} from './scope_fault_trigger.js';
 import {Labels, write} from './scope_labels.js';
+import {mcap} from './scope_mcap.js';
 import {Picture} from './scope_picture.js';
 import {spectrum} from './scope_spectrum.js';
 import {SpectrumPane} from './scope_spectrum_pane.js';
 import {stepResponse} from './scope_step.js';
+import {XyPane} from './scope_xy_pane.js';
 import {remember} from './place.js';
 import {nice} from './widget_values.js';
 
 const most = 16, divisions = 10, rows = 8, before = .2;
+const labelWidth = 56;  // px: of a time
 const hues = [210, 30, 130, 350, 270, 175, 60, 310];
 const paint = i => `hsl(${hues[i % 8]} ${dark.matches ? '85% 68%' : '80% 36%'})`;
-const steps = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, .01, .02, .05, .1, .2, .5, 1, 2];
+const steps = [
+    1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, .01, .02, .05, .1, .2, .5, 1, 2, 5, 10, 30, 60
+];
 const columns = [
     ['Channel'], ['units/div'], ['rise time', 'n step'], ['overshoot', 'n step'],
     ['settling time', 'n step'], ['min', 'n'], ['max', 'n'], ['mean', 'n'], ['rms', 'n'],
@@ -27,6 +33,7 @@ const columns = [
     ['Δ', 'n cursor']
 ];
 const modes = [['roll', 'Roll'], ['auto', 'Auto'], ['normal', 'Normal'], ['single', 'Single']];
+const pages = {PageUp: -divisions / 2, PageDown: divisions / 2, Home: -Infinity, End: Infinity};
 const edges = [['rising', 'rising'], ['falling', 'falling'], ['either', 'either edge']];
 
 /**
@@ -62,8 +69,18 @@ function choose(label, values, value, act) {
     return select;
 }
 
+/// Replaces what a list has to choose from; a value that is not in it becomes the first one.
+function fill(select, values, value) {
+    select.replaceChildren(...values.map(([v, t]) => h('option', {value: v}, t)));
+    select.value = values.some(([v]) => v === value) ? value : values[0][0];
+}
+
 const shortened = value =>
     typeof value === 'number' ? number(Number(value.toPrecision(5))) : value ?? '–';
+
+/// A value, or 0 for what rounding errors of values of this size leave of 0.
+const rounded = (value, size) =>
+    typeof value === 'number' && Math.abs(value) < 1e-12 * size ? 0 : value;
 
 /** The view of the scope. */
 export class View {
@@ -82,9 +99,10 @@ export class View {
         this.useCursors = query.get('cursors') === '1';
         this.useSteps = query.get('step') === '1';
         this.useSpectrum = query.get('spectrum') === '1';
+        this.across = query.get('x') ?? '';  // the channel of the X axis; '': no XY view
         this.cursors = [.3, .7];
         this.selected = 0;
-        this.dragging = null;  // 'move', or the number of a cursor
+        this.dragging = null;  // 'press', 'move', 'scroll', or the number of a cursor
 
         this.store = new Store();
         this.run = true;
@@ -92,11 +110,13 @@ export class View {
         this.source = '';
         /** @type {number} */
         this.shownAt = null;  // s: the right end of the picture; null: the newest
-        /** @type {Trigger} */
+        this.zeroAt = 0;  // s: time 0 of the picture, a trigger or the newest sample
+        /** @type {Trigger | FaultTrigger} */
         this.watcher = null;
         /** @type {number} */
         this.pending = null;  // s: a trigger whose record is not complete
         this.lastTrigger = 0;
+        this.recordEnd = -Infinity;  // s: of the last record that a trigger began
         this.triggered = false;  // the shown record begins with a trigger
         this.stopFollowing = () => {};
         this.following = 0;  // counts calls of follow(): reading the names takes time
@@ -114,13 +134,14 @@ export class View {
 
         this.makeControls();
         this.spectrumPane = new SpectrumPane();
+        this.xyPane = new XyPane();
         this.table = h('tbody');
         this.canvas = h('canvas', {
             tabindex: 0,
             role: 'img',
             'aria-label': 'Traces; the measurements are in the table below. Space runs and ' +
                 'stops, left and right change the time base, up and down move the channel, ' +
-                'plus and minus scale it, a scales all.'
+                'plus and minus scale it, a scales all, page up and page down scroll in time.'
         });
         this.whole =
             h('table', {class: 'channels'},
@@ -131,12 +152,15 @@ export class View {
         main.append(
             h('div', {class: 'column'},
               h('div', {class: 'bar'}, this.add, this.names, this.timeBase, this.modes,
-                this.triggerSource, this.edges, h('label', {class: 'tied'}, 'at', this.levelInput),
-                this.stop, h('button', {onclick: () => this.autoscale()}, 'Auto scale'),
-                this.cursorButton, this.stepButton, this.spectrumButton,
+                this.triggerSource, this.edges, this.levelLabel, this.faultsOf, this.stop,
+                h('button', {onclick: () => this.autoscale()}, 'Auto scale'), this.cursorButton,
+                this.stepButton, this.spectrumButton, this.acrossSource,
                 h('button', {onclick: () => this.saveTable()}, 'CSV'),
+                h('button', {onclick: () => this.saveRecording()}, 'MCAP'),
                 h('button', {onclick: () => this.savePicture()}, 'PNG'), this.status, this.problem),
-              h('div', {class: 'fill high'}, this.canvas), this.spectrumPane.element,
+              h('div', {class: 'pictures'}, h('div', {class: 'fill high'}, this.canvas),
+                this.xyPane.element),
+              this.history, this.spectrumPane.element,
               h('div', {class: 'scroll'}, this.whole)));
         this.surface = surface(
             this.canvas,
@@ -145,6 +169,7 @@ export class View {
         this.suggest();
         this.showCursors();
         this.showSpectrum();
+        this.showXy();
         this.drawChannels();
         this.redraw = () => this.drawChannels();
         dark.addEventListener('change', this.redraw);
@@ -170,6 +195,7 @@ export class View {
         this.stopFollowing();
         this.surface.end();
         this.spectrumPane.end();
+        this.xyPane.end();
     }
 
     makeControls() {
@@ -194,6 +220,14 @@ export class View {
         this.triggerSource = choose(
             'Trigger channel', [['', 'no trigger']], '',
             value => this.setTrigger({trigger: value}));
+        this.faultsOf = h('input', {
+            size: 14,
+            list: 'scope-names',
+            placeholder: 'of any instance',
+            'aria-label': 'Instance or thread whose faults trigger',
+            value: isFaultSource(this.trigger) ? nameOfFaults(this.trigger) : '',
+            onchange: () => this.setTrigger({trigger: faultSource(this.faultsOf.value.trim())})
+        });
         this.edges = choose('Edge', edges, this.edge, value => this.setTrigger({edge: value}));
         this.levelInput = h('input', {
             size: 7,
@@ -202,6 +236,23 @@ export class View {
             value: String(this.level),
             onchange: () => this.setTrigger({level: Number(this.levelInput.value) || 0})
         });
+        this.levelLabel = h('label', {class: 'tied'}, 'at', this.levelInput);
+        this.acrossSource = choose('X axis of the XY view', [['', 'no XY']], '', value => {
+            this.across = value;
+            this.showXy();
+            this.save();
+        });
+        const slider = h('input', {
+            type: 'range',
+            min: -1,
+            max: 0,
+            step: 'any',
+            'aria-label': 'Scroll back in time',
+            oninput: () => this.scrollTo(this.store.newest + Number(slider.value))
+        });
+        this.slider = slider;
+        this.back = h('span', {class: 'dim'});
+        this.history = h('div', {class: 'history'}, slider, this.back);
         this.stop = h('button', {class: 'main', onclick: () => this.toggleRun()}, 'Stop');
         this.cursorButton =
             h('button',
@@ -229,6 +280,7 @@ export class View {
 
     setTrigger(change) {
         Object.assign(this, change);
+        this.drawTrigger();
         this.save();
         this.arm();
     }
@@ -237,6 +289,30 @@ export class View {
         this.run = !this.run;
         this.single = false;
         this.draw();
+        this.drawHistory();
+    }
+
+    /// Stops the picture, with its right end at a time of the record.
+    scrollTo(time) {
+        const {oldest, newest} = this.store, first = Math.min(newest, oldest + this.base);
+        this.run = false;
+        this.shownAt = Math.min(newest, Math.max(first, time));
+        this.draw();
+        this.drawHistory();
+    }
+
+    /// Moves the picture by some divisions, negative to older samples.
+    scroll(by) { this.scrollTo((this.shownAt ?? this.store.newest) + by * this.base); }
+
+    /// Updates the slider that scrolls back.
+    drawHistory() {
+        const {slider, store} = this, kept = store.newest - store.oldest;
+        const behind = Math.max(0, store.newest - this.range()[1]);
+        this.history.hidden = !(kept > this.base * divisions);
+        slider.min = String(Math.min(-1e-3, -kept));
+        if (document.activeElement !== slider || this.run) slider.value = String(-behind);
+        text(this.back, this.run ? `${seconds(kept)} kept` :
+                                   `${seconds(behind)} back of ${seconds(kept)}`);
     }
 
     toggleCursors() {
@@ -265,13 +341,39 @@ export class View {
         this.measureSpectrum();
     }
 
+    /// The channels of the XY view; null when it is off.
+    xyChannels() {
+        const x = this.channels.find(one => one.name === this.across),
+              y = this.channels[this.selected] ?? null;
+        if (!x || !y) return null;
+        return {x, y: x === y ? this.channels.find(one => one !== x) ?? y : y};
+    }
+
+    /// Draws the XY view, if it is shown. `forced`: also when it was drawn just now.
+    showXy(forced = true) {
+        const found = this.xyChannels();
+        this.xyPane.element.hidden = found === null;
+        if (!found) return;
+        const tone = paint(this.channels.indexOf(found.y));
+        this.xyPane.show(this.store, found.x, found.y, this.measured(), tone, forced);
+    }
+
+    /**
+     * The time that is measured: between the cursors, or all that is shown.
+     * @returns {[number, number]}
+     */
+    measured() {
+        const [from, to] = this.range(), [first, second] = this.cursors;
+        if (!this.useCursors) return [from, to];
+        const at = share => from + (to - from) * share;
+        return [at(Math.min(first, second)), at(Math.max(first, second))];
+    }
+
     /// The spectrum of the selected channel, between the cursors if there are any.
     measureSpectrum() {
         const channel = this.channels[this.selected];
         if (!this.useSpectrum || !channel) return null;
-        const [from, to] = this.range(),
-                     times = this.cursors.map(at => from + (to - from) * at).sort((a, b) => a - b),
-                     [begin, end] = this.useCursors ? times : [from, to];
+        const [begin, end] = this.measured();
         const found = spectrum(this.store, channel.name, begin, end);
         this.spectrumPane.show(found, channel.name, channel.unit, paint(this.selected));
         return found?.peak ?? null;
@@ -292,7 +394,32 @@ export class View {
     saveTable() {
         const [from, to] = this.range(), names = this.channels.map(one => one.name);
         const table = csv(this.store, names, from, to);
+        this.reportOverwritten(from);
         download('scope.csv', new Blob([table], {type: 'text/csv'}));
+    }
+
+    /// Saves all samples that are kept, with what happened meanwhile.
+    saveRecording() {
+        const {store} = this, names = this.channels.map(one => one.name), from = store.oldest;
+        const first = store.origin ?? Infinity;
+        const events = state.log.filter(one => one.time_ns > 0 && one.time_ns >= first);
+        const file = mcap(store, names, from, store.newest, events, state);
+        this.reportOverwritten(from);
+        download('scope.mcap', new Blob([file], {type: 'application/octet-stream'}));
+    }
+
+    /// States from when on a file has samples, if not from `from`.
+    reportOverwritten(from) {
+        const {store} = this;
+        const begins = this.channels.filter(one => store.isCoarse(one.name, from)).map(one => {
+            const [group] = store.place.get(one.name);
+            return store.newest - group.time(group.first);
+        });
+        this.report(
+            begins.length === 0 ? '' :
+                                  `the file has the samples of the last ${
+                                      seconds(Math.floor(Math.min(...begins)))}: of earlier ones ` +
+                    'only minima and maxima are kept');
     }
 
     savePicture() {
@@ -312,7 +439,8 @@ export class View {
             level: this.level,
             cursors: this.useCursors ? '1' : '',
             step: this.useSteps ? '1' : '',
-            spectrum: this.useSpectrum ? '1' : ''
+            spectrum: this.useSpectrum ? '1' : '',
+            x: this.across
         });
         this.draw();
     }
@@ -364,8 +492,16 @@ export class View {
     // ---- samples
 
     arm() {
-        this.watcher = this.trigger ? new Trigger(this.trigger, this.edge, this.level) : null;
+        this.watcher = this.makeTrigger();
         this.pending = null;
+        this.recordEnd = -Infinity;
+    }
+
+    makeTrigger() {
+        if (this.trigger === '') return null;
+        if (isFaultSource(this.trigger))
+            return new FaultTrigger(nameOfFaults(this.trigger), () => this.allFaults());
+        return new Trigger(this.trigger, this.edge, this.level);
     }
 
     /// Reads the samples of all channels that the machine has. `restarted`: the page follows the
@@ -390,7 +526,8 @@ export class View {
         this.stopFollowing = probe(list, {batch_ms: 15}, (event, bytes, layout) => {
             if (layout.layout !== known) {
                 known = layout.layout;
-                this.store.layout(layout.groups, list);
+                this.store.layout(layout.groups, list, layout.columns);
+                this.store.unixOffset = layout.unix_ns - layout.time_ns;
                 this.stops = [];
                 this.arm();
             }
@@ -419,7 +556,7 @@ export class View {
         if (this.stops.length === 0 && !state.running) this.noteState();
         if (!this.run) return;
         if (this.mode === 'roll' || !this.watcher) {
-            this.shownAt = this.store.newest;
+            this.shownAt = this.zeroAt = this.store.newest;
             this.triggered = false;
             this.watcher?.scan(this.store);
         } else
@@ -430,7 +567,7 @@ export class View {
     takeTriggered() {
         const {store} = this, window = this.base * divisions, after = window * (1 - before);
         for (const time of this.watcher.scan(store)) {
-            const isNew = this.shownAt === null || time > this.shownAt;
+            const isNew = time > this.recordEnd;
             if (this.pending === null && isNew && time - window * before >= 0) this.pending = time;
         }
         if (this.pending !== null && store.newest >= this.pending + after)
@@ -438,13 +575,14 @@ export class View {
         else if (
             this.mode === 'auto' &&
             performance.now() - this.lastTrigger > Math.max(window * 1000, 300)) {
-            this.shownAt = store.newest;
+            this.shownAt = this.zeroAt = store.newest;
             this.triggered = false;
         }
     }
 
     showRecord(until) {
-        this.shownAt = until;
+        this.shownAt = this.recordEnd = until;
+        this.zeroAt = this.pending;
         this.triggered = true;
         this.lastTrigger = performance.now();
         this.pending = null;
@@ -474,13 +612,18 @@ export class View {
         return silent > 1 && this.followed !== '' ? `no samples for ${Math.floor(silent)} s` : '';
     }
 
-    /// The faults during the shown time.
-    faults() {
-        const {store} = this, [from, to] = this.range();
+    /// All faults since the record began.
+    allFaults() {
+        const {store} = this;
         if (store.origin === null) return [];
         return state.log.filter(one => one.kind === 'fault' && one.time_ns > 0)
-            .map(one => ({at: store.seconds(one.time_ns), text: one.text}))
-            .filter(({at}) => at >= from && at <= to);
+            .map(one => ({at: store.seconds(one.time_ns), text: one.text}));
+    }
+
+    /// The faults during the shown time.
+    faults() {
+        const [from, to] = this.range();
+        return this.allFaults().filter(({at}) => at >= from && at <= to);
     }
 
     /// The shown time, from and to.
@@ -547,6 +690,7 @@ export class View {
             write(context, label, this.looks.back, cssWidth);
         });
         this.writeNotice(context, cssWidth, cssHeight);
+        this.showXy(false);
     }
 
     writeNotice(context, width, height) {
@@ -580,14 +724,19 @@ export class View {
         picture.fill(0, Math.round(10 * ratio), from, from + 2 * thick, picture.colour(paint(i)));
     }
 
-    /// The place of time 0, in divisions: the trigger, or the newest sample.
-    zeroTime() { return this.triggered ? before * divisions : divisions; }
+    /// The place of time 0, in divisions: the trigger, or the newest sample; outside of the picture
+    /// when that was scrolled.
+    zeroTime() {
+        if (this.shownAt === null) return divisions;
+        return Number(((this.zeroAt - this.range()[0]) / this.base).toFixed(6));
+    }
 
     /// The numbers of the axes, the name of the selected channel, and those of the cursors.
     axisLabels(width, height) {
         const {dim, text: tone} = this.looks, channel = this.channels[this.selected];
+        const every = Math.ceil(labelWidth * divisions / width);
         const all =
-            timeLabels(this.base, divisions, this.zeroTime())
+            timeLabels(this.base, divisions, this.zeroTime(), every)
                 .map(
                     ({at, text}) =>
                         ({words: text, x: width * at / divisions + 4, y: height - 5, paint: dim}));
@@ -621,7 +770,7 @@ export class View {
             {name: paint(i), thick, dashed: i >= 8});
         if (channel.name !== this.trigger || this.mode === 'roll') return;
         picture.horizontal(zero - this.level * perUnit, paint(i), true);
-        picture.vertical(canvas.width * before, paint(i), true);
+        picture.vertical(canvas.width * this.zeroTime() / divisions, paint(i), true);
     }
 
     draw() {
@@ -633,11 +782,25 @@ export class View {
 
     drawChannels() {
         const {channels} = this,
-              sources = [['', 'no trigger'], ...channels.map(c => [c.name, c.name])];
-        this.triggerSource.replaceChildren(...sources.map(([v, t]) => h('option', {value: v}, t)));
-        this.triggerSource.value = channels.some(c => c.name === this.trigger) ? this.trigger : '';
+              names = channels.map(c => [c.name, c.name]);
+        fill(
+            this.triggerSource, [['', 'no trigger'], [faultSource(''), 'a fault'], ...names],
+            isFaultSource(this.trigger) ? faultSource('') : this.trigger);
+        fill(
+            this.acrossSource, [['', 'no XY'], ...names.map(([v, t]) => [v, `XY over ${t}`])],
+            this.across);
+        this.acrossSource.disabled = channels.length === 0;
+        this.drawTrigger();
+        this.showXy();
         this.whole.hidden = channels.length === 0;
         this.table.replaceChildren(...channels.map((channel, i) => this.channelRow(channel, i)));
+    }
+
+    /// Shows the controls that the source of the trigger has.
+    drawTrigger() {
+        const isFault = isFaultSource(this.trigger);
+        this.edges.hidden = this.levelLabel.hidden = isFault;
+        this.faultsOf.hidden = !isFault;
     }
 
     channelRow(channel, i) {
@@ -683,6 +846,7 @@ export class View {
     measureAll() {
         this.channels.forEach(channel => this.measureChannel(channel));
         if (this.notice() !== '') this.surface.request();
+        this.drawHistory();
         const now = performance.now(), fps = this.frames * 1000 / (now - this.since);
         this.drawn += this.frames;
         this.frames = 0;
@@ -703,6 +867,7 @@ export class View {
             notice: this.notice(),
             peak: this.measureSpectrum(),
             faults: this.faults(),
+            xy: this.xyPane.element.hidden ? null : this.xyPane.pairs,
             stops: this.stops.map(({from, to}) => ({from, to: to === Infinity ? null : to}))
         };
         Object.assign(window, {halcyonScope: shownNow});  // for tests
@@ -716,11 +881,12 @@ export class View {
         const seen = measure(store, channel.name, begin, end);
         const at =
             useCursors ? times.map(time => valueAt(store, channel.name, time)) : [null, null];
+        const size = seen ? Math.max(Math.abs(seen.min), Math.abs(seen.max)) : 0;
         const known = seen && seen.frequency !== null,
               frequency = known ? `${shortened(seen.frequency)} Hz` : '?',
               difference = at.includes(null) ? null : at[1] - at[0];
         const figures = [
-            ...this.stepCells(channel), seen?.min, seen?.max, seen?.mean, seen?.rms,
+            ...this.stepCells(channel), seen?.min, seen?.max, rounded(seen?.mean, size), seen?.rms,
             seen?.deviation, frequency, ...at, difference
         ];
         figures.forEach((value, k) => text(channel.cells[k], shortened(value)));
@@ -736,7 +902,7 @@ export class View {
             const [first, last] = [...this.cursors].sort((a, b) => a - b);
             return [from + length * first, from + length * last];
         }
-        return this.zeroTime() < divisions ? [from + length * before, to] : null;
+        return this.triggered ? [this.zeroAt, to] : null;
     }
 
     stepCells(channel) {
@@ -754,6 +920,8 @@ export class View {
         if (this.channels.length === 0) return 'Add a channel: a pin, signal or parameter';
         const {store} = this, parts = [this.source, `${store.rows} rows`, `${store.lost} lost`];
         if (!this.run) parts.push(this.single ? 'single record' : 'stopped');
+        if (this.channels.some(one => store.isCoarse(one.name, this.range()[0])))
+            parts.push('minima and maxima of 10 ms');
         const late = performance.now() - this.lastTrigger > 1000;
         if (this.mode !== 'roll' && this.trigger && this.run && late)
             parts.push('waiting for trigger');
@@ -778,7 +946,11 @@ export class View {
         });
         canvas.addEventListener('wheel', event => {
             event.preventDefault();
-            this.shiftBase(Math.sign(event.deltaY));
+            const across = event.shiftKey ? event.deltaY || event.deltaX : event.deltaX;
+            if (event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY))
+                this.scroll(Math.sign(across) * .5);
+            else
+                this.shiftBase(Math.sign(event.deltaY));
         }, {passive: false});
         canvas.addEventListener('keydown', event => {
             if (!this.typed(event)) return;
@@ -790,18 +962,22 @@ export class View {
     pressed(event) {
         const at = event.offsetX / this.canvas.clientWidth, [first, second] = this.cursors;
         const nearest = Math.abs(at - first) < Math.abs(at - second) ? 0 : 1;
-        this.dragging = this.useCursors ? nearest : 'move';
+        this.dragging = this.useCursors ? nearest : 'press';
         this.canvas.setPointerCapture(event.pointerId);
     }
 
     dragged(event) {
         if (this.dragging === null) return;
-        const channel = this.channels[this.selected];
-        if (this.dragging !== 'move')
+        const channel = this.channels[this.selected], {movementX, movementY} = event;
+        if (this.dragging === 'press' && (movementX !== 0 || movementY !== 0))
+            this.dragging = Math.abs(movementX) > Math.abs(movementY) ? 'scroll' : 'move';
+        if (this.dragging === 'scroll')
+            this.scroll(-movementX * divisions / this.canvas.clientWidth);
+        else if (typeof this.dragging === 'number')
             this.cursors[this.dragging] =
                 Math.min(1, Math.max(0, event.offsetX / this.canvas.clientWidth));
         else if (channel)
-            channel.position -= event.movementY * rows / this.canvas.clientHeight;
+            channel.position -= movementY * rows / this.canvas.clientHeight;
         this.surface.request();
     }
 
@@ -822,6 +998,8 @@ export class View {
             this.cursors[ctrlKey ? 1 : 0] += sign * (shiftKey ? .01 : .001);
         else if (key === 'ArrowLeft' || key === 'ArrowRight')
             this.shiftBase(sign);
+        else if (key in pages)
+            this.scroll(pages[key]);
         else if ((key === 'ArrowUp' || key === 'ArrowDown') && channel)
             channel.position += sign * (shiftKey ? 1 : .1);
         else if ((key === '+' || key === '-') && channel)

@@ -31,13 +31,16 @@ const units = [{limit: 1e-3, factor: 1e6, unit: 'µs'}, {limit: 1, factor: 1e3, 
  * @param {number} base seconds per division
  * @param {number} divisions
  * @param {number} zero
+ * @param {number} every the lines that have a label: 1 all of them, 2 every second one …
  * @returns {{at: number, text: string}[]} with the unit in the last one
  */
-export function timeLabels(base, divisions, zero) {
+export function timeLabels(base, divisions, zero, every = 1) {
     const {factor, unit} =
         units.find(({limit}) => base * divisions <= limit) ?? {factor: 1, unit: 's'};
-    return Array.from({length: divisions - 1}, (_, i) => {
-        const at = i + 1, text = label((at - zero) * base * factor, base * factor);
-        return {at, text: at === divisions - 1 ? `${text} ${unit}` : text};
-    });
+    const last = divisions - every, all = [];
+    for (let at = last; at > 0; at -= every) {
+        const text = label((at - zero) * base * factor, base * factor);
+        all.unshift({at, text: at === last ? `${text} ${unit}` : text});
+    }
+    return all;
 }

@@ -5,21 +5,29 @@ const capacity = 1 << 18;
 
 /// Rows that were sampled together: times in seconds, and the values of some channels.
 class Group {
-    /// `hold`: seconds for which a value holds while no newer one comes.
-    constructor(columns, hold) {
+    /// `hold`: seconds for which a value holds while no newer one comes. `thread`: empty for values
+    /// without one.
+    constructor({columns, thread, period_ns}, hold) {
         this.columns = columns;
+        this.thread = thread ?? '';
+        this.period_ns = period_ns ?? 0;
         this.hold = hold;
         this.times = new Float64Array(capacity);
+        this.cycles = new Float64Array(capacity);
         this.values = columns.map(() => new Float64Array(capacity));
         this.count = 0;  // rows ever added; row i is at i % capacity
     }
     get first() { return Math.max(0, this.count - capacity + 1); }
     time(row) { return this.times[row & (capacity - 1)]; }
     value(column, row) { return this.values[column][row & (capacity - 1)]; }
+    cycle(row) { return this.cycles[row & (capacity - 1)]; }
+    /// Whether rows of a time that was shown are overwritten.
+    isOverwritten(time) { return this.first > 0 && time < this.time(this.first); }
     /// Begins a row; returns its place in the columns.
-    add(time) {
+    add(time, cycle = 0) {
         const at = this.count++ & (capacity - 1);
         this.times[at] = time;
+        this.cycles[at] = cycle;
         return at;
     }
     /// The first row at or after a time.
@@ -39,25 +47,24 @@ class Group {
 /// Minimum and maximum of a channel in each interval of `width` seconds, kept up to date as rows
 /// arrive: what a column of pixels shows.
 class Columns {
-    static size = 1 << 13;
-    constructor(group, column, width) {
+    constructor(group, column, width, size = 1 << 13) {
         this.group = group;
         this.column = column;
         this.width = width;
         this.row = group.first;
         this.newest = -1;
         this.last = NaN;
-        this.mask = Columns.size - 1;  // interval i is at i & mask, if index has i there
-        this.index = new Float64Array(Columns.size).fill(NaN);
-        this.low = new Float64Array(Columns.size);
-        this.high = new Float64Array(Columns.size);
+        this.mask = size - 1;  // interval i is at i & mask, if index has i there
+        this.index = new Float64Array(size).fill(NaN);
+        this.low = new Float64Array(size);
+        this.high = new Float64Array(size);
     }
     update() {
         const {group, index, low, high, width} = this, {times} = group,
                                         values = group.values[this.column], mask = capacity - 1;
         for (let row = Math.max(this.row, group.first); row < group.count; row++) {
             const value = values[row & mask], interval = Math.floor(times[row & mask] / width),
-                  at = interval & (Columns.size - 1);
+                  at = interval & this.mask;
             if (Number.isNaN(value)) continue;
             if (index[at] !== interval) {  // from the last value on, so that the trace has no holes
                 index[at] = interval;
@@ -72,7 +79,23 @@ class Columns {
         }
         this.row = group.count;
     }
+    /// The lowest and the highest value between two times as [low, high]; null without one.
+    extremes(from, to) {
+        const first = Math.floor(from / this.width),
+              last = Math.max(first, Math.ceil(to / this.width) - 1);
+        let low = Infinity, high = -Infinity;
+        for (let interval = first; interval <= last; interval++) {
+            const at = interval & this.mask;
+            if (this.index[at] !== interval) continue;
+            low = Math.min(low, this.low[at]);
+            high = Math.max(high, this.high[at]);
+        }
+        return low <= high ? [low, high] : null;
+    }
 }
+
+/// Minimum and maximum of every 10 ms of the last 10 minutes: what remains of overwritten rows.
+const pastWidth = .01, pastSize = 1 << 16;
 
 /// Values of a thread come in every cycle, and those without a thread when they change.
 function holdOf({thread, period_ns}) { return thread ? Math.max(.1, 5e-9 * period_ns) : Infinity; }
@@ -87,7 +110,10 @@ export class Store {
         this.rows = 0;
         this.gaps = 0;
         this.origin = null;
-        this.cut = new Map();  // channel -> Columns
+        this.unixOffset = 0;  // ns: from the machine's clock to Unix time; 0: unknown
+        this.cut = new Map();   // channel -> Columns
+        this.past = new Map();  // channel -> Columns of the last 10 minutes
+        this.columnsOf = new Map();  // channel -> {name, type, unit}
     }
     /// The Columns of a channel, up to date.
     columns(name, width) {
@@ -97,13 +123,41 @@ export class Store {
         columns.update();
         return columns;
     }
-    layout(groups, names) {
+    /// The minima and maxima of the last 10 minutes of a channel, up to date.
+    history(name) {
+        if (!this.past.has(name))
+            this.past.set(name, new Columns(...this.place.get(name), pastWidth, pastSize));
+        const columns = this.past.get(name);
+        columns.update();
+        return columns;
+    }
+    /// Whether a channel has only minima and maxima of a time.
+    isCoarse(name, from) { return this.place.get(name)?.[0].isOverwritten(from) ?? false; }
+    /// Begins another layout. `columns`: {name, type, unit} of each name, as a probe has them.
+    layout(groups, names, columns = []) {
         this.clear();
-        this.groups = groups.map(group => new Group(group.columns, holdOf(group)));
+        this.groups = groups.map(group => new Group(group, holdOf(group)));
         this.cycles = groups.map(() => -1);
         groups.forEach(
             (group, g) => group.columns.forEach(
                 (channel, column) => this.place.set(names[channel], [this.groups[g], column])));
+        for (const column of columns)
+            this.columnsOf.set(column.name, column);
+        for (const name of this.place.keys())
+            this.history(name);
+    }
+    /// The time of the first row, or of the first minimum, that is kept.
+    get oldest() {
+        const times = this.groups.filter(group => group.count > 0).map(group => {
+            const first = group.time(group.first);
+            return group.first > 0 ? Math.max(0, this.newest - pastWidth * pastSize) : first;
+        });
+        return Math.min(this.newest, ...times);
+    }
+    /// Brings minima and maxima up to date before their rows are overwritten.
+    keepPast() {
+        for (const [name, columns] of this.past)
+            if (columns.group.count - columns.row > capacity / 4) this.history(name);
     }
     seconds(ns) {
         this.origin ??= ns;
@@ -125,8 +179,8 @@ export class Store {
                     cycle !== this.cycles[part.group] + every)
                     this.gaps++;
                 this.cycles[part.group] = cycle;
-                const at =
-                    group.add(this.seconds(lows[2 * word + 2] + highs[2 * word + 3] * 4294967296));
+                const ns = lows[2 * word + 2] + highs[2 * word + 3] * 4294967296,
+                      at = group.add(this.seconds(ns), cycle);
                 word += 2;
                 for (let column = 0; column < types.length; column++, word++) {
                     const type = types[column];
@@ -140,6 +194,7 @@ export class Store {
             this.rows += part.rows;
         }
         this.newest = Math.max(this.newest, this.seconds(event.until_ns));
+        this.keepPast();
     }
     /// Takes the values of a subscription.
     values(event) {
@@ -200,11 +255,21 @@ export class Trigger {
     }
 }
 
+/// Minimum and maximum of a time whose rows are overwritten; the other figures are unknown.
+function measureCoarse(store, name, from, to) {
+    const found = store.history(name).extremes(from, to);
+    if (!found) return null;
+    const [min, max] = found;
+    return {min, max, mean: null, rms: null, deviation: null, frequency: null, count: 0};
+}
+
 /// Minimum, maximum, mean, rms, standard deviation and frequency between two times; null without
-/// samples. The frequency needs two rising crossings of the middle.
+/// samples. The frequency needs two rising crossings of the middle. Of a time whose rows are
+/// overwritten only minimum and maximum are known, the others are null.
 export function measure(store, name, from, to) {
     const place = store.place.get(name);
     if (!place) return null;
+    if (store.isCoarse(name, from)) return measureCoarse(store, name, from, to);
     const [group, column] = place, begin = group.row(from), end = group.row(to);
     let min = Infinity, max = -Infinity, mean = 0, squares = 0, deviations = 0, count = 0;
     for (let row = begin; row < end; row++) {

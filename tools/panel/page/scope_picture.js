@@ -66,6 +66,8 @@ export class Picture {
         const [group, column] = place, begin = Math.max(group.row(from) - 1, group.first),
                       end = Math.min(group.row(to) + 1, group.count),
                       paint = this.colour(line.name);
+        if (store.isCoarse(channel, from))
+            return this.traceCoarse(store.history(channel), from, each, zero, perUnit, line);
         const pixelRow = row => Math.max(
             -9, Math.min(this.height + 9, Math.round(zero - group.value(column, row) * perUnit)));
         if (end - begin < 2 * this.width) {
@@ -101,6 +103,22 @@ export class Picture {
             const end = (bottom + thick < height ? bottom + thick : height) * width;
             for (let cell = (top > 0 ? top : 0) * width + x; cell < end; cell += width)
                 pixels[cell] = paint;
+        }
+    }
+
+    /// A channel whose rows are overwritten: a column is a line from its minimum to its maximum.
+    traceCoarse(columns, from, each, zero, perUnit, line) {
+        const paint = this.colour(line.name), {dashed, thick} = line;
+        let last = NaN;
+        for (let x = 0; x < this.width; x++) {
+            const found = columns.extremes(from + x * each, from + (x + 1) * each);
+            if (!found && from + x * each > (columns.newest + 1) * columns.width) return;
+            const [low, high] = found ?? [last, last];
+            last = high;
+            if (Number.isNaN(low) || (dashed && x % 12 >= 8)) continue;
+            const top = Math.round(zero - high * perUnit),
+                  bottom = Math.round(zero - low * perUnit);
+            this.fill(x, 1, top, bottom + thick - 1, paint);
         }
     }
 }
