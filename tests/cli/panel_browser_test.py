@@ -161,6 +161,44 @@ class Views(Page):
             self.browser.evaluate("document.querySelector('.floating').innerText"),
         )
 
+    def test_the_graph_of_300_instances_folds_groups_and_search_opens_them(self):
+        axes, parts = range(25), ("siggen", "limit3", "pid", "scale", "lowpass", "integ")
+        netlist = "loadrt threads name1=servo period1=1000000\n"
+        for part in parts + ("sum2", "comp", "wcomp", "mux2", "and2", "not"):
+            netlist += f"loadrt {part} names={','.join(f'axis{n}-{part}' for n in axes)}\n"
+        for n in axes:
+            netlist += f"""net target{n} axis{n}-siggen.sine => axis{n}-limit3.in
+net command{n} axis{n}-limit3.out => axis{n}-pid.command
+net output{n} axis{n}-pid.output => axis{n}-scale.in
+net drive{n} axis{n}-scale.out => axis{n}-lowpass.in
+net speed{n} axis{n}-lowpass.out => axis{n}-integ.in
+net position{n} axis{n}-integ.out => axis{n}-pid.feedback
+"""
+        netlist += "net follow axis0-pid.error => axis1-sum2.in0\n"
+        self.begin(netlist=netlist, view="graph", token=False)
+        boxes = "Number(document.querySelector('canvas')?.dataset.boxes)"
+        self.browser.wait(f"{boxes} === 25")
+        bar = "document.querySelector('.bar').textContent"
+        self.assertIn("149 instances without links", self.browser.evaluate(bar))
+        self.assertIn("25 boxes, 1 link", self.browser.evaluate(bar))
+        search = "(text => {{ const i = document.querySelector('input[type=search]'); i.value = text; i.dispatchEvent(new Event('change')); }})('{}')"
+        self.browser.evaluate(search.format("axis7-pid.output"))
+        self.browser.wait(f"{boxes} === 24 + 6")
+        self.browser.wait("/signal output7/.test(document.querySelector('.floating').innerText)")
+        self.assertIn("open=axis7", self.browser.evaluate("location.hash"))
+        self.browser.evaluate(search.format("axis9-and2"))
+        self.browser.wait("/no pin is linked/.test(document.querySelector('.floating').innerText)")
+        press = "[...document.querySelectorAll('button')].find(b => b.textContent === '{}').click()"
+        self.browser.evaluate(press.format("Fold groups"))
+        self.browser.wait(f"{boxes} === 25")
+        self.browser.evaluate(press.format("Open groups"))
+        self.browser.wait(f"{boxes} === 151")
+        self.browser.evaluate(
+            "(() => { const s = document.querySelector('[aria-label=Groups]'); s.value = 'component'; s.dispatchEvent(new Event('change')); })()"
+        )
+        self.browser.wait(f"{boxes} === 7")
+        self.assertIn("group=component", self.browser.evaluate("location.hash"))
+
     def test_the_scope_triggers_on_the_right_sample(self):
         self.begin(
             view="scope?ch=sine:0.5:0&mode=normal&trigger=sine&edge=rising&level=0.5&base=0.1"

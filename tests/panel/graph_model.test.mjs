@@ -8,12 +8,16 @@ import {
     firstBoxes,
     head,
     line,
-    neighbourhood
+    neighbourhood,
+    groupId,
+    groupName,
+    unlinked
 } from '../../tools/panel/page/graph_model.js';
 
 const widthOf = text => 6 * text.length;
 const plain = {
-    grouped: false,
+    groups: new Map(),
+    open: new Set(),
     collapsed: new Set()
 };
 
@@ -43,14 +47,49 @@ test('each instance is a box, each reader an edge', () => {
     assert.equal(edges[0].out, head + line / 2);
 });
 
-test('a group is a box per component', () => {
-    const {boxes, edges} = build(chain(3), {grouped: true, collapsed: new Set()}, widthOf);
-    assert.deepEqual(boxes.map(one => one.id), ['a']);
-    assert.equal(edges.length, 2);
+test('a folded group is a box, and its links are bundled', () => {
+    const all = chain(5);
+    all.set('a.0.next', {...all.get('a.0.out'), name: 'a.0.next', signal: 'more'});
+    all.set('a.3.more', {...all.get('a.3.in'), name: 'a.3.more', signal: 'more'});
+    all.set(
+        'more',
+        {kind: 'sig', name: 'more', writer: 'a.0.next', pins: ['a.0.next', 'a.3.more']});
+    const groups = new Map([['a.0', 'left'], ['a.1', 'left'], ['a.2', 'left'], ['a.3', 'right']]);
+    const {boxes, edges, frames} = build(all, {...plain, groups}, widthOf);
+    assert.deepEqual(boxes.map(one => one.id), ['group:left', 'group:right', 'a.4']);
+    assert.deepEqual([...boxes[0].members], ['a.0', 'a.1', 'a.2']);
+    assert.deepEqual(
+        edges.map(({from, to, signals}) => [from, to, signals.map(one => one.name)]),
+        [['group:left', 'group:right', ['s2', 'more']], ['group:right', 'a.4', ['s3']]]);
+    assert.deepEqual(frames, []);
+    assert.equal(boxOf({boxes, edges, frames}, 'a.1.in').id, 'group:left');
+});
+
+test('an open group has its boxes in a frame', () => {
+    const groups = new Map([['a.0', 'left'], ['a.1', 'left'], ['a.2', 'right']]);
+    const {boxes, edges, frames} =
+        build(chain(3), {...plain, groups, open: new Set(['left'])}, widthOf);
+    assert.deepEqual(boxes.map(({id, group}) => [id, group]),
+        [['a.0', 'left'], ['a.1', 'left'], ['group:right', '']]);
+    assert.deepEqual(frames.map(one => one.title), ['left']);
+    assert.deepEqual(edges.map(one => one.bundle), [false, true]);
+});
+
+test('the id of a group is of no instance', () => {
+    assert.equal(groupName(groupId('axis.0')), 'axis.0');
+    assert.equal(groupName('axis.0'), '');
+});
+
+test('instances without a linked pin are counted', () => {
+    const all = chain(2);
+    all.set('b.in', {kind: 'pin', name: 'b.in', instance: 'b', dir: 'IN'});
+    all.set('a.0.in', {kind: 'pin', name: 'a.0.in', instance: 'a.0', dir: 'IN'});
+    all.set('c.time', {kind: 'pin', name: 'c.time', component: 'c', dir: 'OUT'});
+    assert.deepEqual(unlinked(all.values()), ['b']);
 });
 
 test('a collapsed box has its ports at its middle', () => {
-    const {boxes, edges} = build(chain(2), {grouped: false, collapsed: new Set(['a.0'])}, widthOf);
+    const {boxes, edges} = build(chain(2), {...plain, collapsed: new Set(['a.0'])}, widthOf);
     assert.equal(boxes[0].height, head);
     assert.equal(edges[0].out, head / 2);
 });

@@ -1,15 +1,32 @@
 // SPDX-License-Identifier: MIT
-// The netlist as a drawing with live values: search, neighbourhood, groups; a click on a pin shows
-// its writer and readers.
+// The netlist as a drawing with live values: search, neighbourhood, groups that fold; a click on a
+// pin shows its writer and readers.
 import {on, request, subscribe} from './link.js';
 import {h, number, text} from './dom.js';
-import {build, firstBoxes, neighbourhood} from './graph_model.js';
+import {clustered} from './graph_clusters.js';
+import {groupings, groupsOf, instanceOf, instancesOf} from './graph_groups.js';
+import {
+    boxOf,
+    build,
+    firstBoxes,
+    groupId,
+    groupName,
+    neighbourhood,
+    unlinked
+} from './graph_model.js';
 import {GraphCanvas, textMeasure} from './graph_canvas.js';
+import {compareNames} from './names.js';
 import {objects} from './objects.js';
-import {layered} from './layout.js';
 import {remember} from './place.js';
 
 const maxBoxes = 400, maxValues = 1000, maxSuggestions = 2000;
+const manyInstances = 40;  // from which number on they are grouped, if nothing was chosen
+const unlinkedId = 'unlinked:';
+
+/// The names of a list in an address.
+const listOf = words => new Set((words ?? '').split(',').filter(name => name));
+
+const counted = (count, noun) => `${count} ${noun}${count === 1 ? '' : 's'}`;
 
 /// What `show latency` states about a pin, without the pin.
 const latencyOf = (found, pin) =>
@@ -25,7 +42,13 @@ export class View {
         this.all = new Map();
         this.open = true;
         this.selected = query.get('pin') ?? '';
-        this.collapsed = new Set((query.get('collapsed') ?? '').split(',').filter(name => name));
+        this.collapsed = listOf(query.get('collapsed'));
+        this.unfolded = listOf(query.get('open'));
+        /** @type {ReturnType<typeof instancesOf>} */
+        this.instances = new Map();
+        /** @type {Map<string, string>} */
+        this.groups = new Map();  // instance -> group
+        this.unlinked = [];
         this.stopFollowing = () => {};
         this.widthOf = textMeasure();
         this.makeControls(query);
@@ -38,11 +61,13 @@ export class View {
         this.details =
             h('div', {class: 'floating', hidden: true, role: 'region', 'aria-label': 'Details'});
         this.note = h('span', {class: 'dim'});
+        this.unlinkedButton = h('button', {onclick: () => this.select(unlinkedId)});
+        this.foldButton = h('button', {onclick: () => this.foldAll()});
         const all = h('button', {onclick: () => this.drawing.fit()}, 'Show all');
         main.append(
             h('div', {class: 'column'},
-              h('div', {class: 'bar'}, this.search, this.names, this.depth, this.grouped, all,
-                this.note),
+              h('div', {class: 'bar'}, this.search, this.names, this.depth, this.grouping,
+                this.foldButton, all, this.unlinkedButton, this.note),
               h('div', {class: 'fill'}, canvas, this.details)));
         this.drawing = new GraphCanvas(
             canvas, {select: name => this.select(name), fold: name => this.fold(name)});
@@ -82,19 +107,43 @@ export class View {
             },
             depths.map(([value, label]) => h('option', {value}, label)));
         this.depth.value = query.get('depth') ?? '';
-        this.grouped =
-            h('button', {
-                'aria-pressed': query.get('group') ? 'true' : 'false',
-                onclick: () => this.toggleGroups()
-            },
-              'Group by component');
+        this.grouping = h(
+            'select', {'aria-label': 'Groups', onchange: () => this.group(this.grouping.value)},
+            groupings.map(([value, label]) => h('option', {value}, label)));
+        this.chosenGrouping = query.get('group') ?? '';
     }
 
-    isGrouped() { return this.grouped.getAttribute('aria-pressed') === 'true'; }
+    /// Groups instances in another way.
+    group(grouping) {
+        this.chosenGrouping = grouping;
+        this.unfolded.clear();
+        remember({group: grouping, open: ''});
+        this.arrange();
+    }
 
-    toggleGroups() {
-        this.grouped.setAttribute('aria-pressed', String(!this.isGrouped()));
-        remember({group: this.isGrouped() ? '1' : ''});
+    /// Many instances are grouped by name, unless a neighbourhood is shown or the user chose.
+    defaultGrouping(instances) {
+        const isWhole = this.depth.value === '' || this.search.value === '';
+        return isWhole && instances.size > manyInstances ? 'name' : 'none';
+    }
+
+    /// Folds or unfolds a group.
+    unfold(group, isOpen) {
+        if (isOpen)
+            this.unfolded.add(group);
+        else
+            this.unfolded.delete(group);
+        remember({open: [...this.unfolded].join(',')});
+        this.arrange();
+    }
+
+    /// Folds all groups; when they are folded, opens them all.
+    foldAll() {
+        if (this.unfolded.size > 0)
+            this.unfolded.clear();
+        else
+            this.unfolded = new Set(this.groups.values());
+        remember({open: [...this.unfolded].join(',')});
         this.arrange();
     }
 
@@ -108,22 +157,32 @@ export class View {
 
     suggest() {
         const linked = [...this.all.values()].filter(one => one.kind === 'sig' || one.signal);
-        const names =
-            new Set([...this.drawing.graph.boxes.map(one => one.id), ...linked.map(o => o.name)]);
+        const names = new Set([...this.instances.keys(), ...linked.map(one => one.name)]);
         this.names.replaceChildren(
             ...[...names].slice(0, maxSuggestions).map(value => h('option', {value})));
     }
 
     /// Lays out what is to be shown.
     arrange() {
-        let graph = build(
-            this.all, {grouped: this.isGrouped(), collapsed: this.collapsed}, this.widthOf);
-        const whole = graph.boxes.length, {depth, search} = this;
+        const objects = new Set(this.all.values()), {depth, search} = this;
+        this.instances = instancesOf(objects);
+        this.unlinked = unlinked(objects).sort(compareNames);
+        this.grouping.value = this.chosenGrouping || this.defaultGrouping(this.instances);
+        this.groups = groupsOf(this.instances, this.grouping.value);
+        const how = {groups: this.groups, open: this.unfolded, collapsed: this.collapsed};
+        let graph = build(this.all, how, this.widthOf);
+        const whole = graph.boxes.length;
         if (depth.value !== '' && search.value !== '')
             graph = neighbourhood(graph, search.value, Number(depth.value));
         graph = firstBoxes(graph, maxBoxes);
-        const size = layered(graph.boxes, graph.edges);
-        text(this.note, `${graph.boxes.length} of ${whole} boxes, ${graph.edges.length} links`);
+        const size = clustered(graph);
+        const shown = graph.boxes.length === whole ? counted(whole, 'box').replace(/xs$/, 'xes') :
+                                                     `${graph.boxes.length} of ${whole} boxes`;
+        text(this.note, `${shown}, ${counted(graph.edges.length, 'link')}`);
+        this.foldButton.hidden = this.groups.size === 0;
+        text(this.foldButton, this.unfolded.size > 0 ? 'Fold groups' : 'Open groups');
+        this.unlinkedButton.hidden = this.unlinked.length === 0;
+        text(this.unlinkedButton, `${counted(this.unlinked.length, 'instance')} without links`);
         this.drawing.canvas.dataset.boxes = String(graph.boxes.length);
         this.drawing.show(graph, size);
         this.follow();
@@ -149,14 +208,30 @@ export class View {
     find(name) {
         remember({around: name});
         if (this.depth.value !== '') this.arrange();
-        const known =
-            this.all.has(name) || this.drawing.graph.boxes.some(one => one.id === name);
-        if (known) return this.select(name, true);
-        const found = [...this.all.keys()].find(other => other.includes(name));
-        if (found && name !== '') this.select(found, true);
+        const known = this.all.has(name) || this.instances.has(name),
+              names = [...this.instances.keys(), ...this.all.keys()];
+        const found = known ? name : names.find(other => other.includes(name));
+        if (!found || name === '') return;
+        this.reveal(found);
+        this.select(found, true);
+    }
+
+    /// Opens the group that hides a name.
+    reveal(name) {
+        const hidden = boxOf(this.drawing.graph, name);
+        if (!hidden?.members || hidden.id === name) return;
+        const object = this.all.get(name);
+        const pin = object?.kind === 'sig' ? this.all.get(object.writer ?? object.pins[0]) : object;
+        const group = this.groups.get(pin ? instanceOf(pin) : name);
+        if (group) this.unfold(group, true);
     }
 
     fold(name) {
+        const group = groupName(name);
+        if (group !== '') {
+            this.unfold(group, !this.unfolded.has(group));
+            return this.select(name, true);
+        }
         if (!this.collapsed.delete(name)) this.collapsed.add(name);
         remember({collapsed: [...this.collapsed].join(',')});
         const place = {...this.drawing.view};
@@ -178,16 +253,48 @@ export class View {
         if (move) this.drawing.centre(name);
         const content = [
             h('button', {'aria-label': 'close', onclick: () => this.select('')}, '×'),
-            h('h2', {class: 'mono'}, name)
+            h('h2', {class: 'mono'}, this.titleOf(name))
         ];
+        if (groupName(name) !== '') content.push(...this.describeGroup(groupName(name)));
+        if (name === unlinkedId) content.push(this.namesList(this.unlinked));
         if (object) content.push(...this.describe(object));
         if (signal)
             content.push(...await this.describeSignal(signal));
         else if (object)
             content.push(h('p', {class: 'dim'}, 'not linked'));
         const box = this.drawing.graph.boxes.find(one => one.id === name);
-        if (box) content.push(...this.describeBox(box));
+        if (this.unlinked.includes(name))
+            content.push(h('p', {class: 'dim'}, 'no pin is linked'));
+        if (box && !box.members) content.push(...this.describeBox(box));
         if (this.selected === name) this.details.replaceChildren(...content);
+    }
+
+    titleOf(name) {
+        if (name === unlinkedId) return 'Instances without links';
+        return groupName(name) || name;
+    }
+
+    /// Names to choose from.
+    namesList(names) {
+        const show = name => {
+            this.reveal(name);
+            this.select(name, true);
+        };
+        const entry = name => h('button', {class: 'plain mono', onclick: () => show(name)}, name);
+        return h('ul', {class: 'plain'}, names.map(name => h('li', {}, entry(name))));
+    }
+
+    describeGroup(group) {
+        const members = [...this.groups].filter(([, name]) => name === group)
+                            .map(([instance]) => instance)
+                            .sort(compareNames);
+        const isOpen = this.unfolded.has(group);
+        return [
+            h('p', {class: 'dim'}, counted(members.length, 'instance')),
+            h('button', {onclick: () => this.fold(groupId(group))},
+              isOpen ? 'Fold group' : 'Open group'),
+            this.namesList(members)
+        ];
     }
 
     describe({type, dir, unit, doc}) {

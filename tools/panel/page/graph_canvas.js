@@ -1,17 +1,23 @@
 // SPDX-License-Identifier: MIT
 // The canvas of the graph: draws boxes and edges, pans and zooms, and reports what was clicked.
+// What is too small to read is left out: values first, then ports, and last of all names.
 import {colour, number, surface, typeColour} from './dom.js';
 import {boxOf, head, line} from './graph_model.js';
 
 export const font = '12px system-ui, "DejaVu Sans", sans-serif';
 
 const maxScale = 4, minScale = .03;
+const detail = {ports: .3, values: .45};  // from which scale on they are drawn
+const minText = 6;                        // px on the screen: smaller names are not drawn
+const flight = 400;                       // ms
 const steps = {
     ArrowLeft: [60, 0],
     ArrowRight: [-60, 0],
     ArrowUp: [0, 60],
     ArrowDown: [0, -60]
 };
+
+const stillness = matchMedia('(prefers-reduced-motion: reduce)');
 
 /// The width of a text in the font of the drawing.
 export function textMeasure() {
@@ -41,13 +47,15 @@ export class GraphCanvas {
      * @param {HTMLCanvasElement} canvas
      * @param {object} acts
      * @param {(name: string) => void} acts.select a pin or a box was clicked, or '': nothing
-     * @param {(box: string) => void} acts.fold the arrow of a box was clicked
+     * @param {(box: string) => void} acts.fold the arrow of a box or of a frame was clicked
      */
     constructor(canvas, acts) {
         this.canvas = canvas;
         this.acts = acts;
         /** @type {import('./graph_model.js').Graph} */
-        this.graph = {boxes: [], edges: []};
+        this.graph = {boxes: [], edges: [], frames: []};
+        this.looks = {card: '', back: '', text: '', dim: '', line: '', accent: ''};
+        this.flying = 0;  // counts flights: a new one ends the one before
         this.size = {width: 1, height: 1};
         this.values = new Map();
         this.selected = '';
@@ -79,6 +87,10 @@ export class GraphCanvas {
         context.scale(view.scale, view.scale);
         context.font = font;
         context.textBaseline = 'middle';
+        for (const name of Object.keys(this.looks))
+            this.looks[name] = colour(`--${name}`);
+        for (const frame of this.graph.frames)
+            this.drawFrame(context, frame);
         this.drawEdges(context);
         const left = -view.x / view.scale, top = -view.y / view.scale;
         const right = left + width / view.scale, bottom = top + height / view.scale;
@@ -86,14 +98,20 @@ export class GraphCanvas {
             if (box.x <= right && box.x + box.width >= left && box.y <= bottom &&
                 box.y + box.height >= top)
                 this.drawBox(context, box);
+        if (view.scale < detail.ports)
+            for (const frame of this.graph.frames)
+                this.drawFarTitle(context, frame);
     }
 
     drawEdges(context) {
+        const thin = Math.max(1.3, .6 / this.view.scale);  // px: visible at every scale
+        const bundles = this.graph.edges.filter(edge => edge.bundle);
         for (const edge of this.graph.edges) {
-            const marked = edge.signal.name === this.signal, dashed = edge.back || edge.loop;
-            context.strokeStyle = typeColour(edge.signal.type);
-            context.lineWidth = marked ? 3 : 1.3;
-            context.globalAlpha = this.signal && !marked ? .35 : 1;
+            const marked = edge.signals.some(signal => signal.name === this.signal);
+            const dashed = edge.back || edge.loop, wide = 1 + Math.log2(edge.signals.length);
+            context.strokeStyle = edge.type ? typeColour(edge.type) : this.looks.dim;
+            context.lineWidth = marked ? 3 * wide : thin * wide;
+            context.globalAlpha = this.signal && !marked ? .35 : .85;
             context.setLineDash(dashed ? [5, 4] : []);
             context.beginPath();
             curve(context, edge.path, dashed);
@@ -101,25 +119,109 @@ export class GraphCanvas {
         }
         context.globalAlpha = 1;
         context.setLineDash([]);
+        if (this.view.scale < detail.ports) return;
+        for (const {signals, path} of bundles)
+            if (signals.length > 1) this.drawCount(context, signals.length, path[0]);
+    }
+
+    /**
+     * The number of signals of a bundle, where it begins.
+     * @param {CanvasRenderingContext2D} context
+     * @param {number} count
+     * @param {number[]} at
+     */
+    drawCount(context, count, [x, y]) {
+        context.fillStyle = this.looks.text;
+        context.fillText(String(count), x + 6, y - 9);
+    }
+
+    /// A title in a space of this width: as large as on the screen, as far as it fits. Not drawn
+    /// when it would be too small.
+    drawTitle(context, text, x, y, width, height) {
+        const {scale} = this.view;
+        context.font = 'bold ' + font;
+        const natural = 12, fits = natural * width / context.measureText(text).width;
+        const size = Math.min(Math.max(natural, natural / scale), fits, height * .9);
+        if (size * scale < minText) return;
+        context.font = 'bold ' + font.replace(`${natural}px`, `${size}px`);
+        context.fillStyle = this.looks.text;
+        context.fillText(text, x, y);
+        context.font = font;
+    }
+
+    /**
+     * An open group: the space of its boxes, with its name.
+     * @param {any} context
+     * @param {any} frame
+     */
+    drawFrame(context, {x, y, width, height, title, id}) {
+        const chosen = id === this.selected;
+        context.fillStyle = this.looks.back;
+        context.strokeStyle = chosen ? this.looks.accent : this.looks.line;
+        context.lineWidth = chosen ? 3 : 1;
+        context.beginPath();
+        context.roundRect(x, y, width, height, 8);
+        context.fill();
+        context.stroke();
+        if (this.view.scale >= detail.ports)
+            this.drawTitle(context, `▾ ${title}`, x + 10, y + 18, width - 20, 32);
+    }
+
+    /**
+     * The name of an open group across its boxes, which are too small to be read.
+     * @param {any} context
+     * @param {any} frame
+     */
+    drawFarTitle(context, {x, y, width, height, title}) {
+        context.font = 'bold ' + font;
+        const fits = Math.min(12 * width / context.measureText(title).width, height),
+              size = Math.min(15 / this.view.scale, .8 * fits);
+        context.font = 'bold ' + font.replace('12px', `${size}px`);
+        context.textAlign = 'center';
+        context.lineJoin = 'round';
+        context.lineWidth = size / 3;
+        context.strokeStyle = this.looks.back;
+        context.strokeText(title, x + width / 2, y + height / 2);
+        context.fillStyle = this.looks.text;
+        context.fillText(title, x + width / 2, y + height / 2);
+        context.textAlign = 'left';
+        context.font = font;
     }
 
     drawBox(context, box) {
-        const chosen = box.id === this.selected;
-        context.fillStyle = colour('--card');
-        context.strokeStyle = chosen ? colour('--accent') : colour('--dim');
+        const chosen = box.id === this.selected, {scale} = this.view;
+        context.fillStyle = this.looks.card;
+        context.strokeStyle = chosen ? this.looks.accent : this.looks.dim;
         context.lineWidth = chosen ? 3 : 1;
         context.beginPath();
         context.roundRect(box.x, box.y, box.width, box.height, 5);
         context.fill();
         context.stroke();
-        if (this.view.scale < .25) return;
-        context.fillStyle = colour('--text');
+        if (box.members) return this.drawGroup(context, box);
+        if (scale < detail.ports) {
+            const {title, x, y, width, height} = box;
+            return this.drawTitle(context, title, x + 6, y + height / 2, width - 12, height);
+        }
+        context.fillStyle = this.looks.text;
         context.font = 'bold ' + font;
-        context.fillText(`${box.collapsed ? '▸' : '▾'} ${box.id}`, box.x + 6, box.y + head / 2);
+        const title = `${box.collapsed ? '▸' : '▾'} ${box.title}`;
+        context.fillText(title, box.x + 6, box.y + head / 2);
         context.font = font;
         if (box.collapsed) return;
         for (const port of box.ports.values())
             this.drawPort(context, box, port);
+    }
+
+    /// A group that is folded: a second edge looks like boxes behind it.
+    drawGroup(context, {x, y, width, height, title, members}) {
+        const isSmall = this.view.scale < detail.ports;
+        context.fillStyle = this.looks.dim;
+        context.fillRect(x + 5, y + height + 2, width - 10, 1.5);
+        context.fillRect(x + 10, y + height + 5, width - 20, 1.5);
+        if (isSmall) return this.drawTitle(context, title, x + 8, y + height / 2, width - 16, 40);
+        this.drawTitle(context, `▸ ${title}`, x + 8, y + 16, width - 16, 20);
+        context.fillStyle = this.looks.dim;
+        context.fillText(`${members.size} instances`, x + 22, y + 33);
     }
 
     drawPort(context, box, port) {
@@ -128,13 +230,14 @@ export class GraphCanvas {
         context.beginPath();
         context.arc(x, y, port.pin.name === this.selected ? 5 : 3, 0, 7);
         context.fill();
-        context.fillStyle = colour('--text');
+        context.fillStyle = this.looks.text;
         context.textAlign = port.input ? 'left' : 'right';
         context.fillText(port.label, port.input ? x + 8 : x - 8, y);
         context.textAlign = 'left';
         const value = this.values.get(port.pin.signal);
-        if (port.input || value === undefined || this.view.scale < .45) return;
-        context.fillStyle = colour('--dim');
+        if (port.input || value === undefined || this.view.scale < detail.values)
+            return;
+        context.fillStyle = this.looks.dim;
         context.fillText(shortValue(value), x + 6, y - 7);
     }
 
@@ -165,14 +268,51 @@ export class GraphCanvas {
         this.request();
     }
 
-    /// Moves the box of a name to the middle.
+    /// The box or the frame of a name.
+    placeOf(name) {
+        return this.graph.frames.find(one => one.id === name) ?? boxOf(this.graph, name);
+    }
+
+    /// Flies to the box of a name, or to its frame.
     centre(name) {
-        const box = boxOf(this.graph, name), view = this.view;
-        if (!box) return;
-        view.scale = Math.max(view.scale, .8);
-        view.x = this.canvas.clientWidth / 2 - (box.x + box.width / 2) * view.scale;
-        view.y = this.canvas.clientHeight / 2 - (box.y + box.height / 2) * view.scale;
+        const place = this.placeOf(name), {view, canvas} = this;
+        if (!place) return;
+        const {clientWidth: width, clientHeight: height} = canvas;
+        const fits = Math.min(width / (place.width + 60), height / (place.height + 60)),
+              scale = Math.min(Math.max(view.scale, .8), Math.max(fits, minScale));
+        const x = place.x + place.width / 2, y = place.y + place.height / 2;
         view.fitted = view.moved = true;
+        if (stillness.matches) return this.look(x, y, scale);
+        const from = {
+            x: (width / 2 - view.x) / view.scale,
+            y: (height / 2 - view.y) / view.scale,
+            scale: view.scale
+        };
+        this.fly(from, {x, y, scale});
+    }
+
+    /// Moves from one place to another within 400 ms.
+    fly(from, to) {
+        const number = ++this.flying, start = performance.now();
+        const step = () => {
+            if (number !== this.flying || !this.canvas.isConnected) return;
+            const passed = Math.min(1, (performance.now() - start) / flight),
+                  share = passed * passed * (3 - 2 * passed);
+            this.look(
+                from.x + (to.x - from.x) * share, from.y + (to.y - from.y) * share,
+                from.scale * (to.scale / from.scale) ** share);
+            if (passed < 1) requestAnimationFrame(step);
+        };
+        step();
+    }
+
+    /// Shows a place of the drawing in the middle.
+    look(x, y, scale) {
+        Object.assign(this.view, {
+            scale,
+            x: this.canvas.clientWidth / 2 - x * scale,
+            y: this.canvas.clientHeight / 2 - y * scale
+        });
         this.request();
     }
 
@@ -182,12 +322,19 @@ export class GraphCanvas {
         const box = this.graph.boxes.find(
             one => gx >= one.x - 8 && gx <= one.x + one.width + 8 && gy >= one.y &&
                 gy <= one.y + one.height);
-        if (!box) return null;
+        if (!box) return this.hitFrame(gx, gy);
+        if (box.members) return {box: box.id, arrow: gx < box.x + 20 && gy < box.y + head};
         const onPorts = !box.collapsed && gy > box.y + head, left = gx < box.x + box.width / 2;
         const port = [...box.ports.values()].find(
             one => Math.abs(gy - box.y - one.y) < line / 2 && one.input === left);
         if (onPorts && port) return {pin: port.pin.name};
         return {box: box.id, arrow: gx < box.x + 20};
+    }
+
+    hitFrame(x, y) {
+        const frame = this.graph.frames.find(
+            one => x >= one.x && x <= one.x + one.width && y >= one.y && y <= one.y + 36);
+        return frame ? {box: frame.id, arrow: x < frame.x + 26} : null;
     }
 
     listen() {
@@ -204,6 +351,7 @@ export class GraphCanvas {
     }
 
     pressed(event) {
+        this.flying++;
         this.pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
         this.travelled = 0;
         this.canvas.setPointerCapture(event.pointerId);
