@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 # packages: python
 """Python's module hal: components, their death and their return, functions of the module, streams."""
+
 import os
 import re
 import signal
@@ -90,8 +91,7 @@ class PythonTest(Case):
 
     def test_a_probe_gives_arrays_of_every_cycle(self):
         self.machine("loadrt siggen names=wave\n" + SERVO + "addf wave.update servo\nstart\n")
-        out = self.python(
-            """import hal
+        out = self.python("""import hal
 with hal.probe(["wave.sine", "adder.out", "wave.frequency", "servo.threadbeat"]) as samples:
     cycles, counts = [], []
     for rows in samples:
@@ -106,8 +106,7 @@ try:
     hal.probe("adder.uot")
 except hal.error as problem:
     print(problem)
-"""
-        )
+""")
         self.assertEqual(
             "True 0 Hz\nunknown pin, parameter or signal 'adder.uot'; did you mean 'adder.out'?\n",
             out,
@@ -402,6 +401,37 @@ except hal.error as problem:
             self.python(
                 "import hal, os\nc = hal.component('x')\nc.newpin('a', hal.HAL_BIT, hal.HAL_OUT)\nc.ready()\n"
                 "if os.fork() == 0:\n try: c['a'] = 1\n except hal.error: print('rejected', flush=True)\n os._exit(0)\nos.wait()\nassert c['a'] is False\n"
+            ),
+        )
+
+    def test_a_child_process_ends_with_its_component_and_its_own_connection(self):
+        self.machine()
+        child = """import hal, os, sys, threading
+c = hal.component('x')
+c.newpin('a', hal.HAL_BIT, hal.HAL_OUT)
+c.ready()
+def busy():
+    while True: hal.get_value('x.a'); hal.get_info_signals()
+for _ in range(2): threading.Thread(target=busy, daemon=True).start()
+for n in range(30):
+    if os.fork() == 0:
+        hal.get_value('x.a')
+        sys.exit(0) if n % 2 == 0 else 1 / 0
+    assert os.WEXITSTATUS(os.wait()[1]) == n % 2
+c['a'] = True
+print(hal.get_value('x.a'), flush=True)
+os._exit(0)
+"""
+        self.assertEqual("True\n", self.python(child))
+
+    def test_a_child_process_leaves_its_parents_probe_alone(self):
+        self.machine()
+        self.assertEqual(
+            "rejected\nrows\n",
+            self.python(
+                "import hal, os, sys\np = hal.probe('adder.out')\nnext(iter(p))\n"
+                "if os.fork() == 0:\n try: next(iter(p))\n except hal.error: print('rejected', flush=True)\n sys.exit(0)\n"
+                "os.wait()\nfor _ in range(3): rows = next(iter(p))\nprint('rows', flush=True)\n"
             ),
         )
 

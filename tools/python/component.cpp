@@ -3,6 +3,7 @@
 
 #include <csignal>
 #include <cstdio>
+#include <new>
 #include <set>
 #include <utility>
 
@@ -97,10 +98,6 @@ Component::~Component() {
     registry().components.erase(this);
     Component* here = this;
     last_writer.compare_exchange_strong(here, nullptr);
-    // the thread exists in the parent only and cannot be joined
-    if (forked_) {
-        new std::thread(std::move(flusher_));
-    }
 }
 
 std::size_t Component::add(const std::string& name, int type, const std::string& dir,
@@ -227,9 +224,7 @@ void Component::invalidate() {
 }
 
 void Component::leave(bool clean) {
-    if (forked_) {
-        return;  // another thread of the parent may have held the mutex
-    }
+    if (forked_) return;
     {
         const std::scoped_lock lock(mutex_);
         if (left_) return;
@@ -247,8 +242,13 @@ void Component::leave(bool clean) {
 
 void Component::forget() {
     forked_ = true;
+    // the flusher exists in the parent only: it cannot be joined, may have held the mutex, and
+    // would be awaited by the destructor of the condition
+    new std::thread(std::move(flusher_));
+    new (&mutex_) std::mutex;
+    new (&changed_) std::condition_variable;
     if (client_) {
-        client_->close_in_child();
+        client_.release()->close_in_child();
     }
 }
 
@@ -450,14 +450,9 @@ void leave_all(bool clean) {
 }
 
 void forget_all() {
-    // a thread that held it in the parent does not exist here
-    const bool locked = registry().mutex.try_lock();
-    for (Component* const component : registry().components) {
-        component->forget();
-    }
-    if (locked) {
-        registry().mutex.unlock();
-    }
+    // a thread that held it in the parent does not exist here; components change under the GIL
+    new (&registry().mutex) std::mutex;
+    for_all([](Component& component) { component.forget(); });
 }
 
 }  // namespace hal::python

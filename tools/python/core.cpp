@@ -3,12 +3,12 @@
 // hal/__init__.py gives them LinuxCNC's names.
 #include <memory>
 #include <mutex>
+#include <new>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include <pybind11/stl.h>
-#include <unistd.h>
 
 #include "component.hpp"
 #include "probe.hpp"
@@ -24,16 +24,12 @@ public:
         const py::gil_scoped_release release_gil;
         const std::scoped_lock lock(mutex_);
         const Json body = Json::parse(text);
-        if (client_ && process_ != getpid()) {
-            client_->close_in_child();  // the parent goes on using the connection
-        }
         if (client_ && !client_->connected()) {
             client_.reset();
         }
         if (!client_) {
             client_ = connect_to_instance();
         }
-        process_ = getpid();
         Json reply = client_->request(body);
         if (!client_->connected()) {  // the instance was restarted in the meantime
             client_ = connect_to_instance();
@@ -41,11 +37,18 @@ public:
         }
         return dump(reply);
     }
+    /// In a child process, after fork(): the parent goes on using the connection, and a thread that
+    /// used it does not exist here.
+    void forget() {
+        new (&mutex_) std::mutex;
+        if (client_) {
+            client_.release()->close_in_child();
+        }
+    }
 
 private:
     std::mutex mutex_;
     std::unique_ptr<hal::Client> client_;
-    pid_t process_ = 0;  // that made the connection
 };
 
 /// Returns the index of a pin or parameter. Throws AttributeError for an unknown name.
@@ -74,7 +77,10 @@ int before_processes(const char* event, PyObject*, void*) {
 PYBIND11_MODULE(_core, module) {
     module.doc() = "C++ part of the module hal";
     py::register_exception<Problem>(module, "error", PyExc_RuntimeError);
-    py::class_<Link>(module, "Link").def(py::init<>()).def("request", &Link::request);
+    py::class_<Link>(module, "Link")
+        .def(py::init<>())
+        .def("request", &Link::request)
+        .def("after_fork", &Link::forget);
     py::class_<Component, std::shared_ptr<Component>>(module, "Component")
         .def(py::init([](std::string name, std::string prefix, long timeout_ms, long every_ms,
                          bool ends_when_lost) {

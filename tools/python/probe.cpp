@@ -2,13 +2,15 @@
 #include "probe.hpp"
 
 #include <pybind11/stl.h>
+#include <unistd.h>
 
 #include "component.hpp"
 
 namespace hal::python {
 
 Probe::Probe(const std::vector<std::string>& names, std::uint32_t every, int batch_ms,
-             int buffer_ms) {
+             int buffer_ms)
+    : process_(::getpid()) {
     const py::gil_scoped_release release_gil;
     client_ = connect_to_instance();
     ProbeClient::Options options;
@@ -20,6 +22,14 @@ Probe::Probe(const std::vector<std::string>& names, std::uint32_t every, int bat
     if (!probe_) throw Problem(problem);
 }
 
+Probe::~Probe() {
+    if (is_inherited()) {
+        client_->close_in_child();  // what a probe sends at its end would end that of the parent
+    }
+}
+
+bool Probe::is_inherited() const { return process_ != ::getpid(); }
+
 py::list Probe::columns() const {
     py::list all;
     for (const ProbeColumn& column : probe_->columns()) {
@@ -30,6 +40,10 @@ py::list Probe::columns() const {
 }
 
 py::list Probe::next(int timeout_ms) {
+    if (is_inherited()) {
+        throw Problem(
+            "the probe belongs to the parent process; create one of its own in the child");
+    }
     ProbeBatch batch;
     auto got = ProbeClient::Got::nothing;
     {

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Exceptions, constants, and requests to the running instance."""
+
 import enum
 import json
 import math
+import os
 
 from hal import _core
 
@@ -86,6 +88,7 @@ _BY_DIR = {word: dir for dir, word in _DIRS.items()} | {
 }
 
 _link = _core.Link()
+os.register_at_fork(after_in_child=_link.after_fork)
 
 
 def _good(text):
@@ -123,11 +126,7 @@ def _word(value):
     return (
         "TRUE"
         if value is True
-        else "FALSE"
-        if value is False
-        else repr(value)
-        if isinstance(value, float)
-        else str(value)
+        else "FALSE" if value is False else repr(value) if isinstance(value, float) else str(value)
     )
 
 
