@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: MIT
 # cmake -DGIT=PROGRAM -DROOT=FOLDER -DOUTPUT=FILE -P commit.cmake
-# Writes a source with the commit that is checked out in ROOT; without GIT, with `unknown`.
+# Writes a source with the commit that is checked out in ROOT; without GIT, with the one that `git archive` wrote, or `unknown`.
 set(commit unknown)
+file(STRINGS "${ROOT}/cmake/commit.txt" archived LIMIT_COUNT 1)
+if(archived MATCHES "^[0-9a-f]+$")
+    string(SUBSTRING "${archived}" 0 10 commit)
+endif()
 if(GIT)
     execute_process(COMMAND "${GIT}" -c safe.directory=* -C "${ROOT}" rev-parse --short=10 HEAD
                     OUTPUT_VARIABLE found OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET RESULT_VARIABLE result)

@@ -300,8 +300,8 @@ class Script(unittest.TestCase):
         )
 
     def test_a_board_is_one_of_two_and_its_libraries_are_unpacked_once(self):
-        for name in ("cmake/board.sh", "tests/board.sh"):
-            (self.tree / name).parent.mkdir(exist_ok=True)
+        for name in ("cmake/board.sh", "tests/board.sh", "tools/package/package.sh"):
+            (self.tree / name).parent.mkdir(exist_ok=True, parents=True)
             shutil.copy(ROOT / name, self.tree / name)
         self.assertEqual(
             [],
@@ -313,7 +313,11 @@ class Script(unittest.TestCase):
         )
         self.assertTrue(self.said.endswith("hal: usage: ./hal board armhf|arm64\n"), self.said)
         self.hal("package", "armhf", "arm64", status=1)
-        self.assertTrue(self.said.endswith("hal: usage: ./hal package [armhf|arm64]\n"), self.said)
+        usage = "hal: usage: ./hal package [armhf|arm64], or ./hal package --release KEY [ARCHITECTURE...]\n"
+        self.assertTrue(self.said.endswith(usage), self.said)
+        self.hal("package", "--release", status=1)
+        key = "hal: usage: ./hal package --release KEY [ARCHITECTURE...]; KEY signs: one of gpg --list-secret-keys\n"
+        self.assertTrue(self.said.endswith(key), self.said)
         for name in ("qemu-arm-static", "arm-linux-gnueabihf-g++", "dpkg-shlibdeps"):
             (self.tools / name).touch(0o755)
         unpacker, folder = self.tools / "mmdebstrap", self.tree / "build/boards/armhf"

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: MIT
 """build.py ROOT BUILD OUTPUT [ARCHITECTURE SYSROOT]: Debian packages from the build tree BUILD, in OUTPUT. Needs dpkg-dev and binutils.
 
-SYSROOT: the unpacked system of another architecture, with its packages in /var/cache/apt/archives."""
+SYSROOT: the unpacked system of another architecture, with its packages in /var/cache/apt/archives.
+"""
+
 import gzip
 import hashlib
 import os

@@ -76,9 +76,7 @@ PACKAGES = {
 }
 
 DOC = "usr/share/doc/Halcyon/"
-ALIASES = (
-    "(halrun|halcmd|halcompile|halmeter|halsampler|halscope|halshow|halstreamer|haltcl|lcec_conf|mb2hal)"
-)
+ALIASES = "(halrun|halcmd|halcompile|halmeter|halsampler|halscope|halshow|halstreamer|haltcl|lcec_conf|mb2hal)"
 GROUPS = ("vision", "dds", "estimation")  # components that are packages of their own
 
 # (pattern of a path in the installation, package, new path or None for the same); the first match counts. Package None: left out.
