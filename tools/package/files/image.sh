@@ -55,7 +55,9 @@ mmdebstrap --variant=minbase --hook-dir=/usr/share/mmdebstrap/hooks/file-mirror-
     --include=systemd-sysv,udev,dbus,kmod,iproute2,procps,linux-image-rt-amd64,halcyon,halcyon-estimation \
     --customize-hook="$work/setup \"\$1\"" \
     --customize-hook="copy-out /boot $work" \
-    --format=ext2 bookworm "$folder/halcyon.img" "$work/debian.list" "$packages"
+    --format=tar bookworm "$work/root.tar" "$work/debian.list" "$packages"
+rm -f "$folder/halcyon.img" # 2 GB, of which most takes no space on the disk
+genext2fs --block-size 4096 --size-in-blocks 524288 --number-of-inodes 131072 --tarball "$work/root.tar" "$folder/halcyon.img"
 cp "$work"/boot/vmlinuz-* "$folder/vmlinuz"
 cp "$work"/boot/initrd.img-* "$folder/initrd.img"
 
