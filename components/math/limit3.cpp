@@ -12,6 +12,9 @@
 // makes one move per stop that neither speeds up nor brakes by a whole `a`; it is avoided where
 // whole ones end there, too. With an input that moves at w the same holds for speed and way
 // relative to it: `out` meets it at w.
+#include <optional>
+#include <utility>
+
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
 #include "hal/retained.hpp"
@@ -133,7 +136,7 @@ struct Limit3 : hal::Component {
         if (load) {
             carry(a, std::clamp(speed, -v, v));
         } else if (a > 1.0 / max_magnitude) {
-            approach(a, v, speed_to_meet(speed, v));
+            approach(a, v, current_target(speed_to_meet(speed, v)));
         } else {
             stand();
         }
@@ -182,46 +185,86 @@ private:
         arrived_ = false;
     }
 
-    void approach(double a, double v, double input_speed) noexcept {
-        const double goal = std::clamp(enable ? input_ : 0.0, low_now_, high_);
-        const double w = enable && goal == input_ ? input_speed : 0.0;
-        const double left = way_to(goal);
-        const double down = way_to(low_now_);
-        const double up = way_to(high_);
-        // Once on the input it need not be gentle to what the input does within the limits.
-        const double m =
-            arrived_ && std::abs(left - w) <= a ? 1.0 : std::max<double>(smooth_steps, 2.0) - 1.0;
+    /// Where out is to go in this cycle. Distances are measured from out, positive upwards.
+    struct Target {
+        double position;
+        double speed;  ///< of the target itself: out meets it at this speed
+        double distance;
+        double down, up;  ///< to the lower limit: <= 0 within the range; to the upper one: >= 0
+    };
 
-        double wanted =
-            w + next_speed(left - w, speed_ - w, left < w ? v + w : v - w, a, m, w != 0.0);
-        if (too_fast(-wanted, -down, a)) {
-            wanted = std::max(wanted, down < 0.0 ? next_speed(down, speed_, v, a, 1.0)
-                                                 : stopping_speed(down, a, 1.0));
-        }
-        if (too_fast(wanted, up, a)) {
-            wanted = std::min(
-                wanted, up > 0.0 ? next_speed(up, speed_, v, a, 1.0) : stopping_speed(up, a, 1.0));
-        }
-        wanted = std::clamp(wanted, -v, v);
+    Target current_target(double input_speed) const noexcept {
+        const double position = std::clamp(enable ? input_ : 0.0, low_now_, high_);
+        const bool follows_input = enable && position == input_;
+        return {position, follows_input ? input_speed : 0.0, distance_to(position),
+                distance_to(low_now_), distance_to(high_)};
+    }
+
+    /// Moves out for one cycle: the speed that meets the target, reduced until a stop from it fits
+    /// into the range and to `v`, as far as `a` allows. A distance that remains by rounding only is
+    /// dropped: out ends exactly on the target or on a limit.
+    void approach(double a, double v, const Target& target) noexcept {
+        const double wanted =
+            std::clamp(within_range(meeting_speed(target, a, v), target, a, v), -v, v);
         const double possible = std::clamp(wanted, speed_ - a, speed_ + a);
-        const double slack = 1e-12 * a + rounding * (std::abs(speed_) + std::abs(w));
+        const double slack = 1e-12 * a + rounding * (std::abs(speed_) + std::abs(target.speed));
         speed_ = std::abs(wanted - possible) <= slack ? wanted : possible;
         move(speed_);
-
-        const double tiny = rounding * (std::abs(goal) + std::abs(speed_));
-        arrived_ = std::abs(left - speed_) <= tiny && std::abs(speed_ - w) <= a + tiny;
+        arrived_ = reaches(target, a);
         if (arrived_) {
-            stand_at(goal);
-        } else if (up >= 0.0 && up < speed_ && speed_ - up <= slack) {
-            stand_at(high_);
-        } else if (down <= 0.0 && down > speed_ && down - speed_ <= slack) {
-            stand_at(low_now_);
+            stand_at(target.position);
+        } else if (const auto limit = limit_passed_by_rounding(target, slack)) {
+            stand_at(*limit);
         }
     }
 
-    double way_to(double place) const noexcept { return (place - position_) - rest_; }
-    void stand_at(double place) noexcept {
-        position_ = place;
+    /// Returns the speed that meets the target, whatever the range. Ahead of a moving target out
+    /// may be faster than it by v less its speed only.
+    double meeting_speed(const Target& target, double a, double v) const noexcept {
+        const double w = target.speed;
+        const double distance = target.distance - w;  // after this cycle, at standstill
+        const double max_relative_speed = target.distance < w ? v + w : v - w;
+        // Once on the input it need not be gentle to what the input does within the limits.
+        const bool is_on_input = arrived_ && std::abs(distance) <= a;
+        const double m = is_on_input ? 1.0 : std::max<double>(smooth_steps, 2.0) - 1.0;
+        return w + next_speed(distance, speed_ - w, max_relative_speed, a, m, w != 0.0);
+    }
+
+    /// Returns the speed, or the one nearest to it from which out stops within the range. From
+    /// outside of the range it returns to the limit that it has passed.
+    double within_range(double speed, const Target& target, double a, double v) const noexcept {
+        const auto [down, up] = std::pair(target.down, target.up);
+        if (too_fast(-speed, -down, a)) {
+            speed = std::max(speed, down < 0.0 ? next_speed(down, speed_, v, a, 1.0)
+                                               : stopping_speed(down, a, 1.0));
+        }
+        if (too_fast(speed, up, a)) {
+            speed = std::min(
+                speed, up > 0.0 ? next_speed(up, speed_, v, a, 1.0) : stopping_speed(up, a, 1.0));
+        }
+        return speed;
+    }
+
+    /// Whether the move just made ended on the target, at its speed.
+    bool reaches(const Target& target, double a) const noexcept {
+        const double tiny = rounding * (std::abs(target.position) + std::abs(speed_));
+        return std::abs(target.distance - speed_) <= tiny &&
+               std::abs(speed_ - target.speed) <= a + tiny;
+    }
+
+    /// Returns the limit that the move just made passed by at most `slack`, if it did.
+    std::optional<double> limit_passed_by_rounding(const Target& target,
+                                                   double slack) const noexcept {
+        if (target.up >= 0.0 && speed_ > target.up && speed_ - target.up <= slack) return high_;
+        if (target.down <= 0.0 && speed_ < target.down && target.down - speed_ <= slack) {
+            return low_now_;
+        }
+        return std::nullopt;
+    }
+
+    double distance_to(double position) const noexcept { return (position - position_) - rest_; }
+    void stand_at(double position) noexcept {
+        position_ = position;
         rest_ = 0.0;
     }
     // Adds to the position and keeps the rounding error of the sum, so that stops after a long

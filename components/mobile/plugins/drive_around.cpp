@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "hal/component.hpp"
 #include "hal/limit.hpp"
@@ -56,10 +57,11 @@ struct DriveAround : hal::Component {
     hal::LimitParam max_turn{
         *this, "max-turn", "maximum turning speed", {.initial = 1.5, .unit = "rad/s"}};
 
-    hal::Out<double> nearest{*this,
-                             "nearest",
-                             "distance of the nearest obstacle of the infrared ring from the centre; 1000: none",
-                             {.unit = "m", .finite = true}};
+    hal::Out<double> nearest{
+        *this,
+        "nearest",
+        "distance of the nearest obstacle of the infrared ring from the centre; 1000: none",
+        {.unit = "m", .finite = true}};
     hal::Out<double> direction{*this,
                                "direction",
                                "chosen direction, relative to the heading",
@@ -87,6 +89,7 @@ struct DriveAround : hal::Component {
 private:
     static constexpr int sectors = 72;  // 5 degrees each
     static constexpr std::int64_t never = INT64_MIN;
+    static constexpr double no_obstacle = 1000.0;  // value of `nearest`, m
     struct Point {
         double x = 0.0;
         double y = 0.0;
@@ -102,36 +105,56 @@ private:
         blocked = false;
         last_ = 0.0;
     }
-    /// Where the sensors report something, and reported something a short time ago: an obstacle
-    /// beside the robot may be between two of them.
+    /// Updates `seen_`: where the sensors report something, or did so a short time ago, because an
+    /// obstacle beside the robot may be between two of them. Sets `nearest`.
     void look(std::int64_t now) noexcept {
-        double min = 1000.0;
+        look_at_ring(now);
+        look_at_echo(now);
+        see_remembered(now);
+    }
+    /// Remembers what the infrared ring reports within the horizon.
+    void look_at_ring(std::int64_t now) noexcept {
+        double min = no_obstacle;
         for (std::size_t i = 0; i < sensors; ++i) {
-            if (reading[i] == 0) continue;
-            const double range = std::sqrt(std::fmax(constant, 0.0) / reading[i]) - offset;
-            if (!(range < 10.0)) continue;
-            const double facing = static_cast<double>(i / 2) * pi / 4;
-
+            const std::optional<double> range = range_of(reading[i]);
+            if (!range) continue;
+            // where the beam ends, from the centre: sideways, and outwards through the side
             const double aside = i % 2 == 0 ? -spread : spread.get();
-            const double out = apothem + std::fmax(range, 0.0);
-            const double at = std::hypot(out, aside);
-            min = std::fmin(min, at);
-            if (!(at < horizon)) continue;
-            remember(at, facing + std::atan2(aside, out), now);
-        }
-        if (echo_count != echoes_) {
-            echoes_ = echo_count;
-            if (echo_range > 0.0 && echo_range < horizon && std::isfinite(echo_bearing)) {
-                remember(echo_range, echo_bearing, now);
+            const double out = apothem + std::fmax(*range, 0.0);
+            const double distance = std::hypot(out, aside);
+            min = std::fmin(min, distance);
+            if (distance < horizon) {
+                const double facing = static_cast<double>(i / 2) * pi / 4;
+                remember(distance, facing + std::atan2(aside, out), now);
             }
         }
         nearest = go.finite(min);
+    }
+    /// Returns the distance from a sensor of the ring to what it sees; nothing within its range.
+    std::optional<double> range_of(std::uint32_t value) const noexcept {
+        constexpr double max_range_m = 10.0;
+        if (value == 0) return std::nullopt;
+        const double range = std::sqrt(std::fmax(constant, 0.0) / value) - offset;
+        return range < max_range_m ? std::optional(range) : std::nullopt;
+    }
+    /// Remembers a new echo of the ultrasonic head within the horizon.
+    void look_at_echo(std::int64_t now) noexcept {
+        if (echo_count == echoes_) return;
+        echoes_ = echo_count;
+        if (echo_range > 0.0 && echo_range < horizon && std::isfinite(echo_bearing)) {
+            remember(echo_range, echo_bearing, now);
+        }
+    }
+    /// Lists in `seen_` the points that are recent and within the horizon from the pose of now.
+    void see_remembered(std::int64_t now) noexcept {
         count_ = 0;
         for (const Point& p : points_) {
-            const double at = std::hypot(p.x - go.x, p.y - go.y);
-            if (p.at_ns != never && 1e-9 * static_cast<double>(now - p.at_ns) <= memory &&
-                at < horizon) {
-                seen_[count_++] = {std::atan2(p.y - go.y, p.x - go.x) - go.heading, at};
+            if (p.at_ns == never) continue;
+            const double age_s = 1e-9 * static_cast<double>(now - p.at_ns);
+            const double distance = std::hypot(p.x - go.x, p.y - go.y);
+            if (age_s <= memory && distance < horizon) {
+                const double bearing = std::atan2(p.y - go.y, p.x - go.x) - go.heading;
+                seen_[count_++] = {bearing, distance};
             }
         }
     }
