@@ -8,7 +8,7 @@
 
 namespace {
 
-constexpr std::int32_t max = 200;
+constexpr std::int32_t max_bins = 200;
 
 struct Histobins : hal::Component {
     using Component::Component;
@@ -39,15 +39,15 @@ struct Histobins : hal::Component {
     hal::Out<double> variance{*this, "variance", "variance of the values"};
     hal::Out<double> mean{*this, "mean", "mean of the values"};
     hal::Out<std::int32_t> available{
-        *this, "availablebins", "maximum number of bins", {.initial = max}};
+        *this, "availablebins", "maximum number of bins", {.initial = max_bins}};
     hal::Function run{*this, "", &Histobins::update, "counts the value"};
 
     void update(hal::Cycle) noexcept {
         check = index.get();
-        available = max;
+        available = max_bins;
         const double value = chosen();
-        const bool bins = nbins >= 1 && nbins <= max && binsize > 0.0 && std::isfinite(binsize) &&
-                          std::isfinite(minvalue);
+        const bool bins = nbins >= 1 && nbins <= max_bins && binsize > 0.0 &&
+                          std::isfinite(binsize) && std::isfinite(minvalue);
         constexpr double limit = 1e150;  // the square of a larger one is infinite
         input_error = !bins || !(std::fabs(value) <= limit);
         if (input_error) return;
@@ -114,7 +114,7 @@ private:
         variance = statistics_.variance();
     }
     measure::Statistics statistics_;
-    std::array<double, max> bins_{};
+    std::array<double, max_bins> bins_{};
     double above_ = 0.0;
     double below_ = 0.0;
     double smallest_ = 0.0;

@@ -8,15 +8,15 @@
 
 namespace {
 
-constexpr std::int32_t max = 1000;
-using Bins = std::array<std::int32_t, max + 1>;
+constexpr std::int32_t max_bins = 1000;
+using Bins = std::array<std::int32_t, max_bins + 1>;
 
 struct Latencybins : hal::Component {
     using Component::Component;
     hal::In<std::int32_t> highest{*this,
                                   "maxbinnumber",
                                   "number of the last bin on either side, at most 1000",
-                                  {.initial = max}};
+                                  {.initial = max_bins}};
     hal::In<std::int32_t> index{*this, "index", "bin to show"};
     hal::In<bool> reset{*this, "reset", "TRUE clears the histogram"};
     hal::In<std::int32_t> size{*this,
@@ -36,12 +36,12 @@ struct Latencybins : hal::Component {
     hal::Out<std::int32_t> negative_extra{*this, "nextra", "runs earlier than the last bin"};
     hal::Out<std::int32_t> variance{*this, "variance", "variance of the latency, in ns^2"};
     hal::Out<std::int32_t> available{
-        *this, "availablebins", "maximum number of bins", {.initial = max}};
+        *this, "availablebins", "maximum number of bins", {.initial = max_bins}};
     hal::Function run{*this, "", &Latencybins::update, "counts this run"};
 
     void update(hal::Cycle cycle) noexcept {
         const std::int64_t since = time_.since_last(cycle);
-        const std::int32_t last = std::clamp(highest.get(), 0, max);
+        const std::int32_t last = std::clamp(highest.get(), 0, max_bins);
         if (reset) {
             clear();
         } else if (since >= 0) {
@@ -57,7 +57,7 @@ struct Latencybins : hal::Component {
         latency_max = latest_;
         latency_min = earliest_;
         variance = static_cast<std::int32_t>(std::min(statistics_.variance(), 2147483647.0));
-        available = max;
+        available = max_bins;
     }
 
 private:

@@ -17,7 +17,7 @@
 namespace hal {
 namespace {
 
-constexpr std::size_t max = 100'000;  // candidates of one answer
+constexpr std::size_t max_candidates = 100'000;  // of one answer
 
 struct Search {
     const Session& session;
@@ -30,7 +30,7 @@ struct Search {
 
     const Model& model() const { return session.model(); }
     void add(const std::string& text, std::string hint = "") {
-        if (text.starts_with(typed) && found.size() < max) {
+        if (text.starts_with(typed) && found.size() < max_candidates) {
             found.push_back({text, std::move(hint)});
         }
     }

@@ -272,23 +272,23 @@ private:
                           "line of " + std::to_string(line.size()) + " bytes ignored",
                           "the limit is 255 characters");
         }
-        using Kind = text::IniLine::Kind;
+        using LineKind = text::IniLine::Kind;
         const text::IniLine parts = text::ini_line(line);
         const std::string_view name = trimmed(parts.name);
         switch (parts.kind) {
-        case Kind::comment: return comment(line);
-        case Kind::section:
+        case LineKind::comment: return comment(line);
+        case LineKind::section:
             if (!parts.value.empty() && parts.value[0] != ';') {
                 report(parts.value[0] == '#' ? Severity::note : Severity::warning, parts.value,
                        "text after the section name ignored",
                        "write comments on lines of their own");
             }
             return section(line, name, line.substr(0, line.find(']') + 1));
-        case Kind::open_section:
+        case LineKind::open_section:
             report(Severity::warning, line, "section name without ']'",
                    "write [" + std::string(name) + "]");
             return section(line, name, line);
-        case Kind::other: return invalid(line);
+        case LineKind::other: return invalid(line);
         default: return key(line, name, parts.value);
         }
     }

@@ -257,7 +257,8 @@ private:
         return end_;
     }
     void put_objects() noexcept {
-        for (const std::uint16_t index : {0x1000, 0x1008, 0x1018}) {
+        constexpr std::uint16_t own_objects[] = {0x1000, 0x1008, 0x1018};
+        for (const std::uint16_t index : own_objects) {
             put_word(index);
         }
         for (std::size_t n = 0; n < described(); ++n) {

@@ -16,7 +16,7 @@
 
 namespace hal::faults {
 
-inline constexpr std::size_t max = 32;
+inline constexpr std::size_t max_faults = 32;
 
 template <class Fault>
 struct Named {
@@ -107,9 +107,9 @@ auto parse_list(std::string_view text, ParseOne parse_one) {
     while (!text.empty()) {
         all.push_back(parse_one(cut(text, ',')));
     }
-    if (all.size() > max) {
-        throw hal::ArgumentError(
-            "faults", std::to_string(all.size()) + " faults (limit " + std::to_string(max) + ")");
+    if (all.size() > max_faults) {
+        throw hal::ArgumentError("faults", std::to_string(all.size()) + " faults (limit " +
+                                               std::to_string(max_faults) + ")");
     }
     return all;
 }

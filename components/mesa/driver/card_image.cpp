@@ -105,7 +105,7 @@ std::string sentence_of(ModuleFault fault, const CardModule& module, const Modul
 }
 
 /// The registers of I/O ports and of the enables of PWM have a bit for each pin or instance.
-constexpr unsigned max_bits = 32;
+constexpr unsigned max_register_bits = 32;
 
 void read_identity(SetupLink& link, CardImage& image) {
     const auto name = link.read16(Space::card, card::name, 8);
@@ -149,7 +149,7 @@ void read_modules(SetupLink& link, CardImage& image, std::uint16_t at) {
             if (fault != ModuleFault::none) {
                 reject(image, sentence_of(fault, module, *kind));
             }
-            if (descriptor->instances > max_bits) {
+            if (descriptor->instances > max_register_bits) {
                 reject(image, "module " + std::string(kind->name) + " of the firmware has " +
                                   std::to_string(descriptor->instances) +
                                   " instances; the driver supports up to 32");
@@ -265,7 +265,7 @@ CardImage probe(SetupLink& link) {
     if (const IdromFault fault = fault_of(*idrom, at); fault != IdromFault::none) {
         reject(image, sentence_of(fault, *idrom));
     }
-    if (idrom->port_width > max_bits) {
+    if (idrom->port_width > max_register_bits) {
         reject(image, "unknown firmware: ports of " + std::to_string(idrom->port_width) +
                           " pins; the driver supports up to 32");
     }
