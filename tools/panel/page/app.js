@@ -46,6 +46,7 @@ function drawNav() {
                 ([name, [title]]) =>
                     h('a', {href: `#/${name}`, 'aria-current': name === current ? 'page' : null},
                       title)));
+    nav.querySelector('[aria-current]')?.scrollIntoView({inline: 'nearest', block: 'nearest'});
 }
 
 /// What the banner says; empty while everything is as it should be.

@@ -237,6 +237,10 @@ export class GraphCanvas {
         const value = this.values.get(port.pin.signal);
         if (port.input || value === undefined || this.view.scale < detail.values)
             return;
+        context.lineWidth = 3;
+        context.lineJoin = 'round';
+        context.strokeStyle = this.looks.card;  // keeps the value legible above an edge
+        context.strokeText(shortValue(value), x + 6, y - 7);
         context.fillStyle = this.looks.dim;
         context.fillText(shortValue(value), x + 6, y - 7);
     }

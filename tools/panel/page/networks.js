@@ -74,8 +74,17 @@ const shown = [
     'crc-errors', 'dc-sync-diff', 'al-status-code'
 ];
 
+/// The result of a boot, CiA 302-2: 0 not finished, 1 booted, else a letter, A to O.
+const bootResult = (value, names) =>
+    value >= 65 ? `failed (${String.fromCharCode(value)})` : names.get(value) ?? String(value);
+
+/// The title of a column.
+const titleOf = what => what.replace(/-ms$/, '').replaceAll('-', ' ');
+
 /// The words for a value of a pin.
 function wordsFor(name, value, names, unit) {
+    if (value === 'inf') return '–';  // an age without a sign of life
+    if (name === 'boot-result') return bootResult(value, names);
     if (name === 'emcy' || name === 'error-code') return emergency(value);
     if (name === 'error-register') return register(value);
     if (names.size > 1 && typeof value === 'number') return names.get(value) ?? String(value);
@@ -223,20 +232,20 @@ export class View {
         const rows = [...bus.nodes].map(([node, pins]) => {
             const chip = new Chip(node, pins);
             line.append(chip.element);
-            return h(
-                'tr', {'data-node': node}, h('td', {class: 'mono'}, node),
-                columns.map(
-                    what => this.cell(
-                        pins.get(what), (value, cell) => chip.paint(what, value, cell))));
+            const cells = columns.map(what => {
+                const cell =
+                    this.cell(pins.get(what), (value, to) => chip.paint(what, value, to));
+                cell.dataset.title = titleOf(what);  // shown on a narrow screen
+                return cell;
+            });
+            return h('tr', {'data-node': node}, h('td', {class: 'mono'}, node), cells);
         });
-        const titles = columns.map(
-            what =>
-                h('th', {class: 'n', 'data-what': what},
-                  what.replace(/-ms$/, '').replaceAll('-', ' ')));
+        const titles =
+            columns.map(what => h('th', {class: 'n', 'data-what': what}, titleOf(what)));
+        const head = h('thead', {}, h('tr', {}, h('th', {}, 'Station'), titles));
         return h(
             'div', {class: 'scroll'},
-            h('table', {}, h('thead', {}, h('tr', {}, h('th', {}, 'Station'), titles)),
-              h('tbody', {}, rows)));
+            h('table', {class: 'stations'}, head, h('tbody', {}, rows)));
     }
 
     /// Makes the list of the bus's own outputs.

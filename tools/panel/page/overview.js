@@ -59,7 +59,10 @@ function stateOf(thread) {
         ];
     if (thread.faulted) return ['stopped by a fault', 'bad'];
     if (!state.running) return ['stopped: functions do not run', 'warn'];
-    if (thread.missed > 0) return [`running; ${thread.missed} periods missed`, 'warn'];
+    if (thread.missed > 0)
+        return [
+            `running; ${thread.missed} ${thread.missed === 1 ? 'period' : 'periods'} missed`, 'warn'
+        ];
     return ['running, no period missed', 'good'];
 }
 

@@ -799,7 +799,7 @@ export class View {
     /// Shows the controls that the source of the trigger has.
     drawTrigger() {
         const isFault = isFaultSource(this.trigger);
-        this.edges.hidden = this.levelLabel.hidden = isFault;
+        this.edges.hidden = this.levelLabel.hidden = isFault || this.trigger === '';
         this.faultsOf.hidden = !isFault;
     }
 
@@ -918,6 +918,7 @@ export class View {
 
     statusText() {
         if (this.channels.length === 0) return 'Add a channel: a pin, signal or parameter';
+        if (this.source === '') return 'no samples yet';
         const {store} = this, parts = [this.source, `${store.rows} rows`, `${store.lost} lost`];
         if (!this.run) parts.push(this.single ? 'single record' : 'stopped');
         if (this.channels.some(one => store.isCoarse(one.name, this.range()[0])))

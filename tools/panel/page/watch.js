@@ -173,7 +173,7 @@ export class View {
             h('th', {class: 'hide-narrow'}, 'Last 15 s'), h('th', {}, 'Set'),
             h('th', {}, h('span', {class: 'unseen'}, 'Remove'))
         ];
-        const table = h('table', {}, h('thead', {}, h('tr', {}, titles)), this.body);
+        const table = h('table', {class: 'watch'}, h('thead', {}, h('tr', {}, titles)), this.body);
         main.append(
             h('div', {class: 'split'},
               h('div', {class: 'column'}, h('div', {class: 'bar'}, this.filter), this.tree),
@@ -357,9 +357,9 @@ export class View {
             'tr', {},
             h('td', {class: 'mono', title: object?.doc ?? ''}, name,
               object ? h('span', {class: 'dim hide-narrow'}, ` ${object.type}`) : ''),
-            row.value, h('td', {class: 'dim'}, object?.unit ?? ''),
+            row.value, h('td', {class: 'dim unit'}, object?.unit ?? ''),
             h('td', {class: 'hide-narrow'}, row.canvas),
-            h('td', {},
+            h('td', {class: 'set-cell'},
               object ? setter(
                            name, object, value => this.set(name, value),
                            problem => this.reject(problem)) :
