@@ -15,6 +15,9 @@ namespace {
 
 constexpr std::size_t word_bytes = sizeof(std::uint64_t);
 
+/// Of a pointer: a word may consist of small values and, in its padding, of an old address.
+constexpr std::uint64_t low_bytes = 0xff'ffff;
+
 std::uint64_t address_of(const void* memory) { return reinterpret_cast<std::uint64_t>(memory); }
 
 /// The sizes in a state that was written elsewhere are checked against these.
@@ -42,7 +45,7 @@ std::string MachineState::name_of(const Region& region) {
 // --- the regions ---
 
 void MachineState::add(const void* begin, std::size_t bytes, const Instance* instance) {
-    if (!begin || bytes == 0) return;
+    if (!begin || bytes == 0 || component_heap::has(address_of(begin))) return;
     auto* const first = const_cast<char*>(static_cast<const char*>(begin));
     if (by_begin_.emplace(first, regions_.size()).second) {
         regions_.push_back({first, bytes, instance});
@@ -107,7 +110,7 @@ void MachineState::add_instance(const Instance& instance) {
     }
 }
 
-/// Most pins are in the memory of their instance.
+/// Pins of components are in the memory of their instance.
 void MachineState::add_pin(const Pin& pin) {
     if (!region_of(reinterpret_cast<const char*>(pin.memory))) {
         add(pin.memory, sizeof *pin.memory, pin.instance);
@@ -121,37 +124,42 @@ const MachineState::Region* MachineState::region_of(const char* byte) const {
     return byte < region.begin + region.bytes ? &region : nullptr;
 }
 
-/// Adds the heap memory that instances refer to.
-bool MachineState::add_heap() {
-    for (std::size_t i = 0; i < regions_.size(); ++i) {
-        if (regions_[i].instance && !add_heap_of(i)) return false;
-    }
-    return true;
+void MachineState::add_segment(char* begin, const component_heap::Segment& segment) {
+    regions_.push_back({.begin = begin,
+                        .bytes = segment.used,
+                        .is_grown = segment.number == component_heap::grown_segment});
 }
 
-bool MachineState::add_heap_of(std::size_t index) {
-    const Region region = regions_[index];
-    for (std::size_t at = 0; at + word_bytes <= region.bytes; at += word_bytes) {
-        std::uint64_t word = 0;
-        std::memcpy(&word, region.begin + at, sizeof word);
-        if (!memory_.has(word)) continue;
-        const auto* const byte = reinterpret_cast<const char*>(word);
-        if (region_of(byte)) continue;
-        const std::optional<HeapBlock> block = heap_blocks::find(byte);
-        if (!block || block->origin == HeapBlock::Origin::host) continue;
-        if (block->origin != HeapBlock::Origin::setup) {
-            return fail(name_of(region) + " has memory that it has allocated after its start");
+/// Notes where the regions that exist in both processes have pointers to what is not copied.
+void MachineState::note_own_pointers() {
+    for (std::size_t i = 0; i < regions_.size(); ++i) {
+        const Region& region = regions_[i];
+        if (!region.is_copied || region.is_grown) continue;
+        for (std::size_t at = 0; at + word_bytes <= region.bytes; at += word_bytes) {
+            std::uint64_t word = 0;
+            std::memcpy(&word, region.begin + at, sizeof word);
+            Fixup fixup;
+            if (fixup_of(word, fixup) && fixup.kind == own) {
+                own_pointers_.try_emplace(word, static_cast<std::uint32_t>(i), at);
+            }
         }
-        if (block->bytes == 0 || by_begin_.contains(block->begin)) continue;
-        by_begin_.emplace(block->begin, regions_.size());
-        regions_.push_back({block->begin, block->bytes, region.instance, *block});
     }
-    return true;
+}
+
+/// Memory that was allocated in a cycle has no pointers of its own in the process that restores it.
+/// Finds another one to the same object.
+void MachineState::find_like(std::uint64_t word, Fixup& fixup) const {
+    const auto found = own_pointers_.find(word);
+    fixup.kind = none;
+    if (found == own_pointers_.end()) return;
+    fixup.kind = like;
+    fixup.target = found->second.first;
+    fixup.offset = found->second.second;
 }
 
 /// Returns false when the word is a plain number.
 bool MachineState::fixup_of(std::uint64_t word, Fixup& fixup) const {
-    if (!memory_.has(word)) return false;
+    if (component_heap::has(word) || !memory_.has(word)) return false;
     const auto* const byte = reinterpret_cast<const char*>(word);
     const Region* region = region_of(byte);
     if (!region && region_of(byte - 1)) {
@@ -166,7 +174,7 @@ bool MachineState::fixup_of(std::uint64_t word, Fixup& fixup) const {
         fixup.target = static_cast<std::uint32_t>(place->library);
         fixup.offset = place->offset;
     } else {
-        fixup.kind = unknown;
+        fixup.kind = own;
     }
     return true;
 }
@@ -174,7 +182,15 @@ bool MachineState::fixup_of(std::uint64_t word, Fixup& fixup) const {
 // --- writing ---
 
 std::string MachineState::capture() {
-    if (!problem_.empty() || !add_heap()) return "";
+    if (problem_.empty()) {
+        problem_ = component_heap::problem();
+    }
+    if (!problem_.empty()) return "";
+    const std::vector<component_heap::Segment> segments = component_heap::segments();
+    for (const component_heap::Segment& segment : segments) {
+        add_segment(segment.begin, segment);
+    }
+    note_own_pointers();
     std::string to;
     const std::vector<std::string> libraries = memory_.libraries();
     mcap::put(to, static_cast<std::uint32_t>(libraries.size()));
@@ -182,11 +198,10 @@ std::string MachineState::capture() {
         mcap::put_text(to, name);
     }
     mcap::put(to, static_cast<std::uint32_t>(fixed_));
-    mcap::put(to, static_cast<std::uint32_t>(regions_.size() - fixed_));
-    for (std::size_t i = fixed_; i < regions_.size(); ++i) {
-        mcap::put(to, regions_[i].block.call);
-        mcap::put(to, regions_[i].block.index);
-        mcap::put_text(to, name_of(regions_[i]));
+    mcap::put(to, static_cast<std::uint32_t>(segments.size()));
+    for (const component_heap::Segment& segment : segments) {
+        mcap::put(to, segment.number);
+        mcap::put(to, static_cast<std::uint64_t>(segment.used));
     }
     for (const Region& region : regions_) {
         put_region(to, region);
@@ -207,7 +222,11 @@ void MachineState::put_region(std::string& to, const Region& region) const {
         std::memcpy(&word, &content[at], sizeof word);
         Fixup fixup{.word = static_cast<std::uint32_t>(at / word_bytes)};
         if (!fixup_of(word, fixup)) continue;
-        std::memset(&content[at], 0, sizeof word);
+        if (fixup.kind == own && region.is_grown) {
+            find_like(word, fixup);
+        }
+        word &= low_bytes;
+        std::memcpy(&content[at], &word, sizeof word);
         mcap::put(fixups, fixup.word);
         mcap::put(fixups, static_cast<std::uint8_t>(fixup.kind));
         mcap::put(fixups, fixup.target);
@@ -257,11 +276,10 @@ bool MachineState::restore(std::string_view bytes) {
         libraries.emplace_back(from.text());
     }
     const auto fixed = from.get<std::uint32_t>();
-    const auto heap = from.get<std::uint32_t>();
     if (!from.good() || fixed != fixed_) {
         return fail("it is of a machine with other instances or signals");
     }
-    if (!problem_.empty() || !get_heap(from, heap)) return false;
+    if (!problem_.empty() || !get_segments(from)) return false;
     for (const Region& region : regions_) {
         if (!get_region(from, region, libraries)) return false;
     }
@@ -274,22 +292,15 @@ bool MachineState::restore(std::string_view bytes) {
     return from.good() || fail("it is damaged");
 }
 
-bool MachineState::get_heap(mcap::Fields& from, std::size_t count) {
-    std::map<std::pair<std::uint32_t, std::uint32_t>, HeapBlock> blocks;
-    for (const HeapBlock& block : heap_blocks::of_setup_calls()) {
-        blocks.emplace(std::pair(block.call, block.index), block);
-    }
-    for (; count > 0 && from.good(); --count) {
-        const auto call = from.get<std::uint32_t>();
-        const auto index = from.get<std::uint32_t>();
-        const std::string owner(from.text());
-        const auto found = blocks.find({call, index});
-        if (found == blocks.end()) {
-            return fail(fmt::format("{} has other heap memory than it had", owner));
-        }
-        const HeapBlock& block = found->second;
-        by_begin_.emplace(block.begin, regions_.size());
-        regions_.push_back({block.begin, block.bytes, nullptr, block});
+bool MachineState::get_segments(mcap::Fields& from) {
+    for (auto count = from.get<std::uint32_t>(); count > 0 && from.good(); --count) {
+        component_heap::Segment segment;
+        segment.number = from.get<std::uint32_t>();
+        segment.used = from.get<std::uint64_t>();
+        char* const begin =
+            segment.used <= from.left() ? component_heap::resized(segment) : nullptr;
+        if (!begin) return fail("it is damaged, or there is not enough memory");
+        add_segment(begin, segment);
     }
     return from.good() || fail("it is damaged");
 }
@@ -315,19 +326,35 @@ bool MachineState::set_pointers(mcap::Fields& from, const Region& region, std::s
         const auto target = from.get<std::uint32_t>();
         const auto offset = from.get<std::uint64_t>();
         if (!from.good() || at + word_bytes > content.size()) return fail("it is damaged");
-        std::uint64_t word = 0;
-        std::memcpy(&word, region.begin + at, sizeof word);  // the own pointer stays
-        if (kind == into_region) {
+        std::uint64_t before = 0;
+        std::uint64_t stored = 0;
+        std::memcpy(&before, region.begin + at, sizeof before);
+        std::memcpy(&stored, &content[at], sizeof stored);
+        std::uint64_t word = before;  // the own pointer stays
+        const bool is_same = stored == (before & low_bytes) && !region.is_grown;
+        if (is_same || kind == own) {
+            // as it was after the start
+        } else if (kind == into_region) {
             const bool exists = target < regions_.size() && offset <= regions_[target].bytes;
             if (!exists) return fail("it is damaged");
             word = address_of(regions_[target].begin) + offset;
         } else if (kind == into_library && target < libraries.size()) {
             const std::uint64_t address = memory_.address_in(libraries[target], offset);
             word = address == 0 ? word : address;
+        } else if (kind == like) {
+            if (!has_word(target, offset)) return fail("it is damaged");
+            std::memcpy(&word, regions_[target].begin + offset, sizeof word);
+        } else {
+            word = 0;
         }
         std::memcpy(&content[at], &word, sizeof word);
     }
     return true;
+}
+
+bool MachineState::has_word(std::uint32_t region, std::uint64_t offset) const {
+    if (region >= regions_.size() || regions_[region].bytes < word_bytes) return false;
+    return offset <= regions_[region].bytes - word_bytes;
 }
 
 bool MachineState::get_core(mcap::Fields& from, Core& core) {

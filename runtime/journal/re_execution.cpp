@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "journal/heap_blocks.hpp"
+#include "journal/component_heap.hpp"
 #include "journal/machine_state.hpp"
 #include "machine/processes/programs.hpp"
 #include "machine/report/crash.hpp"
@@ -63,7 +63,7 @@ ReExecution::ReExecution(JournalFile& file) : file_(file) {
         }
     }
     now_ns_ = begin_ns_.value_or(0);
-    if (file.begin() && !heap_blocks::track()) {
+    if (file.begin() && !component_heap::track()) {
         fail(State::fails, "a build with a sanitizer cannot restore the state that it begins with");
     }
 }

@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <iterator>
 #include <limits>
 #include <map>
 #include <random>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -18,37 +20,44 @@
 
 namespace hal::test {
 
-#define SCOCAN_TABLE                                                                           \
-    " table=\"cycle 10ms; slots 10; node clock A sync; node n A; node bridge A bridge; node "  \
-    "watch B monitor; mode 0 run; 0 sync; "                                                    \
-    "1 private n 0x100; 2 private clock 0x101; message a 0x100 fields x:f64; message b 0x101 " \
-    "fields y:s16,z:u8; "                                                                      \
-    "message c 0x300 node n event 10ms fields w:f32\""
-// Load arguments of components that cannot be made without.
-inline const std::map<std::string, std::string> component_arguments{
-    {"canopen", "inputs=24831 outputs=24675 slavenodeid=2"},
-    {"dds_publish", "topic=rt/pins fields=f:float,b:bit,i:s32,u:u32,l:s64,k:u64 rate=0 domain=230"},
-    {"dds_subscribe", "topic=rt/pins fields=f:float,b:bit,i:s32,u:u32,l:s64,k:u64 domain=230"},
-    {"ethercat", "config=tests/rt/drive.ethercat"},
-    {"lcec", "config=tests/rt/ethercat-conf.xml link=sim:rt/lcec"},
-    {"hm2_eth", "board_ip=sim:rt-hm2-eth"},
-    {"mesa", "board=sim:rt-mesa config=\"enable_raw\""},
-    {"mesa_card", "config=tests/rt/card.mesa"},
-    {"modbus", "config=tests/rt/bus.modbus"},
-    {"modbus_node", "config=tests/rt/bus.modbus link=sim:rt-modbus-node"},
-    {"scocan", "link=sim:rt-scocan node=n" SCOCAN_TABLE},
-    {"scocan_bridge", "link=sim:rt-scocan node=bridge pc=sim:rt-pc" SCOCAN_TABLE},
-    {"scocan_monitor", "link=sim:rt-scocan node=watch" SCOCAN_TABLE},
-    {"scocan_sync", "link=sim:rt-scocan node=clock" SCOCAN_TABLE},
-    {"segment_record", "link=sim:rt/recorder file=/dev/null"},
-    {"tdma", "link=sim:rt/master station=master schedule=\"master:; cycle 2000; slot 0 100\""},
+/// component_arguments.txt, which tests in Python read, too.
+struct LoadLines {
+    std::map<std::string, std::string> arguments;  // by component
+    std::map<std::string, std::string> before;
 };
 
-// What has to be loaded before: drivers ask their device what it has.
-inline const std::map<std::string, std::string> component_devices{
-    {"hm2_eth", "loadrt mesa_card names=rt-hm2-eth config=tests/rt/card.mesa link=sim:rt-hm2-eth"},
-    {"mesa", "loadrt mesa_card names=rt-mesa config=tests/rt/card.mesa link=sim:rt-mesa"},
-};
+inline LoadLines read_load_lines() {
+    LoadLines lines;
+    std::map<std::string, std::string> texts;
+    std::ifstream file("tests/rt/component_arguments.txt");
+    for (std::string line; std::getline(file, line);) {
+        std::istringstream words(line);
+        std::string first;
+        std::string name;
+        std::string rest;
+        words >> first;
+        if (first.empty() || first.starts_with('#')) continue;
+        if (first == "before" || first == "text") {
+            words >> name;
+        }
+        std::getline(words >> std::ws, rest);
+        if (first == "before") {
+            lines.before[name] = rest;
+        } else if (first == "text") {
+            texts[name] = rest;
+        } else {
+            lines.arguments[first] = rest;
+        }
+    }
+    for (auto& [component, arguments] : lines.arguments) {
+        for (const auto& [name, text] : texts) {
+            if (const std::size_t at = arguments.find(name); at != std::string::npos) {
+                arguments.replace(at, name.size(), text);
+            }
+        }
+    }
+    return lines;
+}
 
 inline std::vector<std::string> all_components() {
     std::vector<std::string> names;
@@ -63,12 +72,13 @@ inline std::vector<std::string> all_components() {
 
 /// Returns the line that loads a component: ours, also where LinuxCNC's of the same name precedes it.
 inline std::string load(const std::string& name) {
-    const auto given = component_arguments.find(name);
-    const auto device = component_devices.find(name);
+    static const LoadLines lines = read_load_lines();
+    const auto given = lines.arguments.find(name);
+    const auto device = lines.before.find(name);
     const bool has_precedent = name == "hm2_eth" || name == "hostmot2";
-    return (device == component_devices.end() ? "" : device->second + "\n") + "loadrt " +
+    return (device == lines.before.end() ? "" : device->second + "\n") + "loadrt " +
            (has_precedent ? "--native " : "") + name +
-           (given == component_arguments.end() ? "" : " " + given->second) + "\n";
+           (given == lines.arguments.end() ? "" : " " + given->second) + "\n";
 }
 
 // Ordinary values mostly, and now and then one from the edge of the type.

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "cli/output.hpp"
-#include "journal/heap_blocks.hpp"
+#include "journal/component_heap.hpp"
 #include "run/chosen_values.hpp"
 #include "run/difference_inputs.hpp"
 #include "run/journal_test.hpp"
@@ -227,7 +227,7 @@ std::string cut_problem(const ReplayOptions& options) {
     if (!options.cut.ends_with(".mcap")) {
         return fmt::format("unknown format of '{}'; name the file .mcap", options.cut);
     }
-    if (!heap_blocks::track()) return "a build with a sanitizer cannot read the state";
+    if (!component_heap::track()) return "a build with a sanitizer cannot read the state";
     return "";
 }
 

@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "machine/load/component_memory.hpp"
 #include "machine/load/construction.hpp"
 #include "machine/load/setup_call.hpp"
 #include "machine/load/thread_options.hpp"
@@ -19,6 +20,15 @@ std::string dashed(std::string text) {
     std::replace(text.begin(), text.end(), '_', '-');
     return text;
 }
+
+namespace {
+
+std::unique_ptr<char[]> memory_of_component(std::size_t bytes) {
+    const ComponentMemory scope;
+    return std::make_unique<char[]>(bytes);
+}
+
+}  // namespace
 
 void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noexcept {
     if (bytes > std::min<std::uint64_t>(std::uint64_t{1} << 32, PTRDIFF_MAX - 4096) || align == 0 ||
@@ -42,7 +52,7 @@ void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noe
             next = std::min(max, std::max<std::size_t>(256, 2 * instance.blocks.back().bytes));
         }
         const std::size_t size = std::max(next, bytes + align);
-        instance.blocks.push_back({std::make_unique<char[]>(size), size, 0});
+        instance.blocks.push_back({memory_of_component(size), size, 0});
         return take(instance.blocks.back());
     } catch (const std::bad_alloc&) {
         return nullptr;
@@ -238,7 +248,11 @@ std::size_t stride_of(const hal_component& plugin) {
 // Cleared memory for so many instances in a row.
 std::shared_ptr<void> block_of(const hal_component& plugin, std::size_t count) {
     const std::align_val_t align{std::max<std::size_t>(plugin.instance_align, 64)};
-    void* const memory = ::operator new(count * stride_of(plugin), align);
+    void* memory = nullptr;
+    {
+        const ComponentMemory scope;
+        memory = ::operator new(count * stride_of(plugin), align);
+    }
     std::memset(memory, 0, count * stride_of(plugin));
     return std::shared_ptr<void>(memory, [align](void* p) { ::operator delete(p, align); });
 }

@@ -24,6 +24,7 @@ struct SetupCallNow {
     std::atomic<const char*> why{""};
     std::atomic<std::int64_t> expected_ns{0};  ///< duration that the component has announced
     std::atomic<pthread_t> thread{};  ///< that makes the call
+    std::atomic<std::uint64_t> number{0};  ///< of the call, counted from 1
     std::atomic<std::int64_t> since_ns{0};  ///< on the monotonic clock; 0: none
 };
 
@@ -37,6 +38,7 @@ public:
         now.what = what;
         now.expected_ns = 0;
         now.thread = pthread_self();
+        now.number.fetch_add(1);
         now.since_ns.store(monotonic_ns(), std::memory_order_release);
     }
     ~SetupCall() {

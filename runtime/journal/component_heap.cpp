@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: MIT
+#include "journal/component_heap.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cstdlib>
+#include <cstring>
+#include <link.h>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <string_view>
+#include <sys/mman.h>
+#include <unwind.h>
+#include <utility>
+
+#include "execute/core.hpp"
+#include "machine/load/component_memory.hpp"
+#include "machine/load/setup_call.hpp"
+
+namespace hal {
+namespace {
+
+struct CodeRange {
+    std::uint64_t begin = 0;
+    std::uint64_t end = 0;
+    bool has(std::uint64_t address) const { return address >= begin && address < end; }
+};
+
+/// Which code of this process asks for memory. A component that asks the program for something, as
+/// a pin, does not own what the program allocates for that.
+class Callers {
+public:
+    Callers() {
+        dl_iterate_phdr(&Callers::note, this);
+        is_of_program(__builtin_return_address(0));  // loads the unwinder
+    }
+
+    /// `from`: where `operator new` returns to. Functions of libraries that the program was linked
+    /// with ask for their callers.
+    bool is_of_program(void* from) const {
+        const auto address = reinterpret_cast<std::uint64_t>(from);
+        if (program_.has(address)) return true;
+        if (!is_in_library(address)) return false;
+        Search search{*this, address};
+        _Unwind_Backtrace(&Callers::look, &search);
+        return search.found;
+    }
+
+private:
+    struct Search {
+        const Callers& callers;
+        std::uint64_t from;
+        bool passed = false;  // the frames of `operator new` itself
+        bool found = false;
+    };
+    static _Unwind_Reason_Code look(_Unwind_Context* frame, void* to) {
+        auto& search = *static_cast<Search*>(to);
+        const auto address = static_cast<std::uint64_t>(_Unwind_GetIP(frame));
+        search.passed = search.passed || address == search.from;
+        if (!search.passed || search.callers.is_in_library(address)) return _URC_NO_REASON;
+        search.found = search.callers.program_.has(address);
+        return _URC_END_OF_STACK;
+    }
+    bool is_in_library(std::uint64_t address) const {
+        for (std::size_t i = 0; i < count_; ++i) {
+            if (libraries_[i].has(address)) return true;
+        }
+        return false;
+    }
+    static int note(dl_phdr_info* object, std::size_t /*size*/, void* to) {
+        auto& callers = *static_cast<Callers*>(to);
+        const std::string_view name = object->dlpi_name ? object->dlpi_name : "";
+        // links are opened and used by components
+        if (name.find("libhalcyon") != std::string_view::npos) return 0;
+        const bool is_program = name.empty();
+        if (is_program && callers.program_.end != 0) return 0;  // the vDSO has no name either
+        if (!is_program && callers.count_ == callers.libraries_.size()) return 0;
+        CodeRange& range = is_program ? callers.program_ : callers.libraries_[callers.count_++];
+        range.begin = UINT64_MAX;
+        for (ElfW(Half) i = 0; i < object->dlpi_phnum; ++i) {
+            const ElfW(Phdr)& part = object->dlpi_phdr[i];
+            if (part.p_type != PT_LOAD) continue;
+            const std::uint64_t begin = object->dlpi_addr + part.p_vaddr;
+            range.begin = std::min<std::uint64_t>(range.begin, begin);
+            range.end = std::max<std::uint64_t>(range.end, begin + part.p_memsz);
+        }
+        return 0;
+    }
+
+    CodeRange program_;
+    std::array<CodeRange, 64> libraries_;
+    std::size_t count_ = 0;
+};
+
+constexpr std::uint64_t heap_begin = 0x5700'0000'0000;  // nothing else is mapped there
+constexpr std::size_t segment_bytes = std::size_t{1} << 28;
+constexpr std::uint32_t max_segments = 4096;
+constexpr std::uint32_t instance_segment = 0;
+constexpr std::uint32_t first_call_segment = 2;
+constexpr std::size_t min_alignment = 16;
+constexpr std::size_t large_bytes = std::size_t{1} << 16;
+
+/// Lies directly before each block.
+struct BlockHead {
+    std::size_t bytes = 0;
+    std::size_t size_class = 0;  ///< of the segment for cycles
+};
+static_assert(sizeof(BlockHead) == min_alignment);
+
+/// At the begin of the segment for cycles, so that its content restores it.
+struct FreeBlocks {
+    static constexpr std::size_t min_class = 5;  ///< 32 bytes
+    std::array<char*, 28> first{};  ///< by class; the first word of a block has the next one
+};
+
+void clear(char* begin, std::size_t bytes) {
+    if (bytes >= large_bytes) {
+        constexpr std::uint64_t page = 4096;
+        const auto first = reinterpret_cast<std::uint64_t>(begin);
+        const std::uint64_t from = (first + page - 1) / page * page;
+        const std::uint64_t to = (first + bytes) / page * page;
+        if (::madvise(reinterpret_cast<void*>(from), to - from, MADV_DONTNEED) == 0) {
+            std::memset(begin, 0, from - first);
+            std::memset(reinterpret_cast<void*>(to), 0, first + bytes - to);
+            return;
+        }
+    }
+    std::memset(begin, 0, bytes);
+}
+
+class ComponentHeap {
+public:
+    static bool has(std::uint64_t address) {
+        return address >= heap_begin && address - heap_begin < max_segments * segment_bytes;
+    }
+
+    /// Returns nullptr when the memory is not a component's, or a segment is full.
+    void* allocate(std::size_t bytes, std::size_t alignment, void* from) {
+        const bool is_in_cycle = Core::current() != nullptr;
+        const bool is_in_call = !is_in_cycle && SetupCall::is_mine();
+        const bool is_for_one = ComponentMemory::is_allocated();
+        if (!is_in_cycle && !is_in_call && !is_for_one) return nullptr;
+        if (!is_for_one && callers_.is_of_program(from)) return nullptr;
+        const std::scoped_lock own(mutex_);
+        void* memory = nullptr;
+        if (is_for_one) {
+            memory = bump(instance_segment, bytes, alignment);
+        } else if (is_in_cycle) {
+            memory = grow(bytes, alignment);
+        } else {
+            memory = bump(segment_of_call(), bytes, alignment);
+        }
+        is_full_ = is_full_ || !memory;
+        return memory;
+    }
+    void release(void* memory) {
+        const std::scoped_lock own(mutex_);
+        auto* const begin = static_cast<char*>(memory);
+        BlockHead& head = head_of(begin);
+        clear(begin, head.bytes);
+        const std::size_t size_class = head.size_class;
+        if (size_class == 0) return;  // a setup call allocates no address twice
+        std::memcpy(begin, &free_blocks().first[size_class], sizeof begin);
+        free_blocks().first[size_class] = begin;
+    }
+    std::vector<component_heap::Segment> segments() {
+        std::array<std::size_t, max_segments> used{};
+        {
+            const std::scoped_lock own(mutex_);
+            used = used_;
+        }
+        std::vector<component_heap::Segment> all;
+        for (std::uint32_t i = 0; i < max_segments; ++i) {
+            if (used[i] > 0) {
+                all.push_back({i, begin_of(i), used[i]});
+            }
+        }
+        return all;
+    }
+    char* resized(const component_heap::Segment& segment) {
+        if (segment.number >= max_segments || segment.used > segment_bytes) return nullptr;
+        const std::scoped_lock own(mutex_);
+        if (!map(segment.number)) return nullptr;
+        std::size_t& used = used_[segment.number];
+        if (used > segment.used) {
+            clear(begin_of(segment.number) + segment.used, used - segment.used);
+        }
+        used = segment.used;
+        return begin_of(segment.number);
+    }
+    bool is_full() {
+        const std::scoped_lock own(mutex_);
+        return is_full_;
+    }
+
+private:
+    static char* begin_of(std::uint32_t segment) {
+        return reinterpret_cast<char*>(heap_begin + segment * segment_bytes);
+    }
+    static BlockHead& head_of(char* block) {
+        return *reinterpret_cast<BlockHead*>(block - sizeof(BlockHead));
+    }
+    FreeBlocks& free_blocks() {
+        return *reinterpret_cast<FreeBlocks*>(begin_of(component_heap::grown_segment));
+    }
+    bool map(std::uint32_t segment) {
+        if (is_mapped_[segment]) return true;
+        constexpr int how =
+            MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE;
+        void* const at =
+            ::mmap(begin_of(segment), segment_bytes, PROT_READ | PROT_WRITE, how, -1, 0);
+        if (at != MAP_FAILED && at != begin_of(segment)) {
+            ::munmap(at, segment_bytes);  // an old kernel takes the address as a hint
+            return false;
+        }
+        is_mapped_[segment] = at != MAP_FAILED;
+        return is_mapped_[segment];
+    }
+    void* bump(std::uint32_t segment, std::size_t bytes, std::size_t alignment) {
+        if (segment >= max_segments || !map(segment)) return nullptr;
+        const std::size_t at =
+            (used_[segment] + sizeof(BlockHead) + alignment - 1) / alignment * alignment;
+        if (bytes > segment_bytes || at > segment_bytes - bytes) return nullptr;
+        used_[segment] = at + bytes;
+        char* const begin = begin_of(segment) + at;
+        head_of(begin).bytes = bytes;
+        return begin;
+    }
+    /// Blocks of a class are used again.
+    void* grow(std::size_t bytes, std::size_t alignment) {
+        constexpr std::uint32_t segment = component_heap::grown_segment;
+        if (used_[segment] == 0) {
+            if (!map(segment)) return nullptr;
+            used_[segment] = sizeof(FreeBlocks);
+        }
+        const std::size_t size = std::max(bytes, alignment);
+        const std::size_t size_class =
+            std::max<std::size_t>(std::bit_width(size - 1), FreeBlocks::min_class);
+        if (size_class >= free_blocks().first.size()) return nullptr;
+        char*& first = free_blocks().first[size_class];
+        char* block = first;
+        if (block) {
+            std::memcpy(&first, block, sizeof first);
+            std::fill_n(block, sizeof(char*), char{0});
+        } else {
+            // blocks of a class have its alignment
+            const std::size_t whole = std::size_t{1} << size_class;
+            block = static_cast<char*>(bump(segment, whole, whole));
+        }
+        if (block) {
+            head_of(block) = {bytes, size_class};
+        }
+        return block;
+    }
+    std::uint32_t segment_of_call() {
+        const std::uint64_t call = SetupCall::now.number.load();
+        if (std::exchange(call_, call) != call) {
+            ++calls_;
+        }
+        return first_call_segment + calls_ - 1;
+    }
+
+    const Callers callers_;
+    std::mutex mutex_;  // of all below
+    std::array<std::size_t, max_segments> used_{};  // bytes, by segment
+    std::array<bool, max_segments> is_mapped_{};
+    std::uint64_t call_ = 0;  // the newest one that has allocated something
+    std::uint32_t calls_ = 0;  // that have allocated something
+    bool is_full_ = false;
+};
+
+std::atomic<ComponentHeap*> heap{nullptr};  // written once
+
+}  // namespace
+
+namespace component_heap {
+
+bool has(std::uint64_t address) {
+    return heap.load(std::memory_order_acquire) && ComponentHeap::has(address);
+}
+
+std::vector<Segment> segments() {
+    ComponentHeap* const all = heap.load(std::memory_order_acquire);
+    return all ? all->segments() : std::vector<Segment>();
+}
+
+char* resized(const Segment& segment) {
+    ComponentHeap* const all = heap.load(std::memory_order_acquire);
+    return all ? all->resized(segment) : nullptr;
+}
+
+std::string problem() {
+    ComponentHeap* const all = heap.load(std::memory_order_acquire);
+    return all && all->is_full() ? "components have more memory than can be written" : "";
+}
+
+}  // namespace component_heap
+}  // namespace hal
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+
+bool hal::component_heap::track() { return false; }
+
+#else
+
+bool hal::component_heap::track() {
+    if (heap.load(std::memory_order_acquire)) return true;
+    auto made = std::make_unique<ComponentHeap>();
+    heap.store(made.get(), std::memory_order_release);
+    // a program with an `operator new` of its own does not use the ones below
+    bool is_used = false;
+    {
+        const ComponentMemory mine;
+        const std::unique_ptr<char> probe(new char);
+        is_used = has(reinterpret_cast<std::uint64_t>(probe.get()));
+    }
+    if (!is_used) {
+        heap.store(nullptr, std::memory_order_release);
+        return false;
+    }
+    made.release();  // for good
+    return true;
+}
+
+namespace {
+
+template <class Allocate>
+void* allocated(std::size_t bytes, std::size_t alignment, void* from, Allocate allocate) {
+    if (hal::ComponentHeap* const all = hal::heap.load(std::memory_order_acquire)) {
+        const std::size_t size = std::max<std::size_t>(bytes, 1);
+        if (void* const memory = all->allocate(size, alignment, from)) return memory;
+    }
+    for (;;) {
+        if (void* const memory = allocate()) return memory;
+        const std::new_handler handler = std::get_new_handler();
+        if (!handler) throw std::bad_alloc();
+        handler();
+    }
+}
+
+void release(void* memory) noexcept {
+    if (hal::component_heap::has(reinterpret_cast<std::uint64_t>(memory))) {
+        hal::heap.load(std::memory_order_acquire)->release(memory);
+    } else {
+        std::free(memory);
+    }
+}
+
+}  // namespace
+
+// The other forms of the library call these. Weak: a program may have its own.
+
+[[gnu::weak]] void* operator new(std::size_t bytes) {
+    return allocated(bytes, hal::min_alignment, __builtin_return_address(0),
+                     [bytes] { return std::malloc(std::max<std::size_t>(bytes, 1)); });
+}
+
+[[gnu::weak]] void* operator new(std::size_t bytes, std::align_val_t alignment) {
+    const auto boundary = static_cast<std::size_t>(alignment);
+    const std::size_t whole =
+        (std::max<std::size_t>(bytes, 1) + boundary - 1) / boundary * boundary;
+    return allocated(whole, std::max(boundary, hal::min_alignment), __builtin_return_address(0),
+                     [=] { return std::aligned_alloc(boundary, whole); });
+}
+
+[[gnu::weak]] void operator delete(void* memory) noexcept { release(memory); }
+[[gnu::weak]] void operator delete(void* memory, std::size_t) noexcept { release(memory); }
+[[gnu::weak]] void operator delete(void* memory, std::align_val_t) noexcept { release(memory); }
+[[gnu::weak]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+    release(memory);
+}
+
+#endif
