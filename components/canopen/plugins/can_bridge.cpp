@@ -6,6 +6,7 @@
 #include "hal/component.hpp"
 #include "hal/setup_time.hpp"
 #include "link/can.hpp"
+#include "link/stale.hpp"
 
 namespace {
 
@@ -27,9 +28,10 @@ struct CanBridge : hal::Component {
     hal::In<bool> read_only{*this, "read-only", "true: frames of b are not forwarded to a"};
     hal::Out<std::uint64_t> a_to_b{*this, "a-to-b", "frames forwarded from a to b"};
     hal::Out<std::uint64_t> b_to_a{*this, "b-to-a", "frames forwarded from b to a"};
-    hal::Out<std::uint64_t> dropped{
-        *this, "dropped",
-        "frames not forwarded: queue full, bus down or off, or CAN FD frame on a classic bus"};
+    hal::Out<std::uint64_t> dropped{*this, "dropped",
+                                    "frames not forwarded: queue full, bus down or off, CAN FD "
+                                    "frame on a classic bus, or waiting "
+                                    "for more than 0.1 s"};
     hal::Out<bool> a_up{*this, "a-up", "bus a is neither down nor bus off"};
     hal::Out<bool> b_up{*this, "b-up", "bus b is neither down nor bus off"};
 
@@ -59,8 +61,8 @@ struct CanBridge : hal::Component {
     }
 
     void update(hal::Cycle cycle) noexcept {
-        carry(ends_[0], ends_[1], cycle.start_ns(), enable);
-        carry(ends_[1], ends_[0], cycle.start_ns(), enable && !read_only);
+        carry(ends_[0], ends_[1], cycle, enable);
+        carry(ends_[1], ends_[0], cycle, enable && !read_only);
         a_to_b = ends_[0].passed;
         b_to_a = ends_[1].passed;
         dropped = ends_[0].dropped + ends_[1].dropped;
@@ -80,10 +82,13 @@ private:
     }
     /// Forwards at most one buffer of frames, so a babbling bus costs a bounded time; the rest
     /// stays queued until the next cycle.
-    void carry(End& from, const End& to, std::int64_t now, bool pass) noexcept {
+    void carry(End& from, const End& to, hal::Cycle cycle, bool pass) noexcept {
+        const std::int64_t now = cycle.start_ns();
         const auto count = from.link->receive(buffer_, now);
         for (std::size_t n = 0; n < count && pass; ++n) {
-            if (to.link->send(buffer_[n], now) == hal::can::Sent::queued) {
+            const hal::can::Frame& frame = buffer_[n];
+            if (!hal::can::is_stale(frame, now, cycle.period_ns()) &&
+                to.link->send(frame, now) == hal::can::Sent::queued) {
                 ++from.passed;
             } else {
                 ++from.dropped;
@@ -115,6 +120,9 @@ tools use by default:
     start
 
     hal can scan udp:239.74.163.2:43113
+
+What arrives while the thread is stopped is not forwarded at the next `start`: frames that have waited
+for more than 0.1 s (and two cycles) are dropped.
 
 With `read-only`, programs on bus b can watch bus a but not send to it. Two bridges between the same
 two buses would forward each frame in an endless loop.

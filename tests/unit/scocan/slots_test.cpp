@@ -103,7 +103,7 @@ TEST(Node_in_a_slow_thread, without_windows_counts_and_reports_the_turns_that_it
 struct Load {
     explicit Load(Member& sender, std::uint32_t identifier) : node(sender), id(identifier) {}
     void operator()() {
-        while (node.station.waiting() < 8) {
+        while (node.station.state() == State::running && node.station.waiting() < 8) {
             node.station.send(
                 {id, std::array<std::uint8_t, 8>{0x55, 0xaa, static_cast<std::uint8_t>(++number),
                                                  0x55, 0xaa, 0x55, 0xaa, 0x55}},

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "link/stale.hpp"
 #include "station_component.hpp"
 
 namespace {
@@ -19,9 +20,12 @@ struct ScocanBridge : StationComponent {
     hal::Out<std::uint64_t> to_pc{*this, receive_, "to-pc", "frames forwarded from the bus"};
     hal::Out<std::uint64_t> from_pc{*this, transmit_, "from-pc",
                                     "frames of the participant that were queued for a slot"};
-    hal::Out<std::uint64_t> rejected{*this, transmit_, "rejected",
-                                     "frames of the participant dropped: identifier of another "
-                                     "node or reserved, queue full, or not a classic base frame"};
+    hal::Out<std::uint64_t> rejected{
+        *this, transmit_, "rejected",
+        "frames of the participant dropped: the node does not run, they "
+        "have waited for more than 0.1 s, "
+        "identifier of another node or reserved, queue full, or not a "
+        "classic base frame"};
 
     void start() {
         if (pc.get().empty()) {
@@ -56,12 +60,13 @@ private:
     }
     /// Takes at most one buffer of frames, so that a babbling participant costs a bounded time; the
     /// rest waits.
-    void before_slots() noexcept override {
+    void before_slots(std::int64_t period_ns) noexcept override {
         const auto count = pc_->receive(buffer_, now_);
         for (std::size_t i = 0; i < count; ++i) {
             const bool is_state =
                 station_->table().owner(station_->mode(), buffer_[i].id) != nullptr;
-            if (station_->send(buffer_[i], is_state) == hal::can::Sent::queued) {
+            if (!hal::can::is_stale(buffer_[i], now_, period_ns) &&
+                station_->send(buffer_[i], is_state) == hal::can::Sent::queued) {
                 ++from_pc_;
             } else {
                 ++rejected_;
@@ -104,5 +109,6 @@ The netlist:
 The messages of the bridge in the table are those of the participant and have no pins. Frames with a
 reserved identifier (0x000..0x00F, 0x780..0x7FF) or one that the table gives to another node, in a
 private slot or as a message, are dropped and counted in `rejected`; the first of each identifier is
-reported. Otherwise the node is one like any other, see `hal doc scocan`.
+reported. So are frames that come while the node does not run, or that have waited for more than
+0.1 s, as while the thread is stopped: receivers would take them for fresh ones. Otherwise the node is one like any other, see `hal doc scocan`.
 )")

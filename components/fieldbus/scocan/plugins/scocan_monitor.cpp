@@ -42,7 +42,7 @@ private:
         bool was = false;
     };
 
-    void before_slots() noexcept override {
+    void before_slots(std::int64_t) noexcept override {
         for (auto& s : silences_) {
             if (s.pin != s.was && station_->state() == State::running &&
                 station_->request_silence(s.node, s.pin)) {

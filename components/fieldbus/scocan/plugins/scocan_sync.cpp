@@ -22,7 +22,7 @@ private:
         changing = station_->changing();
         refused = refusals_;
     }
-    void before_slots() noexcept override {
+    void before_slots(std::int64_t) noexcept override {
         const std::uint32_t wanted = mode_command;
         if (wanted == commanded_) return;
         // asks when that is over

@@ -162,7 +162,7 @@ public:
                 user.outgoing.drop();
             }
         });
-        before_slots();
+        before_slots(cycle.period_ns());
         station_->transmit(now_, cycle.period_ns());
     }
 
@@ -170,7 +170,8 @@ public:
 
 protected:
     virtual void received() noexcept {}      ///< behind receive(). [realtime]
-    virtual void before_slots() noexcept {}  ///< before the slots are planned. [realtime]
+    /// before the slots are planned; the period of the thread. [realtime]
+    virtual void before_slots(std::int64_t) noexcept {}
     virtual void passed(const can::Frame&) noexcept {}  ///< a frame of another node. [realtime]
 
     void on_frame(const can::Frame& frame, Time begin) noexcept override {

@@ -46,7 +46,8 @@ struct StationPins {
     hal::Out<std::uint64_t> late{c, f, "late", "own frames outside of their slots"};
     hal::Out<std::uint64_t> dropped{
         c, f, "dropped",
-        "frames not accepted: queue full, or identifier reserved or of another node"};
+        "frames not sent: the node does not run, queue full, or identifier reserved or of another "
+        "node"};
     hal::Out<std::uint32_t> waiting{c, f, "waiting", "frames waiting for a slot"};
 
     /// Shows the state of the station. [realtime]

@@ -38,6 +38,16 @@ void SendQueue::withdraw(std::uint32_t id) noexcept {
     }
 }
 
+std::size_t SendQueue::drop_waiting(std::uint32_t limit) noexcept {
+    const std::size_t before = size_;
+    for (std::size_t i = size_; i-- > 0;) {
+        if (!entries_[i].in_flight && entries_[i].frame.id < limit) {
+            remove(i);
+        }
+    }
+    return before - size_;
+}
+
 SendQueue::Entry* SendQueue::handed_over(std::uint32_t id, Time planned) noexcept {
     for (std::size_t i = size_; i-- > 0;) {
         Entry& e = entries_[i];

@@ -48,6 +48,8 @@ public:
     /// missed theirs. [realtime]
     std::uint32_t expire(Time now) noexcept;
     void clear() noexcept { size_ = 0; }  ///< [realtime]
+    /// Removes waiting frames with an identifier below `limit`. Returns how many. [realtime]
+    std::size_t drop_waiting(std::uint32_t limit) noexcept;
     std::size_t size() const noexcept { return size_; }
     bool flying() const noexcept;  ///< Returns true while a frame is in flight. [realtime]
 

@@ -318,6 +318,9 @@ void Station::update_state(Time now) noexcept {
     if (core_.state == State::running && before != State::running) {
         core_.raise(Event::running);
     }
+    if (core_.state != State::running) {
+        core_.count.dropped += core_.queue.drop_waiting(configuration_ids);
+    }
 }
 
 }  // namespace hal::scocan

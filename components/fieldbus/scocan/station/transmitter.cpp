@@ -45,6 +45,8 @@ can::Sent Transmitter::send(const can::Frame& frame, bool state, std::uint32_t s
         }
         priv = true;
     }
+    // kept until the node runs, it would reach receivers as a fresh one
+    if (core_.state != State::running) return drop(can::Sent::down);
     if (priv && state) {
         Value& v = values_[frame.id];
         if (v.last != last_call_) {
