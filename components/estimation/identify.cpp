@@ -39,7 +39,8 @@ struct Identify : hal::Component {
     hal::In<double> bias{*this, "bias", "idle value of output, and centre of the relay"};
     hal::In<double> amplitude{
         *this, "amplitude", "height of the step; amplitude of the relay", {.initial = 1.0}};
-    hal::In<double> hysteresis{*this, "hysteresis", "relay: hysteresis; must exceed the noise"};
+    hal::In<double> hysteresis{*this, "hysteresis",
+                               "relay: hysteresis; must exceed the noise, else failure 3"};
     hal::In<double> settle_time{*this,
                                 "settle-time",
                                 "time at bias before a step, for the plant to settle",
@@ -60,7 +61,8 @@ struct Identify : hal::Component {
     hal::Out<std::uint32_t> failure{
         *this, "failure",
         "reason of a failure: 1 value is NaN or infinite, 2 no response, 3 response below the "
-        "noise, 4 not settled, 5 no oscillation, 6 interrupted by a stop"};
+        "noise, or relay: switched by it, 4 not settled, 5 no oscillation, 6 interrupted by a "
+        "stop"};
     hal::Out<bool> active{*this, "active", "TRUE during an experiment", {.safe = false}};
     hal::Out<double> gain{*this, "gain", "K of K e^(-L s) / (T s + 1)"};
     hal::Out<double> time_constant{
@@ -298,7 +300,7 @@ private:
 
             max_ = even_ == 0 ? period : std::fmax(max_, period);
             if (++even_ == periods) {
-                if (max_ <= 1.1 * shortest_) return conclude(dt * static_cast<double>(thin_));
+                if (max_ <= 1.1 * shortest_) return conclude(dt);
                 even_ = 0;
             }
         }
@@ -316,13 +318,15 @@ private:
     /// Wang, *Relay feedback auto-tuning of process controllers*, J. Process Control 12, 2002).
     /// From there to half a turn of the phase it is taken for an integrator with a dead time, which
     /// is what plants are like in that place.
-    void conclude(double h) noexcept {
+    void conclude(double dt) noexcept {
         using Complex = std::complex<double>;
+        const double h = dt * static_cast<double>(thin_);
         const double begin = ups_[0];
         const double span = time_ - begin;
 
         const double w = 2.0 * std::numbers::pi * periods / span;
         if (!(0.5 * (top_ - bottom_) > std::fabs(hysteresis))) return fail(Failure::noisy);
+        if (span < min_period_cycles * periods * dt) return fail(Failure::noisy);
         const auto turn = [&](double t) noexcept {
             return Complex(std::cos(w * t), -std::sin(w * t));
         };
@@ -340,6 +344,7 @@ private:
             in += turn(downs_[i] - begin) - turn(ups_[i] - begin);
         }
         in *= 2.0 * std::fabs(amplitude) * Complex(0.0, 1.0 / w);
+        if (!is_swing(2.0 * std::abs(out) / span)) return fail(Failure::noisy);
         const double response = std::abs(out) / std::abs(in);
         const double late = -std::arg(-out / in);
 
@@ -357,7 +362,22 @@ private:
         enter(Phase::done);
     }
 
+    /// Returns whether a harmonic of this amplitude is most of what is kept. Noise that switches the
+    /// relay is not: most of it has other frequencies.
+    bool is_swing(double harmonic) const noexcept {
+        const auto n = static_cast<double>(count_);
+        double sum = 0.0;
+        double square = 0.0;
+        for (std::size_t i = 0; i < count_; ++i) {
+            sum += kept_[i];
+            square += kept_[i] * kept_[i];
+        }
+        const double variance = square / n - sum / n * (sum / n);
+        return 0.5 * harmonic * harmonic > 0.75 * variance;
+    }
+
     static constexpr std::size_t periods = 4;
+    static constexpr double min_period_cycles = 8.0;  // noise can switch the relay in each cycle
 
     Phase now_ = Phase::idle;
     double time_ = 0.0;
@@ -434,7 +454,9 @@ the step by more than 2 % of the response within a quarter of `step-time`, or th
 **Relay.** The output switches between bias + amplitude and bias - amplitude whenever `value` passes `setpoint`; the plant oscillates, four equal periods
 give `ultimate-gain` and `ultimate-period`, and the Tyreus-Luyben rule the proposed gains. The first harmonics of output and response are compared, not their
 amplitudes, so the error of the gain is below 3 %, or 6 % for a plant with dominant dead time (4 d / (pi a) has an error of 18 % for K = 2, T = 0.5 s,
-L = 0.1 s). The experiment fails if there is no oscillation within `step-time`.
+L = 0.1 s). The experiment fails if there is no oscillation within `step-time`. Noise that exceeds `hysteresis` switches the relay, too: failure 3 is an
+oscillation whose period is below 8 cycles of the thread, or of whose power the first harmonic has less than three quarters. Then increase `hysteresis` or
+`amplitude`.
 
 An experiment does not survive a stop of the machine: `output` is 0 then, and with the next start the experiment has failed.
 
