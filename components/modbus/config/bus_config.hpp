@@ -96,10 +96,15 @@ struct Bus {
     std::optional<Framing> framing;  ///< not given: by the line
     bool guardian = true;  ///< a process of its own sends the stop telegrams
     std::int64_t heartbeat_ns = 50'000'000;  ///< cycles that are missing for longer stop the drives
+    std::vector<Write> broadcast_stop;  ///< stop telegrams to all slaves, which none acknowledges
+    /// The silence after a broadcast (serial line V1.02, clause 2.4.1).
+    std::int64_t turnaround_ns = 100'000'000;
     std::vector<Slave> slaves;
     Span at;
 
     bool has_stops() const;
+    /// The longest silence that one of the slaves needs before a request.
+    std::int64_t max_gap_ns() const;
     /// The framing on a line.
     Framing framing_on(const line::Description&) const;
 };

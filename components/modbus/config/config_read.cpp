@@ -60,6 +60,11 @@ const bus::KeyTable<Bus>& bus_keys() {
         {"heartbeat", bus::time(&Bus::heartbeat_ns, 20 * ms, 10 * second), "`50ms`",
          "The guardian stops the drives when no cycle has run for this time, and at least for 3 "
          "periods of the thread."},
+        {"broadcast-stop", "writes: `holding 0x2000 1, coil 3 0`", "none",
+         "Stop telegrams to slave 0: all slaves that support broadcasts execute them, and none "
+         "answers."},
+        {"turnaround", bus::time(&Bus::turnaround_ns, ms, second), "`100ms`",
+         "The silence after a broadcast, in which the slaves execute it."},
     }};
     return table;
 }
@@ -181,6 +186,9 @@ public:
             bus::Keys keys(key_report_);
             keys.add(*bus);
             bus_keys().apply(keys, out_.bus, key_report_);
+            if (const Entry* entry = keys.find("broadcast-stop")) {
+                out_.bus.broadcast_stop = writes_of(*entry);
+            }
             keys.report_rest("in [bus]", bus_keys().names());
         } else {
             report_.error(Topic::line, {1, 1, 0, 0}, "missing section [bus]",
@@ -730,7 +738,7 @@ private:
     }
 
     void warn_of_missing_stop() {
-        if (!slave_->stop.empty() || no_stop_) return;
+        if (!slave_->stop.empty() || no_stop_ || !out_.bus.broadcast_stop.empty()) return;
         for (const Value& v : slave_->values) {
             if (v.is_output) {
                 report_.warning(Topic::slave, slave_->at,
@@ -780,8 +788,17 @@ std::uint16_t Value::size() const {
 bool Slave::is_huanyang() const { return drive && drive->speed.table == Table::huanyang; }
 
 bool Bus::has_stops() const {
-    return std::any_of(slaves.begin(), slaves.end(),
+    return !broadcast_stop.empty() ||
+           std::any_of(slaves.begin(), slaves.end(),
                        [](const Slave& slave) { return !slave.stop.empty(); });
+}
+
+std::int64_t Bus::max_gap_ns() const {
+    std::int64_t gap = 0;
+    for (const Slave& slave : slaves) {
+        gap = std::max(gap, slave.gap_ns);
+    }
+    return gap;
 }
 
 Framing Bus::framing_on(const line::Description& of) const {

@@ -166,13 +166,20 @@ Load load_of(const Plan& plan, const Bus& bus, Framing framing, std::int64_t thi
             load.set_point_ns = std::max(load.set_point_ns, max + own.request + own.silence);
         }
     }
-    load.stop_ns = max;
+    const bool is_tcp = framing == Framing::tcp;
+    const std::int64_t silence = is_tcp ? 0 : silence_ns(bus.line);
+    const std::int64_t frame = is_tcp ? 0 : line::characters_ns(bus.line, 8);
+    const auto broadcasts = static_cast<std::int64_t>(bus.broadcast_stop.size());
+    if (broadcasts != 0) {
+        const std::int64_t one = silence + bus.max_gap_ns() + frame + bus.turnaround_ns;
+        load.stop_ns = max + broadcasts * one;
+        load.broadcast_ns = load.stop_ns - bus.turnaround_ns;
+    } else {
+        load.stop_ns = max;
+    }
     for (const Slave& slave : bus.slaves) {
-        const std::int64_t silence = silence_ns(bus.line);
         const std::int64_t one =
-            framing == Framing::tcp
-                ? thinking
-                : 2 * line::characters_ns(bus.line, 8) + 2 * silence + slave.gap_ns + thinking;
+            is_tcp ? thinking : 2 * frame + 2 * silence + slave.gap_ns + thinking;
         load.stop_ns += static_cast<std::int64_t>(slave.stop.size()) * one;
     }
     return load;

@@ -59,7 +59,8 @@ struct Load {
     double use = 0.0;                 ///< share of the time in which the line is busy, 1: all
     std::vector<std::int64_t> ages;  ///< of each telegram: worst age of its values when read, in ns
     std::int64_t set_point_ns = 0;  ///< worst time from a changed set-point to the end of its frame
-    std::int64_t stop_ns = 0;  ///< worst time from a stop until the last stop telegram is sent
+    std::int64_t broadcast_ns = 0;  ///< worst time from a stop until its broadcasts are sent
+    std::int64_t stop_ns = 0;  ///< worst time from a stop until the last addressed one is sent
 };
 /// `thinking`: how long a slave takes to answer.
 Load load_of(const Plan& plan, const Bus& bus, Framing framing, std::int64_t thinking);

@@ -139,7 +139,7 @@ bool SlaveBus::hits(SlaveFault& fault, std::uint8_t unit, std::int64_t now_ns) c
 }
 
 void SlaveBus::serve(const Found& found, std::int64_t now_ns) {
-    if (found.unit == 0) {  // a broadcast is not answered
+    if (found.unit == broadcast_unit) {  // a broadcast is not answered
         for (EmulatedSlave& slave : slaves_) {
             slave.answer(found.pdu);
         }

@@ -138,6 +138,7 @@ private:
             reason_ = reason;
         }
         begun_at_ = now;
+        broadcasts_ = image_.header().broadcasts.load();
         master_.stop(reason, now);
     }
 
@@ -163,6 +164,11 @@ private:
         text_ += "the process has ended";
         if (reason_ == StopReason::heartbeat) {
             text_ += " after its cycles had stopped";
+        }
+        if (!bus_.broadcast_stop.empty()) {
+            const bool was_sent = image_.header().broadcasts.load() != broadcasts_;
+            text_ += was_sent ? "; the broadcast stop was sent"
+                              : "; the broadcast stop was not sent: the line is lost";
         }
         for (std::size_t n = 0; n < bus_.slaves.size(); ++n) {
             const Slave& slave = bus_.slaves[n];
@@ -200,6 +206,7 @@ private:
     bool is_hung_ = false;
     StopReason reason_ = StopReason::none;
     std::int64_t begun_at_ = 0;
+    std::uint32_t broadcasts_ = 0;  // before the stop
     std::int64_t suspended_ = 0;
     std::string text_;
 };

@@ -42,6 +42,8 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
     {Event::guardian_runs, bus::Effect::ends, "the guardian runs again"},
     {Event::guardian_killed, bus::Effect::none,
      "the guardian did not end within 15 s and was killed; stop the drives by other means"},
+    {Event::stop_broadcast, bus::Effect::none,
+     "the broadcast stop was sent after {time}; no slave acknowledges a broadcast"},
 };
 static_assert(bus::in_order(event_rows));
 

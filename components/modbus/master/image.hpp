@@ -34,6 +34,7 @@ enum class Event : std::uint8_t {
     guardian_stalls,
     guardian_runs,  ///< again
     guardian_killed,  ///< at the end of the component
+    stop_broadcast,  ///< value: ns from the stop to the end of the frame
 };
 
 /// Why the drives are stopped.
@@ -104,6 +105,7 @@ struct ImageHeader {
     std::atomic<std::uint32_t> event_head{0};
     std::atomic<std::uint32_t> events_lost{0};
     std::atomic<std::uint32_t> line_open{0};
+    std::atomic<std::uint32_t> broadcasts{0};  ///< broadcast stops
     std::atomic<std::uint32_t> activity{0};  ///< counts that of all slaves
     /// why the guardian could not start; written before Phase::ended
     std::array<char, 256> problem{};

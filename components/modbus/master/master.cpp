@@ -144,6 +144,8 @@ void Master::stop(StopReason reason, std::int64_t now_ns) noexcept {
     stopping_ = true;
     stop_at_ns_ = now_ns;
     stop_turn_ = 0;
+    broadcast_ = bus_.broadcast_stop.empty() ? Broadcast::none : Broadcast::first;
+    broadcast_next_ = 0;
     image_.header().phase.store(static_cast<std::uint32_t>(Phase::stopping));
     for (std::uint32_t n = 0; n < slaves_.size(); ++n) {
         slaves_[n].is_stop_reported = false;
@@ -158,6 +160,7 @@ void Master::stop(StopReason reason, std::int64_t now_ns) noexcept {
 void Master::release() noexcept {
     if (!held_ || stopping_) return;
     held_ = false;
+    broadcast_ = Broadcast::none;
     image_.header().phase.store(static_cast<std::uint32_t>(Phase::running));
     for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
         telegrams_[n].is_sent = false;
@@ -209,6 +212,9 @@ bool Master::follow_line(std::int64_t now_ns) noexcept {
     is_echo_known_ = framing_ == Framing::tcp;
     for (std::uint32_t n = 0; n < slaves_.size() && is_open; ++n) {
         repeat_stop(n, now_ns);
+    }
+    if (is_open) {
+        repeat_broadcast();
     }
     return is_open;
 }
@@ -601,8 +607,42 @@ void Master::finish_stop(std::int64_t now_ns) noexcept {
         report_unconfirmed(n, now_ns);
         set_stop(n, StopState::repeating, now_ns);
     }
+    if (!is_lost && has_due_broadcast()) return;
+    broadcast_ = Broadcast::none;
     stopping_ = false;
     image_.header().phase.store(static_cast<std::uint32_t>(Phase::stopped));
+}
+
+/// A line that returns while the stop lasts may have lost the broadcast.
+void Master::repeat_broadcast() noexcept {
+    if (!held_ || bus_.broadcast_stop.empty()) return;
+    broadcast_ = stopping_ ? Broadcast::first : Broadcast::last;
+    broadcast_next_ = 0;
+}
+
+/// Returns whether the stop waits for a broadcast. No slave waits for an addressed stop telegram.
+bool Master::has_due_broadcast() noexcept {
+    if (broadcast_ == Broadcast::waits) {
+        broadcast_ = Broadcast::last;
+    }
+    return broadcast_ != Broadcast::none;
+}
+
+/// A telegram to all slaves is on the line: nothing is sent before they have executed it.
+void Master::finish_broadcast(std::int64_t now_ns) noexcept {
+    const std::int64_t sent_ns = std::max(now_ns, line_->sent_until_ns());
+    free_at_ns_ = sent_ns + bus_.turnaround_ns;
+    image_.header().busy_ns.fetch_add(free_at_ns_ - now_ns, std::memory_order_relaxed);
+    end_of_job();
+    if (++broadcast_next_ < bus_.broadcast_stop.size()) return;
+    broadcast_next_ = 0;
+    image_.header().broadcasts.fetch_add(1, std::memory_order_relaxed);
+    const bool is_first = broadcast_ == Broadcast::first;
+    broadcast_ = is_first ? Broadcast::waits : Broadcast::none;
+    if (is_first) {
+        image_.tell({Event::stop_broadcast, 0, 0, sent_ns - stop_at_ns_});
+    }
+    finish_stop(now_ns);
 }
 
 // --- What is next
@@ -620,6 +660,7 @@ bool Master::is_writable(std::uint32_t telegram) const noexcept {
 }
 
 bool Master::choose(std::int64_t now_ns) noexcept {
+    if (choose_broadcast()) return true;
     const bool needs_echo_job = !is_echo_known_ && (held_ || !has_reads_);
     if (needs_echo_job && begin_echo_job()) return true;
     if (stopping_) return choose_stop();
@@ -630,6 +671,16 @@ bool Master::choose(std::int64_t now_ns) noexcept {
     }
     last_was_set_point_ = false;
     return choose_probe(now_ns) || choose_due(now_ns);
+}
+
+bool Master::choose_broadcast() noexcept {
+    if (broadcast_ != Broadcast::first && broadcast_ != Broadcast::last) return false;
+    end_of_job();
+    has_job_ = true;
+    job_.telegram = broadcast_job;
+    job_.slave = 0;
+    add_write(bus_.broadcast_stop[broadcast_next_]);
+    return true;
 }
 
 /// One stop telegram of each slave in turn, so that a slave that is offline does not delay others.
@@ -964,20 +1015,24 @@ void Master::add_speed(const Drive& drive, double rpm) noexcept {
 
 void Master::send(std::int64_t now_ns) noexcept {
     const Slave& slave = bus_.slaves[job_.slave];
+    const bool is_broadcast = job_.telegram == broadcast_job;
+    const std::int64_t gap_ns = is_broadcast ? bus_.max_gap_ns() : slave.gap_ns;
     const std::int64_t earliest =
-        std::max(last_byte_ns_, line_->sent_until_ns()) + std::max(silence_ns_, slave.gap_ns);
+        std::max(last_byte_ns_, line_->sent_until_ns()) + std::max(silence_ns_, gap_ns);
     if (framing_ == Framing::rtu && now_ns < earliest) {
         free_at_ns_ = earliest;
         return;
     }
     const Pdu& request = job_.requests[job_.next];
-    sent_ = encode(framing_, slave.unit, ++transaction_, request);
+    const std::uint8_t unit = is_broadcast ? broadcast_unit : slave.unit;
+    sent_ = encode(framing_, unit, ++transaction_, request);
     buffer_.clear();
     sent_at_ns_ = now_ns;
-    waits_ = true;
+    waits_ = !is_broadcast;
     echo_is_due_ = true;
     // a failed send is a request that is not answered; is_open() reports a lost line
     line_->send(sent_.span(), now_ns);
+    if (is_broadcast) return finish_broadcast(now_ns);
     deadline_ns_ = std::max(now_ns, line_->sent_until_ns()) + slave.timeout_ns;
 }
 

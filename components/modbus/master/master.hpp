@@ -5,7 +5,7 @@
 //
 // Which telegram is next:
 //   1. stop telegrams, when a stop was requested: nothing else until they are acknowledged or their
-//      attempts are used up;
+//      attempts are used up. The broadcast stop comes first, and again behind them;
 //   2. the stop telegrams of a slave that did not acknowledge them, or returned while the stop
 //      lasts: nothing is written to it before. An offline slave gets them in place of 4;
 //   3. set-points that have changed, so that one waits for at most the telegram that is on the line;
@@ -47,12 +47,20 @@ private:
     static constexpr std::size_t max_requests = 10;
     static constexpr std::uint32_t stop_job = UINT32_MAX;
     static constexpr std::uint32_t echo_job = UINT32_MAX - 1;  ///< a read that shows an echo
+    static constexpr std::uint32_t broadcast_job = UINT32_MAX - 2;  ///< to all slaves
 
     enum class StopState : std::uint8_t {
         none,
         sending,  ///< as often as the slave declares
         repeating,  ///< those attempts are used up, or the slave returned: until acknowledged
         acknowledged,  ///< until release()
+    };
+    /// The broadcast stop: twice, because nothing acknowledges it.
+    enum class Broadcast : std::uint8_t {
+        none,
+        first,  ///< is due, before the addressed stop telegrams
+        waits,  ///< for the end of those
+        last,  ///< is due
     };
     struct SlaveState {
         std::uint32_t failures = 0;  ///< in a row
@@ -135,6 +143,7 @@ private:
     void end_echo_job() noexcept;
 
     bool choose(std::int64_t now_ns) noexcept;
+    bool choose_broadcast() noexcept;
     bool choose_stop() noexcept;
     bool choose_repeated_stop(std::int64_t now_ns) noexcept;
     void begin_stop(std::uint32_t slave) noexcept;
@@ -149,6 +158,9 @@ private:
     bool is_writable(std::uint32_t telegram) const noexcept;
     std::int64_t next_due(std::int64_t now_ns) const noexcept;
     void send(std::int64_t now_ns) noexcept;
+    void finish_broadcast(std::int64_t now_ns) noexcept;
+    bool has_due_broadcast() noexcept;
+    void repeat_broadcast() noexcept;
     void finish_stop(std::int64_t now_ns) noexcept;
 
     void make_read(const Telegram& t) noexcept;
@@ -201,6 +213,8 @@ private:
     std::int64_t stop_at_ns_ = 0;
     std::uint32_t stop_seen_ = 0;  // ImageHeader::stop_count
     std::uint32_t stop_turn_ = 0;
+    Broadcast broadcast_ = Broadcast::none;
+    std::size_t broadcast_next_ = 0;  // telegram
 };
 
 }  // namespace hal::modbus

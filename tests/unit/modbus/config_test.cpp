@@ -23,6 +23,25 @@ TEST(Config, Frequency_that_the_profile_cannot_command_is_rejected) {
                             "speed = holding 0x2001 50000\n"));
 }
 
+TEST(Config, Broadcast_stop_is_a_stop_of_every_slave) {
+    const std::string slave = "[slave 1 s]\nwrite a = holding 1\n";
+    const ReadResult none = read("[bus]\nlink = sim:x\n" + slave, "a.modbus");
+    EXPECT_FALSE(none.bus.has_stops());
+    EXPECT_EQ(1U, none.messages.size()) << "a warning";
+    const ReadResult all = read(
+        "[bus]\nlink = sim:x\nbroadcast-stop = holding 1 5, coil 2 0\nturnaround = 150ms\n" + slave,
+        "a.modbus");
+    EXPECT_TRUE(all.messages.empty());
+    EXPECT_TRUE(all.bus.has_stops());
+    ASSERT_EQ(2U, all.bus.broadcast_stop.size());
+    EXPECT_EQ("coil 0x0002 := 0x0", write_text(all.bus.broadcast_stop[1]));
+    EXPECT_EQ(150'000'000, all.bus.turnaround_ns);
+    const ReadResult bad =
+        read("[bus]\nlink = sim:x\nbroadcast-stop = input 1 5\n" + slave, "a.modbus");
+    EXPECT_NE(std::string::npos,
+              text::errors_text(bad.messages, "a.modbus").find("invalid write 'input 1 5'"));
+}
+
 TEST(Config, Option_that_is_given_twice_is_rejected) {
     EXPECT_EQ("", errors_of("read a = holding 1 scale 2 unit scale\n"));
     const std::string errors = errors_of("read a = holding 1 scale 2 scale 3\n");

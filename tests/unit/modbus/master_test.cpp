@@ -492,6 +492,94 @@ TEST_F(Stop, Is_not_repeated_to_a_slave_that_returns_later) {
     EXPECT_EQ(get(51), 9);
 }
 
+/// Two slaves with the register 50, of which only the second has a stop telegram of its own.
+struct BroadcastStop : testing::Test {
+    void start() {
+        w.run(second);
+        for (EmulatedSlave& slave : w.slaves->slaves()) {
+            ASSERT_TRUE(slave.set("c", 1));
+        }
+        frames.clear();
+    }
+    void stop() {
+        w.image.header().stop_held.store(1);
+        w.image.stop(StopReason::estop);
+    }
+    int get(std::size_t slave) {
+        return w.slaves->slaves()[slave].get(Table::holding, 50).value_or(-1);
+    }
+    std::ptrdiff_t sent(const std::string& frame) const {
+        return std::count(frames.begin(), frames.end(), frame);
+    }
+
+    static constexpr const char* broadcast = "00 06 00 32 00 07 68 16";
+    static constexpr const char* bus =
+        "[bus]\nlink = sim:x\nbaud = 38400\nbroadcast-stop = holding 50 7\nturnaround = 100ms\n"
+        "[defaults]\ntimeout = 50ms\n";
+    std::vector<std::string> frames;
+    World w{std::string(bus) +
+                "[slave 1 a]\nread r = holding 0\n"
+                "[slave 2 b]\nread r = holding 0\nstop = holding 50 7\n",
+            std::string(bus) +
+                "[slave 1 a]\nread r = holding 0\nread c = holding 50\n"
+                "[slave 2 b]\nread r = holding 0\nread c = holding 50\n",
+            [this](std::unique_ptr<line::Line> line) {
+        return std::make_unique<RecordedLine>(std::move(line), frames);
+    }};
+};
+
+TEST_F(BroadcastStop, Reaches_all_slaves_first_and_again_behind_the_addressed_telegrams) {
+    start();
+    stop();
+    w.run(50 * ms);
+    EXPECT_EQ(get(0), 7);
+    EXPECT_EQ(get(1), 7) << "by the broadcast";
+    EXPECT_EQ(w.image.slave(1).stopped.load(), 0U) << "a broadcast acknowledges nothing";
+    EXPECT_EQ(sent(broadcast), 1);
+    const std::size_t before = frames.size();
+    w.run(50 * ms);
+    EXPECT_EQ(frames.size(), before) << "nothing is sent during the turnaround";
+    w.run(second);
+    EXPECT_EQ(sent(broadcast), 2);
+    EXPECT_EQ(w.image.slave(0).stopped.load(), 0U);
+    EXPECT_EQ(w.image.slave(1).stopped.load(), 1U);
+    EXPECT_EQ(w.image.header().broadcasts.load(), 2U);
+    EXPECT_EQ(w.image.header().phase.load(), static_cast<std::uint32_t>(Phase::stopped));
+    ASSERT_GE(frames.size(), before + 3);
+    EXPECT_EQ(frames[before].substr(0, 17), "02 06 00 32 00 07");
+    EXPECT_EQ(frames[before + 1], broadcast);
+    EXPECT_EQ(frames[before + 2].substr(0, 8), "01 03 00") << "the reads go on";
+}
+
+TEST_F(BroadcastStop, Is_sent_when_nobody_answers) {
+    start();
+    w.slaves->faults().push_back({});
+    stop();
+    w.run(2 * second);
+    EXPECT_EQ(get(0), 7);
+    EXPECT_EQ(sent(broadcast), 2);
+    EXPECT_EQ(w.image.slave(1).stopped.load(), 0U);
+    EXPECT_EQ(w.image.slave(1).stop_pending.load(), 1U);
+    std::vector<Event> all;
+    for (EventRecord record; w.image.pop(record);) {
+        all.push_back(record.event);
+    }
+    EXPECT_EQ(std::count(all.begin(), all.end(), Event::stop_broadcast), 1);
+    EXPECT_EQ(std::count(all.begin(), all.end(), Event::stop_unconfirmed), 1);
+}
+
+TEST_F(BroadcastStop, Is_sent_once_more_by_each_further_stop) {
+    start();
+    stop();
+    w.run(second);
+    w.image.header().stop_held.store(0);
+    w.run(second);
+    EXPECT_EQ(w.image.header().phase.load(), static_cast<std::uint32_t>(Phase::running));
+    stop();
+    w.run(second);
+    EXPECT_EQ(sent(broadcast), 4);
+}
+
 TEST(Master, Stop_with_a_rejected_telegram_is_not_acknowledged) {
     const std::string bus = "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\nread a = holding 0\n";
     World w(bus + "write c = holding 50\nstop = holding 500 1, holding 50 7\n",

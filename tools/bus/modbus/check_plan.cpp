@@ -3,6 +3,8 @@
 // and how old each value can be.
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "bus/modbus/bus_file.hpp"
 #include "bus/modbus/options.hpp"
 #include "bus/timeline/text_table.hpp"
@@ -40,15 +42,34 @@ const char* kind_text(const Telegram& t) {
     return names[static_cast<std::size_t>(t.kind)];
 }
 
-std::string stop_text(const modbus::Bus& bus) {
+std::string list_text(const std::vector<Write>& writes) {
     std::string text;
+    for (const Write& write : writes) {
+        append_item(text, write_text(write));
+    }
+    return text.empty() ? "none" : text;
+}
+
+bool has_addressed_stops(const modbus::Bus& bus) {
+    return std::any_of(bus.slaves.begin(), bus.slaves.end(),
+                       [](const Slave& slave) { return !slave.stop.empty(); });
+}
+
+std::string stop_text(const modbus::Bus& bus, const Load& load) {
+    std::string text;
+    if (!bus.broadcast_stop.empty()) {
+        text +=
+            fmt::format("the broadcast stop is sent within {} ms\n", ms_text(load.broadcast_ns));
+    }
+    if (has_addressed_stops(bus)) {
+        text += fmt::format("all stop telegrams are sent within {} ms\n", ms_text(load.stop_ns));
+    }
+    if (!bus.broadcast_stop.empty()) {
+        text += fmt::format("broadcast stop: {}\n", list_text(bus.broadcast_stop));
+    }
     for (const Slave& slave : bus.slaves) {
-        std::string writes;
-        for (const Write& write : slave.stop) {
-            append_item(writes, write_text(write));
-        }
         text += fmt::format("stop of slave {} ({}): {}\n", slave.unit, slave.name,
-                            writes.empty() ? "none" : writes);
+                            list_text(slave.stop));
     }
     return text;
 }
@@ -83,16 +104,14 @@ std::string plan_text(const modbus::Bus& bus, const Plan& plan, Framing framing,
     if (load.set_point_ns != 0) {
         text += fmt::format("a set-point is sent within {} ms\n", ms_text(load.set_point_ns));
     }
-    if (bus.has_stops()) {
-        text += fmt::format("all stop telegrams are sent within {} ms\n", ms_text(load.stop_ns));
-    }
-    return text + stop_text(bus);
+    return text + stop_text(bus, load);
 }
 
 std::string plan_json(const modbus::Bus& bus, const Plan& plan, Framing framing, const Load& load,
                       std::int64_t thinking) {
-    std::string text = fmt::format(R"({{"use":{:.6f},"set_point_ns":{},"stop_ns":{},"telegrams":[)",
-                                   load.use, load.set_point_ns, load.stop_ns);
+    std::string text = fmt::format(
+        R"({{"use":{:.6f},"set_point_ns":{},"broadcast_ns":{},"stop_ns":{},"telegrams":[)",
+        load.use, load.set_point_ns, load.broadcast_ns, load.stop_ns);
     for (std::size_t n = 0; n < plan.telegrams.size(); ++n) {
         const Telegram& t = plan.telegrams[n];
         std::string names;
