@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <limits>
 #include <numbers>
 
 #include "hal/component.hpp"
@@ -252,6 +253,7 @@ private:
             direction_ = deviation >= 0.0 ? 1.0 : -1.0;
             half_cycles_ = -settling_half_cycles;
             peak_ = elapsed_ = amplitude_sum_ = time_sum_ = 0.0;
+            period_ = periods_ = period_sum_ = period_squares_ = 0.0;
         }
         if (tuning_ && (!tune_start || !std::isfinite(deviation))) {
             stop_tuning();
@@ -264,19 +266,43 @@ private:
             if (half_cycles_ >= 0) {
                 amplitude_sum_ += peak_;
                 time_sum_ += elapsed_;
+                note_half_period();
             }
             direction_ = -direction_;
             peak_ = std::fabs(deviation);  // this sample is the first beyond zero
             elapsed_ = 0.0;
             if (++half_cycles_ >=
                 static_cast<std::int64_t>(std::max<std::uint32_t>(tune_cycles, 1))) {
-                adopt(amplitude_sum_ / static_cast<double>(half_cycles_),
-                      2.0 * time_sum_ / static_cast<double>(half_cycles_));
+                if (oscillates_evenly()) {
+                    adopt(amplitude_sum_ / static_cast<double>(half_cycles_),
+                          2.0 * time_sum_ / static_cast<double>(half_cycles_));
+                } else if (faults_ != nullptr) {
+                    faults_->raise(faults_, this, uneven_oscillation,
+                                   std::numeric_limits<double>::quiet_NaN());
+                }
                 stop_tuning();
                 return shut(limited(bias, max_output));
             }
         }
         shut(limited(bias + direction_ * std::fabs(tune_effort), max_output));
+    }
+
+    /// Sums up the periods, of two half cycles each, and their squares.
+    void note_half_period() {
+        period_ += elapsed_;
+        if (half_cycles_ % 2 == 0) return;
+        periods_ += 1.0;
+        period_sum_ += period_;
+        period_squares_ += period_ * period_;
+        period_ = 0.0;
+    }
+    /// Noise around zero switches the output as well, at random: the standard deviation of the
+    /// periods is at least half their mean. That of an oscillation is a sampling period or two.
+    bool oscillates_evenly() const {
+        if (periods_ < 2.0) return true;
+        const double mean = period_sum_ / periods_;
+        const double variance = period_squares_ / periods_ - mean * mean;
+        return variance <= max_spread * max_spread * mean * mean;
     }
 
     void adopt(double amplitude, double period) {
@@ -311,6 +337,11 @@ private:
 
     // until the oscillation has its final shape
     static constexpr std::int64_t settling_half_cycles = 2;
+    static constexpr double max_spread = 0.3;  // of the periods, of their mean
+    static constexpr const char* uneven_oscillation =
+        "auto-tuning failed: noise or a disturbance has switched the output, not the oscillation "
+        "of "
+        "the loop; the gains are unchanged; increase tune-effort, or filter the feedback";
 
     // While tuning: half cycles averaged (negative: still settling) and what was seen of the
     // present one.
@@ -320,6 +351,11 @@ private:
     double elapsed_ = 0.0;
     double amplitude_sum_ = 0.0;
     double time_sum_ = 0.0;
+    double period_ = 0.0;  // its first half cycle
+    double periods_ = 0.0;
+    double period_sum_ = 0.0;
+    double period_squares_ = 0.0;
+    const hal_faults* const faults_ = hal::extension<hal_faults>("hal.faults/1");
     double ultimate_gain_ = 0.0;
     double ultimate_period_ = 0.0;
     hal::Retained retained_{*this,
@@ -342,6 +378,10 @@ private:
                              {"elapsed", elapsed_},
                              {"amplitude-sum", amplitude_sum_},
                              {"time-sum", time_sum_},
+                             {"period", period_},
+                             {"periods", periods_},
+                             {"period-sum", period_sum_},
+                             {"period-squares", period_squares_},
                              {"ultimate-gain", ultimate_gain_},
                              {"ultimate-period", ultimate_period_}}};
 };
@@ -375,7 +415,9 @@ FF1 and Dgain). Setting `maxoutput` to 0 ends the saturation (LinuxCNC: `saturat
 integral remain). A negative limit or deadband counts as positive (LinuxCNC: the output jumps
 between its limits). While an input is NaN the output is 0 (LinuxCNC: NaN). While a limit is NaN its
 last valid value applies (LinuxCNC: no limit). Auto-tuning ignores the first two half cycles, before
-the oscillation is stable (LinuxCNC averages them in).
+the oscillation is stable (LinuxCNC averages them in), and leaves the gains as they are, with a
+fault, when noise has switched the output: the standard deviation of the periods exceeds 30 % of
+their mean (LinuxCNC sets gains that can be 100 times too high).
 
 **Auto-tuning** measures the loop by the relay method and sets the gains by the rules of Ziegler and
 Nichols. Hold `command` constant near the middle of the travel; set `tune-effort` to a small value,
