@@ -125,6 +125,24 @@ Programs::Entry& owned(const Program& by, const std::string& name) {
     return *entry;
 }
 
+/// Returns "float out".
+std::string kind_of(hal_type type, hal_dir dir, bool read_only) {
+    const auto direction =
+        std::find_if(std::begin(directions), std::end(directions),
+                     [&](const Direction& d) { return d.dir == dir && d.read_only == read_only; });
+    return std::string(row(type).name) + " " +
+           (direction == std::end(directions) ? "pin" : direction->word);
+}
+
+/// Throws when a dead program's pin that its successor does not have is linked: the link would be
+/// lost, and the signal would keep its value.
+void check_link(const Pin& of_dead, const std::string& difference) {
+    if (of_dead.signal == nullptr) return;
+    throw RequestError{"pin '" + of_dead.name + "' is linked to signal '" + of_dead.signal->name +
+                       "' since the program before, and this one " + difference +
+                       "; declare the pin as before, or type: unlinkp " + of_dead.name};
+}
+
 /// The component's pin of that name that a dead program left behind, or a new one.
 Pin* add_pin(const Program& by, Transaction& transaction, const Programs::Entry& entry,
              std::unordered_set<const Pin*>& taken, const ProgramPin& wanted) {
@@ -144,6 +162,9 @@ Pin* add_pin(const Program& by, Transaction& transaction, const Programs::Entry&
             });
             return there;
         }
+        check_link(*there, "declares it as " + kind_of(wanted.type, wanted.dir, wanted.read_only) +
+                               " and not as " +
+                               kind_of(there->type, there->dir, there->read_only()));
         by.session.programs().model().remove_pins(transaction, entry.name, {there});
     }
     std::string problem;
@@ -242,6 +263,18 @@ Declaration declaration_of(const Json& body) {
 }
 
 /// Gives the component its pins and declared values. When that is rejected, a component that was
+/// Throws when a dead program has left a linked pin that this one, which is ready, does not have.
+void check_links(const Program& by, const Programs::Entry& entry) {
+    const LoadedComponent* const component = by.session.model().find_component(entry.name);
+    if (component == nullptr || component->instances.empty()) return;
+    const std::unordered_set<const Pin*> own(entry.pins.begin(), entry.pins.end());
+    for (const auto& pin : component->instances.front()->pins) {
+        if (!own.contains(pin.get())) {
+            check_link(*pin, "does not declare it");
+        }
+    }
+}
+
 /// `fresh` keeps the pins and links that its dead predecessor had, if any.
 void add_declared(const Program& by, Programs::Entry& entry, const Declaration& wanted, bool fresh,
                   bool was_dead) {
@@ -254,6 +287,9 @@ void add_declared(const Program& by, Programs::Entry& entry, const Declaration& 
         for (const auto& [pin, value] : declared) {
             pin->safe = value;
             pin->flags |= HAL_PIN_SAFE;
+        }
+        if (wanted.ready.value_or(fresh)) {
+            check_links(by, entry);
         }
     } catch (const RequestError&) {
         if (fresh && was_dead) {

@@ -41,8 +41,8 @@ class PythonTest(Case):
     def machine(self, netlist=SERVO + "start\n", *words):
         return self.start("run", "--no-picture", *words, self.write("machine.hal", netlist))
 
-    def python(self, text):
-        """Runs a program to its end; what it prints."""
+    def python(self, text, status=0):
+        """Runs a program to its end; what it prints, or its errors when it must fail."""
         done = subprocess.run(
             [sys.executable, "-c", text],
             cwd=self.folder,
@@ -53,8 +53,8 @@ class PythonTest(Case):
             text=True,
             timeout=60,
         )
-        self.assertEqual(0, done.returncode, done.stderr)
-        return done.stdout
+        self.assertEqual(status, done.returncode, done.stderr)
+        return done.stdout if status == 0 else done.stderr
 
     def background(self, text):
         program = subprocess.Popen(
@@ -434,6 +434,31 @@ os._exit(0)
                 "os.wait()\nfor _ in range(3): rows = next(iter(p))\nprint('rows', flush=True)\n"
             ),
         )
+
+    def test_a_successor_that_would_lose_a_link_is_rejected(self):
+        self.machine()
+        version = "import hal\nc = hal.component('p', timeout=60)\n{}c.ready()\nc['out'] = 7\n"
+        right = version.format("c.newpin('out', hal.HAL_FLOAT, hal.HAL_OUT)\n")
+        self.python(right + "import os, time\ntime.sleep(0.1)\nos._exit(1)\n", status=1)
+        self.say("net", "speed", "p.out", "=>", "adder.in0")
+        linked = "hal.error: pin 'p.out' is linked to signal 'speed' since the program before, and this one "
+        for pin, difference in (
+            (
+                "c.newpin('out', hal.HAL_S32, hal.HAL_OUT)\n",
+                "declares it as s32 out and not as float out",
+            ),
+            (
+                "c.newpin('out', hal.HAL_FLOAT, hal.HAL_IN)\n",
+                "declares it as float in and not as float out",
+            ),
+            ("", "does not declare it"),
+        ):
+            errors = self.python(version.format(pin), status=1)
+            self.assertIn(
+                f"{linked}{difference}; declare the pin as before, or type: unlinkp p.out", errors
+            )
+        self.assertIn("<== p.out", self.say("show", "sig", "speed"))
+        self.python(right + "assert hal.get_value('speed') == 7\n")
 
 
 if __name__ == "__main__":
