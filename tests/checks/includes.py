@@ -70,7 +70,7 @@ ROWS = {
         "components/modbus/master",
         "components/mesa/card",
     ],  # hal can, ethercat, node, tdma
-    "tools/panel": ["tools/cli"],
+    "tools/panel": ["tools/cli", "components/recording/mcap"],
     "tools/lsp": ["tools/run", "tools/doc", "tools/panel"],
     "tools/python": ["runtime/control"],
     "drivers/link": [],

@@ -5,6 +5,7 @@
 
 from harness import SERVO
 from panel_page import WAVE, Page, main
+from web import start_panel
 
 
 class Views(Page):
@@ -451,6 +452,40 @@ net position{n} axis{n}-integ.out => axis{n}-pid.feedback
             rows = [m for _, c, _, m in reader.iter_decoded_messages(topics=["/hal/servo"])]
             self.assertEqual({5.0}, {row.total for row in rows})
             self.assertGreater(len(rows), 600)
+
+    def test_the_scope_shows_a_recording(self):
+        self.machine = self.start("run", self.write("m.hal", WAVE))
+        self.good("record", "crash.mcap", "sine", "total", "--for", "1s")
+        self.process, self.port, self.token = start_panel(self, "--recording", "crash.mcap")
+        self.browser = self.kind(self)
+        self.open("scope?ch=sine:0.5:0&recording=crash.mcap", token=False)
+        self.browser.wait("window.halcyonScope?.rows > 900")
+        self.assertEqual(0.1, self.browser.evaluate("halcyonScope.base"))
+        self.assertEqual([0, 0], self.browser.evaluate("[halcyonScope.lost, halcyonScope.gaps]"))
+        rows = self.browser.evaluate("halcyonScope.rows")
+        add = "(name => { const i = document.querySelector('[aria-label=\"Add a channel\"]'); i.value = name; i.dispatchEvent(new Event('change')); })"
+        self.browser.evaluate(f"{add}('wave.cosine')")
+        problem = "document.getElementById('scope-problem').textContent"
+        self.browser.wait(f"{problem} === \"unknown name 'wave.cosine'\"")
+        self.browser.evaluate(f"{add}('total')")
+        self.browser.wait(
+            "halcyonScope.store.place.has('total') && document.querySelector('[data-channel=total]').children[5].textContent === '5'"
+        )
+        self.assertEqual(rows, self.browser.evaluate("halcyonScope.rows"))
+        self.assertTrue(self.browser.evaluate("document.querySelector('button.main').disabled"))
+        self.end(self.machine)
+        self.browser.wait("document.body.classList.contains('stale')")
+        self.assertEqual(
+            ["", "none"],
+            self.browser.evaluate(
+                "[halcyonScope.notice, getComputedStyle(document.querySelector('main')).filter]"
+            ),
+        )
+
+    def test_a_recording_that_cannot_be_read_is_rejected(self):
+        self.assertIn("'none.mcap'", self.bad("panel", "--port", "0", "--recording", "none.mcap"))
+        self.write("empty.csv", "time_s,x\n")
+        self.assertIn("'empty.csv'", self.bad("panel", "--port", "0", "--recording", "empty.csv"))
 
     def test_a_batch_of_a_probe_is_read_to_the_last_bit(self):
         self.begin()

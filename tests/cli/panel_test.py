@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: MIT
 # packages: panel
 """The server of `hal panel` without a browser: HTTP and WebSockets by hand, what it must reject, what it serves."""
+
 import json
 import re
 import socket
+import struct
 import sys
 import time
 import unittest
@@ -593,6 +595,36 @@ hal panel: 'bad.panel' has errors
         self.addCleanup(bare.close)
         self.assertIsNone(bare.read())
         self.assertEqual(1008, bare.closed[0])
+
+    def test_a_recording_is_sent_without_a_machine_and_only_by_its_number(self):
+        self.write("run.csv", "time_s,x,on\n0,1.5,1\n0.25,2.5,0\n0.5,-3,1\n")
+        self.begin("--recording", "run.csv", machine=False)
+        page = self.page()
+        welcome = page.expect(lambda m: isinstance(m, dict) and m.get("event") == "welcome")
+        (recording,) = welcome["recordings"]
+        self.assertEqual(("run.csv", 0.5), (recording["name"], recording["seconds"]))
+        self.assertEqual(["x", "on"], [column["name"] for column in recording["columns"]])
+        reply = self.ask(page, recording=0, names=["on", "gone", "x"])
+        self.assertEqual([0, 2], reply["groups"][0]["columns"])
+        event = page.expect(lambda m: isinstance(m, dict) and m.get("event") == "samples")
+        self.assertEqual((reply["probe"], 500_000_000), (event["probe"], event["until_ns"]))
+        rows = page.expect(lambda m: isinstance(m, bytes))
+        self.assertEqual(event["bytes"], len(rows))
+        values = [struct.unpack_from("<Qqdd", rows, 32 * row) for row in range(3)]
+        self.assertEqual(
+            [(0, 0, 1.0, 1.5), (0, 250_000_000, 0.0, 2.5), (0, 500_000_000, 1.0, -3.0)], values
+        )
+        for wrong in (
+            {"recording": 1, "names": ["x"]},
+            {"recording": -1, "names": ["x"]},
+            {"recording": "run.csv", "names": ["x"]},
+            {"recording": 0, "names": "x"},
+            {"recording": 0, "names": []},
+            {"recording": 0, "names": [7]},
+            {"recording": 0},
+            {"recording": 0, "names": ["x"] * 101},
+        ):
+            self.assertFalse(self.ask(page, **wrong)["ok"], wrong)
 
     def test_errors_of_the_command_line(self):
         self.assertEqual(

@@ -13,7 +13,7 @@ struct PanelOptions : Options {
     std::string name;       ///< the instance; empty: not given
     std::string component;  ///< name of the panel's component; empty: by its file
     std::string listen;     ///< empty: loopback only
-    std::vector<std::string> hosts, origins;
+    std::vector<std::string> hosts, origins, recordings;
     std::uint16_t port = 8080;
     std::int64_t for_ns = -1;
     bool write = false;
@@ -34,6 +34,9 @@ struct PanelOptions : Options {
                    "repeated");
         set.value("-c,--component", component, "NAME",
                   "name of the user panel's component (default: from its file)");
+        set.values("--recording", recordings, "FILE",
+                   "show this recording in the scope: an .mcap or .csv of `hal record`, its flight "
+                   "recorder, or a journal with values; may be repeated");
         set.for_how_long(for_ns, "end after 10s … (default: run until Ctrl-C)");
     }
 };

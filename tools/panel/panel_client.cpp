@@ -121,6 +121,7 @@ void PanelClient::message(std::string_view text, bool binary) {
     if (request.contains("take")) return server_.take_control(*this);
     if (request.contains("release")) return server_.release(*this);
     if (request.contains("panel")) return panel_request(request);
+    if (request.contains("recording")) return send_recording(request);
     std::string problem;
     const RequestKind kind = check_request(request, problem);
     if (kind == RequestKind::rejected) return reject(request, problem);
@@ -162,7 +163,8 @@ void PanelClient::greet(const Json& hello) {
                 {"instance", server_.instance()},
                 {"write", server_.access().write},
                 {"token", by_token_},
-                {"client", number_}};
+                {"client", number_},
+                {"recordings", server_.recordings().list()}};
     if (const UserPanel* const panel = server_.panel()) {
         answer["panel"] = Json::parse(panel->layout());
     }
@@ -206,6 +208,18 @@ void PanelClient::write(Json request) {
         return reject(request, "the machine is not running");
     }
     writes_.push_back(std::move(write));
+}
+
+void PanelClient::send_recording(const Json& request) {
+    constexpr std::size_t busy_above = 1 << 20;
+    if (waiting() > busy_above) {
+        return reject(request, "the connection is too slow: what was sent before is on its way");
+    }
+    const Recordings::Answer answer = server_.recordings().answer(request, ++recordings_sent_);
+    if (!answer.problem.empty()) return reject(request, answer.problem);
+    send(answer.reply);
+    send(answer.event);
+    send(answer.rows, true);
 }
 
 void PanelClient::panel_request(const Json& request) {

@@ -40,6 +40,7 @@ private:
     void greet(const nlohmann::json& hello);
     void write(nlohmann::json request);
     void panel_request(const nlohmann::json& request);
+    void send_recording(const nlohmann::json& request);
     void reject(const nlohmann::json& request, std::string_view problem);
     /// Handles a reply to a request of this class itself. Returns false for one of the page.
     bool own_reply(std::string_view line);
@@ -57,6 +58,7 @@ private:
     std::uint64_t number_;
     std::int64_t opened_ms_, retried_ms_ = 0, beat_ms_ = 0;
     bool down_sent_ = false;
+    std::uint64_t recordings_sent_ = 0;
     std::deque<Write> writes_;
 };
 

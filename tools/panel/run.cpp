@@ -12,6 +12,7 @@
 #include "machine/processes/address.hpp"
 #include "panel/panel.hpp"
 #include "panel/panel_layout.hpp"
+#include "panel/recordings.hpp"
 #include "panel/server.hpp"
 #include "text/characters.hpp"
 
@@ -94,9 +95,16 @@ int run_panel(const PanelOptions& options) {
     } else if (!options.component.empty()) {
         return fail(options, "--component names the component of a user panel; add its file");
     }
+    Recordings recordings;
+    for (const std::string& path : options.recordings) {
+        if (const std::string problem = recordings.add(path); !problem.empty()) {
+            return fail(options, problem);
+        }
+    }
     const Access access = access_for(options);
     StopRequest stop;
     PanelServer server(access, instance);
+    server.load(std::move(recordings));
     if (const std::string problem =
             server.open(options.listen.empty() ? loopback : options.listen, options.port);
         !problem.empty()) {

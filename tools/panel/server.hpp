@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "panel/event_log.hpp"
 #include "panel/guard.hpp"
+#include "panel/recordings.hpp"
 #include "panel/web_client.hpp"
 
 struct lws;
@@ -34,6 +36,8 @@ public:
     std::string open(const std::string& address, int port);
     int port() const;
     void load(PanelLayout layout);
+    /// Sets what pages can show besides the machine; before run().
+    void load(Recordings recordings) { recordings_ = std::move(recordings); }
     /// Serves until interrupt() is called.
     void run();
     void interrupt() noexcept;  ///< [any]
@@ -44,6 +48,7 @@ public:
     EventLog& log() { return log_; }
     UserPanel* panel() { return panel_.get(); }
     Metrics& metrics() { return *metrics_; }
+    const Recordings& recordings() const { return recordings_; }
 
     /// At most one page has control at a time.
     const PanelClient* controller() const { return controller_; }
@@ -75,6 +80,7 @@ private:
     lws_context* context_ = nullptr;
     lws_vhost* host_ = nullptr;
     EventLog log_;
+    Recordings recordings_;
     std::unique_ptr<EventLoop> loop_;
     std::unique_ptr<Metrics> metrics_;
     std::unique_ptr<UserPanel> panel_;

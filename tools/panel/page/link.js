@@ -28,6 +28,7 @@ export const state = {
     held: false,
     holder: null,
     panel: null,
+    recordings: [],  // {name, columns, seconds}: what hal panel can show besides the machine
     reason: '',
     log: [],
     stats: {messages: 0, bytes: 0}
@@ -39,6 +40,7 @@ export const isLive = () =>
 
 let socket = null, nextId = 1, replies = new Map(), samples = null, lastReply = 0;
 const subscriptions = new Set(), probes = new Set();
+const awaited = new Map();  // rows of recordings, by the number in their event
 
 function takeToken() {
     const found = /(?:^#|[#&])t=([0-9a-f]+)/.exec(location.hash);
@@ -51,11 +53,12 @@ function takeToken() {
 
 /// Sends a request of the control protocol. Resolves with the reply.
 export function request(body) {
-    if (!socket || socket.readyState !== WebSocket.OPEN || !state.machine)
+    const isOpen = socket && socket.readyState === WebSocket.OPEN;
+    if (!isOpen || !(state.machine || 'recording' in body))
         return Promise.resolve({ok: false, error: 'the machine is not running'});
     const id = nextId++;
     return new Promise(resolve => {
-        replies.set(id, resolve);
+        replies.set(id, {resolve, byServer: 'recording' in body});
         socket.send(JSON.stringify({id, ...body}));
     });
 }
@@ -98,6 +101,13 @@ export function probe(names, options, act, failed) {
         one.number = null;
     };
 }
+/// Reads names of a recording: act(event, ArrayBuffer of the rows) is called once, after the reply
+/// is returned, which is the layout.
+export async function readRecording(index, names, act) {
+    const reply = await request({recording: index, names});
+    if (reply.ok) awaited.set(reply.probe, act);
+    return reply;
+}
 async function startProbe(one) {
     if (!state.machine || one.names.length === 0) return;
     const reply = await request({probe: one.names, ...one.options});
@@ -110,10 +120,14 @@ async function startProbe(one) {
     one.layout = reply;
 }
 
-function settle() {
-    for (const resolve of replies.values())
+/// Ends what waits for the machine; `all`: for the server, too.
+function settle(all) {
+    for (const [id, {resolve, byServer}] of replies) {
+        if (byServer && !all) continue;
+        replies.delete(id);
         resolve({ok: false, error: 'the connection is lost'});
-    replies.clear();
+    }
+    if (all) awaited.clear();
     for (const one of subscriptions)
         one.number = null;
     for (const one of probes)
@@ -121,7 +135,7 @@ function settle() {
 }
 
 function machine(event) {
-    settle();
+    settle(false);
     state.machine = event.up;
     if (event.up)
         Object.assign(state, {
@@ -161,9 +175,9 @@ function receive(text) {
     const message = JSON.parse(text);
     lastReply = performance.now();
     if (!message.event) {
-        const resolve = replies.get(message.id);
+        const waiting = replies.get(message.id);
         replies.delete(message.id);
-        if (resolve) resolve(message);
+        waiting?.resolve(message);
         return;
     }
     switch (message.event) {
@@ -173,7 +187,8 @@ function receive(text) {
                 instance: message.instance,
                 write: message.write,
                 token: message.token,
-                panel: message.panel ?? null
+                panel: message.panel ?? null,
+                recordings: message.recordings ?? []
             });
             emit('welcome');
             emit('state');
@@ -219,6 +234,8 @@ function receiveBytes(bytes) {
     if (!event) return;
     for (const one of probes)
         if (one.number === event.probe) one.act(event, bytes, one.layout);
+    awaited.get(event.probe)?.(event, bytes);
+    awaited.delete(event.probe);
 }
 
 export function connect() {
@@ -235,7 +252,7 @@ export function connect() {
             receiveBytes(message.data);
     };
     socket.onclose = event => {
-        settle();
+        settle(true);
         state.server = 'lost';
         state.machine = state.held = false;
         state.reason = event.reason;

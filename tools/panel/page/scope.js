@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The scope: up to 16 channels, time base, trigger, cursors, measurements. Samples come from a
 // probe, every cycle of their threads; from a machine without probes, by subscription.
-import {on, probe, state, subscribe} from './link.js';
+import {on, probe, readRecording, state, subscribe} from './link.js';
 import {announce, colour, dark, h, number, surface, text} from './dom.js';
 import {compareNames, similar} from './names.js';
 import {objects} from './objects.js';
@@ -99,6 +99,11 @@ export class View {
         this.useCursors = query.get('cursors') === '1';
         this.useSteps = query.get('step') === '1';
         this.useSpectrum = query.get('spectrum') === '1';
+        this.recording = query.get('recording') ?? '';  // the name of one; '': the machine
+        this.hasBase = query.has('base');
+        /** @type {{time_ns: number, kind: string, text: string}[]} */
+        this.recorded = [];  // what happened in the recording
+        this.main = main;
         this.across = query.get('x') ?? '';  // the channel of the X axis; '': no XY view
         this.cursors = [.3, .7];
         this.selected = 0;
@@ -151,8 +156,9 @@ export class View {
               this.table);
         main.append(
             h('div', {class: 'column'},
-              h('div', {class: 'bar'}, this.add, this.names, this.timeBase, this.modes,
-                this.triggerSource, this.edges, this.levelLabel, this.faultsOf, this.stop,
+              h('div', {class: 'bar'}, this.sources, this.add, this.names, this.timeBase,
+                this.modes, this.triggerSource, this.edges, this.levelLabel, this.faultsOf,
+                this.stop,
                 h('button', {onclick: () => this.autoscale()}, 'Auto scale'), this.cursorButton,
                 this.stepButton, this.spectrumButton, this.acrossSource,
                 h('button', {onclick: () => this.saveTable()}, 'CSV'),
@@ -171,6 +177,8 @@ export class View {
         this.showSpectrum();
         this.showXy();
         this.drawChannels();
+        this.drawSources();
+        this.main.classList.toggle('recorded', this.recording !== '');
         this.redraw = () => this.drawChannels();
         dark.addEventListener('change', this.redraw);
         this.arm();
@@ -179,10 +187,12 @@ export class View {
         this.subscriptions = [
             on('machine',
                () => {
+                   if (this.recording !== '') return;
                    this.shownAt = null;
                    this.suggest();
                    this.follow(true);
                }),
+            on('welcome', () => this.drawSources()),
             on('state', () => this.noteState()), on('logged', () => this.surface.request())
         ];
     }
@@ -193,6 +203,7 @@ export class View {
         this.following++;
         this.subscriptions.forEach(unsubscribe => unsubscribe());
         this.stopFollowing();
+        this.main.classList.remove('recorded');
         this.surface.end();
         this.spectrumPane.end();
         this.xyPane.end();
@@ -207,6 +218,12 @@ export class View {
             onchange: () => this.addChannel(this.add.value.trim())
         });
         this.names = h('datalist', {id: 'scope-names'});
+        this.sources = choose('Source', [['', 'machine']], '', value => {
+            this.recording = value;
+            this.hasBase = false;
+            this.save();
+            this.changeSource();
+        });
         this.timeBase = choose(
             'Time per division', steps.map(s => [String(s), `${seconds(s)}/div`]), this.base,
             value => {
@@ -384,8 +401,32 @@ export class View {
         this.whole.classList.toggle('no-step', !this.useSteps);
     }
 
+    /// Lists the recordings that hal panel has, and shows the source.
+    drawSources() {
+        const names = state.recordings.map(({name}) => name);
+        this.sources.hidden = names.length === 0;
+        fill(this.sources, [['', 'machine'], ...names.map(name => [name, name])], this.recording);
+        if (this.recording !== '' && state.recordings.length > 0) this.changeSource();
+    }
+
+    /// Shows the machine or a recording from now on.
+    changeSource() {
+        Object.assign(this, {shownAt: null, followed: '', source: '', run: true, single: false});
+        this.main.classList.toggle('recorded', this.recording !== '');
+        this.suggest();
+        this.follow();
+        this.draw();
+    }
+
+    /// What can be a channel: names with their type and unit.
+    async known(fresh = false) {
+        if (this.recording === '') return objects(fresh);
+        const found = state.recordings.find(({name}) => name === this.recording);
+        return new Map((found?.columns ?? []).map(column => [column.name, column]));
+    }
+
     async suggest() {
-        const all = [...(await objects()).keys()].sort(compareNames).slice(0, 3000);
+        const all = [...(await this.known()).keys()].sort(compareNames).slice(0, 3000);
         this.names.replaceChildren(...all.map(name => h('option', {value: name})));
     }
 
@@ -402,7 +443,7 @@ export class View {
     saveRecording() {
         const {store} = this, names = this.channels.map(one => one.name), from = store.oldest;
         const first = store.origin ?? Infinity;
-        const events = state.log.filter(one => one.time_ns > 0 && one.time_ns >= first);
+        const events = this.happened().filter(one => one.time_ns >= first);
         const file = mcap(store, names, from, store.newest, events, state);
         this.reportOverwritten(from);
         download('scope.mcap', new Blob([file], {type: 'application/octet-stream'}));
@@ -440,7 +481,8 @@ export class View {
             cursors: this.useCursors ? '1' : '',
             step: this.useSteps ? '1' : '',
             spectrum: this.useSpectrum ? '1' : '',
-            x: this.across
+            x: this.across,
+            recording: this.recording
         });
         this.draw();
     }
@@ -462,12 +504,12 @@ export class View {
     async problemOf(name) {
         if (this.channels.some(one => one.name === name)) return [`'${name}' is already shown`];
         if (this.channels.length >= most) return [`the scope has at most ${most} channels`];
-        let all = await objects();
-        if (!all.has(name)) all = await objects(true);  // it may be new
+        let all = await this.known();
+        if (!all.has(name)) all = await this.known(true);  // it may be new
         const type = all.get(name)?.type;
         if (type === 'port') return [`'${name}' is a port, which has no number`];
         if (type) return null;
-        if (!state.machine) return ['the machine is not running'];
+        if (!state.machine && this.recording === '') return ['the machine is not running'];
         return [`unknown name '${name}'`, similar(name, all.keys())];
     }
 
@@ -507,7 +549,7 @@ export class View {
     /// Reads the samples of all channels that the machine has. `restarted`: the page follows the
     /// same names again by itself.
     async follow(restarted = false) {
-        const call = ++this.following, all = await objects();
+        const call = ++this.following, all = await this.known();
         if (call !== this.following) return;
         for (const channel of this.channels) {
             channel.unknown = all.size > 0 && !all.has(channel.name);
@@ -522,6 +564,7 @@ export class View {
         this.store.clear();
         this.stops = [];
         if (list.length === 0) return;
+        if (this.recording !== '') return this.showRecording(list, call);
         let known = 0;
         this.stopFollowing = probe(list, {batch_ms: 15}, (event, bytes, layout) => {
             if (layout.layout !== known) {
@@ -535,6 +578,37 @@ export class View {
             this.store.samples(event, bytes, layout);
             this.take();
         }, () => this.followSlowly(list));
+    }
+
+    /// Shows channels of a recording, its end first.
+    async showRecording(names, call) {
+        const index = state.recordings.findIndex(({name}) => name === this.recording);
+        if (index < 0) return;
+        const reply = await readRecording(index, names, (event, bytes) => {
+            if (call !== this.following) return;
+            this.store.samples(event, bytes, reply);
+            this.lookAtEnd();
+        });
+        if (call !== this.following) return;
+        if (!reply.ok) return this.report(reply.error);
+        const {left_out, groups, columns, unix_ns, events} = reply;
+        this.store.layout(groups, names, columns, state.recordings[index].seconds);
+        this.store.unixOffset = unix_ns;
+        this.store.seconds(0);
+        this.recorded = events;
+        this.source = `recording ${this.recording}` +
+            (left_out > 0 ? `, ${left_out} earlier rows not shown` : '');
+    }
+
+    /// Shows the end of what is kept; when no time base was chosen, all of it.
+    lookAtEnd() {
+        const {store} = this, length = store.newest - store.oldest;
+        if (!this.hasBase) this.base = steps.find(step => step * divisions >= length) ?? 60;
+        this.timeBase.value = String(this.base);
+        this.zeroAt = store.newest;
+        this.triggered = false;
+        this.scrollTo(store.newest);
+        this.save();
     }
 
     /// Follows values of a machine without probes.
@@ -597,6 +671,7 @@ export class View {
         const {store, stops} = this, open = stops.find(one => one.to === Infinity);
         const exact = state.running_ns > 0 && store.origin !== null;
         const now = exact ? store.seconds(state.running_ns) : store.newest;
+        if (this.recording !== '') return;
         if (!state.running && !open) stops.push({from: now, to: Infinity});
         if (state.running && open) open.to = now;
         if (stops.length > 100) stops.shift();
@@ -605,6 +680,7 @@ export class View {
 
     /// Why the newest samples are not those of a running machine; empty when they are.
     notice() {
+        if (this.recording !== '') return '';
         if (!state.machine) return 'machine not running';
         if (!state.responding) return 'machine not responding';
         if (!state.running) return 'stopped: functions do not run';
@@ -612,11 +688,18 @@ export class View {
         return silent > 1 && this.followed !== '' ? `no samples for ${Math.floor(silent)} s` : '';
     }
 
+    /// What happened, with a time on the clock of the samples.
+    happened() {
+        if (this.recording !== '') return this.recorded;
+        return state.log.filter(one => one.time_ns > 0);
+    }
+
     /// All faults since the record began.
     allFaults() {
         const {store} = this;
         if (store.origin === null) return [];
-        return state.log.filter(one => one.kind === 'fault' && one.time_ns > 0)
+        return this.happened()
+            .filter(one => one.kind === 'fault')
             .map(one => ({at: store.seconds(one.time_ns), text: one.text}));
     }
 
@@ -775,6 +858,7 @@ export class View {
 
     draw() {
         text(this.stop, this.run ? 'Stop' : 'Run');
+        this.stop.disabled = this.recording !== '';
         this.surface.request();
     }
 
@@ -863,6 +947,7 @@ export class View {
             lastTrigger,
             pre: this.base * divisions * before,
             store,
+            base: this.base,
             range: this.range(),
             notice: this.notice(),
             peak: this.measureSpectrum(),
@@ -922,7 +1007,7 @@ export class View {
         const {store} = this, parts = [this.source, `${store.rows} rows`, `${store.lost} lost`];
         if (!this.run) parts.push(this.single ? 'single record' : 'stopped');
         if (this.channels.some(one => store.isCoarse(one.name, this.range()[0])))
-            parts.push('minima and maxima of 10 ms');
+            parts.push(`minima and maxima of ${seconds(store.pastWidth)}`);
         const late = performance.now() - this.lastTrigger > 1000;
         if (this.mode !== 'roll' && this.trigger && this.run && late)
             parts.push('waiting for trigger');

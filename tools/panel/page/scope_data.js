@@ -96,6 +96,7 @@ class Columns {
 
 /// Minimum and maximum of every 10 ms of the last 10 minutes: what remains of overwritten rows.
 const pastWidth = .01, pastSize = 1 << 16;
+const keepEvery = (1 << 14) - 1;  // mask of rows: how often it is looked whether some will be lost
 
 /// Values of a thread come in every cycle, and those without a thread when they change.
 function holdOf({thread, period_ns}) { return thread ? Math.max(.1, 5e-9 * period_ns) : Infinity; }
@@ -113,6 +114,7 @@ export class Store {
         this.unixOffset = 0;  // ns: from the machine's clock to Unix time; 0: unknown
         this.cut = new Map();   // channel -> Columns
         this.past = new Map();  // channel -> Columns of the last 10 minutes
+        this.pastWidth = pastWidth;  // s
         this.columnsOf = new Map();  // channel -> {name, type, unit}
     }
     /// The Columns of a channel, up to date.
@@ -126,7 +128,7 @@ export class Store {
     /// The minima and maxima of the last 10 minutes of a channel, up to date.
     history(name) {
         if (!this.past.has(name))
-            this.past.set(name, new Columns(...this.place.get(name), pastWidth, pastSize));
+            this.past.set(name, new Columns(...this.place.get(name), this.pastWidth, pastSize));
         const columns = this.past.get(name);
         columns.update();
         return columns;
@@ -134,8 +136,10 @@ export class Store {
     /// Whether a channel has only minima and maxima of a time.
     isCoarse(name, from) { return this.place.get(name)?.[0].isOverwritten(from) ?? false; }
     /// Begins another layout. `columns`: {name, type, unit} of each name, as a probe has them.
-    layout(groups, names, columns = []) {
+    /// `length`: seconds of all rows, when that is known.
+    layout(groups, names, columns = [], length = 0) {
         this.clear();
+        this.pastWidth = Math.max(pastWidth, length / (pastSize - 2));
         this.groups = groups.map(group => new Group(group, holdOf(group)));
         this.cycles = groups.map(() => -1);
         groups.forEach(
@@ -150,7 +154,7 @@ export class Store {
     get oldest() {
         const times = this.groups.filter(group => group.count > 0).map(group => {
             const first = group.time(group.first);
-            return group.first > 0 ? Math.max(0, this.newest - pastWidth * pastSize) : first;
+            return group.first > 0 ? Math.max(0, this.newest - this.pastWidth * pastSize) : first;
         });
         return Math.min(this.newest, ...times);
     }
@@ -179,6 +183,7 @@ export class Store {
                     cycle !== this.cycles[part.group] + every)
                     this.gaps++;
                 this.cycles[part.group] = cycle;
+                if ((group.count & keepEvery) === 0) this.keepPast();
                 const ns = lows[2 * word + 2] + highs[2 * word + 3] * 4294967296,
                       at = group.add(this.seconds(ns), cycle);
                 word += 2;
