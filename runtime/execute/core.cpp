@@ -939,6 +939,11 @@ void Core::note_fork() noexcept {
            violation::forked, nullptr});
 }
 
+void Core::note_outside_reading() noexcept {
+    raise({HAL_FAULT_VIOLATION, current_function(), info_.number, info_.start_ns, 0.0,
+           violation::read_outside, nullptr});
+}
+
 void Core::end_copy() noexcept {
     for (;;) {
         syscall(SYS_exit_group, 1);

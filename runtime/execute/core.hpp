@@ -238,6 +238,8 @@ public:
     enum Left : int { threw = 1, ended_thread = 2 };
     /// The running function has copied the process: a fault that names it. [realtime]
     void note_fork() noexcept;
+    /// The running function reads what no journal has: a fault that names it. [realtime]
+    void note_outside_reading() noexcept;
     /// A floating-point exception of the running function trapped, and is masked now. In a signal
     /// handler of the thread
     void note_trap() noexcept { modes_.note_trap(); }

@@ -9,5 +9,7 @@ namespace hal::violation {
 inline constexpr char float_modes[] = "changed the floating-point modes";
 inline constexpr char forked[] = "called fork()";
 inline constexpr char ended_thread[] = "ended its thread";
+/// Only while `hal check --deterministic` simulates.
+inline constexpr char read_outside[] = "reads a socket or a file that no journal has";
 
 }  // namespace hal::violation

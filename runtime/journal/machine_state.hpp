@@ -22,10 +22,10 @@ namespace hal {
 class Session;
 
 /// Copies regions of memory: of signals, of images, of what components see of the machine, and the
-/// memory of components, which has the same addresses in both processes (component_heap.hpp). A word
-/// that points into a region of other addresses is stored as its position there, one that points
-/// into a library as an offset in it, and any other pointer keeps the value that it has in the
-/// process that the state is restored in. Both have executed the same edits, with
+/// memory of components, which has the same addresses in both processes (component_heap.hpp). A
+/// word that points into a region of other addresses is stored as its position there, one that
+/// points into a library as an offset in it, and any other pointer keeps the value that it has in
+/// the process that the state is restored in. Both have executed the same edits, with
 /// component_heap::track(). [setup] with the session's lock held and no cycle begun
 class MachineState {
 public:

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "cli/no_output.hpp"
 #include "commands/files.hpp"
 #include "link/bus_key.hpp"
 #include "lsp/editor_texts.hpp"
@@ -14,13 +15,6 @@ namespace hal::tools {
 namespace {
 
 std::uint64_t load_number = 0;  // of the newest load
-
-/// Takes no text: the observer has received what was printed.
-class NoOutput final : public Output {
-public:
-    void out(std::string_view) override {}
-    void err(std::string_view) override {}
-};
 
 bool is_file(const std::string& path) {
     if (!path.starts_with('/')) return false;

@@ -6,14 +6,17 @@
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <map>
+#include <set>
 #include <string>
 #include <unistd.h>
 #include <unordered_set>
 #include <vector>
 
+#include "cli/no_output.hpp"
 #include "cli/other_program.hpp"
 #include "cli/output.hpp"
 #include "comp/toolchain.hpp"
+#include "execute/violation.hpp"
 #include "link/address.hpp"
 #include "recording/mcap/recording.hpp"
 #include "run/offline.hpp"
@@ -41,20 +44,15 @@ private:
     const int kept_;
 };
 
-class NoOutput final : public Output {
-public:
-    void out(std::string_view) override {}
-    void err(std::string_view) override {}
-};
-
 /// Finds the instances whose outputs differ although none of those that they read does.
 class Comparison {
 public:
     Comparison(const Model& model, const mcap::Recording& one, const mcap::Recording& other)
         : model_(model), one_(one), other_(other) {}
 
-    /// Returns lines about what differs.
+    /// Returns lines about what differs, and about functions that a re-execution cannot repeat.
     std::string compare() {
+        name_violations();
         for (const Row& row : rows()) {
             compare(row);
         }
@@ -62,7 +60,7 @@ public:
     }
     std::uint64_t values() const { return values_; }
     std::size_t sources() const { return sources_; }
-    std::size_t followers() const { return tainted_.size() - sources_; }
+    std::size_t followers() const { return tainted_.size() - (sources_ - violations_.size()); }
     bool equal() const { return equal_; }
 
 private:
@@ -91,6 +89,24 @@ private:
         }
         std::ranges::stable_sort(rows, {}, &Row::time_ns);
         return rows;
+    }
+
+    /// What a function reads from a socket, or leaves to the functions after it, differs only when
+    /// another program or another order of threads takes part.
+    void name_violations() {
+        for (const mcap::Event& event : one_.events) {
+            if (event.kind != "fault") continue;
+            for (const char* const reason : {violation::read_outside, violation::float_modes}) {
+                const std::size_t at = event.text.find(reason);
+                const std::size_t name = event.text.find("function '");
+                if (at == std::string::npos || name == std::string::npos) continue;
+                const std::string text = event.text.substr(name, event.text.find(';') - name);
+                if (!violations_.insert(text.substr(0, text.find(reason))).second) continue;
+                ++sources_;
+                equal_ = false;
+                text_ += text + ": it is not deterministic\n";
+            }
+        }
     }
 
     void compare(const Row& row) {
@@ -145,6 +161,7 @@ private:
     const Model& model_;
     const mcap::Recording& one_;
     const mcap::Recording& other_;
+    std::set<std::string> violations_;  // functions
     std::unordered_set<const Instance*> tainted_;  // their outputs have differed
     std::size_t sources_ = 0;
     std::uint64_t values_ = 0;
@@ -152,7 +169,7 @@ private:
     std::string text_;
 };
 
-/// Records all values of a simulation. `fill`: what fresh memory contains.
+/// Records all values of a simulation. `fill`: what fresh memory contains; also the seed of `rand`.
 int simulate(const CheckOptions& options, const std::string& file, const char* fill) {
     std::vector<std::string> words = {"sim"};
     words.insert(words.end(), options.words.begin(), options.words.end());
@@ -163,8 +180,10 @@ int simulate(const CheckOptions& options, const std::string& file, const char* f
     }
     ::setenv("MALLOC_PERTURB_", fill, 1);
     ::setenv(link::links_inside, "1", 1);
+    ::setenv(determinism_seed, fill, 1);
     const Silence silence;
     const int status = run_tool(std::move(words));
+    ::unsetenv(determinism_seed);
     ::unsetenv(link::links_inside);
     ::unsetenv("MALLOC_PERTURB_");
     return status;

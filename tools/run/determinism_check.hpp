@@ -6,6 +6,10 @@
 
 namespace hal::tools {
 
+/// Environment variable of the two simulations: the seed of `rand`, another one in each. Functions
+/// that read sockets are reported, and with an odd seed the threads get new plans in the middle.
+inline constexpr const char* determinism_seed = "HALCYON_DETERMINISM_SEED";
+
 /// Checks the netlists, simulates them twice in two processes that differ in all that a cycle must
 /// not depend on (addresses, content of fresh memory, time), and compares all values. Returns 0
 /// when they are equal. [setup]

@@ -2,13 +2,18 @@
 #include "run/sim_record.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <fmt/core.h>
+#include <utility>
 
+#include "cli/no_output.hpp"
 #include "cli/output.hpp"
+#include "machine/report/outside_readings.hpp"
 #include "paths.hpp"
 #include "record/sink.hpp"
 #include "recording/mcap/held_file.hpp"
 #include "run/chosen_values.hpp"
+#include "run/determinism_check.hpp"
 #include "run/hosted_machine.hpp"
 #include "run/sim_summary.hpp"
 #include "run/values_check.hpp"
@@ -67,6 +72,50 @@ std::uint64_t lost_rows(const ProbeRows& batch) {
     return lost;
 }
 
+/// For `hal check --deterministic`: two simulations with different seeds must be equal.
+class DeterminismCheck {
+public:
+    DeterminismCheck() {
+        const char* const seed = std::getenv(determinism_seed);
+        is_on_ = seed != nullptr;
+        if (!is_on_) return;
+        const auto number = static_cast<unsigned>(std::atoi(seed));
+        std::srand(number);
+        ::srand48(static_cast<long>(number));
+        has_edited_ = number % 2 == 0;
+        report_outside_readings();
+    }
+    /// Makes a step short enough for two.
+    void limit(Step& step, std::int64_t for_ns) const {
+        if (is_on_) {
+            step.ns = std::min(step.ns, for_ns / 2 + 1);
+        }
+    }
+    /// Gives the threads new plans once, in one of the two simulations: a function that has kept an
+    /// address in the old ones reads something else from then on. [setup]
+    void advanced(HostedMachine& machine) {
+        if (!is_on_ || std::exchange(has_edited_, true)) return;
+        NoOutput none;
+        std::vector<std::string> threads;
+        {
+            const auto lock = machine.session.lock();
+            for (const ThreadReport& thread : machine.session.reports().threads()) {
+                threads.push_back(thread.name);
+            }
+        }
+        for (const std::string& thread : threads) {
+            const std::string name = "determinism-check-" + thread;
+            machine.shell.execute("loadrt and2 names=" + name, none);
+            machine.shell.execute("addf " + name + " " + thread, none);
+            machine.shell.execute("delf " + name + " " + thread, none);
+        }
+    }
+
+private:
+    bool is_on_ = false;
+    bool has_edited_ = false;
+};
+
 int record_advance(const SimOptions& options, HostedMachine& machine) {
     Session& session = machine.session;
     std::shared_ptr<LiveProbe> probe;
@@ -100,6 +149,8 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
     std::uint64_t lost = 0;
     std::int64_t left_ns = options.for_ns;
     std::uint64_t left_cycles = options.cycles;
+    DeterminismCheck check;
+    check.limit(step, options.for_ns);
     while (good && !machine.stop.requested() && (left_ns > 0 || left_cycles > 0)) {
         if (left_cycles > 0) {
             machine.advance(-1, std::min(step.cycles, left_cycles));
@@ -108,6 +159,7 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
         }
         left_cycles -= std::min(step.cycles, left_cycles);
         left_ns -= step.ns;
+        check.advanced(machine);
         const auto lock = session.lock();
         for (const LoggedEvent& entry : session.event_log().after(journal)) {
             good = good && sink->event({entry.time_ns, entry.kind, entry.text});

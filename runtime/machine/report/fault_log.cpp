@@ -192,6 +192,8 @@ FaultMessage violation_message(const Model& model, const Thread& thread, const F
         text += " (" + modes_text(event.value) + ")" + at + "; they were reset";
         text += function ? "; the function must restore them before it returns"
                          : "; it did so in one cycle only, so it is unknown which one it was";
+    } else if (event.reason == violation::read_outside) {
+        text += at;
     } else if (event.reason == violation::forked) {
         text += at +
                 "; the copy of the process was ended; start programs with `loadusr`, or outside of "

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
 // A component whose output depends on what a cycle must not depend on; `kind` chooses it.
 #include <atomic>
+#include <cfenv>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <ctime>
 #include <functional>
 #include <random>
+#include <sys/socket.h>
 #include <sys/time.h>
 #include <thread>
 #include <unistd.h>
@@ -23,6 +26,7 @@ struct Seeds : hal::Component {
 
     void start() {
         bytes_ = static_cast<unsigned char*>(std::malloc(4096));
+        socket_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
         thread_ = std::jthread([this](const std::stop_token& end) {
             while (!end.stop_requested()) {
                 ++turns_;
@@ -35,6 +39,7 @@ struct Seeds : hal::Component {
     void stop() noexcept {
         thread_ = {};
         std::free(bytes_);
+        ::close(socket_);
     }
 
     void update(hal::Cycle) noexcept { out = in + read(); }
@@ -52,10 +57,31 @@ struct Seeds : hal::Component {
         case 6: return getpid();
         case 7: return static_cast<double>(std::hash<void*>()(this) / 16 % 1009);
         case 8: return std::random_device()() % 1000003;
+        case 9: return std::rand() % 1009;
+        case 10: return received();
+        case 11: std::fesetround(FE_DOWNWARD); return static_cast<double>(count_);
+        case 12: return old_value();
         default: return static_cast<double>(count_);
         }
     }
 
+    double received() const noexcept {
+        unsigned char byte = 0;
+        return ::recv(socket_, &byte, 1, MSG_DONTWAIT) == 1 ? byte : -1.0;
+    }
+    /// Keeps the address of a value, which is valid for one plan only.
+    double old_value() noexcept {
+        if (!address_) {
+            hal_pin pin;
+            static_assert(sizeof in == sizeof pin);
+            std::memcpy(&pin, static_cast<const void*>(&in), sizeof pin);
+            address_ = pin.slot;
+        }
+        return address_->real;
+    }
+
+    int socket_ = -1;
+    const hal_value* address_ = nullptr;
     std::uint64_t count_ = 0;
     unsigned char* bytes_ = nullptr;
     std::atomic<std::uint64_t> turns_ = 0;
