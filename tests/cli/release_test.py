@@ -156,6 +156,27 @@ class Release(Case):
         status, said = self.apt("arm64", "update")
         self.assertNotEqual(0, status, said)
 
+    def test_a_copy_of_the_folder_installs_from_its_own_place(self):
+        self.assertEqual(0, self.release()[0])
+        copy = self.folder / "stick"
+        shutil.copytree(self.output, copy)
+        shutil.rmtree(self.output)
+        script = (copy / "add-repository").read_text()
+        target = self.folder / "halcyon.sources"
+        script = script.replace("/etc/apt/sources.list.d/halcyon.sources", str(target))
+        (copy / "add-repository").write_text(script.replace('"$(id -u)" -eq 0', "0 -eq 0"))
+        self.run_or_fail("sh", copy / "add-repository")
+        self.output = self.folder / "moved"
+        self.output.mkdir()
+        shutil.copyfile(target, self.output / "halcyon.sources")
+        status, said = self.apt("amd64", "update")
+        self.assertEqual(0, status, said)
+        self.assertEqual(0, self.apt("amd64", "download", "halcyon")[0])
+        shutil.rmtree(copy / "apt")
+        done = subprocess.run(["sh", copy / "add-repository"], capture_output=True, text=True)
+        self.assertEqual(1, done.returncode)
+        self.assertEqual(f"add-repository: {copy} is not the folder of a release\n", done.stderr)
+
     def test_the_address_is_where_it_is_published(self):
         self.assertEqual(0, self.release(url="https://example.org/halcyon/")[0])
         sources = (self.output / "halcyon.sources").read_text()

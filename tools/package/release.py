@@ -117,7 +117,8 @@ class Release:
         (self.output / "halcyon.sources").write_text(
             f"Types: deb\nURIs: {self.url}/apt\nSuites: stable\nComponents: main\nSigned-By:\n{key}"
         )
-        shutil.copyfile(HERE / "files/image.sh", self.output / "image.sh")
+        for name in ("image.sh", "add-repository"):
+            shutil.copyfile(HERE / "files" / name, self.output / name)
 
     def make(self):
         self.check()
