@@ -181,9 +181,7 @@ class Release(Case):
         self.assertEqual(0, self.release(url="https://example.org/halcyon/")[0])
         sources = (self.output / "halcyon.sources").read_text()
         self.assertIn("URIs: https://example.org/halcyon/apt\n", sources)
-        self.assertIn(
-            "https://example.org/halcyon/halcyon.sources", (self.output / "NOTES.md").read_text()
-        )
+        self.assertIn("https://example.org/halcyon/apt", (self.output / "NOTES.md").read_text())
 
     def test_checksums_and_signatures_are_of_all_files(self):
         self.assertEqual(0, self.release()[0])
