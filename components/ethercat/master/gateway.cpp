@@ -63,6 +63,7 @@ struct Gateway::Client {
 struct Gateway::Pending {
     MailboxRequest request;
     Sender sender;
+    std::chrono::steady_clock::time_point taken = std::chrono::steady_clock::now();
     std::array<std::uint8_t, max_mailbox> bytes{};
 };
 
@@ -245,6 +246,10 @@ void Gateway::take(std::span<const std::uint8_t> bytes, const Sender& sender) {
 
 void Gateway::collect() {
     std::erase_if(pending_, [this](const auto& pending) {
+        // the cycle does not run: begun later, it would write what nobody expects any more
+        if (std::chrono::steady_clock::now() - pending->taken > setup_.max_wait) {
+            requests_.withdraw(pending->request);
+        }
         if (!requests_.finished(pending->request)) return false;
         const MailboxResult& result = pending->request.result;
         if (result) {

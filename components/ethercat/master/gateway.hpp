@@ -5,6 +5,7 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -73,6 +74,10 @@ struct GatewaySetup {
     std::uint16_t port = 34980;  ///< 0: any free one
     bool tcp = true;
     std::size_t max_clients = 16;  ///< of TCP
+    /// A request that the cycle has not begun by then, because it does not run or the slave is busy,
+    /// is dropped. Shorter than the 2 s that clients usually wait: what it writes later would
+    /// surprise them.
+    std::chrono::milliseconds max_wait{1500};
     /// Returns the slaves; called in the gateway's thread.
     std::function<std::vector<GatewaySlave>()> slaves;
 };

@@ -34,7 +34,7 @@ bool RequestPort::submit(MailboxRequest& request) noexcept {
 
 bool RequestPort::finished(MailboxRequest& request) const noexcept {
     const Stage stage = request.stage;
-    if (stage == Stage::queued && closed_) {
+    if ((stage == Stage::queued || stage == Stage::withdrawn) && closed_) {
         request.result = nobody;
         return true;
     }
@@ -121,13 +121,32 @@ RequestServer::Unrequested RequestServer::unrequested(const BusSlave& slave, con
     return due ? Unrequested::poll : Unrequested::nothing;
 }
 
+/// Removes the first request of a slot.
+MailboxRequest* RequestServer::take_next(Slot& slot) noexcept {
+    MailboxRequest* const request = std::exchange(slot.first, slot.first->next);
+    --waiting_;
+    if (slot.first == nullptr) {
+        slot.last = nullptr;
+    }
+    return request;
+}
+
 /// Finishes all requests of a slot.
 void RequestServer::refuse_all(Slot& slot, const MailboxResult& result) noexcept {
     while (slot.first != nullptr) {
-        finish(*std::exchange(slot.first, slot.first->next), result);
-        --waiting_;
+        finish(*take_next(slot), result);
     }
-    slot.last = nullptr;
+}
+
+/// Finishes the requests that were withdrawn, up to the first that was not: that one runs from here
+/// on.
+void RequestServer::drop_withdrawn(Slot& slot) noexcept {
+    while (slot.first != nullptr) {
+        Stage stage = Stage::queued;
+        if (slot.first->stage.compare_exchange_strong(stage, Stage::running)) return;
+        if (stage == Stage::running) return;
+        finish(*take_next(slot), nobody);
+    }
 }
 
 /// Starts what a slave needs on an idle worker. Returns whether it needs something.
@@ -139,6 +158,7 @@ bool RequestServer::start(Worker& worker, std::uint16_t number, std::int64_t now
         refuse_all(slot, slave == nullptr ? nobody : refused());
         return false;
     }
+    drop_withdrawn(slot);
     const Unrequested other = unrequested(*slave, slot, now_ns);
     if (slot.first == nullptr) {
         if (other == Unrequested::nothing) return false;
@@ -155,12 +175,7 @@ bool RequestServer::start(Worker& worker, std::uint16_t number, std::int64_t now
             [&] { return serve_unrequested(worker.channel, worker, *slave, frames); });
         return true;
     }
-    worker.request = std::exchange(slot.first, slot.first->next);
-    --waiting_;
-    if (slot.first == nullptr) {
-        slot.last = nullptr;
-    }
-    worker.request->stage = Stage::running;
+    worker.request = take_next(slot);
     worker.channel.start([&] { return serve(worker.channel, worker, *slave); });
     return true;
 }

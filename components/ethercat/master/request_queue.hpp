@@ -71,8 +71,8 @@ struct MailboxRequest {
     EntryDescription entry;
     MailboxResult result;  ///< valid when finished
 
-    enum class Stage : std::uint8_t { idle, queued, running, finished };
-    /// queued by the submitter, then written by the server until it is finished
+    enum class Stage : std::uint8_t { idle, queued, withdrawn, running, finished };
+    /// queued and withdrawn by the submitter, otherwise written by the server until it is finished
     std::atomic<Stage> stage{Stage::idle};
     MailboxRequest* next = nullptr;  ///< of the server
 };
@@ -84,6 +84,12 @@ public:
     /// Submits a request. Returns false when the queue is full or the server has stopped. [any] one
     /// thread
     bool submit(MailboxRequest& request) noexcept;
+    /// Takes back a request that the server has not begun, because nobody waits for it any more: the
+    /// server finishes it as lost. [any] the submitter
+    void withdraw(MailboxRequest& request) noexcept {
+        auto stage = MailboxRequest::Stage::queued;
+        request.stage.compare_exchange_strong(stage, MailboxRequest::Stage::withdrawn);
+    }
     /// Returns whether the result is valid; a request that a stopped server left is finished as
     /// lost. [any]
     bool finished(MailboxRequest& request) const noexcept;
@@ -146,6 +152,8 @@ private:
     enum class Unrequested : std::uint8_t { nothing, poll, frames };
     Unrequested unrequested(const BusSlave&, const Slot&, std::int64_t now_ns) const noexcept;
     bool start(Worker&, std::uint16_t number, std::int64_t now_ns) noexcept;
+    MailboxRequest* take_next(Slot&) noexcept;
+    void drop_withdrawn(Slot&) noexcept;
     void refuse_all(Slot&, const MailboxResult&) noexcept;
     void collect() noexcept;
     void finish(Worker&) noexcept;

@@ -27,8 +27,9 @@ struct GatewayLine {
     std::unique_ptr<Gateway> gateway;
     int fd = -1;
 
-    explicit GatewayLine(int type) {
+    explicit GatewayLine(int type, std::chrono::milliseconds max_wait = std::chrono::seconds(10)) {
         GatewaySetup setup;
+        setup.max_wait = max_wait;
         setup.port = 0;
         setup.slaves = [] { return std::vector<GatewaySlave>{{0x1001, 0, 2, 0x1234, 0x10000, 7}}; };
         gateway = std::make_unique<Gateway>(port, setup, problem);
@@ -75,6 +76,21 @@ struct GatewayLine {
         return bytes;
     }
 };
+
+TEST(EthercatGateway, Drops_a_request_that_the_cycle_has_not_begun_in_time) {
+    GatewayLine line(SOCK_DGRAM, std::chrono::milliseconds(20));
+    unsigned served = 0;
+    const auto answer =
+        std::exchange(line.slave.on_request, [&](const MailboxMessage&) { ++served; });
+    line.send(line.upload(0x1001, 0x6083, 0));
+    usleep(200'000);  // the machine is stopped
+    EXPECT_EQ(line.receive(), Bytes());
+    EXPECT_EQ(served, 0U);
+    EXPECT_EQ(line.gateway->dropped(), 1U);
+    line.slave.on_request = answer;
+    line.send(line.upload(0x1001, 0x6083, 0));
+    EXPECT_NE(line.receive(), Bytes());
+}
 
 TEST(EthercatGateway, Passes_requests_to_the_slave_by_UDP_and_TCP) {
     for (const int type : {SOCK_DGRAM, SOCK_STREAM}) {

@@ -144,10 +144,11 @@ int fail_mailbox(const Options& options, const BusSlave& s, const std::string& w
                                      result.abort, ethercat::coe::abort_text(result.abort)));
 }
 
-/// Returns the type that --type names, or that the slave reports; nullptr after printing the
-/// reason.
+/// Returns the type that --type names, or that the slave reports, else that of plain bytes; nullptr
+/// after printing the reason. `must_be_known`: a slave that does not answer is a reason.
 const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& session,
-                         const BusSlave& s, std::uint16_t index, std::uint8_t sub) {
+                         const BusSlave& s, std::uint16_t index, std::uint8_t sub,
+                         bool must_be_known) {
     if (!options.type.empty()) {
         const ValueType* const named = find_row(value_types, options.type, &ValueType::name);
         if (named != nullptr) return named;
@@ -163,7 +164,16 @@ const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& s
     request.index = index;
     request.sub = sub;
     request.data = name;
-    const bool is_known = session.run(request) && request.result;
+    const bool has_finished = session.run(request);
+    const Outcome outcome = request.result.outcome;
+    const bool answers = outcome != Outcome::timed_out && outcome != Outcome::lost;
+    if (must_be_known && has_finished && !answers) {
+        fail_mailbox(options, s,
+                     fmt::format("the type of 0x{:04X}:{} (--type names it)", index, sub),
+                     request.result);
+        return nullptr;
+    }
+    const bool is_known = has_finished && request.result;
     const ValueType* const reported =
         is_known ? find_row(value_types, request.entry.type, &ValueType::coe_type) : nullptr;
     return reported != nullptr ? reported : &value_types[std::size(value_types) - 1];
@@ -190,7 +200,7 @@ int transfer(const EthercatValueOptions& options, bool download) {
     if (s == nullptr) return 1;
     const std::string what = fmt::format("0x{:04X}:{}", *index, *sub);
     const ValueType* type = type_of(options, session, *s, static_cast<std::uint16_t>(*index),
-                                    static_cast<std::uint8_t>(*sub));
+                                    static_cast<std::uint8_t>(*sub), download);
     if (type == nullptr) return 1;
     Bytes bytes(65536);
     if (download) {
