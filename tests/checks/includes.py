@@ -46,7 +46,7 @@ ROWS = {
         "tools/lsp",
     ],  # the table of subcommands
     "tools/cli": ["runtime/control"],
-    "tools/run": ["tools/record", "tools/tcl", "runtime/cells", "runtime/journal"],
+    "tools/run": ["tools/record", "tools/scope", "tools/tcl", "runtime/cells", "runtime/journal"],
     "tools/record": ["tools/cli", "drivers/link", "components/recording/mcap"],
     "tools/inspect": ["tools/run", "tools/scope"],
     "tools/tcl": ["tools/comp"],

@@ -35,6 +35,8 @@ reverse                 go back to the last cycle in which the break condition b
 goto CYCLE|TIME         go to a cycle of the fastest thread, or to a time: goto 12000, goto 3.5s
 break [NAME > VALUE]    set the break condition (> < >= <= == !=), or remove it
 where                   print the cycle
+scope NAME... [--pre 50ms] [--post 50ms] [--svg FILE] [--csv FILE]
+                        draw values around the present cycle
 quit                    leave
 
 and the commands that only read a machine: show, list, getp, gets, ptype, stype, save, explain
@@ -90,7 +92,7 @@ private:
         std::string_view name;
         int (ReplayShell::*execute)(Words);
     };
-    static const std::array<Row, 10> rows;
+    static const std::array<Row, 11> rows;
 
     int step(Words words);
     int run(Words words);
@@ -98,6 +100,7 @@ private:
     int position(Words words);
     int set_break(Words words);
     int where(Words words);
+    int scope(Words words);
     int help(Words words);
     int quit(Words words);
     std::string parse_step(Words words, std::size_t first, Errand& errand);
@@ -112,13 +115,14 @@ private:
     bool over_ = false;
 };
 
-const std::array<ReplayShell::Row, 10> ReplayShell::rows = {{
+const std::array<ReplayShell::Row, 11> ReplayShell::rows = {{
     {"step", &ReplayShell::step},
     {"continue", &ReplayShell::run},
     {"reverse", &ReplayShell::reverse},
     {"goto", &ReplayShell::position},
     {"break", &ReplayShell::set_break},
     {"where", &ReplayShell::where},
+    {"scope", &ReplayShell::scope},
     {"help", &ReplayShell::help},
     {"quit", &ReplayShell::quit},
     {"exit", &ReplayShell::quit},
@@ -217,6 +221,16 @@ int ReplayShell::set_break(Words words) {
 }
 
 int ReplayShell::where(Words) { return send({}); }
+
+int ReplayShell::scope(Words words) {
+    std::string text;
+    for (const std::string& word : words) {
+        text += (text.empty() ? "" : " ") + word;
+    }
+    Errand errand;
+    errand.kind = Errand::Kind::scope;
+    return send(errand, text);
+}
 
 int ReplayShell::help(Words) { return exit_code(print(help_text)); }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstring>
 #include <fmt/core.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -13,6 +14,7 @@
 #include "commands/table.hpp"
 #include "machine/report/crash.hpp"
 #include "run/replay_note.hpp"
+#include "run/replayed_traces.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::tools {
@@ -68,6 +70,7 @@ void ReplayedMoment::answer(int status, const std::string& text) {
 
 void ReplayedMoment::carry_out(Errand errand) {
     interrupted_ = false;
+    status_ = errand.status;
     if (errand.kind == Errand::Kind::command) {
         answer(execute(errand.text));
         return;
@@ -95,6 +98,8 @@ void ReplayedMoment::carry_out(Errand errand) {
     case Errand::Kind::search: search(errand); break;
     case Errand::Kind::position: go_to(errand); break;
     case Errand::Kind::check: check(condition); break;
+    case Errand::Kind::scope: scope(errand); break;
+    case Errand::Kind::draw: draw(errand); break;
     default: tell();
     }
 }
@@ -183,6 +188,7 @@ void ReplayedMoment::seek(std::uint64_t target, const std::string& condition) {
         Errand errand;
         errand.kind = Errand::Kind::seek;
         errand.count = target;
+        errand.status = status_;
         condition.copy(errand.condition, sizeof errand.condition - 1);
         return resume(errand, target);
     }
@@ -260,6 +266,66 @@ void ReplayedMoment::check(const ValueCondition& condition) {
     answer(0);
 }
 
+void ReplayedMoment::scope(Errand errand) {
+    ScopeCommand command;
+    std::string problem = command.parse(errand.text);
+    if (problem.empty()) {
+        const ReplayedTraces traces(machine_.session(), command, max_time_ns_);
+        problem = traces.problem();
+        // at the begin of the picture a pattern may match less
+        const std::string line = command.line_for(traces.names());
+        if (line.size() < sizeof errand.text) {
+            std::memcpy(errand.text, line.c_str(), line.size() + 1);
+        } else if (problem.empty()) {
+            problem = "the names are too long";
+        }
+    }
+    if (!problem.empty()) {
+        print(fmt::format("scope: {}\n", problem));
+        return answer(1);
+    }
+    errand.kind = Errand::Kind::draw;
+    errand.limit = cycles();
+    errand.time_ns = max_time_ns_;
+    const std::int64_t begin_ns = max_time_ns_ - command.pre_ns;
+    const auto before = [begin_ns](const KeyframeMark& mark) {
+        return mark.cycles == 0 || mark.time_ns < begin_ns;
+    };
+    if (before(mark())) return draw(errand);
+    resume(errand, frames_.newest(before).value_or(0));
+}
+
+/// Executes the cycles around the moment, and goes back to it.
+void ReplayedMoment::draw(const Errand& errand) {
+    ScopeCommand command;
+    command.parse(errand.text);
+    const std::int64_t begin_ns = errand.time_ns - command.pre_ns;
+    bool goes_on = true;
+    while (max_time_ns_ < begin_ns && goes_on) {
+        goes_on = next();
+    }
+    if (resumed_) return;
+    // nothing is loaded before the first cycle
+    if (cycles() == 0) {
+        goes_on = next();
+    }
+    if (resumed_) return;
+    ReplayedTraces traces(machine_.session(), command, errand.time_ns);
+    traces.sample(max_time_ns_);
+    while (goes_on && max_time_ns_ < traces.end_ns()) {
+        goes_on = next();
+        traces.sample(max_time_ns_);
+    }
+    if (resumed_) return;
+    std::string problem;
+    print(traces.drawn(problem));
+    if (!problem.empty()) {
+        print(fmt::format("scope: {}\n", problem));
+        status_ = 1;
+    }
+    seek(errand.limit);
+}
+
 // --- what is printed ---
 
 std::string ReplayedMoment::state_text() {
@@ -294,7 +360,7 @@ void ReplayedMoment::tell(const std::string& found) {
     print(text + "\n" + state);
     const bool good =
         machine_.difference().empty() && machine_.execution().state() != ReExecution::State::fails;
-    answer(exit_code(good));
+    answer(std::max(exit_code(good), status_));
 }
 
 int ReplayedMoment::execute(const std::string& line) {

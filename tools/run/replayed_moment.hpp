@@ -27,11 +27,15 @@ struct Errand {
         where,  ///< print the position
         check,  ///< report a missing name in `condition`
         command,  ///< execute `text` in the shell
+        scope,  ///< draw the values of `text` around the present cycle
+        draw,  ///< the same around `time_ns`, and go to where `limit` cycles have been executed
         complete,  ///< answer the candidates for `text` at byte `count`
     };
     Kind kind = Kind::where;
     std::uint64_t count = 0;
     std::uint64_t limit = 0;
+    std::int64_t time_ns = 0;
+    int status = 0;  ///< exit status so far
     char thread[256] = "";
     char condition[512] = "";
     char text[2048] = "";
@@ -58,6 +62,8 @@ private:
     void go_to(const Errand& errand);
     void complete(const Errand& errand);
     void check(const ValueCondition& condition);
+    void scope(Errand errand);
+    void draw(const Errand& errand);
     int execute(const std::string& line);
     bool next();
     void keep();
@@ -78,6 +84,7 @@ private:
     std::chrono::nanoseconds spacing_;  // of keyframes, in time of execution
     bool resumed_ = false;  // this process continues from a keyframe: it has another errand
     bool interrupted_ = false;
+    int status_ = 0;  // of the errand, so far
 };
 
 }  // namespace hal::tools

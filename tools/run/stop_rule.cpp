@@ -6,24 +6,10 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "run/real_value.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::tools {
-namespace {
-
-double real_of(hal_type type, hal_value value) {
-    switch (type) {
-    case HAL_TYPE_BIT: return value.bit ? 1.0 : 0.0;
-    case HAL_TYPE_S32: return value.s32;
-    case HAL_TYPE_U32: return value.u32;
-    case HAL_TYPE_S64: return static_cast<double>(value.s64);
-    case HAL_TYPE_U64: return static_cast<double>(value.u64);
-    default: return value.real;
-    }
-}
-
-}  // namespace
-
 bool ValueCondition::parse(const std::string& text) {
     const std::size_t at = text.find_first_of("<>=!");
     if (at == std::string::npos || at == 0) return false;
@@ -45,7 +31,7 @@ bool ValueCondition::parse(const std::string& text) {
 bool ValueCondition::holds(Session& session) const {
     const auto reading = session.values().read({name_}).front();
     if (!reading) return false;
-    const double value = real_of(reading->type, reading->value);
+    const double value = real_value(reading->type, reading->value);
     if (operator_ == ">") return value > value_;
     if (operator_ == "<") return value < value_;
     if (operator_ == ">=") return value >= value_;

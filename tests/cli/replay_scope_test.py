@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""The scope in the past: values around a cycle of a journal."""
+
+import csv
+import unittest
+
+from harness import Case, wait_until
+
+# `sum` counts cycles, so that each value states when it was.
+NETLIST = """loadrt threads name1=servo period1=1000000
+loadrt integ names=sum
+loadrt siggen
+setp sum.in 1000
+setp siggen.0.frequency 5
+addf sum servo
+addf siggen.0.update servo
+net sine siggen.0.sine
+start
+loadrt and2 names=late
+addf late servo
+"""
+
+
+class ReplayScope(Case):
+    def setUp(self):
+        super().setUp()
+        machine = self.start("run", self.write("a.hal", NETLIST), "--journal", "run.mcap")
+        wait_until(lambda: int(self.value("servo.threadbeat") or 0) >= 1000, "1000 cycles")
+        self.end(machine)
+
+    def past(self, *lines, status=0):
+        done = self.run_program(
+            "replay", "--exact", "run.mcap", "--shell", given="\n".join(lines) + "\n"
+        )
+        self.assertEqual(status, done.returncode, done.stdout + done.stderr)
+        return done.stdout
+
+    def test_the_picture_is_around_the_present_cycle_which_stays(self):
+        text = self.past("goto 0.5s", "scope sine sum.out --csv a.csv", "getp sum.out", "where")
+        lines = text.splitlines()
+        self.assertEqual("a.csv", lines[1])
+        self.assertEqual([lines[0]] * 2, [lines[2], lines[4]])  # the cycle
+        rows = list(csv.DictReader((self.folder / "a.csv").read_text().splitlines()))
+        times = [float(row["time_s"]) for row in rows]
+        self.assertLess(abs(times[0] + 0.05), 0.01)
+        self.assertLess(abs(times[-1] - 0.05), 0.01)
+        now = min(rows, key=lambda row: abs(float(row["time_s"])))
+        self.assertAlmostEqual(float(lines[3]), float(now["sum.out"]), 5)
+        values = [float(row["sum.out"]) for row in rows]
+        self.assertEqual(sorted(values), values)
+        self.assertGreater(len(set(values)), 50)
+
+    def test_at_both_ends_of_the_journal(self):
+        for place, names in [("goto 0", "sum.out"), ("continue", "sum.out late.in0")]:
+            first, *picture, last = self.past(
+                place, f"scope {names} --pre 10s --post 1s"
+            ).splitlines()
+            self.assertIn("sum.out", "".join(picture))
+            self.assertIn(last, (first, "the journal has no further cycle"))
+        done = self.past("goto 0.2s", "scope sin* --pre 100ms --post 0 --svg a.svg")
+        self.assertIn("a.svg", done)
+        self.assertIn("<svg", (self.folder / "a.svg").read_text())
+
+    def test_what_is_wrong_is_named(self):
+        for words, problem in [
+            ("", "scope: write: scope NAME..."),
+            ("none", "scope: no pin, parameter or signal matches 'none'"),
+            ("sine --pre often", "scope: 'often' is not a valid time"),
+            ("sine --pre", "scope: --pre needs a value"),
+            ("sine --colour red", "scope: unknown option '--colour'"),
+            ("sine --pre 0 --post 0", "scope: the time before and after is 0"),
+            ("sine --svg none/a.svg", "none/a.svg"),
+        ]:
+            self.assertIn(problem, self.past("goto 0.5s", f"scope {words}", status=1))
+
+
+if __name__ == "__main__":
+    unittest.main()
