@@ -1,22 +1,14 @@
 # SPDX-License-Identifier: MIT
 # packages: modbus
-"""The guardian stops a drive on a pseudo terminal however the runtime ends: each kind of end, the stop telegram complete on the line.
-HALCYON_MODBUS_ROUNDS=10 makes a hundred ends of them."""
+"""The guardian stops a drive on a pseudo terminal however the runtime ends, and reports what it did. modbus_stop_test.py measures how soon."""
 
 import os
-import pty
-import select
 import signal
-import threading
 import time
-import tty
 import unittest
 
 from harness import Case, Terminal, wait_until
-
-STOP = bytes.fromhex("010620000001 43CA")
-RUN = 0x12
-ROUNDS = int(os.environ.get("HALCYON_MODBUS_ROUNDS", "1"))
+from modbus_drive import RUN, STOP, Drive
 
 CONFIGURATION = """[bus]
 baud = 115200
@@ -34,77 +26,7 @@ start
 """
 
 
-def crc16(frame):
-    crc = 0xFFFF
-    for byte in frame:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ 0xA001 if crc & 1 else crc >> 1
-    return bytes([crc & 255, crc >> 8])
-
-
-class Drive:
-    """A converter with Delta's registers on the master end of a pseudo terminal."""
-
-    def __init__(self, link):
-        self.master, slave = pty.openpty()
-        self.slave = slave  # held open: the master end reads EIO while nobody has it
-        tty.setraw(slave)
-        tty.setraw(self.master)
-        if os.path.islink(link):
-            os.unlink(link)
-        os.symlink(os.ttyname(slave), link)
-        self.registers = {0x2000: 0, 0x2001: 0, 0x2002: 0, 0x2100: 0, 0x2103: 0}
-        self.writes = []  # (time, frame)
-        self.answers = True
-        self.ended = False
-        self.thread = threading.Thread(target=self.serve, daemon=True)
-        self.thread.start()
-
-    def serve(self):
-        received = b""
-        while not self.ended:
-            if not select.select([self.master], [], [], 0.02)[0]:
-                received = b""  # a frame has no pause of 20 ms
-                continue
-            received += os.read(self.master, 512)
-            while len(received) >= 8:
-                frame, received = received[:8], received[8:]
-                if crc16(frame[:6]) == frame[6:]:
-                    self.answer(frame)
-
-    def answer(self, frame):
-        address = frame[2] << 8 | frame[3]
-        value = frame[4] << 8 | frame[5]
-        if frame[1] == 6:
-            self.writes.append((time.monotonic(), frame))
-            self.registers[address] = value
-            if address == 0x2001 or address == 0x2000:
-                turning = self.registers[0x2000] & 3 == 2
-                self.registers[0x2103] = self.registers[0x2001] if turning else 0
-            reply = frame[:6]
-        else:
-            words = [self.registers.get(address + n, 0) for n in range(value)]
-            reply = bytes([1, 3, 2 * value]) + b"".join(w.to_bytes(2, "big") for w in words)
-        if self.answers:
-            os.write(self.master, reply + crc16(reply))
-
-    def close(self):
-        self.ended = True
-        self.thread.join()
-        os.close(self.master)
-        os.close(self.slave)
-
-
-late = {}  # of each kind of end, in ms
-
-
 class Guardian(Case):
-    @classmethod
-    def tearDownClass(cls):
-        for kind, times in sorted(late.items()):
-            print(f"{kind}: {len(times)} stops, {min(times):.1f} to {max(times):.1f} ms")
-
     def setUp(self):
         super().setUp()
         self.write("spindle.modbus", CONFIGURATION)
@@ -124,28 +46,26 @@ class Guardian(Case):
         wait_until(lambda: self.drive.registers[0x2000] == RUN, "the drive runs")
 
     def stops(self, since):
-        """Waits for the stop telegram, which must be the last command; measures how late it is."""
+        """Waits for a stop telegram, which must be the last command."""
         wait_until(lambda: self.drive.registers[0x2000] == 1, "the drive is stopped")
         time.sleep(0.05)
         commands = [(when, f) for when, f in self.drive.writes if f[2:4] == STOP[2:4]]
         self.assertEqual(STOP, commands[-1][1])
-        first = next(when for when, frame in commands if when >= since and frame == STOP)
-        late.setdefault(self.id().rsplit(".", 1)[1], []).append(1e3 * (first - since))
+        self.assertTrue(any(when >= since and frame == STOP for when, frame in commands))
 
     def report_of_next_start(self):
         machine = self.start("run", "spindle.hal")
         return self.end(machine)[1]
 
     def killed(self, number, group=False):
-        for _ in range(ROUNDS):
-            machine = self.run_spindle(start_new_session=True)
-            since = time.monotonic()
-            if group:
-                os.killpg(machine.pid, number)
-            else:
-                machine.send_signal(number)
-            self.stops(since)
-            self.end(machine, signal.SIGKILL)
+        machine = self.run_spindle(start_new_session=True)
+        since = time.monotonic()
+        if group:
+            os.killpg(machine.pid, number)
+        else:
+            machine.send_signal(number)
+        self.stops(since)
+        self.end(machine, signal.SIGKILL)
 
     def test_a_killed_process(self):
         self.killed(signal.SIGKILL)
@@ -170,63 +90,55 @@ class Guardian(Case):
         self.killed(signal.SIGINT, group=True)
 
     def test_a_suspended_process(self):
-        for _ in range(ROUNDS):
-            machine = self.run_spindle()
-            since = time.monotonic()
-            machine.send_signal(signal.SIGSTOP)
-            self.stops(since)
-            machine.send_signal(signal.SIGCONT)
-            wait_until(
-                lambda: self.value("modbus.0.spindle.stopped") == "FALSE", "writes are allowed"
-            )
-            self.assertEqual(1, self.drive.registers[0x2000])  # needs another edge of run
-            self.end(machine)
+        machine = self.run_spindle()
+        since = time.monotonic()
+        machine.send_signal(signal.SIGSTOP)
+        self.stops(since)
+        machine.send_signal(signal.SIGCONT)
+        wait_until(lambda: self.value("modbus.0.spindle.stopped") == "FALSE", "writes are allowed")
+        self.assertEqual(1, self.drive.registers[0x2000])  # needs another edge of run
+        self.end(machine)
 
     def test_a_closed_terminal(self):
-        for _ in range(ROUNDS):
-            terminal = Terminal(self, "run", "spindle.hal")
-            self.turn()
-            since = time.monotonic()
-            os.close(terminal.descriptor)
-            terminal.descriptor = os.open("/dev/null", os.O_RDWR)
-            self.stops(since)
-            os.waitpid(terminal.process, 0)
-            terminal.status = 0
+        terminal = Terminal(self, "run", "spindle.hal")
+        self.turn()
+        since = time.monotonic()
+        os.close(terminal.descriptor)
+        terminal.descriptor = os.open("/dev/null", os.O_RDWR)
+        self.stops(since)
+        os.waitpid(terminal.process, 0)
+        terminal.status = 0
 
     def test_unload_and_e_stop_and_stop(self):
-        for _ in range(ROUNDS):
-            machine = self.run_spindle()
-            for words in (("setp", "modbus.0.estop", "TRUE"), ("stop",), ("unload", "modbus")):
-                since = time.monotonic()
-                if words[0] == "unload":
-                    self.shell("delf", "modbus.0.receive", "servo")
-                    self.shell("delf", "modbus.0.transmit", "servo")
-                    words = ("unloadrt", "modbus")
-                self.shell(*words)
-                self.stops(since)
-                if words[0] == "setp":
-                    self.say("setp", "modbus.0.estop", "FALSE")
-                    wait_until(
-                        lambda: self.value("modbus.0.spindle.stopped") == "FALSE", "released"
-                    )
-                elif words[0] == "stop":
-                    self.say("start")
-                else:
-                    break
-                self.say("setp", "modbus.0.spindle.run", "FALSE")
-                time.sleep(0.05)
-                wait_until(lambda: self.value("modbus.0.spindle.online") == "TRUE", "online")
-                self.say("setp", "modbus.0.spindle.run", "TRUE")
-                wait_until(lambda: self.drive.registers[0x2000] == RUN, "the drive runs again")
-            self.end(machine)
+        machine = self.run_spindle()
+        for words in (("setp", "modbus.0.estop", "TRUE"), ("stop",), ("unload", "modbus")):
+            since = time.monotonic()
+            if words[0] == "unload":
+                self.shell("delf", "modbus.0.receive", "servo")
+                self.shell("delf", "modbus.0.transmit", "servo")
+                words = ("unloadrt", "modbus")
+            self.shell(*words)
+            self.stops(since)
+            if words[0] == "setp":
+                self.say("setp", "modbus.0.estop", "FALSE")
+                wait_until(lambda: self.value("modbus.0.spindle.stopped") == "FALSE", "released")
+            elif words[0] == "stop":
+                self.say("start")
+            else:
+                break
+            self.say("setp", "modbus.0.spindle.run", "FALSE")
+            time.sleep(0.05)
+            wait_until(lambda: self.value("modbus.0.spindle.online") == "TRUE", "online")
+            self.say("setp", "modbus.0.spindle.run", "TRUE")
+            wait_until(lambda: self.drive.registers[0x2000] == RUN, "the drive runs again")
+        self.end(machine)
 
     def test_an_ordinary_end(self):
-        for _ in range(ROUNDS):
-            machine = self.run_spindle()
-            since = time.monotonic()
-            self.say("exit")
-            self.end(machine)
-            self.stops(since)
+        machine = self.run_spindle()
+        since = time.monotonic()
+        self.say("exit")
+        self.end(machine)
+        self.stops(since)
 
     def test_a_drive_that_does_not_answer_is_reported(self):
         machine = self.run_spindle()
