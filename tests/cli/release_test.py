@@ -16,7 +16,7 @@ from pathlib import Path
 
 from harness import ROOT, Case
 
-MISSING = [name for name in ("gpg", "dpkg-deb", "git", "apt-get") if not shutil.which(name)]
+MISSING = [name for name in ("gpg", "dpkg-deb", "git", "apt-get", "xz") if not shutil.which(name)]
 VERSION = "0.7.1"
 CHANGES = f"# Changes\n\n## {VERSION}, today\n\n* It swings.\n\n## 0.7.0\n\n* It hangs.\n"
 
