@@ -2,6 +2,7 @@
 """The journal of a live machine and its exact re-execution: hal run --journal, hal replay --exact."""
 
 import contextlib
+import csv
 import json
 import os
 import pathlib
@@ -179,6 +180,39 @@ class ExactReplay(Case):
         self.assertGreater(int(found[1]), 1000)
         self.assertGreater(int(found[2]), 1200)
         self.assertRegex(text, r"\nno difference, \d{5,} values compared\n$")
+
+    def test_values_of_a_journal_without_values_become_a_recording(self):
+        machine = self.run_journaled(MACHINE)
+        self.wait_for_cycles(500)
+        self.give(["setp siggen.0.frequency 7"])
+        self.wait_for_cycles(500)
+        self.finish(machine)
+        text = self.replay("--record", "out.csv", "--names", "sine,sum,effort", "--show", "sine")
+        cycles = int(re.match(r"(\d+) cycles", text)[1])
+        self.assertRegex(text, r"out\.csv: \d+ rows of 3 values\n")
+        with (self.folder / "out.csv").open() as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual({"time_s", "sine", "sum", "effort"}, set(rows[0]))
+        sines = [float(row["sine"]) for row in rows if row["sine"]]
+        self.assertGreater(len(sines), 2 * 900)  # of the fast thread, each cycle
+        self.assertLess(len(rows), cycles + 1)
+        self.assertGreater(max(sines), 0.9)
+        shown = float(re.search(r"^sine (\S+)$", text, re.M)[1])
+        self.assertAlmostEqual(shown, sines[-1], places=6)
+        self.replay("--record", "out.mcap", "--names", "sine,sum", "--until", "0.2s")
+        self.good("plot", "out.mcap", "sine", "-o", "out.svg")
+
+    def test_a_recording_of_a_journal_needs_known_names_and_a_known_format(self):
+        self.finish(self.run_journaled(SERVO))
+        text = self.replay("--record", "out.csv", "--names", "nothing", status=1)
+        self.assertIn("--record: --names: ", text)
+        self.assertIn("'nothing'", text)
+        self.assertFalse((self.folder / "out.csv").exists())
+        self.assertIn(
+            "--record: unknown format of 'out.txt'; name the file .mcap or .csv",
+            self.replay("--record", "out.txt", status=1),
+        )
+        self.assertIn("--shell", self.replay("--record", "out.csv", "--shell", status=1))
 
     def test_functions_of_two_threads_that_share_state_run_in_their_order(self):
         with load(2):

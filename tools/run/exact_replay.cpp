@@ -15,6 +15,7 @@
 #include "run/journal_test.hpp"
 #include "run/journaled_program.hpp"
 #include "run/replay_note.hpp"
+#include "run/replay_recording.hpp"
 #include "run/replay_shell.hpp"
 #include "run/replayed_machine.hpp"
 #include "run/sim_summary.hpp"
@@ -35,7 +36,8 @@ public:
           until_(until),
           condition_(condition),
           machine_(options, file, ReplayedMachine::Compare::values, change),
-          execution_(machine_.execution()) {}
+          execution_(machine_.execution()),
+          recording_(options, file, machine_.session()) {}
 
     /// Executes the journal and prints the result. Returns the exit status.
     int run() {
@@ -45,6 +47,9 @@ public:
         const auto took = std::chrono::steady_clock::now() - begun;
         machine_.compare();
         int status = report(stopped, took);
+        if (!recording_.finish()) {
+            status = 1;
+        }
         if (!show()) {
             status = 1;
         }
@@ -68,6 +73,7 @@ private:
     bool execute() {
         bool reached = false;
         while (machine_.advance()) {
+            recording_.note_cycle();
             if (machine_.host().stop.requested()) return true;
             reached = reached || until_.reached(execution_.newest(), machine_.fastest()) ||
                       (!condition_.empty() && condition_.holds(machine_.session()));
@@ -207,6 +213,7 @@ private:
     const ValueCondition& condition_;
     ReplayedMachine machine_;
     ReExecution& execution_;
+    ReplayRecording recording_;
 };
 
 /// Several ones are parts of a ring.
@@ -247,6 +254,9 @@ int run_exact_replay(const ReplayOptions& options) {
     if (!options.break_condition.empty() && !condition.parse(options.break_condition)) {
         return fail(options, fmt::format("--break: invalid condition '{}'; {}",
                                          options.break_condition, ValueCondition::form));
+    }
+    if (const std::string problem = ReplayRecording::problem(options); !problem.empty()) {
+        return fail(options, "--record: " + problem);
     }
     WhatIf change;
     if (const std::string problem = change.parse(options); !problem.empty()) {

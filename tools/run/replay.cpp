@@ -564,11 +564,12 @@ int run_replay(const ReplayOptions& options) {
     }
     if (!options.until.empty() || !options.break_condition.empty() || !options.show.empty() ||
         options.anyway || options.shell || !options.edits.empty() || !options.at.empty() ||
-        !options.as_test.empty() || !options.cut.empty() || !options.netlist.empty()) {
+        !options.as_test.empty() || !options.cut.empty() || !options.netlist.empty() ||
+        !options.record.empty()) {
         return fail(
             options,
-            "--until, --break, --show, --shell, --edit, --netlist, --at, --as-test, --cut and "
-            "--anyway need --exact");
+            "--until, --break, --show, --shell, --edit, --netlist, --at, --as-test, --cut, --record "
+            "and --anyway need --exact");
     }
     if (options.words.size() < 2) return fail(options, "missing netlist: hal replay FILE NETLIST");
     const std::string file = std::filesystem::absolute(options.words.front()).string();

@@ -21,6 +21,7 @@ struct ReplayOptions : NetlistOptions {
     bool shell = false;
     std::string as_test;  ///< a folder
     std::string cut;      ///< a file
+    std::string record;   ///< a file
     std::vector<std::string> edits;  ///< setp NAME VALUE, sets NAME VALUE
     std::string netlist;             ///< a file
     std::string at;                  ///< a time or a cycle number
@@ -37,7 +38,8 @@ struct ReplayOptions : NetlistOptions {
                   "end with status 1 when a value differs from the recording by more than X")
             .not_negative();
         set.value("--names", names, "NAMES",
-                  "use only these values of the recording: patterns separated by commas");
+                  "use only these values of the recording: patterns separated by commas; with "
+                  "--record, record only these");
         set.value("--thread", thread, "THREAD",
                   "the thread that plays the recording (default: the one that was recorded, else "
                   "the fastest)");
@@ -67,6 +69,8 @@ struct ReplayOptions : NetlistOptions {
         set.value("--as-test", as_test, "DIR",
                   "with --exact: write a test of the journal up to here, whose --show values are "
                   "expected; run it with: hal replay DIR");
+        set.value("--record", record, "FILE",
+                  "with --exact: write the values of each cycle to this recording, .mcap or .csv");
         set.value(
             "--cut", cut, "FILE",
             "with --exact: write the rest of the journal to FILE, which begins with the state "

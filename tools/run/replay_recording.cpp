@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+#include "run/replay_recording.hpp"
+
+#include <algorithm>
+#include <fmt/core.h>
+
+#include "cli/output.hpp"
+#include "paths.hpp"
+#include "recording/mcap/held_file.hpp"
+#include "run/chosen_values.hpp"
+#include "run/replay_note.hpp"
+#include "run/sim_summary.hpp"
+#include "text/quoting.hpp"
+
+namespace hal::tools {
+namespace {
+
+constexpr std::uint64_t take_every = 64;  // cycles
+
+/// Returns the time for which rings must keep rows: twice as long as `take_every` cycles of the
+/// slowest thread may take.
+std::int64_t buffered_ns(JournalFile& file) {
+    constexpr std::int64_t min_ns = 200'000'000;
+    std::int64_t slowest_ns = 0;
+    for (const auto& [id, thread] : file.threads()) {
+        slowest_ns = std::max(slowest_ns, thread.period_ns);
+    }
+    return std::max(min_ns, 2 * static_cast<std::int64_t>(take_every) * slowest_ns);
+}
+
+}  // namespace
+
+ReplayRecording::ReplayRecording(const ReplayOptions& options, JournalFile& file, Session& session)
+    : options_(options), file_(file), session_(session), patterns_(names_in({options.names})) {}
+
+ReplayRecording::~ReplayRecording() {
+    if (!probe_) return;
+    session_.probes().detach(probe_);
+    session_.event_log().end();
+}
+
+std::string ReplayRecording::problem(const ReplayOptions& options) {
+    if (options.record.empty()) return "";
+    if (options.shell) return "it does not record what --shell does: without --shell";
+    if (!options.record.ends_with(".mcap") && !options.record.ends_with(".csv")) {
+        return fmt::format("unknown format of '{}'; name the file .mcap or .csv", options.record);
+    }
+    const std::string reason = mcap::unwritable(options.record);
+    return reason.empty() ? "" : fmt::format("cannot write '{}': {}", options.record, reason);
+}
+
+void ReplayRecording::attach() {
+    problem_ = unknown_value(session_.model(), patterns_);
+    if (!problem_.empty()) return;
+    probe_ = session_.probes().attach({.names = chosen_values(session_.model(), patterns_),
+                                       .buffer_ns = buffered_ns(file_)},
+                                      problem_);
+    if (!probe_) return;
+    layout_ = Probes::layout(*probe_);
+    journal_ = session_.event_log().begin();
+    sink_ = make_sink(options_.record, Probes::columns(*probe_),
+                      {.instance = "replay",
+                       .version = std::string(paths::version),
+                       .netlist = "",
+                       .cause = "",
+                       .unix_offset_ns = file_.unix_offset_ns()});
+    if (!sink_->kept().empty()) {
+        write_all(2, kept_line(*sink_, options_.record));
+    }
+    is_written_ = sink_->error() == 0 && sink_->layout(layout_.groups);
+}
+
+void ReplayRecording::note_cycle() {
+    if (options_.record.empty()) return;
+    if (!probe_) return attach();
+    if (++untaken_ < take_every) return;
+    take();
+}
+
+void ReplayRecording::take() {
+    untaken_ = 0;
+    for (const LoggedEvent& entry : session_.event_log().after(journal_)) {
+        is_written_ = is_written_ && sink_->event({entry.time_ns, entry.kind, entry.text});
+    }
+    for (const ProbeRows& rows :
+         session_.probes().take(*probe_, max_taken, Probes::Rest::taken)) {
+        is_written_ = is_written_ && add_rows(*sink_, rows, layout_, rows_);
+        for (const ProbeRows::Part& part : rows.parts) {
+            lost_ += part.lost;
+        }
+    }
+}
+
+bool ReplayRecording::finish() {
+    if (options_.record.empty()) return true;
+    if (!probe_) {
+        note(options_, "--record: " +
+                           (problem_.empty() ? "no cycle was executed" : "--names: " + problem_));
+        return false;
+    }
+    take();
+    if (!sink_->close() || !is_written_) {
+        fail(options_, cannot_write(*sink_, options_.record));
+        return false;
+    }
+    if (lost_ > 0) {
+        note(options_, fmt::format("'{}' is incomplete: {} did not fit the buffer",
+                                   options_.record, counted(lost_, "row")));
+        return false;
+    }
+    return print(fmt::format("{}: {} of {}\n", options_.record, counted(rows_, "row"),
+                             counted(Probes::columns(*probe_).size(), "value")));
+}
+
+}  // namespace hal::tools
