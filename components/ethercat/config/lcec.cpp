@@ -90,6 +90,7 @@ private:
         return {};
     }
 
+    /// Reads a <master> with its slaves, and adds it to the buses.
     void master_of(const Xml& node) {
         attributes(node, {"idx", "name", "appTimePeriod", "refClockSyncCycles", "syncToRefClock",
                           "refClockSlaveIdx"});
@@ -104,32 +105,12 @@ private:
             bus.setup.cycle_ns = *period;
         }
         bus.cycle_given = true;
-        const auto sync = number(node, "refClockSyncCycles", -1, 1'000'000).value_or(0);
-        const bool follow = flag(node, "syncToRefClock", sync < 0);
-        if (node.attribute("syncToRefClock") && node.attribute("refClockSyncCycles") && sync != 0 &&
-            follow != (sync < 0)) {
-            error(Topic::value, node, "syncToRefClock contradicts the sign of refClockSyncCycles",
-                  "delete syncToRefClock; refClockSyncCycles=\"-1\" synchronises the thread to the "
-                  "reference clock");
-        }
-        if (follow) {
-            bus.setup.lead = master::ClockLead::reference;
-        } else if (sync > 0) {
-            bus.setup.lead = master::ClockLead::thread;
-        } else {
-            bus.setup.lead = master::ClockLead::none;
-        }
+        bus.setup.lead = clock_lead_of(node);
         const auto reference = number(node, "refClockSlaveIdx", -1, 65535).value_or(-1);
         bus_ = &bus;
         fsoe_logics_.clear();
         children(node, {"slave"}, [&](const Xml& slave) { slave_of(slave); });
-        for (const auto& [number, at, parameters] : fsoe_logics_) {
-            std::vector<std::string> problems;
-            build_fsoe_logic(bus, number, parameters, problems);
-            for (const std::string& problem : problems) {
-                error(Topic::value, at, problem, "correct the modParam");
-            }
-        }
+        build_fsoe_logics(bus);
         for (std::size_t i = 0; i < bus.setup.slaves.size(); ++i) {
             if (bus.setup.slaves[i].position == reference) {
                 bus.setup.reference_slave = static_cast<std::uint16_t>(i);
@@ -144,38 +125,47 @@ private:
         out_.buses.push_back(std::move(bus));
     }
 
+    /// Returns which clock leads: a negative refClockSyncCycles has the meaning of syncToRefClock.
+    master::ClockLead clock_lead_of(const Xml& node) {
+        const auto sync = number(node, "refClockSyncCycles", -1, 1'000'000).value_or(0);
+        const bool follow = flag(node, "syncToRefClock", sync < 0);
+        if (node.attribute("syncToRefClock") && node.attribute("refClockSyncCycles") && sync != 0 &&
+            follow != (sync < 0)) {
+            error(Topic::value, node, "syncToRefClock contradicts the sign of refClockSyncCycles",
+                  "delete syncToRefClock; refClockSyncCycles=\"-1\" synchronises the thread to the "
+                  "reference clock");
+        }
+        if (follow) return master::ClockLead::reference;
+        return sync > 0 ? master::ClockLead::thread : master::ClockLead::none;
+    }
+
+    /// Connects the safety logics of the slaves, which name other slaves of the bus.
+    void build_fsoe_logics(Bus& bus) {
+        for (const auto& [number, at, parameters] : fsoe_logics_) {
+            std::vector<std::string> problems;
+            build_fsoe_logic(bus, number, parameters, problems);
+            for (const std::string& problem : problems) {
+                error(Topic::value, at, problem, "correct the modParam");
+            }
+        }
+    }
+
+    /// Reads a <slave> and adds it to the bus that is read. What its type means is in the table of
+    /// lcec's devices, but for `generic`, whose children describe it, and `basic_cia402`.
     void slave_of(const Xml& node) {
         attributes(
             node, {"idx", "type", "name", "vid", "pid", "configPdos", "syncUnit", "syncUnitCycle"});
+        begin_slave(node);
         master::Slave s;
-        info_ = {};
-        pins_.clear();
-        parameters_.clear();
-        fsoe_parameters_.clear();
-        info_.at = esi::span_of(node, text_);
         s.line = info_.at.line;
-        info_.type = node.attribute("type").value();
-        const auto idx = number(node, "idx", 0, 65535, false, true);
-        s.position = static_cast<std::uint16_t>(idx.value_or(0));
+        s.position =
+            static_cast<std::uint16_t>(number(node, "idx", 0, 65535, false, true).value_or(0));
         s.name =
             node.attribute("name") ? node.attribute("name").value() : std::to_string(s.position);
-        const bool generic = info_.type == "generic";
-        const bool drive = info_.type == "basic_cia402";
-        device_ = generic || drive ? std::nullopt : find_lcec_device(info_.type);
-        if (!generic && !drive && !device_) {
+        if (!is_generic() && !is_cia402() && !device_) {
             unknown_type(node, s.name);
         }
-        if (const auto vid = number(node, "vid", 0, 0xffffffff, true, generic || drive)) {
-            s.identity.vendor = static_cast<std::uint32_t>(*vid);
-        }
-        if (const auto pid = number(node, "pid", 0, 0xffffffff, true, generic || drive)) {
-            s.identity.product = static_cast<std::uint32_t>(*pid);
-        }
-        if (device_) {
-            s.identity.vendor = s.identity.vendor != 0 ? s.identity.vendor : device_->vendor;
-            s.identity.product = s.identity.product != 0 ? s.identity.product : device_->product;
-            count_as_neighbour(node, s.position);
-        }
+        identity_of(node, s);
         configure_ = flag(node, "configPdos", false);
         if (const std::string unit = node.attribute("syncUnit").value();
             !unit.empty() || node.attribute("syncUnitCycle")) {
@@ -184,29 +174,70 @@ private:
         children(
             node,
             {"dcConf", "watchdog", "sdoConfig", "idnConfig", "initCmds", "modParam", "syncManager"},
-            [&](const Xml& child) {
-            const std::string_view name = child.name();
-            if (name == "dcConf") {
-                dc(child, s);
-            } else if (name == "watchdog") {
-                watchdog(child, s);
-            } else if (name == "sdoConfig") {
-                sdo(child, s);
-            } else if (name == "idnConfig") {
-                idn(child, s);
-            } else if (name == "initCmds") {
-                init_commands(child, s);
-            } else if (name == "modParam") {
-                parameter(child, drive);
-            } else if (generic) {
-                sync_manager(child, s);
-            } else {
-                error(Topic::line, child, "<syncManager> applies only to type=\"generic\"",
-                      "delete it, or write type=\"generic\"");
-            }
-        });
+            [&](const Xml& child) { child_of_slave(child, s); });
+        build(node, s);
+        if (info_.fsoe_logic) {
+            fsoe_logics_.push_back({bus_->setup.slaves.size(), node, fsoe_parameters_});
+        }
+        bus_->setup.slaves.push_back(std::move(s));
+        bus_->slaves.push_back(std::move(info_));
+    }
+
+    bool is_generic() const { return info_.type == "generic"; }
+    bool is_cia402() const { return info_.type == "basic_cia402"; }
+
+    /// Forgets the slave before, and finds the device of this one's type.
+    void begin_slave(const Xml& node) {
+        info_ = {};
+        pins_.clear();
+        parameters_.clear();
+        fsoe_parameters_.clear();
+        info_.at = esi::span_of(node, text_);
+        info_.type = node.attribute("type").value();
+        device_ = is_generic() || is_cia402() ? std::nullopt : find_lcec_device(info_.type);
+    }
+
+    /// Sets vendor and product: as the file has them, or else of the slave's device.
+    void identity_of(const Xml& node, master::Slave& s) {
+        const bool is_required = is_generic() || is_cia402();
+        if (const auto vid = number(node, "vid", 0, 0xffffffff, true, is_required)) {
+            s.identity.vendor = static_cast<std::uint32_t>(*vid);
+        }
+        if (const auto pid = number(node, "pid", 0, 0xffffffff, true, is_required)) {
+            s.identity.product = static_cast<std::uint32_t>(*pid);
+        }
+        if (!device_) return;
+        s.identity.vendor = s.identity.vendor != 0 ? s.identity.vendor : device_->vendor;
+        s.identity.product = s.identity.product != 0 ? s.identity.product : device_->product;
+        count_as_neighbour(node, s.position);
+    }
+
+    void child_of_slave(const Xml& child, master::Slave& s) {
+        const std::string_view name = child.name();
+        if (name == "dcConf") {
+            dc(child, s);
+        } else if (name == "watchdog") {
+            watchdog(child, s);
+        } else if (name == "sdoConfig") {
+            sdo(child, s);
+        } else if (name == "idnConfig") {
+            idn(child, s);
+        } else if (name == "initCmds") {
+            init_commands(child, s);
+        } else if (name == "modParam") {
+            parameter(child, is_cia402());
+        } else if (is_generic()) {
+            sync_manager(child, s);
+        } else {
+            error(Topic::line, child, "<syncManager> applies only to type=\"generic\"",
+                  "delete it, or write type=\"generic\"");
+        }
+    }
+
+    /// Adds process data and pins of a slave whose type describes them.
+    void build(const Xml& node, master::Slave& s) {
         std::vector<std::string> problems;
-        if (drive) {
+        if (is_cia402()) {
             build_cia402(parameters_, s, info_, problems);
         }
         if (device_) {
@@ -215,11 +246,6 @@ private:
         for (const std::string& problem : problems) {
             error(Topic::value, node, problem);
         }
-        if (info_.fsoe_logic) {
-            fsoe_logics_.push_back({bus_->setup.slaves.size(), node, fsoe_parameters_});
-        }
-        bus_->setup.slaves.push_back(std::move(s));
-        bus_->slaves.push_back(std::move(info_));
     }
 
     /// Gives an option card the number of axes of its drive, the slave before it.

@@ -396,83 +396,114 @@ void Controller::keep_write(std::uint16_t address, std::span<const std::uint8_t>
     written_bytes_ += from.size();
 }
 
+/// Bytes that the master writes with one datagram, and what they are to ranges of registers.
+class Controller::WrittenRegisters {
+public:
+    WrittenRegisters(std::uint16_t address, std::span<const std::uint8_t> bytes) noexcept
+        : address_(address), bytes_(bytes) {}
+
+    bool covers(const register_facts::Range& range) const noexcept {
+        return range.touched(address_, bytes_.size());
+    }
+    /// Returns the part of the bytes that is in a range that they cover, and its address.
+    WrittenRegisters part(const register_facts::Range& range) const noexcept {
+        const std::size_t first = std::max<std::size_t>(range.first, address_);
+        const std::size_t end =
+            std::min<std::size_t>(range.first + range.length, address_ + bytes_.size());
+        return {static_cast<std::uint16_t>(first), bytes_.subspan(first - address_, end - first)};
+    }
+    /// Returns the byte of a register as it is after the write; `memory`: all registers before it.
+    std::uint8_t byte(unsigned reg, const std::uint8_t* memory) const noexcept {
+        const bool is_written = reg >= address_ && reg < address_ + bytes_.size();
+        return is_written ? bytes_[reg - address_] : memory[reg];
+    }
+    std::uint16_t address() const noexcept { return address_; }
+    std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
+
+private:
+    std::uint16_t address_;
+    std::span<const std::uint8_t> bytes_;
+};
+
 void Controller::write_registers(std::uint16_t address,
                                  std::span<const std::uint8_t> from) noexcept {
     using namespace register_facts;
-    const auto covers = [&](const Range& range) { return range.touched(address, from.size()); };
-    const auto byte = [&](unsigned reg) {
-        return reg >= address && reg < address + from.size() ? from[reg - address] : memory_[reg];
-    };
-    // The part of the written bytes that falls into a range, and where it starts.
-    struct Part {
-        std::uint16_t address;
-        std::span<const std::uint8_t> bytes;
-    };
-    const auto part = [&](const Range& range) {
-        const std::size_t first = std::max<std::size_t>(range.first, address);
-        const std::size_t end =
-            std::min<std::size_t>(range.first + range.length, address + from.size());
-        return Part{static_cast<std::uint16_t>(first), from.subspan(first - address, end - first)};
-    };
-    const auto keep = [&](const Range& range) {
-        const Part p = part(range);
-        std::memcpy(&memory_[p.address], p.bytes.data(), p.bytes.size());
-    };
-    if (covers(dc)) {
-        if (!settings_.dc) return;
-        if (covers(system_time) && address <= registers::dc_system_time) {
-            std::array<std::uint8_t, 8> time{};
-            for (unsigned i = 0; i < time.size(); ++i) {
-                time[i] = byte(registers::dc_system_time + i);
-            }
-            dc_.receive_system_time(get<std::uint64_t>(time.data()), part(system_time).bytes.size(),
-                                    now_ns_);
-        }
-        if (covers(receive_time)) {
-            dc_.latch_receive_times(now_ns_, frame_number_);
-        }
+    const WrittenRegisters write(address, from);
+    if (write.covers(dc) && !settings_.dc) return;
+    if (write.covers(dc)) {
+        latch_times(write);
     }
     for (const Range& range : plain) {
-        if (covers(range)) {
-            keep(range);
+        if (write.covers(range)) {
+            keep(write.part(range));
         }
     }
     for (const Range& range : counters) {
-        if (covers(range)) {
+        if (write.covers(range)) {
             std::fill_n(&memory_[range.first], range.length, std::uint8_t{0});
         }
     }
-    if (covers(dl_control)) {
-        if (covers({registers::loop_control, 1})) {
+    if (write.covers(dl_control)) {
+        if (write.covers({registers::loop_control, 1})) {
             ports_.open_lost();
         }
         update_ports();
     }
-    if (covers(al_control)) {
-        request_state(byte(registers::al_control), byte(registers::al_control + 1));
+    if (write.covers(al_control)) {
+        request_state(write.byte(registers::al_control, memory_.get()),
+                      write.byte(registers::al_control + 1, memory_.get()));
     }
-    if (covers(eeprom_block)) {
-        const Part p = part(eeprom_block);
-        eeprom_.write(p.address, p.bytes, now_ns_);
+    if (write.covers(eeprom_block)) {
+        const WrittenRegisters part = write.part(eeprom_block);
+        eeprom_.write(part.address(), part.bytes(), now_ns_);
     }
-    if (covers(fmmus)) {
-        keep(fmmus);
+    if (write.covers(fmmus)) {
+        keep(write.part(fmmus));
         fmmus_.configure();
     }
-    if (covers(sync_managers) && sms_.configure(address, from)) {
-        raise(activation_event);
-        if (!sms_.watched()) {
-            watchdog_ns_ = INT64_MAX;
-            memory_[registers::watchdog_status] |= 1;
-        }
+    if (write.covers(sync_managers)) {
+        write_sync_managers(write);
     }
-    if (covers(offset)) {
+    adjust_clock(write);
+}
+
+void Controller::keep(const WrittenRegisters& part) noexcept {
+    std::memcpy(&memory_[part.address()], part.bytes().data(), part.bytes().size());
+}
+
+void Controller::latch_times(const WrittenRegisters& write) noexcept {
+    using namespace register_facts;
+    if (write.covers(system_time) && write.address() <= registers::dc_system_time) {
+        std::array<std::uint8_t, 8> time{};
+        for (unsigned i = 0; i < time.size(); ++i) {
+            time[i] = write.byte(registers::dc_system_time + i, memory_.get());
+        }
+        dc_.receive_system_time(get<std::uint64_t>(time.data()),
+                                write.part(system_time).bytes().size(), now_ns_);
+    }
+    if (write.covers(receive_time)) {
+        dc_.latch_receive_times(now_ns_, frame_number_);
+    }
+}
+
+void Controller::write_sync_managers(const WrittenRegisters& write) noexcept {
+    if (!sms_.configure(write.address(), write.bytes())) return;
+    raise(register_facts::activation_event);
+    if (!sms_.watched()) {
+        watchdog_ns_ = INT64_MAX;
+        memory_[registers::watchdog_status] |= 1;
+    }
+}
+
+void Controller::adjust_clock(const WrittenRegisters& write) noexcept {
+    using namespace register_facts;
+    if (write.covers(offset)) {
         dc_.clock_changed(now_ns_);
     }
-    if (covers(speed)) {
+    if (write.covers(speed)) {
         dc_.clear_filters(now_ns_);
     }
-    if (covers(activation)) {
+    if (write.covers(activation)) {
         dc_.activate(now_ns_);
     }
 }

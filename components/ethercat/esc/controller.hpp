@@ -138,7 +138,14 @@ private:
     void commit(std::int64_t now_ns) noexcept;
     void reset_registers() noexcept;
     void read_registers(std::uint16_t address, std::span<std::uint8_t> to) noexcept;
+    class WrittenRegisters;
+    /// Does what a write to these registers means: keeps the bytes, clears counters, or passes them
+    /// to the part of the controller that has the registers.
     void write_registers(std::uint16_t address, std::span<const std::uint8_t> from) noexcept;
+    void keep(const WrittenRegisters& part) noexcept;
+    void latch_times(const WrittenRegisters& write) noexcept;
+    void write_sync_managers(const WrittenRegisters& write) noexcept;
+    void adjust_clock(const WrittenRegisters& write) noexcept;
     void keep_write(std::uint16_t address, std::span<const std::uint8_t> from) noexcept;
     void request_state(std::uint8_t low, std::uint8_t high) noexcept;
     void raise(std::uint32_t al_events) noexcept;

@@ -232,6 +232,31 @@ std::vector<Object> dictionary(Context& context, const Xml& profile) {
     return node ? Dictionary(context, node).take() : std::vector<Object>{};
 }
 
+namespace {
+
+/// Returns the bits of "ARRAY [0..3] OF UINT"; 0: the text is invalid, or the array too large.
+unsigned array_bits(std::string_view type) {
+    const std::size_t open = type.find('[');
+    const std::size_t dots = type.find("..", open);
+    const std::size_t close = type.find(']', open);
+    const std::size_t of = type.find(" OF ", close);
+    if (open == type.npos || dots == type.npos || close == type.npos || of == type.npos ||
+        dots > close) {
+        return 0;
+    }
+    const auto first = number(type.substr(open + 1, dots - open - 1));
+    const auto last = number(type.substr(dots + 2, close - dots - 2));
+    const std::string_view element = trimmed(type.substr(of + 4));
+    if (!first || !last || *last < *first || *last - *first > 65535 ||
+        element.starts_with("ARRAY")) {
+        return 0;
+    }
+    const std::uint64_t bits = static_cast<std::uint64_t>(*last - *first + 1) * type_bits(element);
+    return bits > 8U * 65536 ? 0 : static_cast<unsigned>(bits);
+}
+
+}  // namespace
+
 unsigned type_bits(std::string_view type) {
     struct Basic {
         std::string_view name;
@@ -257,29 +282,7 @@ unsigned type_bits(std::string_view type) {
             return static_cast<unsigned>(8 * *n);
         }
     }
-    if (type.starts_with("ARRAY")) {  // ARRAY [0..3] OF UINT
-        const std::size_t open = type.find('[');
-        const std::size_t dots = type.find("..", open);
-
-        const std::size_t close = type.find(']', open);
-        const std::size_t of = type.find(" OF ", close);
-        if (open == type.npos || dots == type.npos || close == type.npos || of == type.npos ||
-            dots > close) {
-            return 0;
-        }
-        const auto first = number(type.substr(open + 1, dots - open - 1));
-
-        const auto last = number(type.substr(dots + 2, close - dots - 2));
-        const std::string_view element = trimmed(type.substr(of + 4));
-        if (!first || !last || *last < *first || *last - *first > 65535 ||
-            element.starts_with("ARRAY")) {
-            return 0;
-        }
-        const std::uint64_t bits =
-            static_cast<std::uint64_t>(*last - *first + 1) * type_bits(element);
-        return bits > 8U * 65536 ? 0 : static_cast<unsigned>(bits);
-    }
-    return 0;
+    return type.starts_with("ARRAY") ? array_bits(type) : 0;
 }
 
 }  // namespace hal::ethercat::esi

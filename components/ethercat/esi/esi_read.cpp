@@ -75,33 +75,13 @@ private:
         }
     }
 
+    /// Reads a <Device> (ETG.2000) and adds it to the description.
     void device(const Xml& node) {
         Device d;
         d.vendor = vendor_;
         d.at = span_of(node, context_.text);
-        const Xml type = node.child("Type");
-        d.order = trimmed(type.child_value());
-        d.product = context_.attribute<std::uint32_t>(type, "ProductCode");
-
-        d.revision = context_.attribute<std::uint32_t>(type, "RevisionNo");
-        d.serial = context_.attribute<std::uint32_t>(type, "SerialNo");
-        d.check_revision = revision_rule(type);
-        d.name = text_of(node, "Name");
-        d.group = text_of(node, "GroupType");
-        d.physics = node.attribute("Physics").value();
-        const Xml info = node.child("Info");
-        const Xml state = info.child("StateMachine").child("Timeout");
-
-        const Xml mailbox = info.child("Mailbox").child("Timeout");
-        Timeouts& t = d.timeouts;
-        t.preop = context_.child(state, "PreopTimeout", t.preop);
-
-        t.safeop_op = context_.child(state, "SafeopOpTimeout", t.safeop_op);
-        t.back_to_init = context_.child(state, "BackToInitTimeout", t.back_to_init);
-        t.back_to_safeop = context_.child(state, "BackToSafeopTimeout", t.back_to_safeop);
-        t.request = context_.child(mailbox, "RequestTimeout", t.request);
-
-        t.response = context_.child(mailbox, "ResponseTimeout", t.response);
+        identity(node, d);
+        timeouts(node.child("Info"), d.timeouts);
         for (const Xml f : node.children("Fmmu")) {
             const std::string use = lower(trimmed(f.child_value()));
             d.fmmus.push_back(fmmu_use(use));
@@ -110,15 +90,7 @@ private:
             sync_manager(s, d);
         }
         separate_mailboxes(node, d);
-        pdos(node, "RxPdo", d.rx);
-        pdos(node, "TxPdo", d.tx);
-        correct_direction(node, d, d.tx, sii::SmType::outputs, sii::SmType::inputs);
-        correct_direction(node, d, d.rx, sii::SmType::inputs, sii::SmType::outputs);
-        default_sync_manager(d, d.rx, sii::SmType::outputs);
-
-        default_sync_manager(d, d.tx, sii::SmType::inputs);
-        unassign_excluded(node, d.rx);
-        unassign_excluded(node, d.tx);
+        process_data(node, d);
         if (const Xml box = node.child("Mailbox")) {
             mailbox_of(box, d);
         }
@@ -128,15 +100,7 @@ private:
                 op_mode(mode, d);
             }
         }
-        const Xml slots = node.child("Slots");
-        d.slot_pdo_increment = context_.attribute<unsigned>(slots, "SlotPdoIncrement", 1);
-        d.slot_index_increment = context_.attribute<unsigned>(slots, "SlotIndexIncrement", 0);
-        if (slots.attribute("DownloadModuleIdentList")) {
-            d.download_modules = Context::flag(slots, "DownloadModuleIdentList");
-        }
-        for (const Xml s : slots.children("Slot")) {
-            slot(s, d);
-        }
+        slots(node.child("Slots"), d);
         for (const Xml profile : node.children("Profile")) {
             if (d.profile == 0) {
                 d.profile = context_.child<std::uint16_t>(profile, "ProfileNo");
@@ -149,6 +113,53 @@ private:
             eeprom_of(eeprom, d);
         }
         out_.devices.push_back(std::move(d));
+    }
+
+    void identity(const Xml& node, Device& d) {
+        const Xml type = node.child("Type");
+        d.order = trimmed(type.child_value());
+        d.product = context_.attribute<std::uint32_t>(type, "ProductCode");
+        d.revision = context_.attribute<std::uint32_t>(type, "RevisionNo");
+        d.serial = context_.attribute<std::uint32_t>(type, "SerialNo");
+        d.check_revision = revision_rule(type);
+        d.name = text_of(node, "Name");
+        d.group = text_of(node, "GroupType");
+        d.physics = node.attribute("Physics").value();
+    }
+
+    /// What is not given keeps its default.
+    void timeouts(const Xml& info, Timeouts& t) {
+        const Xml state = info.child("StateMachine").child("Timeout");
+        t.preop = context_.child(state, "PreopTimeout", t.preop);
+        t.safeop_op = context_.child(state, "SafeopOpTimeout", t.safeop_op);
+        t.back_to_init = context_.child(state, "BackToInitTimeout", t.back_to_init);
+        t.back_to_safeop = context_.child(state, "BackToSafeopTimeout", t.back_to_safeop);
+        const Xml mailbox = info.child("Mailbox").child("Timeout");
+        t.request = context_.child(mailbox, "RequestTimeout", t.request);
+        t.response = context_.child(mailbox, "ResponseTimeout", t.response);
+    }
+
+    /// Reads the PDOs, and assigns those without a sync manager that may be exchanged together.
+    void process_data(const Xml& node, Device& d) {
+        pdos(node, "RxPdo", d.rx);
+        pdos(node, "TxPdo", d.tx);
+        correct_direction(node, d, d.tx, sii::SmType::outputs, sii::SmType::inputs);
+        correct_direction(node, d, d.rx, sii::SmType::inputs, sii::SmType::outputs);
+        default_sync_manager(d, d.rx, sii::SmType::outputs);
+        default_sync_manager(d, d.tx, sii::SmType::inputs);
+        unassign_excluded(node, d.rx);
+        unassign_excluded(node, d.tx);
+    }
+
+    void slots(const Xml& node, Device& d) {
+        d.slot_pdo_increment = context_.attribute<unsigned>(node, "SlotPdoIncrement", 1);
+        d.slot_index_increment = context_.attribute<unsigned>(node, "SlotIndexIncrement", 0);
+        if (node.attribute("DownloadModuleIdentList")) {
+            d.download_modules = Context::flag(node, "DownloadModuleIdentList");
+        }
+        for (const Xml s : node.children("Slot")) {
+            slot(s, d);
+        }
     }
 
     std::optional<RevisionRule> revision_rule(const Xml& type) {

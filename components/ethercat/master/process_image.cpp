@@ -52,51 +52,56 @@ std::size_t ProcessImage::capacity() const noexcept {
 
 void ProcessImage::lay_out(const Setup& setup) {
     for (std::size_t n = 0; n < slaves_.size(); ++n) {
-        const Slave& slave = setup.slaves[n];
-        SlaveImage& image = slaves_[n];
-        image.domain = slave.domain < domains_.size() ? slave.domain : std::uint16_t{0};
-        image.no_lrw = !slave.use_lrw;
-        for (const SyncManager& sm : slave.sync_managers) {
-            std::uint32_t bits = 0;
-            for (const Pdo& pdo : sm.pdos) {
-                for (const Entry& entry : pdo.entries) {
-                    bits += entry.bits;
-                }
-            }
-            image.areas.push_back({0, (bits + 7) / 8, sm.output});
-            (sm.output ? image.out_bytes : image.in_bytes) += (bits + 7) / 8;
-        }
-        if (slave.mailbox_status && image.out_bytes + image.in_bytes != 0) {
-            image.mailbox_status_at = 0;
-            image.in_bytes++;
-        }
+        measure(setup.slaves[n], slaves_[n]);
     }
     std::uint32_t at = 0;
     for (std::uint16_t d = 0; d < domains_.size(); ++d) {
+        const unsigned every = d < setup.domains.size() ? std::max(setup.domains[d].every, 1U) : 1;
         for (const bool no_lrw : {false, true}) {
-            Block block;
-            block.domain = d;
-            block.every = d < setup.domains.size() ? std::max(setup.domains[d].every, 1U) : 1;
-            block.first = block.last = static_cast<std::uint16_t>(order_.size());
-            for (std::uint16_t n = 0; n < slaves_.size(); ++n) {
-                const SlaveImage& image = slaves_[n];
-                if (image.domain != d || image.no_lrw != no_lrw ||
-                    image.out_bytes + image.in_bytes == 0) {
-                    continue;
-                }
-                if (block.out_bytes + block.in_bytes + image.out_bytes + image.in_bytes >
-                    capacity()) {
-                    close(block, at);
-                }
-                block.out_bytes += image.out_bytes;
-                block.in_bytes += image.in_bytes;
-                order_.push_back(n);
-                block.last = static_cast<std::uint16_t>(order_.size());
-            }
-            close(block, at);
+            fill_blocks(d, every, no_lrw, at);
         }
     }
     image_.resize(at + 1);
+}
+
+void ProcessImage::measure(const Slave& slave, SlaveImage& image) const {
+    image.domain = slave.domain < domains_.size() ? slave.domain : std::uint16_t{0};
+    image.no_lrw = !slave.use_lrw;
+    for (const SyncManager& sm : slave.sync_managers) {
+        std::uint32_t bits = 0;
+        for (const Pdo& pdo : sm.pdos) {
+            for (const Entry& entry : pdo.entries) {
+                bits += entry.bits;
+            }
+        }
+        image.areas.push_back({0, (bits + 7) / 8, sm.output});
+        (sm.output ? image.out_bytes : image.in_bytes) += (bits + 7) / 8;
+    }
+    if (slave.mailbox_status && image.out_bytes + image.in_bytes != 0) {
+        image.mailbox_status_at = 0;
+        image.in_bytes++;
+    }
+}
+
+void ProcessImage::fill_blocks(std::uint16_t domain, unsigned every, bool no_lrw,
+                               std::uint32_t& at) {
+    Block block;
+    block.domain = domain;
+    block.every = every;
+    block.first = block.last = static_cast<std::uint16_t>(order_.size());
+    for (std::uint16_t n = 0; n < slaves_.size(); ++n) {
+        const SlaveImage& image = slaves_[n];
+        const std::uint32_t bytes = image.out_bytes + image.in_bytes;
+        if (image.domain != domain || image.no_lrw != no_lrw || bytes == 0) continue;
+        if (block.out_bytes + block.in_bytes + bytes > capacity()) {
+            close(block, at);
+        }
+        block.out_bytes += image.out_bytes;
+        block.in_bytes += image.in_bytes;
+        order_.push_back(n);
+        block.last = static_cast<std::uint16_t>(order_.size());
+    }
+    close(block, at);
 }
 
 void ProcessImage::close(Block& block, std::uint32_t& at) {
@@ -410,24 +415,7 @@ bool ProcessImage::returns(std::size_t slave) const noexcept {
 }
 
 void ProcessImage::settle() noexcept {
-    for (DomainStatus& d : domains_) {
-        d.fresh = false;
-    }
-    bool any = false;
-    for (std::size_t n = 0; n < datagrams_used_; ++n) {
-        const Datagram& d = datagrams_[n];
-        if (!d.sent) continue;
-        DomainStatus& s = domains_[d.domain];
-        if (!s.fresh) {
-            s.wkc = s.expected = 0;
-            s.fresh = true;
-        }
-        any = true;
-    }
-    if (!any) return;
-    for (DomainStatus& s : domains_) {
-        s.ok = true;
-    }
+    if (!begin_domains()) return;
     for (std::size_t n = 0; n < datagrams_used_; ++n) {
         Datagram& d = datagrams_[n];
         if (!d.sent) continue;
@@ -440,33 +428,60 @@ void ProcessImage::settle() noexcept {
         d.sent = d.answered = false;
     }
     for (DomainStatus& s : domains_) {
-        if (!s.fresh) continue;
-        ++s.exchanges;
-        WkcState state = s.wkc == 0 ? WkcState::none : WkcState::part;
-        if (s.ok && s.expected != 0) {
-            state = WkcState::complete;
+        if (s.fresh) {
+            count_exchange(s);
         }
-        if (state == WkcState::complete) {
-            if (!s.was_complete) {
-                s.was_complete = true;
-                s.min = s.wkc;
-                s.changes = 0;
-            }
-            s.bad_cycles = 0;
-        } else {
-            if (s.expected != 0) {
-                ++s.incomplete;
-            }
-            ++s.bad_cycles;
-        }
-        if (s.was_complete) {
-            s.min = std::min(s.min, s.wkc);
-            if (state != s.state) {
-                ++s.changes;
-            }
-        }
-        s.state = state;
     }
+}
+
+bool ProcessImage::begin_domains() noexcept {
+    for (DomainStatus& s : domains_) {
+        s.fresh = false;
+    }
+    bool any = false;
+    for (std::size_t n = 0; n < datagrams_used_; ++n) {
+        const Datagram& d = datagrams_[n];
+        if (!d.sent) continue;
+        DomainStatus& s = domains_[d.domain];
+        if (!s.fresh) {
+            s.wkc = s.expected = 0;
+            s.fresh = true;
+        }
+        any = true;
+    }
+    if (!any) return false;
+    for (DomainStatus& s : domains_) {
+        s.ok = true;
+    }
+    return true;
+}
+
+void ProcessImage::count_exchange(DomainStatus& s) noexcept {
+    ++s.exchanges;
+    WkcState state = s.wkc == 0 ? WkcState::none : WkcState::part;
+    if (s.ok && s.expected != 0) {
+        state = WkcState::complete;
+    }
+    if (state == WkcState::complete) {
+        if (!s.was_complete) {
+            s.was_complete = true;
+            s.min = s.wkc;
+            s.changes = 0;
+        }
+        s.bad_cycles = 0;
+    } else {
+        if (s.expected != 0) {
+            ++s.incomplete;
+        }
+        ++s.bad_cycles;
+    }
+    if (s.was_complete) {
+        s.min = std::min(s.min, s.wkc);
+        if (state != s.state) {
+            ++s.changes;
+        }
+    }
+    s.state = state;
 }
 
 }  // namespace hal::ethercat::master

@@ -149,7 +149,17 @@ private:
         std::uint16_t domain = 0;
         unsigned every = 1;
     };
+    /// Gives each slave its place in the image: in blocks of one domain and one way of exchange,
+    /// each of which fits into a frame. [setup]
     void lay_out(const Setup&);
+    /// Sets how many bytes a slave exchanges. [setup]
+    void measure(const Slave&, SlaveImage&) const;
+    /// Adds the blocks of the slaves of a domain that are exchanged with or without LRW. [setup]
+    void fill_blocks(std::uint16_t domain, unsigned every, bool no_lrw, std::uint32_t& at);
+    /// Resets the domains that have sent datagrams. Returns false when there are none. [realtime]
+    bool begin_domains() noexcept;
+    /// Counts the exchange of a domain by its working counter. [realtime]
+    static void count_exchange(DomainStatus&) noexcept;
     void close(Block&, std::uint32_t& at);
     void recount() noexcept;
     void build_frames(unsigned every) noexcept;

@@ -12,64 +12,67 @@ constexpr std::int64_t retry_after_ns = 1'000 * millisecond;
 
 constexpr std::uint16_t code(State state) noexcept { return static_cast<std::uint16_t>(state); }
 
-Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
-    const Slave* config = bus.config(d);
-    const State last = bus.target(d);
-    const Timeouts& t = d.slave.timeouts;
-    const auto done = [&](State reached) {
-        if (reached != last) return false;
-        d.settled = config != nullptr;
-        bus.set_in_op(d, d.settled && reached == State::op);
-        return true;
-    };
-    bool ok = co_await request_state(c, bus, d, State::init, t.to_init);
+/// Returns whether the slave has reached the state that it is to stay in, and notes it as settled.
+bool settle(Bus& bus, Device& d, State reached) noexcept {
+    if (reached != bus.target(d)) return false;
+    d.settled = bus.config(d) != nullptr;
+    bus.set_in_op(d, d.settled && reached == State::op);
+    return true;
+}
+
+// The transitions of the start-up. Each returns false when a step failed.
+
+/// To INIT, whatever the state, without the settings of an earlier start-up.
+Task<bool> enter_init(Channel& c, Bus& bus, Device& d) noexcept {
+    bool ok = co_await request_state(c, bus, d, State::init, d.slave.timeouts.to_init);
     if (!ok) co_return false;
     bus.note_in_op(d, false);
     ok = co_await clear_settings(c, bus, d);
     if (!ok) co_return false;
     ok = co_await startup_writes(c, bus, d, State::preop);
-    if (!ok) co_return false;
-    if (done(State::init)) co_return true;
+    co_return ok;
+}
 
-    d.slave.boot_mailbox = d.to_boot;
-    ok = co_await set_mailbox(c, bus, d);
+/// INIT to `state`, PRE-OP or BOOT, with the mailbox of that state.
+Task<bool> enter_mailbox_state(Channel& c, Bus& bus, Device& d, State state) noexcept {
+    d.slave.boot_mailbox = state == State::boot;
+    bool ok = co_await set_mailbox(c, bus, d);
     if (!ok) co_return false;
-    if (d.to_boot) {
-        ok = co_await request_state(c, bus, d, State::boot, t.to_preop);
-        co_return ok;
-    }
-    ok = co_await request_state(c, bus, d, State::preop, t.to_preop);
-    if (!ok) co_return false;
-    if (config == nullptr) {
-        co_return true;  // not in the setup: stays here for tools
-    }
+    ok = co_await request_state(c, bus, d, state, d.slave.timeouts.to_preop);
+    co_return ok;
+}
 
-    ok = co_await startup_writes(c, bus, d, State::safeop);
+/// In PRE-OP: what the slave exchanges.
+Task<bool> configure_in_preop(Channel& c, Bus& bus, Device& d) noexcept {
+    bool ok = co_await startup_writes(c, bus, d, State::safeop);
     if (!ok) co_return false;
     ok = co_await map_process_data(c, bus, d);
-    if (!ok) co_return false;
-    if (done(State::preop)) co_return true;
+    co_return ok;
+}
 
-    ok = co_await synchronise(c, bus, d);
+/// PRE-OP to SAFE-OP, with clock, process data and SYNC signals.
+Task<bool> enter_safeop(Channel& c, Bus& bus, Device& d) noexcept {
+    bool ok = co_await synchronise(c, bus, d);
     if (!ok) co_return false;
     ok = co_await set_process_data(c, bus, d);
     if (!ok) co_return false;
     ok = co_await start_sync_signals(c, bus, d);
     if (!ok) co_return false;
-    ok = co_await request_state(c, bus, d, State::safeop, t.to_safeop_op);
+    ok = co_await request_state(c, bus, d, State::safeop, d.slave.timeouts.to_safeop_op);
     if (!ok) co_return false;
-    const auto& image = bus.image.slave(static_cast<std::size_t>(d.slave.configured));
-    bus.image.set_counting(static_cast<std::size_t>(d.slave.configured), image.writes, image.reads,
-                           false);
-    if (done(State::safeop)) co_return true;
+    const auto configured = static_cast<std::size_t>(d.slave.configured);
+    const auto& image = bus.image.slave(configured);
+    bus.image.set_counting(configured, image.writes, image.reads, false);
+    co_return true;
+}
 
-    ok = co_await startup_writes(c, bus, d, State::op);
+/// SAFE-OP to OP, once valid outputs reach the slave and its SYNC signals have begun.
+Task<bool> enter_op(Channel& c, Bus& bus, Device& d) noexcept {
+    bool ok = co_await startup_writes(c, bus, d, State::op);
     if (!ok) co_return false;
-    // valid outputs reach it before OP
     for (unsigned cycles = 0; cycles < 3 || !bus.outputs_valid; ++cycles) {
         co_await c.sleep(0);
     }
-    // after the first one
     if (d.sync_begins_ns > c.now_ns()) {
         co_await c.sleep_until(d.sync_begins_ns + bus.setup.cycle_ns);
     }
@@ -78,9 +81,31 @@ Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
     if (!ok) co_return false;
     report_tolerated_clock(bus, d);
     bus.note_in_op(d, true);
-    ok = co_await request_state(c, bus, d, State::op, t.to_safeop_op);
+    ok = co_await request_state(c, bus, d, State::op, d.slave.timeouts.to_safeop_op);
+    co_return ok;
+}
+
+/// Takes the slave from any state to the one that it is to stay in. A slave that is not in the
+/// setup stays in PRE-OP or BOOT, for tools. Returns false when a step failed.
+Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
+    bool ok = co_await enter_init(c, bus, d);
     if (!ok) co_return false;
-    co_return done(State::op);
+    if (settle(bus, d, State::init)) co_return true;
+    const State mailbox_state = d.to_boot ? State::boot : State::preop;
+    ok = co_await enter_mailbox_state(c, bus, d, mailbox_state);
+    if (!ok) co_return false;
+    if (bus.config(d) == nullptr) co_return true;
+    ok = co_await configure_in_preop(c, bus, d);
+    if (!ok) co_return false;
+    if (settle(bus, d, State::preop)) co_return true;
+
+    ok = co_await enter_safeop(c, bus, d);
+    if (!ok) co_return false;
+    if (settle(bus, d, State::safeop)) co_return true;
+
+    ok = co_await enter_op(c, bus, d);
+    if (!ok) co_return false;
+    co_return settle(bus, d, State::op);
 }
 
 }  // namespace
