@@ -30,6 +30,11 @@ enum class ObjectType : std::uint8_t {
 };
 enum class Access : std::uint8_t { ro, wo, rw, rwr, rww, constant };
 enum class Category : std::uint8_t { mandatory, optional, manufacturer };
+/// Returns the category that an object has by its index (CiA 306-1).
+constexpr Category category_of(std::uint16_t index) noexcept {
+    if (index == 0x1000 || index == 0x1001 || index == 0x1018) return Category::mandatory;
+    return index >= 0x2000 && index < 0x6000 ? Category::manufacturer : Category::optional;
+}
 
 std::string_view name_of(ObjectType type);
 std::string_view name_of(Access access);

@@ -222,70 +222,31 @@ private:
         }
     }
 
+    /// The keys of the lists that name an object, by its index.
+    using ListedObjects = std::map<unsigned, const IniKey*>;
+
+    /// Reads the lists of objects, which give each its category. Reports objects that are listed and
+    /// not described, or described and not listed, and mandatory ones that are missing.
     void lists() {
-        struct List {
-            const char* name;
-            Category category;
-        };
-        std::map<unsigned, const IniKey*> listed;
+        ListedObjects listed;
         bool any = false;
-        for (const List& list : {List{"MandatoryObjects", Category::mandatory},
-                                 {"OptionalObjects", Category::optional},
-                                 {"ManufacturerObjects", Category::manufacturer}}) {
-            IniSection* section = ini_.find(list.name);
-            if (section == nullptr) {
-                if (list.category == Category::mandatory) {
-                    missing(list.name, Severity::warning);
-                }
-                continue;
-            }
-            any = true;
-            for (const auto& [number, key] : keys_.list(*section, "SupportedObjects")) {
-                const auto index = keys_.parse(*section, *key, 0xFFFF);
-                if (!index) continue;
-                const auto [at, fresh] = listed.emplace(static_cast<unsigned>(*index), key);
-                if (!fresh) {
-                    keys_.report(
-                        Severity::warning, Topic::count, key->value_at,
-                        "object " + label(static_cast<std::uint16_t>(*index)) + " is listed twice",
-                        "first in line " + std::to_string(at->second->at.line));
-                    continue;
-                }
-                Object* object = out_.find(static_cast<std::uint16_t>(*index));
-                if (object == nullptr) {
-                    keys_.report(
-                        Severity::warning, Topic::undescribed, key->value_at,
-                        "object " + label(static_cast<std::uint16_t>(*index)) +
-                            " is listed but not described",
-                        "missing section [" + label(static_cast<std::uint16_t>(*index)) + "]");
-                    continue;
-                }
-                object->category = list.category;
-                const Category usual = category_of(object->index);
-                if (usual != list.category &&
-                    (usual == Category::manufacturer || list.category == Category::manufacturer)) {
-                    keys_.report(Severity::note, Topic::count, key->value_at,
-                                 "object " + label(object->index) + " does not belong in [" +
-                                     section->name + "]",
-                                 "manufacturer-specific objects are 2000..5FFF");
-                }
-            }
-            if (const Extras more = keys_.rest(*section); !more.empty()) {
-                out_.others.push_back({section->name, more});
+        for (const Category category :
+             {Category::mandatory, Category::optional, Category::manufacturer}) {
+            const std::string name(list_of(category));
+            if (IniSection* section = ini_.find(name)) {
+                any = true;
+                read_list(*section, category, listed);
+            } else if (category == Category::mandatory) {
+                missing(name.c_str(), Severity::warning);
             }
         }
         for (Object& object : out_.objects) {
-            if (listed.count(object.index) != 0) continue;
-            object.category = category_of(object.index);
-            if (any && object.index >= 0x1000) {
-                keys_.report(Severity::warning, Topic::count, object.at,
-                             "object " + label(object.index) + " is described but not listed",
-                             "it was read all the same; add it to [" +
-                                 std::string(list_of(object.category)) + "]");
+            if (!listed.contains(object.index)) {
+                categorise_unlisted(object, any);
             }
         }
-        for (const std::uint16_t index :
-             {std::uint16_t{0x1000}, std::uint16_t{0x1001}, std::uint16_t{0x1018}}) {
+        constexpr std::uint16_t mandatory[] = {0x1000, 0x1001, 0x1018};
+        for (const std::uint16_t index : mandatory) {
             if (out_.find(index) == nullptr && any) {
                 keys_.report(Severity::warning, Topic::missing, {1, 1, 0, 0},
                              "missing mandatory object " + label(index));
@@ -293,10 +254,50 @@ private:
         }
     }
 
-    static Category category_of(std::uint16_t index) {
-        if (index == 0x1000 || index == 0x1001 || index == 0x1018) return Category::mandatory;
-        return index >= 0x2000 && index < 0x6000 ? Category::manufacturer : Category::optional;
+    void read_list(IniSection& section, Category category, ListedObjects& listed) {
+        for (const auto& [number, key] : keys_.list(section, "SupportedObjects")) {
+            const auto parsed = keys_.parse(section, *key, 0xFFFF);
+            if (!parsed) continue;
+            const auto index = static_cast<std::uint16_t>(*parsed);
+            const auto [at, fresh] = listed.emplace(index, key);
+            if (!fresh) {
+                keys_.report(Severity::warning, Topic::count, key->value_at,
+                             "object " + label(index) + " is listed twice",
+                             "first in line " + std::to_string(at->second->at.line));
+                continue;
+            }
+            Object* object = out_.find(index);
+            if (object == nullptr) {
+                keys_.report(Severity::warning, Topic::undescribed, key->value_at,
+                             "object " + label(index) + " is listed but not described",
+                             "missing section [" + label(index) + "]");
+                continue;
+            }
+            object->category = category;
+            const bool is_manufacturers = category_of(index) == Category::manufacturer;
+            if (is_manufacturers != (category == Category::manufacturer)) {
+                keys_.report(
+                    Severity::note, Topic::count, key->value_at,
+                    "object " + label(index) + " does not belong in [" + section.name + "]",
+                    "manufacturer-specific objects are 2000..5FFF");
+            }
+        }
+        if (const Extras more = keys_.rest(section); !more.empty()) {
+            out_.others.push_back({section.name, more});
+        }
     }
+
+    /// `has_lists`: the file has a list in which the object is missing.
+    void categorise_unlisted(Object& object, bool has_lists) {
+        object.category = category_of(object.index);
+        if (has_lists && object.index >= 0x1000) {
+            keys_.report(Severity::warning, Topic::count, object.at,
+                         "object " + label(object.index) + " is described but not listed",
+                         "it was read all the same; add it to [" +
+                             std::string(list_of(object.category)) + "]");
+        }
+    }
+
     static std::string_view list_of(Category category) {
         if (category == Category::mandatory) return "MandatoryObjects";
         if (category == Category::optional) return "OptionalObjects";

@@ -127,61 +127,65 @@ std::string to_string(const Message& message) {
     return message.help.empty() ? text : text + "; " + message.help;
 }
 
-bool decode(std::string_view bytes, std::string& text, std::vector<Message>& messages) {
-    const auto report = [&](Severity severity, Topic topic, std::uint32_t line,
-                            std::string sentence, std::string help) {
-        messages.push_back(
-            {severity, topic, {line, 1, 0, 0}, std::move(sentence), std::move(help)});
-    };
-    const auto refuse = [&](std::string sentence, std::string help) {
-        report(Severity::error, Topic::unreadable, 0, std::move(sentence), std::move(help));
+namespace {
+
+/// Adds the messages about the encoding of a file, by their lines.
+class EncodingReport {
+public:
+    explicit EncodingReport(std::vector<Message>& messages) : messages_(messages) {}
+    void add(Severity severity, std::uint32_t line, std::string sentence, std::string help) {
+        messages_.push_back(
+            {severity, Topic::syntax, {line, 1, 0, 0}, std::move(sentence), std::move(help)});
+    }
+    /// Returns false.
+    bool refuse(std::string sentence, std::string help) {
+        messages_.push_back({Severity::error,
+                             Topic::unreadable,
+                             {0, 1, 0, 0},
+                             std::move(sentence),
+                             std::move(help)});
         return false;
-    };
-    text.clear();
-    if (bytes.size() > max_bytes) {
-        return refuse("the file is larger than 32 MiB", "is it the right file?");
     }
-    std::string plain;
-    const auto starts = [&](std::string_view mark) { return bytes.substr(0, mark.size()) == mark; };
-    std::vector<Message> later;  // their offsets are those of the translated text
+
+private:
+    std::vector<Message>& messages_;
+};
+
+/// Returns the text in UTF-8. UTF-16 is recognised by its byte order mark, or by zeros in the high
+/// bytes of the first characters; what is not UTF-8 counts as Windows-1252.
+std::string to_utf8(std::string_view bytes, EncodingReport& report) {
+    const auto starts = [&](std::string_view mark) { return bytes.starts_with(mark); };
+    bool whole = true;
     if (starts("\xFF\xFE") || starts("\xFE\xFF")) {
-        bool whole = true;
-        plain = from_utf16(bytes.substr(2), starts("\xFE\xFF"), whole);
-        report(Severity::warning, Topic::syntax, 1, "the file is UTF-16 text",
-               "save it as ASCII: most tools read nothing else");
+        std::string plain = from_utf16(bytes.substr(2), starts("\xFE\xFF"), whole);
+        report.add(Severity::warning, 1, "the file is UTF-16 text",
+                   "save it as ASCII: most tools read nothing else");
         if (!whole) {
-            report(Severity::warning, Topic::syntax, 1, "truncated UTF-16 characters", "");
+            report.add(Severity::warning, 1, "truncated UTF-16 characters", "");
         }
-    } else if (bytes.size() >= 4 && bytes[1] == 0 && bytes[3] == 0 && bytes[0] != 0) {
-        bool whole = true;
-        plain = from_utf16(bytes, false, whole);
-        report(Severity::warning, Topic::syntax, 1,
-               "the file is UTF-16 text without a byte order mark",
-               "save it as ASCII: most tools read nothing else");
-    } else {
-        if (starts("\xEF\xBB\xBF")) {
-            bytes.remove_prefix(3);
-            report(Severity::note, Topic::syntax, 1, "the file begins with a byte order mark",
+        return plain;
+    }
+    if (bytes.size() >= 4 && bytes[1] == 0 && bytes[3] == 0 && bytes[0] != 0) {
+        report.add(Severity::warning, 1, "the file is UTF-16 text without a byte order mark",
+                   "save it as ASCII: most tools read nothing else");
+        return from_utf16(bytes, false, whole);
+    }
+    if (starts("\xEF\xBB\xBF")) {
+        bytes.remove_prefix(3);
+        report.add(Severity::note, 1, "the file begins with a byte order mark",
                    "some tools then miss the first section; save it without");
-        }
-        const std::size_t bad = first_bad_utf8(bytes);
-        if (bad == std::string_view::npos) {
-            plain = bytes;
-        } else {
-            plain = from_windows(bytes);
-            report(Severity::note, Topic::syntax, line_of(bytes, bad),
-                   "invalid UTF-8; the file was read as Windows-1252", "CiA 306 requires ASCII");
-        }
     }
-    const auto zeros = static_cast<std::size_t>(std::count(plain.begin(), plain.end(), '\0'));
-    if (zeros > plain.size() / 16 + 4) {
-        return refuse("not a text file", "an EDS consists of [sections] and Key=Value lines");
-    }
-    if (zeros != 0) {
-        report(Severity::warning, Topic::syntax, line_of(plain, plain.find('\0')),
-               "zero byte in the text ignored", "");
-        std::erase(plain, '\0');
-    }
+    const std::size_t bad = first_bad_utf8(bytes);
+    if (bad == std::string_view::npos) return std::string(bytes);
+    report.add(Severity::note, line_of(bytes, bad),
+               "invalid UTF-8; the file was read as Windows-1252", "CiA 306 requires ASCII");
+    return from_windows(bytes);
+}
+
+/// Returns the text with `\n` as its only line end. `\n` with any number of `\r` before it is one,
+/// and a `\r` elsewhere is one, too.
+std::string with_plain_line_ends(std::string_view plain, EncodingReport& report) {
+    std::string text;
     text.reserve(plain.size());
     bool lone = false;
     for (std::size_t i = 0; i < plain.size(); ++i) {
@@ -189,30 +193,53 @@ bool decode(std::string_view bytes, std::string& text, std::vector<Message>& mes
             text += plain[i];
             continue;
         }
-        std::size_t next = i;
-        while (next < plain.size() && plain[next] == '\r') {
-            ++next;
-        }
+        const std::size_t next = std::min(plain.find_first_not_of('\r', i), plain.size());
         if (next < plain.size() && plain[next] == '\n') {
-            i = next - 1;  // any number of \r before \n: one line end
+            i = next - 1;
         } else {
             text += '\n';
             lone = true;
         }
     }
     if (lone) {
-        report(Severity::note, Topic::syntax, 1, "lines end with a carriage return only", "");
+        report.add(Severity::note, 1, "lines end with a carriage return only", "");
     }
-    // The spans point to the start of their lines.
+    return text;
+}
+
+/// Returns the offset of the beginning of a line, from 1; the size of the text behind the last one.
+std::size_t begin_of_line(std::string_view text, std::uint32_t line) {
+    std::size_t at = 0;
+    for (std::uint32_t n = 1; n < line; ++n) {
+        at = text.find('\n', at);
+        if (at == std::string_view::npos) return text.size();
+        ++at;
+    }
+    return std::min(at, text.size());
+}
+
+}  // namespace
+
+bool decode(std::string_view bytes, std::string& text, std::vector<Message>& messages) {
+    EncodingReport report(messages);
+    text.clear();
+    if (bytes.size() > max_bytes) {
+        return report.refuse("the file is larger than 32 MiB", "is it the right file?");
+    }
+    std::string plain = to_utf8(bytes, report);
+    const auto zeros = static_cast<std::size_t>(std::count(plain.begin(), plain.end(), '\0'));
+    if (zeros > plain.size() / 16 + 4) {
+        return report.refuse("not a text file",
+                             "an EDS consists of [sections] and Key=Value lines");
+    }
+    if (zeros != 0) {
+        report.add(Severity::warning, line_of(plain, plain.find('\0')),
+                   "zero byte in the text ignored", "");
+        std::erase(plain, '\0');
+    }
+    text = with_plain_line_ends(plain, report);
     for (Message& message : messages) {
-        std::size_t at = 0;
-        for (std::uint32_t line = 1; line < message.at.line && at != std::string::npos; ++line) {
-            at = text.find('\n', at);
-            if (at != std::string::npos) {
-                ++at;
-            }
-        }
-        message.at.offset = static_cast<std::uint32_t>(std::min(at, text.size()));
+        message.at.offset = static_cast<std::uint32_t>(begin_of_line(text, message.at.line));
     }
     return true;
 }

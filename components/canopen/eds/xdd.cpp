@@ -340,6 +340,7 @@ private:
         return out;
     }
 
+    /// Reads a CANopenObject with its sub-objects, and adds it to the description.
     void object(const Node& node) {
         const auto index = number(node, "index", 0xFFFF, true);
         if (!index) {
@@ -361,50 +362,63 @@ private:
         out.name = own.name;
         out.type = own.type;
         out.flags = own.flags;
-        if (out.index == 0x1000 || out.index == 0x1001 || out.index == 0x1018) {
-            out.category = Category::mandatory;
-        } else if (out.index >= 0x2000 && out.index < 0x6000) {
-            out.category = Category::manufacturer;
-        } else {
-            out.category = Category::optional;
+        out.category = category_of(out.index);
+        sub_objects(node, out);
+        check_type(node, what, own, out);
+        if (!out.single()) {
+            out.data_type = own.data_type;
         }
+        out_.objects.push_back(std::move(out));
+    }
+
+    /// Reads the sub-objects, in the order of their sub-indices.
+    void sub_objects(const Node& node, Object& out) {
         for (Node child = node.first_child(); child; child = child.next_sibling()) {
             if (local(child) != "CANopenSubObject") continue;
             const auto sub = number(child, "subIndex", 0xFF, true);
-            if (!sub || out.find(static_cast<std::uint8_t>(*sub)) != nullptr) {
+            if (!sub) {
                 report(Severity::warning, Topic::object, child,
-                       sub ? label(out.index, static_cast<unsigned>(*sub)) + " is described twice"
-                           : "a sub-index of " + what + " without its number was left out",
-                       sub ? "the first counts" : "");
+                       "a sub-index of " + label(out.index) + " without its number was left out");
+                continue;
+            }
+            const std::string what = label(out.index, static_cast<unsigned>(*sub));
+            if (out.find(static_cast<std::uint8_t>(*sub)) != nullptr) {
+                report(Severity::warning, Topic::object, child, what + " is described twice",
+                       "the first counts");
                 continue;
             }
             std::string denotation;
-            Entry one = entry(child, label(out.index, static_cast<unsigned>(*sub)), denotation);
+            Entry one = entry(child, what, denotation);
             one.denotation = denotation;
             one.sub = static_cast<std::uint8_t>(*sub);
             out.entries.push_back(std::move(one));
         }
         std::sort(out.entries.begin(), out.entries.end(),
                   [](const Entry& a, const Entry& b) { return a.sub < b.sub; });
+    }
+
+    /// Makes the object's own entry that of a VAR, and reports a type or a number of sub-objects
+    /// that does not agree with them.
+    void check_type(const Node& node, const std::string& what, Entry& own, Object& out) {
         if (out.entries.empty() && out.single()) {
             own.flags = 0;
             out.entries.push_back(std::move(own));
-        } else if (out.single()) {
+            return;
+        }
+        if (out.single()) {
             report(Severity::warning, Topic::object, node,
                    "object " + what + " is a " + std::string(name_of(out.type)) +
                        ", yet it has sub-indices",
                    "taken for a RECORD");
             out.type = ObjectType::record;
-        } else if (const auto said = number(node, "subNumber", 0x100);
-                   said && *said != out.entries.size()) {
+            return;
+        }
+        const auto stated = number(node, "subNumber", 0x100);
+        if (stated && *stated != out.entries.size()) {
             report(Severity::warning, Topic::count, node,
-                   "'subNumber' of " + what + " is " + std::to_string(*said) +
+                   "'subNumber' of " + what + " is " + std::to_string(*stated) +
                        ", the file describes " + std::to_string(out.entries.size()));
         }
-        if (!out.single()) {
-            out.data_type = own.data_type;
-        }
-        out_.objects.push_back(std::move(out));
     }
 
     Entry entry_of_object(const Node& node, const std::string& what, Object& out) {

@@ -82,26 +82,35 @@ std::uint16_t Srdos::signature(unsigned number) const noexcept {
 }
 
 Abort Srdos::configure(Srdo& s) noexcept {
-    const auto index = static_cast<std::uint16_t>(communication + s.number);
+    read_communication(s);
+    s.plain.clear();
+    s.inverted.clear();
+    if (s.direction == SrdoDirection::none) return Abort::none;
+    if (!is_valid(s)) return Abort::value;
+    return map(s);
+}
 
-    const auto mapping = static_cast<std::uint16_t>(mapping_base + s.number);
+void Srdos::read_communication(Srdo& s) const noexcept {
+    const auto index = static_cast<std::uint16_t>(communication + s.number);
     s.direction = static_cast<SrdoDirection>(dictionary_.get<std::uint8_t>(index, 1, 0));
     s.cycle = dictionary_.get<std::uint16_t>(index, 2, 0) * millisecond;
     s.validation = dictionary_.get<std::uint8_t>(index, 3, 0) * millisecond;
     s.cob = dictionary_.get<std::uint32_t>(index, 5, 0);
-    s.plain.clear();
-    s.inverted.clear();
-    if (s.direction == SrdoDirection::none) return Abort::none;
+}
+
+bool Srdos::is_valid(const Srdo& s) const noexcept {
     const bool in_range = s.cob >= first_id && s.cob < last_id && s.cob % 2 == 1;
-    if (!in_range || dictionary_.get<std::uint32_t>(index, 6, 0) != s.cob + 1 || s.cycle == 0) {
-        return Abort::value;
-    }
-    if (s.direction == SrdoDirection::receives && s.validation == 0) return Abort::value;
-    for (const auto& other : srdos_) {
-        if (&other != &s && other.direction != SrdoDirection::none && other.cob == s.cob) {
-            return Abort::value;
-        }
-    }
+    const auto index = static_cast<std::uint16_t>(communication + s.number);
+    const auto inverted_cob = dictionary_.get<std::uint32_t>(index, 6, 0);
+    if (!in_range || inverted_cob != s.cob + 1 || s.cycle == 0) return false;
+    if (s.direction == SrdoDirection::receives && s.validation == 0) return false;
+    return std::none_of(srdos_.begin(), srdos_.end(), [&](const Srdo& other) {
+        return &other != &s && other.direction != SrdoDirection::none && other.cob == s.cob;
+    });
+}
+
+Abort Srdos::map(Srdo& s) noexcept {
+    const auto mapping = static_cast<std::uint16_t>(mapping_base + s.number);
     const unsigned count = dictionary_.get<std::uint8_t>(mapping, 0, 0);
     if (count == 0 || count % 2 != 0 || count > 128) return Abort::pdo_length;
     std::array<std::uint32_t, 64> plain{}, inverted{};
@@ -113,10 +122,8 @@ Abort Srdos::configure(Srdo& s) noexcept {
         if (((plain[n] ^ inverted[n]) & 0xff) != 0) return Abort::pdo_length;
     }
     const bool received = s.direction == SrdoDirection::receives;
-    if (const auto why = s.plain.build(dictionary_, {plain.data(), count / 2}, received);
-        why != Abort::none) {
-        return why;
-    }
+    const Abort why = s.plain.build(dictionary_, {plain.data(), count / 2}, received);
+    if (why != Abort::none) return why;
     return s.inverted.build(dictionary_, {inverted.data(), count / 2}, received);
 }
 

@@ -150,8 +150,14 @@ private:
     void check_times(Srdo&, Time now) noexcept;
     bool fail_safe_enabled() const noexcept;
     void on_fail_safe(Time now) noexcept;
+    /// Reads all SRDOs from the dictionary. Returns why the configuration is invalid.
     Abort configure() noexcept;
+    /// Reads one SRDO from its objects 13xxh (EN 50325-5). Returns why it is invalid.
     Abort configure(Srdo&) noexcept;
+    void read_communication(Srdo&) const noexcept;
+    /// Returns whether identifiers and times are permitted, and no other SRDO has the identifiers.
+    bool is_valid(const Srdo&) const noexcept;
+    Abort map(Srdo&) noexcept;
 
     Dictionary& dictionary_;
     FrameQueue& out_;
