@@ -244,82 +244,102 @@ void Edit::extend_function(LoadedFunction& function, const plan::Step& step, Ins
     function.instances.push_back(&instance);
 }
 
-void Edit::remove_instance(Instance& leaving) {
-    LoadedComponent& component = *leaving.component;
-    for (const auto& pin : leaving.pins) {
-        Signal* const written =
-            pin->dir == HAL_DIR_OUT && (pin->flags & HAL_PIN_SAFE) ? pin->signal : nullptr;
-        unlink(*pin);
-        // what it drove goes to the declared safe value
-        if (written) {
-            signal_values[written] = pin->safe;
-        }
-    }
-    // functions of its own go; shared ones lose its steps, and go with the last instance
-    struct Gone {
+/// The functions of an instance that leaves.
+struct Edit::LeavingFunctions {
+    /// One of its own, or the last instance of a shared one: it leaves, too.
+    struct Own {
         LoadedFunction* function;
-        std::ptrdiff_t position;
+        std::ptrdiff_t position;  ///< in the component
     };
-    struct Shrunk {
+    /// A shared one that loses the steps of the instance, as it was before.
+    struct Shared {
         LoadedFunction* function;
         std::vector<plan::Step> steps;
         std::vector<Instance*> instances;
     };
-    std::vector<Gone> gone;
-    auto shrunk = std::make_shared<std::vector<Shrunk>>();
+    std::vector<Own> own;  ///< by position
+    std::vector<Shared> shared;
+};
+
+Edit::LeavingFunctions Edit::functions_leaving_with(const Instance& leaving) {
+    LoadedComponent& component = *leaving.component;
+    LeavingFunctions out;
     for (LoadedFunction* const function : leaving.functions) {
         if (function->shared && function->instances.size() > 1) {
-            shrunk->push_back({function, function->steps, function->instances});
-            continue;
+            out.shared.push_back({function, function->steps, function->instances});
+        } else {
+            out.own.push_back(
+                {function, owner(component.functions, function) - component.functions.begin()});
         }
+    }
+    std::sort(out.own.begin(), out.own.end(),
+              [](const auto& a, const auto& b) { return a.position < b.position; });
+    return out;
+}
+
+void Edit::unlink_for_removal(Instance& leaving, const LeavingFunctions& functions) {
+    for (const auto& pin : leaving.pins) {
+        const bool is_safe_output = pin->dir == HAL_DIR_OUT && (pin->flags & HAL_PIN_SAFE);
+        Signal* const written = is_safe_output ? pin->signal : nullptr;
+        unlink(*pin);
+        if (written) {
+            signal_values[written] = pin->safe;
+        }
+    }
+    for (const auto& [function, position] : functions.own) {
         take_from_thread(*function);
         for (const auto& pin : function->pins) {
             unlink(*pin);
         }
-        gone.push_back(
-            {function, owner(component.functions, function) - component.functions.begin()});
     }
-    std::sort(gone.begin(), gone.end(),
-              [](const Gone& a, const Gone& b) { return a.position < b.position; });
-    const auto at = owner(component.instances, &leaving);
-    make_room(removed_.instances);
-    make_room(removed_.functions, gone.size());
-    on_undo(
-        [this, &leaving, &component, position = at - component.instances.begin(), gone, shrunk] {
-        const auto back = owner(removed_.instances, &leaving);
-        component.instances.insert(component.instances.begin() + position, std::move(*back));
-        removed_.instances.erase(back);
-        model_.instance.emplace(leaving.name, &leaving);
-        for (const auto& pin : leaving.pins) {
+}
+
+void Edit::bring_back(Instance& instance, std::ptrdiff_t position,
+                      const LeavingFunctions& functions) {
+    LoadedComponent& component = *instance.component;
+    const auto removed = owner(removed_.instances, &instance);
+    component.instances.insert(component.instances.begin() + position, std::move(*removed));
+    removed_.instances.erase(removed);
+    model_.instance.emplace(instance.name, &instance);
+    for (const auto& pin : instance.pins) {
+        model_.enter(*pin);
+    }
+    for (const auto& [function, position_of_function] : functions.own) {
+        const auto from = owner(removed_.functions, function);
+        component.functions.insert(component.functions.begin() + position_of_function,
+                                   std::move(*from));
+        removed_.functions.erase(from);
+        model_.function.emplace(function->name, function);
+        for (const auto& pin : function->pins) {
             model_.enter(*pin);
         }
-        for (const auto& [function, place] : gone) {
-            const auto from = owner(removed_.functions, function);
-            component.functions.insert(component.functions.begin() + place, std::move(*from));
-            removed_.functions.erase(from);
-            model_.function.emplace(function->name, function);
-            for (const auto& pin : function->pins) {
-                model_.enter(*pin);
-            }
-        }
-        for (const auto& s : *shrunk) {
-            s.function->steps = s.steps;
-            s.function->instances = s.instances;
-        }
+    }
+    for (const auto& before : functions.shared) {
+        before.function->steps = before.steps;
+        before.function->instances = before.instances;
+    }
+}
+
+void Edit::remove_instance(Instance& leaving) {
+    LoadedComponent& component = *leaving.component;
+    const auto functions =
+        std::make_shared<const LeavingFunctions>(functions_leaving_with(leaving));
+    unlink_for_removal(leaving, *functions);
+    const auto at = owner(component.instances, &leaving);
+    make_room(removed_.instances);
+    make_room(removed_.functions, functions->own.size());
+    on_undo([this, &leaving, position = at - component.instances.begin(), functions] {
+        bring_back(leaving, position, *functions);
     });
     for (const auto& pin : leaving.pins) {
         model_.leave(*pin);
     }
     model_.instance.erase(leaving.name);
-    for (const auto& s : *shrunk) {
-        for (std::size_t i = s.function->instances.size(); i-- > 0;) {
-            if (s.function->instances[i] != &leaving) continue;
-            s.function->instances.erase(s.function->instances.begin() +
-                                        static_cast<std::ptrdiff_t>(i));
-            s.function->steps.erase(s.function->steps.begin() + static_cast<std::ptrdiff_t>(i));
-        }
+    for (const auto& before : functions->shared) {
+        drop_steps_of(leaving, *before.function);
     }
-    for (auto it = gone.rbegin(); it != gone.rend(); ++it) {
+    // from the last one: the positions of the others stay
+    for (auto it = functions->own.rbegin(); it != functions->own.rend(); ++it) {
         for (const auto& pin : it->function->pins) {
             model_.leave(*pin);
         }
@@ -332,6 +352,14 @@ void Edit::remove_instance(Instance& leaving) {
     component.instances.erase(at);
     if (component.process == 0) {
         structural_ = true;  // of a program, only what its links were
+    }
+}
+
+void Edit::drop_steps_of(const Instance& leaving, LoadedFunction& function) noexcept {
+    for (std::size_t i = function.instances.size(); i-- > 0;) {
+        if (function.instances[i] != &leaving) continue;
+        function.instances.erase(function.instances.begin() + static_cast<std::ptrdiff_t>(i));
+        function.steps.erase(function.steps.begin() + static_cast<std::ptrdiff_t>(i));
     }
 }
 
@@ -396,43 +424,61 @@ bool Edit::replace(LoadedComponent& component, std::unique_ptr<LoadedComponent>&
 
 // --- functions and threads ---
 
-Thread* Edit::add_thread(Word name, const ThreadOptions& options) {
-    if (!check_name("thread", name)) return nullptr;
+namespace {
+
+/// A pin that each thread has.
+struct ThreadPin {
+    const char* suffix;
+    hal_type type;
+    hal_dir dir;
+    hal_pin Thread::* memory;
+    const char* doc;
+    const char* unit;
+};
+constexpr ThreadPin thread_pins[] = {
+    {".time", HAL_TYPE_S32, HAL_DIR_OUT, &Thread::time, "execution time of the last cycle", "ns"},
+    {".tmax", HAL_TYPE_S32, HAL_DIR_PARAM, &Thread::tmax,
+     "longest execution time; set to 0 to reset", "ns"},
+    {".tmax-increased", HAL_TYPE_BIT, HAL_DIR_OUT, &Thread::tmax_increased,
+     "TRUE when the last cycle was the longest so far", ""},
+    {".threadbeat", HAL_TYPE_U32, HAL_DIR_OUT, &Thread::beat, "number of cycles", ""},
+    {".missed", HAL_TYPE_U32, HAL_DIR_OUT, &Thread::missed, "missed periods", ""},
+    {".wakeup", HAL_TYPE_S32, HAL_DIR_OUT, &Thread::wakeup, "wake-up latency of the last cycle",
+     "ns"},
+};
+
+}  // namespace
+
+bool Edit::is_free_for_thread(Word name) {
+    if (!check_name("thread", name)) return false;
     if (const Thread* const there = model_.find_thread(name.text)) {
         fail("name-taken", name.span, "thread " + hal::quoted(name.text) + " already exists",
              "second time", Other{there->made, "created here"});
-        return nullptr;
+        return false;
     }
-    for (const char* pin :
-         {".time", ".tmax", ".tmax-increased", ".threadbeat", ".missed", ".wakeup"}) {
-        if (!name_free(std::string(name.text) + pin, name.span, "pin of this thread")) {
-            return nullptr;
-        }
-    }
+    return std::all_of(std::begin(thread_pins), std::end(thread_pins), [&](const ThreadPin& pin) {
+        return name_free(std::string(name.text) + pin.suffix, name.span, "pin of this thread");
+    });
+}
+
+Thread* Edit::add_thread(Word name, const ThreadOptions& options) {
+    if (!is_free_for_thread(name)) return nullptr;
     auto owned = std::make_unique<Thread>();
     Thread* const made = owned.get();
     made->name = name.text;
     made->options = options;
     made->made = name.span;
-    const auto add = [&](const char* suffix, hal_type type, hal_dir dir, hal_pin& memory,
-                         const char* doc, const char* unit) {
-        auto pin = own_pin(model_, made->name + suffix, type, dir, memory, doc, unit);
+    for (const ThreadPin& row : thread_pins) {
+        auto pin = own_pin(model_, made->name + row.suffix, row.type, row.dir, made->*row.memory,
+                           row.doc, row.unit);
         pin->of_thread = made;
         made->pins.push_back(std::move(pin));
-    };
-    add(".time", HAL_TYPE_S32, HAL_DIR_OUT, made->time, "execution time of the last cycle", "ns");
-    add(".tmax", HAL_TYPE_S32, HAL_DIR_PARAM, made->tmax,
-        "longest execution time; set to 0 to reset", "ns");
-    add(".tmax-increased", HAL_TYPE_BIT, HAL_DIR_OUT, made->tmax_increased,
-        "TRUE when the last cycle was the longest so far", "");
-    add(".threadbeat", HAL_TYPE_U32, HAL_DIR_OUT, made->beat, "number of cycles", "");
-    add(".missed", HAL_TYPE_U32, HAL_DIR_OUT, made->missed, "missed periods", "");
-    add(".wakeup", HAL_TYPE_S32, HAL_DIR_OUT, made->wakeup, "wake-up latency of the last cycle",
-        "ns");
-    const auto place = std::upper_bound(
+    }
+    // the fastest thread first
+    const auto behind = std::upper_bound(
         model_.threads.begin(), model_.threads.end(), options.period_ns,
         [](std::int64_t period, const auto& other) { return period < other->options.period_ns; });
-    const auto position = place - model_.threads.begin();
+    const auto position = behind - model_.threads.begin();
     make_room(model_.threads);
     on_undo([this, made] {
         for (const auto& pin : made->pins) {

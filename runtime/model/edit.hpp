@@ -55,6 +55,7 @@ public:
     void note_arguments(LoadedComponent& component, std::string text, Load load);
     /// A shared function gets one more instance.
     void extend_function(LoadedFunction& function, const plan::Step& step, Instance& instance);
+    /// Takes an instance out of the model with its pins, its functions and all their links.
     void remove_instance(Instance& instance);
     void remove_component(LoadedComponent& component);
     void add_time_pins(LoadedFunction& function);
@@ -65,6 +66,19 @@ public:
     bool replace(LoadedComponent& component, std::unique_ptr<LoadedComponent>& fresh, Span at);
 
 private:
+    struct LeavingFunctions;
+
+    /// Returns which functions leave with the instance, and which lose only its steps.
+    static LeavingFunctions functions_leaving_with(const Instance& leaving);
+    /// Takes the pins off their signals and the functions out of their threads. A signal that an
+    /// output with a declared safe value wrote goes to that value.
+    void unlink_for_removal(Instance& leaving, const LeavingFunctions& functions);
+    static void drop_steps_of(const Instance& leaving, LoadedFunction& function) noexcept;
+    /// Undoes remove_instance().
+    void bring_back(Instance& instance, std::ptrdiff_t position, const LeavingFunctions& functions);
+    /// Reports why a thread cannot have this name: an invalid one, or one that it or a pin of it
+    /// would share.
+    bool is_free_for_thread(Word name);
     bool name_free(std::string_view name, Span at, const char* what);
     bool names_free(const Instance& of, const std::vector<std::unique_ptr<Pin>>& pins,
                     const std::vector<std::unique_ptr<LoadedFunction>>& functions);
