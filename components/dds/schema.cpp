@@ -258,7 +258,8 @@ private:
 };
 
 /// Matches joints by name, in any order; a missing one keeps its value.
-void walk_joints(const Schema& schema, Walk& walk, hal_value* to) noexcept {
+void walk_joints(const Schema& schema, Walk& walk, hal_value* to,
+                 std::span<bool> has_joint) noexcept {
     const auto ours = schema.names.size();
     const auto count = walk.get<std::uint32_t>();
     if (!walk.has(std::size_t{count} * 4)) return;
@@ -280,15 +281,18 @@ void walk_joints(const Schema& schema, Walk& walk, hal_value* to) noexcept {
         }
         for (std::uint32_t i = 0; i < values && walk.good(); ++i) {
             const auto value = walk.get<double>();
-            if (to != nullptr && which[i] < ours) {
-                to[part * ours + which[i]].real = value;
+            if (to == nullptr || which[i] >= ours) continue;
+            to[part * ours + which[i]].real = value;
+            if (!has_joint.empty()) {
+                has_joint[which[i]] = true;
             }
         }
     }
 }
 
 /// `to` may be nullptr: then it only looks whether all is well.
-bool walk_all(const Schema& schema, std::span<const std::uint8_t> bytes, hal_value* to) noexcept {
+bool walk_all(const Schema& schema, std::span<const std::uint8_t> bytes, hal_value* to,
+              std::span<bool> has_joint = {}) noexcept {
     Walk walk(bytes);
     hal_value ignored;
     std::size_t next = 0;
@@ -310,7 +314,7 @@ bool walk_all(const Schema& schema, std::span<const std::uint8_t> bytes, hal_val
         case 'B': walk.get<std::uint8_t>(); break;
         case 's': walk.text(); break;
         case 'q': walk.skip(walk.get<std::uint32_t>()); break;
-        case 'j': walk_joints(schema, walk, to); break;
+        case 'j': walk_joints(schema, walk, to, has_joint); break;
         default: return false;
         }
         if (!walk.good()) return false;
@@ -412,10 +416,10 @@ Schema Schema::of_ros(std::string_view ros, const std::vector<std::string>& name
     return schema;
 }
 
-bool decode(const Schema& schema, std::span<const std::uint8_t> bytes,
-            std::span<hal_value> values) noexcept {
+bool decode(const Schema& schema, std::span<const std::uint8_t> bytes, std::span<hal_value> values,
+            std::span<bool> has_joint) noexcept {
     if (values.size() < schema.fields.size() || !walk_all(schema, bytes, nullptr)) return false;
-    return walk_all(schema, bytes, values.data());
+    return walk_all(schema, bytes, values.data(), has_joint);
 }
 
 }  // namespace hal::dds

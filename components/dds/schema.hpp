@@ -62,9 +62,10 @@ struct Schema {
 };
 
 /// Decodes the values of the fields, in their order, from an untrusted sample; joints that a
-/// JointState does not contain keep their value. Returns false and leaves `values` unchanged when
-/// the bytes are not of this type. Allocates nothing. [any]
-bool decode(const Schema&, std::span<const std::uint8_t> bytes,
-            std::span<hal_value> values) noexcept;
+/// JointState does not contain keep their value. `has_joint`, if it is not empty, has an element for
+/// each joint, which is set for those that it contains with a value. Returns false and leaves
+/// `values` unchanged when the bytes are not of this type. Allocates nothing. [any]
+bool decode(const Schema&, std::span<const std::uint8_t> bytes, std::span<hal_value> values,
+            std::span<bool> has_joint = {}) noexcept;
 
 }  // namespace hal::dds

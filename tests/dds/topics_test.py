@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """Two machines on a topic and their faults: a killed publisher, another type, a flood, a wrong clock, malformed samples."""
+
 import contextlib
 import os
 import re
@@ -9,7 +10,7 @@ import unittest
 
 from pathlib import Path
 
-from rig import DdsCase, wait_until
+from rig import DOMAIN, DdsCase, wait_until
 
 # The participant uses loopback only; the writer's QoS is incompatible with dds_subscribe's readers.
 PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
@@ -34,7 +35,40 @@ PROFILE = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
+JOINTS = """loadrt threads name1=servo period1=1000000
+loadrt {component} topic=/js ros=sensor_msgs/JointState domain={domain} {arguments}
+addf j servo
+{more}
+"""
+
+
 class Topics(DdsCase):
+    def joints(self, instance, component, arguments, more=""):
+        return self.machine(
+            instance,
+            JOINTS.format(
+                component=component, domain=DOMAIN, arguments="names=j " + arguments, more=more
+            ),
+        )
+
+    def test_a_joint_of_a_publisher_that_was_lost_makes_the_topic_invalid(self):
+        self.joints("subscriber", "dds_subscribe", "joints=c,b timeout_ms=500 silence_ms=500")
+        self.joints("arm", "dds_publish", "joints=a,b rate=100", "setp j.b-position 2")
+        self.becomes("j.b-position", "2")
+        self.prints("no sample contains joint 'c'; compare joints= with the names")
+        self.assertEqual("FALSE", self.value("j.valid", "subscriber"))
+        self.assertEqual("inf", self.value("j.age-ms", "subscriber"))
+        gripper = self.joints("gripper", "dds_publish", "joints=c rate=100", "setp j.c-position 3")
+        self.becomes("j.valid", "TRUE")
+        self.assertEqual("3", self.value("j.c-position", "subscriber"))
+        gripper.kill()
+        gripper.wait()
+        self.becomes("j.valid", "FALSE")
+        self.assertRegex(
+            self.shell("show", "fault", instance="subscriber").stdout,
+            r"j: no value of joint 'c' in topic 'rt/js' for 0\.\d+ s \(timeout 500 ms\)",
+        )
+
     def test_a_killed_publisher_makes_the_pins_invalid_and_its_successor_makes_them_valid(self):
         publisher = self.publisher(1.5)
         self.subscriber(more="timeout_ms=300")

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 #include <mutex>
+#include <utility>
 
 #include "dds/field_pins.hpp"
 #include "dds/topic_connection.hpp"
@@ -25,6 +26,10 @@ struct Message {
     std::uint64_t received = 0;
     std::uint64_t malformed = 0;
     bool clock_differs = false;
+    // of a JointState, which several publishers may share
+    bool is_complete = true;  // each joint has had a value
+    std::size_t oldest_joint = 0;
+    std::int64_t lag_ns = 0;  // from the newest value of that joint to this sample
 };
 
 class DdsSubscribe : public hal::Component, private Listener, private Served {
@@ -38,6 +43,12 @@ public:
         const std::string limit = std::to_string(timeout_ / 1'000'000) + " ms";
         stale_text_ = "no sample of topic '" + topic_.name + "' for {} s (timeout " + limit +
                       "); its pins are not valid";
+        for (const std::string& joint : schema_.names) {
+            joint_texts_.push_back("no value of joint '" + joint + "' in topic '" + topic_.name +
+                                   "' for {} s (timeout " + limit +
+                                   "); the pins of the topic are not valid");
+        }
+        joint_ns_.resize(schema_.names.size());
     }
 
     void start() {
@@ -59,13 +70,14 @@ public:
             constexpr std::int64_t max_wait_ns = 10'000'000'000;
             const std::int64_t waited = now - m.monotonic_ns;
             const bool is_plausible = waited >= 0 && waited < max_wait_ns;
-            seen_ = is_plausible ? m.monotonic_ns : now;
+            sample_seen_ = is_plausible ? m.monotonic_ns : now;
+            seen_ = sample_seen_ - m.lag_ns;
             transit_ = m.transit_ns;
             seq = m.sequence;
             lost = m.lost;
             received = m.received;
             clock_differs = m.clock_differs;
-            have_ = true;
+            have_ = m.is_complete;
         }
         const std::int64_t silence = now - seen_;
         if (have_) {
@@ -74,8 +86,9 @@ public:
         const bool good = have_ && silence <= timeout_;
         if (!good && valid) {
             fields_.make_safe();
-            stale_fault_.begin(faults_, this, stale_text_.c_str(),
-                               static_cast<double>(silence) * 1e-9);
+            const bool lacks_joint = now - sample_seen_ <= timeout_;
+            const std::string& text = lacks_joint ? joint_texts_[m.oldest_joint] : stale_text_;
+            stale_fault_.begin(faults_, this, text.c_str(), static_cast<double>(silence) * 1e-9);
         }
         if (good && stale_fault_.lasts()) {
             stale_fault_.end(faults_, this);
@@ -159,7 +172,7 @@ private:
             ++message_.received;
             return;
         }
-        if (!decode(schema_, s.bytes, message_.values)) {
+        if (!decode(schema_, s.bytes, message_.values, has_joint_)) {
             if (malformed_.fetch_add(1, std::memory_order_relaxed) == 0) {
                 arguments_.log("topic '" + topic_.name + "': dropped a malformed sample of " +
                                std::to_string(s.bytes.size()) + " bytes; expected type " +
@@ -170,6 +183,7 @@ private:
         }
         ++message_.received;
         message_.monotonic_ns = s.monotonic_ns;
+        note_joints(s.monotonic_ns);
         const std::int64_t transit = s.received_ns - s.source_ns;
         message_.clock_differs = transit < -5'000'000 || transit > 2 * second;
         message_.transit_ns = message_.clock_differs ? 0 : std::max<std::int64_t>(transit, 0);
@@ -177,6 +191,23 @@ private:
             check_clock(transit);
         }
         mailbox_.put(message_);
+    }
+
+    /// The topic is as old as the joint whose value is the oldest.
+    void note_joints(std::int64_t now) noexcept {
+        if (joint_ns_.empty()) return;
+        for (std::size_t i = 0; i < joint_ns_.size(); ++i) {
+            if (std::exchange(has_joint_[i], false)) {
+                joint_ns_[i] = now;
+            }
+        }
+        const auto oldest = std::min_element(joint_ns_.begin(), joint_ns_.end());
+        message_.oldest_joint = static_cast<std::size_t>(oldest - joint_ns_.begin());
+        message_.is_complete = *oldest != 0;
+        message_.lag_ns = message_.is_complete ? now - *oldest : 0;
+        missing_joint_.store(
+            message_.is_complete ? -1 : static_cast<std::ptrdiff_t>(message_.oldest_joint),
+            std::memory_order_relaxed);
     }
 
     void check_rate() noexcept {
@@ -248,8 +279,26 @@ private:
                            "or XCDR2 of a final type, and the firewall");
         }
         silent_.store(quiet, std::memory_order_relaxed);
+        report_missing_joint(now);
         arguments_.flush_log();
         return now + 20'000'000;
+    }
+
+    /// Reports once a joint that no sample contains. [the DDS thread]
+    void report_missing_joint(std::int64_t now) noexcept {
+        const std::ptrdiff_t missing = missing_joint_.load(std::memory_order_relaxed);
+        if (missing < 0) {
+            missing_since_ = 0;
+            return;
+        }
+        if (missing_since_ == 0) {
+            missing_since_ = now;
+        }
+        if (now - missing_since_ < silence_ms_ * 1'000'000 || reported_joint_ == missing) return;
+        reported_joint_ = missing;
+        arguments_.log("topic '" + topic_.name + "': no sample contains joint '" +
+                       schema_.names[static_cast<std::size_t>(missing)] +
+                       "'; compare joints= with the names that its publishers send");
     }
 
     Arguments arguments_{*this};
@@ -317,12 +366,14 @@ private:
     const hal_faults* faults_ = nullptr;
     hal::LastingFault stale_fault_, second_fault_;
     std::int64_t timeout_ = 0;
-    std::int64_t seen_ = 0;
+    std::int64_t seen_ = 0;  // the oldest value of the newest sample
+    std::int64_t sample_seen_ = 0;
     std::int64_t transit_ = 0;
     bool have_ = false;
     std::uint64_t others_seen_ = 0;
     std::int64_t second_until_ = INT64_MIN;
     std::string stale_text_;
+    std::vector<std::string> joint_texts_;
     const bool exclusive_ =
         exclusive_argument_ == 1 || (exclusive_argument_ == -1 && schema_.ros.empty());
     const std::string second_text_ =
@@ -336,9 +387,12 @@ private:
     std::int64_t window_ = 0;
     double rate_ = 0;
     bool clock_differed_ = false;
+    std::array<bool, 256> has_joint_{};
+    std::vector<std::int64_t> joint_ns_;  // when each joint had its newest value; 0: never
     // Between them
     hal::Mailbox<Message> mailbox_{message_};
     std::atomic<State> state_{State::waiting};
+    std::atomic<std::ptrdiff_t> missing_joint_{-1};  // in all samples so far
     std::atomic<std::uint64_t> malformed_{0};
     std::atomic<std::int64_t> last_{0};
     std::atomic<bool> silent_{false};
@@ -352,6 +406,8 @@ private:
     State reported_ = State::waiting;
     bool reported_second_ = false;
     std::int64_t quiet_since_ = 0;
+    std::int64_t missing_since_ = 0;
+    std::ptrdiff_t reported_joint_ = -1;
 
     TopicConnection<Reader> connection_;
 };
@@ -384,5 +440,7 @@ named. `exclusive=0`, the default with `ros=`, accepts all publishers.
 
 `silent`: a publisher is matched, but sent nothing for `silence_ms`. `wrong-type`: another
 participant uses the topic with another type. Each is reported once on standard error. `ros=` is as
-for `dds_publish`; joints are matched by name, in any order.
+for `dds_publish`; joints are matched by name, in any order. Several publishers may each send some
+of the `joints=`: `valid` and `age-ms` are those of the joint whose newest value is the oldest, and a
+joint that no sample contains is reported after `silence_ms`.
 )")
