@@ -30,6 +30,14 @@ const char* code_of(Topic);
 /// The order of the bytes of a value of several registers.
 enum class Order : std::uint8_t { abcd, cdab, badc, dcba };
 
+/// When the values of an answer are accepted: at once, or when the last two answers to the same
+/// request are equal.
+enum class Confirm : std::uint8_t {
+    on_errors,  ///< when they are equal, while answers are corrupt
+    never,
+    always,
+};
+
 /// What a value is for.
 enum class Purpose : std::uint8_t { pin, speed, load, running, fault };
 
@@ -81,6 +89,7 @@ struct Slave {
     std::uint16_t max_registers = max_read_registers;
     std::uint16_t max_gap = 8;  ///< unused registers that are read along with others
     bool single_writes = false;
+    Confirm confirm = Confirm::on_errors;
     std::vector<Value> values;
     std::optional<Drive> drive;
     std::vector<Write> stop;

@@ -33,6 +33,8 @@ constexpr const char* value_usage =
 constexpr const char* write_usage = "write TABLE ADDRESS VALUE, ...: holding 0x2000 1, coil 0x4B 1";
 
 constexpr bus::Choice<Framing> framings[] = {{"rtu", Framing::rtu}, {"tcp", Framing::tcp}};
+constexpr bus::Choice<Confirm> confirms[] = {
+    {"errors", Confirm::on_errors}, {"no", Confirm::never}, {"yes", Confirm::always}};
 constexpr bus::Choice<Order> orders[] = {
     {"abcd", Order::abcd}, {"cdab", Order::cdab}, {"badc", Order::badc}, {"dcba", Order::dcba}};
 
@@ -90,6 +92,10 @@ const bus::KeyTable<Slave>& slave_keys() {
          "the slave rejects registers that it does not have."},
         {"single-writes", bus::flag(&Slave::single_writes), "`no`",
          "The slave does not support function 16 (write multiple registers)."},
+        {"confirm", bus::choice(&Slave::confirm, confirms), "`errors`",
+         "`yes`: a value is accepted when two answers in a row are equal. `errors`: only while "
+         "more "
+         "than 3 % of the answers are corrupt. `no`: never."},
         {"stop", "writes: `holding 0x2000 1, coil 3 0`", "that of the profile",
          "The stop telegrams, in their order; `none`: none."},
         {"stop-attempts", bus::number(&Slave::stop_attempts, 1, 1000), "`5`",

@@ -14,6 +14,10 @@ constexpr std::int64_t tick_ns = 10'000'000;
 
 bool parse_fault_option(std::string_view key, std::string_view value, SlaveFault& fault) {
     if (key == "unit") return parse_whole(value, fault.unit);
+    if (key == "share") {
+        return fault.kind == FaultKind::noise && parse_whole(value, fault.share) &&
+               fault.share >= 0 && fault.share <= 1;
+    }
     if (key == "every") return parse_whole(value, fault.every) && fault.every > 0;
     const auto time = parse_duration_ns(value);
     if (!time || *time < 0) return false;
@@ -36,7 +40,7 @@ std::string parse_fault(std::string_view text, SlaveFault& fault) {
     const auto* at = std::find(std::begin(fault_names), std::end(fault_names), name);
     if (at == std::end(fault_names)) {
         return "unknown fault '" + std::string(name) +
-               "'; write silence, late, corrupt, wrong-unit, exception or half";
+               "'; write silence, late, corrupt, wrong-unit, exception, half or noise";
     }
     fault.kind = static_cast<FaultKind>(at - std::begin(fault_names));
     for (auto rest = text.substr(name.size()); !rest.empty();) {
@@ -47,7 +51,9 @@ std::string parse_fault(std::string_view text, SlaveFault& fault) {
         const std::string_view value = item.substr(std::min(equals + 1, item.size()));
         if (!parse_fault_option(item.substr(0, equals), value, fault)) {
             return "invalid option '" + std::string(item) +
-                   "'; options are unit=N, every=N, late=TIME, from=TIME, for=TIME";
+                   "'; options are unit=N, every=N, late=TIME, from=TIME, for=TIME, and share=0.1 "
+                   "of "
+                   "noise";
         }
     }
     if (fault.until_ns != INT64_MAX) {
@@ -100,6 +106,7 @@ std::int64_t SlaveBus::work(std::int64_t now_ns) {
     }
     while (const std::size_t count = line_->receive(buffer_.free_space(), now_ns)) {
         last_byte_ns_ = now_ns;
+        disturb(buffer_.free_space().first(count), now_ns);
         buffer_.added(count);
         if (buffer_.free_space().empty()) break;
     }
@@ -121,6 +128,7 @@ std::int64_t SlaveBus::work(std::int64_t now_ns) {
     std::int64_t next = now_ns + tick_ns;
     for (auto at = pending_.begin(); at != pending_.end();) {
         if (at->at_ns <= now_ns) {
+            disturb({at->frame.bytes.data(), at->frame.size}, now_ns);
             line_->send(at->frame.span(), now_ns);
             at = pending_.erase(at);
         } else {
@@ -132,10 +140,24 @@ std::int64_t SlaveBus::work(std::int64_t now_ns) {
 }
 
 bool SlaveBus::hits(SlaveFault& fault, std::uint8_t unit, std::int64_t now_ns) const {
-    if (!fault.is_active || (fault.unit != 0 && fault.unit != unit)) return false;
+    if (fault.unit != 0 && fault.unit != unit) return false;
+    return is_in_time(fault, now_ns) && ++fault.matches % fault.every == 0;
+}
+
+bool SlaveBus::is_in_time(const SlaveFault& fault, std::int64_t now_ns) const {
     const std::int64_t since = now_ns - begin_ns_;
-    if (since < fault.from_ns || since >= fault.until_ns) return false;
-    return ++fault.matches % fault.every == 0;
+    return fault.is_active && since >= fault.from_ns && since < fault.until_ns;
+}
+
+/// Each byte that noise strikes gets another value.
+void SlaveBus::disturb(std::span<std::uint8_t> bytes, std::int64_t now_ns) {
+    for (const SlaveFault& fault : faults_) {
+        if (fault.kind != FaultKind::noise || !is_in_time(fault, now_ns)) continue;
+        for (std::uint8_t& byte : bytes) {
+            if (!random_.draw_bool(fault.share)) continue;
+            byte = static_cast<std::uint8_t>(byte ^ (1 + random_.draw() % 255));
+        }
+    }
 }
 
 void SlaveBus::serve(const Found& found, std::int64_t now_ns) {
@@ -156,6 +178,7 @@ void SlaveBus::serve(const Found& found, std::int64_t now_ns) {
     for (SlaveFault& fault : faults_) {
         if (!hits(fault, found.unit, now_ns)) continue;
         switch (fault.kind) {
+        case FaultKind::noise: break;  // of the bytes
         case FaultKind::silence: return;
         case FaultKind::late: at += fault.late_ns; break;
         case FaultKind::corrupt: corrupt = true; break;

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "link/disturbances.hpp"
 #include "link/line.hpp"
 #include "modbus/device/slave.hpp"
 #include "modbus/wire/frame.hpp"
@@ -22,10 +23,11 @@ enum class FaultKind : std::uint8_t {
     wrong_unit,  ///< answers with another address
     exception,   ///< answers with exception 4
     half,        ///< sends the first half of the answer
+    noise,       ///< bytes on the line are changed, of requests and of answers
 };
-inline constexpr const char* fault_names[] = {"silence",    "late",      "corrupt",
-                                              "wrong-unit", "exception", "half"};
-inline constexpr std::size_t fault_kinds = 6;
+inline constexpr const char* fault_names[] = {"silence",   "late", "corrupt", "wrong-unit",
+                                              "exception", "half", "noise"};
+inline constexpr std::size_t fault_kinds = 7;
 
 struct SlaveFault {
     FaultKind kind = FaultKind::silence;
@@ -34,10 +36,11 @@ struct SlaveFault {
     std::int64_t from_ns = 0;
     std::int64_t until_ns = INT64_MAX;  ///< since the first work()
     std::int64_t late_ns = 200'000'000;
+    double share = 0.1;  ///< of the bytes, of noise
     std::uint64_t matches = 0;  ///< answers so far
     bool is_active = true;
 };
-/// Parses `late:unit=2:every=50:late=120ms:from=1s:for=2s`. Returns the problem, or "".
+/// Parses `late:unit=2:every=50:late=120ms:from=1s:for=2s` or `noise:share=0.1`. Returns the problem, or "".
 std::string parse_fault(std::string_view text, SlaveFault& fault);
 
 class SlaveBus {
@@ -57,6 +60,8 @@ public:
 private:
     void serve(const Found& found, std::int64_t now_ns);
     bool hits(SlaveFault& fault, std::uint8_t unit, std::int64_t now_ns) const;
+    bool is_in_time(const SlaveFault& fault, std::int64_t now_ns) const;
+    void disturb(std::span<std::uint8_t> bytes, std::int64_t now_ns);
     bool dialect(std::uint8_t unit);
 
     struct Pending {
@@ -74,6 +79,7 @@ private:
     std::int64_t begin_ns_ = 0;
     std::int64_t last_byte_ns_ = 0;
     std::uint64_t requests_ = 0;
+    link::Random random_;  // of the noise
     ReceiveBuffer buffer_;
     std::vector<Pending> pending_;
 };

@@ -17,6 +17,11 @@ constexpr std::int64_t burst_ns = 20 * millisecond;
 constexpr std::int64_t verify_ns = 3'000 * millisecond;
 constexpr std::int64_t exception_pause_ns = 1'000 * millisecond;
 constexpr std::int64_t poll_ns = millisecond;  // of set-points and stop requests
+// a corrupt answer counts as many as 32 others: the threshold is a share of 1 of 33
+constexpr std::uint32_t corrupt_weight = 32;
+constexpr std::uint32_t disturbed_above = 2 * corrupt_weight - 1;
+constexpr std::uint32_t max_disturbance = 4 * corrupt_weight;
+constexpr std::uint32_t max_rereads = 3;  // at once, of a value that changes
 constexpr std::int64_t probe_share = 20;       // 1/20 of the line: 5 %
 constexpr std::int64_t urgent_share = 4;       // 1/4
 // a slave that was just lost may not have received a command, as the stop of a drive
@@ -65,11 +70,15 @@ Master::Master(const Bus& bus, const Plan& plan, Image image)
     std::size_t max_cells = 2;
     for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
         telegrams_[n].sent.resize(cells_of(n));
+        if (plan.telegrams[n].kind == Telegram::Kind::read) {
+            telegrams_[n].answer.reserve(max_pdu);
+        }
         max_cells = std::max(max_cells, cells_of(n));
     }
     job_.cells.reserve(max_cells);
     for (std::uint32_t n = 0; n < slaves_.size(); ++n) {
         make_sync(n);
+        slaves_[n].confirms = bus.slaves[n].confirm == Confirm::always;
     }
     has_reads_ = std::any_of(plan.telegrams.begin(), plan.telegrams.end(),
                              [](const Telegram& t) { return t.kind == Telegram::Kind::read; });
@@ -318,6 +327,7 @@ void Master::succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) no
     if (t.kind == Telegram::Kind::read) {
         is_echo_known_ = true;
         is_verified_ = true;
+        if (!confirm(data, now_ns)) return end_of_job();
         store(t, data);
     } else {
         own.sent = job_.cells;
@@ -327,6 +337,40 @@ void Master::succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) no
     image_.failures(job_.telegram).store(0, std::memory_order_relaxed);
     touch(job_.slave);
     end_of_job();
+}
+
+/// Keeps the share of corrupt answers of a slave: a rising one counts at once, a falling one slowly.
+void Master::rate(std::uint32_t slave, bool is_corrupt) noexcept {
+    SlaveState& state = slaves_[slave];
+    if (is_corrupt) {
+        state.disturbance = std::min(state.disturbance + corrupt_weight, max_disturbance);
+    } else if (state.disturbance > 0) {
+        --state.disturbance;
+    }
+    if (bus_.slaves[slave].confirm != Confirm::on_errors) return;
+    if (state.disturbance > disturbed_above) {
+        state.confirms = true;
+    } else if (state.disturbance == 0) {
+        state.confirms = false;
+    }
+}
+
+/// Returns whether the answer to a read is accepted. One of 65536 random frames has a valid check
+/// sequence, and a slave answers a request that was changed into another valid one. Two answers in
+/// a row that are wrong and equal are not expected in the life of a machine.
+bool Master::confirm(std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept {
+    TelegramState& own = telegrams_[job_.telegram];
+    const bool is_equal =
+        std::equal(own.answer.begin(), own.answer.end(), data.begin(), data.end());
+    own.answer.assign(data.begin(), data.end());
+    if (is_equal || !slaves_[job_.slave].confirms) {
+        own.unconfirmed = 0;
+        return true;
+    }
+    if (++own.unconfirmed <= max_rereads) {
+        own.due_ns = now_ns;
+    }
+    return false;
 }
 
 void Master::store(const Telegram& t, std::span<const std::uint8_t> data) noexcept {
@@ -352,6 +396,7 @@ void Master::answered(std::uint32_t slave, std::int64_t now_ns) noexcept {
     const bool returns = !state.is_known || state.is_offline;
     state.failures = 0;
     state.is_offline = false;
+    rate(slave, false);
     if (!returns) return;
     state.is_known = true;
     state.is_corrupt = false;
@@ -392,6 +437,7 @@ void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexc
     }
     if (failure == Failure::corrupt) {
         own.errors.fetch_add(1, std::memory_order_relaxed);
+        rate(job_.slave, true);
         if (!state.is_corrupt) {
             state.is_corrupt = true;
             image_.tell({Event::slave_corrupt, job_.slave, 0, 0});

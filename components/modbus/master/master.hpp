@@ -68,6 +68,8 @@ private:
         std::int64_t offline_since_ns = 0;
         bool is_known = false;  ///< an answer has arrived, or it was reported offline
         bool is_corrupt = false;  ///< reported
+        std::uint32_t disturbance = 0;  ///< rises with corrupt answers, falls with others
+        bool confirms = false;  ///< accepts what two answers in a row have
         std::uint32_t rejected_telegrams = 0;
         /// A read that no answer to another read of the slave can answer. It comes first after a
         /// timeout on RTU: a slave answers in order, so that its answer is behind all late ones.
@@ -90,6 +92,8 @@ private:
         std::vector<std::uint64_t> sent;  ///< cells that the slave has acknowledged
         bool is_sent = false;  ///< `sent` is valid
         std::uint32_t rejections = 0;  ///< in a row
+        std::vector<std::uint8_t> answer;  ///< data of the last one, of a read
+        std::uint32_t unconfirmed = 0;  ///< answers in a row
     };
     /// The requests of a telegram, or a stop telegram, one after the other.
     struct Job {
@@ -116,6 +120,8 @@ private:
     bool finish_exchange(std::int64_t now_ns) noexcept;
     bool accept(const Found& found, std::int64_t now_ns) noexcept;
     void succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept;
+    void rate(std::uint32_t slave, bool is_corrupt) noexcept;
+    bool confirm(std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept;
     void store(const Telegram& t, std::span<const std::uint8_t> data) noexcept;
     void fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexcept;
     void fail_stop(Failure failure, std::int64_t now_ns) noexcept;

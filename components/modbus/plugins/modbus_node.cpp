@@ -131,6 +131,9 @@ struct ModbusNode : hal::Component {
     hal::In<bool> exception_{*this, "exception", "requests are answered with exception 4"};
     hal::In<bool> half_{*this, "half", "only the first half of an answer is sent"};
     hal::In<std::uint32_t> unit_{*this, "fault-unit", "the slave of these faults; 0: all"};
+    hal::In<double> noise_{*this, "noise",
+                           "share of the bytes on the line that are changed, 0..1, of requests and "
+                           "of answers of all slaves"};
     hal::Out<std::uint64_t> requests_{*this, "requests", "requests to these slaves"};
 
     void start() {
@@ -157,7 +160,11 @@ struct ModbusNode : hal::Component {
     }
 
     void update(hal::Cycle) noexcept {
-        const bool faults[] = {silence_, late_, corrupt_, wrong_unit_, exception_, half_};
+        const bool has_noise = noise_ > 0.0;
+        const bool faults[] = {silence_,   late_, corrupt_, wrong_unit_,
+                               exception_, half_, has_noise};
+        static_assert(std::size(faults) == fault_kinds);
+        share_.store(noise_, std::memory_order_relaxed);
         std::uint32_t bits = 0;
         for (std::size_t n = 0; n < fault_kinds; ++n) {
             bits |= static_cast<std::uint32_t>(faults[n]) << n;
@@ -175,6 +182,7 @@ private:
         for (std::size_t n = 0; n < fault_kinds; ++n) {
             bus_->faults()[n].is_active = (faults >> n & 1U) != 0;
             bus_->faults()[n].unit = static_cast<std::uint8_t>(faults >> 8);
+            bus_->faults()[n].share = share_.load(std::memory_order_relaxed);
         }
         const std::int64_t next = bus_->work(now_ns);
         for (std::size_t n = 0; n < pins_.size(); ++n) {
@@ -192,6 +200,7 @@ private:
     std::unique_ptr<SlaveBus> bus_;
     hal::Background background_{[this](std::int64_t now, bool may_wait) { turn(now, may_wait); }};
     std::atomic<std::uint32_t> faults_{0};  // written by the cycle: kinds, and the slave from bit 8
+    std::atomic<double> share_{0.0};  // written by the cycle: of the noise
     std::atomic<std::uint64_t> count_{0};  // written by the background
 };
 
@@ -225,7 +234,8 @@ least two of them. The slaves answer also while `modbus-node.0` is in no thread,
 their pins stand, and the registers keep their values.
 
 What the master reads is an input pin here, and what it writes is an output pin. The inputs
-`silence`, `late`, `corrupt`, `wrong-unit`, `exception` and `half` make the faults of a slave.
+`silence`, `late`, `corrupt`, `wrong-unit`, `exception` and `half` make the faults of a slave, and
+`noise` changes bytes on the line.
 `trip` and `blocked` of a drive make those of a motor.
 
 As a process of its own, on a pseudo terminal or a TCP port, it is `hal node modbus FILE`.
