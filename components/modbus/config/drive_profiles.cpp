@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <vector>
 
 namespace hal::modbus {
 
@@ -228,7 +229,49 @@ std::string writes_text(const Write (&writes)[2]) {
     return text.empty() ? "as declared" : text;
 }
 
-const char* yes(bool value) { return value ? "yes" : "no"; }
+std::string reading_text(const Reading& reading) {
+    if (reading.table == none) return "no";
+    char text[48];
+    if (reading.table == Table::huanyang) {
+        std::snprintf(text, sizeof text, "function 04, index %u", reading.address);
+    } else if (reading.mask > 1 && reading.mask != 0xffff) {
+        std::snprintf(text, sizeof text, "%s 0x%04X & 0x%X", to_string(reading.table),
+                      reading.address, reading.mask);
+    } else {
+        std::snprintf(text, sizeof text, "%s 0x%04X", to_string(reading.table), reading.address);
+    }
+    return text;
+}
+
+std::string set_point_text(const Profile& p) {
+    if (p.speed.table == none) return "as declared";
+    char text[64];
+    if (p.speed.table == Table::huanyang) {
+        std::snprintf(text, sizeof text, "function %02X", p.speed.address);
+    } else {
+        std::snprintf(text, sizeof text, "%s 0x%04X", to_string(p.speed.table), p.speed.address);
+    }
+    const std::string where = text;
+    if (p.counts_per_hz != 0) {
+        std::snprintf(text, sizeof text, ", %g Hz", 1 / p.counts_per_hz);
+    } else {
+        std::snprintf(text, sizeof text, ", %u at full speed", p.speed.value);
+    }
+    return where + text;
+}
+
+std::string reset_text(const Profile& p) {
+    return p.reset.table == none ? "panel" : write_text(p.reset);
+}
+
+/// A row of the table of the page.
+std::string row(const std::vector<std::string>& cells) {
+    std::string text = "|";
+    for (const std::string& cell : cells) {
+        text += " " + cell + " |";
+    }
+    return text + "\n";
+}
 
 }  // namespace
 
@@ -257,14 +300,16 @@ std::string write_text(const Write& write) {
 }
 
 std::string profile_reference() {
-    std::string table =
-        "| profile | drive | forward | stop | a stop is | `load` | `fault` | to set at the panel "
-        "|\n| --- | --- | --- | --- | --- | --- | --- | --- |\n";
+    const std::vector<std::string> titles = {
+        "profile", "drive",  "forward",   "reverse", "stop",  "a stop is",          "set-point",
+        "speed",   "`load`", "`running`", "`fault`", "reset", "to set at the panel"};
+    std::string table = row(titles) + row(std::vector<std::string>(titles.size(), "---"));
     for (const Profile& p : all_profiles) {
-        table += std::string("| `") + p.name + "` | " + p.title + " | " + writes_text(p.forward) +
-                 " | " + writes_text(p.stop) + " | " + p.ending + " | " +
-                 yes(p.load.table != none) + " | " + yes(p.fault.table != none) + " | " + p.setup +
-                 " |\n";
+        const bool is_generic = p.speed.table == none;
+        table += row({std::string("`") + p.name + "`", p.title, writes_text(p.forward),
+                      writes_text(p.reverse), writes_text(p.stop), p.ending, set_point_text(p),
+                      is_generic ? "as declared" : reading_text(p.actual), reading_text(p.load),
+                      reading_text(p.running), reading_text(p.fault), reset_text(p), p.setup});
     }
     return table;
 }
