@@ -44,34 +44,21 @@ public:
         }
     }
 
+    /// Opens the link, offers the slots to other components, and claims the clock of the threads.
+    /// Throws the reason when one of them fails; then nothing is kept. [setup]
     void start() {
         if (!arguments_.loaded) {
             throw std::runtime_error(
                 "missing table: write link=sim:NAME config=FILE.scocan node=NAME");
         }
-        const can::Description bus = can::describe(arguments_.link.get());
-        can::Options options{.own_frames = true, .stamps = bus.has_stamps};
-        if (bus.in_memory && bus.has_bit_rate) {
-            options.bit_rate = arguments_.table.bit_rate;
-        }
-        if (bus.in_memory) {
-            options.receive_capacity = Station::receive_capacity;
-        }
-        auto opened = can::open(arguments_.link.get(), options);
-        if (!opened) throw std::runtime_error(opened.problem);
-        const can::Description& d = opened.link->description();
-        hal::bus::check_bit_rate(d, arguments_.link.get(), arguments_.table.bit_rate, "bitrate ");
-        if ((arguments_.ppm != 0.0 || arguments_.tick_ns != 0) && !d.in_memory) {
-            throw std::runtime_error("ppm= and tick_ns= are for simulated nodes; " +
-                                     arguments_.link.get() + " has clocks of its own");
-        }
-        exchange_ = can::offer_slots(arguments_.node.get(), d);
+        std::unique_ptr<can::Link> link = open_link();
+        exchange_ = can::offer_slots(arguments_.node.get(), link->description());
         if (!exchange_) {
             throw std::runtime_error("node " + arguments_.node.get() +
                                      " is in this process already; load each node once");
         }
         claim_clock();
-        link_ = std::move(opened.link);
+        link_ = std::move(link);
         station_->attach(*link_);
         begin_cycles();
         followed_ = 0;
@@ -210,6 +197,29 @@ protected:
         }
         last = now_;
         begin(fault_, fault->text, fault->detail(value));
+    }
+
+    /// Opens the link with the options that a station needs. Throws when it cannot be opened, or does
+    /// not fit to the table and the load arguments. [setup]
+    std::unique_ptr<can::Link> open_link() const {
+        const std::string& address = arguments_.link.get();
+        const can::Description bus = can::describe(address);
+        can::Options options{.own_frames = true, .stamps = bus.has_stamps};
+        if (bus.in_memory && bus.has_bit_rate) {
+            options.bit_rate = arguments_.table.bit_rate;
+        }
+        if (bus.in_memory) {
+            options.receive_capacity = Station::receive_capacity;
+        }
+        auto opened = can::open(address, options);
+        if (!opened) throw std::runtime_error(opened.problem);
+        const can::Description& description = opened.link->description();
+        hal::bus::check_bit_rate(description, address, arguments_.table.bit_rate, "bitrate ");
+        if ((arguments_.ppm != 0.0 || arguments_.tick_ns != 0) && !description.in_memory) {
+            throw std::runtime_error("ppm= and tick_ns= are for simulated nodes; " + address +
+                                     " has clocks of its own");
+        }
+        return std::move(opened.link);
     }
 
     /// Claims the clock of the threads. In start() behind what can fail: a claim is not given back.

@@ -57,51 +57,18 @@ public:
                                                ip ? config::to_string(*ip) : std::string());
     }
 
+    /// Opens the port, offers the slots to other links, and claims the clock of the threads. Throws
+    /// the reason when one of them fails; then nothing is kept. [setup]
     void start() {
-        ethernet::Options options;
-        options.types.assign(Station::types.begin(), Station::types.end());
-        const ethernet::Description line = ethernet::describe(arguments_.link.get());
-        options.pacer = line.paced;
-        const auto wanted = arguments_.entry ? arguments_.entry->mac : arguments_.own_mac;
-        if (wanted && line.in_memory) {
-            options.address = *wanted;
-        }
-        auto opened = ethernet::open(arguments_.link.get(), options);
-        if (!opened) throw std::runtime_error(opened.problem);
-        if (arguments_.own_mac && opened.port->address() != *arguments_.own_mac) {
-            throw std::runtime_error(arguments_.link.get() + " has the address " +
-                                     ethernet::to_string(opened.port->address()) +
-                                     ", not that of station=" + arguments_.station.get() +
-                                     "; write station=auto");
-        }
-        if (arguments_.entry && arguments_.entry->mac &&
-            opened.port->address() != *arguments_.entry->mac) {
-            throw std::runtime_error(arguments_.link.get() + " has the address " +
-                                     ethernet::to_string(opened.port->address()) +
-                                     ", the configuration gives " + arguments_.entry->name + " " +
-                                     ethernet::to_string(*arguments_.entry->mac) +
-                                     "; correct the line 'mac' of its block");
-        }
-        OpenedTap tap = open_tunnel(*opened.port);
-        if (!ethernet::offer_discipline(*opened.port, station_.get(), delivery_times())) {
-            throw std::runtime_error(opened.port->description().address +
+        std::unique_ptr<ethernet::Port> port = open_port();
+        OpenedTap tap = open_tunnel(*port);
+        if (!ethernet::offer_discipline(*port, station_.get(), delivery_times())) {
+            throw std::runtime_error(port->description().address +
                                      " already has a station of this process; give this one its "
                                      "own port, for example sim:NAME/STATION");
         }
-        const void* none = nullptr;
-        leads_ = leading_instance.compare_exchange_strong(none, this);
-        try {
-            if (leads_) {
-                clock_.claim();
-            }
-        } catch (...) {
-            ethernet::withdraw_discipline(station_.get());
-            if (leads_) {
-                leading_instance.store(nullptr);
-            }
-            throw;
-        }
-        port_ = std::move(opened.port);
+        claim_clock();
+        port_ = std::move(port);
         tap_ = std::move(tap.tap);
         const std::string& remark = port_->description().remark;
         if (!remark.empty()) {
@@ -200,6 +167,48 @@ public:
     void make_safe(hal::Cycle) noexcept { interrupt(); }
 
 private:
+    /// Opens the port for a station's frames. Throws when it cannot be opened, or has another
+    /// address than the configuration gives this station. [setup]
+    std::unique_ptr<ethernet::Port> open_port() const {
+        const std::string& link = arguments_.link.get();
+        ethernet::Options options;
+        options.types.assign(Station::types.begin(), Station::types.end());
+        const ethernet::Description line = ethernet::describe(link);
+        options.pacer = line.paced;
+        const auto wanted = arguments_.entry ? arguments_.entry->mac : arguments_.own_mac;
+        if (wanted && line.in_memory) {
+            options.address = *wanted;
+        }
+        auto opened = ethernet::open(link, options);
+        if (!opened) throw std::runtime_error(opened.problem);
+        const ethernet::Address& actual = opened.port->address();
+        const std::string has_address = link + " has the address " + ethernet::to_string(actual);
+        if (arguments_.own_mac && actual != *arguments_.own_mac) {
+            throw std::runtime_error(has_address + ", not that of station=" +
+                                     arguments_.station.get() + "; write station=auto");
+        }
+        if (arguments_.entry && arguments_.entry->mac && actual != *arguments_.entry->mac) {
+            throw std::runtime_error(has_address + ", the configuration gives " +
+                                     arguments_.entry->name + " " +
+                                     ethernet::to_string(*arguments_.entry->mac) +
+                                     "; correct the line 'mac' of its block");
+        }
+        return std::move(opened.port);
+    }
+    /// Claims the clock of the threads for the first station of this process. In start() behind
+    /// what can fail: a claim is not given back. [setup]
+    void claim_clock() {
+        const void* none = nullptr;
+        leads_ = leading_instance.compare_exchange_strong(none, this);
+        if (!leads_) return;
+        try {
+            clock_.claim();
+        } catch (...) {
+            ethernet::withdraw_discipline(station_.get());
+            leading_instance.store(nullptr);
+            throw;
+        }
+    }
     /// Returns the latency of values that pass through this station's slots. [setup]
     ethernet::SlotTimes delivery_times() const {
         ethernet::SlotTimes times;
