@@ -257,6 +257,7 @@ private:
             offset += static_cast<std::size_t>(end - rest.c_str());
             push({Kind::number, 0, v});
         }
+        /// Parses a name: a function with its arguments, pi, or a variable.
         void word() {
             const std::size_t begin = offset;
             while (

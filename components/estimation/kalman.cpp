@@ -105,6 +105,7 @@ public:
     }
 
 private:
+    /// Reads the load arguments. Throws hal::ArgumentError for an invalid one. [setup]
     Linear read() {
         continuous_ = plant_.get() == "continuous";
         if (!continuous_ && plant_.get() != "discrete") {

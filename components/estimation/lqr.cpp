@@ -191,6 +191,7 @@ private:
         return std::string(what) + "-" + std::to_string(i);
     }
 
+    /// Reads the load arguments. Throws hal::ArgumentError for an invalid one. [setup]
     Problem read() {
         Problem p;
         if (plant_.get() == "discrete") {

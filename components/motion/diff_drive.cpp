@@ -89,6 +89,8 @@ struct DiffDrive : hal::Component {
     hal::Function run{*this, "command", &DiffDrive::command,
                       "computes the wheel speeds from the requested motion"};
 
+    /// Follows the pose by the angles of the wheels. An angle that is not finite does not move it,
+    /// and a sum that has grown beyond all measure starts at 0 again.
     void odometry(hal::Cycle cycle) noexcept {
         const double left = left_angle;
         const double right = right_angle;

@@ -215,6 +215,8 @@ struct Stepgen : hal::Component {
         position_fb = position_out_.load(std::memory_order_relaxed) / scale();
     }
 
+    /// Computes the rate of the steps from the commanded position or velocity, and orders it from
+    /// make-pulses together with the timing of the pulses. While disabled the rate is 0.
     void update_freq(hal::Cycle cycle) noexcept {
         updates_.ran(cycle.period_ns());
         if (was_abandoned_.exchange(false, std::memory_order_relaxed)) {

@@ -82,8 +82,8 @@ bool Endpoint::prepare_folder(const std::string& folder, Diagnostics& diagnostic
         return false;
     }
     struct stat about{};
-    const bool is_ours = lstat(folder.c_str(), &about) == 0 && S_ISDIR(about.st_mode) &&
-                         about.st_uid == geteuid();
+    const bool is_ours =
+        lstat(folder.c_str(), &about) == 0 && S_ISDIR(about.st_mode) && about.st_uid == geteuid();
     if (is_ours && group_) {
         if (chown(folder.c_str(), uid_t(-1), *group_) == 0 && chmod(folder.c_str(), 0750) == 0) {
             return true;
@@ -104,6 +104,8 @@ bool Endpoint::prepare_folder(const std::string& folder, Diagnostics& diagnostic
     return false;
 }
 
+/// Locks the name of the instance: a file that is locked as long as this process lives, with its
+/// process number in it. Returns false after reporting why that is not possible.
 bool Endpoint::take_lock(std::string_view name, Diagnostics& diagnostics) {
     const std::string file = lock_path(name);
     while (true) {

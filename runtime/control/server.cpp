@@ -125,6 +125,8 @@ ServerCounts Server::counts() const {
             s.admission.refused, s.requests,           s.invalid_requests};
 }
 
+/// The server's thread: accepts clients, serves their requests and notes the end of their
+/// processes, until the server ends.
 void Server::State::serve() {
     release_unused_stack();
     pool.start();

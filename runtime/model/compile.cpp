@@ -235,6 +235,10 @@ private:
         }
     }
 
+    /// Adds the functions of a thread to its plan, in their order. Behind a function are the checks
+    /// of its outputs that must be finite; around one that shares its state with functions of other
+    /// threads is a gate, when the cycles are journaled. Each instance adds its emergency function
+    /// once.
     void steps(Thread& thread, plan::Plan& plan) {
         std::size_t checks = 0;
         for (const auto* row : {&thread.init, &thread.functions}) {

@@ -56,6 +56,8 @@ private:
         diagnostics_.add(std::move(d));
     }
 
+    /// Decides what a signal that several nodes know is: written by one and read by others, it
+    /// crosses between them. Several writers, I/O pins and ports cannot cross.
     void one_signal(const std::vector<Seen>& seen) {
         std::vector<Seen> writers, readers, shared;
         for (const Seen& one : seen) {

@@ -155,6 +155,8 @@ int execute_and_show(const SimOptions& options, HostedMachine& machine, TrackedO
 
 }  // namespace
 
+/// Loads the netlists on the virtual clock, advances them, executes --execute and prints --show.
+/// Returns the status of the command. `recorder` may be nullptr: then nothing is recorded.
 int simulate(const SimOptions& options, const SimRecorder* recorder) {
     const bool records = !options.record.empty();
     if (const std::string problem = problem_of(options); !problem.empty()) {

@@ -67,6 +67,9 @@ Periods periods_of(View samples, double min, double max) {
     return periods;
 }
 
+/// Measures the response to a step at `step_ns`: settling time, overshoot, and rise time from 10 to
+/// 90 % between the means before the step and of the last tenth of the samples. Sets nothing for a
+/// step below 5 % of `range`, or a response that does not settle.
 void measure_step(View samples, std::int64_t step_ns, double range, Measurements& to) {
     const auto before =
         static_cast<std::size_t>(std::lower_bound(samples.begin(), samples.end(), step_ns,

@@ -110,6 +110,10 @@ private:
         }
     }
 
+    /// Adds the writes of a PDO in the order that CiA 301 prescribes: switch it off, set the number
+    /// of mapped objects to 0, write the mapping, then that number, the other parameters, and last
+    /// the COB-ID that switches it on. A PDO that cannot be switched off gets its values as they
+    /// are.
     void pdo(const Object& communication) {
         const Object* mapping = d_.find(static_cast<std::uint16_t>(communication.index + 0x200));
         const auto changes = [&](const Object& object) {

@@ -253,6 +253,8 @@ private:
         }
     }
 
+    /// Writes the sections of an object and of its sub-indices (CiA 306-1). Keys that are not given
+    /// are left out.
     void object(const Object& o, const std::string& prefix) {
         section(prefix + label(o.index));
         key("ParameterName", o.name);

@@ -252,6 +252,7 @@ struct Cia402 : hal::Component {
     }
 
 private:
+    /// Commands the axis by the input pins, and shows its state and its failure. [realtime]
     void act(hal::Cycle cycle) noexcept {
         AxisCommand c;
         c.enable = enable;

@@ -92,6 +92,8 @@ private:
     static constexpr Names coe_names{"Ccs", 1, "Index", "SubIndex", 0xff};
     static constexpr Names soe_names{"OpCode", 3, "IDN", "DriveNo", 7};
 
+    /// Reads an <InitCmd> that writes an object, as a write at the transition that it names. Other
+    /// commands are left out.
     void take(const Xml& command, bool soe) {
         if (yes(trimmed(command.child_value("Disabled")))) return;
         const Names& names = soe ? soe_names : coe_names;

@@ -148,6 +148,9 @@ Task<bool> write_mappings(Channel& c, Bus& bus, Device& d, const SyncManager& sm
     co_return true;
 }
 
+/// Writes the PDO mapping and the assignment of a sync manager where they differ from the setup.
+/// Returns false when that failed; it is reported. `limit`: entries that a PDO of the slave can
+/// have, 0: unknown.
 Task<bool> map_manager(Channel& c, Bus& bus, Device& d, const SyncManager& sm,
                        unsigned limit) noexcept {
     std::uint64_t differing = 0;  // PDOs whose mapping differs

@@ -205,7 +205,7 @@ void WireEngine::send_acyclic(unsigned frames, std::size_t bytes) noexcept {
     }
 }
 
-/// Fills a frame of at most `most` bytes on the wire with waiting datagrams, in turn; the `first`
+/// Fills a frame of at most `max` bytes on the wire with waiting datagrams, in turn; the `first`
 /// one of a cycle may be longer. Those that count positions do not share a frame with others, as
 /// they leave on one port.
 bool WireEngine::pack(AcyclicFrame& frame, std::uint8_t index, bool& backup, std::size_t max,
@@ -450,6 +450,9 @@ void WireEngine::expire(Flight& f) noexcept {
     missing_ += f.copies;
 }
 
+/// Gives up frames that have been on the way for too long. Of a frame with two copies, one on each
+/// port of a ring, the copy that arrived is used. The tasks whose datagrams are lost continue with
+/// that result. [realtime]
 void WireEngine::expire() noexcept {
     const std::int64_t timeout =
         std::max({acyclic_timeout_ns, 2 * setup_.cycle_ns, setup_.frame_timeout_ns});

@@ -146,6 +146,8 @@ private:
         return index != 0 && index < strings_.size() ? strings_[index] : none;
     }
 
+    /// Reads a category of the EEPROM (ETG.2010); the strings were read before, and unknown ones
+    /// are skipped.
     void category(std::uint16_t type, Fields& data) {
         switch (static_cast<Category>(type)) {
         case Category::strings: return;

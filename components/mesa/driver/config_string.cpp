@@ -57,6 +57,7 @@ ConfigString::Problem ConfigString::parse(std::string_view text) {
     return {};
 }
 
+/// Parses an item KEY=VALUE. Returns what is wrong with it; an empty sentence: nothing.
 ConfigString::Problem ConfigString::parse_item(std::string_view item, std::size_t begin) {
     Problem problem{begin, begin + item.size(), {}, {}};
     const std::size_t equals = std::min(item.find('='), item.size());

@@ -533,6 +533,8 @@ private:
         std::stable_sort(slave_->values.begin(), slave_->values.end(), by_line);
     }
 
+    /// Reads a line `read NAME = …` or `write NAME = …` into the slave that is read. An invalid
+    /// line is reported and adds no value.
     void read_value(const Entry& entry, bool is_output) {
         Value v;
         v.is_output = is_output;

@@ -160,6 +160,8 @@ void SlaveBus::disturb(std::span<std::uint8_t> bytes, std::int64_t now_ns) {
     }
 }
 
+/// Lets the slave that a request addresses answer it, with the faults that are active. A broadcast
+/// reaches all of them and is not answered.
 void SlaveBus::serve(const Found& found, std::int64_t now_ns) {
     if (found.unit == broadcast_unit) {  // a broadcast is not answered
         for (EmulatedSlave& slave : slaves_) {

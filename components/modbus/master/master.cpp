@@ -411,6 +411,9 @@ void Master::answered(std::uint32_t slave, std::int64_t now_ns) noexcept {
     repeat_stop(slave, now_ns);
 }
 
+/// Ends a request that failed: counts it for the slave, which is offline after enough of them in a
+/// row, and chooses when its telegram is due again. An exception is an answer: the slave is online.
+/// `code`: of an exception.
 void Master::fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexcept {
     const Slave& slave = bus_.slaves[job_.slave];
     SlaveState& state = slaves_[job_.slave];

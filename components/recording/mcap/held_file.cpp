@@ -57,6 +57,9 @@ std::string set_aside(const std::string& part, const std::string& target) {
     return "";
 }
 
+/// Opens a file for one recorder, and empties it. Another recorder that has it fails with EBUSY. A
+/// part that a killed recorder left behind is kept under another name, in HeldFile::kept. The file
+/// is opened again when it was replaced between opening and locking it.
 HeldFile hold(const std::string& path, bool part) {
     HeldFile held;
     held.target = followed(path);

@@ -147,6 +147,7 @@ public:
     }
 
 private:
+    /// Reads a line KEY VALUES…, and reports an unknown or repeated key and invalid values.
     void one(const text::Word& line) {
         std::vector<Word> words;
         for (const text::Word& word : text::words_of(line, ",=")) {

@@ -149,6 +149,9 @@ ControllerMonitor::ControllerMonitor(std::string name, Counting& counting, int i
     monitor_.emplace("can-monitor", 500, [this] { look(); });
 }
 
+/// Reads the state, the bit rates and the error counters of the interface from the kernel. An
+/// interface that was replaced is opened again. A controller that is off the bus is restarted when
+/// its time is over, or on request.
 void ControllerMonitor::look() {
     const Interface now = ask(name_);
     const State before = counting_.state.load();

@@ -92,6 +92,8 @@ std::vector<Record> records_of(const ElfFile& file) {
 
 }  // namespace
 
+/// Describes a compiled module by what its file states: parameters, summary, author, license. No
+/// code of the module runs.
 Module::Module(std::string folder, std::string name, ElfFile file)
     : name_(std::move(name)),
       path_(folder + "/" + name_ + ".so"),

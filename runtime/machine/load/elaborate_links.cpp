@@ -12,6 +12,9 @@ namespace hal {
 using edits::Args;
 using edits::word;
 
+/// `net SIGNAL PIN…`: links the pins, and makes the signal with the type of the first one. Arrows
+/// between the pins are checked with the direction of the pin behind them. A signal of unknown
+/// type, because its pins belong to a missing component, is noted as absent.
 void edits::net(Elaboration& on, Args args) {
     struct Wanted {
         Pin* pin;

@@ -299,6 +299,9 @@ LoadedComponent* loaded_component(Elaboration& on, const Token& name) {
 
 }  // namespace
 
+/// `loadrt NAME ARGUMENT…`: makes the instances of a component, or threads. The names of a
+/// component that is missing are noted as absent, so that lines that use them cause no further
+/// errors.
 void edits::loadrt(Elaboration& on, Args args) {
     Origin origin = Origin::any;
     if (!take_origin(on, args, origin)) return;
@@ -340,6 +343,8 @@ void edits::loadrt(Elaboration& on, Args args) {
     absences.note(dashed(args[0].text), cause);
 }
 
+/// `unloadrt NAME`: removes a component with its instances, one instance, or with `all` everything
+/// but programs.
 void edits::unload(Elaboration& on, Args args) {
     if (args[0].text == "all") {
         for (std::size_t i = on.model.components.size(); i-- > 0;) {
@@ -385,6 +390,9 @@ void edits::unload(Elaboration& on, Args args) {
     on.edit.remove_component(*component);
 }
 
+/// `reload NAME`: replaces the code of a component. All instances are constructed again from the
+/// file as it is now, beside the model, and only when that succeeds exchanged for the old ones;
+/// pins, links and values stay.
 void edits::reload(Elaboration& on, Args args) {
     const Token& name = args[0];
     if (const Instance* const instance = on.model.find_instance(name.text);
@@ -416,8 +424,7 @@ void edits::reload(Elaboration& on, Args args) {
         return;
     }
     // a component of ours is not replaced by a module of its name
-    auto plugin =
-        open_component(on.plugins, name.text, Origin::native, name.span, on.diagnostics);
+    auto plugin = open_component(on.plugins, name.text, Origin::native, name.span, on.diagnostics);
     if (!plugin) return;
     if (std::string_view(plugin->component->name) != component->name) {
         on.diagnostics.error(

@@ -26,6 +26,8 @@ std::string grouped_bytes(std::uint64_t there, std::uint64_t needed) {
            " bytes";
 }
 
+/// Returns the names of the libraries that a shared object needs (DT_NEEDED); none when the file is
+/// damaged.
 std::vector<std::string> names_of(std::string_view content, const std::vector<ElfW(Phdr)>& parts) {
     const auto dynamic = std::find_if(parts.begin(), parts.end(), [](const ElfW(Phdr) & part) {
         return part.p_type == PT_DYNAMIC;

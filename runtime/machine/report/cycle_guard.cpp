@@ -91,6 +91,8 @@ std::string wall_time(std::int64_t ns) {
 
 }  // namespace
 
+/// The guard's thread. Prints which thread, function and cycle take too long, and ends the process
+/// with safe outputs when the limit of the user is exceeded.
 void CycleGuard::work() {
     release_unused_stack();
     std::unique_lock lock(mutex_);

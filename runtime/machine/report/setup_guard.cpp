@@ -52,6 +52,9 @@ void print_announced(const SetupCallNow& call, std::int64_t expected_ns) noexcep
     print_text("\n");
 }
 
+/// The guard's thread. Prints which component has not returned from a call of setup: after 2 s, or
+/// as much later as the call has announced, and once for each call. While the process ends it
+/// prints this again, and 13 s later it sets the outputs to their safe values and ends the process.
 void watch(const SetupGuard::Flags& flags) noexcept {
     release_unused_stack();
     constexpr std::int64_t announce_after_ns = 2'000'000'000;

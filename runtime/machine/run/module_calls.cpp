@@ -67,6 +67,9 @@ bool take_later(Construction& c, std::string_view name, const char* number) {
     return true;
 }
 
+/// Executes a command that a module calls while it is loaded, as a line of the netlist would. What
+/// the module has declared by then is entered before. Returns 0 or a negative errno, with the
+/// reason in `why`.
 int carry_out(const hal_host* host, const char* const* words, std::size_t count, char* why,
               std::size_t capacity) {
     Construction& c = construction_of(host);

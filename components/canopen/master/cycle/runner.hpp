@@ -53,13 +53,13 @@ public:
     virtual void on_step(std::size_t node, const NodeStatus&) noexcept { (void)node; }
     virtual void on_network(const NetworkStatus&) noexcept {}
     virtual void on_emergency(std::size_t node, const Emergency&) noexcept { (void)node; }
-    /// A PDO of a node did not come for `silence`, its timeout, in ns. `place` is that in
-    /// OwnNode::received.
+    /// A PDO of a node did not come for `silence`, its timeout, in ns. `position` is its
+    /// index in OwnNode::received.
     virtual void on_late(std::size_t position, Time silence) noexcept {
         (void)position, (void)silence;
     }
-    /// It came with fewer bytes than its objects have; they keep their values. `place` is that in
-    /// OwnNode::received.
+    /// It came with fewer bytes than its objects have; they keep their values. `position` is its
+    /// index in OwnNode::received.
     virtual void on_short(std::size_t position, unsigned bytes) noexcept {
         (void)position, (void)bytes;
     }
@@ -68,8 +68,8 @@ public:
     virtual void on_foreign(const Foreign&) noexcept {}
     /// Another device has the master's own node-id.
     virtual void on_own_id_collision() noexcept {}
-    /// The data of an SRDO is invalid; its objects have their safe values. `place` is that in
-    /// OwnNode::srdos.
+    /// The data of an SRDO is invalid; its objects have their safe values. `position` is its
+    /// index in OwnNode::srdos.
     virtual void on_srdo_fault(std::size_t position, SrdoFault) noexcept { (void)position; }
     virtual void on_bus_state(can::State) noexcept {}
     /// The link did not pass on what its sender may not send.
@@ -104,7 +104,8 @@ public:
     bool operational(std::size_t node) const noexcept {
         return statuses_[node]->operational && late_pdos_[node] == 0;
     }
-    /// A TPDO is late. `place` is that in OwnNode::received. [realtime]
+    /// A TPDO is late. `position` is its index in OwnNode::received.
+    /// [realtime]
     bool late(std::size_t position) const noexcept { return watches_[position].late(); }
     /// A TPDO of a mandatory node is late. [realtime]
     bool any_late() const noexcept;

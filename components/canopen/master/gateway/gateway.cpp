@@ -214,6 +214,8 @@ void Gateway::set_default_node(int client, const Command& command, const Net& ne
     answer(client, command, "OK");
 }
 
+/// Passes a command of CiA 309-3 to the part of the gateway that executes it. An invalid address is
+/// rejected.
 void Gateway::execute(int client, Command&& command, Time now) {
     if (execute_in_gateway(client, command)) return;
     unsigned net_number = 0;

@@ -41,6 +41,8 @@ private:
     }
     std::string bits(std::uint32_t count) const { return std::to_string(count) + " bits"; }
 
+    /// Reports roles that do not fit together: a missing SYNC node, a second node with a role of
+    /// which a bus has one, and backups whose SYNC does not fit in slot 0.
     void roles() {
         const Node* sync = nullptr;
         const Node* monitor = nullptr;
