@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hal/component.hpp"
+#include "hal/edge.hpp"
 #include "hal/retained.hpp"
 
 namespace {
@@ -80,29 +81,14 @@ struct Identify : hal::Component {
 
     hal::Function run{*this, "update", &Identify::update, "runs one period of the experiment"};
 
+    /// Follows the commands, runs one period of the experiment, and sets the outputs.
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
         const double y = value;
-        const bool step_asked = step && !step_was_;
-        const bool relay_asked = relay && !relay_was_;
-        step_was_ = step;
-        relay_was_ = relay;
         if (running() && !active) {  // the outputs had their safe values meanwhile
             fail(Failure::interrupted);
         }
-        if (cancel) {
-            enter(Phase::idle);
-        } else if (step_asked) {
-            enter(Phase::settling);
-        } else if (relay_asked) {
-            enter(Phase::relay);
-            high_ = y < setpoint;
-            last_switch_ = -1.0;
-            swings_ = 0;
-            even_ = 0;
-
-            top_ = bottom_ = y;
-        }
+        follow_commands(y);
         if (running() && !std::isfinite(y)) {
             fail(Failure::not_a_number);
         }
@@ -129,6 +115,27 @@ private:
         return high_ ? amplitude.get() : -amplitude;
     }
 
+    /// Begins or ends an experiment: cancel takes precedence over step, and step over relay.
+    void follow_commands(double y) noexcept {
+        const bool begins_step = step_edge_.rises(step);
+        const bool begins_relay = relay_edge_.rises(relay);
+        if (cancel) {
+            enter(Phase::idle);
+        } else if (begins_step) {
+            enter(Phase::settling);
+        } else if (begins_relay) {
+            begin_relay(y);
+        }
+    }
+    void begin_relay(double y) noexcept {
+        enter(Phase::relay);
+        high_ = y < setpoint;
+        last_switch_ = -1.0;
+        swings_ = 0;
+        even_ = 0;
+        top_ = y;
+        bottom_ = y;
+    }
     void enter(Phase next) noexcept {
         now_ = next;
         time_ = 0.0;
@@ -396,8 +403,8 @@ private:
     std::size_t count_ = 0;
     std::size_t thin_ = 1;
     std::size_t skip_ = 0;
-    bool step_was_ = false;
-    bool relay_was_ = false;
+    hal::RisingEdge step_edge_;
+    hal::RisingEdge relay_edge_;
     bool high_ = false;
     double last_switch_ = -1.0;
     double top_ = 0.0;
@@ -424,8 +431,8 @@ private:
                              {"count", count_},
                              {"thin", thin_},
                              {"skip", skip_},
-                             {"step-was", step_was_},
-                             {"relay-was", relay_was_},
+                             {"step-was", step_edge_},
+                             {"relay-was", relay_edge_},
                              {"high", high_},
                              {"last-switch", last_switch_},
                              {"top", top_},

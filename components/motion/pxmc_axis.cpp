@@ -93,11 +93,11 @@ struct PxmcAxis : hal::Component {
     hal::Function run{*this, "do-control", &PxmcAxis::update,
                       "measures, monitors, plans and controls"};
 
+    /// Measures, decides whether the axis is on, and then moves and controls it.
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
         const bool gone = go_edge_.rises(go);
         const bool cleared = reset_edge_.rises(reset);
-
         const bool measured =
             std::isfinite(actual_position) && std::fabs(actual_position) <= motion::farthest;
         if (measured) {
@@ -108,12 +108,29 @@ struct PxmcAxis : hal::Component {
             motion::Limits::from(max_speed, max_acceleration, 0.0, max_jerk, limits) &&
             min_position <= max_position;
 
-        std::uint32_t found = none;  // a disabled axis has no error
+        std::uint32_t found = none;
         if (!sound) {
             found = bad_parameter;
         } else if (!measured) {
             found = bad_feedback;
         }
+        update_state(found, cleared, limits);
+        if (!was_on_) return rest();
+        if (closing_) {
+            generator_.put(measured_);
+            integral_ = 0.0;
+            moves_ = false;
+        }
+        closing_ = false;
+        command(limits, gone);
+        generator_.advance(dt);
+        control(dt);
+    }
+
+private:
+    /// Switches the axis on or off. `found`: what is wrong with the inputs; it is an error only
+    /// while the axis is on. `cleared`: a reset, which works once nothing is wrong.
+    void update_state(std::uint32_t found, bool cleared, const motion::Limits& limits) noexcept {
         if (cleared && found == none) {
             code_ = none;
         }
@@ -130,20 +147,8 @@ struct PxmcAxis : hal::Component {
             code_ = found;
         }
         was_on_ = on && code_ == none;
-        if (!was_on_) return rest();
-
-        if (closing_) {
-            generator_.put(measured_);
-            integral_ = 0.0;
-            moves_ = false;
-        }
-        closing_ = false;
-        command(limits, gone);
-        generator_.advance(dt);
-        control(dt);
     }
 
-private:
     void measure(double dt) noexcept {
         const double raw = has_measured_ ? (actual_position - measured_) / dt : 0.0;
         const double share = speed_filter > 0.0 ? dt / (speed_filter + dt) : 1.0;

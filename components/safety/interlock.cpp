@@ -61,6 +61,7 @@ struct Interlock : hal::Component {
 
     hal::Function run{*this, "", &Interlock::update, "evaluates the conditions"};
 
+    /// Evaluates the inputs: which have tripped, whether ok may be TRUE, and which was the first.
     void update(hal::Cycle cycle) noexcept {
         const bool pressed = reset_edge_.rises(reset);
         const bool heard = acknowledge_edge_.rises(acknowledge);
@@ -68,10 +69,7 @@ struct Interlock : hal::Component {
         phase_ns_ = (phase_ns_ + cycle.period_ns()) % second_ns;
         const std::uint64_t watched = use & everything();
 
-        bypass_for_ = bypass_enable ? std::min(bypass_for_ + dt, 1e9) : 0.0;
-        const bool key = bypass_enable && !(bypass_time > 0.0 && bypass_for_ > bypass_time);
-        const std::uint64_t skipped = key ? bypass & watched : 0;
-
+        const std::uint64_t skipped = may_bypass(dt) ? bypass & watched : 0;
         const std::uint64_t now = look(watched & ~skipped, dt);
         const std::uint64_t fresh = now & ~tripped_;
         const std::uint64_t stops = ~warn.get();
@@ -84,32 +82,46 @@ struct Interlock : hal::Component {
             unheard_ = 0;
         }
 
-        // After a stop of the runtime, which wrote the safe value, and at the start ok waits for a
-        // reset.
-        if (!has_run_ ? start_needs_reset.get() : was_ok_ && !ok) {
-            waits_ = true;
-        }
-        has_run_ = true;
-        if (pressed && (tripped_ & stops) == 0) {
-            waits_ = false;
-        }
-        const bool healthy = (tripped_ & stops) == 0 && !waits_;
-        if (was_ok_ && !healthy) {
-            trips = trips + 1;
-            since_ = 0.0;
-        } else if (!healthy) {
-            since_ = std::min(since_ + dt, 1e9);
-        }
-        if (healthy || (tripped_ & stops) == 0) {
+        const std::uint64_t stopping = tripped_ & stops;
+        update_wait(pressed && stopping == 0);
+        const bool healthy = stopping == 0 && !waits_;
+        count_trip(healthy, dt);
+        if (stopping == 0) {
             first_ = 0;
         } else if (first_ == 0) {
-            first_ = (fresh & stops) != 0 ? fresh & stops : tripped_ & stops;
+            first_ = (fresh & stops) != 0 ? fresh & stops : stopping;
         }
         was_ok_ = healthy;
         show(healthy, now, stops, skipped != 0);
     }
 
 private:
+    /// Returns whether the key switch is on, and its time is not over.
+    bool may_bypass(double dt) noexcept {
+        bypass_for_ = bypass_enable ? std::min(bypass_for_ + dt, 1e9) : 0.0;
+        return bypass_enable && !(bypass_time > 0.0 && bypass_for_ > bypass_time);
+    }
+    /// ok waits for a reset at the start, and after a stop of the runtime, which wrote the safe
+    /// value.
+    void update_wait(bool is_reset) noexcept {
+        if (!has_run_ ? start_needs_reset.get() : was_ok_ && !ok) {
+            waits_ = true;
+        }
+        has_run_ = true;
+        if (is_reset) {
+            waits_ = false;
+        }
+    }
+    /// Counts the ends of ok, and the time since.
+    void count_trip(bool healthy, double dt) noexcept {
+        if (was_ok_ && !healthy) {
+            trips = trips + 1;
+            since_ = 0.0;
+        } else if (!healthy) {
+            since_ = std::min(since_ + dt, 1e9);
+        }
+    }
+
     static constexpr std::int64_t second_ns = 1'000'000'000;
     std::uint64_t everything() const noexcept {
         return in.size() >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << in.size()) - 1;

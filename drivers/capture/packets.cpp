@@ -51,11 +51,35 @@ std::int64_t time_of(std::uint64_t ticks, double tick_ns) {
     return static_cast<std::int64_t>(time_ns);
 }
 
+/// An interface of a pcapng file.
+struct Interface {
+    unsigned link;
+    double tick_ns;  ///< of its timestamps
+};
+
+/// Reads an interface description block between `at` and `end`.
+Interface interface_of(const Bytes& in, std::size_t at, std::size_t end) {
+    constexpr unsigned time_resolution = 9;  // option if_tsresol
+    Interface out{in.number(at + 8, 2), 1000.0};
+    for (std::size_t option = at + 16; option + 4 <= end;) {
+        const auto code = in.number(option, 2);
+        const auto length = in.number(option + 2, 2);
+        if (code == 0) break;
+        if (code == time_resolution && length >= 1) {  // a negative power of 10, or of 2
+            const auto r = in.number(option + 4, 1);
+            out.tick_ns = 1e9;
+            for (unsigned k = 0; k < (r & 127U); ++k) {
+                out.tick_ns /= (r & 128U) != 0 ? 2.0 : 10.0;
+            }
+        }
+        option += 4 + (length + 3U) / 4 * 4;
+    }
+    return out;
+}
+
+/// Passes the packets of a pcapng file to `take`, block by block. Returns where the file is
+/// damaged, empty: nowhere.
 std::string parse_pcapng(std::string_view all, const Take& take) {
-    struct Interface {
-        unsigned link;
-        double tick_ns;
-    };
     std::vector<Interface> interfaces;
     Bytes in(all);
     for (std::size_t at = 0; at < all.size();) {
@@ -71,21 +95,7 @@ std::string parse_pcapng(std::string_view all, const Take& take) {
         if (size < 12 || size % 4 != 0 || size > all.size() - at) return cut_off(at);
         const std::size_t end = at + size - 4;
         if (type == interface_block && size >= 20 && interfaces.size() < 1024) {
-            Interface i{in.number(at + 8, 2), 1000.0};
-            for (std::size_t o = at + 16; o + 4 <= end;) {
-                const auto code = in.number(o, 2);
-                const auto length = in.number(o + 2, 2);
-                if (code == 0) break;
-                if (code == 9 && length >= 1) {  // time resolution: a negative power of 10, or of 2
-                    const auto r = in.number(o + 4, 1);
-                    i.tick_ns = 1e9;
-                    for (unsigned k = 0; k < (r & 127U); ++k) {
-                        i.tick_ns /= (r & 128U) != 0 ? 2.0 : 10.0;
-                    }
-                }
-                o += 4 + (length + 3U) / 4 * 4;
-            }
-            interfaces.push_back(i);
+            interfaces.push_back(interface_of(in, at, end));
         } else if (type == packet_block && size >= 32) {
             const auto number = in.number(at + 8, 4);
             const auto held = in.number(at + 20, 4);

@@ -209,22 +209,35 @@ private:
         }
         return choose_format() && choose_rate() && map() && stream();
     }
-    bool choose_format() {
-        std::string offered;
+
+    /// The formats of the device, as far as they matter.
+    struct OfferedFormats {
+        std::string names;
         bool yuyv = false;
         bool grey = false;
+    };
+    OfferedFormats offered_formats() {
+        OfferedFormats offered;
         for (std::uint32_t i = 0; i < 64; ++i) {
             v4l2_fmtdesc one{};
             one.index = i;
             one.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
             if (system_.control(fd_, VIDIOC_ENUM_FMT, &one) == -1) break;
-            yuyv = yuyv || one.pixelformat == V4L2_PIX_FMT_YUYV;
-            grey = grey || one.pixelformat == V4L2_PIX_FMT_GREY;
-            append_item(offered, four_letters(one.pixelformat));
+            offered.yuyv = offered.yuyv || one.pixelformat == V4L2_PIX_FMT_YUYV;
+            offered.grey = offered.grey || one.pixelformat == V4L2_PIX_FMT_GREY;
+            append_item(offered.names, four_letters(one.pixelformat));
         }
-        if (!yuyv && !grey) {
+        return offered;
+    }
+
+    /// Sets the format and the size of the frames. Returns false after reporting why the device has
+    /// none that can be read.
+    bool choose_format() {
+        const OfferedFormats offered = offered_formats();
+        if (!offered.yuyv && !offered.grey) {
             return fail(FrameError::unusable,
-                        device_ + " offers " + (offered.empty() ? "no format" : offered) +
+                        device_ + " offers " +
+                            (offered.names.empty() ? "no format" : offered.names) +
                             "; only YUYV and GREY are read; ffmpeg -i " + device_ +
                             " -pix_fmt yuyv422 -f v4l2 /dev/videoN makes YUYV of it for a "
                             "v4l2loopback device");
@@ -233,8 +246,8 @@ private:
         format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
         format.fmt.pix.width = static_cast<std::uint32_t>(width_);
         format.fmt.pix.height = static_cast<std::uint32_t>(height_);
-        format.fmt.pix.pixelformat =
-            yuyv && !(grey && grey_) ? V4L2_PIX_FMT_YUYV : V4L2_PIX_FMT_GREY;
+        const bool takes_grey = offered.grey && (grey_ || !offered.yuyv);
+        format.fmt.pix.pixelformat = takes_grey ? V4L2_PIX_FMT_GREY : V4L2_PIX_FMT_YUYV;
         format.fmt.pix.field = V4L2_FIELD_NONE;
         const std::uint32_t wanted = format.fmt.pix.pixelformat;
         if (system_.control(fd_, VIDIOC_S_FMT, &format) == -1) return failed("format rejected");

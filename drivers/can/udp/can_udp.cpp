@@ -226,6 +226,8 @@ public:
     int descriptor() const noexcept override { return in_.get(); }
 
 private:
+    /// Receives a batch of datagrams, and keeps the frames in them that pass the options and the
+    /// filters. Returns whether there are any. [realtime]
     bool refill(std::int64_t now_ns) noexcept {
         // one system call per cycle unless the batch was full
         if (now_ns != unclocked && was_short_ && now_ns == requested_at_) return false;
@@ -254,32 +256,37 @@ private:
         for (int i = 0; i < got; ++i) {
             Frame& f = buffer_[filled_];
             auto& header = messages[i].msg_hdr;
-            std::int64_t time = 0;
-            for (cmsghdr* c = CMSG_FIRSTHDR(&header); c != nullptr; c = CMSG_NXTHDR(&header, c)) {
-                if (c->cmsg_level != SOL_SOCKET) continue;
-                if (c->cmsg_type == SCM_TIMESTAMPNS) {
-                    timespec t{};
-                    std::memcpy(&t, CMSG_DATA(c), sizeof t);
-                    time = t.tv_sec * 1'000'000'000LL + t.tv_nsec + offset;
-                }
-            }
             if ((header.msg_flags & MSG_TRUNC) != 0 ||
                 !decode({in_buffers_[static_cast<std::size_t>(i)].data(), messages[i].msg_len},
                         f)) {
                 Counting::add(counting_.errors);
                 continue;
             }
-            f.time_ns = time;
+            f.time_ns = stamp_of(header, offset);
             f.own = is_self(from[i]);
-            if ((f.own && !options_.own_frames) || (f.error && !options_.error_frames) ||
-                (f.fd && !options_.fd)) {
-                continue;
-            }
-            if (!f.error && !filters_.pass(f)) continue;
+            if (!is_wanted(f)) continue;
             counting_.count_received(f);
             ++filled_;
         }
         return filled_ != 0;
+    }
+    /// Returns the kernel's time of a datagram on the monotonic clock, `offset` from the real one;
+    /// 0: it has none. [realtime]
+    static std::int64_t stamp_of(msghdr& header, std::int64_t offset) noexcept {
+        for (cmsghdr* c = CMSG_FIRSTHDR(&header); c != nullptr; c = CMSG_NXTHDR(&header, c)) {
+            if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SCM_TIMESTAMPNS) continue;
+            timespec t{};
+            std::memcpy(&t, CMSG_DATA(c), sizeof t);
+            return t.tv_sec * 1'000'000'000LL + t.tv_nsec + offset;
+        }
+        return 0;
+    }
+    /// [realtime]
+    bool is_wanted(const Frame& f) const noexcept {
+        if (f.own && !options_.own_frames) return false;
+        if (f.fd && !options_.fd) return false;
+        if (f.error) return options_.error_frames;
+        return filters_.pass(f);
     }
 
     bool is_self(const sockaddr_storage& a) const noexcept {
@@ -300,7 +307,7 @@ private:
     hal::Queue<Frame> outgoing_;  // written and read by the sending thread
     sockaddr_storage self_{};
 
-    Datagram out_buffers_[batch];                             // used by the sending thread
+    Datagram out_buffers_[batch];  // used by the sending thread
     std::array<std::uint8_t, 512> in_buffers_[batch];  // from here on: used by the receiving thread
     Frame buffer_[batch];
     std::size_t next_ = 0;
