@@ -53,7 +53,8 @@ constexpr const char* halcmd_usage =
     "  -R          accepted and ignored: no lock needs to be released\n"
     "  -h [NAME]   this text, or the help of a command; halcmd help lists the commands\n";
 
-/// Prints completions of the current word for bash's `complete -C halcmd`, one per line.
+}  // namespace
+
 int complete_word() {
     const char* line = std::getenv("COMP_LINE");
     const char* point = std::getenv("COMP_POINT");
@@ -76,8 +77,6 @@ int complete_word() {
     }
     return exit_code(print(text));
 }
-
-}  // namespace
 
 int halcmd(int argc, char** argv) {
     RemoteShellOptions options;

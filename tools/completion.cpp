@@ -6,6 +6,7 @@
 #include <fmt/core.h>
 #include <iterator>
 
+#include "classic_commands.hpp"
 #include "cli/output.hpp"
 #include "command_line.hpp"
 #include "text/quoting.hpp"
@@ -28,7 +29,7 @@ constexpr std::string_view bash_script =
 _hal_names() {
     local command
     for command in getp gets; do
-        COMP_LINE="halcmd $command $1" COMP_POINT='' halcmd -C 2>/dev/null
+        COMP_LINE="halcmd $command $1" COMP_POINT='' hal completion words 2>/dev/null
     done
 }
 _hal() {
@@ -47,7 +48,7 @@ _hal() {
     case ${COMP_WORDS[1]} in
         help) COMPREPLY=($(compgen -W "$commands" -- "$word")) ;;
         doc | explain) COMPREPLY=($(compgen -W "$(hal "${COMP_WORDS[1]}" | cut -d ' ' -f 1)" -- "$word")) ;;
-        shell) COMPREPLY=($(COMP_LINE="halcmd ${COMP_WORDS[*]:2:COMP_CWORD-1}" COMP_POINT='' halcmd -C 2>/dev/null)) ;;
+        shell) COMPREPLY=($(COMP_LINE="halcmd ${COMP_WORDS[*]:2:COMP_CWORD-1}" COMP_POINT='' hal completion words 2>/dev/null)) ;;
         scope | watch | meter) COMPREPLY=($(_hal_names "$word")) ;;
         record)
             if [ "$COMP_CWORD" -eq 2 ]; then compopt -o default 2>/dev/null
@@ -99,7 +100,7 @@ constexpr std::string_view zsh_script =
 # zsh completion of hal; a file _hal in a folder of fpath, or: source <(hal completion zsh)
 _hal_lines() {
     local -a lines
-    lines=(${(f)"$(COMP_LINE="$1" COMP_POINT='' halcmd -C 2>/dev/null)"})
+    lines=(${(f)"$(COMP_LINE="$1" COMP_POINT='' hal completion words 2>/dev/null)"})
     compadd -a lines
 }
 _hal_names() {
@@ -185,7 +186,7 @@ std::string for_zsh(const std::vector<CompletionEntry>& entries) {
 constexpr std::string_view fish_script =
     R"FISH(# fish completion of hal; a file hal.fish in a folder completions, or: hal completion fish | source
 function __hal_lines
-    env COMP_LINE="$argv" COMP_POINT= halcmd -C 2>/dev/null
+    env COMP_LINE="$argv" COMP_POINT= hal completion words 2>/dev/null
 end
 function __hal_names
     __hal_lines halcmd getp (commandline -ct)
@@ -270,6 +271,7 @@ std::string names_of_shells(std::string_view separator) {
 
 int run_completion(const CompletionOptions& options) {
     const std::string name = options.words.size() == 1 ? options.words.front() : "";
+    if (name == "words") return complete_word();  // for the scripts
     const auto* const shell = std::find_if(std::begin(shells), std::end(shells),
                                            [&](const Shell& one) { return name == one.name; });
     if (shell == std::end(shells)) {

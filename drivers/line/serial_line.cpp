@@ -8,6 +8,7 @@
 #include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <termios.h>
 
 #include <algorithm>
@@ -109,6 +110,17 @@ protected:
     std::int64_t sent_until_ = INT64_MIN / 2;
 };
 
+/// Whether a descriptor is of a pseudo-terminal. Its exclusive mode would last as long as the program
+/// on the other side: no later program could open it.
+bool is_pseudo_terminal(int fd) noexcept {
+    constexpr unsigned first_major = 136;  // Linux, Documentation/admin-guide/devices.txt
+    constexpr unsigned last_major = 143;
+    struct stat status{};
+    if (fstat(fd, &status) != 0) return false;
+    const unsigned device = major(status.st_rdev);
+    return S_ISCHR(status.st_mode) && device >= first_major && device <= last_major;
+}
+
 class SerialLine final : public TerminalLine {
 public:
     SerialLine(std::string device, Description description, const Options& options)
@@ -134,7 +146,9 @@ public:
             problem = enable_rs485(fd.get());
         }
         if (!problem.empty()) return problem;
-        ioctl(fd.get(), TIOCEXCL);
+        if (!is_pseudo_terminal(fd.get())) {
+            ioctl(fd.get(), TIOCEXCL);
+        }
         tcflush(fd.get(), TCIOFLUSH);
         fd_ = std::move(fd);
         return {};

@@ -490,7 +490,7 @@ class Unbuilt(Case):
     def test_check_names_the_command_that_builds_it(self):
         done = self.run_hal("check", "file.hal")
         self.assertEqual(1, done.returncode)
-        self.assertIn("error: component 'later' is not built yet [no-such-component]", done.stderr)
+        self.assertIn("error: component 'later' is not installed [no-such-component]", done.stderr)
         self.assertIn("= help: in the source tree, type: ./hal build later\n", done.stderr)
 
     def test_doc_lists_it(self):
@@ -505,7 +505,7 @@ class Unbuilt(Case):
 
     def test_a_build_that_fails_leaves_the_error(self):
         done = self.run_hal("check", "file.hal", HALCYON_BUILD="/bin/false")
-        self.assertIn("error: component 'later' is not built yet", done.stderr)
+        self.assertIn("error: component 'later' is not installed", done.stderr)
 
     def test_a_running_machine_builds_nothing(self):
         (self.folder / "file.hal").write_text("loadrt threads name1=t period1=1000000\n")
@@ -518,7 +518,7 @@ class Unbuilt(Case):
             "loadrt later",
             HALCYON_BUILD=str(self.folder / "build"),
         )
-        self.assertIn("error: component 'later' is not built yet", done.stderr)
+        self.assertIn("error: component 'later' is not installed", done.stderr)
 
 
 if __name__ == "__main__":

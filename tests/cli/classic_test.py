@@ -206,6 +206,22 @@ class Halcmd(Case):
         done = self.halcmd("-C", environment={"COMP_LINE": line, "COMP_POINT": str(len(line))})
         self.assertEqual("adder.in0\nadder.in1\n", done.stdout)
 
+    def test_completion_without_a_program_halcmd(self):
+        only_hal = self.folder / "only-hal"
+        only_hal.mkdir()
+        (only_hal / "hal").symlink_to(HAL)
+        script = (
+            'source <(hal completion bash); COMP_WORDS=(hal scope adder.i) COMP_CWORD=2; _hal; echo "${COMPREPLY[@]}"; '
+            'COMP_WORDS=(hal shell setp adder.i) COMP_CWORD=3; _hal; echo "${COMPREPLY[@]}"'
+        )
+        done = subprocess.run(
+            ["bash", "-c", script],
+            env={**self.environment, "PATH": f"{only_hal}:/usr/bin:/bin"},
+            capture_output=True,
+            text=True,
+        )
+        self.assertEqual("adder.in0 adder.in1\n" * 2, done.stdout, done.stderr)
+
     def test_prompt(self):
         terminal = Terminal(self, "-kf", name="halcmd")
         terminal.expect("halcmd: ")

@@ -365,7 +365,7 @@ class Installed(unittest.TestCase):
         (self.home / "bus.hal").write_text("loadrt can_send\n")
         said = self.ordinary(broken / "bin/hal", "check", "bus.hal", cwd=self.home).stderr
         self.assertIn(
-            "is not a usable component: libhalcyon_link.so.0.1: cannot open shared object file: No such file or directory [bad-plugin]",
+            "is not a usable component: libhalcyon_link.so.0.2: cannot open shared object file: No such file or directory [bad-plugin]",
             said,
         )
         self.assertIn(

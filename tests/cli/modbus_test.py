@@ -2,6 +2,7 @@
 # packages: modbus
 """hal modbus and hal node modbus on a pseudo terminal and on TCP: check, plan, scan, read, write, monitor, faults, and a spindle in real time."""
 
+import fcntl
 import json
 import os
 import pty
@@ -129,6 +130,15 @@ class Modbus(Case):
         self.assertIn(
             "'file' exists", self.bad("node", "modbus", "bus.modbus", "--link", "pty:file")
         )
+
+    def test_a_pseudo_terminal_is_not_left_exclusive(self):
+        """Its other side holds it open, and the exclusive mode with it: no later program of an ordinary user could open it."""
+        self.node("pty:line", "--set", "io.level=-12.5")
+        self.good("modbus", "read", "serial:line?baud=38400", "3", "coil", "3")
+        line = os.open(self.folder / "line", os.O_RDWR | os.O_NOCTTY)
+        self.addCleanup(os.close, line)
+        get_exclusive = 0x80045440  # TIOCGEXCL
+        self.assertEqual(b"\0\0\0\0", fcntl.ioctl(line, get_exclusive, b"\0\0\0\0"))
 
     def test_corrupt_and_silent_slaves(self):
         self.node("pty:line", "--fault", "corrupt:unit=3", "--fault", "silence:unit=7")

@@ -34,8 +34,8 @@ int report_missing(std::string_view name, int error) {
         return fail(
             Options{},
             problem +
-                "this Halcyon was built without libwebsockets or pugixml; type: sudo apt install "
-                "libwebsockets-dev libpugixml-dev, and build again (./hal build panel)");
+                "with Halcyon's Debian packages, type: sudo apt install halcyon-panel; in the source "
+                "tree: sudo apt install libwebsockets-dev libpugixml-dev && ./hal build panel");
     }
     return fail(Options{},
                 problem + fmt::format("it must be in the folder of hal: type ./hal build {} in the "

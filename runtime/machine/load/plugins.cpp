@@ -269,6 +269,17 @@ static std::optional<Plugin> load_plugin(const std::string& path, Span at,
     return plugin;
 }
 
+/// Returns what to type for a component that is listed but not there. `group` is its folder in the
+/// source tree; some groups are Debian packages of their own (tools/package/packages.py).
+std::string how_to_get(const std::string& name, std::string_view group) {
+    constexpr std::string_view packaged[] = {"dds", "estimation", "vision"};
+    std::string text = "in the source tree, type: ./hal build " + name;
+    if (std::find(std::begin(packaged), std::end(packaged), group) != std::end(packaged)) {
+        text += "; with Halcyon's Debian packages: sudo apt install halcyon-" + std::string(group);
+    }
+    return text;
+}
+
 std::optional<Plugin> open_component(const Plugins& plugins, std::string_view name, Origin origin,
                                      Span at, Diagnostics& diagnostics) {
     const bool prefers_module =
@@ -294,8 +305,8 @@ std::optional<Plugin> open_component(const Plugins& plugins, std::string_view na
         return std::nullopt;
     }
     diagnostics.error("no-such-component", at,
-                      "component '" + std::string(name) + "' is not built yet", "",
-                      "in the source tree, type: ./hal build " + own_name);
+                      "component '" + std::string(name) + "' is not installed", "",
+                      how_to_get(own_name, listed_components(plugins.path()).at(own_name).group));
     return std::nullopt;
 }
 
