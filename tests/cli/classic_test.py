@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """halcmd and halrun, with LinuxCNC's options, output and exit status."""
+
 import shutil
 import signal
 import subprocess
@@ -365,8 +366,9 @@ puts [getp a.in0]
             )
         done = self.halrun(
             self.write(
-                "b.tcl", "loadrt sum2 names=a\nsetp a.in0 -inf\nset x 4\nsetp a.in1 {$x*2}\n"
-                "puts [getp a.in0]\nputs [getp a.in1]\n"
+                "b.tcl",
+                "loadrt sum2 names=a\nsetp a.in0 -inf\nset x 4\nsetp a.in1 {$x*2}\n"
+                "puts [getp a.in0]\nputs [getp a.in1]\n",
             )
         )
         self.assertEqual((0, "-inf\n8\n", ""), (done.returncode, done.stdout, done.stderr))

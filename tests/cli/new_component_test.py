@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """hal new: a component compiles and passes its test at once, from the build tree and from an installation; a machine runs and passes its test."""
+
 import os
 import shutil
 import subprocess
@@ -115,12 +116,23 @@ class NewComponent(Case):
 
 
 class NewMachine(Case):
+    def run_in(self, folder, *words):
+        return subprocess.run(
+            [HAL, *words], cwd=folder, env=self.environment, capture_output=True, text=True
+        )
+
     def create(self, name, *options):
         printed = self.good("new", "machine", name, *options)
         return printed.splitlines()
 
     def test_each_bus_runs_and_passes_its_test(self):
-        for bus, axes in (("none", 1), ("none", 9), ("canopen", 3), ("canopen", 4), ("ethercat", 9)):
+        for bus, axes in (
+            ("none", 1),
+            ("none", 9),
+            ("canopen", 3),
+            ("canopen", 4),
+            ("ethercat", 9),
+        ):
             with self.subTest(bus=bus, axes=axes):
                 name = f"{bus}-{axes}"
                 lines = self.create(name, "--bus", bus, "--axes", axes)
@@ -132,6 +144,16 @@ class NewMachine(Case):
                     files.add(f"{name}.{bus}")
                 self.assertEqual(files, set(os.listdir(folder)))
                 test = lines[3].removeprefix("Its test: ")
+                for words in (
+                    ("check", f"{name}.ini"),
+                    ("check", "--ini", f"{name}.ini", f"{name}.hal"),
+                ):
+                    checked = self.run_in(folder, *words)
+                    self.assertEqual(0, checked.returncode, checked.stderr)
+                alone = self.run_in(folder, "check", f"{name}.hal").stderr
+                self.assertTrue(
+                    f"; type: hal check {name}.ini\n" in alone or "--ini FILE.ini" in alone, alone
+                )
                 self.assertIn(test.split(" 2>")[0], (folder / "README.md").read_text())
                 done = subprocess.run(
                     ["bash", "-c", f"set -o pipefail; {test}"],
@@ -162,8 +184,14 @@ class NewMachine(Case):
 
     def test_wrong_words(self):
         for words, message in (
-            (("mill", "--bus", "profinet"), "unknown bus 'profinet'; type one of none, canopen, ethercat"),
-            (("4mill",), "invalid machine name '4mill': use a letter, then letters, digits, - and _; try: hal new machine mill"),
+            (
+                ("mill", "--bus", "profinet"),
+                "unknown bus 'profinet'; type one of none, canopen, ethercat",
+            ),
+            (
+                ("4mill",),
+                "invalid machine name '4mill': use a letter, then letters, digits, - and _; try: hal new machine mill",
+            ),
             ((), "missing name; type: hal new machine NAME"),
         ):
             self.assertEqual(f"hal new: {message}\n", self.bad("new", "machine", *words))

@@ -216,7 +216,8 @@ public:
         return filled(text + "\nstart\n");
     }
     std::string settings() const {
-        return filled("# The settings of the axes, in mm and s.\n" +
+        return filled("# The netlist, for: hal run @NAME@.ini, hal check @NAME@.ini\n[HAL]\n"
+                      "HALFILE = @NAME@.hal\n\n# The settings of the axes, in mm and s.\n" +
                       each(axis_settings, bus_.settings));
     }
     std::string config() const { return filled(std::string(bus_.config) + each(bus_.config_axis)); }

@@ -86,7 +86,11 @@ RULES = (
     (rf"{DOC}halfiles/(.*)", "halcyon", r"usr/share/halcyon/halfiles/\1"),
     (rf"{DOC}tests/netlists/(.*)", "halcyon-doc", r"usr/share/doc/halcyon/tests/netlists/\1"),
     (rf"{DOC}(.*)", "halcyon-doc", r"usr/share/doc/halcyon/\1"),
-    (r"usr/share/man/man1/halcmd\.1", "halcyon-linuxcnc", None),  # LinuxCNC's package has this page too
+    (
+        r"usr/share/man/man1/halcmd\.1",
+        "halcyon-linuxcnc",
+        None,
+    ),  # LinuxCNC's package has this page too
     (r"usr/share/man/.*", "halcyon-doc", None),
     (rf"usr/bin/{ALIASES}", "halcyon-linuxcnc", None),
     (r"usr/share/bash-completion/completions/halcmd", "halcyon-linuxcnc", None),

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Markdown as GitHub renders it, by the library libcmark-gfm."""
+
 import ctypes
 import html
 import re
@@ -31,7 +32,7 @@ class Markdown:
 
     def html(self, text):
         """The HTML of a page, without raw HTML, which no page uses."""
-        data = text.encode()
+        data = with_file_names(text).encode()
         parser = self.cmark.cmark_parser_new(0)
         for name in (TABLE, STRIKETHROUGH):
             self.cmark.cmark_parser_attach_syntax_extension(
@@ -51,6 +52,11 @@ class Markdown:
             .replace("<table>", '<div class="wide"><table>')
             .replace("</table>", "</table></div>")
         )
+
+
+def with_file_names(text):
+    """The text with a line above each code block that is a file, `file=NAME` behind its language: its name."""
+    return re.sub(r"^( *)(```\w+) file=(\S+)$", r"\1`\3`:\n\n\1\2", text, flags=re.MULTILINE)
 
 
 def plain(fragment):
