@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Measures the page of `hal panel` in headless Chromium: panel.py HAL [SECONDS]. Prints a figure per line, with its target.
+"""Measures the page of `hal panel` in headless Chromium: panel.py HAL [SECONDS [OTHER_HAL]]. Prints a figure per line, with its target.
+With OTHER_HAL, the panel of another build shows the same machine to the same browser, in turn with that of HAL.
 
 The browser draws without a GPU, so that its CPU time contains what a GPU would do. CPU times are those of all processes of the browser
 and of hal-panel; the machine is not part of them. The first picture has the values of a thread.
 """
+
 import os
 import re
 import statistics
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -17,6 +20,7 @@ import harness  # noqa: E402
 from web import Browser, have_browser, request, start_panel  # noqa: E402
 
 SECONDS = float(sys.argv[2]) if len(sys.argv) > 2 else 10
+OTHER = Path(sys.argv[3]).resolve() if len(sys.argv) > 3 else None
 NAMES = [f"wave{i}" for i in range(16)]
 NETLIST = (
     f"loadrt threads name1=servo period1=100000\nloadrt siggen names={','.join(NAMES)}\n"
@@ -66,16 +70,36 @@ def row(what, unit, figure, goal=""):
     )
 
 
-def first_picture(browser, port):
+def start_other(case):
+    """The panel of the other build; (process, port)."""
+    process = subprocess.Popen(
+        [str(OTHER), "panel", "--port", "0"],
+        cwd=case.folder,
+        env=case.environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    case.addCleanup(lambda: (process.kill(), process.communicate()))
+    for line in process.stdout:
+        if found := re.match(r"http://[^/]*?:(\d+)/", line):
+            return process, int(found[1])
+    raise AssertionError(f"{OTHER} panel has ended")
+
+
+def first_picture(browser, ports):
     browser.call("Page.addScriptToEvaluateOnNewDocument", source=FIRST_PICTURE)
-    times = []
-    for _ in range(7):
+    times = {port: [] for port in ports}
+    for port in ports * 7:
         browser.open("about:blank")
         browser.wait("location.href === 'about:blank'")
         browser.open(f"http://localhost:{port}/#/overview")
-        times.append(browser.wait("window.firstPicture"))
-    row("page to first picture, median of 7", "ms", statistics.median(times), "<= 500")
-    row("the slowest of them", "ms", max(times))
+        times[port].append(browser.wait("window.firstPicture"))
+    for port, build in zip(ports, ("", ", other build")):
+        median = statistics.median(times[port])
+        row(f"page to first picture, median of 7{build}", "ms", median, "<= 300")
+        row("the slowest of them", "ms", max(times[port]))
 
 
 def page_size(port):
@@ -96,16 +120,14 @@ def floor(browser):
     """What an empty canvas of the scope's size costs in this browser."""
     browser.open("about:blank")
     browser.wait("location.href === 'about:blank'")
-    browser.evaluate(
-        """(() => {
+    browser.evaluate("""(() => {
         const canvas = document.createElement('canvas'), draw = canvas.getContext('2d');
         document.body.append(canvas);
         [canvas.width, canvas.height] = [innerWidth - 16, innerHeight - 100];
         let x = 0;
         const look = () => { draw.clearRect(0, 0, canvas.width, canvas.height); draw.fillRect(x++ % 100, 9, 9, 9); requestAnimationFrame(look); };
         look();
-    })()"""
-    )
+    })()""")
     time.sleep(2)
     cpu, begun = ticks(browser.process.pid), time.monotonic()
     time.sleep(SECONDS)
@@ -116,7 +138,7 @@ def floor(browser):
     )
 
 
-def scope(browser, port, panel):
+def scope(browser, port, panel, build=""):
     channels = ",".join(f"{name}-sine:1:{3.5 - 7 * i / 15:.3g}" for i, name in enumerate(NAMES))
     for mode, query in (
         ("roll", "mode=roll"),
@@ -138,7 +160,7 @@ def scope(browser, port, panel):
         cpu, server = ticks(browser.process.pid) - cpu, process_s(panel.pid) - server
         passed = (after["at"] - before["at"]) / 1000
         row(
-            f"scope, 16 channels at 10 kHz, {mode}: frames per second",
+            f"scope, 16 channels at 10 kHz, {mode}: frames per second{build}",
             "",
             (after["frames"] - before["frames"]) / passed,
             ">= 60" if mode == "roll" else "",
@@ -147,7 +169,10 @@ def scope(browser, port, panel):
         row(f"lost rows, {mode}", "", after["lost"] - before["lost"], "<= 0")
         row(f"cycles that the machine missed itself, {mode}", "", after["gaps"] - before["gaps"])
         row(
-            f"CPU of the browser and hal-panel, {mode}", "%", 100 * (cpu + server) / passed, "<= 30"
+            f"CPU of the browser and hal-panel, {mode}{build}",
+            "%",
+            100 * (cpu + server) / passed,
+            "<= 30",
         )
         row(f"of which hal-panel, {mode}", "%", 100 * server / passed)
 
@@ -163,9 +188,16 @@ def main():
         panel, port, _ = start_panel(case)
         browser = Browser(case)
         page_size(port)
-        first_picture(browser, port)
+        if not OTHER:
+            first_picture(browser, [port])
+            floor(browser)
+            return scope(browser, port, panel)
+        other, other_port = start_other(case)
+        first_picture(browser, [port, other_port])
         floor(browser)
-        scope(browser, port, panel)
+        for _ in range(3):
+            scope(browser, port, panel)
+            scope(browser, other_port, other, ", other build")
     finally:
         case.doCleanups()
 

@@ -8,7 +8,7 @@ export const font = '12px system-ui, "DejaVu Sans", sans-serif';
 
 const maxScale = 4, minScale = .03;
 const detail = {ports: .3, values: .45};  // from which scale on they are drawn
-const minText = 6;                        // px on the screen: smaller names are not drawn
+const minText = 5;                        // px on the screen: smaller names are not drawn
 const flight = 400;                       // ms
 const steps = {
     ArrowLeft: [60, 0],

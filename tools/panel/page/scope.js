@@ -103,6 +103,8 @@ export class View {
         this.hasBase = query.has('base');
         /** @type {{time_ns: number, kind: string, text: string}[]} */
         this.recorded = [];  // what happened in the recording
+        /** @type {{at: number, text: string}[]} */
+        this.knownFaults = null;  // of allFaults(); null: to be read again
         this.main = main;
         this.across = query.get('x') ?? '';  // the channel of the X axis; '': no XY view
         this.cursors = [.3, .7];
@@ -193,7 +195,10 @@ export class View {
                    this.follow(true);
                }),
             on('welcome', () => this.drawSources()),
-            on('state', () => this.noteState()), on('logged', () => this.surface.request())
+            on('state', () => this.noteState()), on('logged', () => {
+                this.knownFaults = null;
+                this.surface.request();
+            })
         ];
     }
 
@@ -325,7 +330,8 @@ export class View {
     drawHistory() {
         const {slider, store} = this, kept = store.newest - store.oldest;
         const behind = Math.max(0, store.newest - this.range()[1]);
-        this.history.hidden = !(kept > this.base * divisions);
+        const isShort = !(kept > this.base * divisions);
+        if (this.history.hidden !== isShort) this.history.hidden = isShort;
         slider.min = String(Math.min(-1e-3, -kept));
         if (document.activeElement !== slider || this.run) slider.value = String(-behind);
         text(this.back, this.run ? `${seconds(kept)} kept` :
@@ -368,8 +374,9 @@ export class View {
 
     /// Draws the XY view, if it is shown. `forced`: also when it was drawn just now.
     showXy(forced = true) {
-        const found = this.xyChannels();
-        this.xyPane.element.hidden = found === null;
+        const found = this.xyChannels(), {element} = this.xyPane;
+        // Writing an attribute makes the browser lay out the page: not in every frame.
+        if (element.hidden !== (found === null)) element.hidden = found === null;
         if (!found) return;
         const tone = paint(this.channels.indexOf(found.y));
         this.xyPane.show(this.store, found.x, found.y, this.measured(), tone, forced);
@@ -562,6 +569,7 @@ export class View {
         this.stopFollowing();
         this.stopFollowing = () => {};
         this.store.clear();
+        this.knownFaults = null;
         this.stops = [];
         if (list.length === 0) return;
         if (this.recording !== '') return this.showRecording(list, call);
@@ -571,6 +579,7 @@ export class View {
                 known = layout.layout;
                 this.store.layout(layout.groups, list, layout.columns);
                 this.store.unixOffset = layout.unix_ns - layout.time_ns;
+                this.knownFaults = null;
                 this.stops = [];
                 this.arm();
             }
@@ -596,6 +605,7 @@ export class View {
         this.store.unixOffset = unix_ns;
         this.store.seconds(0);
         this.recorded = events;
+        this.knownFaults = null;
         this.source = `recording ${this.recording}` +
             (left_out > 0 ? `, ${left_out} earlier rows not shown` : '');
     }
@@ -629,13 +639,15 @@ export class View {
         this.lastSamples = performance.now();
         if (this.stops.length === 0 && !state.running) this.noteState();
         if (!this.run) return;
+        const before = this.shownAt;
         if (this.mode === 'roll' || !this.watcher) {
             this.shownAt = this.zeroAt = this.store.newest;
             this.triggered = false;
             this.watcher?.scan(this.store);
         } else
             this.takeTriggered();
-        this.surface.request();
+        // A record that waits for the next trigger stays as it is.
+        if (this.shownAt !== before || before === null) this.surface.request();
     }
 
     takeTriggered() {
@@ -696,8 +708,14 @@ export class View {
 
     /// All faults since the record began.
     allFaults() {
+        this.knownFaults ??= this.readFaults();
+        return this.knownFaults ?? [];
+    }
+
+    /// Null before the first sample, whose time is that of all others.
+    readFaults() {
         const {store} = this;
-        if (store.origin === null) return [];
+        if (store.origin === null) return null;
         return this.happened()
             .filter(one => one.kind === 'fault')
             .map(one => ({at: store.seconds(one.time_ns), text: one.text}));
@@ -762,10 +780,12 @@ export class View {
         if (this.useCursors)
             for (const at of this.cursors)
                 picture.vertical(width * at, this.looks.text);
-        const faults = this.faults(), [from, to] = this.range();
+        const [from, to] = this.range(), faults = this.faults();
         for (const {at} of faults)
             picture.vertical(width * (at - from) / (to - from), this.looks.bad);
-        this.labels.put(picture, this.axisLabels(cssWidth, cssHeight), this.looks.back, ratio);
+        const key = this.labelKey(cssWidth, cssHeight, ratio);
+        const labels = this.labels.has(key) ? [] : this.axisLabels(cssWidth, cssHeight);
+        this.labels.put(picture, key, labels, this.looks.back, ratio);
         context.putImageData(picture.image, 0, 0);
         faults.forEach(({at, text}, i) => {
             const x = cssWidth * (at - from) / (to - from) + 4, y = 28 + 14 * (i % 4);
@@ -812,6 +832,18 @@ export class View {
     zeroTime() {
         if (this.shownAt === null) return divisions;
         return Number(((this.zeroAt - this.range()[0]) / this.base).toFixed(6));
+    }
+
+    /// What the labels depend on: they are made again when it is another one.
+    labelKey(width, height, ratio) {
+        const channel = this.channels[this.selected], {base, looks, selected} = this;
+        const own = channel && !channel.unknown ?
+            [channel.name, channel.unit, channel.scale, channel.position] :
+            [];
+        const cursors = this.useCursors ? this.cursors : [];
+        return [
+            base, this.zeroTime(), selected, looks.dark, width, height, ratio, ...own, ...cursors
+        ].join(' ');
     }
 
     /// The numbers of the axes, the name of the selected channel, and those of the cursors.

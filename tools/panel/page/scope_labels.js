@@ -33,16 +33,20 @@ export class Labels {
         this.colours = new Uint32Array(0);
     }
 
+    /// Whether the labels of this key are those that were put last.
+    has(key) { return key === this.key; }
+
     /**
      * Puts labels into a picture.
      * @param {import('./scope_picture.js').Picture} picture
-     * @param {Label[]} labels
+     * @param {string} key what the labels depend on
+     * @param {Label[]} labels not used when the labels of this key were put last
      * @param {string} back
      * @param {number} ratio device pixels per CSS pixel
      */
-    put(picture, labels, back, ratio) {
-        const {width, height} = picture, key = JSON.stringify([labels, back, ratio, width, height]);
-        if (key !== this.key) this.draw(width, height, labels, back, ratio);
+    put(picture, key, labels, back, ratio) {
+        const {width, height} = picture;
+        if (!this.has(key)) this.draw(width, height, labels, back, ratio);
         this.key = key;
         const {places, colours} = this, {pixels} = picture;
         for (let i = 0; i < places.length; i++)
