@@ -1037,7 +1037,8 @@ export class View {
         if (this.channels.length === 0) return 'Add a channel: a pin, signal or parameter';
         if (this.source === '') return 'no samples yet';
         const {store} = this, parts = [this.source, `${store.rows} rows`, `${store.lost} lost`];
-        if (!this.run) parts.push(this.single ? 'single record' : 'stopped');
+        if (!this.run && this.recording === '')
+            parts.push(this.single ? 'single record' : 'stopped');
         if (this.channels.some(one => store.isCoarse(one.name, this.range()[0])))
             parts.push(`minima and maxima of ${seconds(store.pastWidth)}`);
         const late = performance.now() - this.lastTrigger > 1000;
