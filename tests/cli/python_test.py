@@ -460,6 +460,27 @@ os._exit(0)
         self.assertIn("<== p.out", self.say("show", "sig", "speed"))
         self.python(right + "assert hal.get_value('speed') == 7\n")
 
+    def test_a_program_with_busy_threads_ends_in_order(self):
+        self.machine()
+        program = """import hal, threading, time
+c = hal.component('x')
+c.newpin('a', hal.HAL_FLOAT, hal.HAL_IN)
+c.ready()
+def watch():
+    for rows in hal.probe('adder.out', batch_ms=1): pass
+def ask():
+    while True: hal.get_value('adder.out'); hal.get_info_signals()
+def read():
+    while True:
+        try: c['a']
+        except hal.error: pass
+for work in (watch, ask, read) * 2: threading.Thread(target=work, daemon=True).start()
+time.sleep(0.3)
+print('done', flush=True)
+"""
+        for _ in range(10):
+            self.assertEqual("done\n", self.python(program))
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "component.hpp"
+#include "released_gil.hpp"
 
 #include <csignal>
 #include <cstdio>
@@ -75,7 +76,7 @@ Component::Component(std::string name, std::string prefix, Json timeout, long ev
       every_ms_(every_ms),
       ends_when_lost_(ends_when_lost) {
     {
-        const py::gil_scoped_release release_gil;
+        const ReleasedGil release_gil;
         client_ = connect_to_instance();
         note_connected();
         checked(client_->request(announcement()));
@@ -91,7 +92,7 @@ Component::Component(std::string name, std::string prefix, Json timeout, long ev
 
 Component::~Component() {
     {
-        const py::gil_scoped_release release_gil;
+        const ReleasedGil release_gil;
         leave(true);
     }
     const std::scoped_lock lock(registry().mutex);
@@ -111,7 +112,7 @@ std::size_t Component::add(const std::string& name, int type, const std::string&
     item.value = initial_value(item.type.type);
     Json reply;
     {
-        const py::gil_scoped_release release_gil;
+        const ReleasedGil release_gil;
         acquire(lock);
         if (index_.contains(name)) {
             throw Problem("component '" + name_ + "': duplicate pin or parameter '" + name + "'");
@@ -132,7 +133,7 @@ std::size_t Component::add(const std::string& name, int type, const std::string&
 }
 
 void Component::ready(bool on) {
-    const py::gil_scoped_release release_gil;
+    const ReleasedGil release_gil;
     std::unique_lock lock(mutex_, std::defer_lock);
     acquire(lock);
     exchange(false);  // a program that waited for ready sees what was set before
@@ -148,7 +149,7 @@ long Component::find(const std::string& name) const {
 py::object Component::get(std::size_t i) {
     std::unique_lock lock(mutex_, std::try_to_lock);
     if (!lock || stale(items_[i]) || report_due()) {
-        const py::gil_scoped_release release_gil;
+        const ReleasedGil release_gil;
         acquire(lock);
         if (stale(items_[i])) {
             exchange(true);
@@ -163,7 +164,7 @@ py::object Component::get(std::size_t i) {
 void Component::send_earlier_writes() {
     Component* const before = last_writer.exchange(this);
     if (!before || before == this || forked_) return;
-    const py::gil_scoped_release release_gil;
+    const ReleasedGil release_gil;
     for_all([before](Component& component) {
         if (&component != before || component.forked_) return;
         const std::scoped_lock lock(component.mutex_);
@@ -178,7 +179,7 @@ void Component::set(std::size_t i, const py::object& value) {
     send_earlier_writes();
     std::unique_lock lock(mutex_, std::try_to_lock);
     if (!lock) {
-        const py::gil_scoped_release release_gil;
+        const ReleasedGil release_gil;
         acquire(lock);
     }
     check_usable();
@@ -192,7 +193,7 @@ void Component::set(std::size_t i, const py::object& value) {
 
 std::string Component::request(const std::string& text) {
     send_earlier_writes();
-    const py::gil_scoped_release release_gil;
+    const ReleasedGil release_gil;
     std::unique_lock lock(mutex_, std::defer_lock);
     acquire(lock);
     exchange(false);
@@ -201,7 +202,7 @@ std::string Component::request(const std::string& text) {
 }
 
 void Component::flush() {
-    if (forked_) return;
+    if (forked_ || left_) return;
     const std::scoped_lock lock(mutex_);
     fetched_ = {};
     if (dirty_ && !left_) {
@@ -210,21 +211,22 @@ void Component::flush() {
 }
 
 void Component::alive() {
-    const py::gil_scoped_release release_gil;
+    const ReleasedGil release_gil;
     std::unique_lock lock(mutex_, std::defer_lock);
     acquire(lock);
     report();
 }
 
 void Component::invalidate() {
-    const py::gil_scoped_release release_gil;
+    const ReleasedGil release_gil;
     std::unique_lock lock(mutex_, std::defer_lock);
     acquire(lock);
     fetched_ = {};
 }
 
 void Component::leave(bool clean) {
-    if (forked_) return;
+    // behind the end of the program, another thread may keep the mutex for ever
+    if (forked_ || left_) return;
     {
         const std::scoped_lock lock(mutex_);
         if (left_) return;
@@ -254,7 +256,7 @@ void Component::forget() {
 
 bool Component::is_connected() {
     if (forked_) return false;
-    const py::gil_scoped_release release_gil;
+    const ReleasedGil release_gil;
     const std::scoped_lock lock(mutex_);
     return !left_ && client_ && client_->connected();
 }
@@ -440,16 +442,17 @@ void Component::reconnect() {
 }
 
 void flush_all() {
-    const py::gil_scoped_release release_gil;
+    const ReleasedGil release_gil;
     for_all([](Component& component) { component.flush(); });
 }
 
 void leave_all(bool clean) {
-    const py::gil_scoped_release release_gil;
+    const ReleasedGil release_gil;
     for_all([clean](Component& component) { component.leave(clean); });
 }
 
 void forget_all() {
+    ReleasedGil::after_fork();
     // a thread that held it in the parent does not exist here; components change under the GIL
     new (&registry().mutex) std::mutex;
     for_all([](Component& component) { component.forget(); });

@@ -123,7 +123,7 @@ private:
     bool dirty_ = false;  // some item is dirty
     bool loops_ = false;  // an output of this component is linked to one of its inputs
     bool ready_ = false;
-    bool left_ = false;
+    std::atomic<bool> left_{false};  // written under the mutex
     std::string lost_;  // why the instance rejected the last exchange
     std::atomic<bool> forked_{false};
     std::chrono::steady_clock::time_point fetched_{};

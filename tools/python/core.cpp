@@ -12,6 +12,7 @@
 
 #include "component.hpp"
 #include "probe.hpp"
+#include "released_gil.hpp"
 
 using namespace hal::python;
 
@@ -21,7 +22,7 @@ namespace {
 class Link {
 public:
     std::string request(const std::string& text) {
-        const py::gil_scoped_release release_gil;
+        const ReleasedGil release_gil;
         const std::scoped_lock lock(mutex_);
         const Json body = Json::parse(text);
         if (client_ && !client_->connected()) {
@@ -102,7 +103,7 @@ PYBIND11_MODULE(_core, module) {
         .def("alive", &Component::alive)
         .def("leave",
              [](Component& c, bool clean) {
-        const py::gil_scoped_release release_gil;
+        const ReleasedGil release_gil;
         c.leave(clean);
     })
         .def("connected", &Component::is_connected)
@@ -119,6 +120,8 @@ PYBIND11_MODULE(_core, module) {
         .def("unix_ns", &Probe::unix_ns)
         .def("lost", &Probe::lost);
     module.def("leave_all", &leave_all);
+    module.def("end", &ReleasedGil::end);
+    ReleasedGil::note_main_thread();
     module.def("after_fork", &forget_all);
     module.def("flush_all", &flush_all);
     PySys_AddAuditHook(before_processes, nullptr);

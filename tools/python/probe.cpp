@@ -5,13 +5,14 @@
 #include <unistd.h>
 
 #include "component.hpp"
+#include "released_gil.hpp"
 
 namespace hal::python {
 
 Probe::Probe(const std::vector<std::string>& names, std::uint32_t every, int batch_ms,
              int buffer_ms)
     : process_(::getpid()) {
-    const py::gil_scoped_release release_gil;
+    const ReleasedGil release_gil;
     client_ = connect_to_instance();
     ProbeClient::Options options;
     options.every = every;
@@ -47,7 +48,7 @@ py::list Probe::next(int timeout_ms) {
     ProbeBatch batch;
     auto got = ProbeClient::Got::nothing;
     {
-        const py::gil_scoped_release release_gil;
+        const ReleasedGil release_gil;
         do {
             got = probe_->next(batch, timeout_ms);
         } while (got == ProbeClient::Got::layout || got == ProbeClient::Got::journal);

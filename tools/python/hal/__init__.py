@@ -10,6 +10,7 @@
 The instance is $HALCYON_INSTANCE (set for what loadusr starts), else the only one running, else `default`.
 See docs/tutorials/python.md.
 """
+
 import atexit
 import os
 import sys
@@ -165,7 +166,14 @@ def _note_crash(kind, what, trace, report=sys.excepthook):
 
 
 sys.excepthook = _note_crash
-atexit.register(lambda: _core.leave_all(not _crashed))
+
+
+@atexit.register
+def _end():
+    _core.leave_all(not _crashed)
+    _core.end()
+
+
 os.register_at_fork(after_in_child=_core.after_fork)
 
 from hal import query  # noqa: E402  uses the names above
