@@ -665,7 +665,11 @@ class Configuration(Ethercat):
         self.assertEqual(
             "1  deviation 0 ns  delay 0 ns  SYNC off  Halcyon servo", self.on("dc").splitlines()[1]
         )
-        self.assertEqual([1, 3], [row["position"] for row in json.loads(self.on("dc", "--json"))])
+        rows = json.loads(self.on("dc", "--json"))
+        self.assertEqual([0, 1, 2, 3], [row["position"] for row in rows])
+        self.assertEqual(
+            [None, 0, None], [row["deviation_ns"] for row in rows[:3]], "null: without a clock"
+        )
 
 
 class Interface(Ethercat):

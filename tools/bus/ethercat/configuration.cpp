@@ -151,6 +151,9 @@ int run_ethercat_dc(const EthercatOptions& options) {
         const auto& s = wire.slave(n);
         if (!s.has_dc()) {
             text += fmt::format("{}  no clock  {}\n", n, wire.name(n));
+            json += fmt::format(
+                R"({}{{"position":{},"deviation_ns":null,"delay_ns":null,"sync":null}})",
+                json.empty() ? "[" : ",\n ", n);
             continue;
         }
         const auto delay = wire.read(n, reg::dc_system_time_delay, 4);
