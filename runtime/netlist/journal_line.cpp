@@ -40,13 +40,10 @@ std::optional<JournalLine> parse_journal_line(const Command& command, Diagnostic
     return line;
 }
 
-std::optional<JournalLine> find_journal_line(const std::vector<Command>& commands) {
+std::optional<JournalLine> journal_line(const Command& command) {
+    if (command.name.text != "journal" || is_journal_request(command)) return std::nullopt;
     Diagnostics reported_when_run;
-    for (const Command& command : commands) {
-        if (command.name.text != "journal" || is_journal_request(command)) continue;
-        if (auto line = parse_journal_line(command, reported_when_run)) return line;
-    }
-    return std::nullopt;
+    return parse_journal_line(command, reported_when_run);
 }
 
 }  // namespace hal

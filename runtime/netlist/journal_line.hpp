@@ -24,7 +24,7 @@ struct JournalLine {
 bool is_journal_request(const Command& command);
 /// Returns what such a line has; nothing after reporting what is invalid.
 std::optional<JournalLine> parse_journal_line(const Command& command, Diagnostics& diagnostics);
-/// Returns the first valid line of a text; nothing when it has none.
-std::optional<JournalLine> find_journal_line(const std::vector<Command>& commands);
+/// Returns what the command has when it is a valid line of this kind; nothing otherwise.
+std::optional<JournalLine> journal_line(const Command& command);
 
 }  // namespace hal

@@ -229,6 +229,16 @@ start
         self.assertIn("own.mcap: the last 5 s of ", self.finish(machine))
         for name in ("own.mcap", "now.mcap"):
             self.assertIn("no difference", self.replay(name))
+        # in a netlist that is sourced, beside the one that sources it
+        (self.folder / "part").mkdir()
+        (self.folder / "part/inner.hal").write_text("journal inner.mcap\n" + HEAP)
+        (self.folder / "part/outer.hal").write_text("source inner.hal\nsource outer.hal\n")
+        path = self.write("c.hal", "source part/outer.hal\n")
+        machine = self.start("run", self.write("d.hal", "source part/inner.hal\n"))
+        self.wait_for_cycles(100)
+        self.finish(machine)
+        self.assertIn("no difference", self.replay("inner.mcap"))
+        self.assertIn("outer.hal", self.bad("run", path))  # it sources itself
         for line, problem in [
             ("journal own.csv", "'own.csv' is not a valid name of a journal"),
             ("journal own.mcap keep=0.1s", "'keep=0.1s' is not a valid duration of a journal"),

@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -12,22 +13,52 @@
 namespace hal::tools {
 namespace {
 
-std::optional<JournalLine> line_of(const std::string& path, Sources& texts, const Ini& ini) {
-    std::string text;
-    std::string ignored;  // loading it reports it
-    const bool is_netlist = !path.ends_with(".tcl") && !path.ends_with(".ini");
-    if (!is_netlist || !read_text_file(resolve_path(path, ""), text, ignored) ||
-        text.find("journal") == std::string::npos) {
+/// Looks for the line in a netlist and in those that it sources, in the order of their commands.
+class JournalSearch {
+public:
+    JournalSearch(Sources& texts, const Ini& ini) : texts_(texts), ini_(ini) {}
+
+    /// `beside`: the netlist that sources it, or "".
+    std::optional<JournalLine> find(const std::string& name, const std::string& beside) {
+        std::string path;
+        std::string text;
+        const bool is_netlist = !name.ends_with(".tcl") && !name.ends_with(".ini");
+        if (!is_netlist || !read(name, beside, path, text) ||
+            !searched_.insert(canonical_path(path)).second || !may_have_line(text)) {
+            return std::nullopt;
+        }
+        const auto variable = [](const std::string& known) -> std::optional<std::string> {
+            const char* const value = std::getenv(known.c_str());
+            return value ? value : known;
+        };
+        Diagnostics reported_when_run;
+        const std::uint32_t source = texts_.add(path, std::move(text));
+        for (const Command& command : parse(texts_, source, {&ini_, variable}, reported_when_run)) {
+            const bool sources = command.name.text == "source" && command.args.size() == 1;
+            auto line = sources ? find(command.args[0].text, path) : journal_line(command);
+            if (line) return line;
+        }
         return std::nullopt;
     }
-    const auto variable = [](const std::string& name) -> std::optional<std::string> {
-        const char* const value = std::getenv(name.c_str());
-        return value ? value : name;
-    };
-    Diagnostics reported_when_run;
-    const std::uint32_t source = texts.add(path, std::move(text));
-    return find_journal_line(parse(texts, source, {&ini, variable}, reported_when_run));
-}
+
+private:
+    /// As the command `source` finds it.
+    static bool read(const std::string& name, const std::string& beside, std::string& path,
+                     std::string& text) {
+        std::string ignored;  // loading it reports it
+        if (read_netlist(name, "", path, text, ignored)) return true;
+        path = resolve_path(name, folder_of(beside));
+        return !beside.empty() && read_text_file(path, text, ignored);
+    }
+    static bool may_have_line(const std::string& text) {
+        const auto has = [&text](const char* word) { return text.find(word) != std::string::npos; };
+        return has("journal") || has("source");
+    }
+
+    Sources& texts_;
+    const Ini& ini_;
+    std::set<std::string> searched_;
+};
 
 }  // namespace
 
@@ -39,8 +70,9 @@ void add_journal_of_netlists(RunOptions& options) {
     if (!options.ini.empty()) {
         ini = Ini::read(texts, options.ini, reported_when_run);
     }
+    JournalSearch search(texts, ini);
     for (const std::string& path : options.words) {
-        const auto line = line_of(path, texts, ini);
+        const auto line = search.find(path, "");
         if (!line) continue;
         options.journal = line->file;
         options.keep_ns = options.keep_ns > 0 ? options.keep_ns : line->keep_ns;
