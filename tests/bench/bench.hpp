@@ -70,6 +70,7 @@ void shell(const Options&, Report&);
 void edit(const Options&, Report&);
 void probe(const Options&, Report&);
 void trace(const Options&, Report&);
+void journal(const Options&, Report&);
 void coherence(const Options&, Report&);
 void python(const Options&, Report&);
 void can(const Options&, Report&);

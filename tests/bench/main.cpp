@@ -36,6 +36,7 @@ constexpr Section sections[] = {
     {"shell", "one-shot commands, a thousand setp, save, against halcmd", shell, true},
     {"edit", "live edits: missed periods, delay, a hundred thousand of them", edit, true},
     {"probe", "sampling values in the cycle: cost, and lost rows at 10 kHz", probe},
+    {"journal", "the execution journal in a cycle of 1000 functions, beside a recording", journal},
     {"trace", "each function of each cycle recorded: cost, and lost events", trace},
     {"coherence", "whether a slow thread sees one state of a fast one, against LinuxCNC",
      coherence},
