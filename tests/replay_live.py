@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: MIT
+"""Runs machines live under load and edits, executes their journals again, and prints what differs.
+
+    replay_live.py [HAL] [--seconds 60] [--random 20] [--edits 200] [--setp 1000] [MACHINE...]
+
+MACHINE is a netlist of halfiles, as canopen-axis/axis.hal; without one all of them that start on this computer. Each runs for the
+time, while two processes load the CPUs, the machine is suspended for moments, values are set, signals, instances and functions
+are added and removed, and a component is reloaded. The exit status is 0 when no bit of any value differs in any cycle.
+"""
+
+import argparse
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from program import ROOT, environment, program
+
+HALFILES = ROOT / "halfiles"
+WRITABLE = re.compile(r"(?m)^\s*\S+\s+(bit|float|s32|u32)\s+IN\s+\S+\s+(\S+)$")
+BUSY = "while True: pass"
+# Components with inputs and outputs of type float.
+PARTS = {
+    "sum2": (["in0", "in1"], ["out"]),
+    "mult2": (["in0", "in1"], ["out"]),
+    "lowpass": (["in"], ["out"]),
+    "integ": (["in"], ["out"]),
+    "ddt": (["in"], ["out"]),
+    "abs": (["in"], ["out"]),
+    "limit1": (["in"], ["out"]),
+    "delay": (["in"], ["out"]),
+    "siggen": ([], ["sine", "cosine", "square"]),
+}
+FUNCTIONS = {"siggen": ".update"}
+
+
+def random_netlist(dice):
+    """Three threads, up to sixty instances, and links between any two of them."""
+    lines = [
+        "loadrt threads name1=fast period1=500000 name2=servo period2=1000000 name3=slow period3=7000000"
+    ]
+    inputs, outputs, functions = [], [], []
+    for kind, (ins, outs) in PARTS.items():
+        count = dice.randrange(2, 8)
+        names = [f"{kind}-{n}" for n in range(count)]
+        lines.append(f"loadrt {kind} names={','.join(names)}")
+        for name in names:
+            inputs += [f"{name}.{pin}" for pin in ins]
+            outputs += [f"{name}.{pin}" for pin in outs]
+            functions.append(name + FUNCTIONS.get(kind, ""))
+    dice.shuffle(inputs)
+    for n, pin in enumerate(outputs):
+        readers = [inputs.pop() for _ in range(dice.randrange(3)) if inputs]
+        lines.append(f"net n{n} {pin} {' '.join(readers)}")
+    dice.shuffle(functions)
+    lines += [
+        f"addf {name} {dice.choice(['fast', 'servo', 'servo', 'slow'])}" for name in functions
+    ]
+    return "\n".join([*lines, "start", ""])
+
+
+class Machine:
+    def __init__(self, hal, folder, netlist, ini=None):
+        self.hal, self.folder = hal, folder
+        self.environment = environment(hal, str(folder))
+        self.words = [hal, "run", netlist, *(["-i", ini] if ini else [])]
+        self.process = None
+
+    def shell(self, *words, given=None):
+        done = subprocess.run(
+            [self.hal, "shell", *words],
+            cwd=self.folder,
+            env=self.environment,
+            input=given,
+            capture_output=True,
+            text=True,
+        )
+        return done.stdout
+
+    def start(self, values):
+        """Returns why it does not start, or ""."""
+        self.process = subprocess.Popen(
+            [*self.words, "--journal", "run.mcap", *(["--values", "*"] if values else [])],
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        runs = False
+        for _ in range(100):
+            if self.process.poll() is not None:
+                return self.process.communicate()[1].strip() or "it has ended"
+            if runs:
+                return ""
+            runs = bool(self.shell("show", "thread").strip())
+            time.sleep(1 if runs else 0.2)  # what cannot be recorded ends it
+        self.stop()
+        return "it has not started in 20 s"
+
+    def stop(self):
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGTERM)
+        return self.process.communicate(timeout=60)[1]
+
+    def disturb(self, options, dice):
+        """Sets values, edits and suspends the machine until the time is over."""
+        pins = WRITABLE.findall(self.shell("show", "pin"))
+        threads = re.findall(r"(?m)^\s*\d+\s+\S+\s+(\S+)\s+\(", self.shell("show", "thread")) or [
+            "servo"
+        ]
+        end = time.monotonic() + options.seconds
+        parts = 20
+        for part in range(parts):
+            lines = [self.setting(dice, pins) for _ in range(options.setp // parts) if pins]
+            for n in range(options.edits // parts // 4):
+                name = f"live-{part}-{n}"
+                lines += [f"loadrt sum2 names={name}", f"addf {name} {dice.choice(threads)}"]
+                lines += [f"net {name} {name}.out", f"delf {name}"]
+            if part == parts // 2:
+                lines.append("reload sum2")
+            self.shell("-k", given="\n".join(lines) + "\n")
+            os.kill(self.process.pid, signal.SIGSTOP)
+            time.sleep(dice.uniform(0.001, 0.03))
+            os.kill(self.process.pid, signal.SIGCONT)
+            time.sleep(max(0.0, (end - time.monotonic()) / (parts - part)))
+
+    @staticmethod
+    def setting(dice, pins):
+        kind, name = dice.choice(pins)
+        value = {"bit": dice.choice(["TRUE", "FALSE"]), "float": f"{dice.uniform(-5, 5):.4f}"}
+        return f"setp {name} {value.get(kind, dice.randrange(5))}"
+
+    def replay(self):
+        done = subprocess.run(
+            [self.hal, "replay", "--exact", "run.mcap"],
+            cwd=self.folder,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+        )
+        return done.returncode, done.stdout, done.stderr
+
+
+def verdict(name, machine):
+    """Prints a line, and returns whether something differs; None: nothing ran."""
+    status, out, err = machine.replay()
+    same = re.search(r"(?m)^no difference(, (\d+) values? compared)?$", out)
+    executed = re.match(r"(\d+ cycles).*?, (\d+ edits?)", out)
+    if executed and executed[1] == "0 cycles":
+        print(f"{name}: does not run by itself: no cycle")
+        return None
+    count = f"{executed[1]}, {executed[2]}" if executed else "nothing"
+    if status == 0 and same:
+        has_values = same[2] not in (None, "0")  # a busy disk may have lost all rows
+        what = f"{same[2]} values compared" if has_values else "compared by checksums"
+        print(f"{name}: {count}, {what}, 0 bits differ", flush=True)
+        return False
+    lines = [line for line in (out + err).splitlines() if not re.match(r"\d+ cycles", line)]
+    print(f"{name}: {count}, DIFFERS: {' | '.join(lines[:3])}", flush=True)
+    return True
+
+
+def run_one(hal, name, prepare, options, dice):
+    """Returns whether something differs; None: it does not start here."""
+    with tempfile.TemporaryDirectory(prefix="hal-live-") as folder:
+        folder = Path(folder)
+        netlist, ini = prepare(folder)
+        machine = Machine(hal, netlist.parent, netlist.name, ini)
+        for values in (True, False):  # too many cannot be recorded
+            why = machine.start(values)
+            if "--values: " not in why:
+                break
+        if why:
+            print(f"{name}: does not start here: {why.splitlines()[-1]}", flush=True)
+            return None
+        busy = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(2)]
+        try:
+            machine.disturb(options, dice)
+        finally:
+            for process in busy:
+                process.kill()
+                process.wait()
+            error = machine.stop()
+        if not (machine.folder / "run.mcap").exists():
+            last = (error.strip().splitlines() or ["it wrote nothing"])[-1]
+            print(f"{name}: ended without a journal: {last}", flush=True)
+            return True
+        differs = verdict(name, machine)
+        if differs and options.keep:
+            shutil.copytree(
+                netlist.parent, Path(options.keep) / name.replace("/", "-"), dirs_exist_ok=True
+            )
+        return differs
+
+
+def prepare_machine(path):
+    def prepare(folder):
+        copy = folder / path.parent.name
+        shutil.copytree(path.parent, copy)
+        beside = sorted(copy.glob("*.ini"))
+        return copy / path.name, beside[0].name if beside else None
+
+    return prepare
+
+
+def prepare_text(text):
+    def prepare(folder):
+        (folder / "random.hal").write_text(text)
+        return folder / "random.hal", None
+
+    return prepare
+
+
+def main():
+    arguments = sys.argv[1:]
+    hal = program(arguments)
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    for name, value in [
+        ("seconds", 60.0),
+        ("random", 20),
+        ("edits", 200),
+        ("setp", 1000),
+        ("seed", 1),
+    ]:
+        options.add_argument(f"--{name}", type=type(value), default=value)
+    options.add_argument("--keep", help="folder for the journals that differ")
+    options.add_argument("machines", nargs="*")
+    options = options.parse_args(arguments)
+    dice = random.Random(options.seed)
+    chosen = [HALFILES / name for name in options.machines]
+    machines = chosen or sorted(HALFILES.glob("*/*.hal"))
+    todo = [(str(path.relative_to(HALFILES)), prepare_machine(path)) for path in machines]
+    todo += [(f"random {n}", prepare_text(random_netlist(dice))) for n in range(options.random)]
+    results = [run_one(hal, name, prepare, options, dice) for name, prepare in todo]
+    run = [one for one in results if one is not None]
+    print(
+        f"{len(run)} machines executed again, {sum(run)} differ, {len(results) - len(run)} do not start here"
+    )
+    return 1 if sum(run) or not run else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
