@@ -57,17 +57,17 @@ struct EventRecord {
 /// The phase of the engine.
 enum class Phase : std::uint32_t { starting, running, stopping, stopped, ended };
 
+/// A cache line of each writer: a slave that is not exchanged costs the cycle nothing.
 struct SlaveImage {
     // written by the engine
-    std::atomic<std::uint32_t> activity{0};  ///< counts what may change a pin of the slave
-    std::atomic<std::uint32_t> online{0};
+    alignas(64) std::atomic<std::uint32_t> online{0};
     std::atomic<std::uint32_t> stopped{0};  ///< the stop telegrams are acknowledged
     std::atomic<std::uint32_t> stop_pending{0};  ///< they are requested and not acknowledged
     std::atomic<std::uint32_t> timeouts{0};
     std::atomic<std::uint32_t> errors{0};  ///< corrupt answers
     std::atomic<std::uint32_t> exceptions{0};
     // written by the cycle
-    std::atomic<std::uint32_t> command{0};  ///< DriveCommand
+    alignas(64) std::atomic<std::uint32_t> command{0};  ///< DriveCommand
     std::atomic<std::uint64_t> speed{0};  ///< double, rpm
 };
 
@@ -88,29 +88,33 @@ enum DriveCommand : std::uint32_t {
 
 struct ImageHeader {
     static constexpr std::size_t event_capacity = 256;
+    static constexpr std::size_t slave_words = 4;  ///< a bit of each slave
 
     // written by the cycle
-    std::atomic<std::uint64_t> heartbeat{0};  ///< cycles
+    alignas(64) std::atomic<std::uint64_t> heartbeat{0};  ///< cycles
     std::atomic<std::int64_t> limit_ns{0};  ///< longest time between two cycles
     std::atomic<std::uint32_t> outputs_valid{0};  ///< the cycle has written all outputs
     std::atomic<std::uint32_t> event_tail{0};
     // written by any thread of the runtime
-    std::atomic<std::uint32_t> stop_count{0};  ///< requests to stop, for those that were short
+    alignas(64) std::atomic<std::uint32_t> stop_count{
+        0};  ///< requests to stop, for those that were short
     std::atomic<std::uint32_t> stop_reason{0};  ///< of the last request
     std::atomic<std::uint32_t> stop_held{0};  ///< StopReason bits that last
     std::atomic<std::uint32_t> ending{0};  ///< stop, then end
-    // written by the engine
-    std::atomic<std::uint32_t> phase{0};
-    std::atomic<std::uint64_t> turns{0};  ///< of the guardian; it waits for at most 5 ms in each
+    // written by the engine; each cycle reads this line
+    alignas(64) std::atomic<std::uint32_t> phase{0};
     std::atomic<std::uint32_t> event_head{0};
-    std::atomic<std::uint32_t> events_lost{0};
-    std::atomic<std::uint32_t> line_open{0};
-    std::atomic<std::uint32_t> broadcasts{0};  ///< broadcast stops
-    std::atomic<std::uint32_t> activity{0};  ///< counts that of all slaves
-    /// why the guardian could not start; written before Phase::ended
-    std::array<char, 256> problem{};
+    std::atomic<std::uint64_t> turns{0};  ///< of the guardian; it waits for at most 5 ms in each
     std::atomic<std::uint64_t> telegrams{0};  ///< answered
     std::atomic<std::int64_t> busy_ns{0};
+    /// Slaves of which a pin may change: set by the engine, cleared by the cycle.
+    std::array<std::atomic<std::uint64_t>, slave_words> changed{};
+    // written by the engine
+    alignas(64) std::atomic<std::uint32_t> events_lost{0};
+    std::atomic<std::uint32_t> line_open{0};
+    std::atomic<std::uint32_t> broadcasts{0};  ///< broadcast stops
+    /// why the guardian could not start; written before Phase::ended
+    std::array<char, 256> problem{};
     std::array<EventRecord, event_capacity> events{};
 };
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free &&
@@ -163,6 +167,17 @@ public:
         event = header_->events[tail % ImageHeader::event_capacity];
         header_->event_tail.store(tail + 1, std::memory_order_release);
         return true;
+    }
+    /// The cycle looks at the slave again; called behind the changes that it is to see. [any]
+    void touch(std::size_t slave) const noexcept {
+        header_->changed[slave / 64].fetch_or(std::uint64_t{1} << slave % 64,
+                                              std::memory_order_release);
+    }
+    /// Returns the slaves of word `n` that were touched, and forgets them; the cycle calls it.
+    /// [realtime]
+    std::uint64_t take_changed(std::size_t n) const noexcept {
+        if (header_->changed[n].load(std::memory_order_relaxed) == 0) return 0;
+        return header_->changed[n].exchange(0, std::memory_order_acquire);
     }
     /// Requests a stop. [any]
     void stop(StopReason reason) const noexcept {

@@ -135,11 +135,7 @@ private:
     void clear_rejections(std::uint32_t telegram) noexcept;
     void answered(std::uint32_t slave, std::int64_t now_ns) noexcept;
     void end_of_job() noexcept;
-    /// The cycle looks at the slave again; behind the changes that it is to see.
-    void touch(std::size_t slave) const noexcept {
-        image_.slave(slave).activity.fetch_add(1, std::memory_order_release);
-        image_.header().activity.fetch_add(1, std::memory_order_release);
-    }
+    void touch(std::size_t slave) const noexcept { image_.touch(slave); }
 
     void make_sync(std::uint32_t slave);
     bool is_sync() const noexcept { return job_.begins_with_sync && job_.next == 0; }

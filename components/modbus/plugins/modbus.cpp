@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <dlfcn.h>
 
+#include <bit>
 #include <deque>
 #include <filesystem>
 
@@ -31,7 +32,11 @@ struct Modbus : hal::bus::BusComponent {
             name_, [this](const EventRecord& record) { return line(record); }, 256,
             &EventTexts::subject);
         for (std::size_t n = 0; n < bus.slaves.size(); ++n) {
-            slaves_.emplace_back(*this, receive_, transmit_, bus, arguments_.plan, n, set_points_);
+            slaves_.emplace_back(*this, receive_, transmit_, bus, arguments_.plan, n,
+                                 SharedPins{set_points_, ages_});
+            if (bus.slaves[n].drive) {
+                drives_.push_back(&slaves_.back());
+            }
             faults_of_slaves_.emplace_back();
             stop_faults_of_slaves_.emplace_back();
             rejections_of_slaves_.emplace_back();
@@ -94,8 +99,8 @@ struct Modbus : hal::bus::BusComponent {
         const hal::bus::Turn turn = receive_turn(cycle);
         if (begins_anew(turn)) {
             header.stop_held.fetch_and(~bit_of(StopReason::fault), std::memory_order_release);
-            for (SlavePins& slave : slaves_) {
-                slave.require_edge();
+            for (SlavePins* drive : drives_) {
+                drive->require_edge();
             }
         }
         if (turn == hal::bus::Turn::leaves) {
@@ -121,8 +126,8 @@ struct Modbus : hal::bus::BusComponent {
                                  static_cast<std::uint32_t>(Phase::running) &&
                              header.stop_held.load(std::memory_order_relaxed) == 0;
         bool invalid = set_points_.transmit(image_);
-        for (SlavePins& slave : slaves_) {
-            invalid = slave.transmit(image_, now, may_run) || invalid;
+        for (SlavePins* drive : drives_) {
+            invalid = drive->command(image_, now, may_run) || invalid;
         }
         record_invalid_inputs(invalid);
         header.outputs_valid.store(1, std::memory_order_release);
@@ -230,8 +235,7 @@ private:
             const bool stopped = has_started && another.image().slave(n).stopped.load() != 0;
             is_stopped_by_another_ = is_stopped_by_another_ && stopped;
             image_.slave(n).stopped.store(stopped ? 1 : 0, std::memory_order_relaxed);
-            image_.slave(n).activity.fetch_add(1, std::memory_order_release);
-            image_.header().activity.fetch_add(1, std::memory_order_release);
+            image_.touch(n);
             image_.tell({stopped ? Event::stop_acknowledged : Event::stop_unconfirmed, n, 0,
                          hal::link::monotonic_ns() - since});
         }
@@ -330,30 +334,37 @@ private:
 
     void show(std::int64_t now, bool is_alive, bool refresh) noexcept {
         const ImageHeader& header = image_.header();
-        const std::uint32_t activity = header.activity.load(std::memory_order_acquire);
         refresh = refresh || is_alive != was_alive_;
-        if (refresh || activity != activity_) {
-            activity_ = activity;
-            was_alive_ = is_alive;
-            show_slaves(is_alive, refresh);
+        was_alive_ = is_alive;
+        show_slaves(is_alive, refresh);
+        ages_.show(now);
+        for (SlavePins* drive : drives_) {
+            drive->show_drive(image_);
         }
-        for (SlavePins& slave : slaves_) {
-            slave.show_ages(image_, now);
-            slave.show_drive(image_);
-        }
+        online = online_slaves_ == slaves_.size() && is_alive;
         fault = lasting_faults_ != 0;
         guarded = has_guardian_ && is_alive;
         telegrams = header.telegrams.load(std::memory_order_relaxed);
         show_load(now, header.busy_ns.load(std::memory_order_relaxed));
     }
 
+    /// Shows the slaves that have changed; `refresh`: all. What is not shown is not read: a slave
+    /// costs a cycle its age only.
     void show_slaves(bool is_alive, bool refresh) noexcept {
-        bool all_online = is_alive;
-        for (SlavePins& slave : slaves_) {
-            slave.show(image_, is_alive, refresh);
-            all_online = all_online && slave.is_online();
+        for (std::size_t word = 0; word < ImageHeader::slave_words && word * 64 < slaves_.size();
+             ++word) {
+            std::uint64_t changed = image_.take_changed(word);
+            if (refresh) {
+                const std::size_t count = std::min<std::size_t>(64, slaves_.size() - word * 64);
+                changed = ~std::uint64_t{0} >> (64 - count);
+            }
+            for (; changed != 0; changed &= changed - 1) {
+                SlavePins& slave = slaves_[word * 64 + std::countr_zero(changed)];
+                online_slaves_ -= slave.is_online() ? 1 : 0;
+                slave.show(image_, is_alive);
+                online_slaves_ += slave.is_online() ? 1 : 0;
+            }
         }
-        online = all_online;
     }
 
     /// The share of the last second.
@@ -411,7 +422,10 @@ private:
     std::unique_ptr<EventTexts> texts_;
     std::unique_ptr<hal::Reporter<EventRecord>> reporter_;
     SetPointPins set_points_;
+    AgePins ages_;
     std::deque<SlavePins> slaves_;
+    std::vector<SlavePins*> drives_;
+    std::size_t online_slaves_ = 0;
     std::deque<hal::LastingFault> faults_of_slaves_, stop_faults_of_slaves_, rejections_of_slaves_;
     hal::LastingFault line_fault_, guardian_fault_, stall_fault_;
     std::string previous_report_;
@@ -431,7 +445,6 @@ private:
     bool has_guardian_ = false;
     bool was_estop_ = false;
     std::int64_t shown_ns_ = 0;
-    std::uint32_t activity_ = 0;
     int lasting_faults_ = 0;
     bool was_alive_ = false;
     std::int64_t load_since_ = 0;

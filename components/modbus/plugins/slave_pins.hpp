@@ -2,6 +2,7 @@
 // The pins of a slave, and what copies them to and from the image.
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -75,7 +76,11 @@ public:
                     return;
                 }
             }
-            image.value(value).store(to_cell(number), std::memory_order_relaxed);
+            // a value that has not changed leaves the cache line to the master
+            auto& cell = image.value(value);
+            if (cell.load(std::memory_order_relaxed) != to_cell(number)) {
+                cell.store(to_cell(number), std::memory_order_relaxed);
+            }
         });
         return invalid;
     }
@@ -93,15 +98,59 @@ private:
     hal::AnyIns<std::uint32_t> pins_;
 };
 
+/// The pins that change in every cycle, the ages, one behind the other: a cycle reads few cache
+/// lines.
+class AgePins {
+public:
+    /// Returns the number of the pin. [setup]
+    std::size_t declare(hal::Component& c, const hal::Function& receive, const std::string& name,
+                        const char* doc) {
+        rows_.emplace_back(c, receive, name, doc);
+        return rows_.size() - 1;
+    }
+    /// Sets when the value was read, in ns; 0: never. [realtime]
+    void set(std::size_t number, std::int64_t stamp_ns) noexcept {
+        rows_[number].stamp_ns = stamp_ns;
+    }
+    /// [realtime]
+    void show(std::int64_t now_ns) noexcept {
+        for (Row& row : rows_) {
+            row.pin = row.stamp_ns == 0 ? infinite_age : seconds_between(row.stamp_ns, now_ns);
+        }
+    }
+
+private:
+    struct Row {
+        Row(hal::Component& c, const hal::Function& receive, const std::string& name,
+            const char* doc)
+            : pin(c, receive, name.c_str(), doc,
+                  {.initial = infinite_age, .unit = "s", .safe = infinite_age}) {}
+        std::int64_t stamp_ns = 0;
+        hal::Out<double> pin;
+    };
+    static double seconds_between(std::int64_t from_ns, std::int64_t to_ns) noexcept {
+        return to_ns > from_ns ? static_cast<double>(to_ns - from_ns) * 1e-9 : 0.0;
+    }
+
+    std::deque<Row> rows_;
+};
+
+/// What the slaves of a bus have together.
+struct SharedPins {
+    SetPointPins& set_points;
+    AgePins& ages;
+};
+
 class SlavePins {
 public:
     /// Declares the pins. [setup]
     SlavePins(hal::Component& c, const hal::Function& receive, const hal::Function& transmit,
-              const Bus& bus, const Plan& plan, std::size_t index, SetPointPins& set_points)
+              const Bus& bus, const Plan& plan, std::size_t index, SharedPins shared)
         : index_(index),
-          age_(c, receive, (name_of(bus, index) + ".age").c_str(),
-               "age of its oldest value; infinite: one was not read, or the thread is stopped",
-               age_options),
+          ages_(shared.ages),
+          age_(ages_.declare(
+              c, receive, name_of(bus, index) + ".age",
+              "age of its oldest value; infinite: one was not read, or the thread is stopped")),
           online_(c, receive, (name_of(bus, index) + ".online").c_str(), "the slave answers",
                   {.safe = false}),
           timeouts_(c, receive, (name_of(bus, index) + ".timeouts").c_str(),
@@ -119,7 +168,7 @@ public:
             if (!planned.value->is_output) {
                 add_reading(planned.telegram);
             }
-            declare(c, receive, transmit, slave.name, planned, n, set_points);
+            declare(c, receive, transmit, slave.name, planned, n, shared.set_points);
         }
         for (std::uint32_t n = 0; slave.drive && n < plan.telegrams.size(); ++n) {
             if (plan.telegrams[n].slave == index &&
@@ -134,7 +183,6 @@ public:
         }
     }
 
-    std::size_t index() const noexcept { return index_; }
     bool is_online() const noexcept { return is_online_; }
     /// Drives start with their next edge of `run` only. [realtime]
     void require_edge() noexcept {
@@ -143,31 +191,35 @@ public:
         }
     }
 
-    /// Shows what the image has, if that has changed; `refresh`: in any case. [realtime]
-    void show(const Image& image, bool is_alive, bool refresh) noexcept {
-        const SlaveImage& slave = image.slave(index_);
-        const std::uint32_t activity = slave.activity.load(std::memory_order_acquire);
-        if (!refresh && activity == activity_) return;
-        activity_ = activity;
-        show_all(image, slave, is_alive);
-    }
-    /// Shows how old the values are, in each cycle. [realtime]
-    void show_ages(const Image& image, std::int64_t now_ns) noexcept {
-        age_ = oldest_ns_ == 0 ? infinite_age : seconds_between(oldest_ns_, now_ns);
-        for (AgePin& age : ages_) {
-            const std::int64_t stamp = image.stamp(age.telegram).load(std::memory_order_relaxed);
-            *age.pin = stamp == 0 ? infinite_age : seconds_between(stamp, now_ns);
-        }
+    /// Shows what the image has. [realtime]
+    void show(const Image& image, bool is_alive) noexcept {
+        show_all(image, image.slave(index_), is_alive);
     }
 
     /// Commands the drive. Returns whether its speed is not finite. [realtime]
-    bool transmit(const Image& image, std::int64_t now_ns, bool may_run) noexcept {
-        return drive_ != nullptr && command(image, now_ns, may_run);
+    bool command(const Image& image, std::int64_t now_ns, bool may_run) noexcept {
+        DriveAxis::Feedback feedback;
+        SlaveImage& slave = image.slave(index_);
+        const bool is_stopping = slave.stop_pending.load(std::memory_order_relaxed) != 0;
+        feedback.is_online = is_online_ && may_run && !is_stopping && !rejects_;
+        const std::int64_t read_at_ns =
+            speed_ == no_value ? 0 : image.stamp(speed_telegram_).load(std::memory_order_relaxed);
+        feedback.has_speed = read_at_ns != 0;
+        feedback.is_current = feedback.has_speed && now_ns - read_at_ns <= max_speed_age_ns_;
+        feedback.speed_rpm = number(image, speed_);
+        feedback.has_running = running_ != no_value;
+        feedback.is_running = bit(image, running_);
+        feedback.is_faulty = bit(image, fault_);
+        const DriveAxis::Outputs out =
+            axis_->step({drive_->run, drive_->speed_cmd, drive_->reset}, feedback, now_ns);
+        slave.speed.store(std::bit_cast<std::uint64_t>(out.speed_rpm), std::memory_order_relaxed);
+        slave.command.store(out.command, std::memory_order_relaxed);
+        shown_ = out;
+        return !std::isfinite(drive_->speed_cmd.get());
     }
 
-    /// Shows what the last command and the values mean. [realtime]
+    /// Shows what the last command and the values of a drive mean. [realtime]
     void show_drive(const Image& image) noexcept {
-        if (!drive_) return;
         const bool works = is_online_ && !rejects_;
         drive_->speed_fb = works ? shown_.speed_feedback_rpm : 0.0;
         drive_->at_speed = works && shown_.at_speed;
@@ -184,13 +236,11 @@ private:
         bool has_safe;
         double safe;
     };
-    struct AgePin {
-        std::unique_ptr<hal::Out<double>> pin;
+    struct ValueAge {
+        std::size_t pin;
         std::uint32_t telegram;
     };
     static constexpr std::uint32_t no_value = UINT32_MAX;
-    static constexpr hal::PinOptions<double> age_options{
-        .initial = infinite_age, .unit = "s", .safe = infinite_age};
 
     static const std::string& name_of(const Bus& bus, std::size_t index) {
         return bus.slaves[index].name;
@@ -242,11 +292,10 @@ private:
                          {n, planned.telegram, v.safe.has_value(), v.safe.value_or(0.0)},
                          {.unit = v.unit.c_str()});
         if (v.has_age) {
-            ages_.push_back(
-                {std::make_unique<hal::Out<double>>(
-                     c, receive, (name + "-age").c_str(),
-                     "age of the value; infinite: it was not read, or the thread is stopped",
-                     age_options),
+            value_ages_.push_back(
+                {ages_.declare(
+                     c, receive, name + "-age",
+                     "age of the value; infinite: it was not read, or the thread is stopped"),
                  planned.telegram});
         }
     }
@@ -273,39 +322,18 @@ private:
                                [&](std::uint32_t telegram) {
             return image.rejected(telegram).load(std::memory_order_relaxed) != 0;
         });
-        find_oldest(image);
-    }
-    /// Stores the time of the oldest value; 0: one was not read.
-    void find_oldest(const Image& image) noexcept {
-        oldest_ns_ = readings_.empty() ? 0 : INT64_MAX;
-        for (const std::uint32_t telegram : readings_) {
-            oldest_ns_ =
-                std::min(oldest_ns_, image.stamp(telegram).load(std::memory_order_relaxed));
+        ages_.set(age_, oldest_of(image));
+        for (const ValueAge& age : value_ages_) {
+            ages_.set(age.pin, image.stamp(age.telegram).load(std::memory_order_relaxed));
         }
     }
-    static double seconds_between(std::int64_t from_ns, std::int64_t to_ns) noexcept {
-        return to_ns > from_ns ? static_cast<double>(to_ns - from_ns) * 1e-9 : 0.0;
-    }
-
-    bool command(const Image& image, std::int64_t now_ns, bool may_run) noexcept {
-        DriveAxis::Feedback feedback;
-        SlaveImage& slave = image.slave(index_);
-        const bool is_stopping = slave.stop_pending.load(std::memory_order_relaxed) != 0;
-        feedback.is_online = is_online_ && may_run && !is_stopping && !rejects_;
-        const std::int64_t read_at_ns =
-            speed_ == no_value ? 0 : image.stamp(speed_telegram_).load(std::memory_order_relaxed);
-        feedback.has_speed = read_at_ns != 0;
-        feedback.is_current = feedback.has_speed && now_ns - read_at_ns <= max_speed_age_ns_;
-        feedback.speed_rpm = number(image, speed_);
-        feedback.has_running = running_ != no_value;
-        feedback.is_running = bit(image, running_);
-        feedback.is_faulty = bit(image, fault_);
-        const DriveAxis::Outputs out =
-            axis_->step({drive_->run, drive_->speed_cmd, drive_->reset}, feedback, now_ns);
-        slave.speed.store(std::bit_cast<std::uint64_t>(out.speed_rpm), std::memory_order_relaxed);
-        slave.command.store(out.command, std::memory_order_relaxed);
-        shown_ = out;
-        return !std::isfinite(drive_->speed_cmd.get());
+    /// Returns the time of the oldest value; 0: one was not read.
+    std::int64_t oldest_of(const Image& image) const noexcept {
+        std::int64_t oldest_ns = readings_.empty() ? 0 : INT64_MAX;
+        for (const std::uint32_t telegram : readings_) {
+            oldest_ns = std::min(oldest_ns, image.stamp(telegram).load(std::memory_order_relaxed));
+        }
+        return oldest_ns;
     }
 
     static double number(const Image& image, std::uint32_t value) noexcept {
@@ -317,10 +345,9 @@ private:
     }
 
     const std::size_t index_;
-    // what each cycle uses is together
-    std::int64_t oldest_ns_ = 0;
-    hal::Out<double> age_;
-    std::vector<AgePin> ages_;
+    AgePins& ages_;
+    const std::size_t age_;  // pins of ages_
+    std::vector<ValueAge> value_ages_;
     std::unique_ptr<DrivePins> drive_;
     hal::Out<bool> online_;
     hal::Out<std::uint32_t> timeouts_, errors_, exceptions_;
@@ -338,7 +365,6 @@ private:
     std::int64_t max_speed_age_ns_ = 0;  // of which `at-speed` is still TRUE
     bool is_online_ = false;
     bool rejects_ = false;  // the telegrams of its drive
-    std::uint32_t activity_ = 0;
 };
 
 }  // namespace hal::modbus
