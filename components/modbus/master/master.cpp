@@ -146,7 +146,7 @@ std::int64_t Master::work(std::int64_t now_ns) noexcept {
 }
 
 void Master::stop(StopReason reason, std::int64_t now_ns) noexcept {
-    if (!held_ || !stopping_) {
+    if ((!held_ || !stopping_) && bus_.has_stops()) {
         image_.tell({Event::stopping, 0, 0, static_cast<std::int64_t>(reason)});
     }
     held_ = true;
