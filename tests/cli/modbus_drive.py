@@ -9,6 +9,7 @@ import time
 import tty
 
 STOP = bytes.fromhex("010620000001 43CA")
+BROADCAST_STOP = bytes.fromhex("000620000001 421B")
 RUN = 0x12
 SILENCE = 3.5  # characters between two frames
 
@@ -75,7 +76,7 @@ class Drive:
         else:
             words = [self.registers.get(address + n, 0) for n in range(value)]
             reply = bytes([1, 3, 2 * value]) + b"".join(w.to_bytes(2, "big") for w in words)
-        if self.answers:
+        if self.answers and frame[0] != 0:  # nobody answers a broadcast
             self.send(reply + crc16(reply))
 
     def send(self, reply):

@@ -8,7 +8,7 @@ import time
 import unittest
 
 from harness import Case, Terminal, wait_until
-from modbus_drive import RUN, STOP, Drive
+from modbus_drive import BROADCAST_STOP, RUN, STOP, Drive
 
 CONFIGURATION = """[bus]
 baud = 115200
@@ -139,6 +139,23 @@ class Guardian(Case):
         self.say("exit")
         self.end(machine)
         self.stops(since)
+
+    def test_a_broadcast_stop_is_sent_before_and_behind_the_addressed_one(self):
+        broadcast = "[bus]\nbroadcast-stop = holding 0x2000 1\nturnaround = 40ms\n"
+        self.write("spindle.modbus", CONFIGURATION.replace("[bus]\n", broadcast))
+        machine = self.run_spindle()
+        begin = len(self.drive.writes)
+        machine.send_signal(signal.SIGKILL)
+        wait_until(
+            lambda: sum(f == BROADCAST_STOP for _, f in self.drive.writes) == 2, "both broadcasts"
+        )
+        self.end(machine, signal.SIGKILL)
+        writes = [(when, f) for when, f in self.drive.writes[begin:] if f[2:4] == STOP[2:4]]
+        self.assertEqual([BROADCAST_STOP, STOP, BROADCAST_STOP], [f for _, f in writes[-3:]])
+        self.assertIn(
+            "; the broadcast stop was sent; slave 1 (spindle) acknowledged its stop telegrams",
+            self.report_of_next_start(),
+        )
 
     def test_a_drive_that_does_not_answer_is_reported(self):
         machine = self.run_spindle()
