@@ -106,6 +106,7 @@ ROWS = {
     "components/bus/component": ["runtime/sdk", "runtime/text", "drivers/link"],
     "components/bus/config": ["runtime/text"],
     "components/bus/events": [],
+    "components/bus/guardian": ["runtime/sdk", "drivers/link"],
     "components/cia301": [],
     "components/cia402": ["runtime/sdk", "components/cia301"],
     "components/canopen/protocol": [
@@ -164,7 +165,11 @@ ROWS = {
     ],
     "components/modbus/master": ["components/modbus/config", "components/bus/events", "runtime/sdk"],
     "components/modbus/device": ["components/modbus/config"],
-    "components/modbus/guardian": ["components/modbus/master", "runtime/sdk"],
+    "components/modbus/guardian": [
+        "components/modbus/master",
+        "components/bus/guardian",
+        "runtime/sdk",
+    ],
     "components/modbus/plugins": [
         "components/modbus/guardian",
         "components/modbus/device",

@@ -2,14 +2,10 @@
 // The guardian as the runtime sees it: starts the process, shares the image with it, ends it.
 #pragma once
 
-#include <sys/types.h>
-
-#include <atomic>
-#include <cstddef>
-#include <memory>
+#include <cstdint>
 #include <string>
 
-#include "link/system.hpp"
+#include "bus/guardian/child_process.hpp"
 #include "modbus/master/image.hpp"
 
 namespace hal::modbus {
@@ -23,20 +19,10 @@ struct GuardianArguments {
     std::string report;  ///< a file for what it did; empty: none
 };
 
-/// Descriptors of the guardian.
-inline constexpr int guardian_memory_fd = 3;
-inline constexpr int guardian_text_fd = 4;
-
-/// Returns the file in which a guardian of a link leaves what it did; empty: there is no folder for
-/// it. Creates the folder. [setup]
-std::string report_file(const std::string& link);
-/// Returns the content of the file and deletes it. [setup]
-std::string take_report(const std::string& file);
-
 class GuardianProcess {
 public:
     GuardianProcess() = default;
-    ~GuardianProcess();
+    ~GuardianProcess() { end(); }
     GuardianProcess(const GuardianProcess&) = delete;
 
     /// Starts the process and waits until it holds the line. Returns the problem, or "". [setup]
@@ -45,19 +31,18 @@ public:
     const Image& image() const noexcept { return image_; }
     /// Waits for its end, for at most `limit_ns`. Returns whether it has ended; called by a thread
     /// that may wait.
-    bool has_ended_within(std::int64_t limit_ns) noexcept;
+    bool has_ended_within(std::int64_t limit_ns) noexcept {
+        return child_.has_ended_within(limit_ns);
+    }
     /// Continues a guardian that was suspended by a signal. [any]
-    void resume() const noexcept;
+    void resume() const noexcept { child_.resume(); }
     /// Continues it, requests the stop telegrams and the end, and waits for it. Returns false when
     /// it had to be killed. [setup]
     bool end() noexcept;
 
 private:
-    void* memory_ = nullptr;
-    std::size_t size_ = 0;
+    bus::ChildProcess child_;
     Image image_;
-    pid_t pid_ = -1;
-    link::Descriptor process_;
 };
 
 }  // namespace hal::modbus

@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "bus/component/bus_component.hpp"
+#include "bus/guardian/report.hpp"
 #include "hal/background.hpp"
 #include "hal/reporter.hpp"
 #include "link/call_journal.hpp"
@@ -187,8 +188,8 @@ private:
 
     void start_guardian() {
         const std::string& link = arguments_.bus.link;
-        const std::string report = report_file(link);
-        previous_report_ = take_report(report);
+        const std::string report = hal::bus::report_file(link);
+        previous_report_ = hal::bus::take_report(report);
         guardian_ = std::make_unique<GuardianProcess>();
         const std::string problem =
             guardian_->start({guardian_program(), name_, arguments_.config.get(), link, report},

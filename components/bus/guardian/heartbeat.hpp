@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-namespace hal::modbus {
+namespace hal::bus {
 
 /// Detects that no cycle has run. It does so from the first cycle on.
 class Heartbeat {
@@ -22,4 +22,4 @@ private:
     std::int64_t last_ns_ = 0;
 };
 
-}  // namespace hal::modbus
+}  // namespace hal::bus
