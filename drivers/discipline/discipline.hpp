@@ -31,6 +31,9 @@ public:
     /// Launch. [any, realtime]
     virtual Sent send(std::span<const std::uint8_t> frame, unsigned slot, unsigned priority,
                       Finisher* finisher = nullptr) noexcept = 0;
+    /// Counts a frame that its sender has dropped before send(): the line is down, or no frame of
+    /// the slot is long enough. [any, realtime]
+    virtual void count_dropped() noexcept {}
     /// Returns the payload bytes that a frame in this slot may have; 0: no such slot. [any]
     virtual std::size_t capacity(unsigned slot) const noexcept = 0;
     /// Returns true when the station may send: synchronised and calibrated. [any]

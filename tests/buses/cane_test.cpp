@@ -212,9 +212,14 @@ TEST(CaneLink, is_down_without_a_cable_and_comes_back) {
 struct Slots final : ethernet::Discipline {
     std::vector<std::pair<Bytes, unsigned>> queue;
     std::size_t max = 2;
+    std::uint64_t dropped = 0;
     bool is_ready = true;
     ethernet::Sent send(std::span<const std::uint8_t> frame, unsigned, unsigned priority,
                         ethernet::Finisher* finisher) noexcept override {
+        if (!is_ready) {
+            ++dropped;
+            return ethernet::Sent::down;
+        }
         if (queue.size() == max) return ethernet::Sent::full;
         queue.emplace_back(Bytes(frame.begin(), frame.end()), priority);
         if (finisher != nullptr) {
@@ -222,7 +227,9 @@ struct Slots final : ethernet::Discipline {
         }
         return ethernet::Sent::queued;
     }
-    std::size_t capacity(unsigned slot) const noexcept override { return slot == 2 ? 60 : 0; }
+    void count_dropped() noexcept override { ++dropped; }
+    std::size_t capacity(unsigned slot) const noexcept override { return slot == 2 ? size : 0; }
+    std::size_t size = 60;
     bool ready() const noexcept override { return is_ready; }
     const Address& address() const noexcept override { return b; }
 };
@@ -276,6 +283,37 @@ TEST(CaneLink, in_a_slot_keeps_what_does_not_fit_for_the_next_cycle) {
     x->receive(f, 5'000'000);
     EXPECT_EQ(x->state(), State::active);
     ethernet::withdraw_discipline(&slots);
+}
+
+TEST(CaneLink, in_a_slot_has_the_station_count_what_it_drops) {
+    for (const char* format : {"packed", "single"}) {
+        Slots slots;
+        const auto line = ethernet::open("sim:slots/lost");
+        ASSERT_TRUE(ethernet::offer_discipline(*line.port, &slots));
+        auto x = opened("cane:sim:slots/lost?slot=2&format=" + std::string(format));
+        const auto send = [&](std::int64_t now) {
+            EXPECT_EQ(x->send(message(0x201, {1}), now), Sent::queued);
+            x->flush(now);
+        };
+        slots.is_ready = false;
+        send(1'000'000);
+        EXPECT_EQ(slots.dropped, 1U) << "no sync";
+        slots.is_ready = true;
+        slots.size = 4;
+        send(2'000'000);
+        EXPECT_EQ(slots.dropped, 2U) << "longer than the slot";
+        slots.size = 60;
+        auto& segment = *line.port->segment();
+        segment.cut(segment.port(), true);
+        Frame f;
+        x->receive(f, 3'000'000);
+        send(3'000'000);
+        EXPECT_EQ(slots.dropped, 3U) << "no carrier";
+        EXPECT_EQ(x->statistics().dropped, 3U);
+        EXPECT_EQ(x->statistics().sent, 0U);
+        EXPECT_TRUE(slots.queue.empty());
+        ethernet::withdraw_discipline(&slots);
+    }
 }
 
 TEST(CaneLink, that_missed_a_turn_sends_the_newest_in_the_next) {

@@ -6,15 +6,16 @@
 #include "hal/component.hpp"
 #include "hal/setup_time.hpp"
 #include "link/can.hpp"
+#include "link/send_counter.hpp"
 #include "link/stale.hpp"
 
 namespace {
 
-/// One end of the bridge and its counters.
+/// One end of the bridge.
 struct End {
     std::unique_ptr<hal::can::Link> link;
-    std::uint64_t passed = 0;
-    std::uint64_t dropped = 0;
+    hal::can::SendCounter forwarded{};  // to this end
+    std::uint64_t stale = 0;          // for this end
 };
 
 struct CanBridge : hal::Component {
@@ -29,9 +30,9 @@ struct CanBridge : hal::Component {
     hal::Out<std::uint64_t> a_to_b{*this, "a-to-b", "frames forwarded from a to b"};
     hal::Out<std::uint64_t> b_to_a{*this, "b-to-a", "frames forwarded from b to a"};
     hal::Out<std::uint64_t> dropped{*this, "dropped",
-                                    "frames not forwarded: queue full, bus down or off, CAN FD "
-                                    "frame on a classic bus, or waiting "
-                                    "for more than 0.1 s"};
+                                    "frames not forwarded: queue full, bus down or off, no sync of "
+                                    "the slots, CAN FD frame on a classic bus, or waiting for more "
+                                    "than 0.1 s"};
     hal::Out<bool> a_up{*this, "a-up", "bus a is neither down nor bus off"};
     hal::Out<bool> b_up{*this, "b-up", "bus b is neither down nor bus off"};
 
@@ -63,9 +64,9 @@ struct CanBridge : hal::Component {
     void update(hal::Cycle cycle) noexcept {
         carry(ends_[0], ends_[1], cycle, enable);
         carry(ends_[1], ends_[0], cycle, enable && !read_only);
-        a_to_b = ends_[0].passed;
-        b_to_a = ends_[1].passed;
-        dropped = ends_[0].dropped + ends_[1].dropped;
+        a_to_b = ends_[1].forwarded.sent();
+        b_to_a = ends_[0].forwarded.sent();
+        dropped = dropped_to(ends_[0]) + dropped_to(ends_[1]);
         a_up = is_up(ends_[0]);
         b_up = is_up(ends_[1]);
     }
@@ -76,25 +77,28 @@ private:
         if (!opened) throw std::runtime_error(opened.problem);
         end = {std::move(opened.link)};
     }
+    static std::uint64_t dropped_to(const End& end) noexcept {
+        return end.forwarded.dropped() + end.stale;
+    }
     static bool is_up(const End& end) noexcept {
         const auto state = end.link->state();
         return state != hal::can::State::down && state != hal::can::State::bus_off;
     }
     /// Forwards at most one buffer of frames, so a babbling bus costs a bounded time; the rest
     /// stays queued until the next cycle.
-    void carry(End& from, const End& to, hal::Cycle cycle, bool pass) noexcept {
+    void carry(const End& from, End& to, hal::Cycle cycle, bool pass) noexcept {
         const std::int64_t now = cycle.start_ns();
         const auto count = from.link->receive(buffer_, now);
         for (std::size_t n = 0; n < count && pass; ++n) {
             const hal::can::Frame& frame = buffer_[n];
-            if (!hal::can::is_stale(frame, now, cycle.period_ns()) &&
-                to.link->send(frame, now) == hal::can::Sent::queued) {
-                ++from.passed;
+            if (hal::can::is_stale(frame, now, cycle.period_ns())) {
+                ++to.stale;
             } else {
-                ++from.dropped;
+                to.forwarded.count(to.link->send(frame, now));
             }
         }
         to.link->flush(now);
+        to.forwarded.update(to.link->statistics());
     }
 
     std::array<End, 2> ends_;

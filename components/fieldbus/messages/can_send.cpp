@@ -5,6 +5,7 @@
 #include "hal/component.hpp"
 #include "hal/setup_time.hpp"
 #include "link/can.hpp"
+#include "link/send_counter.hpp"
 #include "message_fields.hpp"
 
 namespace {
@@ -41,9 +42,11 @@ struct CanSend : hal::Component {
     hal::Param<double> period{
         *this, "period", "also sends at multiples of this time; 0: only by trigger", {.unit = "s"}};
     hal::Param<double> phase{*this, "phase", "delay of these instants", {.unit = "s"}};
-    hal::Out<std::uint64_t> sent{*this, "sent", "messages queued"};
-    hal::Out<std::uint64_t> dropped{*this, "dropped",
-                                    "messages not queued: queue full, bus down or off"};
+    hal::Out<std::uint64_t> sent{*this, "sent", "messages sent or waiting"};
+    hal::Out<std::uint64_t> dropped{
+        *this, "dropped",
+        "messages not sent: queue full, bus down or off, no sync of the slots, "
+        "or replaced by a newer one while they waited"};
     hal::Out<std::uint32_t> waiting{*this, "waiting",
                                     "messages of this instance waiting for the bus"};
 
@@ -61,6 +64,7 @@ struct CanSend : hal::Component {
         auto opened = hal::can::open(address.get(), {.stamps = true});
         if (!opened) throw std::runtime_error(opened.problem);
         link_ = std::move(opened.link);
+        counter_.open();
         setup_time_.start();
         const hal::can::Filter nothing{.id = 0x1fffffff, .mask = 0x1fffffff, .extended = true};
         link_->set_filters(std::span(&nothing, 1));
@@ -83,19 +87,18 @@ struct CanSend : hal::Component {
                 first_ + std::min<std::uint32_t>(id_offset, static_cast<std::uint32_t>(ids - 1));
             frame.extended = first_ > 0x7ff;
             last_data_ = frame.data;
-            if (link_->send(frame, now) == hal::can::Sent::queued) {
-                sent = sent + 1;
-                if (!is_valid) {
-                    *invalid = *invalid + 1;
-                }
-            } else {
-                dropped = dropped + 1;
+            if (counter_.count(link_->send(frame, now)) && !is_valid) {
+                *invalid = *invalid + 1;
             }
         }
         link_->flush(now);
         while (link_->receive(buffer_, now) == buffer_.size()) {
         }
-        waiting = link_->statistics().queued;
+        const hal::can::Statistics statistics = link_->statistics();
+        counter_.update(statistics);
+        sent = counter_.sent();
+        dropped = counter_.dropped();
+        waiting = statistics.queued;
     }
 
 private:
@@ -119,6 +122,7 @@ private:
     }
 
     std::unique_ptr<hal::can::Link> link_;
+    hal::can::SendCounter counter_;
     hal::SetupTime setup_time_;
     std::array<hal::can::Frame, 16> buffer_;
     std::array<std::uint8_t, 64> last_data_{};
@@ -140,7 +144,9 @@ NaN and infinity are not sent: the last valid value is, and `invalid` counts the
 A message leaves in each cycle in which `trigger` is TRUE, at multiples of `period`, counted from
 the first cycle, and with `on-change` when its data are not those sent last (at the start: zeros).
 Each instance is a node of its own on a `sim:` bus, so the messages of several instances are sent in
-order of their identifiers, as by a controller with a buffer for each. With `ids=8` the pin
+order of their identifiers, as by a controller with a buffer for each. Each message is counted in
+`sent` or in `dropped`. On a bus with time slots, frames that the station has taken and drops later,
+when it loses the sync, are counted by the station: `frames-dropped` of tdma, `dropped` of scocan. With `ids=8` the pin
 `id-offset` selects one of eight consecutive identifiers.
 
     loadrt can_send link=sim:robot names=position id=0x10a fields=a:s32,b:s32

@@ -217,12 +217,13 @@ private:
     ethernet::Sent launch(std::size_t length, bool service, std::int64_t now_ns) noexcept {
         ethernet::Finisher* const finisher =
             settings_.format == Format::packed ? seal_.get() : nullptr;
-        if (!is_up()) return ethernet::Sent::down;
+        if (!line_up_) return count_dropped(ethernet::Sent::down);
         const std::span whole(frame_.data(), length);
         auto sent = ethernet::Sent::down;
         if (!discipline_) {
             sent = port_->send(whole, {.finisher = finisher}, now_ns);
         } else {
+            // a station that may not send drops it and counts it
             discipline_->with([&](ethernet::Discipline& d) {
                 sent = d.send(whole, *settings_.slot, settings_.priority + (service ? 1 : 0),
                               finisher);
@@ -232,6 +233,13 @@ private:
             load_.add(length);
         }
         return sent;
+    }
+    /// Counts a frame that is not passed to the discipline.
+    ethernet::Sent count_dropped(ethernet::Sent why) noexcept {
+        if (discipline_) {
+            discipline_->with([](ethernet::Discipline& d) { d.count_dropped(); });
+        }
+        return why;
     }
     /// Removes the first `count` messages of a queue and counts them as sent or lost.
     void done(hal::Queue<Frame>& queue, std::size_t count, ethernet::Sent sent) noexcept {
@@ -254,7 +262,7 @@ private:
                 const auto bytes =
                     put_single(*f, settings_.order,
                                std::span(frame_).subspan(ethernet::header_bytes, capacity()));
-                const auto sent = bytes == 0 ? ethernet::Sent::rejected
+                const auto sent = bytes == 0 ? count_dropped(ethernet::Sent::rejected)
                                              : launch(ethernet::header_bytes + bytes,
                                                       queue == &service_data_, now_ns);
                 if (sent == ethernet::Sent::full) return;
@@ -301,6 +309,7 @@ private:
             }
             auto sent = ethernet::Sent::rejected;  // not even one fits
             if (first) {
+                count_dropped(sent);
                 counts[process_data_.front() != nullptr ? 0 : 1] = 1;
             } else {
                 const auto& destination = to_all ? ethernet::broadcast : *to;

@@ -190,7 +190,7 @@ TEST(TdmaSlot, counts_the_frames_that_were_queued_when_the_station_stopped_sendi
         ASSERT_TRUE(to.slot->push(frame_of(header + 46, 1), 8, nullptr, to.epoch));
     }
     sender.transmitter.clear_slots();
-    EXPECT_EQ(sender.core.status.count.dropped, 2U);
+    EXPECT_EQ(sender.core.status.count.cleared, 2U);
 }
 
 }  // namespace

@@ -125,7 +125,27 @@ TEST(Station, does_not_count_frames_that_were_rejected_before_it_was_attached) {
     EXPECT_NE(ethernet::Sent::queued, m.station.send(frame, 0, 0));
     m.station.attach(m.port);
     bed.run(5 * ms);
-    EXPECT_EQ(0U, m.status().count.dropped);
+    EXPECT_EQ(0U, m.station.dropped(m.port.statistics()));
+}
+
+TEST(Station, counts_each_frame_that_does_not_leave_once) {
+    Bed bed;
+    Machine& m = bed.add(1, master());
+    const auto dropped = [&m] { return m.station.dropped(m.port.statistics()); };
+    const std::vector<std::uint8_t> frame(60);
+    EXPECT_EQ(ethernet::Sent::down, m.station.send(frame, 0, 0));
+    EXPECT_EQ(1U, dropped()) << "sent while the station may not send";
+    bed.run(100 * ms);
+    ASSERT_TRUE(m.station.ready());
+    EXPECT_EQ(1U, dropped());
+    m.station.count_dropped();
+    EXPECT_EQ(2U, dropped()) << "dropped by the sender";
+    const std::uint64_t before = m.status().count.syncs_sent;
+    m.port.cut = true;
+    bed.run(10 * ms);
+    EXPECT_EQ(before, m.status().count.syncs_sent);
+    EXPECT_EQ(12U, dropped()) << "a sync in each of ten cycles";
+    EXPECT_EQ(0U, m.port.statistics().late);
 }
 
 TEST(Station, reports_the_new_schedule_of_a_master_that_restarted_at_once) {

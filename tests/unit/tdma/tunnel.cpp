@@ -133,7 +133,7 @@ TEST(Tunnel, uses_its_own_slot_only) {
     EXPECT_GT(tunnelled, 190);
     EXPECT_GT(full.at_m.dropped(), 0u) << "more than the slot carries was given";
     EXPECT_EQ(0u, full.m.status().count.intruders + full.s.status().count.intruders);
-    EXPECT_EQ(0u, full.m.status().count.late + full.s.status().count.late);
+    EXPECT_EQ(0u, full.m.port.statistics().late + full.s.port.statistics().late);
 }
 
 TEST(Tunnel, drops_the_newest_when_it_is_full) {

@@ -48,10 +48,14 @@ public:
         const Address& address() const noexcept override { return address_; }
         ethernet::Sent send(std::span<const std::uint8_t> frame, const ethernet::Launch& launch,
                             std::int64_t now) noexcept override {
-            if (cut) return ethernet::Sent::down;
+            if (cut) {
+                ++statistics_.dropped;
+                return ethernet::Sent::down;
+            }
             const Time at = launch.at_ns == 0 ? now : launch.at_ns;
             farthest = std::max(farthest, at - now);
             if (now > at + (launch.guard_ns == 0 ? INT64_MAX / 4 : launch.guard_ns)) {
+                ++statistics_.late;
                 return ethernet::Sent::late;
             }
             Frame f{
@@ -76,7 +80,7 @@ public:
             return ethernet::Arrival{f.bytes, clock_.local(f.arrives) + wire_.noise()};
         }
         bool wait(std::int64_t) noexcept override { return false; }
-        ethernet::Statistics statistics() const noexcept override { return {}; }
+        ethernet::Statistics statistics() const noexcept override { return statistics_; }
         const ethernet::Description& description() const noexcept override { return description_; }
         const Clock& clock() const { return clock_; }
 
@@ -93,6 +97,7 @@ public:
         std::vector<Frame> inbox_;
         std::size_t next_ = 0;
         ethernet::Description description_;
+        ethernet::Statistics statistics_;
     };
 
     Port& port(int number, Clock clock = {}) {

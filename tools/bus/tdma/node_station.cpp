@@ -274,12 +274,13 @@ void TdmaStation::run(const std::function<bool(std::int64_t, bool)>& turn) {
 
 std::string TdmaStation::summary() const {
     const auto& s = station_.status();
+    const ethernet::Statistics port = port_.statistics();
     return fmt::format(
         "TDMA: {}, {} cycles, {} missed; syncs {} received, {} lost; frames {} sent, {} late, {} "
         "dropped; clock {:+.1f} ppm, "
         "{} ns to the master, sync jitter {:.0f} ns\n",
         tdma::to_string(s.state), cycles_, missed_, s.count.syncs, s.count.syncs_lost, s.count.sent,
-        s.count.late, s.count.dropped, s.drift * 1e6, s.delay, s.jitter);
+        port.late, station_.dropped(port), s.drift * 1e6, s.delay, s.jitter);
 }
 
 std::string make_tdma_station(const NodeOptions& options, std::string& link,

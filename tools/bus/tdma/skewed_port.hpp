@@ -84,6 +84,7 @@ public:
                         ethernet::Finisher* finisher) noexcept override {
         return its_.send(frame, slot, priority, finisher);
     }
+    void count_dropped() noexcept override { its_.count_dropped(); }
     std::size_t capacity(unsigned slot) const noexcept override { return its_.capacity(slot); }
     bool ready() const noexcept override { return its_.ready(); }
     const ethernet::Address& address() const noexcept override { return its_.address(); }

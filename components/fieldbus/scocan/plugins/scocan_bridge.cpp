@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "link/send_counter.hpp"
 #include "link/stale.hpp"
 #include "station_component.hpp"
 
@@ -18,6 +19,9 @@ struct ScocanBridge : StationComponent {
         {.per_instance = true}};
 
     hal::Out<std::uint64_t> to_pc{*this, receive_, "to-pc", "frames forwarded from the bus"};
+    hal::Out<std::uint64_t> to_pc_dropped{*this, receive_, "to-pc-dropped",
+                                          "frames of the bus not forwarded: queue full, or the "
+                                          "participant's bus down or off"};
     hal::Out<std::uint64_t> from_pc{*this, transmit_, "from-pc",
                                     "frames of the participant that were queued for a slot"};
     hal::Out<std::uint64_t> rejected{
@@ -41,7 +45,8 @@ struct ScocanBridge : StationComponent {
         if (!opened) throw std::runtime_error(opened.problem);
         StationComponent::start();
         pc_ = std::move(opened.link);
-        to_pc_ = from_pc_ = rejected_ = 0;
+        to_pc_ = {};
+        from_pc_ = rejected_ = 0;
     }
     void stop() noexcept {
         StationComponent::stop();
@@ -50,13 +55,15 @@ struct ScocanBridge : StationComponent {
 
 private:
     void passed(const hal::can::Frame& frame) noexcept override {
-        if (pc_ && pc_->send(frame, now_) == hal::can::Sent::queued) {
-            ++to_pc_;
+        if (pc_) {
+            to_pc_.count(pc_->send(frame, now_));
         }
     }
     void received() noexcept override {
         pc_->flush(now_);
-        to_pc = to_pc_;
+        to_pc_.update(pc_->statistics());
+        to_pc = to_pc_.sent();
+        to_pc_dropped = to_pc_.dropped();
     }
     /// Takes at most one buffer of frames, so that a babbling participant costs a bounded time; the
     /// rest waits.
@@ -78,7 +85,7 @@ private:
 
     std::unique_ptr<hal::can::Link> pc_;
     std::array<hal::can::Frame, 32> buffer_;
-    std::uint64_t to_pc_ = 0;
+    hal::can::SendCounter to_pc_;
     std::uint64_t from_pc_ = 0;
     std::uint64_t rejected_ = 0;
 };

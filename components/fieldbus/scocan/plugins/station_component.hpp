@@ -139,10 +139,10 @@ public:
         }
         exchange_->each([this](can::SlotUser& user) {
             while (const can::SlotFrame* next = user.outgoing.front()) {
-                const can::Sent result = station_->send(next->frame, false, next->slot);
-                if (result == can::Sent::full) {
-                    break;  // waits for the next cycle
+                if (station_->is_full()) {
+                    break;  // it waits for the next cycle
                 }
+                const can::Sent result = station_->send(next->frame, false, next->slot);
                 if (result != can::Sent::queued) {
                     user.rejected.fetch_add(1, std::memory_order_relaxed);
                 }

@@ -69,6 +69,8 @@ public:
     bool changing() const noexcept { return modes_.changing(); }
     std::uint32_t lost() const noexcept { return core_.clock.lost(); }
     std::size_t waiting() const noexcept { return core_.queue.size(); }
+    /// Returns true when send() would drop a frame that replaces no value. [realtime]
+    bool is_full() const noexcept { return core_.queue.size() == SendQueue::capacity; }
     std::uint32_t foreign_of(std::uint32_t id) const noexcept {
         return slot_monitor_.foreign_of(id);
     }

@@ -63,8 +63,8 @@ struct StationPins {
     hal::Out<std::uint64_t> syncs_lost{c, f, "syncs-lost", "cycles without a sync"};
     hal::Out<std::uint64_t> sent{c, f, "frames-sent", "frames sent in slots"};
     hal::Out<std::uint64_t> dropped{c, f, "frames-dropped",
-                                    "frames dropped: longer than their slot, no link, or queued when "
-                                    "the station stopped sending"};
+                                    "frames dropped: longer than their slot, no link, or queued or "
+                                    "passed to the station while it may not send"};
     hal::Out<std::uint64_t> late{c, f, "frames-late",
                                  "frames not sent because their slot had passed"};
     hal::Out<std::uint64_t> foreign{
@@ -106,8 +106,8 @@ struct StationPins {
         syncs = s.count.syncs + s.count.syncs_sent;
         syncs_lost = s.count.syncs_lost;
         sent = s.count.sent;
-        dropped = s.count.dropped;
-        late = s.count.late + port.late;
+        dropped = station.dropped(port);
+        late = port.late;
         intruders = s.count.intruders;
         losses = s.count.losses;
         if (tunnel == nullptr) return;

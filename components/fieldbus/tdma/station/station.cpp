@@ -161,6 +161,10 @@ void Station::become(State state) noexcept {
     report(Event::running);
 }
 
+std::uint64_t Station::dropped(const ethernet::Statistics& port) const noexcept {
+    return rejected_.load(std::memory_order_relaxed) + core_.status.count.cleared + port.dropped;
+}
+
 std::size_t Station::waiting(unsigned slot) const noexcept {
     const Slot* s = transmitter_.find(slot);
     return s == nullptr ? 0 : s->waiting();
@@ -187,7 +191,7 @@ ethernet::Sent Station::send(std::span<const std::uint8_t> frame, unsigned slot,
     }
     if (result != queued && result != full) {
         // full: the sender keeps it
-        rejected_.fetch_add(1, std::memory_order_relaxed);
+        count_dropped();
     }
     return result;
 }
@@ -722,7 +726,6 @@ void Station::check_loss(Time now) noexcept {
 }
 
 void Station::transmit(Time now) noexcept {
-    core_.status.count.dropped += rejected_.exchange(0, std::memory_order_relaxed);
     if (core_.port == nullptr || !core_.grid_known || !core_.clock.settled()) return;
     const State state = core_.status.state;
     if (state != State::calibrating && state != State::running) return;

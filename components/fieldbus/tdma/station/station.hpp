@@ -81,6 +81,9 @@ public:
     Time cycle_start(std::uint32_t cycle) const noexcept {
         return core_.clock.local(core_.start_of(cycle));
     }
+    /// Returns the own frames since attach() that did not leave, except late ones: rejected by
+    /// send(), queued when the station stopped sending, dropped by the port. [realtime]
+    std::uint64_t dropped(const ethernet::Statistics& port) const noexcept;
     std::size_t waiting(unsigned slot) const noexcept;  ///< frames queued for it. [realtime]
 
     /// Returns the state of the other stations, in the order of the setup. [realtime]
@@ -99,6 +102,7 @@ public:
         return slot_monitor_.origin(from, arrived_ns, length);
     }
     std::size_t capacity(unsigned slot) const noexcept override;
+    void count_dropped() noexcept override { rejected_.fetch_add(1, std::memory_order_relaxed); }
     bool ready() const noexcept override { return ready_.load(std::memory_order_relaxed); }
     const Address& address() const noexcept override { return core_.address; }
 
@@ -170,7 +174,7 @@ private:
     Pings pings_;
     Transmitter transmitter_{core_, calibration_, pings_, slot_monitor_.roster()};
     std::atomic<bool> ready_{false};
-    /// that send() rejected, in any thread; transmit() counts them
+    /// frames that send() rejected, or its caller dropped, in any thread
     std::atomic<std::uint64_t> rejected_{0};
 
     LastSync sync_;

@@ -159,10 +159,8 @@ struct Counters {
     /// truncated frames, other versions and disciplines, syncs of another schedule
     std::uint64_t foreign = 0;
     std::uint64_t intruders = 0;  ///< frames of others in slots of this station
-    /// frames sent in slots; dropped without space or time
-    std::uint64_t sent = 0;
-    std::uint64_t dropped = 0;
-    std::uint64_t late = 0;  ///< frames whose slot had passed
+    std::uint64_t sent = 0;  ///< frames sent in slots
+    std::uint64_t cleared = 0;  ///< frames that were queued when the station stopped sending
     std::uint64_t losses = 0;
     std::uint64_t take_overs = 0;
 };

@@ -38,7 +38,7 @@ void Transmitter::clear_slots() noexcept {
     epoch_.store(epoch, std::memory_order_release);
     for (Slot& s : slots_) {
         s.clear(epoch);
-        core_.status.count.dropped += s.take_dropped();
+        core_.status.count.cleared += s.take_dropped();
     }
 }
 
@@ -80,13 +80,7 @@ void Transmitter::queue_reply(const Decoded& d, Time arrived) noexcept {
 
 bool Transmitter::launch(std::span<const std::uint8_t> frame,
                          const ethernet::Launch& how) noexcept {
-    const auto sent = core_.port->send(frame, how, local_now());
-    if (sent == ethernet::Sent::late) {
-        ++core_.status.count.late;
-    } else if (sent != ethernet::Sent::queued) {
-        ++core_.status.count.dropped;
-    }
-    return sent == ethernet::Sent::queued;
+    return core_.port->send(frame, how, local_now()) == ethernet::Sent::queued;
 }
 
 void Transmitter::send_sync(std::uint32_t cycle, Time global_at) noexcept {
@@ -169,7 +163,7 @@ void Transmitter::send_slot(std::size_t index, std::uint32_t cycle) noexcept {
         slot.pop();
         used += bytes;
     }
-    core_.status.count.dropped += slot.take_dropped();
+    core_.status.count.cleared += slot.take_dropped();
     send_pings(slot, at, used);
 }
 

@@ -69,6 +69,8 @@ private:
     static constexpr std::size_t max_turns = 4 * (max_slots + 1);
 
     std::span<Turn> due_turns(std::array<Turn, max_turns>&, Time from, Time until) const noexcept;
+    /// Passes a frame to the port, which counts it when it drops it. Returns false when it does so
+    /// at once.
     bool launch(std::span<const std::uint8_t> frame, const ethernet::Launch&) noexcept;
     void send_sync(std::uint32_t cycle, Time global_at) noexcept;
     void send_replies() noexcept;
