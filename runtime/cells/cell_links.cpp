@@ -243,24 +243,23 @@ NodeLinks node_links(const Cell& cell, std::size_t node,
     }
     // Subscribers run before everything that reads their pins, and before node.watch: each addf
     // puts its function first.
-    std::set<std::size_t> heard;
     for (const NodeTopic& topic : cell.topics()) {
-        const std::string described =
-            from(cell, topic) + "/" + topic.thread + "=" + compact(topic) + ";";
+        const std::string named = from(cell, topic) + "/" + topic.thread;
+        const std::string described = named + "=" + compact(topic) + ";";
         if (topic.from == node) {
             publish(cell, topic, participant, sent);
             own.offers += described;
         } else if (topic.read_by(node)) {
             subscribe(cell, topic, node, participant, links.after);
             own.wants += described;
-            // the node is online while its first topic is valid
-            if (!heard.insert(topic.from).second) continue;
             const std::string instance = in_name(cell, topic, node);
-            const std::string name = from(cell, topic);
-            monitored.push_back({"net", "node:" + name + ":heard", instance + "." + dds::pin::valid,
-                                 "=>", dds::NodeLink::pin(name, dds::pin::heard)});
-            monitored.push_back({"net", "node:" + name + ":age", instance + "." + dds::pin::age_ms,
-                                 "=>", dds::NodeLink::pin(name, dds::pin::heard_age_ms)});
+            const std::string signal = "node:" + from(cell, topic) + ":" + topic.thread;
+            const auto monitor = [&](const char* suffix, const char* pin, const char* heard) {
+                monitored.push_back({"net", signal + suffix, instance + "." + pin, "=>",
+                                     "node." + dds::NodeLink::heard(named, heard)});
+            };
+            monitor(":heard", dds::pin::valid, dds::pin::heard);
+            monitor(":age", dds::pin::age_ms, dds::pin::heard_age_ms);
         }
     }
     links.before.push_back(with(own.arguments(), participant));

@@ -47,6 +47,27 @@ sets count -1
 net doubled twice.out
 """
 
+TWO_THREADS = """loadrt threads name1=servo period1=1000000 name2=slow period2=10000000
+
+node desk deadline=1s
+loadrt integ names=ta,tb
+addf ta servo
+addf tb slow
+setp ta.in 1
+setp tb.in 1
+net fast ta.out
+net lazy tb.out
+
+node motor deadline=1s
+loadrt sum2 names=a,b
+addf a servo
+addf b slow
+net fast => a.in0
+net lazy => b.in0
+sets fast -1
+sets lazy -1
+"""
+
 
 class Language(Case):
     def test_check_takes_all_nodes_at_once(self):
@@ -246,6 +267,21 @@ class Running(Case):
         self.end(again)
         out, err = self.end(taker)
         self.assertNotIn("ERROR", err)
+
+    def test_is_offline_when_the_signals_of_one_of_its_threads_are_lost(self):
+        path = self.write("threads.hal", TWO_THREADS)
+        self.node("motor", path)
+        self.node("desk", path)
+        self.until("motor", "node.desk.online", lambda v: v == "TRUE", "the desk is there")
+        self.until("motor", "b.in0", lambda v: float(v or -1) > 0, "signals of both threads come")
+        self.shell("delthread", "slow", instance="desk")
+        self.until("motor", "node.desk.online", lambda v: v == "FALSE", "the loss is noticed")
+        self.assertEqual("-1", self.value("b.in0", instance="motor"))
+        age = float(self.value("node.desk.age-ms", instance="motor"))
+        self.assertGreater(age, 1000, "the age of the oldest signal")
+        count = float(self.value("a.in0", instance="motor"))
+        self.until("motor", "a.in0", lambda v: float(v) > count, "the other thread goes on")
+        self.assertEqual("FALSE", self.value("node.desk.online", instance="motor"))
 
     def test_rejects_another_version_by_name(self):
         self.node("taker")

@@ -9,6 +9,7 @@
 // All of it is [setup] and allocates.
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <string>
@@ -27,7 +28,7 @@ inline constexpr const char *topic = "topic", *type = "type", *fields = "fields"
 }  // namespace argument
 
 /// Names of pins that are linked between dds_subscribe and node. Those of node are prefixed by the
-/// other node: `node.robot.heard`.
+/// other node and its thread: `node.robot.servo.heard`.
 namespace pin {
 inline constexpr const char *valid = "valid", *age_ms = "age-ms", *heard = "heard",
                             *heard_age_ms = "heard-age-ms";
@@ -113,8 +114,12 @@ struct NodeLink {
         }
         return words;
     }
-    static std::string pin(const std::string& other, const char* name) {
-        return "node." + other + "." + name;
+    /// Returns the name of a pin of a topic ROBOT/THREAD that this node receives, without that of
+    /// the component: "robot.servo.heard".
+    static std::string heard(const std::string& topic, const char* name) {
+        std::string prefix = topic;
+        std::replace(prefix.begin(), prefix.end(), '/', '.');
+        return prefix + "." + name;
     }
 };
 

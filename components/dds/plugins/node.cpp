@@ -16,44 +16,73 @@
 
 #include <unistd.h>
 
-#include "hal/age.hpp"
 #include "dds/arguments.hpp"
+#include "dds/links/links.hpp"
 #include "dds/status.hpp"
+#include "hal/age.hpp"
 
 namespace {
 
 using namespace hal::dds;
 
+/// A topic that another node sends to this one: the signals of one of its threads.
+struct Received {
+    Received(hal::Component& c, const hal::Function& f, const std::string& topic)
+        : valid_name(NodeLink::heard(topic, pin::heard)),
+          age_name(NodeLink::heard(topic, pin::heard_age_ms)),
+          valid(c, f, valid_name.c_str(), "the signals of this thread are valid"),
+          age(c, f, age_name.c_str(), "age of the signals of this thread", {.unit = "ms"}) {}
+
+    const std::string valid_name, age_name;
+    hal::In<bool> valid;
+    hal::In<double> age;
+};
 
 /// Another node, as its cycle and the engine's threads know it.
 struct Other {
-    Other(hal::Component& c, const hal::Function& f, std::string node)
+    /// `wanted`: the topics that this node receives, of any node.
+    Other(hal::Component& c, const hal::Function& f, std::string node,
+          const std::map<std::string, std::string>& wanted)
         : name(std::move(node)),
-          heard_name(name + "." + pin::heard),
-          age_name(name + "." + pin::heard_age_ms),
           online_name(name + ".online"),
           age_ms_name(name + ".age-ms"),
           incompatible_name(name + ".incompatible"),
-          heard(c, f, heard_name.c_str(),
-                "its signals are valid; linked when it sends some to this node"),
-          heard_age(c, f, age_name.c_str(), "age of its signals", {.unit = "ms"}),
           online(c, f, online_name.c_str(),
-                 "online: its signals are valid, or its status is received if it sends none to "
-                 "this node",
+                 "online: all its signals are valid, or its status is received if it sends none "
+                 "to this node",
                  {.safe = false}),
           age(c, f, age_ms_name.c_str(),
-              "age of its signals, or of its status; infinite: none yet, or the thread is stopped",
+              "age of its oldest signal, or of its status; infinite: none yet, or the thread is "
+              "stopped",
               {.initial = hal::infinite_age, .unit = "ms", .safe = hal::infinite_age}),
           incompatible(c, f, incompatible_name.c_str(),
-                       "it runs another version of the netlist; its signals are ignored") {}
+                       "it runs another version of the netlist; its signals are ignored") {
+        for (const auto& [topic, layout] : wanted) {
+            if (topic.starts_with(name + "/")) {
+                received.emplace_back(c, f, topic);
+            }
+        }
+    }
 
-    const std::string name, heard_name, age_name, online_name, age_ms_name, incompatible_name;
-    hal::In<bool> heard;
-    hal::In<double> heard_age;
+    /// Returns true when the signals of all its threads are valid. [realtime]
+    bool all_valid() const noexcept {
+        return std::all_of(received.begin(), received.end(),
+                           [](const Received& topic) { return topic.valid.get(); });
+    }
+    /// Returns the age of the signals that were received first, in ms. [realtime]
+    double max_age() const noexcept {
+        double oldest = 0.0;
+        for (const Received& topic : received) {
+            oldest = std::max(oldest, topic.age.get());
+        }
+        return oldest;
+    }
+
+    const std::string name, online_name, age_ms_name, incompatible_name;
+    std::deque<Received> received;  ///< empty: it sends nothing to this node
     hal::Out<bool> online;
     hal::Out<double> age;
     hal::Out<bool> incompatible;
-    bool sends = false;  ///< to this node
     // Between the engine and the cycle
     std::atomic<std::int64_t> status_at{0};  ///< reception of its last status, CLOCK_MONOTONIC
     std::atomic<bool> differs{false};
@@ -66,14 +95,7 @@ class Node : public hal::Component, private Listener {
 public:
     static constexpr hal::Traits traits{.singleton = true};
 
-    explicit Node(const hal_host* host) : Component(host) {
-        const auto wanted = topics_of(wants_.get());
-        for (Other& other : others_) {
-            other.sends = std::any_of(wanted.begin(), wanted.end(), [&](const auto& topic) {
-                return topic.first.starts_with(other.name + "/");
-            });
-        }
-    }
+    using Component::Component;
 
     void start() {
         participant_ = open(settings_);
@@ -128,10 +150,10 @@ public:
             const bool there =
                 status_at != 0 && since < static_cast<double>(5 * status_period_ns) * 1e-6;
             other.incompatible = other.differs.load(std::memory_order_relaxed);
-            other.online =
-                !other.incompatible && (other.sends ? static_cast<bool>(other.heard) : there);
-            if (other.sends) {
-                other.age = other.heard_age;
+            const bool sends = !other.received.empty();
+            other.online = !other.incompatible && (sends ? other.all_valid() : there);
+            if (sends) {
+                other.age = other.max_age();
             } else if (status_at != 0) {
                 other.age = std::max(since, 0.0);
             }
@@ -270,8 +292,9 @@ private:
 
     std::deque<Other> others_ = [this] {
         std::deque<Other> all;
+        const auto wanted = topics_of(wants_.get());
         for (const std::string& name : list_of(names_.get())) {
-            all.emplace_back(*this, watch_, name);
+            all.emplace_back(*this, watch_, name, wanted);
         }
         return all;
     }();
@@ -298,9 +321,9 @@ HAL_COMPONENT(Node, "node", "Monitors the other nodes of a netlist for several m
 `hal run FILE --node NAME` loads it; a netlist does not. Its pins show whether every other node is
 online:
 
-* `node.OTHER.online`: its signals are received within their deadline. A node that sends none to
-  this one is online while its status is received.
-* `node.OTHER.age-ms`: the age of its signals.
+* `node.OTHER.online`: all its signals are received within their deadline, those of each of its
+  threads. A node that sends none to this one is online while its status is received.
+* `node.OTHER.age-ms`: the age of its oldest signal.
 * `node.OTHER.incompatible`: it runs a version of the netlist in which a signal between the two
   differs. Its signals are ignored, and a line on standard error names the signal and both nodes. A
   node that finds an incompatible node, or a duplicate of itself, while it starts fails to start.
@@ -313,4 +336,7 @@ netlist that also has a node `desk`, by hand:
     addf node.watch servo
     addf alarm servo
     net desk-there node.desk.online => alarm.in
+
+With `wants=desk/servo=speed:float;` it also has the pins `node.desk.servo.heard` and
+`node.desk.servo.heard-age-ms`, which the loader links to the subscriber for that thread.
 )")
