@@ -44,6 +44,7 @@ private:
 
     bool declaration();
     bool component(const Text& keyword);
+    /// `pin` or `param`: DIRECTION TYPE NAME[SIZE] = START if CONDITION "DOC".
     bool item(const Text& keyword);
     bool function(const Text& keyword);
     bool variable(const Text& keyword);
@@ -53,6 +54,10 @@ private:
     template <std::vector<Text> Tree::* list>
     bool prose(const Text& keyword);
 
+    // Parts of declarations. False after reporting why the declaration is invalid.
+    bool direction(Item& item);
+    /// Parses `= START` and `if CONDITION`, in any order, each at most once.
+    bool start_and_condition(Item& item);
     bool type(Item& item);
     bool array(Item& item);
     bool name(Name& name, const std::string& of);
@@ -209,49 +214,38 @@ bool Parser::array(Item& item) {
     return in_.take(']') || fail("'[' without ']'");
 }
 
-bool Parser::item(const Text& keyword) {
-    Item item;
-    item.parameter = keyword == "param";
+bool Parser::direction(Item& item) {
     struct Direction {
         const char* name;
+        bool parameter;
         hal_dir dir;
-        bool writable;
+        bool writable, read_only;
     };
-    static constexpr Direction of_pins[] = {
-        {"in", HAL_DIR_IN, false}, {"out", HAL_DIR_OUT, true}, {"io", HAL_DIR_IO, true}};
-    static constexpr Direction of_parameters[] = {{"r", HAL_DIR_PARAM, true},
-                                                  {"rw", HAL_DIR_PARAM, true}};
+    static constexpr Direction directions[] = {{"in", false, HAL_DIR_IN, false, false},
+                                               {"out", false, HAL_DIR_OUT, true, false},
+                                               {"io", false, HAL_DIR_IO, true, false},
+                                               {"r", true, HAL_DIR_PARAM, true, true},
+                                               {"rw", true, HAL_DIR_PARAM, true, false}};
     const Text word = in_.word();
-    bool known = false;
-    const auto look = [&](const Direction& row) {
-        if (!(word == row.name)) return;
-        known = true;
+    for (const Direction& row : directions) {
+        if (row.parameter != item.parameter || !(word == row.name)) continue;
         item.dir = row.dir;
         item.writable = row.writable;
-        item.read_only = item.parameter && word == "r";
-    };
+        item.read_only = row.read_only;
+        return true;
+    }
+    const Span at = word.given() ? word.span : in_.here();
     if (item.parameter) {
-        for (const Direction& row : of_parameters) {
-            look(row);
-        }
+        in_.error(at, "invalid direction: a parameter is r (set by the component) or rw", "",
+                  "param rw float gain = 1.0 \"what it is\";");
     } else {
-        for (const Direction& row : of_pins) {
-            look(row);
-        }
+        in_.error(at, "invalid direction: a pin is in, out or io", "",
+                  "pin in float angle \"what it is\";");
     }
-    if (!known) {
-        const Span at = word.given() ? word.span : in_.here();
-        if (item.parameter) {
-            in_.error(at, "invalid direction: a parameter is r (set by the component) or rw", "",
-                      "param rw float gain = 1.0 \"what it is\";");
-        } else {
-            in_.error(at, "invalid direction: a pin is in, out or io", "",
-                      "pin in float angle \"what it is\";");
-        }
-        return false;
-    }
-    if (!type(item) || !name(item.name, item.parameter ? "parameter" : "pin")) return false;
-    if (in_.take('[') && !array(item)) return false;
+    return false;
+}
+
+bool Parser::start_and_condition(Item& item) {
     while (in_.next() == '=' || in_.peek_word() == "if") {
         const bool start = in_.take('=');
         Text& part = start ? item.start : item.condition;
@@ -260,12 +254,21 @@ bool Parser::item(const Text& keyword) {
         }
         if (part.given()) {
             in_.error(part.span, start ? "duplicate initial value" : "duplicate condition");
-
             return false;
         }
         part = in_.expression(start ? "" : "=");
         if (!part.given()) return fail(start ? "missing initial value" : "missing condition");
     }
+    return true;
+}
+
+bool Parser::item(const Text& keyword) {
+    Item item;
+    item.parameter = keyword == "param";
+    if (!direction(item)) return false;
+    if (!type(item) || !name(item.name, item.parameter ? "parameter" : "pin")) return false;
+    if (in_.take('[') && !array(item)) return false;
+    if (!start_and_condition(item)) return false;
     doc(item.doc);
     tree_.items.push_back(std::move(item));
     return true;

@@ -51,8 +51,9 @@ std::string slots_of(const Pins& pins, const std::string& station) {
     return text.empty() ? "-" : text;
 }
 
-std::string rows(const std::string& instance, const Pins& pins) {
-    std::string text = fmt::format(
+/// Formats the state and the counters of a station in two lines.
+std::string own_lines(const std::string& instance, const Pins& pins) {
+    return fmt::format(
         "{}: {}{}, cycle {:.0f}; own clock {:+.1f} ppm to the master's, {:.2f} us to the master, "
         "jitter {:.2f} us\n"
         "{}: frames {:.0f} sent, {:.0f} late, {:.0f} dropped; syncs {:.0f}, {:.0f} lost; intruding "
@@ -62,23 +63,35 @@ std::string rows(const std::string& instance, const Pins& pins) {
         number(pins, "frames-sent"), number(pins, "frames-late"), number(pins, "frames-dropped"),
         number(pins, "syncs"), number(pins, "syncs-lost"), number(pins, "frames-intruding"),
         number(pins, "frames-foreign"));
+}
+
+/// Formats the row of another station, whose pins begin with its name.
+std::string station_row(const std::string& station, bool is_online, const Pins& pins) {
+    const double frames = number(pins, station + ".frames");
+    const char* state = frames == 0.0 ? "unheard" : "offline";
+    if (is_online) {
+        state = "online";
+    }
+    std::string drift = "-";
+    if (is_on(pins, station + ".drift-known")) {
+        drift = fmt::format("{:+.1f} ppm", number(pins, station + ".drift"));
+    }
+    return fmt::format("{:<16} {:<8} {:>9} {:>12.0f} {:>8.0f} {:>10}  {}\n", station, state,
+                       since(number(pins, station + ".since")), frames,
+                       number(pins, station + ".late"), drift, slots_of(pins, station));
+}
+
+/// Formats what a station knows of itself and of each other one. `pins` are those of its component,
+/// without the name of the instance.
+std::string rows(const std::string& instance, const Pins& pins) {
+    std::string text = own_lines(instance, pins);
     text += fmt::format("{:<16} {:<8} {:>9} {:>12} {:>8} {:>10}  {}\n", "station", "state", "since",
                         "frames", "late", "drift", "slots");
     for (const auto& [name, value] : pins) {
         if (!name.ends_with(".online")) continue;
-        const std::string station = name.substr(0, name.size() - 7);
-        const double frames = number(pins, station + ".frames");
-        const char* state = frames == 0.0 ? "unheard" : "offline";
-        if (value.is_boolean() && value.get<bool>()) {
-            state = "online";
-        }
-        std::string drift = "-";
-        if (is_on(pins, station + ".drift-known")) {
-            drift = fmt::format("{:+.1f} ppm", number(pins, station + ".drift"));
-        }
-        text += fmt::format("{:<16} {:<8} {:>9} {:>12.0f} {:>8.0f} {:>10}  {}\n", station, state,
-                            since(number(pins, station + ".since")), frames,
-                            number(pins, station + ".late"), drift, slots_of(pins, station));
+        const std::string station =
+            name.substr(0, name.size() - std::string_view(".online").size());
+        text += station_row(station, value.is_boolean() && value.get<bool>(), pins);
     }
     return text;
 }

@@ -10,6 +10,7 @@
 #include <map>
 #include <pugixml.hpp>
 #include <unistd.h>
+#include <utility>
 
 #include "cli/output.hpp"
 #include "panel/panel_errors.hpp"
@@ -174,7 +175,36 @@ private:
         return did_you_mean(std::string(name), known);
     }
 
-    /// Reads the widgets in a container, and what changes the packing of those that follow.
+    /// How the next widget is placed in its container.
+    struct Layout {
+        Json pack;                    ///< in a box
+        Json cell = Json::object();   ///< in a table: of the next widget only
+        std::string sticky = "ne";    ///< in a table
+    };
+
+    /// Reads an element that changes the layout of the widgets behind it. Returns false for another
+    /// element.
+    static bool change_layout(pugi::xml_node element, Layout& layout) {
+        const std::string_view name = element.name();
+        if (name == "boxfill") {
+            layout.pack["fill"] = element.attribute("fill").as_string("none");
+        } else if (name == "boxanchor") {
+            layout.pack["anchor"] = element.attribute("anchor").as_string("center");
+        } else if (name == "boxexpand") {
+            layout.pack["expand"] =
+                std::string_view(element.attribute("expand").as_string("yes")) == "yes";
+        } else if (name == "tablespan") {
+            layout.cell = {{"rows", element.attribute("rows").as_int(1)},
+                           {"columns", element.attribute("columns").as_int(1)}};
+        } else if (name == "tablesticky") {
+            layout.sticky = element.attribute("sticky").as_string("ne");
+        } else {
+            return false;
+        }
+        return true;
+    }
+
+    /// Reads the widgets in a container, and what changes the layout of those that follow.
     void children(pugi::xml_node element, Json& node, bool top) {
         if (++depth_ > deepest) {
             --depth_;
@@ -182,30 +212,18 @@ private:
         }
         const std::string_view owner = element.name();
         const char* const fill = owner == "hbox" ? "y" : "x";
-        Json pack{{"fill", top ? "both" : fill}, {"expand", true}, {"anchor", "center"}};
+        Layout layout;
+        layout.pack = {{"fill", top ? "both" : fill}, {"expand", true}, {"anchor", "center"}};
         Json options = Json::object();
-        Json cell = Json::object();
         if (!top) {
             attributes(element, options);
         }
-        std::string sticky = "ne";
         for (const pugi::xml_node child : element.children()) {
             if (child.type() != pugi::node_element) continue;
             const std::string_view name = child.name();
-            if (name == "boxfill") {
-                pack["fill"] = child.attribute("fill").as_string("none");
-            } else if (name == "boxanchor") {
-                pack["anchor"] = child.attribute("anchor").as_string("center");
-            } else if (name == "boxexpand") {
-                pack["expand"] =
-                    std::string_view(child.attribute("expand").as_string("yes")) == "yes";
-            } else if (name == "tablerow") {
+            if (change_layout(child, layout)) continue;
+            if (name == "tablerow") {
                 node["children"].push_back({{"widget", "tablerow"}});
-            } else if (name == "tablespan") {
-                cell = {{"rows", child.attribute("rows").as_int(1)},
-                        {"columns", child.attribute("columns").as_int(1)}};
-            } else if (name == "tablesticky") {
-                sticky = child.attribute("sticky").as_string("ne");
             } else if (name == "image") {
                 picture(child);
             } else if (one_of(name, invisible)) {
@@ -215,11 +233,10 @@ private:
                 Json one = name == "include" ? include(child) : widget(child);
                 if (one.is_null()) continue;
                 if (owner == "table") {
-                    one["span"] = cell;
-                    one["sticky"] = sticky;
-                    cell = Json::object();
+                    one["span"] = std::exchange(layout.cell, Json::object());
+                    one["sticky"] = layout.sticky;
                 } else {
-                    one["pack"] = pack;
+                    one["pack"] = layout.pack;
                 }
                 node["children"].push_back(std::move(one));
             } else if (top) {

@@ -55,58 +55,31 @@ public:
         return finish();
     }
 
+    /// Records only the time around events, each in a file of its own. Returns the status of the
+    /// command.
     int flight() {
         if (const std::string problem = mcap::unwritable(what_.file); !problem.empty()) {
             return fail(options_, fmt::format("cannot write '{}': {}", what_.file, problem));
         }
-        FlightMemory memory(probe_.groups(), what_.last_ns);
-        FlightTrigger trigger(what_.last_ns, what_.after_ns);
         const std::filesystem::path folder = std::filesystem::path(what_.file).parent_path();
-        FlightBacklog backlog(folder.empty() ? "." : folder.string());
-        const bool forever = what_.for_ns < 0;
+        Flight flight{FlightMemory(probe_.groups(), what_.last_ns),
+                      FlightTrigger(what_.last_ns, what_.after_ns),
+                      FlightBacklog(folder.empty() ? "." : folder.string())};
         for (bool over = false; !over;) {
-            const auto got = next();
+            const ProbeClient::Got got = next();
             over = stop_.requested() || got == ProbeClient::Got::disconnected ||
-                   (!forever && now_ns_ - first_ns_ >= what_.for_ns);
-            if (got == ProbeClient::Got::layout) {
-                memory.layout(probe_.groups());
-            }
-            if (got == ProbeClient::Got::journal) {
-                memory.add(probe_.entry());
-                if (probe_.entry().kind == "fault") {
-                    trigger.event(probe_.entry().time_ns, "fault");
-                }
-            }
-            if (got == ProbeClient::Got::batch) {
-                now_ns_ = batch_.until_ns;
-                if (first_ns_ == 0) {
-                    first_ns_ = now_ns_;
-                }
-                if (const auto time_ns = triggered()) {
-                    trigger.event(*time_ns, what_.trigger);
-                }
-                memory.add(std::move(batch_));
-                memory.prune(now_ns_, std::min(backlog.needed_from_ns(),
-                                               trigger.pending() ? trigger.begin_ns() : INT64_MAX));
-            }
-            if (got == ProbeClient::Got::disconnected &&
-                client_.instance_end() == InstanceEnd::killed) {
-                trigger.event(now_ns_, "end-of-machine");
-            }
-            if (trigger.pending() && (over || now_ns_ >= trigger.end_ns())) {
-                backlog.add({trigger.begin_ns(), trigger.begin_ns() + what_.last_ns,
-                             trigger.end_ns(), trigger.cause(), ""});
-                trigger.done();
-            }
-            backlog.forget(memory.forgotten_until_ns());
-            if (over || backlog.may_write(monotonic_ns())) {
-                write(memory, backlog);
+                   (what_.for_ns >= 0 && now_ns_ - first_ns_ >= what_.for_ns);
+            accept(got, flight);
+            end_event(over, flight);
+            flight.backlog.forget(flight.memory.forgotten_until_ns());
+            if (over || flight.backlog.may_write(monotonic_ns())) {
+                write(flight.memory, flight.backlog);
             }
         }
-        if (!backlog.empty() || backlog.lost() != 0) {
+        if (!flight.backlog.empty() || flight.backlog.lost() != 0) {
+            const std::size_t unwritten = flight.backlog.size() + flight.backlog.lost();
             return fail(options_,
-                        fmt::format("{} not written: {}",
-                                    counted(backlog.size() + backlog.lost(), "event"), failure_));
+                        fmt::format("{} not written: {}", counted(unwritten, "event"), failure_));
         }
         if (files_ == 0) {
             nothing_written();
@@ -115,6 +88,54 @@ public:
     }
 
 private:
+    struct Flight {
+        FlightMemory memory;  ///< the newest rows
+        FlightTrigger trigger;  ///< the event whose time is not over
+        FlightBacklog backlog;  ///< events that are not written yet
+    };
+
+    /// Keeps what the machine has sent, and begins an event at a fault, at the trigger, and when the
+    /// machine was killed.
+    void accept(ProbeClient::Got got, Flight& flight) {
+        switch (got) {
+        case ProbeClient::Got::layout: flight.memory.layout(probe_.groups()); break;
+        case ProbeClient::Got::journal:
+            flight.memory.add(probe_.entry());
+            if (probe_.entry().kind == "fault") {
+                flight.trigger.event(probe_.entry().time_ns, "fault");
+            }
+            break;
+        case ProbeClient::Got::batch: accept_batch(flight); break;
+        case ProbeClient::Got::disconnected:
+            if (client_.instance_end() == InstanceEnd::killed) {
+                flight.trigger.event(now_ns_, "end-of-machine");
+            }
+            break;
+        default: break;
+        }
+    }
+    void accept_batch(Flight& flight) {
+        now_ns_ = batch_.until_ns;
+        if (first_ns_ == 0) {
+            first_ns_ = now_ns_;
+        }
+        if (const auto time_ns = triggered()) {
+            flight.trigger.event(*time_ns, what_.trigger);
+        }
+        flight.memory.add(std::move(batch_));
+        const std::int64_t event_ns =
+            flight.trigger.pending() ? flight.trigger.begin_ns() : INT64_MAX;
+        flight.memory.prune(now_ns_, std::min(flight.backlog.needed_from_ns(), event_ns));
+    }
+    /// Passes an event on to the backlog once its time is over; `over`: the recording ends.
+    void end_event(bool over, Flight& flight) {
+        FlightTrigger& trigger = flight.trigger;
+        if (!trigger.pending() || (!over && now_ns_ < trigger.end_ns())) return;
+        flight.backlog.add({trigger.begin_ns(), trigger.begin_ns() + what_.last_ns,
+                            trigger.end_ns(), trigger.cause(), ""});
+        trigger.done();
+    }
+
     ProbeClient::Got next() {
         constexpr int look_ms = 100;  // for Ctrl-C
         return probe_.next(batch_, look_ms);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fmt/ranges.h>
+#include <optional>
 
 #include "bus/ethercat/bus_file.hpp"
 #include "bus/ethercat/plan_picture.hpp"
@@ -141,38 +142,55 @@ int run_ethercat_pdos(const EthercatOptions& options) {
     return print(list_or_text(options.json, json, text)) ? 0 : 1;
 }
 
-int run_ethercat_dc(const EthercatOptions& options) {
+namespace {
+
+/// What a slave's clock states about itself.
+struct ClockState {
+    std::int64_t deviation_ns;  ///< from the reference clock
+    std::uint32_t delay_ns;  ///< from the reference clock to the slave
+    bool sync;  ///< it makes SYNC signals
+};
+
+/// Reads the registers of a slave's clock (ETG.1000.4, clause 6.7); nothing: it does not answer.
+std::optional<ClockState> read_clock(EthercatWire& wire, std::size_t n) {
     namespace reg = ethercat::registers;
+    const auto delay = wire.read(n, reg::dc_system_time_delay, 4);
+    const auto difference = wire.read(n, reg::dc_system_time_difference, 4);
+    const auto activation = wire.read(n, reg::dc_activation, 1);
+    if (!delay || !difference || !activation) return std::nullopt;
+    const auto raw = ethercat::get<std::uint32_t>(difference->data());  // magnitude and sign
+    const auto magnitude = static_cast<std::int64_t>(raw & 0x7fffffff);
+    return ClockState{raw >> 31 != 0 ? -magnitude : magnitude,
+                      ethercat::get<std::uint32_t>(delay->data()), ((*activation)[0] & 0x01) != 0};
+}
+
+}  // namespace
+
+/// `hal ethercat dc`: prints the clock of each slave.
+int run_ethercat_dc(const EthercatOptions& options) {
     EthercatWire wire;
     if (!wire.open(options) || !wire.without_arguments(options)) return 1;
     wire.identify();
     std::string text, json;
     for (std::size_t n = 0; n < wire.size(); ++n) {
-        const auto& s = wire.slave(n);
-        if (!s.has_dc()) {
+        if (!wire.slave(n).has_dc()) {
             text += fmt::format("{}  no clock  {}\n", n, wire.name(n));
             json += fmt::format(
                 R"({}{{"position":{},"deviation_ns":null,"delay_ns":null,"sync":null}})",
                 json.empty() ? "[" : ",\n ", n);
             continue;
         }
-        const auto delay = wire.read(n, reg::dc_system_time_delay, 4);
-        const auto difference = wire.read(n, reg::dc_system_time_difference, 4);
-        const auto activation = wire.read(n, reg::dc_activation, 1);
-        if (!delay || !difference || !activation) {
+        const std::optional<ClockState> clock = read_clock(wire, n);
+        if (!clock) {
             return fail(options,
                         fmt::format("slave {} no longer responds; check its supply and cable", n));
         }
-        const auto raw = ethercat::get<std::uint32_t>(difference->data());
-        const auto magnitude = static_cast<std::int64_t>(raw & 0x7fffffff);
-        const auto deviation = raw >> 31 != 0 ? -magnitude : magnitude;
-        const bool sync = ((*activation)[0] & 0x01) != 0;
-        text += fmt::format("{}  deviation {} ns  delay {} ns  SYNC {}  {}\n", n, deviation,
-                            ethercat::get<std::uint32_t>(delay->data()), sync ? "on" : "off",
-                            wire.name(n));
+        text +=
+            fmt::format("{}  deviation {} ns  delay {} ns  SYNC {}  {}\n", n, clock->deviation_ns,
+                        clock->delay_ns, clock->sync ? "on" : "off", wire.name(n));
         json += fmt::format(R"({}{{"position":{},"deviation_ns":{},"delay_ns":{},"sync":{}}})",
-                            json.empty() ? "[" : ",\n ", n, deviation,
-                            ethercat::get<std::uint32_t>(delay->data()), sync);
+                            json.empty() ? "[" : ",\n ", n, clock->deviation_ns, clock->delay_ns,
+                            clock->sync);
     }
     return print(list_or_text(options.json, json, text)) ? 0 : 1;
 }

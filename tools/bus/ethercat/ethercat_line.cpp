@@ -255,6 +255,58 @@ std::string read_fault(const std::string& text, std::size_t slaves, esc::LineCom
         text, name);
 }
 
+/// Reads the faults of the command line. Returns false after printing what is wrong.
+bool read_faults(const EthercatLineOptions& options, std::size_t devices,
+                 std::vector<esc::LineCommand>& faults) {
+    if (options.faults.size() > esc::Line::max_disturbances) {
+        fail(options, fmt::format("at most {} faults are possible", esc::Line::max_disturbances));
+        return false;
+    }
+    faults.resize(options.faults.size());
+    for (std::size_t n = 0; n < faults.size(); ++n) {
+        const std::string problem = read_fault(options.faults[n], devices, faults[n]);
+        if (!problem.empty()) {
+            fail(options, problem);
+            return false;
+        }
+    }
+    return true;
+}
+
+/// Returns what is printed at the start: the interfaces, and the devices with their positions.
+std::string start_text(const std::vector<devices::Device>& devices, const ethernet::Port& primary,
+                       const ethernet::Port* secondary) {
+    std::string addresses = primary.description().address;
+    if (secondary != nullptr) {
+        addresses += " and " + secondary->description().address;
+    }
+    std::string text =
+        fmt::format("EtherCAT line of {} on {} ({}); press Ctrl-C to end\n",
+                    counted(devices.size(), "slave"), addresses, primary.description().transport);
+    for (std::size_t n = 0; n < devices.size(); ++n) {
+        text += fmt::format("{:4}  {}\n", n, devices[n].name);
+    }
+    return text;
+}
+
+/// Serves the frames of the ports by a thread of its own until `end_ns`, or Ctrl-C, and prints what
+/// happens. Returns false when nobody reads what is printed.
+bool serve(esc::Line& line, const std::vector<devices::Device>& devices, ethernet::Port& primary,
+           ethernet::Port* secondary, std::int64_t began_ns, std::int64_t end_ns,
+           const StopRequest& stop) {
+    StatusCopy status(devices.size());
+    LineReporter reporter(devices, status, began_ns);
+    std::atomic<bool> ended{false};
+    std::thread server([&] { esc::serve(line, primary, secondary, ended, &status); });
+    bool is_read = true;
+    while (is_read && !stop.wait_ns(10'000'000) && link::monotonic_ns() < end_ns) {
+        is_read = reporter.look(link::monotonic_ns());
+    }
+    ended = true;
+    server.join();
+    return is_read && reporter.look(link::monotonic_ns()) && reporter.finish();
+}
+
 }  // namespace
 
 int run_node_ethercat(const EthercatLineOptions& options) {
@@ -265,17 +317,8 @@ int run_node_ethercat(const EthercatLineOptions& options) {
     }
     std::vector<devices::Device> devices;
     if (!read_devices(options, devices)) return 1;
-    if (options.faults.size() > esc::Line::max_disturbances) {
-        return fail(options,
-                    fmt::format("at most {} faults are possible", esc::Line::max_disturbances));
-    }
-    std::vector<esc::LineCommand> faults(options.faults.size());
-    for (std::size_t n = 0; n < faults.size(); ++n) {
-        if (const std::string problem = read_fault(options.faults[n], devices.size(), faults[n]);
-            !problem.empty()) {
-            return fail(options, problem);
-        }
-    }
+    std::vector<esc::LineCommand> faults;
+    if (!read_faults(options, devices.size(), faults)) return 1;
     StopRequest stop;
     const auto primary = open_interface(options, options.link);
     if (!primary) return 1;
@@ -292,38 +335,14 @@ int run_node_ethercat(const EthercatLineOptions& options) {
             "--backup: the last device has no second port; put one with two ports at the end");
     }
     const std::int64_t began = link::monotonic_ns();
-
     const std::int64_t end = options.for_ns >= 0 ? began + options.for_ns : INT64_MAX;
     line.power_on(began);
     for (const esc::LineCommand& fault : faults) {
         line.execute(fault, began);
     }
-
-    std::string addresses = primary->description().address;
-    if (secondary) {
-        addresses += " and " + secondary->description().address;
-    }
-    std::string text =
-        fmt::format("EtherCAT line of {} on {} ({}); press Ctrl-C to end\n",
-                    counted(devices.size(), "slave"), addresses, primary->description().transport);
-    for (std::size_t n = 0; n < devices.size(); ++n) {
-        text += fmt::format("{:4}  {}\n", n, devices[n].name);
-    }
-    if (!print(text)) return 1;
-
-    StatusCopy status(devices.size());
-    LineReporter reporter(devices, status, began);
-    std::atomic<bool> ended{false};
-    std::thread server([&] { esc::serve(line, *primary, secondary.get(), ended, &status); });
-    bool is_read = true;
-    while (is_read && !stop.wait_ns(10'000'000) && link::monotonic_ns() < end) {
-        is_read = reporter.look(link::monotonic_ns());
-    }
-    ended = true;
-    server.join();
-    if (!is_read) return 1;
+    if (!print(start_text(devices, *primary, secondary.get()))) return 1;
+    if (!serve(line, devices, *primary, secondary.get(), began, end, stop)) return 1;
     const std::int64_t now = link::monotonic_ns();
-    if (!reporter.look(now) || !reporter.finish()) return 1;
     const ethernet::Statistics s = primary->statistics();
     return print(fmt::format("{:.1f} s: {} frames passed, {} sent, {} lost here\n",
                              static_cast<double>(now - began) / 1e9, line.frames(),

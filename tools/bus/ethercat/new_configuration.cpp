@@ -287,62 +287,81 @@ std::string summary(const std::string& file, const std::string& netlist, const S
                                source.slaves.size(), source.slaves.size() == 1 ? "" : "s", netlist);
 }
 
+/// Returns what is wrong with the options together, nullptr: nothing.
+const char* contradiction(const EthercatConfigOptions& options) {
+    if (options.esi.empty()) return nullptr;
+    if (!options.emulate.empty()) return "--esi and --emulate exclude each other";
+    if (!options.descriptions.empty()) return "--esi and --descriptions exclude each other";
+    return nullptr;
+}
+
+/// Returns what to type when the command line has a wrong number of words, nullptr: the number is
+/// right. `described`: with --esi.
+const char* usage_for(bool described, std::size_t words) {
+    if (described) {
+        return words == 1 || words == 2 ? nullptr
+                                        : "type: hal ethercat config --esi FILE.xml:DEVICE NAME, "
+                                          "or eth:INTERFACE before "
+                                          "NAME";
+    }
+    return words == 1
+               ? nullptr
+               : "type: hal ethercat config ADDRESS NAME; it writes NAME.ethercat and NAME.hal";
+}
+
+/// The files that the command writes.
+struct OutputFiles {
+    explicit OutputFiles(const std::filesystem::path& stem)
+        : configuration(stem.string() + ".ethercat"), netlist(stem.string() + ".hal") {}
+    std::string configuration, netlist;
+};
+
+/// Writes configuration and netlist of the slaves. Returns why that is not possible, empty on
+/// success.
+std::string write_files(const OutputFiles& files, const std::string& name, const Source& source) {
+    constexpr std::int64_t millisecond = 1'000'000;
+    const std::string text = config::write(source.link, millisecond, source.slaves);
+    const config::Reading reading = config::read(text, files.configuration);
+    if (!reading.good() || reading.buses.empty()) {
+        return "the slaves describe their process data in a way that no configuration can be "
+               "made of: " +
+               config::to_string(reading, files.configuration);
+    }
+    const std::string lines =
+        config::netlist(reading.buses.front(), name + ".ethercat", source.segment);
+    if (std::string problem = write_file(files.configuration, text); !problem.empty()) {
+        return problem;
+    }
+    return write_file(files.netlist, lines);
+}
+
 }  // namespace
 
 int run_ethercat_config(const EthercatConfigOptions& options) {
     EthercatWire wire;
     const bool described = !options.esi.empty();
-    if (described && !options.emulate.empty()) {
-        return fail(options, "--esi and --emulate exclude each other");
-    }
-    if (described && !options.descriptions.empty()) {
-        return fail(options, "--esi and --descriptions exclude each other");
-    }
+    if (const char* const problem = contradiction(options)) return fail(options, problem);
     if (!described && !wire.open(options)) return 1;
     const std::vector<std::string>& words = described ? options.words : wire.arguments();
-    if (described ? words.empty() || words.size() > 2 : words.size() != 1) {
-        return fail(
-            options,
-            described
-                ? "type: hal ethercat config --esi FILE.xml:DEVICE NAME, or eth:INTERFACE before "
-                  "NAME"
-                : "type: hal ethercat config ADDRESS NAME; it writes NAME.ethercat and NAME.hal");
-    }
+    if (const char* const usage = usage_for(described, words.size())) return fail(options, usage);
     const std::filesystem::path stem = words.back();
-    const std::string file = stem.string() + ".ethercat";
-    const std::string netlist = stem.string() + ".hal";
-
-    const std::string name = stem.filename().string();
-    for (const std::string& path : {file, netlist}) {
+    const OutputFiles files(stem);
+    for (const std::string& path : {files.configuration, files.netlist}) {
         if (std::filesystem::exists(path)) {
             return fail(options, fmt::format("'{}' exists already; choose another name", path));
         }
     }
     Source source;
     const std::string address = described && words.size() == 2 ? words.front() : "";
-    if (!(described ? from_descriptions(options, stem, address, source)
-                    : from_bus(options, stem, wire, source))) {
-        return 1;
-    }
-    constexpr std::int64_t millisecond = 1'000'000;
-    const std::string text = config::write(source.link, millisecond, source.slaves);
-    const config::Reading reading = config::read(text, file);
-    if (!reading.good() || reading.buses.empty()) {
-        return fail(options,
-                    "the slaves describe their process data in a way that no configuration can be "
-                    "made of: " +
-                        config::to_string(reading, file));
-    }
-    const std::string lines =
-        config::netlist(reading.buses.front(), name + ".ethercat", source.segment);
-    for (const auto& [path, contents] : {std::pair(&file, &text), std::pair(&netlist, &lines)}) {
-        if (const std::string problem = write_file(*path, *contents); !problem.empty()) {
-            return fail(options, problem);
-        }
-    }
-    const std::string said =
-        options.json ? json_summary(file, netlist, source) : summary(file, netlist, source);
-    return print(said) ? 0 : 1;
+    const bool has_slaves = described ? from_descriptions(options, stem, address, source)
+                                      : from_bus(options, stem, wire, source);
+    if (!has_slaves) return 1;
+    const std::string problem = write_files(files, stem.filename().string(), source);
+    if (!problem.empty()) return fail(options, problem);
+    const std::string report = options.json
+                                   ? json_summary(files.configuration, files.netlist, source)
+                                   : summary(files.configuration, files.netlist, source);
+    return print(report) ? 0 : 1;
 }
 
 }  // namespace hal::tools

@@ -219,6 +219,8 @@ int run_ethercat_slaves(const EthercatOptions& options) {
     });
 }
 
+/// `hal ethercat states`: prints the states of the slaves; with a state, brings one or all to it
+/// before.
 int run_ethercat_states(const EthercatPositionOptions& options) {
     const std::size_t address_words = options.emulate.empty() ? 1 : 0;
     if (options.words.size() > address_words + 1) {
@@ -257,10 +259,59 @@ int run_ethercat_states(const EthercatPositionOptions& options) {
     return code != 0 ? code : printed;
 }
 
+namespace {
+
+/// The error counters of a port.
+struct PortErrors {
+    unsigned invalid, receive, forwarded, lost;
+    /// Returns whether the cable of this port is a cause; forwarded errors happened before.
+    bool are_own() const { return invalid + receive + lost != 0; }
+    bool any() const { return are_own() || forwarded != 0; }
+};
+
+/// Returns what is at the other end of the cable of a port: "slave 2 port 0", "the master".
+std::string far_end(EthercatWire& wire, std::size_t n, unsigned port) {
+    const BusSlave& s = wire.slave(n);
+    const int other = s.neighbour[port];
+    if (other < 0) {
+        return n == 0 && port == s.entry_port ? "the master" : "nothing (open now)";
+    }
+    const BusSlave& peer = wire.slave(static_cast<std::size_t>(other));
+    unsigned at = 0;
+    while (at < 3 && peer.neighbour[at] != static_cast<int>(n)) {
+        ++at;
+    }
+    return fmt::format("slave {} port {}", other, at);
+}
+
+/// The counters of all ports, for both forms of output.
+struct PortReport {
+    std::string text = "slave port  invalid  receive  forwarded  link losses\n";
+    std::string rows, cables;  ///< JSON
+
+    void add(EthercatWire& wire, std::size_t n, unsigned port, const PortErrors& e) {
+        text += fmt::format("{:>5} {:>4} {:>8} {:>8} {:>10} {:>12}\n", n, port, e.invalid,
+                            e.receive, e.forwarded, e.lost);
+        rows += fmt::format(
+            "{}{{\"position\":{},\"port\":{},\"invalid\":{},\"receive\":{},\"forwarded\":{},"
+            "\"link_losses\":{}}}",
+            rows.empty() ? "" : ",\n ", n, port, e.invalid, e.receive, e.forwarded, e.lost);
+        if (!e.are_own()) return;
+        const std::string cable = fmt::format("check the cable between slave {} port {} and {}", n,
+                                              port, far_end(wire, n, port));
+        text += "      " + cable + "\n";
+        cables += (cables.empty() ? "" : ",") + json_string(cable);
+    }
+};
+
+}  // namespace
+
+/// `hal ethercat crc`: prints the error counters of the ports, and between which ports a cable
+/// causes errors.
 int run_ethercat_crc(const EthercatOptions& options) {
     EthercatWire wire;
     if (!wire.open(options) || !wire.without_arguments(options)) return 1;
-    std::string rows, cables, text = "slave port  invalid  receive  forwarded  link losses\n";
+    PortReport report;
     for (std::size_t n = 0; n < wire.size(); ++n) {
         const BusSlave& s = wire.slave(n);
         auto all = wire.read(n, reg::rx_errors, 20);
@@ -270,46 +321,24 @@ int run_ethercat_crc(const EthercatOptions& options) {
         }
         all->resize(20);  // counters that the controller does not have are 0
         for (unsigned port = 0; port < 4; ++port) {
+            const PortErrors errors{(*all)[2 * port], (*all)[2 * port + 1], (*all)[8 + port],
+                                    (*all)[16 + port]};
             const bool used = port == s.entry_port || s.neighbour[port] >= 0;
-            const unsigned invalid = (*all)[2 * port];
-            const unsigned receive = (*all)[2 * port + 1];
-
-            const unsigned forwarded = (*all)[8 + port];
-            const unsigned lost = (*all)[16 + port];
-            if (!used && invalid + receive + forwarded + lost == 0) continue;
-            text += fmt::format("{:>5} {:>4} {:>8} {:>8} {:>10} {:>12}\n", n, port, invalid,
-                                receive, forwarded, lost);
-            rows += fmt::format(
-                "{}{{\"position\":{},\"port\":{},\"invalid\":{},\"receive\":{},\"forwarded\":{},"
-                "\"link_losses\":{}}}",
-                rows.empty() ? "" : ",\n ", n, port, invalid, receive, forwarded, lost);
-            if (invalid + receive + lost == 0) {
-                continue;  // forwarded ones happened before
+            if (used || errors.any()) {
+                report.add(wire, n, port, errors);
             }
-            const int other = s.neighbour[port];
-            std::string location =
-                n == 0 && port == s.entry_port ? "the master" : "nothing (open now)";
-            if (other >= 0) {
-                const BusSlave& peer = wire.slave(static_cast<std::size_t>(other));
-                unsigned at = 0;
-                while (at < 3 && peer.neighbour[at] != static_cast<int>(n)) {
-                    ++at;
-                }
-                location = fmt::format("slave {} port {}", other, at);
-            }
-            const std::string cable =
-                fmt::format("check the cable between slave {} port {} and {}", n, port, location);
-            text += "      " + cable + "\n";
-            cables += (cables.empty() ? "" : ",") + json_string(cable);
         }
     }
     if (options.json) {
-        return print(fmt::format("{{\"ports\":[{}],\"cables\":[{}]}}\n", rows, cables)) ? 0 : 1;
+        return print(
+                   fmt::format("{{\"ports\":[{}],\"cables\":[{}]}}\n", report.rows, report.cables))
+                   ? 0
+                   : 1;
     }
-    if (cables.empty()) {
-        text += "no port has counted errors of its own\n";
+    if (report.cables.empty()) {
+        report.text += "no port has counted errors of its own\n";
     }
-    return print(text) ? 0 : 1;
+    return print(report.text) ? 0 : 1;
 }
 
 }  // namespace hal::tools

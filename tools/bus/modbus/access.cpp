@@ -281,55 +281,85 @@ int run_modbus_scan(const ModbusScanOptions& options) {
     return 0;
 }
 
+namespace {
+
+/// The bytes on a serial line, split into frames and printed.
+class FramePrinter {
+public:
+    explicit FramePrinter(std::int64_t begin_ns) : begin_ns_(begin_ns), last_ns_(begin_ns) {}
+
+    /// Receives what has arrived.
+    void receive(line::Line& line, std::int64_t now_ns) {
+        const std::size_t count = line.receive(buffer_.free_space(), now_ns);
+        if (count != 0) {
+            buffer_.added(count);
+            last_ns_ = now_ns;
+        }
+    }
+    /// Prints the frames that are complete: at their length where several arrived in one piece, as
+    /// on a busy line, the last one after a pause of 5 ms. Returns false when nobody reads them.
+    bool print_complete(std::int64_t now_ns) {
+        constexpr std::int64_t pause_ns = 5'000'000;
+        for (std::size_t size = first_frame(); size != 0; size = first_frame()) {
+            ReceiveBuffer rest = buffer_;
+            rest.drop(size);
+            ReceiveBuffer first;
+            std::copy_n(buffer_.span().begin(), size, first.free_space().begin());
+            first.added(size);
+            buffer_ = first;
+            if (!flush()) return false;
+            buffer_ = rest;
+        }
+        const bool is_over = now_ns - last_ns_ > pause_ns || buffer_.free_space().empty();
+        return !is_over || flush();
+    }
+
+private:
+    /// Returns the size of a valid frame with more bytes behind it; 0: there is none.
+    std::size_t first_frame() const {
+        Found found;
+        Scan result = scan(Framing::rtu, Role::requests, false, buffer_.span(), found);
+        if (result != Scan::valid) {
+            result = scan(Framing::rtu, Role::answers, false, buffer_.span(), found);
+        }
+        const bool is_whole = result != Scan::valid || found.length == buffer_.span().size();
+        return is_whole ? 0 : found.length;
+    }
+    bool flush() {
+        if (buffer_.empty()) return true;
+        std::string hex;
+        for (const std::uint8_t byte : buffer_.span()) {
+            hex += fmt::format("{:02X} ", byte);
+        }
+        const bool valid = buffer_.span().size() >= 4 && crc16(buffer_.span()) == 0;
+        const std::string text =
+            fmt::format("{:12.6f}  {}{}\n", static_cast<double>(last_ns_ - begin_ns_) / 1e9, hex,
+                        valid ? "" : " wrong check sequence");
+        buffer_.clear();
+        return print(text);
+    }
+
+    ReceiveBuffer buffer_;
+    const std::int64_t begin_ns_;
+    std::int64_t last_ns_;  // time of the newest bytes
+};
+
+}  // namespace
+
+/// `hal modbus monitor`: prints the frames on a serial line.
 int run_modbus_monitor(const ModbusMonitorOptions& options) {
     auto opened = line::open(options.words[0]);
     if (!opened) return fail(options, opened.problem);
     line::Line& line = *opened.line;
     StopRequest stop;
-    ReceiveBuffer buffer;
-    const std::int64_t begin = link::monotonic_ns();
-    std::int64_t last = begin;
-    const auto flush = [&] {
-        if (buffer.empty()) return true;
-        std::string hex;
-        for (const std::uint8_t byte : buffer.span()) {
-            hex += fmt::format("{:02X} ", byte);
-        }
-        const bool valid = buffer.span().size() >= 4 && crc16(buffer.span()) == 0;
-        const std::string text =
-            fmt::format("{:12.6f}  {}{}\n", static_cast<double>(last - begin) / 1e9, hex,
-                        valid ? "" : " wrong check sequence");
-        buffer.clear();
-        return print(text);
-    };
+    const std::int64_t begin_ns = link::monotonic_ns();
+    FramePrinter printer(begin_ns);
     while (!stop.requested()) {
-        const std::int64_t now = link::monotonic_ns();
-        if (options.for_ns >= 0 && now - begin >= options.for_ns) break;
-        line.is_open(now);
-        const std::size_t count = line.receive(buffer.free_space(), now);
-        if (count != 0) {
-            buffer.added(count);
-            last = now;
-        }
-        // frames of a busy line arrive in one piece: split them by length
-        while (true) {
-            Found found;
-            Scan result = scan(Framing::rtu, Role::requests, false, buffer.span(), found);
-            if (result != Scan::valid) {
-                result = scan(Framing::rtu, Role::answers, false, buffer.span(), found);
-            }
-            if (result != Scan::valid || found.length == buffer.span().size()) break;
-            ReceiveBuffer rest = buffer;
-            rest.drop(found.length);
-            const std::size_t size = found.length;
-            ReceiveBuffer first;
-            std::copy_n(buffer.span().begin(), size, first.free_space().begin());
-            first.added(size);
-            buffer = first;
-            if (!flush()) return 1;
-            buffer = rest;
-        }
-        if ((now - last > 5'000'000 || buffer.free_space().empty()) && !flush()) return 1;
+        const std::int64_t now_ns = link::monotonic_ns();
+        if (options.for_ns >= 0 && now_ns - begin_ns >= options.for_ns) break;
+        line.is_open(now_ns);
+        printer.receive(line, now_ns);
+        if (!printer.print_complete(now_ns)) return 1;
         pollfd p{line.descriptor(), POLLIN, 0};
         ::poll(&p, p.fd >= 0 ? 1 : 0, 5);
     }

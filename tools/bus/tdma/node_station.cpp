@@ -48,43 +48,77 @@ std::optional<double> parts_per_million(std::string_view text) {
 
 }  // namespace
 
-std::string TdmaStation::make(const NodeOptions& options, std::string& link,
-                              const hal::LinePrefix& prefix, const std::function<bool()>& ended,
-                              std::unique_ptr<TdmaStation>& made) {
-    const auto question = link.find('?');
-    const std::string segment = can::describe(link).segment;
-    if (segment.empty()) {
-        return "--tdma needs an Ethernet link; write --link cane:eth0, or remove --tdma";
-    }
-    const auto skew = parts_per_million(options.skew.empty() ? "0ppm" : options.skew);
-    const auto drift = parts_per_million(options.drift.empty() ? "0ppm" : options.drift);
-    if (!skew) {
+std::string TdmaStation::Request::read(const NodeOptions& options) {
+    const auto given_skew = parts_per_million(options.skew.empty() ? "0ppm" : options.skew);
+    const auto given_drift = parts_per_million(options.drift.empty() ? "0ppm" : options.drift);
+    if (!given_skew) {
         return fmt::format("invalid --skew '{}'; write --skew 200ppm, at most 500ppm",
                            options.skew);
     }
-    if (!drift) {
+    if (!given_drift) {
         return fmt::format(
             "invalid --drift '{}'; write --drift 0.1ppm, the change of the skew per second",
             options.drift);
     }
-    const bool by_rtcfg = options.tdma == "auto";
+    skew = *given_skew;
+    drift = *given_drift;
+    by_rtcfg = options.tdma == "auto";
+    if (by_rtcfg) return "";
     std::string text;
-    if (!by_rtcfg && !tdma::config::read_from_disk(options.tdma, text)) {
+    if (!tdma::config::read_from_disk(options.tdma, text)) {
         return fmt::format("cannot read '{}': {}", options.tdma, text);
     }
-    const auto reading = by_rtcfg ? tdma::config::Reading{} : tdma::config::read(text);
+    tdma::config::Reading reading = tdma::config::read(text);
     const auto code = [](const tdma::config::Message& m) {
         return Code::named(tdma::config::code_of(m.topic)).value_or(Code("tdma-line"));
     };
     if (!print_findings(options.tdma, text, reading.messages, code)) {
         return fmt::format("invalid schedule '{}'; see the errors above", options.tdma);
     }
+    schedule = std::move(reading.schedule);
+    return "";
+}
+
+std::string TdmaStation::find_entry(const NodeOptions& options, const Request& request,
+                                    const ethernet::Port& port, const std::string& segment,
+                                    std::size_t& index) {
+    const std::string who =
+        options.station.empty() ? ethernet::to_string(port.address()) : options.station;
+    const auto which = tdma::config::find(request.schedule, who);
+    if (!which) {
+        return fmt::format("{} has no station '{}'; write --station with one of: {}", options.tdma,
+                           who, tdma::config::names(request.schedule));
+    }
+    const tdma::config::StationEntry& entry = request.schedule.stations[*which];
+    if (entry.mac && *entry.mac != port.address()) {
+        return fmt::format(
+            "{} has the address {}, but {} gives {} {}; correct the line 'mac' of its block",
+            segment, ethernet::to_string(port.address()), options.tdma, entry.name,
+            ethernet::to_string(*entry.mac));
+    }
+    if (entry.slots.empty()) {
+        return fmt::format("station '{}' of {} has no slot to send in; add one: slot 0 300",
+                           entry.name, options.tdma);
+    }
+    index = *which;
+    return "";
+}
+
+std::string TdmaStation::make(const NodeOptions& options, std::string& link,
+                              const hal::LinePrefix& prefix, const std::function<bool()>& ended,
+                              std::unique_ptr<TdmaStation>& made) {
+    const std::string segment = can::describe(link).segment;
+    if (segment.empty()) {
+        return "--tdma needs an Ethernet link; write --link cane:eth0, or remove --tdma";
+    }
+    Request request;
+    if (std::string problem = request.read(options); !problem.empty()) return problem;
 
     ethernet::Options how;
     how.types = {tdma::Station::types.begin(), tdma::Station::types.end()};
     how.spin_ns = spin_ns;
-    how.pacer =
-        by_rtcfg || !options.tunnel.empty() || has_far_slot(reading.schedule, options.station);
+    how.pacer = request.by_rtcfg || !options.tunnel.empty() ||
+                has_far_slot(request.schedule, options.station);
     auto opened = ethernet::open(segment, how);
     if (!opened) return opened.problem;
     if (opened.port->description().simulated) {
@@ -92,42 +126,31 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link,
                " is a segment in memory of this process only; write an interface, as in cane:eth0";
     }
     const tdma::config::StationEntry* entry = nullptr;
-    if (by_rtcfg) {
+    if (request.by_rtcfg) {
         tdma::StationSetup unknown;
         unknown.configured = false;
         unknown.slot_capacity = tdma::max_slots;
-        made.reset(
-            new TdmaStation(unknown, {}, segment, std::move(opened.port), *skew, *drift, prefix));
+        made.reset(new TdmaStation(unknown, {}, segment, std::move(opened.port), request.skew,
+                                   request.drift, prefix));
         if (std::string problem = made->receive_schedule(options, ended); !problem.empty()) {
             return problem;
         }
         entry = &made->applicant_->accepted()->schedule.stations.front();
     } else {
-        const std::string who =
-            options.station.empty() ? ethernet::to_string(opened.port->address()) : options.station;
-        const auto which = tdma::config::find(reading.schedule, who);
-        if (!which) {
-            return fmt::format("{} has no station '{}'; write --station with one of: {}",
-                               options.tdma, who, tdma::config::names(reading.schedule));
+        std::size_t index = 0;
+        if (std::string problem = find_entry(options, request, *opened.port, segment, index);
+            !problem.empty()) {
+            return problem;
         }
-        entry = &reading.schedule.stations[*which];
-        if (entry->mac && *entry->mac != opened.port->address()) {
-            return fmt::format(
-                "{} has the address {}, but {} gives {} {}; correct the line 'mac' of its block",
-                segment, ethernet::to_string(opened.port->address()), options.tdma, entry->name,
-                ethernet::to_string(*entry->mac));
-        }
-        if (entry->slots.empty()) {
-            return fmt::format("station '{}' of {} has no slot to send in; add one: slot 0 300",
-                               entry->name, options.tdma);
-        }
-        made.reset(new TdmaStation(tdma::config::setup_of(reading.schedule, *which),
-                                   reading.schedule, segment, std::move(opened.port), *skew, *drift,
-                                   prefix));
+        entry = &request.schedule.stations[index];
+        made.reset(new TdmaStation(tdma::config::setup_of(request.schedule, index),
+                                   request.schedule, segment, std::move(opened.port), request.skew,
+                                   request.drift, prefix));
     }
     if (link.find("slot=") == std::string::npos) {
         made->slot_ = entry->slots.front().setup.id;
-        link += fmt::format("{}slot={}", question == std::string::npos ? '?' : '&', *made->slot_);
+        const char separator = link.find('?') == std::string::npos ? '?' : '&';
+        link += fmt::format("{}slot={}", separator, *made->slot_);
     }
     if (!ethernet::offer_discipline(made->port_, &made->discipline_)) {
         return segment + " already has a TDMA station";

@@ -31,6 +31,21 @@ public:
     std::string summary() const override;
 
 private:
+    /// What the options ask for.
+    struct Request {
+        double skew = 0.0;   ///< of the clock
+        double drift = 0.0;  ///< change of the skew per second
+        bool by_rtcfg = false;  ///< the master sends the schedule
+        tdma::config::Schedule schedule;  ///< empty by RTcfg
+
+        /// Reads options and schedule. Returns what is wrong with them, empty: nothing.
+        std::string read(const NodeOptions&);
+    };
+    /// Sets `index` to the station of the schedule that this is. Returns why there is none, empty on
+    /// success.
+    static std::string find_entry(const NodeOptions&, const Request&, const ethernet::Port&,
+                                  const std::string& segment, std::size_t& index);
+
     TdmaStation(const tdma::StationSetup&, tdma::config::Schedule, std::string segment,
                 std::unique_ptr<ethernet::Port>, double skew, double drift, hal::LinePrefix prefix);
     /// Returns the problem, or "".
