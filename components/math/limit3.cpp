@@ -73,8 +73,8 @@ bool lands(double way, double speed, double a, int moves) {
            (lands(way, speed - a, a, moves - 1) || lands(way, speed + a, a, moves - 1));
 }
 
-// The speed after `before`, to go `way` by at most `most` in a cycle; speeds and way are relative
-// to the goal, which may be moving.
+// The speed after `before`, to go `way` by at most `max_speed` in a cycle; speeds and way are
+// relative to the goal, which may be moving.
 double next_speed(double way, double before, double max_speed, double a, double m,
                   bool moving = false) {
     const double side = std::copysign(1.0, way);

@@ -87,7 +87,7 @@ public:
         end_.acceleration = a;
     }
     /// Changes the speed to `v`, with an acceleration of 0 there, with accelerations within
-    /// ±`most`; an initial acceleration beyond it returns to it immediately.
+    /// ±`max`; an initial acceleration beyond it returns to it immediately.
     void reach(double v, double max) noexcept {
         if (!(jerk_ < unlimited)) {
             end_.acceleration = std::copysign(max, v - end_.velocity);

@@ -21,7 +21,7 @@ public:
     static constexpr std::size_t max = 64;  ///< of one client
 
     /// Adds a subscription to the values of `names` and returns its number; 0 when there are
-    /// `most`.
+    /// `max`.
     std::uint64_t add(std::vector<std::string> names, std::int64_t every_ns, bool changes_only);
     /// Returns false when there is no subscription of this number.
     bool remove(std::uint64_t id);

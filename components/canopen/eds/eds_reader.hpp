@@ -47,7 +47,7 @@ public:
     std::string text(IniSection& section, std::string_view key);
     /// Returns the value without a trailing comment.
     std::string bare(IniSection& section, std::string_view key);
-    /// Returns nothing if the key is missing, empty or not a number in 0..`most`; reports an
+    /// Returns nothing if the key is missing, empty or not a number in 0..`max`; reports an
     /// invalid number.
     std::optional<std::uint64_t> number(IniSection& section, std::string_view key,
                                         std::uint64_t max);

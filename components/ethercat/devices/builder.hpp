@@ -32,7 +32,7 @@ public:
     /// Adds a further protocol of the mailbox.
     void service(std::unique_ptr<MailboxService>);
     /// Adds a PDO whose entries are in the dictionary already. Fixed PDOs cannot be mapped anew;
-    /// others hold up to `most` entries.
+    /// others hold up to `max` entries.
     void pdo(bool output, std::uint16_t index, std::string name,
              const std::vector<PdoEntry>& entries, bool assigned = true, unsigned max = 0);
     /// Offers SYNC0, and SYNC1 with `sync1`.

@@ -101,7 +101,7 @@ private:
 /// Writes a frame of datagrams into a buffer of max_frame_bytes. [realtime]
 class FrameWriter {
 public:
-    /// `most`: bytes of the longest frame.
+    /// `max`: bytes of the longest frame.
     FrameWriter(std::span<std::uint8_t, max_frame_bytes> buffer,
                 const std::array<std::uint8_t, 6>& source,
                 std::size_t max = max_frame_bytes) noexcept;

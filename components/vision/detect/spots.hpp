@@ -36,7 +36,7 @@ struct Spot {
 /// Computes the weights of a colour frame; those of a grey frame are 0. [any] allocates memory
 void weigh(const Frame& frame, Hue hue, std::vector<std::uint8_t>& weights);
 
-/// Returns at most `most` connected spots of at least `min_area` px above `threshold`, the
+/// Returns at most `max` connected spots of at least `min_area` px above `threshold`, the
 /// heaviest first. [any] allocates memory
 std::vector<Spot> find_spots(const std::vector<std::uint8_t>& weights, int width, int height,
                              int threshold, int min_area, std::size_t max);

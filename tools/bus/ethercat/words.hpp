@@ -15,7 +15,7 @@
 
 namespace hal::tools {
 
-/// Returns a number in decimal, 0x… or 0…; nullopt: invalid, or above `most`. [any]
+/// Returns a number in decimal, 0x… or 0…; nullopt: invalid, or above `max`. [any]
 inline std::optional<std::uint64_t> ethercat_number(const std::string& text, std::uint64_t max) {
     char* end = nullptr;
     errno = 0;

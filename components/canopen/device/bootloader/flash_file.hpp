@@ -10,7 +10,7 @@
 
 namespace hal::canopen {
 
-/// Reads an image of at most `most` bytes; a file that does not exist leaves `image` empty. Returns
+/// Reads an image of at most `max` bytes; a file that does not exist leaves `image` empty. Returns
 /// the problem, or "". [setup]
 std::string read_flash(const std::string& path, std::size_t max,
                        std::optional<std::vector<std::uint8_t>>& image);
