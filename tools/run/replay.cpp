@@ -511,6 +511,14 @@ private:
         }
     }
 
+    /// Returns how far two values are apart: 0 for equal ones and two NaN, infinity for one NaN.
+    static double difference(double recorded, double replayed) {
+        if (std::isnan(recorded) != std::isnan(replayed)) {
+            return std::numeric_limits<double>::infinity();
+        }
+        if (recorded == replayed || std::isnan(recorded)) return 0.0;
+        return std::abs(recorded - replayed);
+    }
     void compare(Compared& one, std::int64_t time_ns, std::uint64_t word) const {
         const auto& times = one.table->times_ns;
         while (one.row < times.size() && times[one.row] - recording_.begin_ns() < time_ns) {
@@ -522,14 +530,9 @@ private:
         }
         const hal_type type = one.table->columns[one.column].type;
         const double recorded = one.table->real(one.row, one.column);
-
         const double replayed = real_of(type, word);
         ++one.rows;
-        const bool no_number = std::isnan(recorded) != std::isnan(replayed);
-        const double apart = no_number ? std::numeric_limits<double>::infinity()
-                             : recorded == replayed || std::isnan(recorded)
-                                 ? 0
-                                 : std::abs(recorded - replayed);
+        const double apart = difference(recorded, replayed);
         if (apart <= one.worst) return;
         one.worst = apart;
         one.recorded = recorded;
@@ -549,8 +552,20 @@ private:
     std::int64_t replayed_ns_ = 0;
 };
 
+/// Returns whether an option is given that works with --exact only.
+bool has_exact_options(const ReplayOptions& options) {
+    const std::string* const texts[] = {&options.until, &options.break_condition, &options.as_test,
+                                        &options.cut, &options.record};
+    const bool has_text = std::any_of(std::begin(texts), std::end(texts),
+                                      [](const std::string* text) { return !text->empty(); });
+    return has_text || options.anyway || options.shell || !options.show.empty() ||
+           !options.edits.empty() || !options.at.empty() || !options.netlist.empty();
+}
+
 }  // namespace
 
+/// `hal replay`: runs a netlist with the inputs of a recording and compares the outputs; with
+/// --exact, executes a journal again.
 int run_replay(const ReplayOptions& options) {
     if (options.exact && (options.tolerance >= 0 || options.for_ns >= 0)) {
         return fail(
@@ -562,10 +577,7 @@ int run_replay(const ReplayOptions& options) {
     if (options.words.size() == 1 && is_journal_test(options.words[0])) {
         return run_journal_test(options);
     }
-    if (!options.until.empty() || !options.break_condition.empty() || !options.show.empty() ||
-        options.anyway || options.shell || !options.edits.empty() || !options.at.empty() ||
-        !options.as_test.empty() || !options.cut.empty() || !options.netlist.empty() ||
-        !options.record.empty()) {
+    if (has_exact_options(options)) {
         return fail(
             options,
             "--until, --break, --show, --shell, --edit, --netlist, --at, --as-test, --cut, --record "

@@ -143,6 +143,10 @@ private:
     bool open();
     void begin_file();
     int finish();
+    /// Makes the end of a machine that was killed the event of a ring; else prints why it has ended
+    /// too early. Returns the status of the command.
+    int note_end_of_machine();
+    void print_summary() const;
     int fail_to_write();
     std::string ending(InstanceEnd end) const;
     bool remove_if_empty();
@@ -160,9 +164,9 @@ private:
     std::int64_t fired_ns_ = 0;  ///< when the overrun or fault came; 0: not yet
     std::string cause_;
     int file_ = -1;
-    bool fresh_ = false;         ///< there was no file of this name
-    std::size_t written_ = 0;    ///< bytes of whole packets in the file
-    int error_ = 0;              ///< of the first write that failed
+    bool fresh_ = false;  ///< there was no file of this name
+    std::size_t written_ = 0;  ///< bytes of whole packets in the file
+    int error_ = 0;  ///< of the first write that failed
     std::size_t kept_bytes_ = 0;
 };
 
@@ -333,23 +337,10 @@ std::string Tracer::ending(InstanceEnd end) const {
     }
 }
 
+/// Writes what a ring has kept, and prints the summary and why the trace has ended. Returns the
+/// status of the command.
 int Tracer::finish() {
-    int status = 0;
-    if (!client_->connected()) {
-        const std::string& why = client_->closed_because();
-        const InstanceEnd end = client_->instance_end();
-        const bool killed = end == InstanceEnd::killed;
-        const bool runs = end == InstanceEnd::running;
-        const std::string ended = ending(end);
-        if (ring() && fired_ns_ == 0 && killed) {
-            fired_ns_ = now_ns(CLOCK_MONOTONIC);
-            cause_ = ended;
-        } else if (options_.for_ns >= 0) {
-            status = fail(options_, ended + " before the time was over");
-        } else if (killed || runs || !why.empty()) {
-            status = fail(options_, ended);
-        }
-    }
+    const int status = client_->connected() ? 0 : note_end_of_machine();
     if (ring() && fired_ns_ == 0) {
         remove_if_empty();
         const char* what = options_.on_overrun ? "overrun" : "fault";
@@ -366,15 +357,34 @@ int Tracer::finish() {
             write(chunk);
         }
     }
-    const std::string& path = options_.words.front();
     if (error_ != 0) return fail_to_write();
+    print_summary();
+    return status;
+}
+
+int Tracer::note_end_of_machine() {
+    const InstanceEnd end = client_->instance_end();
+    const bool killed = end == InstanceEnd::killed;
+    const std::string ended = ending(end);
+    if (ring() && fired_ns_ == 0 && killed) {
+        fired_ns_ = now_ns(CLOCK_MONOTONIC);
+        cause_ = ended;
+        return 0;
+    }
+    if (options_.for_ns >= 0) return fail(options_, ended + " before the time was over");
+    const bool runs = end == InstanceEnd::running;
+    return killed || runs || !client_->closed_because().empty() ? fail(options_, ended) : 0;
+}
+
+void Tracer::print_summary() const {
     if (!cause_.empty()) {
         print(cause_ + "\n");
     }
-    print(fmt::format("wrote {}: {}, {}, {}, {} lost; open it in https://ui.perfetto.dev\n", path,
-                      counted(summary_.cycles, "cycle"), counted(summary_.calls, "function call"),
+    print(fmt::format("wrote {}: {}, {}, {}, {} lost; open it in https://ui.perfetto.dev\n",
+                      options_.words.front(), counted(summary_.cycles, "cycle"),
+                      counted(summary_.calls, "function call"),
                       counted(summary_.overruns, "overrun"), counted(summary_.lost, "event")));
-    if (summary_.max_ns < 0) return status;
+    if (summary_.max_ns < 0) return;
     std::string line = fmt::format(
         "latest end: cycle {} of '{}', {} after it was due: wake-up latency {}, execution {}",
         summary_.cycle, summary_.thread, format_duration(static_cast<double>(summary_.max_ns)),
@@ -386,7 +396,6 @@ int Tracer::finish() {
                             summary_.function);
     }
     print(line + "\n");
-    return status;
 }
 
 int Tracer::run() {

@@ -123,16 +123,19 @@ std::string latencies_text(const Table& t, const plan::Plan& p) {
     return table.text();
 }
 
+/// Returns why a message has no worst case.
+const char* unbounded_reason(const Message& m, const Latency& l) {
+    if (m.period <= 0) return "no period: write `period T` or `event T` behind it";
+    if (l.priv) return "its slot has no turn";
+    return "unbounded: the shared slots do not carry it with the messages before it within its "
+           "period";
+}
+
 /// Explains the worst case of a message.
 std::string arithmetic(const Table& t, const Latency& l) {
     const Message& m = t.messages[l.message];
     std::string text = fmt::format("{} {}: ", scocan::id_text(m.id), m.name);
-    if (l.worst < 0) {
-        return text + (m.period <= 0 ? "no period: write `period T` or `event T` behind it"
-                       : l.priv      ? "its slot has no turn"
-                                : "unbounded: the shared slots do not carry it with the messages "
-                                  "before it within its period");
-    }
+    if (l.worst < 0) return text + unbounded_reason(m, l);
     if (m.jitter > 0) {
         text += fmt::format("{} jitter + ", ms(m.jitter));
     }
