@@ -47,8 +47,10 @@ The netlist, with an emulated drive:
 
 `receive` belongs to the beginning of the thread, `transmit` to its end; the period of the thread is
 the cycle. Slaves are started in parallel, while others already exchange data; one that was lost is
-started again. Until a slave is `operational` its outputs are off and its inputs keep their last
-values.
+started again. The outputs of a slave are off outside of OP. It switches them on, with the values of
+their pins, when it enters OP; the master reads that state up to 10 ms later, and only then is
+`operational` TRUE. Outputs must be valid before that, as with other masters. Inputs keep their last
+values while `operational` is FALSE.
 
 `operational` is also FALSE while the process data of a slave in OP is not exchanged for 30 cycles
 and 30 ms, although the slave answers: its frames return later than the next cycle (or
