@@ -123,8 +123,9 @@ HAL does not convert between types implicitly; link this component between two s
 of a float is truncated (1.9 becomes 1, -1.9 becomes -1). A value out of range wraps around (modulo
 2^32 or 2^64; a bit is TRUE for all but 0), or, with `clamp`, is set to the nearest limit of the
 range. With `clamp`, `out-of-range` is TRUE while the input is outside of the range. Without, it
-becomes TRUE with the first input that is not converted exactly, a fraction included, and remains
-TRUE until a cycle with `clamp`. A NaN input gives 0 and sets `out-of-range`.
+becomes TRUE with the first input that is not converted exactly, a fraction included. It remains
+TRUE, also when `clamp` has become FALSE meanwhile, until a cycle with `clamp` and an input within
+the range. A NaN input gives 0 and sets `out-of-range`.
 
 **Differences from LinuxCNC:** an integer that wraps around sets `out-of-range` (LinuxCNC: not
 between signed and unsigned integers of the same width). A float wraps around and NaN gives 0
