@@ -264,7 +264,8 @@ private:
     void report_key(const Reference& reference, Span at) {
         const std::string name = reference_text(reference.section, reference.name);
         if (environment_->ini == nullptr || environment_->ini->empty()) {
-            return error("unset-ini-key", at, "'" + name + "' has no value: no INI file was given",
+            return error("unset-ini-key", at,
+                         "'" + name + "' has no value: no INI file was given, or it has no keys",
                          "", "specify it with --ini FILE.ini (halcmd: -i FILE.ini)");
         }
         const std::vector<std::string> names = environment_->ini->names();

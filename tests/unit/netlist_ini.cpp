@@ -131,7 +131,7 @@ test.hal:2:8: error: unknown key '[NONE]NOTHING': not in the INI file [unset-ini
 TEST_F(Ini_file, that_was_not_given_is_named_as_the_reason) {
     EXPECT_EQ(
         said("setp a [AXIS_X]MAX\n"),
-        R"(test.hal:1:8: error: '[AXIS_X]MAX' has no value: no INI file was given [unset-ini-key]
+        R"(test.hal:1:8: error: '[AXIS_X]MAX' has no value: no INI file was given, or it has no keys [unset-ini-key]
     1 | setp a [AXIS_X]MAX
       |        ^^^^^^^^^^^
       = help: specify it with --ini FILE.ini (halcmd: -i FILE.ini)
