@@ -163,6 +163,10 @@ class Language(Case):
         self.assertIn(
             "use --execute 'sender: getp x'", self.bad("sim", path, "--for", "1ms", "-e", "getp x")
         )
+        self.assertIn(
+            "time passes for all nodes together; use --for",
+            self.bad("sim", path, "--for", "1ms", "-e", "sender: advance 1s"),
+        )
 
     def test_rejects_dds_without_a_node(self):
         self.assertEqual(

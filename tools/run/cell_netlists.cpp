@@ -69,6 +69,14 @@ std::optional<std::vector<std::string>> dds_settings(const Options& options,
     return words;
 }
 
+/// Returns the first word of a command line.
+std::string_view first_word(std::string_view line) {
+    const auto begin = line.find_first_not_of(" \t");
+    if (begin == line.npos) return {};
+    const auto end = line.find_first_of(" \t", begin);
+    return line.substr(begin, end == line.npos ? end : end - begin);
+}
+
 /// "NODE: COMMAND" of --execute.
 int execute(const Options& options, Cell& cell, const std::string& command, Output& output) {
     const auto colon = command.find(':');
@@ -78,7 +86,13 @@ int execute(const Options& options, Cell& cell, const std::string& command, Outp
         return fail(options, fmt::format("--execute needs a node; use --execute '{}: {}'",
                                          cell.nodes().front().name, command));
     }
-    return cell.shell(node).execute(command.substr(colon + 1), output, "<commandline>");
+    const std::string line = command.substr(colon + 1);
+    if (first_word(line) == "advance") {
+        return fail(options, fmt::format("--execute '{}': time passes for all nodes together; use "
+                                         "--for, or simulate this node only: --node {}",
+                                         command, cell.nodes()[node].name));
+    }
+    return cell.shell(node).execute(line, output, "<commandline>");
 }
 
 }  // namespace
