@@ -123,9 +123,20 @@ class Modbus(Case):
             self.bad("node", "modbus", "bus.modbus", "--link", "pty:l", "--fault", "late:every=0"),
         )
         self.assertIn(
-            "there is no value io.x",
+            "--set 'io.x=1': io.x: unknown value",
             self.bad("node", "modbus", "bus.modbus", "--link", "pty:l", "--set", "io.x=1"),
         )
+        for setting, problem in (
+            ("io.level=4000", "io.level: out of range; write -3276.8..3276.7"),
+            ("io.ready=2", "io.ready: out of range; write 0..1"),
+            ("io.pump=1", "io.pump: the master writes it"),
+            ("spindle.speed-fb=3", "spindle.speed-fb: the model of the drive writes it"),
+            ("oi.level=1", "unknown slave 'oi'"),
+        ):
+            self.assertEqual(
+                f"hal node modbus: --set '{setting}': {problem}\n",
+                self.bad("node", "modbus", "bus.modbus", "--link", "pty:l", "--set", setting),
+            )
         self.write("file", "")
         self.assertIn(
             "'file' exists", self.bad("node", "modbus", "bus.modbus", "--link", "pty:file")

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <limits>
+#include <utility>
 
 namespace hal::modbus {
 
@@ -21,6 +24,25 @@ Pdu echo(std::span<const std::uint8_t> request) {
         pdu.add8(byte);
     }
     return pdu;
+}
+
+/// Returns the numbers that the registers of a value can have, in its unit; 53 of 64 bits.
+std::pair<double, double> range_of(const Value& v) {
+    if (v.is_bit() || v.mask != 0) return {0.0, 1.0};
+    double min = 0.0;
+    double max = 0.0;
+    if (bus::is_real(v.type)) {
+        max = v.type == bus::ValueType::f32 ? std::numeric_limits<float>::max()
+                                            : std::numeric_limits<double>::max();
+        min = -max;
+    } else {
+        const int bits = std::min(16 * static_cast<int>(v.size()), 53);
+        max = std::ldexp(1.0, bits - (bus::is_signed(v.type) ? 1 : 0)) - 1.0;
+        min = bus::is_signed(v.type) ? -max - 1.0 : 0.0;
+    }
+    const double one = min * v.scale + v.offset;
+    const double other = max * v.scale + v.offset;
+    return {std::min(one, other), std::max(one, other)};
 }
 
 }  // namespace
@@ -66,6 +88,19 @@ bool EmulatedSlave::set(std::string_view name, double value) {
     return false;
 }
 
+std::string EmulatedSlave::problem_of(std::string_view name, double value) const {
+    const auto v = std::find_if(config_.values.begin(), config_.values.end(),
+                                [&](const Value& one) { return one.name == name; });
+    if (v == config_.values.end()) return "unknown value";
+    if (v->is_output) return "the master writes it";
+    if (v->purpose != Purpose::pin) return "the model of the drive writes it";
+    const auto [min, max] = range_of(*v);
+    if (value >= min && value <= max) return {};
+    char text[96];
+    std::snprintf(text, sizeof text, "out of range; write %.10g..%.10g", min, max);
+    return text;
+}
+
 /// Stores a number in the registers of a value; numbers of 64 bits keep 53 of them.
 void EmulatedSlave::put(const Value& v, double number) {
     if (std::isnan(number)) return;  // the register keeps its value
@@ -94,7 +129,7 @@ void EmulatedSlave::put(const Value& v, double number) {
         constexpr double exact = 9007199254740992.0;  // 2^53: a double has all whole numbers below
         const int width = 16 * static_cast<int>(v.size()) - (bus::is_signed(v.type) ? 1 : 0);
         const double limit = std::min(std::ldexp(1.0, width) - 1, exact);
-        const double low = bus::is_signed(v.type) ? -limit : 0.0;
+        const double low = bus::is_signed(v.type) ? -limit - 1 : 0.0;
         bits = static_cast<std::uint64_t>(
             static_cast<std::int64_t>(std::clamp(std::round(counts), low, limit)));
     }

@@ -31,10 +31,13 @@ std::string apply_setting(SlaveBus& bus, const std::string& text) {
     }
     const std::string slave = text.substr(0, dot);
     const std::string name = text.substr(dot + 1, equals - dot - 1);
-    for (EmulatedSlave& one : bus.slaves()) {
-        if (one.config().name == slave && one.set(name, *value)) return {};
-    }
-    return "--set '" + text + "': there is no value " + slave + "." + name;
+    const auto of_name = [&](const EmulatedSlave& one) { return one.config().name == slave; };
+    const auto found = std::find_if(bus.slaves().begin(), bus.slaves().end(), of_name);
+    if (found == bus.slaves().end()) return "--set '" + text + "': unknown slave '" + slave + "'";
+    const std::string problem = found->problem_of(name, *value);
+    if (!problem.empty()) return "--set '" + text + "': " + slave + "." + name + ": " + problem;
+    found->set(name, *value);
+    return {};
 }
 
 /// Prints drives whose state has changed.
