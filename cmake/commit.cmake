@@ -2,7 +2,10 @@
 # cmake -DGIT=PROGRAM -DROOT=FOLDER -DOUTPUT=FILE -P commit.cmake
 # Writes a source with the commit that is checked out in ROOT; without GIT, with the one that `git archive` wrote, or `unknown`.
 set(commit unknown)
-file(STRINGS "${ROOT}/cmake/commit.txt" archived LIMIT_COUNT 1)
+set(archived)
+if(EXISTS "${ROOT}/cmake/commit.txt")
+    file(STRINGS "${ROOT}/cmake/commit.txt" archived LIMIT_COUNT 1)
+endif()
 if(archived MATCHES "^[0-9a-f]+$")
     string(SUBSTRING "${archived}" 0 10 commit)
 endif()
