@@ -209,6 +209,7 @@ void OpenTransaction::withdraw(Diagnostics* diagnostics) {
         close_edit();
     } else {
         keep_for_good(std::move(edit_));  // a thread may still use what the edit made
+        forget_edit();
     }
 }
 
@@ -253,6 +254,11 @@ void OpenTransaction::close_edit() {
     if (!removed.instances.empty() || !replaced.empty()) {
         state_.faults.close_rows();
     }
+    forget_edit();
+}
+
+/// The next transaction begins without anything of this one.
+void OpenTransaction::forget_edit() {
     edit_.reset();
     auto_orders_.clear();
     before_.clear();

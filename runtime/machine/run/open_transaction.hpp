@@ -60,6 +60,7 @@ private:
     void withdraw(Diagnostics* diagnostics = nullptr);
     bool restore_threads(Diagnostics& diagnostics);
     void close_edit();
+    void forget_edit();
 
     SessionState& state_;
     bool open_ = false;
