@@ -83,8 +83,9 @@ struct FurutaControl : hal::Component {
         "identified-frequency",
         "identified frequency of small oscillations with the arm fixed",
         {.unit = "rad/s", .finite = true}};
-    hal::Out<std::uint32_t> bad_inputs{
-        *this, "bad-inputs", "cycles with a NaN or infinite angle or speed; the torque is 0"};
+    hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs",
+                                       "cycles with a NaN or infinite angle or speed, or an angle "
+                                       "beyond 1e6 rad; the torque is 0"};
 
     hal::LimitParam max_acceleration{*this,
                                      "max-acceleration",
@@ -176,37 +177,31 @@ struct FurutaControl : hal::Component {
     void update(hal::Cycle cycle) noexcept {
         const double dt = cycle.seconds();
         State s{arm_angle - arm_command, pendulum_angle, arm_velocity, pendulum_velocity};
-        const bool sane = std::isfinite(s.arm + s.pendulum + s.arm_speed + s.pendulum_speed) &&
-                          std::fabs(s.pendulum) < 1e6;
-        if (!sane) {
+        const bool is_usable = std::isfinite(s.arm + s.pendulum + s.arm_speed + s.pendulum_speed) &&
+                               std::fabs(s.pendulum) < 1e6;
+        if (!is_usable) {
             bad_inputs = bad_inputs + 1;
             balanced = false;
             upright_s_ = 0.0;
             identification_.forget_motion();
-            return give(0.0, 0.0);
+            // the phase stays: one bad sample does not end balancing
+            return command_torque(0.0, 0.0);
         }
-        learn(s, dt);
-        lead(s);
+        update_rig(s, dt);
+        predict_pendulum(s);
         const double tilt = std::remainder(s.pendulum - std::numbers::pi, 2.0 * std::numbers::pi);
-        // in the frame of the turning arm: the energy upright at a constant arm speed
-        const double spread = s.arm_speed * std::sin(tilt);
-
-        const double kinetic =
-            0.5 * rig_.pendulum_inertia * (s.pendulum_speed * s.pendulum_speed - spread * spread);
-        const double weight = rig_.weight_moment;
-        const double part =
-            weight > 0.0 ? (kinetic + weight * (1.0 + std::cos(tilt))) / (2.0 * weight) : 0.0;
-        const double known = std::isfinite(part) ? part : 0.0;
+        const double relative_energy = energy_of_pendulum(tilt, s);
         from_upright = tilt;
-        energy = known;
+        energy = relative_energy;
 
-        choose(tilt, s);
+        choose_phase(tilt, s);
         upright_s_ = std::fabs(tilt) < upright_angle ? upright_s_ + dt : 0.0;
         balanced = now_ == Phase::balance && upright_s_ >= upright_time;
         switch (now_) {
-        case Phase::off: return give(0.0, 0.0);
-        case Phase::balance: return give(held(tilt, s), s.arm_speed);
-        case Phase::swing_up: return give(pumped(known, s), s.arm_speed);
+        case Phase::off: return command_torque(0.0, 0.0);
+        case Phase::balance: return command_torque(balancing_torque(tilt, s), s.arm_speed);
+        case Phase::swing_up:
+            return command_torque(swing_up_torque(relative_energy, s), s.arm_speed);
         }
     }
 
@@ -215,10 +210,23 @@ private:
         double arm, pendulum, arm_speed, pendulum_speed;
     };
 
-    /// Returns the rig as given, or as identified from its motion. A pendulum that does not hang at
-    /// 0 is not driven, because every torque would be computed for a wrong angle. A rising edge of
+    /// Returns the energy of the pendulum relative to that upright at standstill, as it is in the
+    /// frame that turns with the arm, so less the centrifugal part; 0 when it is not finite.
+    double energy_of_pendulum(double tilt, const State& s) const noexcept {
+        const double centrifugal_speed = s.arm_speed * std::sin(tilt);
+        const double kinetic =
+            0.5 * rig_.pendulum_inertia *
+            (s.pendulum_speed * s.pendulum_speed - centrifugal_speed * centrifugal_speed);
+        const double weight = rig_.weight_moment;
+        if (!(weight > 0.0)) return 0.0;
+        const double relative = (kinetic + weight * (1.0 + std::cos(tilt))) / (2.0 * weight);
+        return std::isfinite(relative) ? relative : 0.0;
+    }
+
+    /// Sets the rig to that of the parameters, or to the one identified from its motion, and
+    /// `homed`. A pendulum that does not hang at 0 is not driven, because every torque would be computed for a wrong angle. A rising edge of
     /// `enable` restarts the identification.
-    void learn(const State& s, double dt) noexcept {
+    void update_rig(const State& s, double dt) noexcept {
         const hal::estimation::FurutaParameters given{arm_inertia, swing_inertia, coupling,
                                                       weight_moment, friction};
         const bool usable = given.arm_inertia > 0.0 && given.pendulum_inertia > 0.0 &&
@@ -255,7 +263,7 @@ private:
         identified_frequency = std::sqrt(rig_.weight_moment / rig_.pendulum_inertia);
     }
 
-    void choose(double tilt, const State& s) noexcept {
+    void choose_phase(double tilt, const State& s) noexcept {
         if (!enable || !homed) {
             now_ = Phase::off;
         } else if (now_ != Phase::balance || std::fabs(tilt) >= lose_angle ||
@@ -269,7 +277,7 @@ private:
         phase = static_cast<std::uint32_t>(now_);
     }
 
-    double held(double tilt, const State& s) const noexcept {
+    double balancing_torque(double tilt, const State& s) const noexcept {
         const double reach = std::fabs(arm_reach);
         return -(gain_arm * std::clamp(s.arm, -reach, reach) + gain_pendulum * tilt +
                  gain_arm_velocity * s.arm_speed + gain_pendulum_velocity * s.pendulum_speed);
@@ -283,12 +291,11 @@ private:
         constexpr double part_of_speed = 0.95;
         constexpr int steps = 120;  // 0.6 s
         const double limit = part_of_torque * std::fabs(max_torque);
-
         const double fastest = std::fabs(max_velocity);
         for (int i = 0; i < steps; ++i) {
-            const Rates rates = under(std::clamp(held(tilt, s), -limit, limit), s);
+            const Rates rates =
+                accelerations(std::clamp(balancing_torque(tilt, s), -limit, limit), s);
             s.arm += dt * (s.arm_speed + 0.5 * dt * rates.arm);
-
             tilt += dt * (s.pendulum_speed + 0.5 * dt * rates.pendulum);
             s.arm_speed += dt * rates.arm;
             s.pendulum_speed += dt * rates.pendulum;
@@ -308,16 +315,17 @@ private:
     /// Energy flows into the pendulum as -(c cos a a' + K sin²a q') q" (K. Åström, K. Furuta,
     /// *Swinging up a pendulum by energy control*, Automatica 36, 2000, and the centrifugal part),
     /// so the arm is accelerated against the sign of that; from rest in either direction.
-    double pumped(double part, const State& s) const noexcept {
+    double swing_up_torque(double relative_energy, const State& s) const noexcept {
         const double limit = std::fabs(max_acceleration);
         const double sin = std::sin(s.pendulum);
-
         const double cos = std::cos(s.pendulum);
-        const double wanted = std::clamp(energy_gain * (energy_target - part), -1.0, 1.0) * limit;
+        const double wanted =
+            std::clamp(energy_gain * (energy_target - relative_energy), -1.0, 1.0) * limit;
         const double flow = rig_.coupling * cos * s.pendulum_speed +
                             rig_.pendulum_inertia * sin * sin * s.arm_speed;
-        const double sign =
-            part < 0.01 && flow == 0.0 ? 1.0 : std::clamp(flow / (0.1 * rig_.coupling), -1.0, 1.0);
+        const double sign = relative_energy < 0.01 && flow == 0.0
+                                ? 1.0
+                                : std::clamp(flow / (0.1 * rig_.coupling), -1.0, 1.0);
         const double centring = -centre_gain * s.arm - centre_damping * s.arm_speed;
         const bool fast = std::fabs(s.arm_speed) > max_velocity;
         const double acceleration = fast ? std::copysign(limit, -s.arm_speed)
@@ -344,10 +352,9 @@ private:
     };
     /// Accelerations under a torque, without friction: the rig's two equations, solved. Zeros when
     /// the parameters make no physical sense.
-    Rates under(double drive, const State& s) const noexcept {
+    Rates accelerations(double drive, const State& s) const noexcept {
         const double K = rig_.pendulum_inertia;
         const double sin = std::sin(s.pendulum);
-
         const double cos = std::cos(s.pendulum);
         const double c = rig_.coupling * cos;
         const double J = rig_.arm_inertia + K * sin * sin;
@@ -364,15 +371,15 @@ private:
     }
 
     /// Leads the pendulum on by its age, with the arm's acceleration of the last torque.
-    void lead(State& s) const noexcept {
+    void predict_pendulum(State& s) const noexcept {
         const double age = std::clamp(pendulum_age.get(), 0.0, 0.05);
         if (!(age > 0.0)) return;
-        const double acceleration = under(torque, s).pendulum;
+        const double acceleration = accelerations(torque, s).pendulum;
         s.pendulum += age * (s.pendulum_speed + 0.5 * age * acceleration);
         s.pendulum_speed += age * acceleration;
     }
 
-    void give(double wanted, double arm_speed) noexcept {
+    void command_torque(double wanted, double arm_speed) noexcept {
         const double limit = std::fabs(max_torque);
 
         const double given = std::isfinite(wanted) ? std::clamp(wanted, -limit, limit) : 0.0;

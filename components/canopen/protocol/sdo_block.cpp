@@ -42,7 +42,7 @@ Acknowledgement BlockSender::evaluate(std::uint8_t good, std::uint8_t next, cons
         if (now - acknowledged_at_ < interval) return Acknowledgement::duplicate;
         if (good != 0) return Acknowledgement::stalled;
     }
-    return Acknowledgement::advances;
+    return Acknowledgement::of_this_block;
 }
 
 void BlockSender::advance(std::uint8_t good, std::uint8_t next, std::uint32_t size,

@@ -149,8 +149,8 @@ private:
 enum class Acknowledgement : std::uint8_t {
     duplicate,  ///< or of an earlier block
     beyond,  ///< of segments that were not sent
-    stalled,  ///< the receiver still waits for this block: continue after its last good segment
-    advances,
+    stalled,  ///< the last one again, after a pause: its segments are counted, the rest is lost
+    of_this_block,  ///< its first good segments, perhaps none, have arrived
 };
 
 /// The sender of blocks. [realtime]

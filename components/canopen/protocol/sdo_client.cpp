@@ -139,7 +139,7 @@ void SdoClient::begin_mode(bool block) noexcept {
     stalls_ = 0;
     size_known_ = false;
     last_error_ = Abort::none;
-    progress();
+    restart_timer();
     if (first_->upload) return begin_upload(block);
     begin_download(block);
 }
@@ -200,7 +200,7 @@ void SdoClient::dispatch(const Frame& f) noexcept {
 }
 
 void SdoClient::on_block_download_end(const Frame& f) noexcept {
-    if (f.data[0] != 0xa1) return unexpected(Abort::command);
+    if (f.data[0] != 0xa1) return ignore(Abort::command);
     finish(Abort::none);
 }
 
@@ -218,7 +218,7 @@ bool SdoClient::starting() const noexcept {
 void SdoClient::on_abort(const Frame& f) noexcept {
     const auto why = static_cast<Abort>(load<std::uint32_t>(f.data.data() + 4));
     // of an earlier transfer: some servers send their abort late
-    if (!concerns_request(f)) return unexpected(why);
+    if (!concerns_request(f)) return ignore(why);
     if (starting()) {
         // The abort codes with which servers without block transfer reject it.
         if (in_block_ && (why == Abort::command || why == Abort::access || why == Abort::general)) {
@@ -238,8 +238,8 @@ void SdoClient::on_abort(const Frame& f) noexcept {
 }
 
 void SdoClient::on_download_start(const Frame& f) noexcept {
-    if (f.data[0] >> 5 != 3 || !concerns_request(f)) return unexpected(Abort::command);
-    progress();
+    if (f.data[0] >> 5 != 3 || !concerns_request(f)) return ignore(Abort::command);
+    restart_timer();
     if (size_ > 0 && size_ <= 4) {
         offset_ = size_;
         return finish(Abort::none);
@@ -249,9 +249,9 @@ void SdoClient::on_download_start(const Frame& f) noexcept {
 }
 
 void SdoClient::on_download_segment(const Frame& f) noexcept {
-    if (f.data[0] >> 5 != 1) return unexpected(Abort::command);
-    if ((f.data[0] & 0x10) != toggle_) return unexpected(Abort::toggle);
-    progress();
+    if (f.data[0] >> 5 != 1) return ignore(Abort::command);
+    if ((f.data[0] & 0x10) != toggle_) return ignore(Abort::toggle);
+    restart_timer();
     offset_ += segment_;
     toggle_ ^= 0x10;
     if (offset_ == size_) return finish(Abort::none);
@@ -286,8 +286,8 @@ bool SdoClient::store_received(std::span<const std::uint8_t> bytes) noexcept {
 
 void SdoClient::on_upload_start(const Frame& f) noexcept {
     const auto command = f.data[0];
-    if (command >> 5 != 2 || !concerns_request(f)) return unexpected(Abort::command);
-    progress();
+    if (command >> 5 != 2 || !concerns_request(f)) return ignore(Abort::command);
+    restart_timer();
     size_known_ = (command & 1) != 0;
     if ((command & 2) != 0) {
         // without a size, as much as the caller wants
@@ -308,9 +308,9 @@ void SdoClient::on_upload_start(const Frame& f) noexcept {
 
 void SdoClient::on_upload_segment(const Frame& f) noexcept {
     const auto command = f.data[0];
-    if (command >> 5 != 0) return unexpected(Abort::command);
-    if ((command & 0x10) != toggle_) return unexpected(Abort::toggle);
-    progress();
+    if (command >> 5 != 0) return ignore(Abort::command);
+    if ((command & 0x10) != toggle_) return ignore(Abort::toggle);
+    restart_timer();
     if (!store_received({f.data.data() + 1, 7U - (command >> 1 & 7)})) return;
     toggle_ ^= 0x10;
     if ((command & 1) == 0) {
@@ -384,9 +384,9 @@ void SdoClient::queue_full() noexcept {
 
 void SdoClient::on_block_download_start(const Frame& f) noexcept {
     const auto command = f.data[0];
-    if ((command & 0xe3) != 0xa0 || !concerns_request(f)) return unexpected(Abort::command);
+    if ((command & 0xe3) != 0xa0 || !concerns_request(f)) return ignore(Abort::command);
     if (!is_block_size(f.data[4])) return abort(Abort::block_size);
-    progress();
+    restart_timer();
     sender_.begin(f.data[4], (command & 4) != 0);
     state_ = State::block_download;
     send_block();
@@ -405,30 +405,34 @@ void SdoClient::send_block() noexcept {
     last_received_ = now_;
 }
 
+/// The server acknowledges the first `good` segments of this block and asks for a block of `next`
+///. Continues behind them, or restarts the transfer when too many blocks bring
+/// nothing. What is not an acknowledgement of this block is ignored; the timeout decides.
 void SdoClient::on_block_acknowledge(const Frame& f) noexcept {
-    if ((f.data[0] & 0xe3) != 0xa2) return unexpected(Abort::command);
+    if ((f.data[0] & 0xe3) != 0xa2) return ignore(Abort::command);
     const auto good = f.data[1];
     const auto next = f.data[2];
     const auto sent = sender_.sequence();
-    switch (sender_.evaluate(good, next, out_, now_, settings_.timeout / 10)) {
-    case Acknowledgement::duplicate: return unexpected(Abort::sequence);
+    const Time duplicates_within = settings_.timeout / 10;
+    switch (sender_.evaluate(good, next, out_, now_, duplicates_within)) {
+    case Acknowledgement::duplicate: return ignore(Abort::sequence);
     case Acknowledgement::beyond: return restart_or_fail(Abort::sequence, false);
     case Acknowledgement::stalled:
-        if (!tolerates_stall()) return restart_or_fail(Abort::sequence, false);
+        if (!count_stall()) return restart_or_fail(Abort::sequence, false);
         sender_.repeat(now_);
         return send_block();
-    case Acknowledgement::advances: break;
+    case Acknowledgement::of_this_block: break;
     }
     if (!is_block_size(next)) return abort(Abort::block_size);
     if (good != 0) {
         stalls_ = 0;
-    } else if (!tolerates_stall()) {
+    } else if (!count_stall()) {
         return restart_or_fail(Abort::sequence, false);
     }
     if (good < sent) {
         count_retry();
     }
-    progress();
+    restart_timer();
     sender_.advance(good, next, size_, now_);
     offset_ = sender_.offset();
     if (offset_ != size_) return send_block();
@@ -446,14 +450,14 @@ void SdoClient::send_block_end() noexcept {
 
 void SdoClient::on_block_upload_start(const Frame& f) noexcept {
     const auto command = f.data[0];
-    if (!concerns_request(f)) return unexpected(Abort::command);
+    if (!concerns_request(f)) return ignore(Abort::command);
     if (command >> 5 == 2) return on_upload_start(f);
-    if ((command & 0xe1) != 0xc0) return unexpected(Abort::command);
+    if ((command & 0xe1) != 0xc0) return ignore(Abort::command);
     receiver_.use_crc((command & 4) != 0);
     size_known_ = (command & 2) != 0;
     size_ = size_known_ ? load<std::uint32_t>(f.data.data() + 4) : 0;
     if (size_ > first_->buffer.size()) return abort(Abort::memory);
-    progress();
+    restart_timer();
     state_ = State::block_upload;
     send({0xa3});
 }
@@ -469,7 +473,7 @@ void SdoClient::on_block_segment(const Frame& f) noexcept {
         ++unexpected_;
         return;
     case BlockReceiver::Arrived::out_of_order: ++unexpected_; break;
-    case BlockReceiver::Arrived::in_order: progress(); break;
+    case BlockReceiver::Arrived::in_order: restart_timer(); break;
     }
     if (receiver_.ends_with(f)) {
         acknowledge_block(receiver_.change(BlockChange::larger));
@@ -480,7 +484,7 @@ void SdoClient::acknowledge_block(BlockChange change) noexcept {
     const std::uint8_t good = receiver_.acknowledge(change, settings_.block_size);
     if (good != 0) {
         stalls_ = 0;
-    } else if (!tolerates_stall()) {
+    } else if (!count_stall()) {
         return restart_or_fail(Abort::sequence, false);
     }
     send({0xa2, good, receiver_.size()});
@@ -490,11 +494,11 @@ void SdoClient::acknowledge_block(BlockChange change) noexcept {
 }
 
 void SdoClient::on_block_end(const Frame& f) noexcept {
-    if ((f.data[0] & 0xe3) != 0xc1) return unexpected(Abort::command);
+    if ((f.data[0] & 0xe3) != 0xc1) return ignore(Abort::command);
     const bool valid = receiver_.crc_matches(f);
     // a repeated last segment, which can look like an end frame
     if (receiver_.repeats_last(f) && !(receiver_.crc_used() && valid)) {
-        return unexpected(Abort::command);
+        return ignore(Abort::command);
     }
     if (receiver_.crc_used() && !valid) return restart_or_fail(Abort::crc, false);
     if (!store_received(receiver_.rest(f))) return;

@@ -164,16 +164,16 @@ private:
     bool store_received(std::span<const std::uint8_t>) noexcept;
     bool starting() const noexcept;
     /// Counts a block without progress. Returns false when there were too many.
-    bool tolerates_stall() noexcept { return ++stalls_ <= 4 + settings_.resends; }
+    bool count_stall() noexcept { return ++stalls_ <= 4 + settings_.resends; }
     void count_retry() noexcept {
         ++retries_;
         ++first_->retries;
     }
-    void progress() noexcept {
+    void restart_timer() noexcept {
         last_received_ = now_;
         resends_left_ = settings_.resends;
     }
-    void unexpected(Abort why) noexcept {
+    void ignore(Abort why) noexcept {
         ++unexpected_;
         last_error_ = why;
     }

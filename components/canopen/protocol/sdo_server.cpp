@@ -329,7 +329,7 @@ void SdoServer::on_acknowledgement(const Frame& f) noexcept {
     case Acknowledgement::duplicate: return;
     case Acknowledgement::beyond: return abort(Abort::sequence);
     case Acknowledgement::stalled: sender_.repeat(now_); break;
-    case Acknowledgement::advances: sender_.advance(good, next, object_.size(), now_); break;
+    case Acknowledgement::of_this_block: sender_.advance(good, next, object_.size(), now_); break;
     }
     if (sender_.offset() != object_.size()) return send_block();
     state_ = State::block_upload_end;
