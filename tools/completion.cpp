@@ -77,8 +77,8 @@ std::string for_bash(const std::vector<CompletionEntry>& entries) {
     std::string groups;
     for (const CompletionEntry& entry : entries) {
         append_item(commands, entry.name, " ");
-        options += fmt::format("            {}) options='{}' ;;\n", entry.name,
-                               joined(entry.options));
+        options +=
+            fmt::format("            {}) options='{}' ;;\n", entry.name, joined(entry.options));
         if (entry.words.empty()) continue;
         groups += fmt::format(
             "        {}) if [ \"$COMP_CWORD\" -eq 2 ]; then COMPREPLY=($(compgen -W '{}' -- "
@@ -224,8 +224,8 @@ std::string fish_option(const std::string& command, const CompletionOption& opti
     const char* const kind = is_long ? "-l" : "-s";
     const std::string name = option.name.substr(is_long ? 2 : 1);
     const char* const value = option.takes_value ? " -r" : "";
-    return fmt::format("complete -c hal -n '__hal_after 2 {}' {} {}{} -d {}\n", command, kind,
-                       name, value, fish_quoted(option.text));
+    return fmt::format("complete -c hal -n '__hal_after 2 {}' {} {}{} -d {}\n", command, kind, name,
+                       value, fish_quoted(option.text));
 }
 
 std::string for_fish(const std::vector<CompletionEntry>& entries) {
@@ -275,8 +275,9 @@ int run_completion(const CompletionOptions& options) {
     const auto* const shell = std::find_if(std::begin(shells), std::end(shells),
                                            [&](const Shell& one) { return name == one.name; });
     if (shell == std::end(shells)) {
-        return fail(options, fmt::format("unsupported shell; type: hal completion SHELL with one of {}",
-                                         names_of_shells(", ")));
+        return fail(options,
+                    fmt::format("unsupported shell; type: hal completion SHELL with one of {}",
+                                names_of_shells(", ")));
     }
     std::string text = shell->write(completions());
     replace(text, "@SHELLS@", names_of_shells(" "));

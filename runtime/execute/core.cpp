@@ -976,9 +976,8 @@ std::uint64_t Core::pass(plan::Gate& gate, bool enters, bool& overlaps) noexcept
         return word >> 1;
     }
     plan::GateCounters& counters = *gate.counters;
-    const std::uint32_t others = enters
-                                     ? counters.inside.fetch_add(1, std::memory_order_acq_rel)
-                                     : counters.inside.load(std::memory_order_acquire) - 1;
+    const std::uint32_t others = enters ? counters.inside.fetch_add(1, std::memory_order_acq_rel)
+                                        : counters.inside.load(std::memory_order_acquire) - 1;
     const std::uint64_t ticket = counters.tickets.fetch_add(1, std::memory_order_acq_rel);
     overlaps = others > 0 || (!enters && ticket != gate.entered + 1);
     inputs_->note(ticket << 1 | (overlaps ? 1 : 0));

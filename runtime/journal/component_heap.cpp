@@ -208,8 +208,7 @@ private:
     }
     bool map(std::uint32_t segment) {
         if (is_mapped_[segment]) return true;
-        constexpr int how =
-            MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE;
+        constexpr int how = MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE;
         void* const at =
             ::mmap(begin_of(segment), segment_bytes, PROT_READ | PROT_WRITE, how, -1, 0);
         if (at != MAP_FAILED && at != begin_of(segment)) {

@@ -521,8 +521,8 @@ bool ReExecution::make_edit(const ExecutionEntry& entry) {
     }
     if (done || state_ != State::goes_on) return done;
     if (breaks_off()) {
-        return fail(State::ends, "it breaks off before all threads take the edit " +
-                                     text_of(entry.commands));
+        return fail(State::ends,
+                    "it breaks off before all threads take the edit " + text_of(entry.commands));
     }
     std::string why = "it is rejected";
     for (const Diagnostic& one : diagnostics.all()) {

@@ -34,7 +34,8 @@ int report_missing(std::string_view name, int error) {
         return fail(
             Options{},
             problem +
-                "with Halcyon's Debian packages, type: sudo apt install halcyon-panel; in the source "
+                "with Halcyon's Debian packages, type: sudo apt install halcyon-panel; in the "
+                "source "
                 "tree: sudo apt install libwebsockets-dev libpugixml-dev && ./hal build panel");
     }
     return fail(Options{},

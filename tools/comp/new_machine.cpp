@@ -216,9 +216,10 @@ public:
         return filled(text + "\nstart\n");
     }
     std::string settings() const {
-        return filled("# The netlist, for: hal run @NAME@.ini, hal check @NAME@.ini\n[HAL]\n"
-                      "HALFILE = @NAME@.hal\n\n# The settings of the axes, in mm and s.\n" +
-                      each(axis_settings, bus_.settings));
+        return filled(
+            "# The netlist, for: hal run @NAME@.ini, hal check @NAME@.ini\n[HAL]\n"
+            "HALFILE = @NAME@.hal\n\n# The settings of the axes, in mm and s.\n" +
+            each(axis_settings, bus_.settings));
     }
     std::string config() const { return filled(std::string(bus_.config) + each(bus_.config_axis)); }
     std::string_view config_ending() const { return bus_.config_ending; }
@@ -231,9 +232,10 @@ public:
             "sets chain-closed TRUE\nsets reset TRUE\nadvance 500ms\nsets reset FALSE\n";
         text += each("gets enable      # TRUE\nsets @A@-target 1@N@\n");
         text += "advance 3s\n" + each("getp @A@-there.out   # TRUE\n");
-        text += "sets x-target 500\nadvance 500ms\ngetp x-there.out   # FALSE\n"
-                "sets chain-closed FALSE\nadvance 1s\ngets enable      # FALSE\n"
-                "getp x-there.out   # FALSE: it stopped on its way\n";
+        text +=
+            "sets x-target 500\nadvance 500ms\ngetp x-there.out   # FALSE\n"
+            "sets chain-closed FALSE\nadvance 1s\ngets enable      # FALSE\n"
+            "getp x-there.out   # FALSE: it stopped on its way\n";
         return filled(text);
     }
     std::string expected() const {
@@ -313,8 +315,8 @@ std::vector<NewFile> machine_files(const NewMachine& machine) {
     std::vector<NewFile> files{{machine.name + ".hal", generator.netlist()},
                                {machine.name + ".ini", generator.settings()}};
     if (!generator.config_ending().empty()) {
-        files.push_back({fmt::format("{}.{}", machine.name, generator.config_ending()),
-                         generator.config()});
+        files.push_back(
+            {fmt::format("{}.{}", machine.name, generator.config_ending()), generator.config()});
     }
     files.push_back({"test.hal", generator.test()});
     files.push_back({"expected", generator.expected()});

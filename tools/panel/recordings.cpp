@@ -28,9 +28,8 @@ struct Group {
 };
 
 Json described(const mcap::Column& column) {
-    return {{"name", column.name},
-            {"type", mcap::word_of_type(column.type)},
-            {"unit", column.unit}};
+    return {
+        {"name", column.name}, {"type", mcap::word_of_type(column.type)}, {"unit", column.unit}};
 }
 
 /// Returns the mean time between two rows, ns.
@@ -176,9 +175,8 @@ Recordings::Answer Recordings::answer(const Json& request, std::uint64_t number)
     }
     Json events = Json::array();
     for (const mcap::Event& event : recording.events) {
-        events.push_back({{"time_ns", event.time_ns - begin_ns},
-                          {"kind", event.kind},
-                          {"text", event.text}});
+        events.push_back(
+            {{"time_ns", event.time_ns - begin_ns}, {"kind", event.kind}, {"text", event.text}});
     }
     const std::string probe = "recording:" + std::to_string(number);
     answer.reply = text_of({{"id", request.value("id", Json())},

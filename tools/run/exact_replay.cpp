@@ -118,10 +118,11 @@ private:
         const bool differs = !difference.empty() && !is_cut;
         bool good = !differs;
         if (is_cut) {
-            text += fmt::format("the journal ends: it was cut off, and an edit or a value that cycle "
-                                "{} of thread '{}' depends on may be missing; no difference "
-                                "before\n",
-                                newest.number, newest.thread);
+            text += fmt::format(
+                "the journal ends: it was cut off, and an edit or a value that cycle "
+                "{} of thread '{}' depends on may be missing; no difference "
+                "before\n",
+                newest.number, newest.thread);
         } else if (differs) {
             text += difference;
         } else if (!machine_.change_problem().empty()) {

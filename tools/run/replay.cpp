@@ -578,10 +578,10 @@ int run_replay(const ReplayOptions& options) {
         return run_journal_test(options);
     }
     if (has_exact_options(options)) {
-        return fail(
-            options,
-            "--until, --break, --show, --shell, --edit, --netlist, --at, --as-test, --cut, --record "
-            "and --anyway need --exact");
+        return fail(options,
+                    "--until, --break, --show, --shell, --edit, --netlist, --at, --as-test, --cut, "
+                    "--record "
+                    "and --anyway need --exact");
     }
     if (options.words.size() < 2) return fail(options, "missing netlist: hal replay FILE NETLIST");
     const std::string file = std::filesystem::absolute(options.words.front()).string();

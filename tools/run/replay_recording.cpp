@@ -52,9 +52,9 @@ std::string ReplayRecording::problem(const ReplayOptions& options) {
 void ReplayRecording::attach() {
     problem_ = unknown_value(session_.model(), patterns_);
     if (!problem_.empty()) return;
-    probe_ = session_.probes().attach({.names = chosen_values(session_.model(), patterns_),
-                                       .buffer_ns = buffered_ns(file_)},
-                                      problem_);
+    probe_ = session_.probes().attach(
+        {.names = chosen_values(session_.model(), patterns_), .buffer_ns = buffered_ns(file_)},
+        problem_);
     if (!probe_) return;
     layout_ = Probes::layout(*probe_);
     journal_ = session_.event_log().begin();
@@ -82,8 +82,7 @@ void ReplayRecording::take() {
     for (const LoggedEvent& entry : session_.event_log().after(journal_)) {
         is_written_ = is_written_ && sink_->event({entry.time_ns, entry.kind, entry.text});
     }
-    for (const ProbeRows& rows :
-         session_.probes().take(*probe_, max_taken, Probes::Rest::taken)) {
+    for (const ProbeRows& rows : session_.probes().take(*probe_, max_taken, Probes::Rest::taken)) {
         is_written_ = is_written_ && add_rows(*sink_, rows, layout_, rows_);
         for (const ProbeRows::Part& part : rows.parts) {
             lost_ += part.lost;
@@ -94,8 +93,8 @@ void ReplayRecording::take() {
 bool ReplayRecording::finish() {
     if (options_.record.empty()) return true;
     if (!probe_) {
-        note(options_, "--record: " +
-                           (problem_.empty() ? "no cycle was executed" : "--names: " + problem_));
+        note(options_,
+             "--record: " + (problem_.empty() ? "no cycle was executed" : "--names: " + problem_));
         return false;
     }
     take();
@@ -104,8 +103,8 @@ bool ReplayRecording::finish() {
         return false;
     }
     if (lost_ > 0) {
-        note(options_, fmt::format("'{}' is incomplete: {} did not fit the buffer",
-                                   options_.record, counted(lost_, "row")));
+        note(options_, fmt::format("'{}' is incomplete: {} did not fit the buffer", options_.record,
+                                   counted(lost_, "row")));
         return false;
     }
     return print(fmt::format("{}: {} of {}\n", options_.record, counted(rows_, "row"),

@@ -42,8 +42,8 @@ private:
     std::shared_ptr<LiveProbe> probe_;
     ProbeLayout layout_;
     EventLog::Position journal_;
-    std::string problem_;          // why nothing is recorded yet
-    std::uint64_t untaken_ = 0;    // cycles since rows were taken
+    std::string problem_;  // why nothing is recorded yet
+    std::uint64_t untaken_ = 0;  // cycles since rows were taken
     std::uint64_t rows_ = 0;
     std::uint64_t lost_ = 0;
     bool is_written_ = true;

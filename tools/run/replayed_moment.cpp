@@ -372,11 +372,11 @@ int ReplayedMoment::execute(const std::string& line) {
     }
     if (!row->is_query() && !row->is_apart()) {
         const bool can_be_tried = name == "setp" || name == "sets";
-        print(
-            fmt::format("'{}' is not possible: this is a moment of the past. To execute the "
-                        "journal with another value, type: hal replay --exact FILE --edit '{}' --at "
-                        "CYCLE\n",
-                        name, can_be_tried ? line : "setp NAME VALUE"));
+        print(fmt::format(
+            "'{}' is not possible: this is a moment of the past. To execute the "
+            "journal with another value, type: hal replay --exact FILE --edit '{}' --at "
+            "CYCLE\n",
+            name, can_be_tried ? line : "setp NAME VALUE"));
         return 1;
     }
     ProcessOutput output;

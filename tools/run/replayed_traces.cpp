@@ -79,10 +79,8 @@ std::string ReplayedTraces::problem() const {
 Channel ReplayedTraces::channel_of(const std::string& name) const {
     const auto reading = session_.values().read({name}).front();
     const hal_type type = reading ? reading->type : HAL_TYPE_FLOAT;
-    Channel channel{.name = name,
-                    .unit = "",
-                    .stepped = type != HAL_TYPE_FLOAT,
-                    .bit = type == HAL_TYPE_BIT};
+    Channel channel{
+        .name = name, .unit = "", .stepped = type != HAL_TYPE_FLOAT, .bit = type == HAL_TYPE_BIT};
     if (type == HAL_TYPE_S64) {
         channel.wide = Channel::Wide::s64;
     } else if (type == HAL_TYPE_U64) {
@@ -145,10 +143,11 @@ std::string ReplayedTraces::drawn(std::string& problem) const {
     }
     if (!text.empty()) return text;
     ScopeView view(acquisition, unicode_terminal(), false);
-    const std::vector<std::string> lines = view.frame(picture_columns, picture_rows + channels.size());
-    text = fmt::format("around {:.6f} s, {}/div\n", static_cast<double>(moment_ns_) * 1e-9,
-                       format_duration(static_cast<double>(command_.pre_ns + command_.post_ns) /
-                                       divisions_x));
+    const std::vector<std::string> lines =
+        view.frame(picture_columns, picture_rows + channels.size());
+    text = fmt::format(
+        "around {:.6f} s, {}/div\n", static_cast<double>(moment_ns_) * 1e-9,
+        format_duration(static_cast<double>(command_.pre_ns + command_.post_ns) / divisions_x));
     for (std::size_t i = 1; i + 1 < lines.size(); ++i) {  // without the states and the keys
         text += lines[i] + "\n";
     }

@@ -405,9 +405,9 @@ void SdoClient::send_block() noexcept {
     last_received_ = now_;
 }
 
-/// The server acknowledges the first `good` segments of this block and asks for a block of `next`
-///. Continues behind them, or restarts the transfer when too many blocks bring
-/// nothing. What is not an acknowledgement of this block is ignored; the timeout decides.
+/// The server acknowledges the first `good` segments of this block and asks for a block of `next`.
+/// Continues behind them, or restarts the transfer when too many blocks bring nothing. What is not an
+/// acknowledgement of this block is ignored; the timeout decides.
 void SdoClient::on_block_acknowledge(const Frame& f) noexcept {
     if ((f.data[0] & 0xe3) != 0xa2) return ignore(Abort::command);
     const auto good = f.data[1];

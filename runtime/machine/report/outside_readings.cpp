@@ -67,9 +67,9 @@ extern "C" {
     return (*next_recv)(socket, to, bytes, flags);
 }
 
-[[gnu::weak, gnu::visibility("default")]] ssize_t recvfrom(int socket, void* to,
-                                                           std::size_t bytes, int flags,
-                                                           sockaddr* address, socklen_t* size) {
+[[gnu::weak, gnu::visibility("default")]] ssize_t recvfrom(int socket, void* to, std::size_t bytes,
+                                                           int flags, sockaddr* address,
+                                                           socklen_t* size) {
     note_reading();
     return (*next_recvfrom)(socket, to, bytes, flags, address, size);
 }

@@ -156,7 +156,7 @@ public:
     void make_safe(hal::Cycle) noexcept { interrupt(); }
 
 protected:
-    virtual void received() noexcept {}      ///< behind receive(). [realtime]
+    virtual void received() noexcept {}  ///< behind receive(). [realtime]
     /// before the slots are planned; the period of the thread. [realtime]
     virtual void before_slots(std::int64_t) noexcept {}
     virtual void passed(const can::Frame&) noexcept {}  ///< a frame of another node. [realtime]
