@@ -24,7 +24,7 @@ changed_before=$build/.changed-before
 sh "$root/tests/checks/clean_tree.sh" "$root" >"$changed_before"
 
 need gtest/gtest.h=libgtest-dev python3=python3 git=git python3-config=python3-dev pybind11/pybind11.h=pybind11-dev pugixml.hpp=libpugixml-dev zstd.h=libzstd-dev lz4frame.h=liblz4-dev \
-    libwebsockets.h=libwebsockets-dev chromium=chromium node=nodejs tsc=node-typescript \
+    libwebsockets.h=libwebsockets-dev gpg=gpg xz=xz-utils chromium=chromium node=nodejs tsc=node-typescript \
     cmark-gfm.h=libcmark-gfm-dev cmark-gfm-core-extensions.h=libcmark-gfm-extensions-dev \
     /usr/lib/python3/dist-packages/can=python3-can /usr/lib/python3/dist-packages/msgpack=python3-msgpack \
     /usr/lib/python3/dist-packages/serial=python3-serial "$(python3 -c 'import os; print(os.__file__[:-6])' 2>/dev/null)/ensurepip=python3-venv" \

@@ -21,7 +21,6 @@ VERSION = "0.7.1"
 CHANGES = f"# Changes\n\n## {VERSION}, today\n\n* It swings.\n\n## 0.7.0\n\n* It hangs.\n"
 
 
-@unittest.skipIf(MISSING, f"needs {', '.join(MISSING)}")
 class Release(Case):
     def setUp(self):
         super().setUp()
@@ -84,20 +83,36 @@ class Release(Case):
         self.run_or_fail("dpkg-deb", "--root-owner-group", "--build", tree, path)
         shutil.rmtree(tree)
 
-    def release(self, key="tester@example.org", url=""):
+    def check(self):
+        return self.release(options=("--check",))
+
+    def release(self, key="tester@example.org", url="", options=()):
         """Makes the release; the exit status and what was printed."""
         script = ROOT / "tools/package/release.py"
         self.output = self.folder / "release"
         done = subprocess.run(
-            [sys.executable, script, self.root, self.packages, self.output, key, url],
+            [sys.executable, script, *options, self.root, self.packages, self.output, key, url],
             capture_output=True,
             text=True,
             env=self.environment,
         )
         return done.returncode, done.stdout + done.stderr
 
-    def apt(self, architecture, *words):
-        """apt-get with folders of its own, the sources of the release and no other."""
+    def add_repository(self, folder):
+        """What add-repository of a folder writes for apt: its exit status, what it prints, and the file."""
+        target = self.folder / "halcyon.sources"
+        script = (folder / "add-repository").read_text()
+        script = script.replace("/etc/apt/sources.list.d/halcyon.sources", str(target))
+        changed = folder / "add-repository-here"
+        changed.write_text(script.replace('"$(id -u)" -eq 0', "0 -eq 0"))
+        done = subprocess.run(["sh", changed], capture_output=True, text=True)
+        changed.unlink()
+        return done.returncode, done.stdout + done.stderr, target
+
+    def apt(self, architecture, *words, folder=None):
+        """apt-get with folders of its own, the repository of a folder and no other."""
+        status, said, sources = self.add_repository(folder or self.output)
+        self.assertEqual(0, status, said)
         state = self.folder / f"apt-{architecture}"
         for name in ("lists/partial", "archives/partial", "etc"):
             (state / name).mkdir(parents=True, exist_ok=True)
@@ -117,7 +132,7 @@ class Release(Case):
             "Dir::Etc::trusted": "/dev/null",
             "Dir::Etc::trustedparts": "/dev/null",
         }
-        shutil.copyfile(self.output / "halcyon.sources", state / "etc/halcyon.sources")
+        shutil.copyfile(sources, state / "etc/halcyon.sources")
         done = subprocess.run(
             ["apt-get", *(f"-o{name}={value}" for name, value in options.items()), *words],
             capture_output=True,
@@ -160,27 +175,23 @@ class Release(Case):
         copy = self.folder / "stick"
         shutil.copytree(self.output, copy)
         shutil.rmtree(self.output)
-        script = (copy / "add-repository").read_text()
-        target = self.folder / "halcyon.sources"
-        script = script.replace("/etc/apt/sources.list.d/halcyon.sources", str(target))
-        (copy / "add-repository").write_text(script.replace('"$(id -u)" -eq 0', "0 -eq 0"))
-        self.run_or_fail("sh", copy / "add-repository")
-        self.output = self.folder / "moved"
-        self.output.mkdir()
-        shutil.copyfile(target, self.output / "halcyon.sources")
-        status, said = self.apt("amd64", "update")
-        self.assertEqual(0, status, said)
-        self.assertEqual(0, self.apt("amd64", "download", "halcyon")[0])
+        self.assertEqual(0, self.apt("amd64", "update", folder=copy)[0])
+        self.assertEqual(0, self.apt("amd64", "download", "halcyon", folder=copy)[0])
+        self.assertNotIn(str(self.output), "".join(p.read_text() for p in copy.glob("*.md")))
+        self.assertFalse(
+            (copy / "halcyon.sources").exists(), "it would name the place where it was made"
+        )
         shutil.rmtree(copy / "apt")
-        done = subprocess.run(["sh", copy / "add-repository"], capture_output=True, text=True)
-        self.assertEqual(1, done.returncode)
-        self.assertEqual(f"add-repository: {copy} is not the folder of a release\n", done.stderr)
+        self.assertEqual(
+            (1, f"add-repository: {copy} is not the folder of a release\n"),
+            self.add_repository(copy)[:2],
+        )
 
     def test_the_address_is_where_it_is_published(self):
         self.assertEqual(0, self.release(url="https://example.org/halcyon/")[0])
         sources = (self.output / "halcyon.sources").read_text()
         self.assertIn("URIs: https://example.org/halcyon/apt\n", sources)
-        self.assertIn("https://example.org/halcyon/apt", (self.output / "NOTES.md").read_text())
+        self.assertIn("\n -----BEGIN PGP PUBLIC KEY BLOCK-----\n .\n", sources)
 
     def test_checksums_and_signatures_are_of_all_files(self):
         self.assertEqual(0, self.release()[0])
@@ -239,6 +250,28 @@ class Release(Case):
             ]
             self.assertEqual([digest], found)
 
+    def test_the_bill_of_materials_has_what_programs_are_linked_with(self):
+        sys.path.insert(0, str(ROOT / "tools/package"))
+        from sbom import COMPILED_IN
+
+        packages = {
+            "${HALCYON_CAP}": "libcap-dev",
+            "${HALCYON_CMARK_EXTENSIONS}": "libcmark-gfm-extensions-dev",
+            "${HALCYON_CMARK}": "libcmark-gfm-dev",
+            "${HALCYON_EDIT}": "libedit-dev",
+            "${HALCYON_LZ4_LIBRARY}": "liblz4-dev",
+            "${HALCYON_ZSTD_LIBRARY}": "libzstd-dev",
+            "bsd": "libbsd-dev",
+            "md": "libmd-dev",
+        }
+        linked = set()
+        for path in ROOT.glob("*/**/CMakeLists.txt"):
+            if "build" not in path.relative_to(ROOT).parts:
+                for words in re.findall(r"halcyon_in_programs\(\w+ ([^)]*)\)", path.read_text()):
+                    linked |= {packages[word.strip('"')] for word in words.split()}
+        self.assertEqual(set(packages.values()), linked)
+        self.assertLessEqual(linked, set(COMPILED_IN))
+
     def test_it_is_the_same_to_the_byte_when_it_is_made_again(self):
         def unsigned():
             signed = r"(InRelease|\.gpg|SHA256SUMS)$"
@@ -282,10 +315,15 @@ class Release(Case):
             (1, f"hal: {old} is not of version {VERSION}; remove it\n"), self.release()
         )
         old.unlink()
+        self.assertEqual(0, self.check()[0])
         (self.root / "CHANGELOG.md").write_text("# Changes\n")
         self.git("commit", "-q", "-a", "-m", "No notes")
         self.assertEqual((1, f"hal: CHANGELOG.md has no section '## {VERSION}'\n"), self.release())
+        self.assertEqual(self.release(), self.check(), "before anything is compiled")
 
 
 if __name__ == "__main__":
+    if MISSING:
+        print(f"needs {', '.join(MISSING)}")
+        sys.exit(77)
     unittest.main()

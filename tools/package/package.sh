@@ -21,18 +21,32 @@ packages_of_board() {
     python3 "$root/tools/package/build.py" "$root" "$build/$board" "$build/packages/$board" "$board" "$sysroot"
 }
 
+# publish [--check]: makes the release of $version from build/packages, signed by $key; or only checks that nothing prevents it.
+publish() {
+    python3 "$root/tools/package/release.py" "$@" "$root" "$build/packages" "$build/releases/$version" "$key" "${HALCYON_RELEASE_URL-}"
+}
+
 # release KEY [ARCH...]: makes the packages of all architectures, or of these, and what a project publishes of them in build/releases/VERSION.
 release() {
     key=$1
     shift
-    if [ $# -eq 0 ]; then set -- "$(dpkg --print-architecture)" armhf arm64; fi
-    need gpg=gpg git=git
+    here=$(dpkg --print-architecture)
+    if [ $# -eq 0 ]; then
+        case $here in armhf | arm64) set -- armhf arm64 ;; *) set -- "$here" armhf arm64 ;; esac
+    fi
+    for arch; do
+        case $arch in "$here" | armhf | arm64) ;; *) die "cannot make packages for '$arch' here; write $here, armhf or arm64" ;; esac
+    done
+    names=
+    prepare
+    need gpg=gpg git=git python3=python3
     version=$(sed -n 's/^project(Halcyon VERSION \([^ ]*\).*/\1/p' "$root/CMakeLists.txt")
     rm -rf "$build/packages"
+    publish --check # before hours of compiling
     for arch; do
-        if [ "$arch" = "$(dpkg --print-architecture)" ]; then packages_here; else packages_of_board "$arch"; fi
+        if [ "$arch" = "$here" ]; then packages_here; else packages_of_board "$arch"; fi
     done
-    python3 "$root/tools/package/release.py" "$root" "$build/packages" "$build/releases/$version" "$key" "${HALCYON_RELEASE_URL-}"
+    publish
 }
 
 package() {

@@ -24,7 +24,12 @@ PACKAGES = {
     },
     "halcyon-linuxcnc": {
         "depends": OWN,
-        "fields": {"Conflicts": "linuxcnc-uspace, linuxcnc", "Architecture": "all"},
+        "fields": {
+            "Conflicts": "linuxcnc-uspace, linuxcnc",
+            "Breaks": "halcyon-doc (<< 0.2.0)",  # had the manual page halcmd
+            "Replaces": "halcyon-doc (<< 0.2.0)",
+            "Architecture": "all",
+        },
         "summary": "LinuxCNC's command names for Halcyon",
         "text": "halrun, halcmd, halcompile, halmeter, halsampler, halscope, halshow, halstreamer,\nhaltcl, lcec_conf and mb2hal as names of the program hal. Programs that a machine starts\nfind them without this package.",
     },

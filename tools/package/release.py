@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""release.py ROOT PACKAGES OUTPUT KEY [URL]: what a project publishes of one version, in the folder OUTPUT.
+"""release.py [--check] ROOT PACKAGES OUTPUT KEY [URL]: what a project publishes of one version, in the folder OUTPUT; or only whether something
+prevents it.
 
 PACKAGES: a folder with the Debian packages of this version, also in folders in it. KEY: the key of GnuPG that signs. URL: where OUTPUT will be
-found; without it users reach OUTPUT as a folder. Needs git, gpg, dpkg-dev and xz."""
+found; without it users reach OUTPUT as a folder. Needs git, gpg and dpkg."""
 
 import hashlib
 import json
@@ -46,7 +47,7 @@ class Release:
             Path(path).resolve() for path in (root, packages, output)
         )
         self.key = key
-        self.url = url.rstrip("/") or f"file:{self.output}"
+        self.url = url.rstrip("/")
         project = (self.root / "CMakeLists.txt").read_text()
         self.version = re.search(r"project\(Halcyon VERSION (\S+)", project)[1]
 
@@ -54,7 +55,8 @@ class Release:
         return run("git", "-c", "safe.directory=*", "-C", self.root, *words)
 
     def check(self):
-        """Ends the program when the release would differ from its sources."""
+        """Ends the program when the release would differ from its sources, or has no notes or no key."""
+        notes((self.root / "CHANGELOG.md").read_text(), self.version)
         if changed := self.git("status", "--porcelain").decode().splitlines():
             sys.exit(
                 f"hal: a release is made of commits, and {len(changed)} files differ from the last one; type: git status"
@@ -72,7 +74,7 @@ class Release:
             )
 
     def source(self):
-        """The source archive, which builds without git: cmake/commit has the commit."""
+        """The source archive, which builds without git: cmake/commit.txt has the commit."""
         name = f"halcyon-{self.version}"
         tar = self.git("archive", "--format=tar", f"--prefix={name}/", "HEAD")
         path = self.output / f"{name}.tar.xz"
@@ -107,18 +109,23 @@ class Release:
         template = (HERE / "files/release.md").read_text()
         for name, value in (
             ("VERSION", self.version),
-            ("URL", self.url),
             ("ARCHITECTURES", ", ".join(architectures)),
             ("CHANGES", changes),
         ):
             template = template.replace(f"@{name}@", value)
         (self.output / "NOTES.md").write_text(template)
-        key = "".join(f" {line or '.'}\n" for line in self.public_key().splitlines())
-        (self.output / "halcyon.sources").write_text(
-            f"Types: deb\nURIs: {self.url}/apt\nSuites: stable\nComponents: main\nSigned-By:\n{key}"
-        )
         for name in ("image.sh", "add-repository"):
             shutil.copyfile(HERE / "files" / name, self.output / name)
+
+    def sources(self):
+        """The key, and the file for apt where the address of the repository is known."""
+        key = self.public_key()
+        (self.output / "halcyon.asc").write_text(key)
+        if self.url:
+            lines = "".join(f" {line or '.'}\n" for line in key.splitlines())
+            (self.output / "halcyon.sources").write_text(
+                f"Types: deb\nURIs: {self.url}/apt\nSuites: stable\nComponents: main\nSigned-By:\n{lines}"
+            )
 
     def make(self):
         self.check()
@@ -138,9 +145,13 @@ class Release:
         path = self.output / f"halcyon-{self.version}.spdx.json"
         path.write_text(json.dumps(sbom.document(), indent=1) + "\n")
         self.texts(repository.architectures)
+        self.sources()
         self.checksums()
         print(f"{self.output}: Halcyon {self.version} for {', '.join(repository.architectures)}")
 
 
 if __name__ == "__main__":
-    Release(*sys.argv[1:6]).make()
+    if sys.argv[1] == "--check":
+        Release(*sys.argv[2:7]).check()
+    else:
+        Release(*sys.argv[1:6]).make()

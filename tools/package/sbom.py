@@ -7,20 +7,22 @@ import subprocess
 
 NAMESPACE = "https://spdx.org/spdxdocs"
 
-PROGRAMS = ("halcyon", "halcyon-panel", "halcyon-dev")
+PROGRAMS = ("halcyon", "halcyon-panel")
 
-# Debian package: its licence, and the packages of ours that contain code of it, because it consists of headers or is linked as an archive
-# (halcyon_in_programs in cmake/HalcyonBuild.cmake). Everything else that a package uses is in its Depends, and comes from the system.
+# Debian package: its licence, where one holds for all of it, and the packages of ours that contain code of it, because it consists of headers or
+# is linked as an archive (halcyon_in_programs in the CMake files; a test compares). Everything else that a package uses is in its Depends.
 COMPILED_IN = {
-    "libbsd-dev": ("BSD-3-Clause", PROGRAMS),
+    "libbsd-dev": ("NOASSERTION", PROGRAMS),
     "libcap-dev": ("BSD-3-Clause OR GPL-2.0-only", PROGRAMS),
     "libcli11-dev": ("BSD-3-Clause", PROGRAMS),
+    "libcmark-gfm-dev": ("NOASSERTION", ("halcyon",)),
+    "libcmark-gfm-extensions-dev": ("NOASSERTION", ("halcyon",)),
     "libedit-dev": ("BSD-3-Clause", PROGRAMS),
-    "libeigen3-dev": ("MPL-2.0", ("halcyon-estimation", "halcyon-vision")),
+    "libeigen3-dev": ("MPL-2.0", ("halcyon-estimation",)),
     "liblz4-dev": ("BSD-2-Clause", PROGRAMS),
     "libmd-dev": ("NOASSERTION", PROGRAMS),
     "libzstd-dev": ("BSD-3-Clause OR GPL-2.0-only", PROGRAMS),
-    "nlohmann-json3-dev": ("MIT", (*PROGRAMS, "halcyon-dds")),
+    "nlohmann-json3-dev": ("MIT", (*PROGRAMS, "python3-halcyon")),
     "pybind11-dev": ("BSD-3-Clause", ("python3-halcyon",)),
 }
 
@@ -92,7 +94,7 @@ class Sbom:
         )
 
     def add_compiled_in(self, package, name):
-        """What the compiler took into a package, with the version on this computer."""
+        """What the compiler took into a package. The version is that of this computer; the packages of boards are built with the same Debian."""
         for library, (licence, packages) in COMPILED_IN.items():
             version = installed_version(library)
             if name in packages and version:
@@ -105,13 +107,13 @@ class Sbom:
                 self.relate(package, "STATIC_LINK", found)
 
     def add_dependencies(self, package, fields):
-        """What a package needs beside Halcyon's own: name and the oldest version that will do."""
+        """What a package needs beside Halcyon's own; the first of several that will do."""
         own = {other["Package"] for other, _, _ in self.found}
         for one in fields.get("Depends", "").split(", "):
-            name, _, bound = one.split(" | ")[0].partition(" ")
+            name = one.split(" | ")[0].partition(" ")[0]
             if not name or name in own:
                 continue
-            needed = self.add(name, comment=f"of the system: {one}")
+            needed = self.add(name, comment="of the system on which it is installed")
             self.relate(package, "DEPENDS_ON", needed)
 
     def document(self):

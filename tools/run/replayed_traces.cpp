@@ -79,8 +79,10 @@ std::string ReplayedTraces::problem() const {
 Channel ReplayedTraces::channel_of(const std::string& name) const {
     const auto reading = session_.values().read({name}).front();
     const hal_type type = reading ? reading->type : HAL_TYPE_FLOAT;
-    Channel channel{
-        .name = name, .unit = "", .stepped = type != HAL_TYPE_FLOAT, .bit = type == HAL_TYPE_BIT};
+    Channel channel;
+    channel.name = name;
+    channel.stepped = type != HAL_TYPE_FLOAT;
+    channel.bit = type == HAL_TYPE_BIT;
     if (type == HAL_TYPE_S64) {
         channel.wide = Channel::Wide::s64;
     } else if (type == HAL_TYPE_U64) {

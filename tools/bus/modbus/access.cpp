@@ -315,7 +315,7 @@ public:
     }
 
 private:
-    /// Returns the size of a valid frame with more bytes behind it; 0: there is none.
+    /// Returns the size of the first frame when it is valid and more bytes follow it, else 0.
     std::size_t first_frame() const {
         Found found;
         Scan result = scan(Framing::rtu, Role::requests, false, buffer_.span(), found);

@@ -149,8 +149,9 @@ std::string TdmaStation::make(const NodeOptions& options, std::string& link,
     }
     if (link.find("slot=") == std::string::npos) {
         made->slot_ = entry->slots.front().setup.id;
-        const char separator = link.find('?') == std::string::npos ? '?' : '&';
-        link += fmt::format("{}slot={}", separator, *made->slot_);
+        const bool has_options = link.find('?') != std::string::npos;
+        link += has_options ? '&' : '?';
+        link += fmt::format("slot={}", *made->slot_);
     }
     if (!ethernet::offer_discipline(made->port_, &made->discipline_)) {
         return segment + " already has a TDMA station";

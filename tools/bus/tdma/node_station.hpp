@@ -41,7 +41,7 @@ private:
         /// Reads options and schedule. Returns what is wrong with them, empty: nothing.
         std::string read(const NodeOptions&);
     };
-    /// Sets `index` to the station of the schedule that this is. Returns why there is none, empty on
+    /// Finds this station in the schedule and sets `index`. Returns the problem, or an empty text on
     /// success.
     static std::string find_entry(const NodeOptions&, const Request&, const ethernet::Port&,
                                   const std::string& segment, std::size_t& index);

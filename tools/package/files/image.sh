@@ -15,18 +15,18 @@ die() {
 for program in mmdebstrap genext2fs; do
     command -v "$program" >/dev/null || die "$program is missing; type: sudo apt install mmdebstrap genext2fs"
 done
-[ -f "$release/halcyon.sources" ] || die "$release/halcyon.sources is missing: image.sh belongs into the folder of a release"
+[ -f "$release/halcyon.asc" ] || die "$release/halcyon.asc is missing: image.sh belongs into the folder of a release"
 [ "$(dpkg --print-architecture)" = amd64 ] || die "makes images for amd64 only"
+case $release in *[[:space:]]*) die "apt cannot read a folder with blanks in its name: $release" ;; esac
 mkdir -p "$folder"
 folder=$(cd "$folder" && pwd -P)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 # The repository as a folder, wherever the release is published.
-packages=$work/halcyon.sources
-sed "s|^URIs: .*|URIs: file:$release/apt|" "$release/halcyon.sources" >"$packages"
-cat >"$work/debian.list" <<END
+cat >"$work/packages.list" <<END
 deb $mirror bookworm main
+deb [signed-by="$release/halcyon.asc"] file:$release/apt stable main
 END
 
 # What is in the system beside its packages.
@@ -47,7 +47,7 @@ echo "The pendulum runs as halcyon@pendulum. Push it:  hal shell --name pendulum
 echo "Look at it:  hal top --name pendulum    Switch off:  poweroff"
 hal shell --name pendulum show timing
 PROFILE
-rm -f "$root/etc/apt/sources.list.d/"*halcyon* # the folder on the other computer
+find "$root/etc/apt" -name '*.list' -exec sed -i '/ stable main$/d' {} + # the folder on the other computer
 END
 chmod +x "$work/setup"
 
@@ -55,7 +55,7 @@ mmdebstrap --variant=minbase --hook-dir=/usr/share/mmdebstrap/hooks/file-mirror-
     --include=systemd-sysv,udev,dbus,kmod,iproute2,procps,linux-image-rt-amd64,halcyon,halcyon-estimation \
     --customize-hook="$work/setup \"\$1\"" \
     --customize-hook="copy-out /boot $work" \
-    --format=tar bookworm "$work/root.tar" "$work/debian.list" "$packages"
+    --format=tar bookworm "$work/root.tar" "$work/packages.list"
 rm -f "$folder/halcyon.img" # 2 GB, of which most takes no space on the disk
 genext2fs --block-size 4096 --size-in-blocks 524288 --number-of-inodes 131072 --tarball "$work/root.tar" "$folder/halcyon.img"
 cp "$work"/boot/vmlinuz-* "$folder/vmlinuz"

@@ -25,10 +25,11 @@ export function instancesOf(objects) {
     for (const one of objects) {
         if (one.kind !== 'pin' || !one.instance) continue;
         const name = one.instance;
-        if (!found.has(name))
-            found.set(
-                name,
-                {name, component: one.component ?? name, file: one.file ?? '', thread: ''});
+        if (!found.has(name)) {
+            const component = one.component ?? name;
+            const file = one.file ?? '';
+            found.set(name, {name, component, file, thread: ''});
+        }
         found.get(name).thread ||= one.thread ?? '';
     }
     return found;

@@ -75,8 +75,11 @@ const shown = [
 ];
 
 /// The result of a boot, CiA 302-2: 0 not finished, 1 booted, else a letter, A to O.
-const bootResult = (value, names) =>
-    value >= 65 ? `failed (${String.fromCharCode(value)})` : names.get(value) ?? String(value);
+function bootResult(value, names) {
+    const firstLetter = 65;
+    if (value >= firstLetter) return `failed (${String.fromCharCode(value)})`;
+    return names.get(value) ?? String(value);
+}
 
 /// The title of a column.
 const titleOf = what => what.replace(/-ms$/, '').replaceAll('-', ' ');
