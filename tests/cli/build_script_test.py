@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: MIT
 """What the script ./hal decides to install, to configure, to build and to start: in a small tree, with a CMake, a ninja and an apt-get that
 write down what they are asked."""
+
 import os
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -315,6 +317,10 @@ class Script(unittest.TestCase):
         self.hal("package", "armhf", "arm64", status=1)
         usage = "hal: usage: ./hal package [armhf|arm64], or ./hal package --release KEY [ARCHITECTURE...]\n"
         self.assertTrue(self.said.endswith(usage), self.said)
+        self.hal("package", "--release", "somebody", "mips", status=1)
+        self.assertRegex(
+            self.said, r"hal: cannot make packages for 'mips' here; write \w+, armhf or arm64\n$"
+        )
         self.hal("package", "--release", status=1)
         key = "hal: usage: ./hal package --release KEY [ARCHITECTURE...]; KEY signs: one of gpg --list-secret-keys\n"
         self.assertTrue(self.said.endswith(key), self.said)
@@ -492,6 +498,32 @@ class Unbuilt(Case):
         self.assertEqual(1, done.returncode)
         self.assertIn("error: component 'later' is not installed [no-such-component]", done.stderr)
         self.assertIn("= help: in the source tree, type: ./hal build later\n", done.stderr)
+
+    def test_check_names_the_debian_package_that_has_it(self):
+        sys.path.insert(0, str(ROOT / "tools/package"))
+        from packages import GROUPS
+
+        for group in GROUPS:
+            (self.folder / "groups").write_text(f"later {group} Comes later\n")
+            self.assertIn(
+                f"= help: in the source tree, type: ./hal build later; with Halcyon's Debian packages: sudo apt install halcyon-{group}\n",
+                self.run_hal("check", "file.hal").stderr,
+            )
+
+    def test_a_program_that_is_not_there_is_named_with_its_package(self):
+        alone = self.folder / "hal"
+        shutil.copy(HAL, alone)
+        done = subprocess.run(
+            [alone, "panel"], env=self.environment, capture_output=True, text=True
+        )
+        self.assertEqual(
+            (
+                1,
+                f"hal: cannot start {self.folder}/hal-panel: No such file or directory; with Halcyon's Debian packages, type: "
+                "sudo apt install halcyon-panel; in the source tree: sudo apt install libwebsockets-dev libpugixml-dev && ./hal build panel\n",
+            ),
+            (done.returncode, done.stderr),
+        )
 
     def test_doc_lists_it(self):
         self.assertRegex(self.run_hal("doc").stdout, "(?m)^later +Comes later, from its source$")
