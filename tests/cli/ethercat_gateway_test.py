@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: MIT
 # packages: ethercat
 """The mailbox gateway of a running machine: our commands, and bytes of ETG.8200 by hand over UDP and TCP."""
+
 import json
+import select
 import socket
 import struct
+import threading
 import unittest
 
-from harness import ROOT, Case, free_port, wait_until
+from harness import ROOT, TIMEOUT, Case, free_port, wait_until
 
 MACHINE = ROOT / "halfiles/ethercat-servo"
 
@@ -90,6 +93,35 @@ class Gateway(Case):
         udp.send(b"not a frame")  # nothing answers, nothing breaks
         udp.send(upload(station, 0x1000, 0))
         self.assertEqual((0x1000, 0, 0x20192), struct.unpack_from("<HBI", udp.recv(1500), 11))
+
+    def test_a_gateway_that_closes_is_named_and_not_the_slave(self):
+        """Between command and gateway: what closes the connection at the question for the type of an object."""
+        self.begin(f"127.0.0.1:{self.port}")
+        between = socket.create_server(("127.0.0.1", 0))
+        self.addCleanup(between.close)
+        thread = threading.Thread(
+            target=self.close_at_question_for_type, args=(between,), daemon=True
+        )
+        thread.start()
+        address = f"gateway:127.0.0.1:{between.getsockname()[1]}"
+        self.assertEqual(
+            f"hal ethercat download: {address} closed the connection; does the machine still run?\n",
+            self.bad("ethercat", "download", address, "-p", "0", "0x6083", "0", "12345"),
+        )
+        thread.join(TIMEOUT)
+
+    def close_at_question_for_type(self, between):
+        client = between.accept()[0]
+        gateway = socket.create_connection(("127.0.0.1", self.port))
+        with client, gateway:
+            while True:
+                ready = select.select([client, gateway], [], [], TIMEOUT)[0]
+                for one in ready:
+                    data = one.recv(65536)
+                    is_information = data[8:10] == struct.pack("<H", 8 << 12)
+                    if not data or one is client and is_information:
+                        return
+                    (gateway if one is client else client).sendall(data)
 
     def test_without_gateway(self):
         said = self.bad("ethercat", "upload", self.address, "-p", "0", "0x1000", "0")

@@ -94,7 +94,7 @@ Task<bool> bring_up(Channel& c, Bus& bus, Device& d) noexcept {
     const State mailbox_state = d.to_boot ? State::boot : State::preop;
     ok = co_await enter_mailbox_state(c, bus, d, mailbox_state);
     if (!ok) co_return false;
-    if (bus.config(d) == nullptr) co_return true;
+    if (d.to_boot || bus.config(d) == nullptr) co_return true;
     ok = co_await configure_in_preop(c, bus, d);
     if (!ok) co_return false;
     if (settle(bus, d, State::preop)) co_return true;

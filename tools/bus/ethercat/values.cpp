@@ -144,8 +144,16 @@ int fail_mailbox(const Options& options, const BusSlave& s, const std::string& w
                                      result.abort, ethercat::coe::abort_text(result.abort)));
 }
 
+/// Returns whether the machine behind a gateway has closed the connection, after printing it.
+bool gateway_is_lost(const EthercatValueOptions& options, const EthercatSession& session) {
+    if (!session.gateway_lost()) return false;
+    fail(options, fmt::format("{} closed the connection; does the machine still run?",
+                              options.words.front()));
+    return true;
+}
+
 /// Returns the type that --type names, or that the slave reports, else that of plain bytes; nullptr
-/// after printing the reason. `must_be_known`: a slave that does not answer is a reason.
+/// after printing the reason. `must_be_known`: fails when the slave does not answer.
 const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& session,
                          const BusSlave& s, std::uint16_t index, std::uint8_t sub,
                          bool must_be_known) {
@@ -154,7 +162,6 @@ const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& s
         if (named != nullptr) return named;
         fail(options,
              fmt::format("unknown type '{}'; see: hal help ethercat upload", options.type));
-
         return nullptr;
     }
     Bytes name(256);
@@ -165,7 +172,8 @@ const ValueType* type_of(const EthercatValueOptions& options, EthercatSession& s
     request.sub = sub;
     request.data = name;
     const bool has_finished = session.run(request);
-    const Outcome outcome = request.result.outcome;
+    if (gateway_is_lost(options, session)) return nullptr;
+    const Outcome outcome = has_finished ? request.result.outcome : Outcome::timed_out;
     const bool answers = outcome != Outcome::timed_out && outcome != Outcome::lost;
     if (must_be_known && has_finished && !answers) {
         fail_mailbox(options, s,
@@ -217,17 +225,13 @@ int transfer(const EthercatValueOptions& options, bool download) {
     request.kind = download ? MailboxRequest::Kind::sdo_download : MailboxRequest::Kind::sdo_upload;
     request.slave = s->number;
     request.index = static_cast<std::uint16_t>(*index);
-
     request.sub = static_cast<std::uint8_t>(*sub);
     request.data = bytes;
     if (!session.run(request)) {
         return fail(options,
                     fmt::format("slave {}: {}: not finished within 60 s", s->position, what));
     }
-    if (session.gateway_lost()) {
-        return fail(options, fmt::format("{} closed the connection; does the machine still run?",
-                                         options.words.front()));
-    }
+    if (gateway_is_lost(options, session)) return 1;
     if (!request.result) return fail_mailbox(options, *s, what, request.result);
     if (!download) {
         bytes.resize(request.result.length);
