@@ -276,7 +276,7 @@ class Chroot(unittest.TestCase):
             self.assertIn(f"\n{key}\n", unit)
         command = re.search(r"ExecStart=(.*)", unit)[1]
         self.assertEqual(
-            "/usr/bin/hal run --no-picture --name %i $HAL_OPTIONS machine.hal", command
+            "/usr/bin/hal run --no-picture --name %i --group realtime $HAL_OPTIONS machine.hal", command
         )
         if shutil.which("systemd-analyze"):
             units = self.root / "lib/systemd/system"
