@@ -614,17 +614,89 @@ hal panel: 'bad.panel' has errors
         self.assertEqual(
             [(0, 0, 1.0, 1.5), (0, 250_000_000, 0.0, 2.5), (0, 500_000_000, 1.0, -3.0)], values
         )
-        for wrong in (
-            {"recording": 1, "names": ["x"]},
-            {"recording": -1, "names": ["x"]},
-            {"recording": "run.csv", "names": ["x"]},
-            {"recording": 0, "names": "x"},
-            {"recording": 0, "names": []},
-            {"recording": 0, "names": [7]},
-            {"recording": 0},
-            {"recording": 0, "names": ["x"] * 101},
-        ):
-            self.assertFalse(self.ask(page, **wrong)["ok"], wrong)
+        self.assertEqual([], recording["notes"])
+        for index in (1, -1, "run.csv", None):
+            self.assertEqual(
+                'unknown recording; "recording" must be an index of "recordings" in "welcome"',
+                self.ask(page, recording=index, names=["x"])["error"],
+            )
+        for names in ("x", [], [7], None, ["x"] * 101):
+            self.assertEqual(
+                '"names" must be an array of 1 to 100 names, as ["speed"]',
+                self.ask(page, recording=0, names=names)["error"],
+            )
+
+    def recordings_of(self, *files):
+        """The recordings that a page gets, and what `hal panel` prints on stderr of them."""
+        words = [word for file in files for word in ("--recording", str(file))]
+        self.begin(*words, machine=False)
+        welcome = self.page().expect(lambda m: isinstance(m, dict) and m.get("event") == "welcome")
+        errors = (self.folder / "panel.err").read_text().splitlines(True)
+        return welcome["recordings"], "".join(
+            line for line in errors if not re.search("default|client", line)
+        )
+
+    def test_the_missing_rows_of_a_cut_recording_are_reported(self):
+        self.write("cut.csv", "time_s,x,y\n0,1,2\n1,2,3\n2,3")
+        note = "'cut.csv', line 4: the line is cut off; rows after 1 s are missing, of x, y"
+        (recording,), errors = self.recordings_of("cut.csv")
+        self.assertEqual([note], recording["notes"])
+        self.assertEqual(f"hal panel: {note}\n", errors)
+
+    def test_recordings_with_the_same_file_name_have_different_names(self):
+        text = "time_s,x\n0,1\n1,2\n"
+        for folder in ("a", "b"):
+            (self.folder / folder).mkdir()
+            self.write(f"{folder}/run.csv", text)
+        self.write("run.csv", text)
+        recordings, errors = self.recordings_of("a/run.csv", "b/run.csv", "run.csv")
+        self.assertEqual(
+            ["run.csv", "b/run.csv", str(self.folder / "run.csv")],
+            [recording["name"] for recording in recordings],
+        )
+        self.assertEqual("", errors)
+        self.assertEqual(
+            "hal panel: 'run.csv' and './run.csv' are the same file; name it once\n",
+            self.bad("panel", "--recording", "run.csv", "--recording", "./run.csv"),
+        )
+
+    def test_the_address_of_each_recording_is_printed(self):
+        self.write("run 1&.csv", "time_s,x\n0,1\n1,2\n")
+        words = ("panel", "--port", "0", "--for", "10ms", "--recording", "run 1&.csv")
+        out = self.run_program(*words).stdout
+        port = re.match(r"http://localhost:(\d+)/\n", out)[1]
+        self.assertIn(
+            "\nrecording run 1&.csv: choose it as the source of the scope: "
+            f"http://localhost:{port}/#/scope?recording=run%201%26.csv\n",
+            out,
+        )
+        out = self.run_program(*words, "--write").stdout
+        address, token = re.match(r"(http://localhost:\d+/)#t=(\w+)\n", out).groups()
+        self.assertIn(f" {address}#/scope?recording=run%201%26.csv&t={token}\n", out)
+
+    def test_a_recording_that_cannot_be_shown_is_rejected(self):
+        self.assertEqual(
+            "hal panel: cannot read 'none.mcap': No such file or directory\n",
+            self.bad("panel", "--recording", "none.mcap"),
+        )
+        self.write("empty.csv", "time_s,x\n")
+        self.assertEqual(
+            "hal panel: 'empty.csv' has no rows: nothing was recorded; record values with: hal record FILE NAMES\n",
+            self.bad("panel", "--recording", "empty.csv"),
+        )
+
+    def test_a_page_that_reads_slowly_gets_no_second_recording(self):
+        rows = "".join(f"{row},{row}\n" for row in range(30000))
+        self.write("long.csv", "time_s,x\n" + rows)
+        self.begin("--recording", "long.csv", machine=False)
+        page = self.page()
+        for number in (1, 2):  # 24 MB each
+            page.send({"id": number, "recording": 0, "names": ["x"] * 100})
+        answer = page.expect(lambda m: isinstance(m, dict) and m.get("id") == 2)
+        self.assertEqual(
+            "the connection is slow: more than 1 MiB sent before has not arrived; choose the recording again in a few seconds",
+            answer["error"],
+        )
 
     def test_errors_of_the_command_line(self):
         self.assertEqual(

@@ -213,7 +213,9 @@ void PanelClient::write(Json request) {
 void PanelClient::send_recording(const Json& request) {
     constexpr std::size_t busy_above = 1 << 20;
     if (waiting() > busy_above) {
-        return reject(request, "the connection is too slow: what was sent before is on its way");
+        return reject(request,
+                      "the connection is slow: more than 1 MiB sent before has not arrived; "
+                      "choose the recording again in a few seconds");
     }
     const Recordings::Answer answer = server_.recordings().answer(request, ++recordings_sent_);
     if (!answer.problem.empty()) return reject(request, answer.problem);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 namespace hal::tools {
@@ -112,35 +113,78 @@ std::string text_of(const Json& json) {
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
+/// Returns why a file that was loaded has no rows, and what to do.
+std::string why_empty(const mcap::Recording& recording) {
+    if (!recording.unread.empty()) return recording.unread;
+    if (!recording.missing.empty()) return "all were cut off or damaged; choose another file";
+    return "nothing was recorded; record values with: hal record FILE NAMES";
+}
+
 }  // namespace
 
-std::string Recordings::add(const std::string& path) {
-    Loaded loaded{std::filesystem::path(path).filename().string(), {}};
+bool Recordings::is_taken(const std::string& name) const {
+    return std::any_of(all_.begin(), all_.end(),
+                       [&](const Loaded& loaded) { return loaded.name == name; });
+}
+
+std::string Recordings::unique_name(const std::string& path) const {
+    const std::string file_name = std::filesystem::path(path).filename().string();
+    if (!is_taken(file_name)) return file_name;
+    return is_taken(path) ? std::filesystem::absolute(path).string() : path;
+}
+
+std::string Recordings::same_file_as(const std::string& path) const {
+    for (const Loaded& loaded : all_) {
+        std::error_code ignored;
+        if (std::filesystem::equivalent(loaded.path, path, ignored)) return loaded.path;
+    }
+    return "";
+}
+
+Recordings::Added Recordings::add(const std::string& path) {
+    if (const std::string same = same_file_as(path); !same.empty()) {
+        return {fmt::format("'{}' and '{}' are the same file; name it once", same, path), {}};
+    }
+    Loaded loaded{unique_name(path), path, {}};
+    mcap::LoadOptions options;
+    options.max_bytes = max_bytes_;
+    options.too_large_help =
+        "record fewer values or a shorter time; of a journal, choose values with: hal replay "
+        "--exact JOURNAL --record FILE --names NAMES";
     std::string problem;
-    if (!mcap::load(path, loaded.recording, problem)) return problem;
-    const auto& tables = loaded.recording.tables;
-    if (std::none_of(tables.begin(), tables.end(), [](const Table& t) { return t.rows() != 0; })) {
-        return "'" + path + "' has no rows" +
-               (loaded.recording.unread.empty() ? "" : ": " + loaded.recording.unread);
+    if (!mcap::load(path, loaded.recording, problem, options)) return {problem, {}};
+    Added added{"", loaded.recording.notes()};
+    if (loaded.recording.tables.empty()) {
+        added.problem = fmt::format("'{}' has no rows: {}", path, why_empty(loaded.recording));
+        return added;
     }
     all_.push_back(std::move(loaded));
-    return "";
+    return added;
+}
+
+std::vector<std::string> Recordings::names() const {
+    std::vector<std::string> names;
+    for (const Loaded& loaded : all_) {
+        names.push_back(loaded.name);
+    }
+    return names;
 }
 
 Json Recordings::list() const {
     Json all = Json::array();
     for (const Loaded& loaded : all_) {
+        const mcap::Recording& recording = loaded.recording;
         Json columns = Json::array();
-        for (const Table& table : loaded.recording.tables) {
+        for (const Table& table : recording.tables) {
             for (const mcap::Column& column : table.columns) {
                 columns.push_back(described(column));
             }
         }
-        all.push_back({{"name", loaded.name},
-                       {"columns", std::move(columns)},
-                       {"seconds", static_cast<double>(loaded.recording.end_ns() -
-                                                       loaded.recording.begin_ns()) *
-                                       1e-9}});
+        all.push_back(
+            {{"name", loaded.name},
+             {"notes", recording.notes()},
+             {"columns", std::move(columns)},
+             {"seconds", static_cast<double>(recording.end_ns() - recording.begin_ns()) * 1e-9}});
     }
     return all;
 }
@@ -148,10 +192,15 @@ Json Recordings::list() const {
 Recordings::Answer Recordings::answer(const Json& request, std::uint64_t number) const {
     const Json& index = request["recording"];
     if (!index.is_number_unsigned() || index.get<std::uint64_t>() >= all_.size()) {
-        return {"unknown recording", {}, {}, {}};
+        return {R"(unknown recording; "recording" must be an index of "recordings" in "welcome")",
+                {},
+                {},
+                {}};
     }
     const std::vector<std::string> names = names_of(request);
-    if (names.empty()) return {"names must be an array of 1 to 100 names", {}, {}, {}};
+    if (names.empty()) {
+        return {R"("names" must be an array of 1 to 100 names, as ["speed"])", {}, {}, {}};
+    }
     const mcap::Recording& recording = all_[index.get<std::size_t>()].recording;
     std::vector<Group> groups = groups_of(recording, names);
     const std::size_t left_out = limit(groups);

@@ -21,9 +21,20 @@ public:
         std::string reply, event, rows;
     };
 
-    /// Loads a file (.mcap, .csv). Returns a sentence with its name when it cannot be shown, or "".
-    std::string add(const std::string& path);
-    /// Returns the recordings for the greeting of a page: their names, and those of their values.
+    struct Added {
+        std::string problem;  // why it cannot be shown, with its name; "" when it is shown
+        std::vector<std::string> notes;  // what is missing of a cut or damaged file, and why
+    };
+
+    /// Of a file with more than `max_bytes` of values, none is shown.
+    explicit Recordings(std::uint64_t max_bytes = std::uint64_t{1} << 30) : max_bytes_(max_bytes) {}
+    /// Loads a file (.mcap, .csv).
+    Added add(const std::string& path);
+    /// Returns the names by which pages choose recordings: that of the file, or the path when an
+    /// earlier one has that name.
+    std::vector<std::string> names() const;
+    /// Returns the recordings for the greeting of a page: their names, notes, and the names of
+    /// their values.
     nlohmann::json list() const;
     /// Answers `{"id":7,"recording":0,"names":["speed"]}`. `number` is unique among the answers of
     /// a page. Of more than 64 MiB of rows, the newest are sent.
@@ -32,8 +43,14 @@ public:
 private:
     struct Loaded {
         std::string name;
+        std::string path;
         mcap::Recording recording;
     };
+    bool is_taken(const std::string& name) const;
+    std::string unique_name(const std::string& path) const;
+    std::string same_file_as(const std::string& path) const;
+
+    std::uint64_t max_bytes_;
     std::vector<Loaded> all_;
 };
 

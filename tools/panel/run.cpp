@@ -40,9 +40,39 @@ Access access_for(const PanelOptions& options) {
     return access;
 }
 
-/// What a start prints.
+/// Loads the recordings, and prints what is missing of them. Returns false after a message when one
+/// cannot be shown.
+bool load(const PanelOptions& options, Recordings& recordings) {
+    for (const std::string& path : options.recordings) {
+        const Recordings::Added added = recordings.add(path);
+        for (const std::string& note : added.notes) {
+            write_all(STDERR_FILENO, fmt::format("{}: {}\n", options.program, note));
+        }
+        if (!added.problem.empty()) {
+            fail(options, added.problem);
+            return false;
+        }
+    }
+    return true;
+}
+
+/// Encodes a text as a value in the query of a URL (RFC 3986).
+std::string url_encoded(const std::string& text) {
+    std::string encoded;
+    for (const char c : text) {
+        if (is_alphanumeric(c) || std::string_view("-._~/").find(c) != std::string_view::npos) {
+            encoded += c;
+        } else {
+            encoded += fmt::format("%{:02X}", static_cast<unsigned char>(c));
+        }
+    }
+    return encoded;
+}
+
+/// What a start prints. `recordings`: their names.
 std::string announcement(const PanelOptions& options, const Access& access,
-                         const std::string& instance, int port) {
+                         const std::string& instance, int port,
+                         const std::vector<std::string>& recordings) {
     std::string text;
     const bool all = options.listen == "0.0.0.0";
     std::string host = options.listen.empty() ? "localhost" : options.listen;
@@ -60,6 +90,12 @@ std::string announcement(const PanelOptions& options, const Access& access,
     }
     const bool token = options.write || !access.open;
     text += fmt::format("http://{}:{}/{}\n", host, port, token ? "#t=" + access.token : "");
+    for (const std::string& name : recordings) {
+        text += fmt::format(
+            "recording {}: choose it as the source of the scope: http://{}:{}/#/scope?recording={}"
+            "{}\n",
+            name, host, port, url_encoded(name), token ? "&t=" + access.token : "");
+    }
     text += fmt::format("programs and Foxglove: ws://{}:{}/?t={}\n", host, port, access.token);
     if (!options.write) {
         text += "read-only; with --write, values can be set\n";
@@ -96,11 +132,8 @@ int run_panel(const PanelOptions& options) {
         return fail(options, "--component names the component of a user panel; add its file");
     }
     Recordings recordings;
-    for (const std::string& path : options.recordings) {
-        if (const std::string problem = recordings.add(path); !problem.empty()) {
-            return fail(options, problem);
-        }
-    }
+    if (!load(options, recordings)) return 1;
+    const std::vector<std::string> names = recordings.names();
     const Access access = access_for(options);
     StopRequest stop;
     PanelServer server(access, instance);
@@ -118,7 +151,7 @@ int run_panel(const PanelOptions& options) {
                                              "shows it as soon as it runs\n",
                                              instance));
     }
-    if (!print(announcement(options, access, instance, server.port()))) return 1;
+    if (!print(announcement(options, access, instance, server.port(), names))) return 1;
     std::thread ending([&] {
         stop.wait_ns(options.for_ns);
         server.interrupt();

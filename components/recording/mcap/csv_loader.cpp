@@ -263,7 +263,7 @@ private:
         table_.words.insert(table_.words.end(), held_.begin(), held_.end());
         if (table_.words.size() * 8 <= options_.max_bytes) return true;
         return fail("'" + path_ + "' has more than " + std::to_string(options_.max_bytes >> 20) +
-                    " MiB of values; choose a part of it");
+                    " MiB of values; " + options_.too_large_help);
     }
 
     void note(bool is_cut) {

@@ -264,7 +264,7 @@ bool load_mcap(const std::string& path, Recording& to, std::string& problem,
     loader.finish();
     if (loader.too_large()) {
         problem = "'" + path + "' has more than " + std::to_string(options.max_bytes >> 20) +
-                  " MiB of values; choose a part of it";
+                  " MiB of values; " + options.too_large_help;
         return false;
     }
     return true;

@@ -65,6 +65,8 @@ struct LoadOptions {
     std::int64_t end_ns = INT64_MAX;
     /// of columns of a .csv, which does not have them; others are FLOAT
     std::map<std::string, hal_type> types = {};
+    /// what `problem` advises for a file with more than `max_bytes` of values
+    std::string too_large_help = "choose a part of it";
 };
 
 /// Loads a recording (.mcap, or .csv as `hal record` writes it). Returns false and sets `problem`.

@@ -43,10 +43,12 @@ const subscriptions = new Set(), probes = new Set();
 const awaited = new Map();  // rows of recordings, by the number in their event
 
 function takeToken() {
-    const found = /(?:^#|[#&])t=([0-9a-f]+)/.exec(location.hash);
+    const found = /[#&]t=([0-9a-f]+)/.exec(location.hash);
     if (found) {
         sessionStorage.setItem('token', found[1]);
-        history.replaceState(null, '', location.pathname + '#/overview');
+        const rest = location.hash.replace(found[0], '');  // no token stays in the address bar
+        history.replaceState(
+            null, '', location.pathname + (rest.startsWith('#/') ? rest : '#/overview'));
     }
     return sessionStorage.getItem('token');
 }
