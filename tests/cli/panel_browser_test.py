@@ -389,7 +389,7 @@ net position{n} axis{n}-integ.out => axis{n}-pid.feedback
     def test_the_scope_scrolls_back_and_returns(self):
         self.begin(view="scope?ch=sine:0.5:0&base=0.01")
         self.browser.wait("window.halcyonScope?.rows > 1500")
-        canvas = "document.querySelector('.fill.high canvas')"
+        canvas = "document.querySelector('.pictures canvas')"
         press = canvas + ".dispatchEvent(new KeyboardEvent('keydown', {{key: '{}'}}))"
         self.browser.evaluate(press.format("PageUp"))
         self.browser.wait("/back of/.test(document.querySelector('.history').textContent)")
@@ -400,7 +400,10 @@ net position{n} axis{n}-integ.out => axis{n}-pid.feedback
         self.browser.wait(more.format(rows))
         self.assertEqual([begin, end], self.browser.evaluate("halcyonScope.range"))
         self.browser.evaluate(press.format("Home"))
-        self.browser.wait("halcyonScope.range[0] <= 0.001 && halcyonScope.range[1] < 0.2")
+        # all of the picture has samples
+        self.browser.wait(
+            "Math.abs(halcyonScope.range[0] - halcyonScope.store.oldest) < 1e-6 && (s => Math.abs(s.min - s.value) < 1e-6)(document.querySelector('[aria-label^=\"Scroll\"]'))"
+        )
         self.browser.evaluate(press.format(" "))
         self.browser.wait("halcyonScope.store.newest - halcyonScope.range[1] < 0.5")
 
@@ -481,6 +484,82 @@ net position{n} axis{n}-integ.out => axis{n}-pid.feedback
                 "[halcyonScope.notice, getComputedStyle(document.querySelector('main')).filter]"
             ),
         )
+
+    def show_recording(self, text, view, *words, token=False):
+        """The scope with run.csv, without a machine."""
+        self.write("run.csv", text)
+        words = ("--recording", "run.csv", *words)
+        self.process, self.port, self.token = start_panel(self, *words)
+        self.browser = self.kind(self)
+        self.browser.open(f"http://localhost:{self.port}/#/{view}")
+
+    def test_a_recording_keeps_its_picture_when_a_channel_is_added_and_the_server_restarts(self):
+        rows = "".join(f"{row / 1000},{row % 7},{row % 5}\n" for row in range(1000))
+        self.show_recording("time_s,x,y\n" + rows, "scope?ch=x:1:0&recording=run.csv")
+        self.browser.wait("window.halcyonScope?.rows === 1000 && halcyonScope.range[1] > 0.9")
+        self.assertEqual(0.1, self.browser.evaluate("halcyonScope.base"))
+        press = "document.querySelector('canvas').dispatchEvent(new KeyboardEvent('keydown', {key: '%s'}))"
+        for key in ("ArrowLeft", "ArrowLeft", "ArrowLeft", "PageUp"):
+            self.browser.evaluate(press % key)
+        there = "JSON.stringify(halcyonScope.range.map(s => s.toFixed(6)))"
+        self.browser.wait(f'{there} === \'["0.849000","0.949000"]\'')
+        self.browser.evaluate(
+            "(i => { i.value = 'y'; i.dispatchEvent(new Event('change')); })(document.querySelector('[aria-label=\"Add a channel\"]'))"
+        )
+        self.browser.wait("halcyonScope.store.place.has('y') && halcyonScope.rows === 1000")
+        self.browser.wait("halcyonScope.frames > 0")
+        self.assertEqual('["0.849000","0.949000"]', self.browser.evaluate(there))
+        self.browser.evaluate("window.before = halcyonScope.store.groups[0]")
+        self.process.kill()
+        self.process.wait()
+        self.process, _, _ = start_panel(self, "--port", self.port, "--recording", "run.csv")
+        self.browser.wait(
+            "halcyonScope.store.groups[0] && halcyonScope.store.groups[0] !== before && halcyonScope.rows === 1000"
+        )
+        self.assertEqual('["0.849000","0.949000"]', self.browser.evaluate(there))
+        self.browser.errors.clear()  # of connections while the server was down
+
+    def test_a_recording_that_hal_panel_does_not_have_is_reported(self):
+        self.show_recording("time_s,x\n0,1\n1,2\n", "scope?ch=x:1:0&recording=gone.mcap")
+        problem = "document.getElementById('scope-problem')?.textContent"
+        self.browser.wait(
+            f"{problem} === \"hal panel has no recording 'gone.mcap'; start it with --recording FILE\""
+        )
+        self.assertNotIn("recording", self.browser.evaluate("location.hash"))
+        self.assertEqual(
+            "",
+            self.browser.evaluate("document.querySelector('[aria-label=\"Source\"]').value"),
+        )
+
+    def test_the_scope_reports_what_a_cut_recording_lacks(self):
+        self.show_recording("time_s,x\n0,1\n1,2\n2", "scope?ch=x:1:0&recording=run.csv")
+        self.browser.wait(
+            "document.getElementById('scope-problem')?.textContent === \"'run.csv', line 4: the line is cut off; rows after 1 s are missing, of x\""
+        )
+
+    def test_a_printed_address_with_the_token_opens_the_recording(self):
+        text = "time_s,x\n0,1\n1,2\n"
+        self.show_recording(text, "overview", "--write")
+        self.browser.open("about:blank")
+        self.browser.open(
+            f"http://localhost:{self.port}/#/scope?recording=run.csv&ch=x&t={self.token}"
+        )
+        self.browser.wait("window.halcyonScope?.rows === 2 && window.halcyon?.token")
+        self.assertNotIn(self.token, self.browser.evaluate("location.href"))
+
+    def test_a_file_that_is_saved_of_a_recording_does_not_name_the_running_machine(self):
+        self.show_recording("time_s,x\n0,1\n1,2\n", "scope?ch=x:1:0&recording=run.csv")
+        self.browser.wait("window.halcyonScope?.rows === 2")
+        self.browser.evaluate(
+            """halcyon.instance = 'other'; halcyon.version = '9.9.9'; window.saved = null;
+            URL.createObjectURL = blob => { blob.text().then(text => { saved = text; }); return 'blob:none'; };
+            HTMLAnchorElement.prototype.click = () => {};
+            [...document.querySelectorAll('button')].find(b => b.textContent === 'MCAP').click();"""
+        )
+        text = self.browser.wait("saved")
+        self.assertIn("instance", text)
+        self.assertNotIn("other", text)
+        self.assertNotIn("9.9.9", text)
 
     def test_a_batch_of_a_probe_is_read_to_the_last_bit(self):
         self.begin()

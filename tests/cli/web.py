@@ -296,10 +296,11 @@ def have_browser():
 
 
 def start_panel(case, *words):
-    """Starts `hal panel` on a free port; (process, port, token or None)."""
+    """Starts `hal panel`, on a free port unless one is given; (process, port, token or None)."""
+    port = () if "--port" in words else ("--port", "0")
     with open(case.folder / "panel.err", "w") as errors:
         process = subprocess.Popen(
-            [str(HAL), "panel", "--port", "0", *map(str, words)],
+            [str(HAL), "panel", *port, *map(str, words)],
             cwd=case.folder,
             env=case.environment,
             stdin=subprocess.DEVNULL,

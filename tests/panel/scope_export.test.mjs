@@ -4,7 +4,7 @@ import {test} from 'node:test';
 
 import {label, timeLabels, valueLabels} from '../../tools/panel/page/scope_axes.js';
 import {Store} from '../../tools/panel/page/scope_data.js';
-import {csv} from '../../tools/panel/page/scope_export.js';
+import {csv, overwritten} from '../../tools/panel/page/scope_export.js';
 
 /// Two threads, of 1 ms and 2 ms.
 function twoThreads() {
@@ -44,6 +44,48 @@ test('the table has a row per sample of each thread, in the order of time', () =
 test('the table of nothing is its header', () => {
     assert.equal(csv(twoThreads(), ['a'], 5, 6), 'time_s,a\n');
     assert.equal(csv(new Store(), ['a'], 0, 1), 'time_s\n');
+});
+
+/// 'slow' has 1000 rows of 0.4 s. 'a' and 'b' have 400 000 rows of 1 ms, the newest 262 143 are
+/// kept.
+function longRecord() {
+    const store = new Store();
+    store.layout(
+        [
+            {columns: [0, 1], thread: 'fast', period_ns: 1e6},
+            {columns: [2], thread: 'slow', period_ns: 4e8}
+        ],
+        ['a', 'b', 'slow']);
+    const [fast, slow] = store.groups;
+    for (let i = 0; i < 400000; i++)
+        fast.add(i / 1000);
+    for (let i = 0; i < 1000; i++)
+        slow.add(i * .4);
+    store.newest = 399.999;
+    return store;
+}
+
+test('what a file lacks is reported, and none is saved of minima and maxima alone', () => {
+    const store = longRecord();
+    const of = (...all) => Object.values(overwritten(store, ...all));
+    assert.deepEqual(of(['a', 'b', 'slow'], 200, 210), [false, '']);
+    assert.deepEqual(of(['a', 'unknown'], 137, 147, ' of the picture'), [
+        false,
+        'the file has the last 9.143 s of the picture: ' +
+            'only minima and maxima of earlier samples are kept'
+    ]);
+    assert.deepEqual(of(['a', 'b', 'slow'], 0, 399.999), [
+        false,
+        'the file has the last 262.1 s of a, b: only minima and maxima of earlier samples are kept'
+    ]);
+    assert.deepEqual(of(['slow', 'b'], 10, 20, ' of the picture'), [
+        false, 'the file has no samples of b: only minima and maxima of earlier samples are kept'
+    ]);
+    assert.deepEqual(of(['a', 'b'], 10, 20, ' of the picture'), [
+        true,
+        'no file is saved: only minima and maxima of this time are kept; ' +
+            'scroll to the last 262.1 s, whose samples are kept'
+    ]);
 });
 
 test('the axis of a channel has its values, and 0 at the zero line', () => {

@@ -28,7 +28,7 @@ export const state = {
     held: false,
     holder: null,
     panel: null,
-    recordings: [],  // {name, columns, seconds}: what hal panel can show besides the machine
+    recordings: [],  // {name, notes, columns, seconds}: what hal panel can show besides the machine
     reason: '',
     log: [],
     stats: {messages: 0, bytes: 0}
@@ -56,6 +56,8 @@ function takeToken() {
 /// Sends a request of the control protocol. Resolves with the reply.
 export function request(body) {
     const isOpen = socket && socket.readyState === WebSocket.OPEN;
+    if (!isOpen && 'recording' in body)
+        return Promise.resolve({ok: false, error: 'no connection to hal panel'});
     if (!isOpen || !(state.machine || 'recording' in body))
         return Promise.resolve({ok: false, error: 'the machine is not running'});
     const id = nextId++;

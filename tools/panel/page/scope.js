@@ -5,9 +5,9 @@ import {on, probe, readRecording, state, subscribe} from './link.js';
 import {announce, colour, dark, h, number, surface, text} from './dom.js';
 import {compareNames, similar} from './names.js';
 import {objects} from './objects.js';
-import {timeLabels, valueLabels} from './scope_axes.js';
+import {seconds, timeLabels, valueLabels} from './scope_axes.js';
 import {Store, Trigger, measure, valueAt} from './scope_data.js';
-import {csv, download} from './scope_export.js';
+import {csv, download, overwritten} from './scope_export.js';
 import {FaultTrigger, faultSource, isFaultSource, nameOfFaults} from './scope_fault_trigger.js';
 import {Labels, write} from './scope_labels.js';
 import {mcap} from './scope_mcap.js';
@@ -46,13 +46,6 @@ const edges = [['rising', 'rising'], ['falling', 'falling'], ['either', 'either 
  * @property {HTMLInputElement} [input]
  * @property {HTMLElement[]} [cells]
  */
-
-/// A time with a unit.
-function seconds(s) {
-    if (s < 1e-3) return `${Number((s * 1e6).toPrecision(4))} µs`;
-    if (s < 1) return `${Number((s * 1e3).toPrecision(4))} ms`;
-    return `${Number(s.toPrecision(4))} s`;
-}
 
 /// The channels of a URL: name:units per division:position,…
 const channelsOf = words => words.split(',').filter(word => word).slice(0, most).map(word => {
@@ -103,6 +96,7 @@ export class View {
         this.hasBase = query.has('base');
         /** @type {{time_ns: number, kind: string, text: string}[]} */
         this.recorded = [];  // what happened in the recording
+        this.hasLooked = false;  // the end of the recording was shown; the picture stays
         /** @type {{at: number, text: string}[]} */
         this.knownFaults = null;  // of allFaults(); null: to be read again
         this.main = main;
@@ -166,7 +160,7 @@ export class View {
                 h('button', {onclick: () => this.saveTable()}, 'CSV'),
                 h('button', {onclick: () => this.saveRecording()}, 'MCAP'),
                 h('button', {onclick: () => this.savePicture()}, 'PNG'), this.status, this.problem),
-              h('div', {class: 'pictures'}, h('div', {class: 'fill high'}, this.canvas),
+              h('div', {class: 'pictures'}, h('div', {class: 'fill'}, this.canvas),
                 this.xyPane.element),
               this.history, this.spectrumPane.element,
               h('div', {class: 'scroll'}, this.whole)));
@@ -194,7 +188,13 @@ export class View {
                    this.suggest();
                    this.follow(true);
                }),
-            on('welcome', () => this.drawSources()),
+            on('welcome',
+               () => {
+                   this.drawSources();
+                   if (this.recording === '') return;
+                   this.suggest();
+                   this.follow();
+               }),
             on('state', () => this.noteState()), on('logged', () => {
                 this.knownFaults = null;
                 this.surface.request();
@@ -316,7 +316,8 @@ export class View {
 
     /// Stops the picture, with its right end at a time of the record.
     scrollTo(time) {
-        const {oldest, newest} = this.store, first = Math.min(newest, oldest + this.base);
+        const {oldest, newest} = this.store;
+        const first = Math.min(newest, oldest + this.base * divisions);
         this.run = false;
         this.shownAt = Math.min(newest, Math.max(first, time));
         this.draw();
@@ -330,9 +331,9 @@ export class View {
     drawHistory() {
         const {slider, store} = this, kept = store.newest - store.oldest;
         const behind = Math.max(0, store.newest - this.range()[1]);
-        const isShort = !(kept > this.base * divisions);
+        const scrollable = kept - this.base * divisions, isShort = !(scrollable > 0);
         if (this.history.hidden !== isShort) this.history.hidden = isShort;
-        slider.min = String(Math.min(-1e-3, -kept));
+        slider.min = String(Math.min(-1e-3, -scrollable));
         if (document.activeElement !== slider || this.run) slider.value = String(-behind);
         text(this.back, this.run ? `${seconds(kept)} kept` :
                                    `${seconds(behind)} back of ${seconds(kept)}`);
@@ -413,12 +414,24 @@ export class View {
         const names = state.recordings.map(({name}) => name);
         this.sources.hidden = names.length === 0;
         fill(this.sources, [['', 'machine'], ...names.map(name => [name, name])], this.recording);
-        if (this.recording !== '' && state.recordings.length > 0) this.changeSource();
+        if (state.server === 'up' && this.recording !== '' && !names.includes(this.recording))
+            this.leaveMissing();
+    }
+
+    /// Shows the machine instead of a recording that hal panel does not have.
+    leaveMissing() {
+        const name = this.recording;
+        this.recording = '';
+        this.save();
+        this.changeSource();
+        this.report(`hal panel has no recording '${name}'; start it with --recording FILE`);
     }
 
     /// Shows the machine or a recording from now on.
     changeSource() {
         Object.assign(this, {shownAt: null, followed: '', source: '', run: true, single: false});
+        this.hasLooked = false;
+        this.report('');
         this.main.classList.toggle('recorded', this.recording !== '');
         this.suggest();
         this.follow();
@@ -441,8 +454,10 @@ export class View {
 
     saveTable() {
         const [from, to] = this.range(), names = this.channels.map(one => one.name);
+        const {isEmpty, problem} = overwritten(this.store, names, from, to, ' of the picture');
+        this.report(problem);
+        if (isEmpty) return;
         const table = csv(this.store, names, from, to);
-        this.reportOverwritten(from);
         download('scope.csv', new Blob([table], {type: 'text/csv'}));
     }
 
@@ -451,23 +466,11 @@ export class View {
         const {store} = this, names = this.channels.map(one => one.name), from = store.oldest;
         const first = store.origin ?? Infinity;
         const events = this.happened().filter(one => one.time_ns >= first);
-        const file = mcap(store, names, from, store.newest, events, state);
-        this.reportOverwritten(from);
+        // The running machine is not the one of a recording.
+        const about = this.recording === '' ? state : {instance: '', version: ''};
+        const file = mcap(store, names, from, store.newest, events, about);
+        this.report(overwritten(store, names, from, store.newest).problem);
         download('scope.mcap', new Blob([file], {type: 'application/octet-stream'}));
-    }
-
-    /// States from when on a file has samples, if not from `from`.
-    reportOverwritten(from) {
-        const {store} = this;
-        const begins = this.channels.filter(one => store.isCoarse(one.name, from)).map(one => {
-            const [group] = store.place.get(one.name);
-            return store.newest - group.time(group.first);
-        });
-        this.report(
-            begins.length === 0 ? '' :
-                                  `the file has the samples of the last ${
-                                      seconds(Math.floor(Math.min(...begins)))}: of earlier ones ` +
-                    'only minima and maxima are kept');
     }
 
     savePicture() {
@@ -589,19 +592,22 @@ export class View {
         }, () => this.followSlowly(list));
     }
 
-    /// Shows channels of a recording, its end first.
+    /// Shows channels of a recording.
     async showRecording(names, call) {
         const index = state.recordings.findIndex(({name}) => name === this.recording);
         if (index < 0) return;
         const reply = await readRecording(index, names, (event, bytes) => {
             if (call !== this.following) return;
             this.store.samples(event, bytes, reply);
-            this.lookAtEnd();
+            if (!this.hasLooked) return this.lookAtEnd();
+            this.scrollTo(this.shownAt ?? this.store.newest);
         });
         if (call !== this.following) return;
         if (!reply.ok) return this.report(reply.error);
         const {left_out, groups, columns, unix_ns, events} = reply;
-        this.store.layout(groups, names, columns, state.recordings[index].seconds);
+        const {notes, seconds: length} = state.recordings[index];
+        this.report(notes.join('; '));
+        this.store.layout(groups, names, columns, length);
         this.store.unixOffset = unix_ns;
         this.store.seconds(0);
         this.recorded = events;
@@ -613,6 +619,7 @@ export class View {
     /// Shows the end of what is kept; when no time base was chosen, all of it.
     lookAtEnd() {
         const {store} = this, length = store.newest - store.oldest;
+        this.hasLooked = true;
         if (!this.hasBase) this.base = steps.find(step => step * divisions >= length) ?? 60;
         this.timeBase.value = String(this.base);
         this.zeroAt = store.newest;
@@ -680,10 +687,10 @@ export class View {
 
     /// Remembers when the functions did not run.
     noteState() {
+        if (this.recording !== '') return;
         const {store, stops} = this, open = stops.find(one => one.to === Infinity);
         const exact = state.running_ns > 0 && store.origin !== null;
         const now = exact ? store.seconds(state.running_ns) : store.newest;
-        if (this.recording !== '') return;
         if (!state.running && !open) stops.push({from: now, to: Infinity});
         if (state.running && open) open.to = now;
         if (stops.length > 100) stops.shift();

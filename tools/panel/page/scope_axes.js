@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: MIT
 // The numbers of the scope's axes.
 
+/// A time with a unit.
+export function seconds(s) {
+    if (s < 1e-3) return `${Number((s * 1e6).toPrecision(4))} µs`;
+    if (s < 1) return `${Number((s * 1e3).toPrecision(4))} ms`;
+    return `${Number(s.toPrecision(4))} s`;
+}
+
 /// Digits behind the decimal point with which steps of `size` differ.
 const digits = size => Math.min(9, Math.max(0, 2 - Math.floor(Math.log10(size))));
 
