@@ -212,7 +212,53 @@ class ExactReplay(Case):
             "--record: unknown format of 'out.txt'; name the file .mcap or .csv",
             self.replay("--record", "out.txt", status=1),
         )
-        self.assertIn("--shell", self.replay("--record", "out.csv", "--shell", status=1))
+        self.assertEqual(
+            "hal replay: --record and --shell exclude each other; leave one out\n",
+            self.replay("--record", "out.csv", "--shell", status=1),
+        )
+        self.assertEqual(
+            "hal replay: --record: cannot write 'none/out.csv': No such file or directory\n",
+            self.replay("--record", "none/out.csv", status=1),
+        )
+
+    def test_values_that_a_recording_lacks_because_they_were_loaded_later_are_reported(self):
+        machine = self.run_journaled(SERVO + "net early servo.threadbeat\n")
+        self.wait_for_cycles(20)
+        self.give(["loadrt not names=late", "addf late servo", "net later late.out"])
+        self.wait_for_cycles(20)
+        self.give(["loadrt and2 names=short"])
+        self.wait_for_cycles(20)
+        self.give(["unloadrt short"])
+        self.wait_for_cycles(20)
+        self.finish(machine)
+        note = (
+            "hal replay: 'out.csv' does not have {} loaded after its first row: {}; to record "
+            "more, list each name in --names: the recording then begins when the machine has all "
+            "of them\n"
+        )
+        done = self.run_program("replay", "--exact", "run.mcap", "--record", "out.csv")
+        self.assertEqual(
+            note.format(
+                "12 values",
+                "late.in, late.out, late.time, late.tmax, late.tmax-increased, later, short.in0, "
+                "short.in1, short.out, … (3 more)",
+            ),
+            done.stderr,
+        )
+        words = ("replay", "--exact", "run.mcap", "--record", "out.csv", "--names")
+        self.assertEqual(
+            note.format(
+                "6 values", "late.in, late.out, late.time, late.tmax, late.tmax-increased, later"
+            ),
+            self.run_program(*words, "[el]a*").stderr,
+        )
+        done = self.run_program(*words, "early,late.in")
+        self.assertEqual("", done.stderr)
+        self.assertRegex(done.stdout, r"out\.csv: [1-9]\d+ rows of 2 values\n")
+        with (self.folder / "out.csv").open() as file:
+            beats = [int(row["early"]) for row in csv.DictReader(file)]
+        self.assertGreater(beats[0], 20)
+        self.assertEqual(list(range(beats[0], beats[-1] + 1)), beats)
 
     def test_functions_of_two_threads_that_share_state_run_in_their_order(self):
         with load(2):

@@ -73,7 +73,7 @@ private:
     bool execute() {
         bool reached = false;
         while (machine_.advance()) {
-            recording_.note_cycle();
+            recording_.note_cycle(execution_.edits());
             if (machine_.host().stop.requested()) return true;
             reached = reached || until_.reached(execution_.newest(), machine_.fastest()) ||
                       (!condition_.empty() && condition_.holds(machine_.session()));
@@ -257,7 +257,7 @@ int run_exact_replay(const ReplayOptions& options) {
                                          options.break_condition, ValueCondition::form));
     }
     if (const std::string problem = ReplayRecording::problem(options); !problem.empty()) {
-        return fail(options, "--record: " + problem);
+        return fail(options, problem);
     }
     WhatIf change;
     if (const std::string problem = change.parse(options); !problem.empty()) {

@@ -580,8 +580,7 @@ int run_replay(const ReplayOptions& options) {
     if (has_exact_options(options)) {
         return fail(options,
                     "--until, --break, --show, --shell, --edit, --netlist, --at, --as-test, --cut, "
-                    "--record "
-                    "and --anyway need --exact");
+                    "--record and --anyway need --exact");
     }
     if (options.words.size() < 2) return fail(options, "missing netlist: hal replay FILE NETLIST");
     const std::string file = std::filesystem::absolute(options.words.front()).string();

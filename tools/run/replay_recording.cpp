@@ -11,6 +11,7 @@
 #include "run/replay_note.hpp"
 #include "run/sim_summary.hpp"
 #include "text/quoting.hpp"
+#include "text/suggest.hpp"
 
 namespace hal::tools {
 namespace {
@@ -41,20 +42,21 @@ ReplayRecording::~ReplayRecording() {
 
 std::string ReplayRecording::problem(const ReplayOptions& options) {
     if (options.record.empty()) return "";
-    if (options.shell) return "it does not record what --shell does: without --shell";
+    if (options.shell) return "--record and --shell exclude each other; leave one out";
     if (!options.record.ends_with(".mcap") && !options.record.ends_with(".csv")) {
-        return fmt::format("unknown format of '{}'; name the file .mcap or .csv", options.record);
+        return fmt::format("--record: unknown format of '{}'; name the file .mcap or .csv",
+                           options.record);
     }
     const std::string reason = mcap::unwritable(options.record);
-    return reason.empty() ? "" : fmt::format("cannot write '{}': {}", options.record, reason);
+    return reason.empty() ? ""
+                          : fmt::format("--record: cannot write '{}': {}", options.record, reason);
 }
 
 void ReplayRecording::attach() {
     problem_ = unknown_value(session_.model(), patterns_);
     if (!problem_.empty()) return;
-    probe_ = session_.probes().attach(
-        {.names = chosen_values(session_.model(), patterns_), .buffer_ns = buffered_ns(file_)},
-        problem_);
+    names_ = chosen_values(session_.model(), patterns_);
+    probe_ = session_.probes().attach({.names = names_, .buffer_ns = buffered_ns(file_)}, problem_);
     if (!probe_) return;
     layout_ = Probes::layout(*probe_);
     journal_ = session_.event_log().begin();
@@ -70,11 +72,24 @@ void ReplayRecording::attach() {
     is_written_ = sink_->error() == 0 && sink_->layout(layout_.groups);
 }
 
-void ReplayRecording::note_cycle() {
+void ReplayRecording::note_cycle(std::uint64_t edits) {
     if (options_.record.empty()) return;
+    const bool is_edited = edits != edits_;
+    edits_ = edits;
     if (!probe_) return attach();
+    if (is_edited) {
+        note_later_values();
+    }
     if (++untaken_ < take_every) return;
     take();
+}
+
+void ReplayRecording::note_later_values() {
+    for (std::string& name : chosen_values(session_.model(), patterns_)) {
+        if (!std::binary_search(names_.begin(), names_.end(), name)) {
+            later_.insert(std::move(name));
+        }
+    }
 }
 
 void ReplayRecording::take() {
@@ -106,6 +121,14 @@ bool ReplayRecording::finish() {
         note(options_, fmt::format("'{}' is incomplete: {} did not fit the buffer", options_.record,
                                    counted(lost_, "row")));
         return false;
+    }
+    if (!later_.empty()) {
+        const std::vector<std::string> names(later_.begin(), later_.end());
+        note(options_,
+             fmt::format("'{}' does not have {} loaded after its first row: {}; to record more, "
+                         "list each name in --names: the recording then begins when the machine "
+                         "has all of them",
+                         options_.record, counted(names.size(), "value"), listed(names)));
     }
     return print(fmt::format("{}: {} of {}\n", options_.record, counted(rows_, "row"),
                              counted(Probes::columns(*probe_).size(), "value")));

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -23,15 +24,16 @@ public:
 
     /// Returns why --record is not possible; "" when it is.
     static std::string problem(const ReplayOptions& options);
-    /// Called after each cycle. Records what follows the first cycle in which the machine has all
-    /// names of --names.
-    void note_cycle();
+    /// Called after each cycle, with the number of edits so far. Records what follows the first
+    /// cycle in which the machine has all names of --names.
+    void note_cycle(std::uint64_t edits);
     /// Completes the file and prints what it has. Returns false after a message when something
     /// could not be recorded.
     bool finish();
 
 private:
     void attach();
+    void note_later_values();
     void take();
 
     const ReplayOptions& options_;
@@ -41,6 +43,9 @@ private:
     std::unique_ptr<Sink> sink_;
     std::shared_ptr<LiveProbe> probe_;
     ProbeLayout layout_;
+    std::vector<std::string> names_;  // recorded, sorted
+    std::set<std::string> later_;  // match patterns_, and were loaded too late
+    std::uint64_t edits_ = 0;
     EventLog::Position journal_;
     std::string problem_;  // why nothing is recorded yet
     std::uint64_t untaken_ = 0;  // cycles since rows were taken
