@@ -40,12 +40,26 @@ test('numbered instances group by their component; one alone has no group', () =
 });
 
 test('component, file and thread group', () => {
-    const lines = ['a pid', 'b pid /x/motors.hal', 'c sum2 /y/motors.hal fast', 'd sum2'];
+    const lines = ['a pid', 'b pid /x/motors.hal', 'c sum2 /x/motors.hal fast', 'd sum2'];
     assert.deepEqual(groups('component', ...lines), {a: 'pid', b: 'pid', c: 'sum2', d: 'sum2'});
     assert.deepEqual(
         groups('file', ...lines), {a: 'x.hal', d: 'x.hal', b: 'motors.hal', c: 'motors.hal'});
     assert.deepEqual(groups('thread', ...lines), {a: 'servo', b: 'servo', d: 'servo'});
     assert.deepEqual(groups('none', ...lines), {});
+});
+
+test('files with the same name are different groups, titled with their folders', () => {
+    const all = (...files) =>
+        files.flatMap((file, i) => [`a${i} pid ${file}`, `b${i} pid ${file}`]);
+    const titles = (...files) => [...new Set(Object.values(groups('file', ...all(...files))))];
+    assert.deepEqual(
+        titles('/m/x/motors.hal', '/m/y/motors.hal', '/m/y/io.hal'),
+        ['x/motors.hal', 'y/motors.hal', 'io.hal']);
+    assert.deepEqual(
+        titles('/m/x/a/motors.hal', '/m/y/a/motors.hal', 'motors.hal', '/m/oldmotors.hal'),
+        ['x/a/motors.hal', 'y/a/motors.hal', 'motors.hal', 'oldmotors.hal']);
+    assert.deepEqual(titles('/motors.hal', '/x/motors.hal'), ['/motors.hal', 'x/motors.hal']);
+    assert.deepEqual(groups('file', 'a pid /x/m.hal', 'b pid /y/m.hal'), {});
 });
 
 test('an instance is found by its pins, its thread by any of them', () => {

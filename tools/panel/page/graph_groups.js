@@ -38,8 +38,8 @@ export function instancesOf(objects) {
 /// The instance that owns a pin, or the component of a pin without one.
 export const instanceOf = pin => pin.instance ?? pin.component ?? pin.name.split('.')[0];
 
-/// The beginnings of a name that end before a dot or a dash, the longest first: axis.0.pid has
-/// axis.0 and axis.
+/// The beginnings of a name that end before a dot, a dash or an underscore, the longest first:
+/// axis.0.pid has axis.0 and axis.
 function beginnings(name) {
     const found = [];
     for (let i = name.length - 1; i > 0; i--)
@@ -78,10 +78,28 @@ function byName(instances) {
     };
 }
 
+/// The shortest end of a path, in whole parts, that no other of the paths has: motors.hal, or
+/// x/motors.hal when there is a y/motors.hal.
+function shortestEnd(path, paths) {
+    const parts = path.split('/'), others = paths.filter(other => other !== path);
+    for (let count = 1; count < parts.length; count++) {
+        const end = parts.slice(-count).join('/');
+        if (!others.some(other => other === end || other.endsWith(`/${end}`))) return end;
+    }
+    return path;
+}
+
+/// Groups by the file whose line made the instance.
+function byFile(instances) {
+    const paths = [...new Set(instances.map(({file}) => file))];
+    const titles = new Map(paths.map(path => [path, shortestEnd(path, paths)]));
+    return ({file}) => titles.get(file) || 'no file';
+}
+
 const keys = {
     name: byName,
     component: () => ({component}) => component,
-    file: () => ({file}) => file.split('/').pop() || 'no file',
+    file: byFile,
     thread: () => ({thread}) => thread || 'no thread'
 };
 
