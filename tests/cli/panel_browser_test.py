@@ -428,6 +428,8 @@ net position{n} axis{n}-integ.out => axis{n}-pid.feedback
         self.browser.wait("window.halcyonScope?.rows > 600")
         self.good("shell", "setp", "adder.in0", "2")
         self.browser.wait("halcyon.log.some(one => /adder.in0/.test(one.text))")
+        rows = self.browser.evaluate("halcyonScope.rows")
+        self.browser.wait(f"halcyonScope.rows > {rows} + 100")  # samples after the edit
         self.browser.evaluate("""window.saved = null;
             URL.createObjectURL = blob => { blob.arrayBuffer().then(b => { saved = [...new Uint8Array(b)]; }); return 'blob:none'; };
             HTMLAnchorElement.prototype.click = () => {};

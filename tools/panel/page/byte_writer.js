@@ -49,8 +49,8 @@ export class ByteWriter {
     /** @param {ByteWriter} other */
     append(other) { this.bytes(other.done()); }
     /// A text with its length in bytes before it.
-    text(words) {
-        const bytes = new TextEncoder().encode(words);
+    text(value) {
+        const bytes = new TextEncoder().encode(value);
         this.uint32(bytes.length);
         this.bytes(bytes);
     }

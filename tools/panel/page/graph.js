@@ -24,9 +24,9 @@ const manyInstances = 40;  // from which number on they are grouped, if nothing 
 const unlinkedId = 'unlinked:';
 
 /// The names of a list in an address.
-const listOf = words => new Set((words ?? '').split(',').filter(name => name));
+const listOf = list => new Set((list ?? '').split(',').filter(name => name));
 
-const counted = (count, noun) => `${count} ${noun}${count === 1 ? '' : 's'}`;
+const counted = (count, noun, plural = `${noun}s`) => `${count} ${count === 1 ? noun : plural}`;
 
 /// What `show latency` states about a pin, without the pin.
 const latencyOf = (found, pin) =>
@@ -176,7 +176,7 @@ export class View {
             graph = neighbourhood(graph, search.value, Number(depth.value));
         graph = firstBoxes(graph, maxBoxes);
         const size = clustered(graph);
-        const shown = graph.boxes.length === whole ? counted(whole, 'box').replace(/xs$/, 'xes') :
+        const shown = graph.boxes.length === whole ? counted(whole, 'box', 'boxes') :
                                                      `${graph.boxes.length} of ${whole} boxes`;
         text(this.note, `${shown}, ${counted(graph.edges.length, 'link')}`);
         this.foldButton.hidden = this.groups.size === 0;

@@ -48,8 +48,8 @@ const edges = [['rising', 'rising'], ['falling', 'falling'], ['either', 'either 
  */
 
 /// The channels of a URL: name:units per division:position,…
-const channelsOf = words => words.split(',').filter(word => word).slice(0, most).map(word => {
-    const [name, scale, position] = word.split(':');
+const channelsOf = list => list.split(',').filter(entry => entry).slice(0, most).map(entry => {
+    const [name, scale, position] = entry.split(':');
     return {name, scale: Number(scale) || 0, position: Number(position) || 0};
 });
 
@@ -796,7 +796,7 @@ export class View {
         context.putImageData(picture.image, 0, 0);
         faults.forEach(({at, text}, i) => {
             const x = cssWidth * (at - from) / (to - from) + 4, y = 28 + 14 * (i % 4);
-            const label = {words: `fault: ${text}`, x, y, paint: this.looks.bad};
+            const label = {text: `fault: ${text}`, x, y, paint: this.looks.bad};
             write(context, label, this.looks.back, cssWidth);
         });
         this.writeNotice(context, cssWidth, cssHeight);
@@ -804,14 +804,14 @@ export class View {
     }
 
     writeNotice(context, width, height) {
-        const words = this.notice(), {back, bad} = this.looks, y = height / 2;
-        if (words === '') return;
+        const notice = this.notice(), {back, bad} = this.looks, y = height / 2;
+        if (notice === '') return;
         const font = '600 18px system-ui, sans-serif';
         context.font = font;
-        const wide = context.measureText(words).width, x = (width - wide) / 2;
+        const wide = context.measureText(notice).width, x = (width - wide) / 2;
         context.fillStyle = back;
         context.fillRect(x - 12, y - 22, wide + 24, 36);
-        write(context, {words, x, y: y + 2, paint: bad, font}, back, width);
+        write(context, {text: notice, x, y: y + 2, paint: bad, font}, back, width);
     }
 
     /// Shades the time in which the functions did not run.
@@ -861,16 +861,16 @@ export class View {
             timeLabels(this.base, divisions, this.zeroTime(), every)
                 .map(
                     ({at, text}) =>
-                        ({words: text, x: width * at / divisions + 4, y: height - 5, paint: dim}));
+                        ({text, x: width * at / divisions + 4, y: height - 5, paint: dim}));
         if (channel?.scale && !channel.unknown) {
             const own = paint(this.selected), unit = channel.unit ? ` (${channel.unit})` : '';
             for (const {row, text} of valueLabels(channel, rows))
-                all.push({words: text, x: 14, y: height * row / rows - 4, paint: own});
-            all.push({words: channel.name + unit, x: 14, y: 14, paint: own});
+                all.push({text, x: 14, y: height * row / rows - 4, paint: own});
+            all.push({text: channel.name + unit, x: 14, y: 14, paint: own});
         }
         if (this.useCursors)
             this.cursors.forEach(
-                (at, i) => all.push({words: String(i + 1), x: width * at + 4, y: 14, paint: tone}));
+                (at, i) => all.push({text: String(i + 1), x: width * at + 4, y: 14, paint: tone}));
         return all;
     }
 

@@ -4,7 +4,7 @@
 
 /**
  * @typedef {object} Label
- * @property {string} words
+ * @property {string} text
  * @property {number} x CSS pixels
  * @property {number} y CSS pixels, of the base line
  * @property {string} paint
@@ -14,16 +14,15 @@
 const usual = '12px system-ui, sans-serif';
 
 /// Draws a label with a margin in the colour `back`, kept within `width`.
-export function write(context, {words, x, y, paint, font = usual}, back, width) {
+export function write(context, {text, x, y, paint, font = usual}, back, width) {
     context.font = font;
-    const wide = context.measureText(words).width,
-          left = Math.max(2, Math.min(x, width - wide - 4));
+    const wide = context.measureText(text).width, left = Math.max(2, Math.min(x, width - wide - 4));
     context.lineJoin = 'round';
     context.lineWidth = 3;
     context.strokeStyle = back;
-    context.strokeText(words, left, y);
+    context.strokeText(text, left, y);
     context.fillStyle = paint;
-    context.fillText(words, left, y);
+    context.fillText(text, left, y);
 }
 
 export class Labels {

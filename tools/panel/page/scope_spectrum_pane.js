@@ -50,7 +50,7 @@ export class SpectrumPane {
 
     paint(context, width, height) {
         const [grid, dim, back] = ['--line', '--dim', '--card'].map(colour);
-        const label = (words, x, y, paint) => write(context, {words, x, y, paint}, back, width);
+        const label = (text, x, y, paint) => write(context, {text, x, y, paint}, back, width);
         context.fillStyle = grid;
         for (let i = 1; i < lines; i++)
             context.fillRect(0, Math.round(height * i / lines), width, 1);

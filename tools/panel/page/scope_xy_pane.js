@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The values of the selected channel over those of another one, below the traces of the scope. The
-// newest pair has a dot.
+// The values of the selected channel over those of another one, beside the traces of the scope.
+// The newest pair has a dot.
 import {colour, h, surface} from './dom.js';
 import {label} from './scope_axes.js';
 import {write} from './scope_labels.js';
@@ -40,9 +40,9 @@ export class XyPane {
 
     paint(context, width, height) {
         const back = colour('--card'), dim = colour('--dim');
-        const say = (words, x, y, paint) => write(context, {words, x, y, paint}, back, width);
+        const put = (text, x, y, paint) => write(context, {text, x, y, paint}, back, width);
         if (this.pairs.length === 0) {
-            say(`${this.y.name} over ${this.x.name}: no samples`, 14, 16, dim);
+            put(`${this.y.name} over ${this.x.name}: no samples`, 14, 16, dim);
             return;
         }
         const same = this.x.unit === this.y.unit;
@@ -56,13 +56,13 @@ export class XyPane {
             context.fillRect(0, Math.round(down(value)), width, 1);
         this.paintPairs(context, across, down);
         for (const value of ticks(x))
-            say(label(value, x.step), across(value) + 4, height - 5, dim);
+            put(label(value, x.step), across(value) + 4, height - 5, dim);
         for (const value of ticks(y))
             if (down(value) > 30 && down(value) < height - 24)
-                say(label(value, y.step), 4, down(value) - 4, this.tone);
-        say(titled(this.y), 4, 14, this.tone);
+                put(label(value, y.step), 4, down(value) - 4, this.tone);
+        put(titled(this.y), 4, 14, this.tone);
         const name = titled(this.x);
-        say(name, width - context.measureText(name).width - 6, height - 20, dim);
+        put(name, width - context.measureText(name).width - 6, height - 20, dim);
     }
 
     paintPairs(context, across, down) {
