@@ -532,6 +532,43 @@ net position{n} axis{n}-integ.out => axis{n}-pid.feedback
             "",
             self.browser.evaluate("document.querySelector('[aria-label=\"Source\"]').value"),
         )
+        self.browser.evaluate("location.hash = '#/scope?ch=x:1:0&recording=other.csv'")
+        self.browser.wait(
+            f"{problem} === \"hal panel has no recording 'other.csv'; start it with --recording FILE\""
+        )
+        self.browser.evaluate("location.hash = '#/scope?ch=x:1:0&recording=run.csv'")
+        self.browser.wait(f"window.halcyonScope?.rows === 2 && {problem} === ''")
+
+    def test_a_table_of_minima_and_maxima_alone_is_not_saved(self):
+        rows = "".join(f"{row / 1000},{row % 7}\n" for row in range(300_000))
+        self.show_recording("time_s,x\n" + rows, "scope?ch=x:1:0&base=1&recording=run.csv")
+        self.browser.wait("window.halcyonScope?.rows === 300000 && halcyonScope.frames > 0")
+        self.browser.evaluate("""window.saved = 0;
+            URL.createObjectURL = () => { saved++; return 'blob:none'; };
+            HTMLAnchorElement.prototype.click = () => {};
+            window.press = label => [...document.querySelectorAll('button')].find(b => b.textContent === label).click();
+            window.type = key => document.querySelector('.pictures canvas').dispatchEvent(new KeyboardEvent('keydown', {key}));
+            type('Home');
+            press('CSV');""")
+        result = "[saved, document.getElementById('scope-problem').textContent]"
+        self.assertEqual(
+            [
+                0,
+                "no file is saved: only minima and maxima of this time are kept; "
+                "scroll to the last 262.1 s, whose samples are kept",
+            ],
+            self.browser.evaluate(result),
+        )
+        self.browser.evaluate("type('End'); press('CSV')")
+        self.assertEqual([1, ""], self.browser.evaluate(result))
+        self.browser.evaluate("press('MCAP')")
+        self.assertEqual(
+            [
+                2,
+                "the file has the last 262.1 s: only minima and maxima of earlier samples are kept",
+            ],
+            self.browser.evaluate(result),
+        )
 
     def test_the_scope_reports_what_a_cut_recording_lacks(self):
         self.show_recording("time_s,x\n0,1\n1,2\n2", "scope?ch=x:1:0&recording=run.csv")
