@@ -194,6 +194,12 @@ ROWS = {
     ],
     "components/fieldbus/can_timing": ["drivers/link"],
     "components/fieldbus/segment": ["runtime/sdk", "runtime/text", "drivers/link"],
+    "components/fieldbus/guardian": [
+        "components/bus/events",
+        "components/bus/guardian",
+        "drivers/link",
+    ],
+    "components/fieldbus/guardian/plugins": ["components/fieldbus/guardian", "runtime/sdk"],
     "components/fieldbus/scocan/table": [
         "runtime/text",
         "drivers/link",

@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "bus/guardian/ambient_capabilities.hpp"
 #include "link/system.hpp"
 
 extern char** environ;
@@ -72,6 +73,7 @@ public:
             argv.push_back(word.data());
         }
         argv.push_back(nullptr);
+        const AmbientCapabilities capabilities;
         const int error = posix_spawn(&pid_, words[0].c_str(), &attributes.actions,
                                       &attributes.attributes, argv.data(), environ);
         memory_fd_ = link::Descriptor();
