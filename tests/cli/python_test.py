@@ -481,6 +481,27 @@ print('done', flush=True)
         for _ in range(10):
             self.assertEqual("done\n", self.python(program))
 
+    def test_a_program_ends_whichever_thread_imports_the_module(self):
+        self.machine()
+        program = """import atexit, threading
+def last():  # it runs after the end of the module
+    import hal
+    print(hal.component_exists('sum2'), hal.get_value('adder.in1'), flush=True)
+atexit.register(last)
+def load():
+    global hal, c
+    import hal
+    c = hal.component('x')
+    c.newpin('a', hal.HAL_FLOAT, hal.HAL_IN)
+    c.ready()
+{}
+print(c['a'], flush=True)
+"""
+        in_worker = "worker = threading.Thread(target=load)\nworker.start()\nworker.join()"
+        for loads in ("load()", in_worker):
+            with self.subTest(loads):
+                self.assertEqual("0.0\nTrue 3.0\n", self.python(program.format(loads)))
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -121,7 +121,6 @@ PYBIND11_MODULE(_core, module) {
         .def("lost", &Probe::lost);
     module.def("leave_all", &leave_all);
     module.def("end", &ReleasedGil::end);
-    ReleasedGil::note_main_thread();
     module.def("after_fork", &forget_all);
     module.def("flush_all", &flush_all);
     PySys_AddAuditHook(before_processes, nullptr);

@@ -17,11 +17,11 @@ namespace hal::python {
 /// sleeps instead, until the process ends.
 class ReleasedGil {
 public:
-    ReleasedGil() : state_(PyEval_SaveThread()) {}
+    ReleasedGil() : thread_(present_thread()), state_(PyEval_SaveThread()) {}
     ReleasedGil(const ReleasedGil&) = delete;
     ~ReleasedGil() {
         ++restoring_;
-        if (ends_ && PyThreadState_GetID(state_) != main_thread_) {
+        if (ends_ && thread_ != main_thread_) {
             --restoring_;
             while (true) {
                 ::pause();
@@ -30,16 +30,16 @@ public:
         PyEval_RestoreThread(state_);
         --restoring_;
     }
-    /// Called while the module is loaded. [setup]
-    static void note_main_thread() { main_thread_ = PyThreadState_GetID(PyThreadState_Get()); }
     /// In a child process, after fork(): the other threads do not exist here. [setup]
     static void after_fork() {
         restoring_ = 0;
-        note_main_thread();
+        main_thread_ = present_thread();
     }
     /// Called last at the end of the program, in the main thread, with the lock held: no other
-    /// thread waits for the lock in the destructor when it returns. [setup]
+    /// thread waits for the lock in the destructor when it returns. Another thread may have loaded
+    /// the module. [setup]
     static void end() {
+        main_thread_ = present_thread();
         ends_ = true;
         PyThreadState* const state = PyEval_SaveThread();
         while (restoring_ != 0) {
@@ -49,9 +49,12 @@ public:
     }
 
 private:
-    inline static std::uint64_t main_thread_ = 0;
+    static std::uint64_t present_thread() { return PyThreadState_GetID(PyThreadState_Get()); }
+
+    inline static std::uint64_t main_thread_ = 0;  // written before ends_
     inline static std::atomic<bool> ends_{false};
     inline static std::atomic<int> restoring_{0};  // threads that want the lock back
+    const std::uint64_t thread_;  // a state may be freed while the lock is released
     PyThreadState* const state_;
 };
 
