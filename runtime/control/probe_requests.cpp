@@ -23,6 +23,7 @@ void ProbeRequests::probe(const Json& body, std::string& reply) {
     ProbeRequest request{names_in(body["probe"], "probe")};
     request.every = static_cast<std::uint32_t>(number("every", 1, 1'000'000, 1));
     request.buffer_ns = number("buffer_ms", 10, 60'000, 2000) * 1'000'000;
+    request.advice = "sample fewer values, a shorter buffer_ms, or a larger every";
     const std::int64_t batch_ns = number("batch_ms", 1, 1000, 20) * 1'000'000;
     if (std::string problem = probes_.add(request, batch_ns, reply); !problem.empty()) {
         throw RequestError{std::move(problem)};

@@ -163,6 +163,21 @@ setp io.fault-emcy-storm 1
                 )
                 self.assertEqual(["a.hal"], sorted(os.listdir(self.folder)))
 
+    def test_values_that_need_too_much_memory_name_the_option(self):
+        executed = "".join(f"addf sum2.{i} fast\n" for i in range(100))
+        self.write("a.hal", f"newthread fast 50000\nloadrt sum2 count=100\n{executed}start\n")
+        self.assertRegex(
+            self.bad("run", "a.hal", "--journal", "x.mcap", "--values", "sum2.*"),
+            r"^hal run: --values: the probe needs up to 550 MiB of memory, more than 64; choose "
+            r"fewer with --values\nx\.mcap: \d+ cycles\n$",
+        )
+
+    def test_a_netlist_that_can_be_read_only_once_is_recorded(self):
+        for values in (["--values", "sine"], []):
+            record = ["--for", "10ms", "-q", "--record", "x.csv", *values]
+            self.good("sim", "/dev/stdin", *record, given=NETLIST)
+            self.assertEqual(11, len(self.rows("x.csv")))
+
     def test_a_plot_has_the_values_it_was_asked_for(self):
         self.sim(NETLIST, "--for", "1s", "--record", "run.mcap")
         self.assertEqual("run.svg\n", self.good("plot", "run.mcap", "sine", "high"))

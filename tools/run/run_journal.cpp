@@ -40,7 +40,7 @@ public:
         }
         std::vector<std::string> names = chosen_values(session_.model(), patterns);
         std::string problem;
-        probe_ = session_.probes().attach({names}, problem);
+        probe_ = session_.probes().attach({.names = names, .advice = fewer_values}, problem);
         if (!probe_) return "--values: " + problem;
         journal_.sampled(std::move(names));
         layout_ = Probes::layout(*probe_);
@@ -242,8 +242,7 @@ int run_journaled(const RunOptions& given) {
                     "later has no recorded values");
     }
     if (!options.values.empty()) {
-        const auto buffer_ns = [](std::int64_t) { return ProbeRequest().buffer_ns; };
-        const std::string problem = problem_of_values(options, options.values, buffer_ns);
+        const std::string problem = problem_of_values(options, options.values);
         if (!problem.empty()) return fail(options, "--values: " + problem);
     }
     FileOfRun journal(options);

@@ -57,10 +57,7 @@ int check_recording(const SimOptions& options) {
     if (const std::string problem = mcap::unwritable(options.record); !problem.empty()) {
         return fail(options, fmt::format("cannot write '{}': {}", options.record, problem));
     }
-    const auto buffer_ns = [&options](std::int64_t period_ns) {
-        return step_of(period_ns, options).buffered_ns;
-    };
-    const std::string problem = problem_of_values(options, options.values, buffer_ns);
+    const std::string problem = problem_of_values(options, options.values);
     return problem.empty() ? 0 : fail(options, "--values: " + problem);
 }
 
@@ -131,9 +128,10 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
             return fail(options, "--values: " + unknown);
         }
         step = step_of(shortest_period_ns(session), options);
-        probe = session.probes().attach(
-            {.names = chosen_values(session.model(), patterns), .buffer_ns = step.buffered_ns},
-            problem);
+        probe = session.probes().attach({.names = chosen_values(session.model(), patterns),
+                                         .buffer_ns = step.buffered_ns,
+                                         .advice = fewer_values},
+                                        problem);
         if (!probe) return fail(options, "--values: " + problem);
         layout = Probes::layout(*probe);
         journal = session.event_log().begin();

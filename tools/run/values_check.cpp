@@ -6,11 +6,15 @@
 #include <chrono>
 #include <csignal>
 #include <fcntl.h>
+#include <filesystem>
 #include <poll.h>
 #include <sys/wait.h>
+#include <system_error>
 #include <unistd.h>
 
+#include "cli/no_output.hpp"
 #include "cli/output.hpp"
+#include "machine/load/source_tree.hpp"
 #include "machine/session.hpp"
 #include "run/chosen_values.hpp"
 #include "run/hosted_machine.hpp"
@@ -20,41 +24,27 @@ namespace hal::tools {
 
 namespace {
 
-/// Prints nothing: the run that follows does.
-class Silent final : public Output {
-public:
-    void out(std::string_view) override {}
-    void err(std::string_view) override {}
-};
-
-std::string problem_in(Session& session, const std::vector<std::string>& values,
-                       const BufferOf& buffer_ns) {
+std::string problem_in(Session& session, const std::vector<std::string>& values) {
     const Model& model = session.model();
     const std::vector<std::string> patterns = names_in(values);
     if (session.absences().has_programs()) return "";
     if (std::string unknown = unknown_value(model, patterns); !unknown.empty()) return unknown;
-    std::int64_t shortest_ns = 0;
-    for (const auto& thread : model.threads) {
-        const std::int64_t period_ns = thread->options.period_ns;
-        shortest_ns = shortest_ns == 0 ? period_ns : std::min(shortest_ns, period_ns);
-    }
     std::string problem;
-    session.probes().attach(
-        {.names = chosen_values(model, patterns), .buffer_ns = buffer_ns(shortest_ns)}, problem);
+    session.probes().attach({.names = chosen_values(model, patterns), .advice = fewer_values},
+                            problem);
     return problem;
 }
 
-std::string load_and_check(const NetlistOptions& options, const std::vector<std::string>& values,
-                           const BufferOf& buffer_ns) {
+std::string load_and_check(const NetlistOptions& options, const std::vector<std::string>& values) {
     export_variables(options, own_name(options));
     Session session(offline());
     ShellOptions how = shell_options(options);
     how.check = true;
     Shell shell(session, how);
-    Silent output;
+    NoOutput output;  // the run that follows prints
     if (load_offline(shell, options, output) != 0) return "";
     const auto lock = session.lock();
-    return problem_in(session, values, buffer_ns);
+    return problem_in(session, values);
 }
 
 /// Returns what the other process writes up to its end, and ends it after 10 s.
@@ -80,13 +70,22 @@ std::string answer_of(pid_t child, int end) {
     return text;
 }
 
-bool is_script(const std::string& path) { return path.ends_with(".tcl"); }
+/// A pipe can be read once only, and a script does more than to load.
+bool can_be_read_twice(const std::string& path) {
+    std::error_code error;
+    return !path.ends_with(".tcl") && std::filesystem::is_regular_file(path, error);
+}
+
+bool can_be_loaded_twice(const NetlistOptions& options) {
+    return options.part.empty() && (options.ini.empty() || can_be_read_twice(options.ini)) &&
+           std::ranges::all_of(options.words, can_be_read_twice);
+}
 
 }  // namespace
 
-std::string problem_of_values(const NetlistOptions& options, const std::vector<std::string>& values,
-                              const BufferOf& buffer_ns) {
-    if (std::ranges::any_of(options.words, is_script) || !options.part.empty()) return "";
+std::string problem_of_values(const NetlistOptions& options,
+                              const std::vector<std::string>& values) {
+    if (values.empty() || !can_be_loaded_twice(options)) return "";
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) return "";
     const pid_t child = ::fork();
@@ -94,7 +93,8 @@ std::string problem_of_values(const NetlistOptions& options, const std::vector<s
         const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
         ::dup2(nothing, STDOUT_FILENO);
         ::dup2(nothing, STDERR_FILENO);
-        write_all(ends[1], load_and_check(options, values, buffer_ns));
+        forbid_builds();  // the run builds
+        write_all(ends[1], load_and_check(options, values));
         ::_exit(0);
     }
     ::close(ends[1]);

@@ -2,8 +2,6 @@
 // The values of --values, checked before the machine runs.
 #pragma once
 
-#include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -11,14 +9,15 @@
 
 namespace hal::tools {
 
-/// Returns the capacity of a probe's rings for the shortest period, both in ns.
-using BufferOf = std::function<std::int64_t(std::int64_t shortest_period_ns)>;
+/// The end of a problem with too many values.
+inline constexpr char fewer_values[] = "choose fewer with --values";
 
-/// Loads the netlists in a process of its own that starts nothing, and returns why the values of
-/// `values` (of --values) cannot be recorded there; "" where they can, or where only a run shows it: with
-/// errors in the netlists, names that programs create, or netlists in Tcl. Called before
-/// the process has another thread. [setup]
-std::string problem_of_values(const NetlistOptions& options, const std::vector<std::string>& values,
-                              const BufferOf& buffer_ns);
+/// Loads the netlists in a process of its own that starts and builds nothing, and returns why the
+/// values of `values` (of --values) cannot be recorded there; "" where they can, or where only a
+/// run shows it: without names, with errors in the netlists, names that programs create, netlists
+/// in Tcl, components that are built first, a file that can be read only once, or too much memory
+/// for the rows. Called before the process has another thread. [setup]
+std::string problem_of_values(const NetlistOptions& options,
+                              const std::vector<std::string>& values);
 
 }  // namespace hal::tools

@@ -130,6 +130,7 @@ std::uint64_t lost_in(const std::vector<RingGroup>& groups) {
 }
 
 std::size_t rows_for(const ProbeRequest& request, const Thread& thread) {
+    if (request.buffer_rows > 0) return request.buffer_rows;
     const std::int64_t period = thread.options.period_ns * request.every;
     return static_cast<std::size_t>(
         std::max<std::int64_t>(request.buffer_ns / std::max<std::int64_t>(period, 1), 16));
@@ -254,8 +255,8 @@ std::shared_ptr<LiveProbe> Probes::attach(const ProbeRequest& request, std::stri
     }
     if (bytes > max_bytes) {
         return reject("the probe needs up to " + std::to_string(bytes >> 20) +
-                      " MiB of memory, more than " + std::to_string(max_bytes >> 20) +
-                      "; sample fewer values, a shorter buffer_ms, or a larger every");
+                      " MiB of memory, more than " + std::to_string(max_bytes >> 20) + "; " +
+                      request.advice);
     }
     adopt(*probe, found);
     probe->until_ns = state_.executor->now_ns();

@@ -23,6 +23,9 @@ struct ProbeRequest {
     std::vector<std::string> names;      ///< pins, parameters, signals
     std::uint32_t every = 1;             ///< cycles of each thread from one row to the next
     std::int64_t buffer_ns = 2'000'000'000;  ///< capacity of each thread's ring
+    std::size_t buffer_rows = 0;             ///< in place of buffer_ns where it is not 0
+    /// The end of the problem when the rings need too much memory.
+    std::string advice = "name fewer";
 };
 
 struct ProbeColumn {
