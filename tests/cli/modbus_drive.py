@@ -86,6 +86,8 @@ class Drive:
         os.write(self.master, reply)
 
     def close(self):
+        if self.ended:
+            return
         self.ended = True
         self.thread.join()
         os.close(self.master)

@@ -3,11 +3,12 @@
 """The guardian stops a drive on a pseudo terminal however the runtime ends, and reports what it did. modbus_stop_test.py measures how soon."""
 
 import os
+import re
 import signal
 import time
 import unittest
 
-from harness import Case, Terminal, wait_until
+from harness import Case, Terminal, suspend, wait_until
 from modbus_drive import BROADCAST_STOP, RUN, STOP, Drive
 
 CONFIGURATION = """[bus]
@@ -157,6 +158,27 @@ class Guardian(Case):
             self.report_of_next_start(),
         )
 
+    def test_a_broadcast_stop_that_cannot_be_sent_is_not_reported_as_sent(self):
+        broadcast = "[bus]\nbroadcast-stop = holding 0x2000 1\nturnaround = 40ms\n"
+        self.write("spindle.modbus", CONFIGURATION.replace("[bus]\n", broadcast))
+        machine = self.run_spindle()
+        guardian = self.children(machine.pid)[0]
+        suspend(guardian)
+        self.drive.close()
+        machine.kill()
+        machine.wait()
+        os.kill(guardian, signal.SIGCONT)
+        reports = self.folder / "state/halcyon"
+        report = wait_until(
+            lambda: "".join(file.read_text() for file in reports.glob("guardian-*")), "the report"
+        )
+        report = re.sub("^[-0-9]{10} [:0-9]{8}, (.*); [0-9.]+ ms\n$", r"\1", report)
+        self.assertEqual(
+            "the process has ended; the broadcast stop was not sent: the line is lost; "
+            "slave 1 (spindle) did not acknowledge its stop telegrams",
+            report.replace(" after its cycles had stopped", ""),
+        )
+
     def test_a_drive_that_does_not_answer_is_reported(self):
         machine = self.run_spindle()
         self.drive.answers = False
@@ -212,7 +234,9 @@ class Guardian(Case):
             "another program uses 'line'",
             self.bad("modbus", "read", "serial:line?baud=115200", "1", "holding", "0x2103"),
         )
-        self.assertIn("another program uses 'line'", self.bad("run", "--name", "two", "spindle.hal"))
+        self.assertIn(
+            "another program uses 'line'", self.bad("run", "--name", "two", "spindle.hal")
+        )
         self.assertEqual(RUN, self.drive.registers[0x2000])
         self.assertEqual("0", self.value("modbus.0.spindle.timeouts"))
         self.end(machine)

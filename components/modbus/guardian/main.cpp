@@ -110,9 +110,7 @@ private:
             text_ += " after its cycles had stopped";
         }
         if (!bus_.broadcast_stop.empty()) {
-            const bool was_sent = image_.header().broadcasts.load() != broadcasts_;
-            text_ += was_sent ? "; the broadcast stop was sent"
-                              : "; the broadcast stop was not sent: the line is lost";
+            text_ += broadcast_text();
         }
         for (std::size_t n = 0; n < bus_.slaves.size(); ++n) {
             const Slave& slave = bus_.slaves[n];
@@ -127,6 +125,15 @@ private:
         dprintf(STDERR_FILENO, "%s: guardian: %s\n", name_, text_.c_str());
         bus::keep_report(report_, text_);
         return 0;
+    }
+
+    const char* broadcast_text() const {
+        if (image_.header().broadcasts.load() != broadcasts_) {
+            return "; the broadcast stop was sent";
+        }
+        return image_.header().line_open.load() == 0
+                   ? "; the broadcast stop was not sent: the line is lost"
+                   : "; the broadcast stop was not sent: the line does not accept it";
     }
 
     const char* name_;

@@ -24,6 +24,9 @@ constexpr std::uint32_t max_disturbance = 4 * corrupt_weight;
 constexpr std::uint32_t max_rereads = 3;  // at once, of a value that changes
 constexpr std::int64_t probe_share = 20;       // 1/20 of the line: 5 %
 constexpr std::int64_t urgent_share = 4;       // 1/4
+// a line that is open and does not accept the broadcast stop: 1 s
+constexpr std::int64_t broadcast_retry_ns = 10 * millisecond;
+constexpr std::uint32_t max_broadcast_failures = 100;
 // a slave that was just lost may not have received a command, as the stop of a drive
 constexpr std::int64_t fresh_loss_ns = 5'000 * millisecond;
 
@@ -155,6 +158,8 @@ void Master::stop(StopReason reason, std::int64_t now_ns) noexcept {
     stop_turn_ = 0;
     broadcast_ = bus_.broadcast_stop.empty() ? Broadcast::none : Broadcast::first;
     broadcast_next_ = 0;
+    broadcast_failures_ = 0;
+    is_broadcast_reported_ = false;
     image_.header().phase.store(static_cast<std::uint32_t>(Phase::stopping));
     for (std::uint32_t n = 0; n < slaves_.size(); ++n) {
         slaves_[n].is_stop_reported = false;
@@ -656,7 +661,7 @@ void Master::finish_stop(std::int64_t now_ns) noexcept {
         report_unconfirmed(n, now_ns);
         set_stop(n, StopState::repeating, now_ns);
     }
-    if (!is_lost && has_due_broadcast()) return;
+    if (!is_lost && request_last_broadcast()) return;
     broadcast_ = Broadcast::none;
     stopping_ = false;
     image_.header().phase.store(static_cast<std::uint32_t>(Phase::stopped));
@@ -667,10 +672,12 @@ void Master::repeat_broadcast() noexcept {
     if (!held_ || bus_.broadcast_stop.empty()) return;
     broadcast_ = stopping_ ? Broadcast::first : Broadcast::last;
     broadcast_next_ = 0;
+    broadcast_failures_ = 0;
 }
 
-/// Returns whether the stop waits for a broadcast. No slave waits for an addressed stop telegram.
-bool Master::has_due_broadcast() noexcept {
+/// Requests the broadcast behind the addressed stop telegrams, for which no slave waits any more.
+/// Returns whether the stop waits for a broadcast.
+bool Master::request_last_broadcast() noexcept {
     if (broadcast_ == Broadcast::waits) {
         broadcast_ = Broadcast::last;
     }
@@ -683,14 +690,29 @@ void Master::finish_broadcast(std::int64_t now_ns) noexcept {
     free_at_ns_ = sent_ns + bus_.turnaround_ns;
     image_.header().busy_ns.fetch_add(free_at_ns_ - now_ns, std::memory_order_relaxed);
     end_of_job();
+    broadcast_failures_ = 0;
     if (++broadcast_next_ < bus_.broadcast_stop.size()) return;
-    broadcast_next_ = 0;
     image_.header().broadcasts.fetch_add(1, std::memory_order_relaxed);
-    const bool is_first = broadcast_ == Broadcast::first;
-    broadcast_ = is_first ? Broadcast::waits : Broadcast::none;
-    if (is_first) {
+    if (!is_broadcast_reported_) {
+        is_broadcast_reported_ = true;
         image_.tell({Event::stop_broadcast, 0, 0, sent_ns - stop_at_ns_});
     }
+    end_broadcast(now_ns);
+}
+
+/// The line did not accept a telegram to all slaves: it is sent again, but an open line that accepts
+/// nothing must not keep the addressed stop telegrams waiting.
+void Master::fail_broadcast(std::int64_t now_ns) noexcept {
+    free_at_ns_ = now_ns + broadcast_retry_ns;
+    end_of_job();
+    if (++broadcast_failures_ < max_broadcast_failures) return;
+    broadcast_failures_ = 0;
+    end_broadcast(now_ns);
+}
+
+void Master::end_broadcast(std::int64_t now_ns) noexcept {
+    broadcast_next_ = 0;
+    broadcast_ = broadcast_ == Broadcast::first ? Broadcast::waits : Broadcast::none;
     finish_stop(now_ns);
 }
 
@@ -1080,8 +1102,8 @@ void Master::send(std::int64_t now_ns) noexcept {
     waits_ = !is_broadcast;
     echo_is_due_ = true;
     // a failed send is a request that is not answered; is_open() reports a lost line
-    line_->send(sent_.span(), now_ns);
-    if (is_broadcast) return finish_broadcast(now_ns);
+    const bool is_sent = line_->send(sent_.span(), now_ns);
+    if (is_broadcast) return is_sent ? finish_broadcast(now_ns) : fail_broadcast(now_ns);
     deadline_ns_ = std::max(now_ns, line_->sent_until_ns()) + slave.timeout_ns;
 }
 

@@ -161,7 +161,9 @@ private:
     std::int64_t next_due(std::int64_t now_ns) const noexcept;
     void send(std::int64_t now_ns) noexcept;
     void finish_broadcast(std::int64_t now_ns) noexcept;
-    bool has_due_broadcast() noexcept;
+    void fail_broadcast(std::int64_t now_ns) noexcept;
+    void end_broadcast(std::int64_t now_ns) noexcept;
+    bool request_last_broadcast() noexcept;
     void repeat_broadcast() noexcept;
     void finish_stop(std::int64_t now_ns) noexcept;
 
@@ -217,6 +219,8 @@ private:
     std::uint32_t stop_turn_ = 0;
     Broadcast broadcast_ = Broadcast::none;
     std::size_t broadcast_next_ = 0;  // telegram
+    std::uint32_t broadcast_failures_ = 0;  // to send it, in a row
+    bool is_broadcast_reported_ = false;  // as sent, since the stop
 };
 
 }  // namespace hal::modbus

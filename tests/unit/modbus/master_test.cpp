@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "modbus/master/event_texts.hpp"
 #include "world.hpp"
 
 namespace hal::modbus::test {
@@ -492,6 +493,29 @@ TEST_F(Stop, Is_not_repeated_to_a_slave_that_returns_later) {
     EXPECT_EQ(get(51), 9);
 }
 
+/// A line that is lost, or is open and accepts no bytes.
+class FailingLine final : public line::Line {
+public:
+    enum class State : std::uint8_t { good, accepts_nothing, lost };
+    FailingLine(std::unique_ptr<line::Line> line, const State& state)
+        : line_(std::move(line)), state_(state) {}
+    const line::Description& description() const noexcept override { return line_->description(); }
+    bool is_open(std::int64_t now) noexcept override {
+        return state_ != State::lost && line_->is_open(now);
+    }
+    bool send(std::span<const std::uint8_t> bytes, std::int64_t now) noexcept override {
+        return state_ == State::good && line_->send(bytes, now);
+    }
+    std::size_t receive(std::span<std::uint8_t> bytes, std::int64_t now) noexcept override {
+        return line_->receive(bytes, now);
+    }
+    std::int64_t sent_until_ns() const noexcept override { return line_->sent_until_ns(); }
+
+private:
+    std::unique_ptr<line::Line> line_;
+    const State& state_;
+};
+
 /// Two slaves with the register 50, of which only the second has a stop telegram of its own.
 struct BroadcastStop : testing::Test {
     void start() {
@@ -511,12 +535,22 @@ struct BroadcastStop : testing::Test {
     std::ptrdiff_t sent(const std::string& frame) const {
         return std::count(frames.begin(), frames.end(), frame);
     }
+    /// Returns the lines of all events since the last call.
+    std::vector<std::string> lines() const {
+        const EventTexts texts(w.bus(), w.plan());
+        std::vector<std::string> all;
+        for (EventRecord record; w.image.pop(record);) {
+            all.push_back(texts.line(record));
+        }
+        return all;
+    }
 
     static constexpr const char* broadcast = "00 06 00 32 00 07 68 16";
     static constexpr const char* bus =
         "[bus]\nlink = sim:x\nbaud = 38400\nbroadcast-stop = holding 50 7\nturnaround = 100ms\n"
         "[defaults]\ntimeout = 50ms\n";
     std::vector<std::string> frames;
+    FailingLine::State state = FailingLine::State::good;
     World w{std::string(bus) +
                 "[slave 1 a]\nread r = holding 0\n"
                 "[slave 2 b]\nread r = holding 0\nstop = holding 50 7\n",
@@ -524,7 +558,8 @@ struct BroadcastStop : testing::Test {
                 "[slave 1 a]\nread r = holding 0\nread c = holding 50\n"
                 "[slave 2 b]\nread r = holding 0\nread c = holding 50\n",
             [this](std::unique_ptr<line::Line> line) {
-        return std::make_unique<RecordedLine>(std::move(line), frames);
+        return std::make_unique<FailingLine>(
+            std::make_unique<RecordedLine>(std::move(line), frames), state);
     }};
 };
 
@@ -578,6 +613,60 @@ TEST_F(BroadcastStop, Is_sent_once_more_by_each_further_stop) {
     stop();
     w.run(second);
     EXPECT_EQ(sent(broadcast), 4);
+}
+
+TEST_F(BroadcastStop, Is_sent_again_and_not_reported_until_the_line_accepts_it) {
+    start();
+    lines();
+    state = FailingLine::State::accepts_nothing;
+    stop();
+    w.run(200 * ms);
+    EXPECT_EQ(w.image.header().broadcasts.load(), 0U);
+    EXPECT_EQ(lines(), std::vector<std::string>{"sends the stop telegrams: the pin estop is TRUE"});
+    state = FailingLine::State::good;
+    w.run(second);
+    EXPECT_EQ(sent(broadcast), 2);
+    EXPECT_EQ(w.image.header().broadcasts.load(), 2U);
+    EXPECT_EQ(lines(),
+              (std::vector<std::string>{
+                  "the broadcast stop was sent after 202.1 ms; no slave acknowledges a broadcast",
+                  "slave 2 (b) acknowledged its stop telegrams after 308.1 ms"}));
+}
+
+TEST_F(BroadcastStop, Is_reported_when_it_is_sent_only_after_the_line_has_returned) {
+    start();
+    lines();
+    state = FailingLine::State::lost;
+    stop();
+    w.run(2 * second);
+    EXPECT_EQ(w.image.header().phase.load(), static_cast<std::uint32_t>(Phase::stopped));
+    EXPECT_EQ(w.image.header().broadcasts.load(), 0U);
+    EXPECT_EQ(lines(),
+              (std::vector<std::string>{
+                  "sends the stop telegrams: the pin estop is TRUE",
+                  "sim:x is lost; it is opened again as soon as possible",
+                  "slave 2 (b) did not acknowledge its stop telegrams; stop it by other means"}));
+    state = FailingLine::State::good;
+    w.run(second);
+    EXPECT_EQ(sent(broadcast), 1);
+    EXPECT_EQ(w.image.header().broadcasts.load(), 1U);
+    EXPECT_EQ(lines(),
+              (std::vector<std::string>{
+                  "sim:x is open again",
+                  "the broadcast stop was sent after 2002.1 ms; no slave acknowledges a broadcast",
+                  "slave 1 (a) is online", "slave 2 (b) is online",
+                  "slave 2 (b) acknowledged its stop telegrams after 2115.5 ms"}));
+}
+
+TEST_F(BroadcastStop, Ends_on_a_line_that_accepts_nothing) {
+    start();
+    lines();
+    state = FailingLine::State::accepts_nothing;
+    stop();
+    w.run(4 * second);
+    EXPECT_EQ(w.image.header().phase.load(), static_cast<std::uint32_t>(Phase::stopped));
+    EXPECT_EQ(w.image.header().broadcasts.load(), 0U);
+    EXPECT_EQ(sent(broadcast), 0);
 }
 
 TEST(Master, Stop_with_a_rejected_telegram_is_not_acknowledged) {
