@@ -746,17 +746,18 @@ private:
     }
 
     void warn_of_missing_stop() {
-        if (!slave_->stop.empty() || no_stop_ || !out_.bus.broadcast_stop.empty()) return;
-        for (const Value& v : slave_->values) {
-            if (v.is_output) {
-                report_.warning(Topic::slave, slave_->at,
-                                "no stop telegram for slave " + std::to_string(slave_->unit) +
-                                    ", which is written to",
-                                "a slave keeps its last command when the machine ends; write stop "
-                                "= holding ADDRESS VALUE, or stop = none");
-                return;
-            }
-        }
+        if (!slave_->stop.empty() || no_stop_) return;
+        const bool is_written = std::any_of(slave_->values.begin(), slave_->values.end(),
+                                            [](const Value& v) { return v.is_output; });
+        if (!is_written) return;
+        const bool has_broadcast = !out_.bus.broadcast_stop.empty();
+        report_.warning(
+            Topic::slave, slave_->at,
+            "no stop telegram for slave " + std::to_string(slave_->unit) + ", which is written to" +
+                (has_broadcast ? "; it may miss the broadcast stop" : ""),
+            std::string(has_broadcast ? "a broadcast that it misses is not repeated for it"
+                                      : "a slave keeps its last command when the machine ends") +
+                "; write stop = holding ADDRESS VALUE, or stop = none");
     }
 
     /// Frames of the first Huanyang dialect and of Modbus have different lengths: a slave of the one
