@@ -179,6 +179,23 @@ class Guardian(Case):
             report.replace(" after its cycles had stopped", ""),
         )
 
+    def test_a_stop_without_guardian_lasts_as_long_as_its_broadcasts(self):
+        writes = ", ".join(["holding 0x2000 1"] * 4)
+        broadcast = f"[bus]\nguardian = no\nbroadcast-stop = {writes}\nturnaround = 1s\n"
+        self.write("spindle.modbus", CONFIGURATION.replace("[bus]\n", broadcast))
+        machine = self.start("run", "spindle.hal")
+        self.comes("modbus.0.spindle.online", "TRUE")
+        self.say("setp", "modbus.0.spindle.run", "TRUE")
+        wait_until(lambda: self.drive.registers[0x2000] == RUN, "the drive runs")
+        begin = len(self.drive.writes)
+        out = self.end(machine)[1]
+        frames = [f for _, f in self.drive.writes[begin:] if f[2:4] == STOP[2:4]]
+        # the end of the thread and the unload are stops: the second begins anew
+        self.assertEqual([BROADCAST_STOP] * 4 + [STOP] + [BROADCAST_STOP] * 4, frames[-9:])
+        self.assertEqual({BROADCAST_STOP}, set(frames[:-5]))
+        self.assertIn("slave 1 (spindle) acknowledged its stop telegrams after", out)
+        self.assertNotIn("stop the drives by other means", out)
+
     def test_a_drive_that_does_not_answer_is_reported(self):
         machine = self.run_spindle()
         self.drive.answers = False

@@ -185,4 +185,24 @@ Load load_of(const Plan& plan, const Bus& bus, Framing framing, std::int64_t thi
     return load;
 }
 
+std::int64_t max_stop_ns(const Plan& plan, const Bus& bus) {
+    constexpr std::int64_t burst_ns = 20'000'000;  // of a USB adapter
+    const std::int64_t silence = silence_ns(bus.line);
+    const std::int64_t frame = line::characters_ns(bus.line, 16);  // at most 13: 32 coils
+    // a late answer is waited for once more
+    const auto waits = [&](const Slave& slave) { return 2 * slave.timeout_ns + burst_ns; };
+    std::int64_t on_line = bus.broadcast_stop.empty() ? 0 : bus.turnaround_ns;
+    for (const Telegram& t : plan.telegrams) {
+        on_line = std::max(on_line, time_of(t, bus, Framing::rtu).all(waits(bus.slaves[t.slave])));
+    }
+    std::int64_t all = 2 * on_line;  // it ends, and a register may be read for the echo
+    const auto broadcasts = 2 * static_cast<std::int64_t>(bus.broadcast_stop.size());
+    all += broadcasts * (silence + bus.max_gap_ns() + frame + bus.turnaround_ns);
+    for (const Slave& slave : bus.slaves) {
+        const auto requests = static_cast<std::int64_t>(slave.stop.size()) * slave.stop_attempts;
+        all += requests * (2 * frame + 2 * silence + slave.gap_ns + waits(slave));
+    }
+    return all;
+}
+
 }  // namespace hal::modbus

@@ -6,12 +6,12 @@ namespace hal::modbus {
 namespace {
 
 constexpr std::int64_t arm_ns = 3'000'000'000;
-constexpr std::int64_t end_ns = 15'000'000'000;
 
 }  // namespace
 
 std::string GuardianProcess::start(const GuardianArguments& arguments, const std::string& text,
                                    const Bus& bus, const Plan& plan) {
+    end_limit_ns_ = stop_limit_ns(plan, bus);
     if (std::string problem = child_.map(Image::size_of(bus, plan), text); !problem.empty()) {
         return problem;
     }
@@ -45,7 +45,7 @@ bool GuardianProcess::end() noexcept {
     resume();
     image_.header().ending.store(1, std::memory_order_release);
     image_.stop(StopReason::unload);
-    if (has_ended_within(end_ns)) return true;
+    if (has_ended_within(end_limit_ns_)) return true;
     child_.kill();
     return false;
 }

@@ -36,13 +36,15 @@ public:
     }
     /// Continues a guardian that was suspended by a signal. [any]
     void resume() const noexcept { child_.resume(); }
-    /// Continues it, requests the stop telegrams and the end, and waits for it. Returns false when
-    /// it had to be killed. [setup]
+    /// Continues it, requests the stop telegrams and the end, and waits for it, for at most
+    /// end_limit_ns(). Returns false when it had to be killed. [setup]
     bool end() noexcept;
+    std::int64_t end_limit_ns() const noexcept { return end_limit_ns_; }
 
 private:
     bus::ChildProcess child_;
     Image image_;
+    std::int64_t end_limit_ns_ = 0;
 };
 
 }  // namespace hal::modbus

@@ -78,7 +78,12 @@ private:
                              header.outputs_valid.load(std::memory_order_acquire) != 0, now)) {
         case bus::ParentWatch::Change::none: break;
         case bus::ParentWatch::Change::died: begin(StopReason::death, now); break;
-        case bus::ParentWatch::Change::hangs: begin(StopReason::heartbeat, now); break;
+        case bus::ParentWatch::Change::hangs:
+            // a stop that precedes the end must not begin anew because its machine runs no cycles
+            if (header.ending.load(std::memory_order_acquire) == 0) {
+                begin(StopReason::heartbeat, now);
+            }
+            break;
         }
     }
 

@@ -41,9 +41,11 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
      "other means]"},
     {Event::guardian_runs, bus::Effect::ends, "the guardian runs again"},
     {Event::guardian_killed, bus::Effect::none,
-     "the guardian did not end within 15 s and was killed; stop the drives by other means"},
+     "the guardian did not end within {limit} and was killed; stop the drives by other means"},
     {Event::stop_broadcast, bus::Effect::none,
      "the broadcast stop was sent after {time}; no slave acknowledges a broadcast"},
+    {Event::stop_unfinished, bus::Effect::none,
+     "not all stop telegrams were sent within {limit}; stop the drives by other means"},
 };
 static_assert(bus::in_order(event_rows));
 
@@ -102,6 +104,7 @@ private:
             std::snprintf(text, sizeof text, "%.1f ms", static_cast<double>(r.value) * 1e-6);
             return text;
         }
+        if (name == "limit") return std::to_string((r.value + 999'999'999) / 1'000'000'000) + " s";
         return {};
     }
     std::string slave_text(std::size_t slave) const {

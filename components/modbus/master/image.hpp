@@ -33,8 +33,9 @@ enum class Event : std::uint8_t {
     slave_accepts,  ///< all telegrams again
     guardian_stalls,
     guardian_runs,  ///< again
-    guardian_killed,  ///< at the end of the component
+    guardian_killed,  ///< at the end of the component; value: ns that it had
     stop_broadcast,  ///< value: ns from the stop to the end of the frame
+    stop_unfinished,  ///< at the end of the component; value: ns that the master had
 };
 
 /// Why the drives are stopped.

@@ -9,6 +9,7 @@
 #include "bus/guardian/report.hpp"
 #include "hal/background.hpp"
 #include "hal/reporter.hpp"
+#include "hal/setup_time.hpp"
 #include "link/call_journal.hpp"
 #include "modbus/guardian/guardian_process.hpp"
 #include "modbus/master/event_texts.hpp"
@@ -65,6 +66,7 @@ struct Modbus : hal::bus::BusComponent {
             // the values of a line are not in a journal, and replaying one opens no real line
             start_local(replays ? "sim:replay" : arguments_.bus.link);
         }
+        setup_time_.start();
         begin_cycles();
         is_alive_.store(true);
         is_stopped_by_another_ = false;
@@ -76,6 +78,10 @@ struct Modbus : hal::bus::BusComponent {
     }
 
     void stop() noexcept {
+        if (has_image_ && !is_virtual_ && arguments_.bus.has_stops()) {
+            setup_time_.expect(stop_limit_ns(arguments_.plan, arguments_.bus),
+                               "the stop telegrams are sent until the slaves acknowledge them");
+        }
         if (local_) {
             stop_local();
         }
@@ -208,7 +214,7 @@ private:
     void end_guardian() noexcept {
         if (!guardian_) return;
         if (!guardian_->end()) {
-            reporter_->tell({Event::guardian_killed, 0, 0, 0});
+            reporter_->tell({Event::guardian_killed, 0, 0, guardian_->end_limit_ns()});
             stop_drives();
         } else if (!is_alive_.load() && !is_stopped_by_another_) {
             stop_drives();
@@ -263,9 +269,12 @@ private:
         if (is_virtual_ || !arguments_.bus.has_stops()) return;
         image_.header().ending.store(1, std::memory_order_release);
         image_.stop(StopReason::unload);
-        for (int n = 0; n < 1000; ++n) {
-            if (image_.header().phase.load(std::memory_order_acquire) ==
-                static_cast<std::uint32_t>(Phase::stopped)) {
+        const std::int64_t limit = stop_limit_ns(arguments_.plan, arguments_.bus);
+        const std::int64_t begin = hal::link::monotonic_ns();
+        while (image_.header().phase.load(std::memory_order_acquire) !=
+               static_cast<std::uint32_t>(Phase::stopped)) {
+            if (hal::link::monotonic_ns() - begin > limit) {
+                reporter_->tell({Event::stop_unfinished, 0, 0, limit});
                 return;
             }
             const timespec pause{0, 5 * millisecond};
@@ -429,6 +438,7 @@ private:
     std::size_t online_slaves_ = 0;
     std::deque<hal::LastingFault> faults_of_slaves_, stop_faults_of_slaves_, rejections_of_slaves_;
     hal::LastingFault line_fault_, guardian_fault_, stall_fault_;
+    hal::SetupTime setup_time_;
     std::string previous_report_;
 
     std::vector<std::byte> memory_;  // of the image of a local master

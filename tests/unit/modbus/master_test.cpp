@@ -669,6 +669,39 @@ TEST_F(BroadcastStop, Ends_on_a_line_that_accepts_nothing) {
     EXPECT_EQ(sent(broadcast), 0);
 }
 
+/// Returns the time from a stop to its end, on a line of this configuration without answers, behind
+/// the expected longest one.
+std::pair<std::int64_t, std::int64_t> time_of_stop(const std::string& text) {
+    World w(text);
+    w.run(second);
+    w.slaves->faults().push_back({});
+    w.run(100 * ms);
+    w.image.header().stop_held.store(1);
+    w.image.stop(StopReason::unload);
+    const std::int64_t begin = w.now;
+    do {
+        w.run(10 * ms);
+    } while (w.image.header().phase.load() != static_cast<std::uint32_t>(Phase::stopped));
+    return {max_stop_ns(w.plan(), w.bus()), w.now - begin};
+}
+
+TEST(Master, Longest_time_of_a_stop_is_that_of_slaves_that_do_not_answer) {
+    const std::string slave = "timeout = 200ms\nlost = 1\nread a = holding 0\n";
+    for (const std::string& text :
+         {"[bus]\nlink = sim:x\nturnaround = 1s\nbroadcast-stop = holding 50 7, holding 51 7, "
+          "holding 52 7, holding 53 7, holding 54 7, holding 55 7, holding 56 7, holding 57 7\n"
+          "[slave 1 s]\n" +
+              slave,
+          "[bus]\nlink = sim:x\nbaud = 1200\n[slave 1 s]\nstop-attempts = 20\n"
+          "stop = holding 50 7, holding 51 7\n" +
+              slave + "[slave 2 t]\ngap = 50ms\nstop = holding 50 7\n" + slave}) {
+        const auto [max, measured] = time_of_stop(text);
+        EXPECT_LE(measured, max) << text;
+        EXPECT_GE(measured, max / 2) << text;
+        EXPECT_GE(measured, 15 * second) << text;
+    }
+}
+
 TEST(Master, Stop_with_a_rejected_telegram_is_not_acknowledged) {
     const std::string bus = "[bus]\nlink = sim:x\nbaud = 38400\n[slave 1 s]\nread a = holding 0\n";
     World w(bus + "write c = holding 50\nstop = holding 500 1, holding 50 7\n",
