@@ -34,7 +34,8 @@ struct SlotUser {
     Queue<SlotFrame> outgoing;
     Queue<Frame> incoming;
     std::atomic<std::uint64_t> lost{0};
-    std::atomic<std::uint64_t> rejected{0};  ///< written by the thread of the node
+    /// Frames of `outgoing` that did not come into a queue of the node; written by its thread.
+    std::atomic<std::uint64_t> rejected{0};
 };
 
 class SlotExchange {

@@ -157,8 +157,8 @@ public:
 
 protected:
     virtual void received() noexcept {}  ///< behind receive(). [realtime]
-    /// before the slots are planned; the period of the thread. [realtime]
-    virtual void before_slots(std::int64_t) noexcept {}
+    /// Before the slots are planned; `period_ns` of the thread. [realtime]
+    virtual void before_slots(Time /*period_ns*/) noexcept {}
     virtual void passed(const can::Frame&) noexcept {}  ///< a frame of another node. [realtime]
 
     void on_frame(const can::Frame& frame, Time begin) noexcept override {
@@ -230,6 +230,7 @@ protected:
             clock_.claim();
         } catch (...) {
             can::withdraw_slots(*exchange_);
+            exchange_.reset();
             throw;
         }
     }
@@ -246,6 +247,7 @@ protected:
         exchange_->each([](can::SlotUser& user) {
             while (user.outgoing.front() != nullptr) {
                 user.outgoing.drop();
+                user.rejected.fetch_add(1, std::memory_order_relaxed);
             }
         });
         discipline_.lose();

@@ -33,13 +33,16 @@ void Station::attach(can::Link& link) noexcept {
     modes_.attach();
     slot_monitor_.attach();
     transmitter_.attach();
+    core_.count.dropped += core_.queue.size();
+    core_.queue.clear();
     forget();
 }
 
-/// Forgets the bus: everything that came from it or goes to it.
+/// Forgets the bus: everything that came from it or goes to it, except frames on the link, whose
+/// echo decides whether they were sent.
 void Station::forget() noexcept {
     core_.clock.clear();
-    core_.queue.clear();
+    core_.count.dropped += core_.queue.drop_waiting(UINT32_MAX);
     core_.state = State::listening;
     core_.numbered = core_.leading = was_silent_ = false;
     core_.counter = off_rate_ = 0;
@@ -53,12 +56,24 @@ void Station::forget() noexcept {
 void Station::restart(Time now) noexcept {
     if (core_.link == nullptr) return;
     for (std::size_t round = 0; round < max_rounds_of_restart; ++round) {
-        if (core_.link->receive(frames_, now) < frames_.size()) break;
+        const auto count = core_.link->receive(frames_, now);
+        for (std::size_t i = 0; i < count; ++i) {
+            confirm_old_echo(frames_[i]);
+        }
+        if (count < frames_.size()) break;
     }
     if (core_.is_sync_node()) {
         core_.listen_only = false;  // whether the tables differ is found out anew
     }
     forget();
+}
+
+/// A frame that was on the link when the thread was stopped has been sent, and is not dropped.
+void Station::confirm_old_echo(const can::Frame& frame) noexcept {
+    SendQueue::Entry sent;
+    if (frame.own && core_.queue.confirm(frame, sent)) {
+        core_.sink.on_sent(frame, frame.time_ns);
+    }
 }
 
 void Station::reset() noexcept {

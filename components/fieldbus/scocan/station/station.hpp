@@ -34,7 +34,7 @@ public:
     void detach() noexcept { core_.link = nullptr; }  ///< [setup]
 
     /// Starts anew after a time without cycles: the node listens first, as another one may send the
-    /// SYNC now. Drops queued frames and those received meanwhile; a silenced node stays silenced.
+    /// SYNC now. Drops and counts queued frames, and drops those received meanwhile; a silenced node stays silenced.
     /// [realtime]
     void restart(Time now) noexcept;
     void receive(Time now) noexcept;  ///< [realtime]
@@ -82,6 +82,7 @@ public:
 
 private:
     void forget() noexcept;
+    void confirm_old_echo(const can::Frame&) noexcept;
     void accept(const can::Frame&) noexcept;
     void accept_sync(const can::Frame&, Time begin) noexcept;
     bool synchronises(Time stamp, bool led) noexcept;
