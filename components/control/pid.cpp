@@ -88,10 +88,6 @@ private:
     // The state of the loop is beside the pins that every cycle uses, so that a cycle touches few
     // cache lines.
     double integral_ = 0.0;
-
-private:
-    // The state of the loop is beside the pins that every cycle uses, so that a cycle touches few
-    // cache lines.
     double pushing_ = 0.0;
     double last_command_ = 0.0;
     double last_feedback_ = 0.0;
@@ -111,7 +107,10 @@ public:
     hal::Io<std::uint32_t> tune_type{*this, "tune-type",
                                      "0 finds Pgain, Igain, Dgain; 1 finds Pgain, Igain, FF1"};
     hal::Io<std::uint32_t> tune_cycles{
-        *this, "tune-cycles", "half cycles of the oscillation to average over", {.initial = 50}};
+        *this,
+        "tune-cycles",
+        "half cycles of the oscillation to average over, at least 30",
+        {.initial = 50}};
     hal::Io<double> tune_effort{*this,
                                 "tune-effort",
                                 "amplitude of the output's oscillation around bias",
@@ -271,8 +270,7 @@ private:
             direction_ = -direction_;
             peak_ = std::fabs(deviation);  // this sample is the first beyond zero
             elapsed_ = 0.0;
-            if (++half_cycles_ >=
-                static_cast<std::int64_t>(std::max<std::uint32_t>(tune_cycles, 1))) {
+            if (++half_cycles_ >= std::max<std::int64_t>(tune_cycles.get(), min_half_cycles)) {
                 if (oscillates_evenly()) {
                     adopt(amplitude_sum_ / static_cast<double>(half_cycles_),
                           2.0 * time_sum_ / static_cast<double>(half_cycles_));
@@ -296,10 +294,9 @@ private:
         period_squares_ += period_ * period_;
         period_ = 0.0;
     }
-    /// Noise around zero switches the output as well, at random: the standard deviation of the
+    /// Noise around zero switches the output as well, at random: the standard deviation of many
     /// periods is at least half their mean. That of an oscillation is a sampling period or two.
     bool oscillates_evenly() const {
-        if (periods_ < 2.0) return true;
         const double mean = period_sum_ / periods_;
         const double variance = period_squares_ / periods_ - mean * mean;
         return variance <= max_spread * max_spread * mean * mean;
@@ -337,11 +334,12 @@ private:
 
     // until the oscillation has its final shape
     static constexpr std::int64_t settling_half_cycles = 2;
-    static constexpr double max_spread = 0.3;  // of the periods, of their mean
+    // White noise has 15 periods within the spread in one of 3000 tunings, 10 in one of 200.
+    static constexpr std::int64_t min_half_cycles = 30;
+    static constexpr double max_spread = 0.2;  // of the periods, of their mean
     static constexpr const char* uneven_oscillation =
         "auto-tuning failed: noise or a disturbance has switched the output, not the oscillation "
-        "of "
-        "the loop; the gains are unchanged; increase tune-effort, or filter the feedback";
+        "of the loop; the gains are unchanged; increase tune-effort, or filter the feedback";
 
     // While tuning: half cycles averaged (negative: still settling) and what was seen of the
     // present one.
@@ -416,8 +414,9 @@ integral remain). A negative limit or deadband counts as positive (LinuxCNC: the
 between its limits). While an input is NaN the output is 0 (LinuxCNC: NaN). While a limit is NaN its
 last valid value applies (LinuxCNC: no limit). Auto-tuning ignores the first two half cycles, before
 the oscillation is stable (LinuxCNC averages them in), and leaves the gains as they are, with a
-fault, when noise has switched the output: the standard deviation of the periods exceeds 30 % of
-their mean (LinuxCNC sets gains that can be 100 times too high).
+fault, when noise has switched the output: the standard deviation of the periods exceeds 20 % of
+their mean (LinuxCNC sets gains that can be 100 times too high). It measures at least 30 half
+cycles: fewer of noise can be even by chance.
 
 **Auto-tuning** measures the loop by the relay method and sets the gains by the rules of Ziegler and
 Nichols. Hold `command` constant near the middle of the travel; set `tune-effort` to a small value,
@@ -425,6 +424,13 @@ then set `enable`, `tune-mode` and `tune-start`. If the loop does not oscillate 
 `tune-effort`. When `tune-start` becomes FALSE the gains are set (except gains linked to a signal),
 and `output` remains at `bias` until `tune-mode` is FALSE. Clearing `enable`, `tune-mode` or
 `tune-start` aborts the tuning.
+
+A loop without dead time whose plant is a lag and an integrator, as a position loop on a motor with
+a time constant, has no ultimate gain. From rest it oscillates with the fastest period that a thread
+can see, 4 of its cycles, and the gains are far too high for an output that has a limit. Nothing
+distinguishes it from an integrator alone, whose period is 4 cycles as well and whose gains are
+right. Read `ultimate-period` (`debug=1`): below 8 cycles use `identify`, which rejects such an
+oscillation, or set the gains by hand.
 
     loadrt pid names=pid.x
     addf pid.x.do-pid-calcs servo

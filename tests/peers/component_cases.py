@@ -253,7 +253,7 @@ def pid_rows():
         {
             "error-previous-target": 1,
             "tune-effort": 1,
-            "tune-cycles": 20,
+            "tune-cycles": 40,
             "tune-mode": 1,
             "tune-start": 1,
             "enable": 1,

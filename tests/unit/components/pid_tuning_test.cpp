@@ -6,6 +6,7 @@
 #include <deque>
 #include <limits>
 #include <numbers>
+#include <random>
 
 #include "unit/components/pid_loop.hpp"
 
@@ -31,7 +32,7 @@ struct DelayedIntegrator {
 void start_tuning(Loop& loop, int type) {
     loop.set("tune-type", type);
     loop.set("tune-effort", 2.0);
-    loop.set("tune-cycles", 20);
+    loop.set("tune-cycles", 40);
     loop.set("tune-mode", true);
     loop.set("tune-start", true);
 }
@@ -52,7 +53,7 @@ TEST(Pid_auto_tuning, Finds_the_ultimate_gain_of_an_integrator_with_dead_time) {
         }
         EXPECT_NEAR(loop.real("ultimate-gain"), 4.0 / (std::numbers::pi * 0.1), 0.02 * 12.7);
         EXPECT_NEAR(loop.real("ultimate-period"), 0.4, 0.02 * 0.4);
-        EXPECT_NEAR(cycles, 22 * 200, 200);
+        EXPECT_NEAR(cycles, 42 * 200, 200);
 
         const double gain = loop.real("ultimate-gain");
         const double period = loop.real("ultimate-period");
@@ -109,6 +110,25 @@ TEST(Pid_auto_tuning, Is_aborted_by_enable_tune_mode_and_tune_start_without_touc
         loop.set(pin, pin != std::string("tune-start"));
         loop.step(0.0, 1.0);
         EXPECT_EQ(loop.output(), 0.0) << pin << " does not start it again";
+    }
+}
+
+TEST(Pid_auto_tuning, Is_rejected_when_noise_has_switched_the_output_however_few_the_half_cycles) {
+    for (const int half_cycles : {0, 1, 3, 4, 6, 10, 50}) {
+        for (unsigned seed = 1; seed <= 50; ++seed) {
+            Loop loop;
+            loop.set("Pgain", 3.0);
+            start_tuning(loop, 0);
+            loop.set("tune-cycles", half_cycles);
+            std::mt19937 noise(seed);
+            int cycles = 0;
+            for (; loop.get<bool>("tune-start") && cycles < 10'000; ++cycles) {
+                loop.step(0.0, static_cast<double>(noise()) / 4294967296.0 - 0.5);
+            }
+            EXPECT_GE(cycles, 30) << half_cycles;
+            EXPECT_FALSE(loop.get<bool>("tune-start"));
+            EXPECT_EQ(loop.real("Pgain"), 3.0) << half_cycles << " half cycles, seed " << seed;
+        }
     }
 }
 
