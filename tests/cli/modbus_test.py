@@ -27,6 +27,8 @@ profile = vfs11
 every = 100ms
 """
 
+CONFIRM = "[bus]\nlink = sim:c\n[slave 3 meter]\nread a = holding 0\nconfirm = yes\n"
+
 
 class Modbus(Case):
     def setUp(self):
@@ -68,6 +70,11 @@ class Modbus(Case):
             self.assertGreater(telegram["age_ns"], telegram["period_ns"])
         self.write("bad.modbus", "[bus]\n[slave 1 a]\nread x = holding\n")
         self.assertIn("[modbus-value]", self.bad("modbus", "check", "bad.modbus"))
+        self.write("confirm.modbus", CONFIRM)
+        self.assertEqual(
+            "confirm of slave 3 (meter): a changed value is read twice; the table counts one read",
+            self.good("modbus", "plan", "confirm.modbus").splitlines()[-2],
+        )
         self.assertIn("cannot read", self.bad("modbus", "plan", "none.modbus"))
 
     def by_hand(self, line):

@@ -93,9 +93,8 @@ const bus::KeyTable<Slave>& slave_keys() {
         {"single-writes", bus::flag(&Slave::single_writes), "`no`",
          "The slave does not support function 16 (write multiple registers)."},
         {"confirm", bus::choice(&Slave::confirm, confirms), "`errors`",
-         "`yes`: a value is accepted when two answers in a row are equal. `errors`: only while "
-         "more "
-         "than 3 % of the answers are corrupt. `no`: never."},
+         "`yes`: a value is accepted when it is the same in two answers in a row. `errors`: only "
+         "while more than 3 % of the answers are corrupt. `no`: never."},
         {"stop", "writes: `holding 0x2000 1, coil 3 0`", "that of the profile",
          "The stop telegrams, in their order; `none`: none."},
         {"stop-attempts", bus::number(&Slave::stop_attempts, 1, 1000), "`5`",

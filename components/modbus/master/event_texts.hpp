@@ -46,6 +46,10 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
      "the broadcast stop was sent after {time}; no slave acknowledges a broadcast"},
     {Event::stop_unfinished, bus::Effect::none,
      "not all stop telegrams were sent within {limit}; stop the drives by other means"},
+    {Event::value_changes, bus::Effect::raises,
+     "{slave}: a value that changes between all answers is not accepted[: {value}; "
+     "{remedy}{place}]"},
+    {Event::values_accepted, bus::Effect::ends, "{slave}: all values are accepted again"},
 };
 static_assert(bus::in_order(event_rows));
 
@@ -97,6 +101,12 @@ private:
             return std::string(exception_name(code)) + " (exception " + std::to_string(code) + ")";
         }
         if (name == "place") return place(r);
+        if (name == "value" && is_value(r)) return value_at(r).name;
+        if (name == "remedy") {
+            return bus_.slaves[r.slave].confirm == Confirm::always
+                       ? "write confirm = errors for this slave"
+                       : "repair the line, or write confirm = no for this slave";
+        }
         if (name == "link") return bus_.link;
         if (name == "reason") return to_string(static_cast<StopReason>(r.value));
         if (name == "time") {
@@ -123,11 +133,21 @@ private:
                       modbus::to_string(t.table), t.address, t.address + t.count - 1U);
         return text;
     }
+    bool is_value(const EventRecord& r) const {
+        return r.event == Event::value_changes && r.value >= 0 &&
+               static_cast<std::size_t>(r.value) < plan_.values.size();
+    }
+    const Value& value_at(const EventRecord& r) const {
+        return *plan_.values[static_cast<std::size_t>(r.value)].value;
+    }
     std::string place(const EventRecord& r) const {
-        const Span at =
-            r.telegram < plan_.telegrams.size() && !plan_.telegrams[r.telegram].values.empty()
-                ? plan_.values[plan_.telegrams[r.telegram].values.front()].value->at
-                : bus_.slaves[r.slave].at;
+        Span at = bus_.slaves[r.slave].at;
+        if (is_value(r)) {
+            at = value_at(r).at;
+        } else if (r.telegram < plan_.telegrams.size() &&
+                   !plan_.telegrams[r.telegram].values.empty()) {
+            at = plan_.values[plan_.telegrams[r.telegram].values.front()].value->at;
+        }
         return "; see " + bus_.file + ":" + std::to_string(at.line);
     }
 

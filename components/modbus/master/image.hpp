@@ -36,6 +36,8 @@ enum class Event : std::uint8_t {
     guardian_killed,  ///< at the end of the component; value: ns that it had
     stop_broadcast,  ///< value: ns from the stop to the end of the frame
     stop_unfinished,  ///< at the end of the component; value: ns that the master had
+    value_changes,  ///< between all answers, and is not accepted; value: its index in the plan
+    values_accepted,  ///< all of the slave again
 };
 
 /// Why the drives are stopped.
@@ -97,8 +99,8 @@ struct ImageHeader {
     std::atomic<std::uint32_t> outputs_valid{0};  ///< the cycle has written all outputs
     std::atomic<std::uint32_t> event_tail{0};
     // written by any thread of the runtime
-    alignas(64) std::atomic<std::uint32_t> stop_count{
-        0};  ///< requests to stop, for those that were short
+    /// requests to stop, for those that were short
+    alignas(64) std::atomic<std::uint32_t> stop_count{0};
     std::atomic<std::uint32_t> stop_reason{0};  ///< of the last request
     std::atomic<std::uint32_t> stop_held{0};  ///< StopReason bits that last
     std::atomic<std::uint32_t> ending{0};  ///< stop, then end
@@ -128,14 +130,16 @@ public:
     /// Returns the bytes that a plan needs. [setup]
     static std::size_t size_of(const Bus& bus, const Plan& plan) {
         return offset_values(bus.slaves.size(), plan.telegrams.size()) +
-               plan.values.size() * sizeof(std::atomic<std::uint64_t>);
+               plan.values.size() *
+                   (sizeof(std::atomic<std::uint64_t>) + sizeof(std::atomic<std::int64_t>));
     }
     /// `memory` has size_of() bytes at a multiple of 64. `fresh`: it is initialised. [setup]
     Image(void* memory, const Bus& bus, const Plan& plan, bool fresh);
 
     ImageHeader& header() const noexcept { return *header_; }
     SlaveImage& slave(std::size_t n) const noexcept { return slaves_[n]; }
-    /// When the last answer of a telegram arrived, in ns; 0: never.
+    /// When the last answer of a telegram arrived, in ns; 0: never. Of a read: when its oldest value
+    /// was accepted.
     std::atomic<std::int64_t>& stamp(std::size_t telegram) const noexcept {
         return telegrams_[telegram].stamp;
     }
@@ -149,6 +153,10 @@ public:
     }
     /// The bits of a value: a double when it is scaled or a float, else a whole number.
     std::atomic<std::uint64_t>& value(std::size_t n) const noexcept { return values_[n]; }
+    /// When a value that is read was accepted, in ns; 0: never.
+    std::atomic<std::int64_t>& value_stamp(std::size_t n) const noexcept {
+        return value_stamps_[n];
+    }
 
     /// Queues an event; the engine calls it. A full queue counts it.
     void tell(const EventRecord& event) const noexcept {
@@ -198,6 +206,7 @@ private:
     SlaveImage* slaves_ = nullptr;
     TelegramImage* telegrams_ = nullptr;
     std::atomic<std::uint64_t>* values_ = nullptr;
+    std::atomic<std::int64_t>* value_stamps_ = nullptr;
 };
 
 }  // namespace hal::modbus

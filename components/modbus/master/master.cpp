@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "modbus/master/value_codec.hpp"
 
@@ -22,6 +23,8 @@ constexpr std::uint32_t corrupt_weight = 32;
 constexpr std::uint32_t disturbed_above = 2 * corrupt_weight - 1;
 constexpr std::uint32_t max_disturbance = 4 * corrupt_weight;
 constexpr std::uint32_t max_rereads = 3;  // at once, of a value that changes
+// answers in a row of which none has the value of the one before, until it is reported
+constexpr std::uint32_t max_unaccepted = 50;
 constexpr std::int64_t probe_share = 20;       // 1/20 of the line: 5 %
 constexpr std::int64_t urgent_share = 4;       // 1/4
 // a line that is open and does not accept the broadcast stop: 1 s
@@ -43,10 +46,17 @@ Function read_function(Table table) noexcept {
 bool is_of_gateway(std::uint8_t code) noexcept { return code == 10 || code == 11; }
 
 /// The registers of a value in the data of an answer; 16 bits are one register, the first bit the
-/// least significant.
+/// least significant. None in an answer that is too short.
 Registers registers_at(const PlannedValue& p, std::span<const std::uint8_t> data) noexcept {
     Registers r;
     const Value& v = *p.value;
+    if (v.table == Table::huanyang) {
+        // index, then the number (function 04 of the dialect)
+        if (data.size() < 3) return r;
+        r.words[0] = word_at(data, 1);
+        r.count = 1;
+        return r;
+    }
     if (is_bits(v.table)) {
         unsigned number = 0;
         for (unsigned n = 0; n < v.size(); ++n) {
@@ -70,6 +80,7 @@ Master::Master(const Bus& bus, const Plan& plan, Image image)
     : bus_(bus), plan_(plan), image_(image) {
     slaves_.resize(bus.slaves.size());
     telegrams_.resize(plan.telegrams.size());
+    unaccepted_.resize(plan.values.size());
     std::size_t max_cells = 2;
     for (std::uint32_t n = 0; n < telegrams_.size(); ++n) {
         telegrams_[n].sent.resize(cells_of(n));
@@ -332,13 +343,12 @@ void Master::succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) no
     if (t.kind == Telegram::Kind::read) {
         is_echo_known_ = true;
         is_verified_ = true;
-        if (!confirm(data, now_ns)) return end_of_job();
-        store(t, data);
+        store(data, now_ns);
     } else {
         own.sent = job_.cells;
         own.is_sent = true;
+        image_.stamp(job_.telegram).store(now_ns, std::memory_order_relaxed);
     }
-    image_.stamp(job_.telegram).store(now_ns, std::memory_order_relaxed);
     image_.failures(job_.telegram).store(0, std::memory_order_relaxed);
     touch(job_.slave);
     end_of_job();
@@ -360,39 +370,60 @@ void Master::rate(std::uint32_t slave, bool is_corrupt) noexcept {
     }
 }
 
-/// Returns whether the answer to a read is accepted. One of 65536 random frames has a valid check
-/// sequence, and a slave answers a request that was changed into another valid one. Two answers in
-/// a row that are wrong and equal are not expected in the life of a machine.
-bool Master::confirm(std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept {
+/// Stores the values of an answer that are accepted. The others are read again at once, a few times.
+void Master::store(std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept {
     TelegramState& own = telegrams_[job_.telegram];
-    const bool is_equal =
-        std::equal(own.answer.begin(), own.answer.end(), data.begin(), data.end());
-    own.answer.assign(data.begin(), data.end());
-    if (is_equal || !slaves_[job_.slave].confirms) {
-        own.unconfirmed = 0;
-        return true;
+    bool has_all = true;
+    std::int64_t oldest_ns = now_ns;
+    for (const std::uint32_t n : plan_.telegrams[job_.telegram].values) {
+        has_all = accept_value(n, data, now_ns) && has_all;
+        oldest_ns = std::min(oldest_ns, image_.value_stamp(n).load(std::memory_order_relaxed));
     }
-    if (++own.unconfirmed <= max_rereads) {
+    own.answer.assign(data.begin(), data.end());
+    image_.stamp(job_.telegram).store(oldest_ns, std::memory_order_relaxed);
+    own.unconfirmed = has_all ? 0 : own.unconfirmed + 1;
+    if (!has_all && own.unconfirmed <= max_rereads) {
         own.due_ns = now_ns;
     }
-    return false;
 }
 
-void Master::store(const Telegram& t, std::span<const std::uint8_t> data) noexcept {
-    for (const std::uint32_t n : t.values) {
-        const PlannedValue& planned = plan_.values[n];
-        Registers r;
-        if (t.table == Table::huanyang) {
-            // index, then the number (function 04 of the dialect)
-            if (data.size() < 3) return;
-            r.words[0] = word_at(data, 1);
-            r.count = 1;
-        } else {
-            r = registers_at(planned, data);
+/// Stores a value, unless its slave confirms and the answer before had another one. One of 65536
+/// random frames has a valid check sequence, and a slave answers a request that was changed into
+/// another valid one. Two answers in a row that are wrong and equal are not expected in the life of
+/// a machine. Returns whether it is accepted.
+bool Master::accept_value(std::uint32_t n, std::span<const std::uint8_t> data,
+                          std::int64_t now_ns) noexcept {
+    const PlannedValue& planned = plan_.values[n];
+    const Registers registers = registers_at(planned, data);
+    if (registers.count == 0) return true;
+    auto& cell = image_.value(n);
+    const std::uint64_t last = cell.load(std::memory_order_relaxed);
+    const std::uint64_t value = decode_value(*planned.value, registers, last);
+    if (slaves_[job_.slave].confirms) {
+        const std::span<const std::uint8_t> before = telegrams_[job_.telegram].answer;
+        if (before.size() != data.size() ||
+            decode_value(*planned.value, registers_at(planned, before), last) != value) {
+            count_unaccepted(n);
+            return false;
         }
-        auto& cell = image_.value(n);
-        cell.store(decode_value(*planned.value, r, cell.load(std::memory_order_relaxed)),
-                   std::memory_order_relaxed);
+    }
+    clear_unaccepted(n);
+    cell.store(value, std::memory_order_relaxed);
+    image_.value_stamp(n).store(now_ns, std::memory_order_relaxed);
+    return true;
+}
+
+void Master::count_unaccepted(std::uint32_t n) noexcept {
+    if (unaccepted_[n] == max_unaccepted || ++unaccepted_[n] != max_unaccepted) return;
+    if (slaves_[job_.slave].changing_values++ == 0) {
+        image_.tell({Event::value_changes, job_.slave, job_.telegram, n});
+    }
+}
+
+void Master::clear_unaccepted(std::uint32_t n) noexcept {
+    const bool was_reported = std::exchange(unaccepted_[n], 0) == max_unaccepted;
+    if (was_reported && --slaves_[job_.slave].changing_values == 0) {
+        image_.tell({Event::values_accepted, job_.slave, 0, 0});
     }
 }
 

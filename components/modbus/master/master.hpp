@@ -69,7 +69,8 @@ private:
         bool is_known = false;  ///< an answer has arrived, or it was reported offline
         bool is_corrupt = false;  ///< reported
         std::uint32_t disturbance = 0;  ///< rises with corrupt answers, falls with others
-        bool confirms = false;  ///< accepts what two answers in a row have
+        bool confirms = false;  ///< accepts values that two answers in a row have
+        std::uint32_t changing_values = 0;  ///< reported, until they are accepted
         std::uint32_t rejected_telegrams = 0;
         /// A read that no answer to another read of the slave can answer. It comes first after a
         /// timeout on RTU: a slave answers in order, so that its answer is behind all late ones.
@@ -93,7 +94,7 @@ private:
         bool is_sent = false;  ///< `sent` is valid
         std::uint32_t rejections = 0;  ///< in a row
         std::vector<std::uint8_t> answer;  ///< data of the last one, of a read
-        std::uint32_t unconfirmed = 0;  ///< answers in a row
+        std::uint32_t unconfirmed = 0;  ///< answers in a row with a value that is not accepted
     };
     /// The requests of a telegram, or a stop telegram, one after the other.
     struct Job {
@@ -121,8 +122,11 @@ private:
     bool accept(const Found& found, std::int64_t now_ns) noexcept;
     void succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept;
     void rate(std::uint32_t slave, bool is_corrupt) noexcept;
-    bool confirm(std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept;
-    void store(const Telegram& t, std::span<const std::uint8_t> data) noexcept;
+    void store(std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept;
+    bool accept_value(std::uint32_t n, std::span<const std::uint8_t> data,
+                      std::int64_t now_ns) noexcept;
+    void count_unaccepted(std::uint32_t n) noexcept;
+    void clear_unaccepted(std::uint32_t n) noexcept;
     void fail(Failure failure, std::uint8_t code, std::int64_t now_ns) noexcept;
     void fail_stop(Failure failure, std::int64_t now_ns) noexcept;
     void use_attempt(std::uint32_t slave, std::int64_t now_ns) noexcept;
@@ -190,6 +194,7 @@ private:
 
     std::vector<SlaveState> slaves_;
     std::vector<TelegramState> telegrams_;
+    std::vector<std::uint32_t> unaccepted_;  // of each value: answers in a row
     Job job_;
     bool has_job_ = false;
     bool waits_ = false;  // for an answer

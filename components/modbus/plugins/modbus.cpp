@@ -42,6 +42,7 @@ struct Modbus : hal::bus::BusComponent {
             faults_of_slaves_.emplace_back();
             stop_faults_of_slaves_.emplace_back();
             rejections_of_slaves_.emplace_back();
+            changes_of_slaves_.emplace_back();
         }
     }
 
@@ -338,6 +339,8 @@ private:
         case Event::stop_unconfirmed: return stop_faults_of_slaves_[record.slave];
         case Event::slave_rejects:
         case Event::slave_accepts: return rejections_of_slaves_[record.slave];
+        case Event::value_changes:
+        case Event::values_accepted: return changes_of_slaves_[record.slave];
         default: return faults_of_slaves_[record.slave];
         }
     }
@@ -421,8 +424,8 @@ private:
         "else is written"};
     hal::Out<bool> online{*this, receive_, "online", "all slaves answer", {.safe = false}};
     hal::Out<bool> fault{*this, receive_, "fault",
-                         "a slave is offline or rejects requests, or the line or the guardian is "
-                         "lost"};
+                         "a slave is offline or rejects requests, a value of it is not accepted, "
+                         "or the line or the guardian is lost"};
     hal::Out<bool> guarded{*this, receive_, "guarded",
                            "a guardian sends the stop telegrams when this process ends"};
     hal::Out<double> load{*this, receive_, "load",
@@ -436,7 +439,8 @@ private:
     std::deque<SlavePins> slaves_;
     std::vector<SlavePins*> drives_;
     std::size_t online_slaves_ = 0;
-    std::deque<hal::LastingFault> faults_of_slaves_, stop_faults_of_slaves_, rejections_of_slaves_;
+    std::deque<hal::LastingFault> faults_of_slaves_, stop_faults_of_slaves_, rejections_of_slaves_,
+        changes_of_slaves_;
     hal::LastingFault line_fault_, guardian_fault_, stall_fault_;
     hal::SetupTime setup_time_;
     std::string previous_report_;

@@ -203,7 +203,7 @@ public:
         const bool is_stopping = slave.stop_pending.load(std::memory_order_relaxed) != 0;
         feedback.is_online = is_online_ && may_run && !is_stopping && !rejects_;
         const std::int64_t read_at_ns =
-            speed_ == no_value ? 0 : image.stamp(speed_telegram_).load(std::memory_order_relaxed);
+            speed_ == no_value ? 0 : image.value_stamp(speed_).load(std::memory_order_relaxed);
         feedback.has_speed = read_at_ns != 0;
         feedback.is_current = feedback.has_speed && now_ns - read_at_ns <= max_speed_age_ns_;
         feedback.speed_rpm = number(image, speed_);
@@ -238,7 +238,7 @@ private:
     };
     struct ValueAge {
         std::size_t pin;
-        std::uint32_t telegram;
+        std::uint32_t value;
     };
     static constexpr std::uint32_t no_value = UINT32_MAX;
 
@@ -273,7 +273,6 @@ private:
         case Purpose::pin: break;
         case Purpose::speed:
             speed_ = n;
-            speed_telegram_ = planned.telegram;
             max_speed_age_ns_ = 1'000'000'000 + 3 * v.period_ns;
             return;
         case Purpose::load: load_ = n; return;
@@ -296,7 +295,7 @@ private:
                 {ages_.declare(
                      c, receive, name + "-age",
                      "age of the value; infinite: it was not read, or the thread is stopped"),
-                 planned.telegram});
+                 n});
         }
     }
 
@@ -315,7 +314,7 @@ private:
                 pin = static_cast<T>(data.safe);
                 return;
             }
-            if (image.stamp(data.telegram).load(std::memory_order_relaxed) == 0) return;
+            if (image.value_stamp(data.value).load(std::memory_order_relaxed) == 0) return;
             pin = from_cell<T>(image.value(data.value).load(std::memory_order_relaxed));
         });
         rejects_ = std::any_of(drive_telegrams_.begin(), drive_telegrams_.end(),
@@ -324,7 +323,7 @@ private:
         });
         ages_.set(age_, oldest_of(image));
         for (const ValueAge& age : value_ages_) {
-            ages_.set(age.pin, image.stamp(age.telegram).load(std::memory_order_relaxed));
+            ages_.set(age.pin, image.value_stamp(age.value).load(std::memory_order_relaxed));
         }
     }
     /// Returns the time of the oldest value; 0: one was not read.
@@ -361,7 +360,6 @@ private:
     std::uint32_t load_ = no_value;
     std::uint32_t running_ = no_value;
     std::uint32_t fault_ = no_value;
-    std::uint32_t speed_telegram_ = 0;
     std::int64_t max_speed_age_ns_ = 0;  // of which `at-speed` is still TRUE
     bool is_online_ = false;
     bool rejects_ = false;  // the telegrams of its drive

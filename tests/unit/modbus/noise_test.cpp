@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <deque>
 
+#include "modbus/master/event_texts.hpp"
 #include "world.hpp"
 
 namespace hal::modbus::test {
@@ -152,6 +153,84 @@ TEST(Noise, Wrong_answer_with_a_valid_check_sequence_is_not_accepted_once_answer
     EXPECT_EQ(accept_forged("errors", true), 0);
     EXPECT_EQ(accept_forged("yes", true), 0);
     EXPECT_EQ(accept_forged("yes", false), 0);
+}
+
+/// Three values of one telegram, of which `angle` changes between all answers.
+struct ChangingValue : testing::Test {
+    static std::string text(const std::string& confirm) {
+        return "[bus]\nlink = sim:x\nbaud = 115200\n[slave 1 s]\nevery = 10ms\nconfirm = " +
+               confirm +
+               "\nread limit = holding 0\nread angle = holding 1 f32\nread on = holding 3.2\n";
+    }
+    explicit ChangingValue(const std::string& confirm = "yes") : w(text(confirm)) {}
+    void run(std::int64_t duration, bool changes) {
+        for (const std::int64_t end = w.now + duration; w.now < end;) {
+            angle += changes ? 1.0 : 0.0;
+            w.slaves->slaves()[0].set("angle", angle);
+            w.run(ms);
+        }
+    }
+    std::int64_t age(const std::string& name) const {
+        return w.now - w.image.value_stamp(w.value(name)).load();
+    }
+    std::vector<std::string> lines() const {
+        const EventTexts texts(w.bus(), w.plan());
+        std::vector<std::string> all;
+        for (EventRecord record; w.image.pop(record);) {
+            all.push_back(texts.line(record));
+        }
+        return all;
+    }
+    double angle = 0.0;
+    World w;
+};
+
+TEST_F(ChangingValue, Waits_alone_and_is_a_fault_until_it_is_accepted) {
+    w.slaves->slaves()[0].set("limit", 7);
+    w.slaves->slaves()[0].set("on", 1);
+    run(200 * ms, true);
+    EXPECT_EQ(w.number("limit"), 7U);
+    EXPECT_EQ(w.number("on"), 1U);
+    EXPECT_LT(age("limit"), 20 * ms);
+    EXPECT_LT(age("on"), 20 * ms);
+    EXPECT_EQ(w.image.value_stamp(w.value("angle")).load(), 0) << "never accepted";
+    EXPECT_EQ(w.image.stamp(0).load(), 0) << "that of the oldest value";
+    EXPECT_EQ(lines(), std::vector<std::string>{"slave 1 (s) is online"});
+
+    run(second, true);
+    EXPECT_EQ(lines(), std::vector<std::string>{
+                           "slave 1 (s): a value that changes between all answers is not accepted: "
+                           "angle; write confirm = errors for this slave; see test.modbus:8"});
+    w.slaves->slaves()[0].set("limit", 8);
+    run(50 * ms, true);
+    EXPECT_EQ(w.number("limit"), 8U);
+
+    run(100 * ms, false);
+    EXPECT_EQ(w.real("angle"), angle);
+    EXPECT_LT(age("angle"), 20 * ms);
+    EXPECT_EQ(w.image.stamp(0).load(), w.image.value_stamp(w.value("angle")).load());
+    EXPECT_EQ(lines(), std::vector<std::string>{"slave 1 (s): all values are accepted again"});
+}
+
+struct DisturbedChangingValue : ChangingValue {
+    DisturbedChangingValue() : ChangingValue("errors") {}
+};
+
+TEST_F(DisturbedChangingValue, Is_accepted_again_when_the_line_is_repaired) {
+    SlaveFault fault;
+    fault.kind = FaultKind::corrupt;
+    fault.every = 9;
+    w.slaves->faults().push_back(fault);
+    run(2 * second, true);
+    std::vector<std::string> all = lines();
+    EXPECT_EQ(
+        all.back(),
+        "slave 1 (s): a value that changes between all answers is not accepted: angle; repair "
+        "the line, or write confirm = no for this slave; see test.modbus:8");
+    w.slaves->faults().clear();
+    run(4 * second, true);
+    EXPECT_EQ(lines(), std::vector<std::string>{"slave 1 (s): all values are accepted again"});
+    EXPECT_LT(age("angle"), 20 * ms);
 }
 
 }  // namespace

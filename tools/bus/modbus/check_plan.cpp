@@ -101,6 +101,12 @@ std::string plan_text(const modbus::Bus& bus, const Plan& plan, Framing framing,
     text +=
         fmt::format("{} telegrams use {:.1f} % of the line{}\n", plan.telegrams.size(),
                     100 * load.use, load.use > 1 ? "; all periods are longer by this factor" : "");
+    for (const Slave& slave : bus.slaves) {
+        if (slave.confirm != modbus::Confirm::always) continue;
+        text += fmt::format(
+            "confirm of slave {} ({}): a changed value is read twice; the table counts one read\n",
+            slave.unit, slave.name);
+    }
     if (load.set_point_ns != 0) {
         text += fmt::format("a set-point is sent within {} ms\n", ms_text(load.set_point_ns));
     }
