@@ -48,7 +48,8 @@ struct Frame {
     bool error = false;
     /// received: sent by this link itself. Only with Options::own_frames
     bool own = false;
-    std::int64_t time_ns = 0;  ///< received: time of its last bit in ns, on the clock of `now_ns`
+    /// received: time of its last bit in ns, on the clock of `now_ns`; 0: the system gave none
+    std::int64_t time_ns = 0;
     alignas(8) std::array<std::uint8_t, 64> data{};
 
     Frame() = default;

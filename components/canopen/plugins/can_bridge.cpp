@@ -27,8 +27,12 @@ struct CanBridge : hal::Component {
 
     hal::In<bool> enable{*this, "enable", "false: no frames are forwarded", {.initial = true}};
     hal::In<bool> read_only{*this, "read-only", "true: frames of b are not forwarded to a"};
-    hal::Out<std::uint64_t> a_to_b{*this, "a-to-b", "frames forwarded from a to b"};
-    hal::Out<std::uint64_t> b_to_a{*this, "b-to-a", "frames forwarded from b to a"};
+    hal::Out<std::uint64_t> a_to_b{*this, "a-to-b",
+                                   "frames forwarded from a to b, or waiting; decreases when the "
+                                   "link discards frames that wait"};
+    hal::Out<std::uint64_t> b_to_a{*this, "b-to-a",
+                                   "frames forwarded from b to a, or waiting; decreases when the "
+                                   "link discards frames that wait"};
     hal::Out<std::uint64_t> dropped{*this, "dropped",
                                     "frames not forwarded: queue full, bus down or off, no sync of "
                                     "the slots, CAN FD frame on a classic bus, or waiting for more "
@@ -125,8 +129,9 @@ tools use by default:
 
     hal can scan udp:239.74.163.2:43113
 
-What arrives while the thread is stopped is not forwarded at the next `start`: frames that have waited
-for more than 0.1 s (and two cycles) are dropped.
+What arrives while the thread is stopped is not forwarded at the next `start`: frames that have
+waited for more than 0.1 s (and two cycles) are dropped. Frames of a bus without time stamps are
+forwarded.
 
 With `read-only`, programs on bus b can watch bus a but not send to it. Two bridges between the same
 two buses would forward each frame in an endless loop.

@@ -18,7 +18,9 @@ struct ScocanBridge : StationComponent {
         "bus of the ordinary CAN participant: udp:239.74.163.2:43113, sim:NAME or can:can1",
         {.per_instance = true}};
 
-    hal::Out<std::uint64_t> to_pc{*this, receive_, "to-pc", "frames forwarded from the bus"};
+    hal::Out<std::uint64_t> to_pc{*this, receive_, "to-pc",
+                                  "frames forwarded from the bus, or waiting; decreases when the "
+                                  "link discards frames that wait"};
     hal::Out<std::uint64_t> to_pc_dropped{*this, receive_, "to-pc-dropped",
                                           "frames of the bus not forwarded: queue full, or the "
                                           "participant's bus down or off"};
@@ -26,10 +28,8 @@ struct ScocanBridge : StationComponent {
                                     "frames of the participant that were queued for a slot"};
     hal::Out<std::uint64_t> rejected{
         *this, transmit_, "rejected",
-        "frames of the participant dropped: the node does not run, they "
-        "have waited for more than 0.1 s, "
-        "identifier of another node or reserved, queue full, or not a "
-        "classic base frame"};
+        "frames of the participant dropped: the node does not run, they have waited for more than "
+        "0.1 s, identifier of another node or reserved, queue full, or not a classic base frame"};
 
     void start() {
         if (pc.get().empty()) {
@@ -117,5 +117,6 @@ The messages of the bridge in the table are those of the participant and have no
 reserved identifier (0x000..0x00F, 0x780..0x7FF) or one that the table gives to another node, in a
 private slot or as a message, are dropped and counted in `rejected`; the first of each identifier is
 reported. So are frames that come while the node does not run, or that have waited for more than
-0.1 s, as while the thread is stopped: receivers would take them for fresh ones. Otherwise the node is one like any other, see `hal doc scocan`.
+0.1 s, as while the thread is stopped: receivers would take them for fresh ones. Otherwise the node
+is one like any other, see `hal doc scocan`.
 )")
