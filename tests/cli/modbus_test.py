@@ -121,24 +121,38 @@ class Modbus(Case):
         self.assertIn("cannot open '/dev/none'", self.bad("modbus", "scan", "serial:/dev/none"))
         self.assertIn("not a serial line", self.bad("modbus", "scan", "serial:/dev/null"))
         self.assertIn("invalid baud", self.bad("modbus", "scan", "serial:/dev/null?baud=x"))
-        self.assertIn(
-            "unknown fault 'slow'",
-            self.bad("node", "modbus", "bus.modbus", "--link", "pty:l", "--fault", "slow"),
-        )
-        self.assertIn(
-            "invalid option 'every=0'",
-            self.bad("node", "modbus", "bus.modbus", "--link", "pty:l", "--fault", "late:every=0"),
-        )
-        self.assertIn(
-            "--set 'io.x=1': io.x: unknown value",
-            self.bad("node", "modbus", "bus.modbus", "--link", "pty:l", "--set", "io.x=1"),
-        )
+        for fault, problem in (
+            (
+                "slow",
+                "unknown fault 'slow'; faults are silence, late, corrupt, wrong-unit, exception, half, noise",
+            ),
+            ("late:every=0", "invalid option 'every=0'; write a whole number from 1"),
+            ("late:late=soon", "invalid option 'late=soon'; write a time, as in late=200ms"),
+            ("half:unit=248", "invalid option 'unit=248'; write a slave, 1..247, or 0 for all"),
+            ("half:for", "invalid option 'for'; write a time, as in for=2s"),
+            ("half:late=1s", "half has no option 'late'; its options are unit, every, from, for"),
+            ("noise:share=1.5", "invalid option 'share=1.5'; write a number in 0..1"),
+            ("noise:unit=2", "noise has no option 'unit'; its options are share, from, for"),
+            ("noise:every=2", "noise has no option 'every'; its options are share, from, for"),
+            ("noise:late=1s", "noise has no option 'late'; its options are share, from, for"),
+            ("late:x=1", "late has no option 'x'; its options are unit, every, late, from, for"),
+        ):
+            self.assertEqual(
+                f"hal node modbus: --fault: {problem}\n",
+                self.bad("node", "modbus", "bus.modbus", "--link", "pty:l", "--fault", fault),
+            )
+        of_io = "values that can be set are level, ready"
+        of_spindle = "this slave has no value that can be set"
         for setting, problem in (
+            ("io.x=1", f"io.x: unknown value; {of_io}"),
             ("io.level=4000", "io.level: out of range; write -3276.8..3276.7"),
             ("io.ready=2", "io.ready: out of range; write 0..1"),
-            ("io.pump=1", "io.pump: the master writes it"),
-            ("spindle.speed-fb=3", "spindle.speed-fb: the model of the drive writes it"),
-            ("oi.level=1", "unknown slave 'oi'"),
+            ("io.pump=1", f"io.pump: the master writes it; {of_io}"),
+            (
+                "spindle.speed-fb=3",
+                f"spindle.speed-fb: the model of the drive writes it; {of_spindle}",
+            ),
+            ("oi.level=1", "unknown slave 'oi'; slaves are io, spindle"),
         ):
             self.assertEqual(
                 f"hal node modbus: --set '{setting}': {problem}\n",

@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <limits>
 #include <utility>
+
+#include "text/quoting.hpp"
 
 namespace hal::modbus {
 
@@ -43,6 +46,19 @@ std::pair<double, double> range_of(const Value& v) {
     const double one = min * v.scale + v.offset;
     const double other = max * v.scale + v.offset;
     return {std::min(one, other), std::max(one, other)};
+}
+
+/// Returns a bound of a range with as few digits as it needs to be accepted; whole ones with all.
+template <class IsWithin>
+std::string bound_text(double bound, IsWithin is_within) {
+    constexpr double exact = 9007199254740992.0;  // 2^53
+    char text[32];
+    std::snprintf(text, sizeof text, "%.10g", bound);
+    const bool is_whole = std::trunc(bound) == bound && std::fabs(bound) < exact;
+    if (is_whole || !is_within(std::strtod(text, nullptr))) {
+        std::snprintf(text, sizeof text, "%.17g", bound);
+    }
+    return text;
 }
 
 }  // namespace
@@ -91,14 +107,26 @@ bool EmulatedSlave::set(std::string_view name, double value) {
 std::string EmulatedSlave::problem_of(std::string_view name, double value) const {
     const auto v = std::find_if(config_.values.begin(), config_.values.end(),
                                 [&](const Value& one) { return one.name == name; });
-    if (v == config_.values.end()) return "unknown value";
-    if (v->is_output) return "the master writes it";
-    if (v->purpose != Purpose::pin) return "the model of the drive writes it";
+    if (v == config_.values.end()) return "unknown value; " + settable_values();
+    if (v->is_output) return "the master writes it; " + settable_values();
+    if (v->purpose != Purpose::pin) {
+        return "the model of the drive writes it; " + settable_values();
+    }
     const auto [min, max] = range_of(*v);
     if (value >= min && value <= max) return {};
-    char text[96];
-    std::snprintf(text, sizeof text, "out of range; write %.10g..%.10g", min, max);
-    return text;
+    const auto is_within = [&](double number) { return number >= min && number <= max; };
+    return "out of range; write " + bound_text(min, is_within) + ".." + bound_text(max, is_within);
+}
+
+std::string EmulatedSlave::settable_values() const {
+    std::string names;
+    for (const Value& v : config_.values) {
+        if (!v.is_output && v.purpose == Purpose::pin) {
+            append_item(names, v.name);
+        }
+    }
+    return names.empty() ? "this slave has no value that can be set"
+                         : "values that can be set are " + names;
 }
 
 /// Stores a number in the registers of a value; numbers of 64 bits keep 53 of them.

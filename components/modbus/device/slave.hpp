@@ -30,7 +30,8 @@ public:
     /// Sets a value that the master reads, in its unit. Returns false for an unknown name.
     bool set(std::string_view name, double value);
     /// Returns why a value cannot be set to a number: unknown, written by the master or by the model
-    /// of the drive, or out of the range of its registers; "" when it can. [setup]
+    /// of the drive, or out of the range of its registers; and what can be set. "" when it can.
+    /// [setup]
     std::string problem_of(std::string_view name, double value) const;
     /// Returns a register; nullopt: there is none.
     std::optional<std::uint16_t> get(Table table, std::uint16_t address) const;
@@ -39,6 +40,7 @@ private:
     static std::uint32_t key(Table table, unsigned address) {
         return static_cast<std::uint32_t>(table) << 16 | (address & 0xffffU);
     }
+    std::string settable_values() const;
     void create(Table table, unsigned address, unsigned count);
     void put(const Value& value, double number);
     Pdu read(std::span<const std::uint8_t> request, Table table);

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "modbus/config/plan.hpp"
-#include "text/numbers.hpp"
 
 namespace hal::modbus {
 
@@ -12,55 +11,7 @@ namespace {
 
 constexpr std::int64_t tick_ns = 10'000'000;
 
-bool parse_fault_option(std::string_view key, std::string_view value, SlaveFault& fault) {
-    if (key == "unit") return parse_whole(value, fault.unit);
-    if (key == "share") {
-        return fault.kind == FaultKind::noise && parse_whole(value, fault.share) &&
-               fault.share >= 0 && fault.share <= 1;
-    }
-    if (key == "every") return parse_whole(value, fault.every) && fault.every > 0;
-    const auto time = parse_duration_ns(value);
-    if (!time || *time < 0) return false;
-    if (key == "late") {
-        fault.late_ns = *time;
-    } else if (key == "from") {
-        fault.from_ns = *time;
-    } else if (key == "for") {
-        fault.until_ns = *time;
-    } else {
-        return false;
-    }
-    return true;
-}
-
 }  // namespace
-
-std::string parse_fault(std::string_view text, SlaveFault& fault) {
-    const std::string_view name = text.substr(0, text.find(':'));
-    const auto* at = std::find(std::begin(fault_names), std::end(fault_names), name);
-    if (at == std::end(fault_names)) {
-        return "unknown fault '" + std::string(name) +
-               "'; write silence, late, corrupt, wrong-unit, exception, half or noise";
-    }
-    fault.kind = static_cast<FaultKind>(at - std::begin(fault_names));
-    for (auto rest = text.substr(name.size()); !rest.empty();) {
-        rest.remove_prefix(1);
-        const std::string_view item = rest.substr(0, rest.find(':'));
-        rest.remove_prefix(item.size());
-        const auto equals = std::min(item.find('='), item.size());
-        const std::string_view value = item.substr(std::min(equals + 1, item.size()));
-        if (!parse_fault_option(item.substr(0, equals), value, fault)) {
-            return "invalid option '" + std::string(item) +
-                   "'; options are unit=N, every=N, late=TIME, from=TIME, for=TIME, and share=0.1 "
-                   "of "
-                   "noise";
-        }
-    }
-    if (fault.until_ns != INT64_MAX) {
-        fault.until_ns += fault.from_ns;
-    }
-    return {};
-}
 
 SlaveBus::SlaveBus(const Bus& bus) : bus_(bus) {
     for (const Slave& slave : bus.slaves) {

@@ -33,7 +33,13 @@ std::string apply_setting(SlaveBus& bus, const std::string& text) {
     const std::string name = text.substr(dot + 1, equals - dot - 1);
     const auto of_name = [&](const EmulatedSlave& one) { return one.config().name == slave; };
     const auto found = std::find_if(bus.slaves().begin(), bus.slaves().end(), of_name);
-    if (found == bus.slaves().end()) return "--set '" + text + "': unknown slave '" + slave + "'";
+    if (found == bus.slaves().end()) {
+        std::string names;
+        for (const EmulatedSlave& one : bus.slaves()) {
+            append_item(names, one.config().name);
+        }
+        return "--set '" + text + "': unknown slave '" + slave + "'; slaves are " + names;
+    }
     const std::string problem = found->problem_of(name, *value);
     if (!problem.empty()) return "--set '" + text + "': " + slave + "." + name + ": " + problem;
     found->set(name, *value);
