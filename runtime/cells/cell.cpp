@@ -7,6 +7,7 @@
 
 #include <unistd.h>
 
+#include "hal/age.hpp"
 #include "machine/processes/programs.hpp"
 #include "text/characters.hpp"
 
@@ -97,18 +98,15 @@ bool Cell::load(const std::vector<std::string>& files, const std::string& ini, O
             machine.session->programs().model().add_component(transaction, watch, ::getpid(), {});
             for (const NodeLine& other : nodes_) {
                 if (other.name == nodes_[i].name) continue;
-                std::string problem;
-                ProgramPin online{"node." + other.name + ".online", HAL_TYPE_BIT, HAL_DIR_OUT};
-                ProgramPin incompatible{"node." + other.name + ".incompatible", HAL_TYPE_BIT,
-                                        HAL_DIR_OUT};
-                ProgramPin age{"node." + other.name + ".age-ms", HAL_TYPE_FLOAT, HAL_DIR_OUT};
-                machine.pins[other.name + ".online"] = machine.session->programs().model().add_pin(
-                    transaction, watch, online, problem);
-                machine.pins[other.name + ".incompatible"] =
-                    machine.session->programs().model().add_pin(transaction, watch, incompatible,
-                                                                problem);
-                machine.pins[other.name + ".age-ms"] =
-                    machine.session->programs().model().add_pin(transaction, watch, age, problem);
+                const std::string prefix = "node." + other.name;
+                ProgramPin age{prefix + ".age-ms", HAL_TYPE_FLOAT, HAL_DIR_OUT};
+                age.initial.real = infinite_age;
+                for (const ProgramPin& pin :
+                     {ProgramPin{prefix + ".online", HAL_TYPE_BIT, HAL_DIR_OUT},
+                      ProgramPin{prefix + ".incompatible", HAL_TYPE_BIT, HAL_DIR_OUT}, age}) {
+                    std::string problem;
+                    machine.session->programs().model().add_pin(transaction, watch, pin, problem);
+                }
             }
             Diagnostics none;
             transaction.commit(none);
@@ -167,8 +165,7 @@ bool Cell::start(Output& output) {
                 ProgramPin pin{"node." + from + "." + field.signal, field.type, HAL_DIR_OUT};
                 pin.initial = reader.safe;
                 Transaction transaction = machine.session->begin();
-                machine.pins[from + "." + field.signal] =
-                    machine.session->programs().model().add_pin(transaction, watch, pin, problem);
+                machine.session->programs().model().add_pin(transaction, watch, pin, problem);
                 Diagnostics none;
                 transaction.commit(none);
                 links[reader.node].push_back({"net", field.signal, pin.name});
@@ -194,6 +191,11 @@ bool Cell::start(Output& output) {
     if (step_ns_ == 0) {
         step_ns_ = 1'000'000;
     }
+    std::vector<SimulatedLinks::Node> nodes;
+    for (std::size_t i = 0; i < size(); ++i) {
+        nodes.push_back({nodes_[i].name, machines_[i].session.get()});
+    }
+    links_.emplace(std::move(nodes), topics_);
     return good;
 }
 
@@ -205,59 +207,10 @@ void Cell::advance(std::int64_t ns) {
             const auto lock = machines_[i].session->lock();
             machines_[i].session->threads().advance_ns(step);
         }
-        const bool first = now_ns_ == 0;
         now_ns_ += step;
-        if (isolated_ != SIZE_MAX) continue;
-        for (const NodeTopic& topic : topics_) {
-            if (now_ns_ % topic.rate_ns < step) {
-                deliver(topic);
-            }
+        if (isolated_ == SIZE_MAX) {
+            links_->update(now_ns_, step);
         }
-        if (first) {
-            set_online();
-        }
-    }
-}
-
-// After the first step all nodes are online.
-void Cell::set_online() {
-    for (Machine& machine : machines_) {
-        std::vector<std::pair<Pin*, hal_value>> online;
-        for (const auto& [name, pin] : machine.pins) {
-            if (name.ends_with(".online") && pin) {
-                online.emplace_back(pin, hal_value{.raw = 1});
-            }
-        }
-        const auto lock = machine.session->lock();
-        machine.session->values().write(online);
-    }
-}
-
-void Cell::deliver(const NodeTopic& topic) {
-    std::vector<std::string> names;
-    for (const NodeField& field : topic.fields) {
-        names.push_back(field.signal);
-    }
-    std::vector<std::optional<Reading>> values;
-    {
-        Session& from = *machines_[topic.from].session;
-        const auto lock = from.lock();
-        values = from.values().read(names);
-    }
-    std::vector<std::vector<std::pair<Pin*, hal_value>>> rows(size());
-    for (std::size_t i = 0; i < topic.fields.size(); ++i) {
-        for (const NodeReader& reader : topic.fields[i].readers) {
-            if (Pin* const pin =
-                    machines_[reader.node].pins[nodes_[topic.from].name + "." + names[i]];
-                pin && values[i]) {
-                rows[reader.node].emplace_back(pin, values[i]->value);
-            }
-        }
-    }
-    for (std::size_t i = 0; i < size(); ++i) {
-        if (rows[i].empty()) continue;
-        const auto lock = machines_[i].session->lock();
-        machines_[i].session->values().write(rows[i]);
     }
 }
 

@@ -7,10 +7,12 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "cells/simulated_links.hpp"
 #include "commands/shell.hpp"
 #include "machine/session.hpp"
 #include "model/nodes.hpp"
@@ -52,20 +54,18 @@ private:
     struct Machine {
         std::unique_ptr<Session> session;
         std::unique_ptr<Shell> shell;
-        std::map<std::string, Pin*> pins;  ///< by "robot.online", "robot.age-ms", "robot.SIGNAL"
     };
     class UniqueOutput;
     bool connect(Output& output);
     Span place(std::size_t node, Span span);
     void report(Diagnostics& found, Output& output) const;
-    void set_online();
-    void deliver(const NodeTopic& topic);
 
     std::string name_;
     std::vector<NodeLine> nodes_;
     ShellOptions options_;
-    std::vector<Machine> machines_;
     std::vector<NodeTopic> topics_;
+    std::optional<SimulatedLinks> links_;  ///< from start() on
+    std::vector<Machine> machines_;
     Sources texts_;  ///< texts of all nodes that diagnostics between them show
     std::map<std::pair<std::string, std::uint32_t>, std::uint32_t> known_texts_;
     std::int64_t step_ns_ = 0;

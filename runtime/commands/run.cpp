@@ -98,7 +98,25 @@ void command_stop(Context& context) {
     context.transaction->when_committed([&session] { session.threads().stop(); });
 }
 
+namespace {
+
+/// Reports an `advance` that would advance one of several machines alone. Returns true for one.
+bool reject_shared_time(Context& context) {
+    const ShellOptions& options = context.options();
+    if (!options.shared_time) return false;
+    const std::string amount = context.argument(0);
+    context.diagnostics.error(
+        "shared-time", context.command.span,
+        "'advance' in a netlist for several machines, whose time passes for all together", "",
+        "leave it out and use --for " + amount + ", or -e 'all: advance " + amount + "'; --node " +
+            options.node + " simulates this node only");
+    return true;
+}
+
+}  // namespace
+
 void command_advance(Context& context) {
+    if (reject_shared_time(context)) return;
     const std::string& amount = context.argument(0);
     if (context.count() == 2) {
         const auto cycles = whole_number(amount);

@@ -83,6 +83,9 @@ struct ShellOptions {
     Level level = Level::errors;
     /// of a netlist with `node` lines: whose part is loaded; `$NODE` in it
     std::string node = {};
+    /// of a netlist with `node` lines that runs on one virtual clock with the others: rejects
+    /// `advance`
+    bool shared_time = false;
     /// what relative paths of source, save, loadusr are relative to; empty: the process's own
     std::string directory = {};
     ShellObserver* observer = nullptr;  ///< outlives the shell; nullptr: none

@@ -160,12 +160,101 @@ class Language(Case):
 
     def test_execute_selects_the_node(self):
         path = self.write("cell.hal", CELL)
-        self.assertIn(
-            "use --execute 'sender: getp x'", self.bad("sim", path, "--for", "1ms", "-e", "getp x")
+        command = ("sim", path, "--for", "1ms", "-q", "-e", "sender: print executed", "-e")
+        node = "needs a node, or 'all'; use --execute"
+        for text, problem in {
+            "getp x": f"'getp x' {node} 'sender: getp x'",
+            "getp a:b": f"'getp a:b' {node} 'sender: getp a:b'",
+            "nobody: getp x": f"'nobody: getp x' {node} 'sender: getp x'",
+            "sender: advance 1s": "'sender: advance 1s': time passes for all nodes together; use "
+            "--execute 'all: advance 1s'",
+            "all: advance 5": "'all: advance 5': invalid time '5'; use a number with its unit: "
+            "--execute 'all: advance 5s'",
+        }.items():
+            with self.subTest(text):
+                # nothing was executed
+                self.assertEqual(f"hal sim: --execute {problem}\n", self.bad(*command, text))
+        self.assertEqual("0\n0\n", self.good(*command[:5], "-e", "all: getp servo.missed"))
+
+    def sim(self, netlist, *commands, time="1s"):
+        path = self.write("cell.hal", netlist)
+        words = [word for command in commands for word in ("-e", command)]
+        return self.good("sim", path, "--for", time, "-q", *words)
+
+    def state(self, reader, other):
+        return [f"{reader}: getp node.{other}.{pin}" for pin in ("online", "age-ms")]
+
+    def test_sim_finds_a_stopped_node_offline_after_its_deadline(self):
+        fault = (
+            "servo: node 'sender' sent no signals of thread 'servo' for 1.001 s (deadline 1 s) at "
+            "cycle 2 001; they have their safe values; see: show pin node\n"
         )
-        self.assertIn(
-            "time passes for all nodes together; use --for",
-            self.bad("sim", path, "--for", "1ms", "-e", "sender: advance 1s"),
+        value = "taker: gets count"
+        stopped = ("sender: stop", "all: advance 1s")
+        online = self.state("taker", "sender")
+        self.assertEqual(
+            "TRUE\n1000\n1\nno faults\n",
+            self.sim(CELL, *stopped, *online, value, "taker: show fault"),
+        )
+        lost = self.sim(CELL, *stopped, "all: advance 1s", *online, value, "taker: show fault")
+        self.assertEqual(
+            f"FALSE\n2000\n-1\n   1  999 ms ago (lasts)  {fault}1 not acknowledged; 1 lasts: "
+            "type `fault clear` once the cause is over\n",
+            lost,
+        )
+        # and the other way it is as lost, because a stopped node receives nothing
+        self.assertEqual("FALSE\ninf\n", self.sim(CELL, *stopped, *self.state("sender", "taker")))
+        again = self.sim(
+            CELL,
+            *stopped,
+            "all: advance 1s",
+            "sender: start",
+            "all: advance 10ms",
+            *online,
+            "taker: show fault",
+            "taker: fault clear",
+            "taker: show fault",
+        )
+        self.assertEqual(
+            f"TRUE\n0\n   1  1.01 s ago  {fault}1 not acknowledged; `fault clear` acknowledges "
+            "them\nno faults\n",
+            again.replace("(lasts) ", ""),
+        )
+
+    def test_sim_finds_a_node_offline_without_one_of_its_threads(self):
+        commands = ["desk: delthread slow", "desk: addf tb servo", "all: advance 2s"]
+        shown = [*self.state("motor", "desk"), "motor: gets lazy", "motor: gets fast"]
+        path = self.write("cell.hal", TWO_THREADS)
+        words = [word for command in (*commands, *shown) for word in ("-e", command)]
+        done = self.run_program("sim", path, "--for", "1s", "-q", *words)
+        self.assertEqual((0, "FALSE\n2000\n-1\n3\n"), (done.returncode, done.stdout), done.stderr)
+
+    def test_sim_finds_a_node_offline_whose_machine_is_unloaded(self):
+        commands = ["sender: unload all", "all: advance 2s"]
+        self.assertEqual("FALSE\n2000\n", self.sim(CELL, *commands, *self.state("taker", "sender")))
+
+    def test_advance_in_a_netlist_of_all_nodes(self):
+        path = self.write("cell.hal", CELL + "advance 2s\n")
+        self.assertEqual(
+            f"{path}:22:1: error: 'advance' in a netlist for several machines, whose time passes "
+            "for all together [shared-time]\n   22 | advance 2s\n      | ^^^^^^^^^^\n"
+            "      = help: leave it out and use --for 2s, or -e 'all: advance 2s'; --node taker "
+            "simulates this node only\n",
+            self.bad("sim", path),
+        )
+        self.assertEqual(
+            "2\n",
+            self.good(
+                "sim",
+                path,
+                "--node",
+                "taker",
+                "-q",
+                "-e",
+                "all: advance 1s",
+                "-e",
+                "taker: getp twice.gain",
+            ),
         )
 
     def test_rejects_dds_without_a_node(self):

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cstdint>
 #include <cstdlib>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -13,7 +14,9 @@
 #include "run/offline.hpp"
 #include "run/report.hpp"
 #include "run/sim_summary.hpp"
+#include "text/characters.hpp"
 #include "text/diagnostic.hpp"
+#include "text/numbers.hpp"
 #include "text/quoting.hpp"
 
 namespace hal::tools {
@@ -69,30 +72,100 @@ std::optional<std::vector<std::string>> dds_settings(const Options& options,
     return words;
 }
 
-/// Returns the first word of a command line.
-std::string_view first_word(std::string_view line) {
-    const auto begin = line.find_first_not_of(" \t");
-    if (begin == line.npos) return {};
-    const auto end = line.find_first_of(" \t", begin);
-    return line.substr(begin, end == line.npos ? end : end - begin);
+/// "NODE: COMMAND" or "all: COMMAND" of --execute.
+struct NodeCommand {
+    static constexpr std::size_t all = SIZE_MAX;
+    std::size_t node = all;
+    std::string line;
+    std::int64_t advance_ns = 0;  ///< of all nodes; 0: `line` is another command
+};
+
+constexpr std::string_view blanks = " \t";
+
+std::string_view trimmed(std::string_view text) {
+    const auto begin = text.find_first_not_of(blanks);
+    if (begin == text.npos) return {};
+    return text.substr(begin, text.find_last_not_of(blanks) - begin + 1);
 }
 
-/// "NODE: COMMAND" of --execute.
-int execute(const Options& options, Cell& cell, const std::string& command, Output& output) {
-    const auto colon = command.find(':');
-    const std::size_t node =
-        colon == command.npos ? cell.size() : cell.find(command.substr(0, colon));
-    if (node == cell.size()) {
-        return fail(options, fmt::format("--execute needs a node; use --execute '{}: {}'",
-                                         cell.nodes().front().name, command));
+/// Returns what follows "advance" in a command line; nullopt: another command.
+std::optional<std::string_view> advance_of(std::string_view line) {
+    line = trimmed(line);
+    constexpr std::string_view word = "advance";
+    const bool is_other = line.size() > word.size() && blanks.find(line[word.size()]) == line.npos;
+    if (!line.starts_with(word) || is_other) return std::nullopt;
+    return trimmed(line.substr(word.size()));
+}
+
+/// Returns the commands of --execute; nullopt after printing what is wrong with one.
+std::optional<std::vector<NodeCommand>> node_commands(const SimOptions& options,
+                                                      const std::vector<NodeLine>& nodes) {
+    std::vector<NodeCommand> commands;
+    for (const std::string& text : options.execute) {
+        const auto colon = text.find(':');
+        const std::string_view name = trimmed(std::string_view(text).substr(0, colon));
+        const auto at = std::find_if(nodes.begin(), nodes.end(),
+                                     [name](const NodeLine& node) { return node.name == name; });
+        if (colon == text.npos || (at == nodes.end() && name != "all")) {
+            // "getp a:b" has a colon, but no node
+            const bool is_command = colon == text.npos || name.find_first_of(blanks) != name.npos;
+            const auto command =
+                trimmed(is_command ? text : std::string_view(text).substr(colon + 1));
+            fail(options,
+                 fmt::format("--execute '{}' needs a node, or 'all'; use --execute '{}: {}'", text,
+                             nodes.front().name, command));
+            return std::nullopt;
+        }
+        NodeCommand command;
+        command.line = text.substr(colon + 1);
+        const auto amount = advance_of(command.line);
+        if (at != nodes.end()) {
+            command.node = static_cast<std::size_t>(at - nodes.begin());
+        }
+        if (amount && command.node != NodeCommand::all) {
+            fail(options, fmt::format("--execute '{}': time passes for all nodes together; use "
+                                      "--execute 'all: advance {}'",
+                                      text, *amount));
+            return std::nullopt;
+        }
+        if (amount) {
+            const auto ns = is_digit(amount->empty() ? 'x' : amount->back())
+                                ? std::nullopt
+                                : parse_duration_ns(*amount);
+            if (!ns || *ns <= 0) {
+                fail(options,
+                     fmt::format("--execute '{}': invalid time '{}'; use a number with its unit: "
+                                 "--execute 'all: advance 5s'",
+                                 text, *amount));
+                return std::nullopt;
+            }
+            command.advance_ns = *ns;
+        }
+        commands.push_back(std::move(command));
     }
-    const std::string line = command.substr(colon + 1);
-    if (first_word(line) == "advance") {
-        return fail(options, fmt::format("--execute '{}': time passes for all nodes together; use "
-                                         "--for, or simulate this node only: --node {}",
-                                         command, cell.nodes()[node].name));
+    return commands;
+}
+
+void advance(Cell& cell, std::int64_t ns, const StopRequest& stop) {
+    constexpr std::int64_t slice_ns = 100'000'000;
+    for (std::int64_t left = ns; left > 0 && !stop.requested(); left -= slice_ns) {
+        cell.advance(std::min(left, slice_ns));
     }
-    return cell.shell(node).execute(line, output, "<commandline>");
+}
+
+/// Returns the exit status.
+int execute(Cell& cell, const NodeCommand& command, const StopRequest& stop, Output& output) {
+    if (command.advance_ns != 0) {
+        advance(cell, command.advance_ns, stop);
+        return 0;
+    }
+    int status = 0;
+    for (std::size_t i = 0; i < cell.size(); ++i) {
+        if (command.node == NodeCommand::all || command.node == i) {
+            status = std::max(status, cell.shell(i).execute(command.line, output, "<commandline>"));
+        }
+    }
+    return status;
 }
 
 }  // namespace
@@ -160,23 +233,25 @@ int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
         return fail(options,
                     "--show applies to one machine; for several use --execute 'NODE: getp NAME'");
     }
+    const auto commands = node_commands(options, nodes);
+    if (!commands) return 1;
     TrackedOutput output;
     const auto begun = std::chrono::steady_clock::now();
-    Cell cell(cell_name(options.words), std::move(nodes), session, shell_options(options));
+    ShellOptions how = shell_options(options);
+    how.shared_time = options.part.empty();
+    Cell cell(cell_name(options.words), std::move(nodes), session, how);
     int status = cell.load(options.words, options.ini, output) && cell.start(output) ? 0 : 1;
-    constexpr std::int64_t slice_ns = 100'000'000;
     if (!options.part.empty()) {
         cell.isolate(cell.find(options.part));
     }
-    for (std::int64_t left = status == 0 ? options.for_ns : 0; left > 0 && !stop.requested();
-         left -= slice_ns) {
-        cell.advance(std::min(left, slice_ns));
+    if (status == 0) {
+        advance(cell, options.for_ns, stop);
     }
     const bool loaded = status == 0;
     const auto wall = std::chrono::steady_clock::now() - begun;
-    for (const std::string& command : options.execute) {
+    for (const NodeCommand& command : *commands) {
         if (status == 0 && !stop.requested()) {
-            status = execute(options, cell, command, output);
+            status = execute(cell, command, stop, output);
         }
     }
     if (loaded && !options.report && summary_wanted(options, output.printed) && cell.size() != 0) {

@@ -48,8 +48,8 @@ struct SimOptions : NetlistOptions {
         set.value("--node", part, "NAME",
                   "simulate only this node of a netlist for several machines (default: all nodes)");
         set.values("-e,--execute", execute, "COMMAND",
-                   "execute this command at the end; for several machines: 'NODE: COMMAND'; may be "
-                   "repeated");
+                   "execute this command at the end; for several machines: 'NODE: COMMAND', 'all: "
+                   "COMMAND' or 'all: advance 5s'; may be repeated");
     }
 };
 

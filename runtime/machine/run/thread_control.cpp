@@ -126,6 +126,20 @@ void ThreadControl::advance_cycles(std::uint64_t cycles) {
     }
 }
 
+bool ThreadControl::runs(std::string_view thread) const {
+    const Core* const core = state_.threads.core(state_.model.find_thread(thread));
+    return running() && core && !core->stopped_by_fault() && !core->monitor.hung();
+}
+
+void ThreadControl::begin_fault(std::string_view thread, const char* reason, double detail) {
+    Core* const core = state_.threads.core(state_.model.find_thread(thread));
+    if (!core) return;
+    state_.executor->board().begin(reason, reason);
+    core->raise({HAL_FAULT_COMPONENT, 0, core->cycle_number(), now_ns(), detail, reason, reason});
+}
+
+void ThreadControl::end_fault(const char* reason) { state_.executor->board().end(reason, reason); }
+
 std::int64_t ThreadControl::now_ns() const { return state_.executor->now_ns(); }
 
 // --- the watchdog device: the kernel resets the host when nobody writes to it for its timeout; the supervisor writes ---------------

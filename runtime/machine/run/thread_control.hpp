@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "plan/plan.hpp"
@@ -62,6 +63,14 @@ public:
     void advance_ns(std::int64_t ns);
     /// The same for `cycles` cycles of the fastest thread.
     void advance_cycles(std::uint64_t cycles);
+    /// Returns true while the functions of a thread run: they are started, and no fault has stopped
+    /// them. False for an unknown thread.
+    bool runs(std::string_view thread) const;
+    /// Virtual clock: raises a fault of the thread, as hal_faults::raise does for its functions,
+    /// that lasts until end_fault(). `reason` outlives the session, and its address is what
+    /// end_fault() knows. Does nothing for an unknown thread.
+    void begin_fault(std::string_view thread, const char* reason, double detail);
+    void end_fault(const char* reason);
     /// The runtime's clock: CLOCK_MONOTONIC or the virtual clock.
     std::int64_t now_ns() const;
 

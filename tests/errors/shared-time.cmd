@@ -1,0 +1,1 @@
+hal sim shared-time.hal
