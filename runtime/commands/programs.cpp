@@ -222,6 +222,7 @@ private:
 class Timeout {
 public:
     explicit Timeout(std::int64_t limit_ns) : limit_(limit_ns) {}
+    std::int64_t limit_ns() const { return limit_.count(); }
     bool over() const { return limit_.count() != 0 && waited() >= limit_; }
     /// True after 1 s, 10 s, and then every minute.
     bool report_due() {
@@ -245,6 +246,12 @@ private:
     std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
     std::chrono::nanoseconds limit_, report_ = 1s;
 };
+
+/// Returns how long a command waits for a program: as its `-t` states, else the limit of the virtual
+/// clock.
+std::int64_t limit_of(const Context& context, std::int64_t timeout_ns) {
+    return timeout_ns != 0 ? timeout_ns : context.session.options().wait_limit_ns;
+}
 
 void report_wait(Context& context, Timeout& timeout, const auto& what) {
     if (!timeout.report_due() || context.options().level == Level::nothing) return;
@@ -289,7 +296,7 @@ bool wait_for_name(Context& context, const Plan& plan, Timeout& timeout) {
         }
         if (timeout.over()) {
             timed_out(
-                context, plan.timeout_ns,
+                context, timeout.limit_ns(),
                 "the previous '" + plan.name + "' (process " + std::to_string(entry->pid) +
                     ") did not end",
                 "nothing was started; kill -9 " + std::to_string(entry->pid) + " ends it by force");
@@ -369,7 +376,7 @@ void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64
             if (entry) {
                 context.programs.give_up(*entry);
             }
-            return timed_out(context, plan.timeout_ns,
+            return timed_out(context, timeout.limit_ns(),
                              "component '" + plan.name + "' was not ready",
                              "'" + program + "' " + last + "; it was terminated");
         }
@@ -382,13 +389,25 @@ void wait_until_ready(Context& context, const Plan& plan, pid_t pid, std::uint64
     }
 }
 
+/// Reports, under the virtual clock, that a command waits for a program, and for what time stands.
+void report_virtual_wait(Context& context, Timeout& timeout, const std::string& program,
+                         pid_t pid) {
+    if (!context.session.options().virtual_clock) return;
+    report_wait(context, timeout, [&] {
+        return "waiting for '" + program + "' (process " + std::to_string(pid) +
+               ") to end; time passes only while it reads a sampler or feeds a streamer";
+    });
+}
+
 void wait_until_ended(Context& context, const Plan& plan, pid_t pid, Pipes* pipes,
-                      const Timeout& timeout) {
+                      Timeout& timeout) {
+    const Programs::Awaited awaited(context.programs, pid);
     while (true) {
         const auto* const entry = context.programs.find(pid);
         if (entry->ended()) break;
+        report_virtual_wait(context, timeout, context.argument(plan.program), pid);
         if (timeout.over()) {
-            timed_out(context, plan.timeout_ns,
+            timed_out(context, timeout.limit_ns(),
                       "'" + context.argument(plan.program) + "' did not end",
                       "the program was terminated");
             context.programs.give_up(*context.programs.find(pid));
@@ -449,7 +468,7 @@ void command_loadusr(Context& context) {
         start.err = pipes->err();
     }
 
-    Timeout timeout(plan.timeout_ns);
+    Timeout timeout(limit_of(context, plan.timeout_ns));
     if (!plan.any_name && !plan.wait_end && !wait_for_name(context, plan, timeout)) return;
     const bool fresh = !plan.any_name && !context.programs.find(plan.name);
     std::string problem;
@@ -496,7 +515,8 @@ void command_waitusr(Context& context) {
         }
         return;  // it has already ended
     }
-    const Timeout timeout(limit_ns);
+    Timeout timeout(limit_of(context, limit_ns));
+    const Programs::Awaited awaited(context.programs, context.programs.find(name)->pid);
     // the one that has the name now; another that takes the name over meanwhile is not waited for
     const std::uint64_t number = context.programs.find(name)->number;
     const auto living = [&]() -> const Programs::Entry* {
@@ -506,11 +526,12 @@ void command_waitusr(Context& context) {
     };
     while (const auto* const entry = living()) {
         if (timeout.over()) {
-            return timed_out(context, limit_ns,
+            return timed_out(context, timeout.limit_ns(),
                              "'" + name + "' (process " + std::to_string(entry->pid) + ", " +
                                  entry->state() + ") did not end",
                              "");
         }
+        report_virtual_wait(context, timeout, name, entry->pid);
         if (context.interrupted()) return;
         context.programs.wait(context.lock, 100ms);
     }

@@ -20,9 +20,8 @@ constexpr unsigned run = 8;  // bits of Lock
 
 namespace kind {
 constexpr Behaviour addition{.effect = Effect::addition, .timing = Timing::at_commit};
-constexpr Behaviour linking{.effect = Effect::addition,
-                            .timing = Timing::at_commit,
-                            .operands = Operands::arrows};
+constexpr Behaviour linking{
+    .effect = Effect::addition, .timing = Timing::at_commit, .operands = Operands::arrows};
 constexpr Behaviour change{.effect = Effect::change, .timing = Timing::at_commit};
 constexpr Behaviour unloading{.effect = Effect::end_of_program, .timing = Timing::at_commit};
 constexpr Behaviour deferred{.timing = Timing::at_commit};
@@ -36,9 +35,8 @@ constexpr Behaviour saving{.operands = Operands::paths};
 constexpr Behaviour saving_apart{.waiting = Waiting::possible, .operands = Operands::paths};
 constexpr Behaviour nothing{.effect = Effect::nothing};
 constexpr Behaviour output{.effect = Effect::output};
-constexpr Behaviour sourcing{.effect = Effect::nothing,
-                             .waiting = Waiting::possible,
-                             .operands = Operands::paths};
+constexpr Behaviour sourcing{
+    .effect = Effect::nothing, .waiting = Waiting::possible, .operands = Operands::paths};
 }  // namespace kind
 
 constexpr CommandRow rows[] = {
@@ -80,7 +78,9 @@ constexpr CommandRow rows[] = {
      "a program of that name to end, loadusr waits for that first. The wait is reported after 1 s, "
      "10 s and every minute.\n"
      "-w waits for the program to end and fails if its exit status is not 0; -i ignores the "
-     "status.\n"
+     "status. In `hal sim`, time stands meanwhile; it passes only as far as the program needs it "
+     "to "
+     "read a sampler or to feed a streamer.\n"
      "-t TIME (10s, 500ms) limits the wait: then the command fails and the program is terminated.\n"
      "--restart=on-failure restarts the program, after --restart-delay (1s), when a signal "
      "terminated it or its exit status is\n"
@@ -88,7 +88,9 @@ constexpr CommandRow rows[] = {
      "5 restarts within 10 s no other follows.",
      command_loadusr, load, kind::waiting},
     {"waitusr", "", "[-t TIME] PROCESS", "wait until a program has ended",
-     "-t TIME (10s, 500ms) limits the wait: then the command fails, and the program continues.",
+     "-t TIME (10s, 500ms) limits the wait: then the command fails, and the program continues. In "
+     "`hal sim`, time stands meanwhile,\n"
+     "as with loadusr -w.",
      command_waitusr, 0, kind::waiting},
     {"unloadusr", "", "PROCESS|all", "end a program (SIGTERM)",
      "Sends SIGTERM and does not wait for the program to end (waitusr does); until then `show "

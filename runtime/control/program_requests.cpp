@@ -620,6 +620,20 @@ std::vector<std::vector<std::string>> rows_of(const Json& records) {
     return rows;
 }
 
+/// A command waits for the end of this program, and the program for the machine, whose virtual time
+/// stands meanwhile: lets time pass until `is_done`, for some cycles at most.
+void pass_time_until(const Program& by, auto&& is_done) {
+    constexpr int max_cycles = 1000;
+    ThreadControl& threads = by.session.threads();
+    if (!by.session.options().virtual_clock || !threads.running() || by.session.in_transaction()) {
+        return;
+    }
+    if (is_done() || !by.session.programs().awaits(by.peer)) return;
+    for (int i = 0; i < max_cycles && !is_done() && !by.session.ending(); ++i) {
+        threads.advance_cycles(1);
+    }
+}
+
 }  // namespace
 
 void use_stream(const Program& by, const Json& body, std::string& reply) {
@@ -636,13 +650,22 @@ void use_stream(const Program& by, const Json& body, std::string& reply) {
         create_stream(by, name, create, member(body, "owner"));
     }
     hal_stream& stream = find_stream(by, name, take.is_null());
+    const auto waiting = [&stream] {
+        return __atomic_load_n(&stream.head, __ATOMIC_ACQUIRE) -
+               __atomic_load_n(&stream.tail, __ATOMIC_ACQUIRE);
+    };
     std::string why;
     bool good = true;
     if (!take.is_null()) {
         const auto max_count = static_cast<std::uint64_t>(whole(take, "take", 0, 1'000'000));
+        const std::uint64_t wanted = std::min<std::uint64_t>(max_count, stream.depth / 2 + 1);
+        pass_time_until(by, [&] { return waiting() >= wanted; });
         good = pop_records(stream, max_count, reply, why);
     } else if (!records.is_null()) {
-        good = feed_records(stream, rows_of(records), reply, why);
+        const auto rows = rows_of(records);
+        const std::uint64_t wanted = std::min<std::uint64_t>(rows.size(), stream.depth / 2 + 1);
+        pass_time_until(by, [&] { return stream.depth - waiting() >= wanted; });
+        good = feed_records(stream, rows, reply, why);
     }
     if (!good) {
         throw RequestError{why};

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
 """hal sim: the virtual clock from outside."""
+
+import re
 import signal
 import unittest
 
@@ -125,6 +127,66 @@ class Sim(Case):
             + "start\nadvance 2 cycles\nloadusr -w halcmd setp adder.in0 10\nadvance 2 cycles\ngets total\n",
         )
         self.assertEqual("13\n", self.good("sim", path))
+
+    SAMPLER = (
+        "loadrt threads name1=servo period1=1000000\n"
+        "loadrt sampler depth=100 cfg=u\naddf sampler.0 servo\n"
+        "net alive servo.threadbeat => sampler.0.pin.0\n"
+    )
+
+    def sampled(self, file):
+        return [int(line) for line in (self.folder / file).read_text().split()]
+
+    def test_time_passes_as_far_as_a_program_needs_it_that_a_command_waits_for(self):
+        """A sampler is read, a streamer is fed, in a program of the program's, and with waitusr."""
+        self.write("twice.sh", "halsampler -n 250 | cat >b.txt\n")
+        self.write("in.txt", "".join(f"{i}\n" for i in range(300)))
+        for name, commands, end in (
+            ("one program", "loadusr -w halsampler -n 250 a.txt\n", 250),
+            ("its program", "loadusr -w sh twice.sh\n", 250),
+            ("waitusr", "loadusr -Wn s halsampler -N s -n 250 a.txt\nwaitusr s\n", 250),
+        ):
+            with self.subTest(name):
+                path = self.write(
+                    "a.hal", self.SAMPLER + "start\n" + commands + "getp servo.threadbeat\n"
+                )
+                for _ in range(2):
+                    (self.folder / "a.txt").unlink(missing_ok=True)
+                    self.assertEqual(f"{end}\n", self.good("sim", path))
+                    values = self.sampled("b.txt" if name == "its program" else "a.txt")
+                    self.assertEqual(list(range(values[0], values[0] + 250)), values)
+        path = self.write(
+            "a.hal",
+            "loadrt threads name1=servo period1=1000000\nloadrt streamer depth=16 cfg=u\n"
+            "addf streamer.0 servo\nnet s streamer.0.pin.0\nstart\nloadusr -w halstreamer in.txt\n"
+            "gets s\nadvance 20 cycles\ngets s\n",
+        )
+        self.assertEqual("284\n299\n", self.good("sim", path))
+
+    def test_time_stands_for_a_program_that_a_command_does_not_wait_for(self):
+        path = self.write(
+            "a.hal",
+            self.SAMPLER + "start\nloadusr halsampler -n 50 a.txt\nloadusr -w sleep 0.3\n"
+            "getp servo.threadbeat\n",
+        )
+        self.assertEqual("0\n", self.good("sim", path))
+
+    def test_the_wait_for_a_program_that_gets_no_samples_is_reported_and_limited(self):
+        path = self.write(
+            "a.hal", self.SAMPLER + "loadusr -w halsampler -n 20 a.txt\nprint not executed\n"
+        )
+        done = self.run_program("sim", path, "--cycle-limit", "1200ms")
+        self.assertEqual((1, ""), (done.returncode, done.stdout))
+        self.assertEqual(
+            "loadusr: waiting for 'halsampler' (process N) to end; time passes only while it reads "
+            "a sampler or feeds a streamer (1 s)\n"
+            f"{path}:5:1: error: 'halsampler' did not end within 1.20 s [program-timeout]\n"
+            "    5 | loadusr -w halsampler -n 20 a.txt\n"
+            "      | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^\n"
+            "      = help: the program was terminated\n\n"
+            "1 error; lines 1 to 4 took effect; line 6 had no effect\n",
+            re.sub(r"process \d+", "process N", done.stderr),
+        )
 
     def test_can_be_interrupted(self):
         path = self.write("a.hal", SERVO)

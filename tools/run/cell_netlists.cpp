@@ -229,6 +229,7 @@ int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
     SessionOptions session;
     session.name = fmt::format("sim-{}", ::getpid());
     session.virtual_clock = true;
+    session.wait_limit_ns = options.cycle_limit_ns;
     if (!options.show.empty()) {
         return fail(options,
                     "--show applies to one machine; for several use --execute 'NODE: getp NAME'");

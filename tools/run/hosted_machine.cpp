@@ -28,6 +28,7 @@ SessionOptions session_options(const NetlistOptions& of, const std::string& name
     options.observer = observer;
     options.name = name;
     options.virtual_clock = virtual_clock;
+    options.wait_limit_ns = virtual_clock ? of.cycle_limit_ns : 0;
     options.max_gap_ns = of.max_gap_ns;
     options.max_gap_realtime_ns = of.max_gap_realtime_ns;
     return options;

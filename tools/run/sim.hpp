@@ -25,9 +25,11 @@ struct SimOptions : NetlistOptions {
         set.for_how_long(for_ns, "advance the virtual clock by 10s, 250ms … after loading");
         set.value("--cycles", cycles, "N",
                   "advance by N cycles of the fastest thread after loading");
-        set.duration("--cycle-limit", cycle_limit_ns,
-                     "end with status 1 when one cycle takes longer than this in wall time", 1,
-                     "10s, 1min or 500ms");
+        set.duration(
+            "--cycle-limit", cycle_limit_ns,
+            "end with status 1 when one cycle, or the wait for a program, takes longer than "
+            "this in wall time",
+            1, "10s, 1min or 500ms");
         set.value("-N,--name", name, "NAME", "of the instance");
         declare_netlists(set);
         set.flag("--report", report, "print the timing report on stderr at the end");

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <csignal>
+#include <fstream>
 #include <utility>
 
 #include "execute/core.hpp"
@@ -22,6 +24,19 @@ using Process = ProgramEntry::Process;
 std::string in_use_text(const ProgramEntry& entry) {
     return "the name '" + entry.name + "' is in use by process " + std::to_string(entry.pid) +
            " (" + entry.state() + ")";
+}
+
+/// Returns the process that started `pid`; 0 when it is unknown.
+pid_t parent_of(pid_t pid) {
+    std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
+    std::string text;
+    std::getline(file, text);
+    // the name, which is in parentheses, may contain blanks; the state and the parent follow
+    const auto name_end = text.rfind(") ");
+    pid_t parent = 0;
+    if (name_end == text.npos || name_end + 4 > text.size()) return 0;
+    std::from_chars(text.data() + name_end + 4, text.data() + text.size(), parent);
+    return parent;
 }
 
 }  // namespace
@@ -563,6 +578,15 @@ void Programs::start_again(Entry& entry, std::int64_t now_ns) {
         entry.death()->restarted = true;
         model_.replace_process(entry.name, pid);
     }
+}
+
+bool Programs::awaits(pid_t pid) const {
+    if (awaited_.empty()) return false;
+    constexpr int max_generations = 32;
+    for (int i = 0; i < max_generations && pid > 1; ++i, pid = parent_of(pid)) {
+        if (std::find(awaited_.begin(), awaited_.end(), pid) != awaited_.end()) return true;
+    }
+    return false;
 }
 
 // What sleeps longer than it meant to was suspended as a whole, and the programs' signs of life

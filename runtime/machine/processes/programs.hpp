@@ -99,6 +99,23 @@ public:
     /// after 5 s.
     void give_up(Entry& entry);
 
+    /// A command waits for the end of a process, from here to its own end. [setup]
+    class Awaited {
+    public:
+        Awaited(Programs& programs, pid_t pid) : programs_(programs), pid_(pid) {
+            programs_.awaited_.push_back(pid_);
+        }
+        ~Awaited() { std::erase(programs_.awaited_, pid_); }
+        Awaited(const Awaited&) = delete;
+
+    private:
+        Programs& programs_;
+        const pid_t pid_;
+    };
+    /// Returns true when a command waits for the end of this process, or of one that has started
+    /// it.
+    bool awaits(pid_t pid) const;
+
     /// Releases the lock until something about a process changes, for `timeout` at most.
     void wait(std::unique_lock<std::mutex>& lock, std::chrono::milliseconds timeout) {
         changed_.wait_for(lock, timeout);
@@ -132,6 +149,7 @@ private:
     ProgramModel model_;
     std::vector<Entry> entries_;
     std::condition_variable changed_;
+    std::vector<pid_t> awaited_;
     std::uint64_t owners_ = 0;
     std::uint64_t numbers_ = 0;
     std::deque<std::pair<pid_t, std::string>> refusals_;  // the newest first
