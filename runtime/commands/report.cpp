@@ -140,12 +140,41 @@ void command_status(Context& context) {
     context.output.out(text);
 }
 
-void show_timing(Context& context) {
+namespace {
+
+/// Returns the words behind the kind of a `show`.
+std::vector<std::string> words_of(const Context& context) {
     std::vector<std::string> words;
     for (std::size_t i = 1; i < context.count(); ++i) {
         words.push_back(context.argument(i));
     }
-    const Patterns patterns(std::move(words));
+    return words;
+}
+
+template <class Objects>
+std::vector<std::string> names_of(const Objects& objects) {
+    std::vector<std::string> names;
+    for (const auto& [name, object] : objects) {
+        names.emplace_back(name);
+    }
+    return names;
+}
+
+}  // namespace
+
+void show_timing(Context& context) {
+    const std::vector<std::string> words = words_of(context);
+    const Model& model = context.session.model();
+    for (std::size_t i = 0; i < words.size(); ++i) {
+        if (!threads_slowest_first(model, Patterns({words[i]})).empty()) continue;
+        const auto names = names_of(model.thread);
+        context.diagnostics.error("no-such-thread", context.span(i + 1),
+                                  "unknown thread '" + words[i] + "'",
+                                  did_you_mean(words[i], names),
+                                  names.empty() ? "no thread exists" : "threads: " + listed(names));
+    }
+    if (context.diagnostics.failed()) return;
+    const Patterns patterns(words);
     std::string text;
     if (context.options().json) {
         describe(text, context.session, Listed::threads, patterns, std::nullopt);
@@ -190,17 +219,81 @@ void show_timing(Context& context) {
     context.output.out(text + "\n");
 }
 
-void show_latency(Context& context) {
-    std::vector<std::string> words;
-    for (std::size_t i = 1; i < context.count(); ++i) {
-        words.push_back(context.argument(i));
-    }
-    const Patterns patterns(std::move(words));
-    std::string text;
-    for (const auto& line : context.shell.latencies()) {
-        if (patterns.match(line)) {
-            text += line + "\n";
+namespace {
+
+/// Returns true when a line of `show latency` is about what the pattern names: its signal, a pin,
+/// or the line itself.
+bool is_about(const std::string& line, const Patterns& pattern) {
+    if (pattern.match(line)) return true;
+    // "SIGNAL: WRITER => READER  0 cycles (...)"
+    const std::size_t end = std::min(line.find("  "), line.size());
+    for (std::size_t at = 0; at < end;) {
+        const std::size_t stop = std::min(line.find(' ', at), end);
+        std::string word = line.substr(at, stop - at);
+        if (word.ends_with(':')) {
+            word.pop_back();
         }
+        if (pattern.match(word)) return true;
+        at = stop + 1;
+    }
+    return false;
+}
+
+/// Reports that `show latency` has no line for the word at `index`.
+void report_no_latency(Context& context, std::size_t index) {
+    const std::string& word = context.argument(index);
+    const Model& model = context.session.model();
+    const Pin* const pin = model.find_pin(word);
+    const Signal* const signal = pin ? pin->signal : model.find_signal(word);
+    if (signal) {
+        return context.diagnostics.error(
+            "no-latency", context.span(index),
+            "signal '" + signal->name + "' has no latency: it has no writer, or no reader", "",
+            "see: show sig " + signal->name);
+    }
+    if (pin) {
+        return context.diagnostics.error("no-latency", context.span(index),
+                                         "pin '" + word + "' has no latency: it is not linked", "",
+                                         "see: show pin " + word);
+    }
+    std::vector<std::string> names = names_of(model.signal);
+    const auto pins = names_of(model.pin);
+    names.insert(names.end(), pins.begin(), pins.end());
+    context.diagnostics.error("no-latency", context.span(index),
+                              "no linked pin or signal '" + word + "'", did_you_mean(word, names),
+                              "`show latency` lists the latencies of all signals");
+}
+
+}  // namespace
+
+void show_latency(Context& context) {
+    const std::vector<std::string> words = words_of(context);
+    const auto lines = context.shell.latencies();
+    std::vector<bool> shown(lines.size(), words.empty());
+    for (std::size_t i = 0; i < words.size(); ++i) {
+        const Patterns pattern({words[i]});
+        bool any = false;
+        for (std::size_t line = 0; line < lines.size(); ++line) {
+            if (!is_about(lines[line], pattern)) continue;
+            any = true;
+            shown[line] = true;
+        }
+        if (!any) {
+            report_no_latency(context, i + 1);
+        }
+    }
+    std::string text;
+    auto rows = nlohmann::ordered_json::array();
+    for (std::size_t line = 0; line < lines.size(); ++line) {
+        if (!shown[line]) continue;
+        text += lines[line] + "\n";
+        rows.push_back(lines[line]);
+    }
+    if (context.diagnostics.failed()) return;
+    if (context.options().json) {
+        text = json_text(rows) + "\n";
+    } else if (lines.empty()) {
+        text = "no signal links a writer to a reader\n";
     }
     context.output.out(text);
 }
@@ -227,6 +320,11 @@ std::string acknowledgement_text(const Context& context) {
 }  // namespace
 
 void show_faults(Context& context) {
+    if (context.count() > 1) {
+        return context.diagnostics.error("wrong-arguments", context.span(1),
+                                         "`show fault` lists all faults, and has no argument", "",
+                                         "see: help show");
+    }
     const Reports& reports = context.session.reports();
     const auto records =
         context.script.clears_faults() ? reports.lasting_faults() : reports.faults();

@@ -190,7 +190,8 @@ constexpr CommandRow rows[] = {
      "or parameters of a type.\n"
      "timing: cycles, missed periods and wake-up latency of each thread, execution times of each "
      "function. latency: delay of each\n"
-     "signal in cycles, with the reason. fault: the faults since start.",
+     "signal in cycles, with the reason; a PATTERN is the name of a signal or of a pin. fault: the "
+     "faults since start.",
      command_show, 0, kind::reading},
     {"list", "", "comp|pin|sig|signal|param|parameter|funct|function|thread [PATTERN]...",
      "list names on one line", "", command_list, 0, kind::reading},

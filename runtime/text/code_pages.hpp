@@ -419,6 +419,11 @@ inline constexpr CodePage code_pages[] = {
      "On Debian: `sudo apt install libfastrtps-dev`, then build again. `hal check` and `hal sim` "
      "accept netlists with nodes without "
      "DDS."},
+    {"no-latency",
+     "`show latency NAME` has nothing to show: no signal or pin has this name, or it does not link a "
+     "writer to a reader.\n\n"
+     "The latency of a signal is the delay from its writer to a reader. `show latency` lists all; a "
+     "name may be that of the signal, of the writer or of a reader, or begin it."},
     {"no-program",
      "loadusr could not start the program: it is not in PATH, is not executable, or the system "
      "denied it.\n\n"

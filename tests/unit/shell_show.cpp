@@ -218,6 +218,20 @@ TEST_F(Show, timing_and_latency_are_readable) {
     EXPECT_EQ(machine.says("show fault"), "no faults\n");
     EXPECT_NE(machine.says("show latency s").find("a.out => b.in0"), std::string::npos)
         << machine.out;
+    // by the signal, its pins and patterns
+    const std::string line = machine.says("show latency s");
+    for (const char* const name : {"a.out", "b.in0", "a.o*", "s a.out"}) {
+        EXPECT_EQ(machine.says(std::string("show latency ") + name), line) << name;
+    }
+    machine.shell.options.json = true;
+    const auto lines = nlohmann::json::parse(machine.says("show latency a.out"));
+    ASSERT_EQ(lines.size(), 1U);
+    EXPECT_EQ(lines[0].get<std::string>() + "\n", line);
+}
+
+TEST(ShowNothing, is_stated) {
+    ShellMachine machine;
+    EXPECT_EQ(machine.says("show latency"), "no signal links a writer to a reader\n");
 }
 
 TEST(ShowLarge, a_hundred_thousand_pins_are_printed_by_one_read) {

@@ -1,0 +1,1 @@
+hal sim -k no-latency.hal

@@ -1,0 +1,1 @@
+hal sim no-such-thread-timing.hal
