@@ -126,6 +126,7 @@ class Chroot(unittest.TestCase):
             ("./usr/include/hal/component.hpp", "halcyon-dev_"),
             ("./usr/share/halcyon/halfiles/furuta/hang.hal", "halcyon_"),
             ("./usr/share/doc/halcyon/README.md", "halcyon-doc_"),
+            ("./usr/share/doc/halcyon/LICENSE", "halcyon-doc_"),
         ):
             self.assertTrue(seen.get(name, "").startswith(package), (name, seen.get(name)))
 

@@ -74,6 +74,7 @@ PACKAGES = {
     },
     "halcyon-doc": {
         "depends": "",
+        "lintian": ["extra-license-file [usr/share/doc/halcyon/LICENSE]"],  # README.md links it
         "fields": {"Section": "doc", "Architecture": "all"},
         "summary": "pages and component reference of Halcyon",
         "text": "Tutorials, guides and manual pages; as one searchable site in\n/usr/share/doc/halcyon/html.",
@@ -86,7 +87,6 @@ GROUPS = ("vision", "dds", "estimation")  # components that are packages of thei
 
 # (pattern of a path in the installation, package, new path or None for the same); the first match counts. Package None: left out.
 RULES = (
-    (rf"{DOC}LICENSE", None, None),
     (rf"{DOC}reference/.*", None, None),  # is in the site
     (rf"{DOC}halfiles/(.*)", "halcyon", r"usr/share/halcyon/halfiles/\1"),
     (rf"{DOC}tests/netlists/(.*)", "halcyon-doc", r"usr/share/doc/halcyon/tests/netlists/\1"),
