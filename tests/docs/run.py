@@ -13,8 +13,8 @@ In README.md and docs/**/*.md:
                         number, with its unit of time, stands for any number, the slowest function of a late cycle for any
                         function, and the width of columns is not compared.
                         There are no placeholders: a command whose output is too long ends in `| head` or the like.
-  `./hal` in a command is the program under test and `build/release` its build tree; such commands run in the repository's
-root. Nothing is skipped but `./hal test` and `./hal bench`, which run this, and `./hal build`.
+  `hal` in a command is the program under test. So is `./hal`, and such commands run in the repository's root. Nothing is skipped
+but `./hal test` and `./hal bench`, which run this, and `./hal build`.
 """
 import os
 import pathlib
@@ -60,8 +60,6 @@ def run(command, folder, environment):
     command = command.strip()
     if command.startswith("./hal "):
         command, folder = str(HAL) + command[len("./hal") :], ROOT
-    if command.startswith("cmake --install build/release"):
-        command, folder = command.replace("build/release", str(HAL.parents[1])), ROOT
     try:
         done = subprocess.run(
             ["bash", "-c", command],
