@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# awk -v command=run -f needs.awk -- ARGUMENT...
+# awk -v command=run -v machines=halfiles -f needs.awk -- ARGUMENT...
 # Prints what a command of `hal` needs in addition to the program, one name per line: components, with _ for -, and
 #     bus       the program of the bus tools
 #     python    Python's module hal
@@ -49,7 +49,7 @@ function emit_bus(program, word) {
 
 # Whether a command loads components, or prints their pages.
 function needs_components() {
-    return command ~ /^(run|sim|check|graph|doc|shell|build|halrun)$/
+    return command ~ /^(run|examples|sim|check|graph|doc|shell|build|halrun)$/
 }
 
 # A command of a netlist, or several words of the command line that may be one.
@@ -112,6 +112,7 @@ BEGIN {
         offer(ARGV[i])
         line = line " " ARGV[i]
     }
+    if (command == "examples" && ARGC > 2) read_file(machines "/" ARGV[2] ".hal", "")
     if (command != "doc") {
         for (i = 2; i < ARGC; ++i)
             if (ARGV[i] !~ /^-/ && (ARGV[i] ~ /[.](hal|ini)$/ || command ~ /^(run|sim|check|graph|halrun|build)$/)) read_file(ARGV[i], "")

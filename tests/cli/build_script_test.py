@@ -66,7 +66,10 @@ case "$*" in *libsolving-dev*) touch "$TOOLS/solving.h" ;; esac
 def needs(*words, cwd=ROOT):
     """What cmake/needs.awk prints for a command of the program."""
     done = subprocess.run(
-        ["awk", "-v", f"command={words[0]}", "-f", ROOT / "cmake/needs.awk", "--", *words],
+        [
+            *("awk", "-v", f"command={words[0]}", "-v", f"machines={ROOT / 'halfiles'}"),
+            *("-f", ROOT / "cmake/needs.awk", "--", *words),
+        ],
         cwd=cwd,
         capture_output=True,
         text=True,
@@ -427,6 +430,13 @@ class Needs(unittest.TestCase):
                 self.assertEqual(
                     self.loaded(path, set()), needs("run", str(path)) - {"python", "bus"}
                 )
+
+    def test_an_example_is_the_netlist_of_its_machine(self):
+        machine = ROOT / "halfiles/furuta/swing-up.hal"
+        found = needs("examples", "furuta/swing-up", "--for", "10s")
+        self.assertEqual(self.loaded(machine, set()), found)
+        self.assertIn("lqr", found)
+        self.assertEqual(set(), needs("examples"))
 
     def test_an_ini_file_names_its_netlists_and_the_values_of_variables(self):
         with tempfile.TemporaryDirectory() as folder:
