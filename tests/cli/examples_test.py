@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """hal examples: the machines to start from."""
+
 import os
 import re
 import shutil
@@ -20,7 +21,8 @@ class Examples(Case):
     def test_lists_every_machine_by_topic(self):
         text = self.good("examples")
         self.assertTrue(
-            text.startswith("Machines to start from. Each runs on any computer.\n\nAxes and forces\n"), text
+            text.startswith("Machines to start from. None needs hardware.\n\nAxes and forces\n"),
+            text,
         )
         self.assertTrue(
             text.endswith("\n\nTo run one: hal examples NAME [OPTION of hal run]\n"), text
@@ -65,18 +67,55 @@ class Examples(Case):
 
 
 class Installed(Case):
-    def test_finds_the_machines_beside_the_program(self):
-        shutil.copytree(MACHINES, self.folder / "share/halcyon/halfiles")
+    def list_beside_the_program(self, **environment):
         (self.folder / "bin").mkdir()
         shutil.copy(HAL, self.folder / "bin/hal")
         done = subprocess.run(
             [self.folder / "bin/hal", "examples"],
             capture_output=True,
             text=True,
-            env=dict(os.environ, LD_LIBRARY_PATH=str(HAL.parent.parent / "lib")),
+            env=dict(os.environ, LD_LIBRARY_PATH=str(HAL.parent.parent / "lib"), **environment),
         )
         self.assertEqual((0, ""), (done.returncode, done.stderr))
-        self.assertIn("  furuta/hang ", done.stdout)
+        return done.stdout
+
+    def test_finds_the_machines_beside_the_program(self):
+        shutil.copytree(MACHINES, self.folder / "share/halcyon/halfiles")
+        text = self.list_beside_the_program()
+        self.assertIn("  furuta/hang ", text)
+        self.assertNotIn("(needs ", text)
+
+    def write_machine_of_components_that_are_not_installed(self):
+        """Two netlists, which source each other, and the list of their components without plugins."""
+        machine = self.folder / "share/halcyon/halfiles/mill"
+        machine.mkdir(parents=True)
+        (machine / "mill.hal").write_text(
+            "# Topic: Mills\n# A mill.\nloadrt sum2\nloadrt later_eye\nsource loop.hal\n"
+        )
+        (machine / "loop.hal").write_text("loadrt later_design\nsource mill.hal\n")
+        (machine / "plain.hal").write_text("# Topic: Mills\n# A plain one.\nloadrt sum2\n")
+        (self.folder / "groups").write_text(
+            "later_eye vision Sees\nlater_design estimation Designs\n"
+        )
+
+    def test_names_the_packages_that_a_machine_needs_and_that_are_missing(self):
+        self.write_machine_of_components_that_are_not_installed()
+        text = self.list_beside_the_program(HALCYON_PLUGIN_PATH=str(self.folder))
+        self.assertIn(
+            "\nMills\n"
+            "  mill/mill   A mill (needs halcyon-estimation, halcyon-vision)\n"
+            "  mill/plain  A plain one\n"
+            "\nPackages that are not installed: sudo apt install halcyon-estimation halcyon-vision\n",
+            text,
+        )
+
+    def test_needs_no_package_where_the_source_tree_builds_on_demand(self):
+        self.write_machine_of_components_that_are_not_installed()
+        text = self.list_beside_the_program(
+            HALCYON_PLUGIN_PATH=str(self.folder), HALCYON_BUILD="/nowhere/hal"
+        )
+        self.assertIn("  mill/mill   A mill\n", text)
+        self.assertNotIn("sudo", text)
 
 
 if __name__ == "__main__":

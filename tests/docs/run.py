@@ -17,6 +17,7 @@ In README.md and docs/**/*.md:
   `hal` in a command is the program under test. So is `./hal`, and such commands run in the repository's root. Nothing is skipped
 but `./hal test` and `./hal bench`, which run this, and `./hal build`.
 """
+
 import os
 import pathlib
 import re
@@ -103,9 +104,7 @@ def check_console(text, where, folder, environment, figures):
             problems.append(
                 f"{where}: `{command}` ended with status {status}:\n" + "\n".join(actual)
             )
-        elif expected and not matches(
-            expected, actual, figures and not is_exact(command, actual)
-        ):
+        elif expected and not matches(expected, actual, figures and not is_exact(command, actual)):
             problems.append(
                 f"{where}: `{command}` printed\n"
                 + "\n".join(actual)

@@ -4,14 +4,19 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fmt/format.h>
 #include <fstream>
+#include <map>
+#include <sstream>
 #include <tuple>
 #include <unistd.h>
 
 #include "cli/output.hpp"
+#include "machine/load/plugins.hpp"
+#include "machine/load/source_tree.hpp"
 #include "paths.hpp"
 #include "text/diagnostic.hpp"
 
@@ -63,6 +68,38 @@ Example read_header(const fs::path& folder, const fs::path& netlist) {
     return example;
 }
 
+/// Adds the components that a netlist loads, and those of the netlists that it sources. A reader of
+/// the lines of examples: it expects one command per line and no variables in names.
+void add_components(const fs::path& netlist, std::set<std::string>& names,
+                    std::set<fs::path>& seen) {
+    if (!seen.insert(netlist.lexically_normal()).second) return;
+    std::ifstream file(netlist);
+    for (std::string line; std::getline(file, line);) {
+        std::istringstream words(line);
+        std::string command, name;
+        words >> command >> name;
+        if (command == "source") add_components(netlist.parent_path() / name, names, seen);
+        if (command == "loadrt") names.insert(name);
+    }
+}
+
+/// The Debian packages of components that the netlist loads and that have no plugin. None when
+/// components are built on demand.
+std::set<std::string> missing_packages(const fs::path& netlist, const Plugins& plugins,
+                                       const std::map<std::string, ComponentSummary>& listed) {
+    std::set<std::string> components, packages;
+    if (std::getenv("HALCYON_BUILD")) return packages;
+    std::set<fs::path> seen;
+    add_components(netlist, components, seen);
+    for (const std::string& name : components) {
+        const auto about = listed.find(name);
+        if (about == listed.end() || !plugins.find(name).empty()) continue;
+        const std::string package = debian_package(about->second.group);
+        if (!package.empty()) packages.insert(package);
+    }
+    return packages;
+}
+
 const Example* find(const std::vector<Example>& examples, std::string_view name) {
     const auto found = std::find_if(examples.begin(), examples.end(),
                                     [&](const Example& e) { return e.name == name; });
@@ -99,11 +136,15 @@ int become_run(const Options& options, const Example& example,
 std::vector<Example> find_examples() {
     std::vector<Example> examples;
     const fs::path folder = machines();
+    const Plugins plugins;
+    const auto listed = listed_components(plugins.path());
     std::error_code ignored;
     for (const auto& entry : fs::recursive_directory_iterator(folder, ignored)) {
         if (entry.path().extension() != ".hal") continue;
         Example example = read_header(folder, entry.path());
-        if (!example.topic.empty()) examples.push_back(std::move(example));
+        if (example.topic.empty()) continue;
+        example.missing = missing_packages(entry.path(), plugins, listed);
+        examples.push_back(std::move(example));
     }
     std::sort(examples.begin(), examples.end(), [](const Example& a, const Example& b) {
         return std::tie(a.topic, a.name) < std::tie(b.topic, b.name);
@@ -116,10 +157,20 @@ std::string list_of(const std::vector<Example>& examples) {
     for (const Example& example : examples)
         width = std::max(width, example.name.size());
     std::string text, topic;
+    std::set<std::string> missing;
     for (const Example& example : examples) {
         if (example.topic != topic) text += fmt::format("\n{}\n", example.topic);
         topic = example.topic;
-        text += fmt::format("  {:{}}  {}\n", example.name, width, example.summary);
+        text += fmt::format("  {:{}}  {}", example.name, width, example.summary);
+        if (!example.missing.empty()) {
+            text += fmt::format(" (needs {})", fmt::join(example.missing, ", "));
+        }
+        text += "\n";
+        missing.insert(example.missing.begin(), example.missing.end());
+    }
+    if (!missing.empty()) {
+        text += fmt::format("\nPackages that are not installed: sudo apt install {}\n",
+                            fmt::join(missing, " "));
     }
     return text;
 }
@@ -133,7 +184,7 @@ int run_examples(const ExamplesOptions& options) {
                                 paths::build_machines));
     }
     if (options.words.empty()) {
-        const std::string list = "Machines to start from. Each runs on any computer.\n" +
+        const std::string list = "Machines to start from. None needs hardware.\n" +
                                  list_of(examples) +
                                  "\nTo run one: hal examples NAME [OPTION of hal run]\n";
         return exit_code(print(list));

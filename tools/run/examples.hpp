@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -14,13 +15,15 @@ struct Example {
     std::string path;     ///< its netlist
     std::string topic;    ///< from its line `# Topic: …`
     std::string summary;  ///< the first sentence of its first comment
+    std::set<std::string> missing;  ///< Debian packages of components that are not installed
 };
 
 /// All examples, ordered by topic and name; none when this program was copied without them.
 /// [setup]
 std::vector<Example> find_examples();
 
-/// The examples by topic, a line each. [setup]
+/// The examples by topic, a line each, with the packages that they need and that are missing; and
+/// what installs these. [setup]
 std::string list_of(const std::vector<Example>&);
 
 struct ExamplesOptions : Options {

@@ -270,12 +270,11 @@ static std::optional<Plugin> load_plugin(const std::string& path, Span at,
 }
 
 /// Returns what to type for a component that is listed but not there. `group` is its folder in the
-/// source tree; some groups are Debian packages of their own (tools/package/packages.py).
+/// source tree.
 std::string how_to_get(const std::string& name, std::string_view group) {
-    constexpr std::string_view packaged[] = {"dds", "estimation", "vision"};
     std::string text = "in the source tree, type: ./hal build " + name;
-    if (std::find(std::begin(packaged), std::end(packaged), group) != std::end(packaged)) {
-        text += "; with Halcyon's Debian packages: sudo apt install halcyon-" + std::string(group);
+    if (const std::string package = debian_package(group); !package.empty()) {
+        text += "; with Halcyon's Debian packages: sudo apt install " + package;
     }
     return text;
 }

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include "machine/load/source_tree.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
 #include <spawn.h>
 #include <sstream>
 #include <sys/wait.h>
@@ -33,6 +35,12 @@ std::map<std::string, ComponentSummary> listed_components(const std::vector<std:
         }
     }
     return all;
+}
+
+std::string debian_package(std::string_view group) {
+    constexpr std::string_view packaged[] = {"dds", "estimation", "vision"};
+    const bool has_own = std::ranges::find(packaged, group) != std::end(packaged);
+    return has_own ? "halcyon-" + std::string(group) : std::string();
 }
 
 bool build_on_demand(const std::string& name) {

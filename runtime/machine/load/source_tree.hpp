@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 /// The source tree a program was built in: what it has is known before all of it is built.
@@ -15,6 +16,10 @@ struct ComponentSummary {
 
 /// The components that the build lists in the file `groups` of these plugin folders, built or not.
 std::map<std::string, ComponentSummary> listed_components(const std::vector<std::string>& folders);
+
+/// Returns the Debian package of Halcyon that has the components of this group: `halcyon-vision`;
+/// empty for the package `halcyon` (tools/package/packages.py).
+std::string debian_package(std::string_view group);
 
 /// Builds a component, or `bus`, the program of the bus tools, with the script in $HALCYON_BUILD;
 /// progress is printed to stderr. False when this program was not started by that script, after
