@@ -1,10 +1,34 @@
 # SPDX-License-Identifier: MIT
 """hal top on a terminal: keys, width and height; and without one."""
 
+import os
+import shutil
+import subprocess
 import unittest
 
-from harness import SERVO, Case
+from harness import HAL, SERVO, Case
 from virtual_terminal import ShownTerminal
+
+
+class WithoutDds(Case):
+    def test_names_the_package_that_other_computers_need(self):
+        alone = self.folder / "bin/hal"
+        alone.parent.mkdir()
+        for program in ("hal", "hal-tools"):
+            shutil.copy(HAL.with_name(program), alone.with_name(program))
+        plain = {key: value for key, value in os.environ.items() if key != "LD_LIBRARY_PATH"}
+        done = subprocess.run(
+            [alone, "top", "--dds", "domain=3"], capture_output=True, text=True, env=plain
+        )
+        self.assertEqual(
+            (
+                1,
+                "hal top: cannot load libhalcyon_dds.so; with Halcyon's Debian packages, type: "
+                "sudo apt install halcyon-dds; in the source tree: sudo apt install "
+                "libfastrtps-dev && ./hal build\n",
+            ),
+            (done.returncode, done.stderr),
+        )
 
 
 class Top(Case):

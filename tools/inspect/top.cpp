@@ -86,8 +86,9 @@ public:
         if (library == nullptr) {
             absent_ = true;
             problem =
-                "this Halcyon was built without DDS; type: sudo apt install libfastrtps-dev, and "
-                "build again";
+                "cannot load libhalcyon_dds.so; with Halcyon's Debian packages, type: sudo apt "
+                "install halcyon-dds; in the source tree: sudo apt install libfastrtps-dev && "
+                "./hal build";
             return false;
         }
         using Open =
