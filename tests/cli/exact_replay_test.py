@@ -260,6 +260,52 @@ class ExactReplay(Case):
         self.assertGreater(beats[0], 20)
         self.assertEqual(list(range(beats[0], beats[-1] + 1)), beats)
 
+    def test_a_recording_of_a_journal_with_a_slow_thread(self):
+        slow = "newthread slow 10000000000\nloadrt integ names=late\naddf late slow\n"
+        machine = self.run_journaled(SERVO + slow + "start\n")
+        self.wait_for_cycles(300)
+        self.finish(machine)
+        self.assertRegex(
+            self.replay("--record", "out.csv"), r"\nout\.csv: \d{3,} rows of \d\d values\n$"
+        )
+
+    def test_a_recording_that_is_not_possible_ends_at_the_first_cycle(self):
+        machine = self.run_journaled(SERVO + "loadrt sum2 count=500\nstart\n")
+        self.wait_for_cycles(300)
+        self.finish(machine)
+        done = self.run_program("replay", "--exact", "run.mcap", "--record", "out.csv")
+        self.assertRegex(
+            done.stderr,
+            r"^hal replay: --record: --names: 45\d\d values are more than the 4096 that a probe can "
+            r"sample; name fewer\n$",
+        )
+        self.assertRegex(
+            done.stdout,
+            r"^\d cycles? of 1 thread, .* newest: cycle \d of 'servo' .*\nstopped; no difference so far\n$",
+        )
+        self.assertEqual(1, done.returncode)
+
+    def test_no_option_replaces_the_journal_itself(self):
+        self.finish(self.run_journaled(SERVO + "start\n"))
+        whole = (self.folder / "run.mcap").read_bytes()
+        os.symlink("run.mcap", self.folder / "link.mcap")
+        part = shutil.copy(self.folder / "run.mcap", self.folder / "a.mcap")
+        for option, more in (("--record", []), ("--cut", ["--until", "2"])):
+            for name in ("run.mcap", "./link.mcap"):
+                self.assertEqual(
+                    f"hal replay: {option}: '{name}' is the journal itself; name another file\n",
+                    self.replay(option, name, *more, status=1),
+                )
+            self.assertEqual(
+                f"hal replay: {option}: 'a.mcap' is the journal itself; name another file\n",
+                self.replay(part, option, "a.mcap", *more, status=1),
+            )
+        self.assertEqual(
+            "hal replay: --cut: 'b.mcap' is the file of --record; name another one\n",
+            self.replay("--record", "b.mcap", "--cut", "b.mcap", "--until", "2", status=1),
+        )
+        self.assertEqual(whole, (self.folder / "run.mcap").read_bytes())
+
     def test_functions_of_two_threads_that_share_state_run_in_their_order(self):
         with load(2):
             machine = self.run_journaled(SHARED, "--values", "*")

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <fmt/core.h>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "cli/output.hpp"
@@ -69,11 +71,11 @@ public:
     }
 
 private:
-    /// Returns true when a rule or the user has stopped it before the end.
+    /// Returns true when a rule, the user or the recording has stopped it before the end.
     bool execute() {
         bool reached = false;
         while (machine_.advance()) {
-            recording_.note_cycle(execution_.edits());
+            if (!recording_.note_cycle(execution_.edits())) return true;
             if (machine_.host().stop.requested()) return true;
             reached = reached || until_.reached(execution_.newest(), machine_.fastest()) ||
                       (!condition_.empty() && condition_.holds(machine_.session()));
@@ -225,6 +227,22 @@ bool has_only_journals(const std::vector<std::string>& words) {
     });
 }
 
+/// Returns why a file must not be written; "" when it may.
+std::string target_problem(const ReplayOptions& options, const std::string& path) {
+    const bool is_source = std::ranges::any_of(options.words, [&path](const std::string& journal) {
+        std::error_code error;
+        return std::filesystem::equivalent(path, journal, error);
+    });
+    return is_source ? fmt::format("'{}' is the journal itself; name another file", path) : "";
+}
+
+std::string record_problem(const ReplayOptions& options) {
+    std::string problem = ReplayRecording::problem(options);
+    if (!problem.empty()) return problem;
+    problem = target_problem(options, options.record);
+    return problem.empty() ? "" : "--record: " + problem;
+}
+
 std::string cut_problem(const ReplayOptions& options) {
     if (!options.edits.empty() || !options.netlist.empty() || options.shell) {
         return "it is for the journal as it is: without --edit, --netlist and --shell";
@@ -235,8 +253,11 @@ std::string cut_problem(const ReplayOptions& options) {
     if (!options.cut.ends_with(".mcap")) {
         return fmt::format("unknown format of '{}'; name the file .mcap", options.cut);
     }
+    if (options.cut == options.record) {
+        return fmt::format("'{}' is the file of --record; name another one", options.cut);
+    }
     if (!component_heap::track()) return "a build with a sanitizer cannot read the state";
-    return "";
+    return target_problem(options, options.cut);
 }
 
 }  // namespace
@@ -256,7 +277,7 @@ int run_exact_replay(const ReplayOptions& options) {
         return fail(options, fmt::format("--break: invalid condition '{}'; {}",
                                          options.break_condition, ValueCondition::form));
     }
-    if (const std::string problem = ReplayRecording::problem(options); !problem.empty()) {
+    if (const std::string problem = record_problem(options); !problem.empty()) {
         return fail(options, problem);
     }
     WhatIf change;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "run/replay_recording.hpp"
 
-#include <algorithm>
 #include <fmt/core.h>
 
 #include "cli/output.hpp"
@@ -16,18 +15,7 @@
 namespace hal::tools {
 namespace {
 
-constexpr std::uint64_t take_every = 64;  // cycles
-
-/// Returns the time for which rings must keep rows: twice as long as `take_every` cycles of the
-/// slowest thread may take.
-std::int64_t buffered_ns(JournalFile& file) {
-    constexpr std::int64_t min_ns = 200'000'000;
-    std::int64_t slowest_ns = 0;
-    for (const auto& [id, thread] : file.threads()) {
-        slowest_ns = std::max(slowest_ns, thread.period_ns);
-    }
-    return std::max(min_ns, 2 * static_cast<std::int64_t>(take_every) * slowest_ns);
-}
+constexpr std::uint64_t take_every = 64;  // cycles, of all threads
 
 }  // namespace
 
@@ -52,12 +40,14 @@ std::string ReplayRecording::problem(const ReplayOptions& options) {
                           : fmt::format("--record: cannot write '{}': {}", options.record, reason);
 }
 
-void ReplayRecording::attach() {
+bool ReplayRecording::attach() {
     problem_ = unknown_value(session_.model(), patterns_);
-    if (!problem_.empty()) return;
+    if (!problem_.empty()) return true;  // a later cycle may have them
     names_ = chosen_values(session_.model(), patterns_);
-    probe_ = session_.probes().attach({.names = names_, .buffer_ns = buffered_ns(file_)}, problem_);
-    if (!probe_) return;
+    probe_ = session_.probes().attach(
+        {.names = names_, .buffer_rows = 2 * take_every, .advice = "choose fewer with --names"},
+        problem_);
+    if (!probe_) return false;
     layout_ = Probes::layout(*probe_);
     journal_ = session_.event_log().begin();
     sink_ = make_sink(options_.record, Probes::columns(*probe_),
@@ -70,18 +60,21 @@ void ReplayRecording::attach() {
         write_all(2, kept_line(*sink_, options_.record));
     }
     is_written_ = sink_->error() == 0 && sink_->layout(layout_.groups);
+    return true;
 }
 
-void ReplayRecording::note_cycle(std::uint64_t edits) {
-    if (options_.record.empty()) return;
+bool ReplayRecording::note_cycle(std::uint64_t edits) {
+    if (options_.record.empty()) return true;
     const bool is_edited = edits != edits_;
     edits_ = edits;
     if (!probe_) return attach();
     if (is_edited) {
         note_later_values();
     }
-    if (++untaken_ < take_every) return;
-    take();
+    if (++untaken_ >= take_every) {
+        take();
+    }
+    return true;
 }
 
 void ReplayRecording::note_later_values() {

@@ -25,14 +25,15 @@ public:
     /// Returns why --record is not possible; "" when it is.
     static std::string problem(const ReplayOptions& options);
     /// Called after each cycle, with the number of edits so far. Records what follows the first
-    /// cycle in which the machine has all names of --names.
-    void note_cycle(std::uint64_t edits);
+    /// cycle in which the machine has all names of --names. Returns false when they cannot be
+    /// recorded in any cycle.
+    bool note_cycle(std::uint64_t edits);
     /// Completes the file and prints what it has. Returns false after a message when something
     /// could not be recorded.
     bool finish();
 
 private:
-    void attach();
+    bool attach();
     void note_later_values();
     void take();
 
