@@ -5,8 +5,10 @@
 #include <array>
 #include <atomic>
 #include <bit>
+#include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <fmt/core.h>
 #include <link.h>
 #include <memory>
 #include <mutex>
@@ -37,6 +39,9 @@ public:
         dl_iterate_phdr(&Callers::note, this);
         is_of_program(__builtin_return_address(0));  // loads the unwinder
     }
+
+    /// Returns false when the program uses more libraries than this can note.
+    bool are_all() const { return are_all_; }
 
     /// `from`: where `operator new` returns to. Functions of libraries that the program was linked
     /// with ask for their callers.
@@ -77,7 +82,10 @@ private:
         if (name.find("libhalcyon") != std::string_view::npos) return 0;
         const bool is_program = name.empty();
         if (is_program && callers.program_.end != 0) return 0;  // the vDSO has no name either
-        if (!is_program && callers.count_ == callers.libraries_.size()) return 0;
+        if (!is_program && callers.count_ == callers.libraries_.size()) {
+            callers.are_all_ = false;
+            return 0;
+        }
         CodeRange& range = is_program ? callers.program_ : callers.libraries_[callers.count_++];
         range.begin = UINT64_MAX;
         for (ElfW(Half) i = 0; i < object->dlpi_phnum; ++i) {
@@ -91,13 +99,15 @@ private:
     }
 
     CodeRange program_;
-    std::array<CodeRange, 64> libraries_;
+    std::array<CodeRange, 256> libraries_;
     std::size_t count_ = 0;
+    bool are_all_ = true;
 };
 
-constexpr std::uint64_t heap_begin = 0x5700'0000'0000;  // nothing else is mapped there
+using component_heap::heap_begin;
 constexpr std::size_t segment_bytes = std::size_t{1} << 28;
-constexpr std::uint32_t max_segments = 4096;
+constexpr std::uint32_t max_segments = 65536;
+constexpr std::size_t heap_bytes = segment_bytes * max_segments;
 constexpr std::uint32_t instance_segment = 0;
 constexpr std::uint32_t first_call_segment = 2;
 constexpr std::size_t min_alignment = 16;
@@ -131,30 +141,56 @@ void clear(char* begin, std::size_t bytes) {
     std::memset(begin, 0, bytes);
 }
 
+/// The first allocation that is in no segment.
+struct Overflow {
+    enum Kind : std::uint8_t { none, instances, cycles, call, calls, system };
+    Kind kind = none;
+    std::uint32_t function = 0;  ///< that allocated in a cycle; 0: unknown
+    int error = 0;  ///< errno of `system`
+    std::array<char, 128> instance{};
+    std::array<char, 128> component{};
+};
+
+template <std::size_t size>
+void copy(const char* from, std::array<char, size>& to) {
+    std::strncpy(to.data(), from, size - 1);
+}
+
 class ComponentHeap {
 public:
     static bool has(std::uint64_t address) {
-        return address >= heap_begin && address - heap_begin < max_segments * segment_bytes;
+        return address >= heap_begin && address - heap_begin < heap_bytes;
     }
+
+    /// Returns why the addresses cannot be had; "" when nothing else is mapped there from now on.
+    std::string reserve() {
+        if (!callers_.are_all()) return "the program uses more libraries than can be distinguished";
+        constexpr int how = MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE;
+        void* const begin = begin_of(0);
+        void* const at = ::mmap(begin, heap_bytes, PROT_NONE, how, -1, 0);
+        if (at == begin) return "";
+        if (at != MAP_FAILED) {
+            ::munmap(at, heap_bytes);  // an old kernel takes the address as a hint
+        } else if (errno != EEXIST) {
+            return fmt::format("the addresses for the memory of components cannot be reserved: {}",
+                               std::strerror(errno));
+        }
+        return "other memory has the addresses that components need";
+    }
+
+    void give_back() { ::munmap(begin_of(0), heap_bytes); }
 
     /// Returns nullptr when the memory is not a component's, or a segment is full.
     void* allocate(std::size_t bytes, std::size_t alignment, void* from) {
         const bool is_in_cycle = Core::current() != nullptr;
         const bool is_in_call = !is_in_cycle && SetupCall::is_mine();
-        const bool is_for_one = ComponentMemory::is_allocated();
+        const bool is_for_one = ComponentMemory::component() != nullptr;
         if (!is_in_cycle && !is_in_call && !is_for_one) return nullptr;
         if (!is_for_one && callers_.is_of_program(from)) return nullptr;
         const std::scoped_lock own(mutex_);
-        void* memory = nullptr;
-        if (is_for_one) {
-            memory = bump(instance_segment, bytes, alignment);
-        } else if (is_in_cycle) {
-            memory = grow(bytes, alignment);
-        } else {
-            memory = bump(segment_of_call(), bytes, alignment);
-        }
-        is_full_ = is_full_ || !memory;
-        return memory;
+        if (is_for_one) return bump(instance_segment, bytes, alignment);
+        if (is_in_cycle) return grow(bytes, alignment);
+        return bump(segment_of_call(), bytes, alignment);
     }
     void release(void* memory) {
         const std::scoped_lock own(mutex_);
@@ -167,10 +203,10 @@ public:
         free_blocks().first[size_class] = begin;
     }
     std::vector<component_heap::Segment> segments() {
-        std::array<std::size_t, max_segments> used{};
+        std::vector<std::size_t> used(max_segments);
         {
             const std::scoped_lock own(mutex_);
-            used = used_;
+            std::ranges::copy(used_, used.begin());
         }
         std::vector<component_heap::Segment> all;
         for (std::uint32_t i = 0; i < max_segments; ++i) {
@@ -191,9 +227,9 @@ public:
         used = segment.used;
         return begin_of(segment.number);
     }
-    bool is_full() {
+    Overflow overflow() {
         const std::scoped_lock own(mutex_);
-        return is_full_;
+        return overflow_;
     }
 
 private:
@@ -207,22 +243,37 @@ private:
         return *reinterpret_cast<FreeBlocks*>(begin_of(component_heap::grown_segment));
     }
     bool map(std::uint32_t segment) {
-        if (is_mapped_[segment]) return true;
-        constexpr int how = MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE;
-        void* const at =
-            ::mmap(begin_of(segment), segment_bytes, PROT_READ | PROT_WRITE, how, -1, 0);
-        if (at != MAP_FAILED && at != begin_of(segment)) {
-            ::munmap(at, segment_bytes);  // an old kernel takes the address as a hint
-            return false;
+        if (!is_mapped_[segment]) {
+            const int done = ::mprotect(begin_of(segment), segment_bytes, PROT_READ | PROT_WRITE);
+            is_mapped_[segment] = done == 0;
         }
-        is_mapped_[segment] = at != MAP_FAILED;
         return is_mapped_[segment];
     }
+    /// Notes the first time. Returns nullptr.
+    void* fail(Overflow::Kind kind) {
+        if (overflow_.kind != Overflow::none) return nullptr;
+        overflow_.kind = kind;
+        overflow_.error = errno;
+        if (const char* const component = ComponentMemory::component()) {
+            copy(component, overflow_.component);
+        } else if (const Core* const core = Core::current()) {
+            overflow_.function = core->current_function();
+        } else {
+            copy(SetupCall::now.instance, overflow_.instance);
+            copy(SetupCall::now.component, overflow_.component);
+        }
+        return nullptr;
+    }
+    static Overflow::Kind kind_of(std::uint32_t segment) {
+        if (segment == instance_segment) return Overflow::instances;
+        return segment == component_heap::grown_segment ? Overflow::cycles : Overflow::call;
+    }
     void* bump(std::uint32_t segment, std::size_t bytes, std::size_t alignment) {
-        if (segment >= max_segments || !map(segment)) return nullptr;
+        if (segment >= max_segments) return fail(Overflow::calls);
+        if (!map(segment)) return fail(Overflow::system);
         const std::size_t at =
             (used_[segment] + sizeof(BlockHead) + alignment - 1) / alignment * alignment;
-        if (bytes > segment_bytes || at > segment_bytes - bytes) return nullptr;
+        if (bytes > segment_bytes || at > segment_bytes - bytes) return fail(kind_of(segment));
         used_[segment] = at + bytes;
         char* const begin = begin_of(segment) + at;
         head_of(begin).bytes = bytes;
@@ -232,13 +283,15 @@ private:
     void* grow(std::size_t bytes, std::size_t alignment) {
         constexpr std::uint32_t segment = component_heap::grown_segment;
         if (used_[segment] == 0) {
-            if (!map(segment)) return nullptr;
+            if (!map(segment)) return fail(Overflow::system);
             used_[segment] = sizeof(FreeBlocks);
         }
         const std::size_t size = std::max(bytes, alignment);
         const std::size_t size_class =
             std::max<std::size_t>(std::bit_width(size - 1), FreeBlocks::min_class);
-        if (size_class >= free_blocks().first.size()) return nullptr;
+        if (size_class >= free_blocks().first.size()) {
+            return fail(Overflow::cycles);
+        }
         char*& first = free_blocks().first[size_class];
         char* block = first;
         if (block) {
@@ -268,8 +321,35 @@ private:
     std::array<bool, max_segments> is_mapped_{};
     std::uint64_t call_ = 0;  // the newest one that has allocated something
     std::uint32_t calls_ = 0;  // that have allocated something
-    bool is_full_ = false;
+    Overflow overflow_;
 };
+
+std::string text_of(const Overflow& overflow, const std::string& function) {
+    constexpr std::size_t mib = segment_bytes >> 20;
+    const std::string instance =
+        fmt::format("'{}' ({})", overflow.instance.data(), overflow.component.data());
+    const auto outside = [](const std::string& by) {
+        return by.empty() ? "" : fmt::format("; what {} allocates is not in the state", by);
+    };
+    switch (overflow.kind) {
+    case Overflow::none: break;
+    case Overflow::instances:
+        return fmt::format("instances need more than {} MiB; those of '{}' are not in the state",
+                           mib, overflow.component.data());
+    case Overflow::cycles:
+        return fmt::format("what functions allocate in cycles does not fit {} MiB", mib) +
+               outside(function);
+    case Overflow::call:
+        return fmt::format("{} allocates more than {} MiB in one setup call", instance, mib);
+    case Overflow::calls:
+        return fmt::format("more than {} setup calls allocate memory",
+                           max_segments - first_call_segment) +
+               outside(instance);
+    case Overflow::system:
+        return fmt::format("no memory for components: {}", std::strerror(overflow.error));
+    }
+    return "";
+}
 
 std::atomic<ComponentHeap*> heap{nullptr};  // written once
 
@@ -291,9 +371,11 @@ char* resized(const Segment& segment) {
     return all ? all->resized(segment) : nullptr;
 }
 
-std::string problem() {
+std::string problem(const std::function<std::string(std::uint32_t)>& function_named) {
     ComponentHeap* const all = heap.load(std::memory_order_acquire);
-    return all && all->is_full() ? "components have more memory than can be written" : "";
+    if (!all) return "";
+    const Overflow overflow = all->overflow();
+    return text_of(overflow, overflow.function == 0 ? "" : function_named(overflow.function));
 }
 
 }  // namespace component_heap
@@ -301,27 +383,30 @@ std::string problem() {
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 
-bool hal::component_heap::track() { return false; }
+std::string hal::component_heap::track() {
+    return "a build with a sanitizer has an operator new of its own";
+}
 
 #else
 
-bool hal::component_heap::track() {
-    if (heap.load(std::memory_order_acquire)) return true;
+std::string hal::component_heap::track() {
+    if (heap.load(std::memory_order_acquire)) return "";
     auto made = std::make_unique<ComponentHeap>();
+    if (std::string problem = made->reserve(); !problem.empty()) return problem;
     heap.store(made.get(), std::memory_order_release);
-    // a program with an `operator new` of its own does not use the ones below
     bool is_used = false;
     {
-        const ComponentMemory mine;
+        const ComponentMemory mine("");
         const std::unique_ptr<char> probe(new char);
         is_used = has(reinterpret_cast<std::uint64_t>(probe.get()));
     }
     if (!is_used) {
         heap.store(nullptr, std::memory_order_release);
-        return false;
+        made->give_back();
+        return "the program has an operator new of its own";
     }
     made.release();  // for good
-    return true;
+    return "";
 }
 
 namespace {

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -16,9 +17,13 @@ namespace hal {
 /// so that no byte depends on what was there before. [any], not in a real-time thread
 namespace component_heap {
 
-/// Call before the first component is loaded. Returns false in a build that has its own
-/// `operator new`.
-bool track();
+/// The segments begin here: below the area of mmap, whichever way it grows, and below a program
+/// that is loaded anywhere. A state is restored only where they begin at the same address.
+constexpr std::uint64_t heap_begin = 0x1000'0000'0000;
+
+/// Call before the first component is loaded. Reserves the addresses of all segments. Returns why
+/// that is not possible, as in a build that has its own `operator new`; "" when it is done.
+std::string track();
 
 /// Returns whether an address is in a segment, used or not.
 bool has(std::uint64_t address);
@@ -37,8 +42,9 @@ std::vector<Segment> segments();
 /// Makes a segment as large as it was elsewhere, and returns its memory; nullptr: it is too large,
 /// or there is no memory. Its content decides which blocks exist.
 char* resized(const Segment& segment);
-/// Returns why memory of components is not in a segment; "" when all of it is.
-std::string problem();
+/// Returns why memory of components is not in a segment; "" when all of it is. `function_named`
+/// returns the name of a function by its number.
+std::string problem(const std::function<std::string(std::uint32_t)>& function_named);
 
 }  // namespace component_heap
 }  // namespace hal

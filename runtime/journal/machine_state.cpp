@@ -23,9 +23,14 @@ std::uint64_t address_of(const void* memory) { return reinterpret_cast<std::uint
 /// The sizes in a state that was written elsewhere are checked against these.
 constexpr std::uint32_t max_history = 1u << 20;
 
+/// Begins a state with the address of the memory of components. States before it begin with a
+/// number of libraries.
+constexpr std::uint32_t state_format = 0x5348'0002;
+
 }  // namespace
 
-MachineState::MachineState(Session& session, std::vector<Core*> cores) : cores_(std::move(cores)) {
+MachineState::MachineState(Session& session, std::vector<Core*> cores)
+    : session_(session), cores_(std::move(cores)) {
     add_regions(session);
     fixed_ = regions_.size();
 }
@@ -40,6 +45,15 @@ bool MachineState::fail(std::string problem) {
 std::string MachineState::name_of(const Region& region) {
     if (!region.instance) return "the machine";
     return fmt::format("'{}' ({})", region.instance->name, region.instance->component->name);
+}
+
+std::string MachineState::function_named(std::uint32_t id) const {
+    for (const auto& component : session_.model().components) {
+        for (const auto& function : component->functions) {
+            if (function->id == id) return fmt::format("'{}'", function->name);
+        }
+    }
+    return "";
 }
 
 // --- the regions ---
@@ -183,7 +197,7 @@ bool MachineState::fixup_of(std::uint64_t word, Fixup& fixup) const {
 
 std::string MachineState::capture() {
     if (problem_.empty()) {
-        problem_ = component_heap::problem();
+        problem_ = component_heap::problem([this](std::uint32_t id) { return function_named(id); });
     }
     if (!problem_.empty()) return "";
     const std::vector<component_heap::Segment> segments = component_heap::segments();
@@ -192,6 +206,8 @@ std::string MachineState::capture() {
     }
     note_own_pointers();
     std::string to;
+    mcap::put(to, state_format);
+    mcap::put(to, component_heap::heap_begin);
     const std::vector<std::string> libraries = memory_.libraries();
     mcap::put(to, static_cast<std::uint32_t>(libraries.size()));
     for (const std::string& name : libraries) {
@@ -271,6 +287,11 @@ void MachineState::put_core(std::string& to, Core& core) {
 
 bool MachineState::restore(std::string_view bytes) {
     mcap::Fields from(bytes);
+    const bool is_known = from.get<std::uint32_t>() == state_format &&
+                          from.get<std::uint64_t>() == component_heap::heap_begin;
+    if (!is_known) {
+        return fail("another version of Halcyon has written it");
+    }
     std::vector<std::string> libraries;
     for (auto count = from.get<std::uint32_t>(); count > 0 && from.good(); --count) {
         libraries.emplace_back(from.text());

@@ -81,7 +81,9 @@ private:
     bool get_core(mcap::Fields& from, Core& core);
     bool fail(std::string problem);
     static std::string name_of(const Region& region);
+    std::string function_named(std::uint32_t id) const;
 
+    Session& session_;
     std::vector<Core*> cores_;
     MappedMemory memory_;
     std::vector<Region> regions_;

@@ -63,8 +63,9 @@ ReExecution::ReExecution(JournalFile& file) : file_(file) {
         }
     }
     now_ns_ = begin_ns_.value_or(0);
-    if (file.begin() && !component_heap::track()) {
-        fail(State::fails, "a build with a sanitizer cannot restore the state that it begins with");
+    if (!file.begin()) return;
+    if (const std::string problem = component_heap::track(); !problem.empty()) {
+        fail(State::fails, "the state that the journal begins with cannot be restored: " + problem);
     }
 }
 

@@ -105,6 +105,36 @@ class ExactReplayRing(Case):
         self.finish(machine)
         self.cut_and_compare("delayed,smooth,sum.out", "--until", "0.7s")
 
+    def test_memory_of_thousands_of_setup_calls_is_in_the_state(self):
+        every = "".join(f"addf hoard.{number} servo\n" for number in (0, 2099))
+        machine = self.run_journaled(
+            f"newthread servo 1000000\nloadrt hoard count=2100\n{every}start\n"
+        )
+        self.wait_for_cycles(500)
+        self.finish(machine)
+        self.cut_and_compare("hoard.0.sum,hoard.2099.sum", "--until", "0.2s")
+
+    def test_memory_that_does_not_fit_names_its_component(self):
+        cannot = "hal replay: --cut: the state of the machine cannot be written: "
+        for argument, problem in (
+            ("mib=300", "'hoard.0' (hoard) allocates more than 256 MiB in one setup call"),
+            (
+                "cycle-mib=300",
+                "what functions allocate in cycles does not fit 256 MiB; what 'hoard.0' allocates "
+                "is not in the state",
+            ),
+        ):
+            machine = self.run_journaled(
+                f"newthread servo 1000000\nloadrt hoard {argument}\naddf hoard.0 servo\nstart\n"
+            )
+            self.wait_for_cycles(100)
+            self.finish(machine)
+            done = self.run_program(
+                "replay", "--exact", "run.mcap", "--until", "50", "--cut", "rest.mcap"
+            )
+            self.assertEqual((1, cannot + problem + "\n"), (done.returncode, done.stderr))
+            self.assertFalse((self.folder / "rest.mcap").exists())
+
     def test_a_bus_goes_on(self):
         shutil.copy(AXIS / "axis.canopen", self.folder)
         machine = self.run_journaled("""loadrt threads name1=servo period1=1000000

@@ -256,8 +256,11 @@ std::string cut_problem(const ReplayOptions& options) {
     if (options.cut == options.record) {
         return fmt::format("'{}' is the file of --record; name another one", options.cut);
     }
-    if (!component_heap::track()) return "a build with a sanitizer cannot read the state";
-    return target_problem(options, options.cut);
+    if (std::string problem = target_problem(options, options.cut); !problem.empty()) {
+        return problem;
+    }
+    const std::string problem = component_heap::track();
+    return problem.empty() ? "" : "the state of the machine cannot be written: " + problem;
 }
 
 }  // namespace

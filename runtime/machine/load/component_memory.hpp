@@ -3,18 +3,24 @@
 // (runtime/journal/component_heap.hpp).
 #pragma once
 
+#include <utility>
+
 namespace hal {
 
 /// While it exists, the calling thread allocates memory of a component. [setup]
 class ComponentMemory {
 public:
-    ComponentMemory() noexcept { ++depth_; }
-    ~ComponentMemory() { --depth_; }
+    /// `component`: its name, which outlives this.
+    explicit ComponentMemory(const char* component) noexcept
+        : before_(std::exchange(component_, component)) {}
+    ~ComponentMemory() { component_ = before_; }
     ComponentMemory(const ComponentMemory&) = delete;
-    static bool is_allocated() noexcept { return depth_ > 0; }
+    /// Returns the component's name; nullptr: the thread allocates no such memory.
+    static const char* component() noexcept { return component_; }
 
 private:
-    inline static thread_local int depth_ = 0;
+    const char* const before_;
+    inline static thread_local const char* component_ = nullptr;
 };
 
 }  // namespace hal

@@ -23,8 +23,8 @@ std::string dashed(std::string text) {
 
 namespace {
 
-std::unique_ptr<char[]> memory_of_component(std::size_t bytes) {
-    const ComponentMemory scope;
+std::unique_ptr<char[]> memory_of(const LoadedComponent& component, std::size_t bytes) {
+    const ComponentMemory scope(component.name.c_str());
     return std::make_unique<char[]>(bytes);
 }
 
@@ -52,7 +52,7 @@ void* allocate_for(Instance& instance, std::size_t bytes, std::size_t align) noe
             next = std::min(max, std::max<std::size_t>(256, 2 * instance.blocks.back().bytes));
         }
         const std::size_t size = std::max(next, bytes + align);
-        instance.blocks.push_back({memory_of_component(size), size, 0});
+        instance.blocks.push_back({memory_of(*instance.component, size), size, 0});
         return take(instance.blocks.back());
     } catch (const std::bad_alloc&) {
         return nullptr;
@@ -250,7 +250,7 @@ std::shared_ptr<void> block_of(const hal_component& plugin, std::size_t count) {
     const std::align_val_t align{std::max<std::size_t>(plugin.instance_align, 64)};
     void* memory = nullptr;
     {
-        const ComponentMemory scope;
+        const ComponentMemory scope(plugin.name);
         memory = ::operator new(count * stride_of(plugin), align);
     }
     std::memset(memory, 0, count * stride_of(plugin));
