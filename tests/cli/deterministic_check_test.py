@@ -22,6 +22,13 @@ SEEDS = (
     + "net d source.out => image.in\n"
     + "".join(f"addf {name} servo\n" for name in ["source", *KINDS, "after", "later", "clean"])
 )
+OUTSIDE = {
+    name: 100 + number
+    for number, name in enumerate(
+        "read readv pread preadv recv recvfrom recvmsg recvmmsg ioctl fread fgets fgetc getc "
+        "getline getdelim fscanf read-chk pread-chk recv-chk recvfrom-chk fread-chk fgets-chk".split()
+    )
+}
 CLEAN = """loadrt threads name1=servo period1=1000000
 loadrt siggen
 loadrt noise
@@ -35,13 +42,15 @@ getp lowpass.0.out
 
 
 class DeterministicCheck(Case):
+    def compile_seeds(self):
+        done = self.run_program("compile", Path(__file__).parent / "sources/seeds.cpp")
+        self.assertEqual(0, done.returncode, done.stderr)
+
     @unittest.skipIf(
         SANITIZED, "a sanitizer fills memory itself, and has the functions of the clock"
     )
     def test_components_that_depend_on_the_process_are_named(self):
-        source = Path(__file__).parent / "sources/seeds.cpp"
-        done = self.run_program("compile", source)
-        self.assertEqual(0, done.returncode, done.stderr)
+        self.compile_seeds()
         netlist = self.write("a.hal", SEEDS)
         done = self.run_program("check", "--deterministic", "--for", "50ms", netlist)
         self.assertEqual(1, done.returncode, done.stderr)
@@ -61,6 +70,52 @@ class DeterministicCheck(Case):
             "because of them\n",
             done.stdout,
         )
+
+    @unittest.skipIf(SANITIZED, "a sanitizer has these functions itself")
+    def test_functions_that_read_outside_are_named_whatever_they_call(self):
+        self.compile_seeds()
+        netlist = self.write(
+            "a.hal",
+            f"loadrt threads name1=servo period1=1000000\nloadrt seeds names={','.join(OUTSIDE)}\n"
+            + "".join(
+                f"setp {name}.kind {kind}\naddf {name} servo\n" for name, kind in OUTSIDE.items()
+            ),
+        )
+        done = self.run_program("check", "--deterministic", "--for", "20ms", netlist)
+        self.assertEqual(1, done.returncode, done.stderr)
+        lines = [
+            f"function '{name}' (seeds) reads a socket or a file that no journal has at cycle 0: it "
+            "is not deterministic"
+            for name in OUTSIDE
+        ]
+        lines += [
+            f"two simulations differ: {len(OUTSIDE)} instances are not deterministic, 0 instances "
+            "differ because of them"
+        ]
+        self.assertEqual(lines, done.stdout.splitlines()[-len(lines) :], done.stdout)
+
+    @unittest.skipIf(SANITIZED, "a sanitizer has the functions of the clock")
+    def test_a_violation_by_an_unknown_function_is_a_difference(self):
+        self.compile_seeds()
+        netlist = self.write(
+            "a.hal",
+            "loadrt threads name1=servo period1=1000000\nloadrt seeds names=once\n"
+            "setp once.kind 13\naddf once servo\n",
+        )
+        done = self.run_program("check", "--deterministic", "--for", "3s", netlist)
+        self.assertEqual(1, done.returncode, done.stdout + done.stderr)
+        self.assertRegex(
+            done.stdout,
+            r"^a function changed the floating-point modes \(rounding\) at cycle 2 000: it is not "
+            r"deterministic\ntwo simulations differ: 1 instance is not deterministic, 0 instances "
+            r"differ because of them\n$",
+        )
+
+    def test_plans_that_cannot_be_exchanged_are_reported(self):
+        netlist = self.write("a.hal", CLEAN + "loadrt lowpass names=determinism-check-servo\n")
+        done = self.run_program("check", "--deterministic", "--for", "50ms", netlist)
+        self.assertEqual((1, ""), (done.returncode, done.stdout))
+        self.assertIn("hal sim: the plans could not be exchanged: ", done.stderr)
 
     def test_a_deterministic_machine_is_equal_in_all_values(self):
         netlist = self.write("a.hal", CLEAN)

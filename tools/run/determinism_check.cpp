@@ -98,13 +98,14 @@ private:
             if (event.kind != "fault") continue;
             for (const char* const reason : {violation::read_outside, violation::float_modes}) {
                 const std::size_t at = event.text.find(reason);
-                const std::size_t name = event.text.find("function '");
-                if (at == std::string::npos || name == std::string::npos) continue;
-                const std::string text = event.text.substr(name, event.text.find(';') - name);
-                if (!violations_.insert(text.substr(0, text.find(reason))).second) continue;
+                if (at == std::string::npos) continue;
+                // "servo: function 'f' (c) REASON at cycle 7; what to do", or "servo: a function …"
+                const std::size_t who = event.text.find(": ") + 2;
+                if (!violations_.insert(event.text.substr(who, at - who)).second) continue;
                 ++sources_;
                 equal_ = false;
-                text_ += text + ": it is not deterministic\n";
+                text_ += event.text.substr(who, event.text.find(';') - who) +
+                         ": it is not deterministic\n";
             }
         }
     }

@@ -6,7 +6,6 @@
 #include <fmt/core.h>
 #include <utility>
 
-#include "cli/no_output.hpp"
 #include "cli/output.hpp"
 #include "machine/report/outside_readings.hpp"
 #include "paths.hpp"
@@ -89,10 +88,10 @@ public:
         }
     }
     /// Gives the threads new plans once, in one of the two simulations: a function that has kept an
-    /// address in the old ones reads something else from then on. [setup]
-    void advanced(HostedMachine& machine) {
-        if (!is_on_ || std::exchange(has_edited_, true)) return;
-        NoOutput none;
+    /// address in the old ones reads something else from then on. Returns why they have not got
+    /// them; "" when they have. [setup]
+    std::string advanced(HostedMachine& machine) {
+        if (!is_on_ || std::exchange(has_edited_, true)) return "";
         std::vector<std::string> threads;
         {
             const auto lock = machine.session.lock();
@@ -102,10 +101,16 @@ public:
         }
         for (const std::string& thread : threads) {
             const std::string name = "determinism-check-" + thread;
-            machine.shell.execute("loadrt and2 names=" + name, none);
-            machine.shell.execute("addf " + name + " " + thread, none);
-            machine.shell.execute("delf " + name + " " + thread, none);
+            for (const std::string& command :
+                 {"loadrt and2 names=" + name, "addf " + name + " " + thread,
+                  "delf " + name + " " + thread}) {
+                TextOutput output;
+                if (machine.shell.execute(command, output) != 0) {
+                    return output.err_text.substr(0, output.err_text.find_last_not_of('\n') + 1);
+                }
+            }
         }
+        return "";
     }
 
 private:
@@ -149,7 +154,8 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
     std::uint64_t left_cycles = options.cycles;
     DeterminismCheck check;
     check.limit(step, options.for_ns);
-    while (good && !machine.stop.requested() && (left_ns > 0 || left_cycles > 0)) {
+    while (good && problem.empty() && !machine.stop.requested() &&
+           (left_ns > 0 || left_cycles > 0)) {
         if (left_cycles > 0) {
             machine.advance(-1, std::min(step.cycles, left_cycles));
         } else {
@@ -157,7 +163,7 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
         }
         left_cycles -= std::min(step.cycles, left_cycles);
         left_ns -= step.ns;
-        check.advanced(machine);
+        problem = check.advanced(machine);
         const auto lock = session.lock();
         for (const LoggedEvent& entry : session.event_log().after(journal)) {
             good = good && sink->event({entry.time_ns, entry.kind, entry.text});
@@ -172,6 +178,9 @@ int record_advance(const SimOptions& options, HostedMachine& machine) {
         const auto lock = session.lock();
         session.probes().detach(probe);
         session.event_log().end();
+    }
+    if (!problem.empty()) {
+        return fail(options, "the plans could not be exchanged: " + problem);
     }
     if (!sink->close() || !good) return fail(options, cannot_write(*sink, options.record));
     if (lost > 0) {
