@@ -275,6 +275,7 @@ void check_links(const Program& by, const Programs::Entry& entry) {
     }
 }
 
+/// Gives the component its pins and declared values. When that is rejected, a component that was
 /// `fresh` keeps the pins and links that its dead predecessor had, if any.
 void add_declared(const Program& by, Programs::Entry& entry, const Declaration& wanted, bool fresh,
                   bool was_dead) {

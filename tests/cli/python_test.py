@@ -457,6 +457,14 @@ os._exit(0)
             self.assertIn(
                 f"{linked}{difference}; declare the pin as before, or type: unlinkp p.out", errors
             )
+            orderly = version.replace("c.ready()", "    c.ready()\nexcept hal.error: sys.exit(0)")
+            orderly = orderly.replace("{}", "import sys\ntry:\n    {}")
+            self.assertEqual("", self.python(orderly.format(pin)))
+            self.assertIn("<== p.out", self.say("show", "sig", "speed"))
+            self.assertRegex(
+                self.say("show", "comp"),
+                r"(?m)^ +\d+  User  p +\d+ dead since [\d:]{8} \(it has ended before it was ready\)$",
+            )
         self.assertIn("<== p.out", self.say("show", "sig", "speed"))
         self.python(right + "assert hal.get_value('speed') == 7\n")
 

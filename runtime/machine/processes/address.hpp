@@ -27,7 +27,7 @@ std::string group_without_user(std::string_view name);
 std::string lock_path(std::string_view name);
 
 enum class InstanceEnd {
-    ended,   ///< in order
+    ended,  ///< in order
     killed,  ///< without removing its socket
     running  ///< it has not ended
 };

@@ -13,8 +13,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "base/poll_all.hpp"
 #include "base/own_descriptors.hpp"
+#include "base/poll_all.hpp"
 #include "execute/core.hpp"
 #include "execute/process_setup.hpp"
 #include "machine/run/running_model.hpp"

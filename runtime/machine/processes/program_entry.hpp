@@ -70,7 +70,9 @@ struct ProgramEntry {
     /// Not registered over the socket: just started, or it has left.
     struct Unregistered {};
     /// A connection has registered it and still adds pins.
-    struct Initializing {};
+    struct Initializing {
+        bool succeeds = false;  ///< it took over the pins and links of a dead program
+    };
     struct Ready {};
     struct Dead {
         std::int64_t since_ns = 0;  ///< on the steady clock
@@ -120,6 +122,11 @@ struct ProgramEntry {
 
     bool ready() const { return std::holds_alternative<Ready>(component); }
     bool registered() const { return ready() || std::holds_alternative<Initializing>(component); }
+    /// It has taken over a dead program's pins and has not declared that it has all of them.
+    bool is_unready_successor() const {
+        const auto* const initializing = std::get_if<Initializing>(&component);
+        return initializing && initializing->succeeds;
+    }
     /// Returns nullptr while it lives.
     const Dead* death() const { return std::get_if<Dead>(&component); }
     Dead* death() { return std::get_if<Dead>(&component); }

@@ -251,11 +251,13 @@ std::string Programs::announce(pid_t pid, const std::string& name, std::uint64_t
                "no . at the beginning";
     }
     Entry* entry = find(name);
+    bool succeeds = false;
     if (entry) {
         std::string conflict = conflict_with(*entry, pid);
         if (!conflict.empty()) return reject(pid, std::move(conflict));
         if (entry->dead()) {
             entry = &succeed(*entry, pid);
+            succeeds = true;
         }
     } else {
         if (machine_.model().find_component(name) || machine_.model().find_instance(name)) {
@@ -272,6 +274,9 @@ std::string Programs::announce(pid_t pid, const std::string& name, std::uint64_t
     entry->timeout_ns = Entry::usual_timeout_ns;
     entry->heartbeat = {};
     set_ready(*entry, ready);
+    if (auto* const initializing = std::get_if<Entry::Initializing>(&entry->component)) {
+        initializing->succeeds = succeeds;
+    }
     return "";
 }
 
@@ -285,7 +290,7 @@ void Programs::set_ready(Entry& entry, bool ready) {
         entry.component = Entry::Ready{};
         entry.reserved = false;
     } else if (entry.owner != 0) {
-        entry.component = Entry::Initializing{};
+        entry.component = Entry::Initializing{.succeeds = entry.is_unready_successor()};
     } else {
         entry.component = Entry::Unregistered{};
     }
@@ -322,6 +327,9 @@ std::vector<std::string> Programs::stream_names() const {
 // --- the end of a component or of its process ---
 
 void Programs::leave(Entry& entry) {
+    if (entry.is_unready_successor() && !entry.stopping) {
+        return die(entry, "it has ended before it was ready");  // another one may have the pins
+    }
     remove(entry);
     entry.name.clear();
     entry.streams.clear();

@@ -64,7 +64,8 @@ public:
     void note_alive(Entry& entry);
     /// A component declares that it exchanges values at least so often; 0: no longer.
     void set_rate(Entry& entry, std::int64_t every_ns);
-    /// A component leaves in good order: its pins are removed.
+    /// A component leaves in good order: its pins are removed. One that took over those of a dead
+    /// program and is not ready yet is dead.
     void leave(Entry& entry);
     /// A connection has ended; what it answered for and did not leave() is dead.
     void withdraw(std::uint64_t owner);
