@@ -64,17 +64,41 @@ class ReplayScope(Case):
         self.assertIn("a.svg", done)
         self.assertIn("<svg", (self.folder / "a.svg").read_text())
 
+    def test_a_file_name_may_have_spaces(self):
+        text = self.past("goto 0.5s", 'scope sine --csv "my file.csv"', 'scope sum.out --svg "a b"')
+        self.assertEqual(["my file.csv", "a b"], text.splitlines()[1:4:2])
+        self.assertIn("sine", (self.folder / "my file.csv").read_text().splitlines()[0])
+        self.assertIn("<svg", (self.folder / "a b").read_text())
+
     def test_what_is_wrong_is_named(self):
-        for words, problem in [
-            ("", "scope: write: scope NAME..."),
-            ("none", "scope: no pin, parameter or signal matches 'none'"),
-            ("sine --pre often", "scope: 'often' is not a valid time"),
-            ("sine --pre", "scope: --pre needs a value"),
-            ("sine --colour red", "scope: unknown option '--colour'"),
-            ("sine --pre 0 --post 0", "scope: the time before and after is 0"),
-            ("sine --svg none/a.svg", "none/a.svg"),
+        usage = "scope NAME... [--pre 50ms] [--post 50ms] [--svg FILE] [--csv FILE]"
+        no_folder = "scope: cannot write 'none/a': No such file or directory"
+        for words, lines in [
+            ("", [f"scope: write: {usage}"]),
+            ("none", ["scope: no pin, parameter or signal matches 'none'"]),
+            ("sine --pre often", ["scope: 'often' is not a valid time; write 20ms or 1s"]),
+            ("sine --pre", ["scope: --pre needs a value"]),
+            ("sine --colour red", ["scope: unknown option '--colour'"]),
+            ("sine --pre 0 --post 0", ["scope: the time before and after is 0"]),
+            ("*", ["scope: 35 values match; at most 16 are drawn"]),
+            ("sine --svg none/a --csv b.csv", [no_folder]),
+            ("sine --svg a.svg --csv none/a", ["a.svg", no_folder]),
         ]:
-            self.assertIn(problem, self.past("goto 0.5s", f"scope {words}", status=1))
+            text = self.past("goto 0.5s", f"scope {words}", status=1)
+            self.assertEqual(lines, text.splitlines()[1 : 1 + len(lines)])
+            self.assertFalse((self.folder / "b.csv").exists())
+
+    def test_names_that_are_too_long_together(self):
+        names = [f"{n:x}".rjust(160, "n") for n in range(15)]
+        netlist = (
+            "loadrt threads name1=servo period1=1000000\nloadrt sum2 count=15\naddf sum2.0 servo\n"
+        )
+        netlist += "".join(f"net {name} sum2.{n}.out\n" for n, name in enumerate(names)) + "start\n"
+        machine = self.start("run", self.write("b.hal", netlist), "--journal", "run.mcap")
+        wait_until(lambda: int(self.value("servo.threadbeat") or 0) >= 100, "100 cycles")
+        self.end(machine)
+        text = self.past("goto 50", "scope nn*", status=1)
+        self.assertEqual("scope: the names are too long", text.splitlines()[1])
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fmt/core.h>
 #include <functional>
+#include <iomanip>
 #include <optional>
 #include <poll.h>
 #include <sstream>
@@ -22,6 +23,7 @@
 #include "cli/signals.hpp"
 #include "journal/keyframes.hpp"
 #include "run/replayed_moment.hpp"
+#include "run/replayed_traces.hpp"
 #include "run/stop_rule.hpp"
 
 namespace hal::tools {
@@ -45,7 +47,7 @@ and the commands that only read a machine: show, list, getp, gets, ptype, stype,
 std::vector<std::string> split(const std::string& line) {
     std::istringstream in(line);
     std::vector<std::string> words;
-    for (std::string word; in >> word;) {
+    for (std::string word; in >> std::quoted(word);) {
         words.push_back(word);
     }
     return words;
@@ -223,13 +225,9 @@ int ReplayShell::set_break(Words words) {
 int ReplayShell::where(Words) { return send({}); }
 
 int ReplayShell::scope(Words words) {
-    std::string text;
-    for (const std::string& word : words) {
-        text += (text.empty() ? "" : " ") + word;
-    }
     Errand errand;
     errand.kind = Errand::Kind::scope;
-    return send(errand, text);
+    return send(errand, ScopeCommand::joined(words));
 }
 
 int ReplayShell::help(Words) { return exit_code(print(help_text)); }

@@ -273,9 +273,9 @@ void ReplayedMoment::scope(Errand errand) {
         const ReplayedTraces traces(machine_.session(), command, max_time_ns_);
         problem = traces.problem();
         // at the begin of the picture a pattern may match less
-        const std::string line = command.line_for(traces.names());
-        if (line.size() < sizeof errand.text) {
-            std::memcpy(errand.text, line.c_str(), line.size() + 1);
+        const std::string text = command.text_for(traces.names());
+        if (text.size() < sizeof errand.text) {
+            std::memcpy(errand.text, text.c_str(), text.size() + 1);
         } else if (problem.empty()) {
             problem = "the names are too long";
         }

@@ -20,20 +20,30 @@ namespace {
 constexpr std::size_t picture_columns = 100;
 constexpr std::size_t picture_rows = 24;
 constexpr std::size_t max_channels = 16;
+constexpr char separator = '\n';  // in no line of the shell
 
 }  // namespace
 
-std::string ScopeCommand::parse(const std::string& line) {
-    std::istringstream in(line);
+std::string ScopeCommand::joined(const std::vector<std::string>& words) {
+    std::string text;
+    for (const std::string& word : words) {
+        text += word + separator;
+    }
+    return text;
+}
+
+std::string ScopeCommand::parse(const std::string& text) {
+    std::istringstream in(text);
     std::string word;
-    in >> word;  // scope
-    while (in >> word) {
+    const auto next = [&in](std::string& to) { return !!std::getline(in, to, separator); };
+    next(word);  // scope
+    while (next(word)) {
         if (!word.starts_with("--")) {
             names.push_back(word);
             continue;
         }
         std::string value;
-        if (!(in >> value)) return fmt::format("{} needs a value", word);
+        if (!next(value)) return fmt::format("{} needs a value", word);
         if (word == "--svg") {
             svg = value;
         } else if (word == "--csv") {
@@ -52,21 +62,23 @@ std::string ScopeCommand::parse(const std::string& line) {
     return pre_ns + post_ns > 0 ? "" : "the time before and after is 0";
 }
 
+std::string ScopeCommand::text_for(const std::vector<std::string>& values) const {
+    std::vector<std::string> words = {"scope", "--pre", fmt::format("{}ns", pre_ns), "--post",
+                                      fmt::format("{}ns", post_ns)};
+    words.insert(words.end(), values.begin(), values.end());
+    if (!svg.empty()) {
+        words.insert(words.end(), {"--svg", svg});
+    }
+    if (!csv.empty()) {
+        words.insert(words.end(), {"--csv", csv});
+    }
+    return joined(words);
+}
+
 ReplayedTraces::ReplayedTraces(Session& session, ScopeCommand command, std::int64_t moment_ns)
     : session_(session), command_(std::move(command)), moment_ns_(moment_ns) {
     names_ = named_values(session.model(), command_.names);
     samples_.resize(names_.size());
-}
-
-std::string ScopeCommand::line_for(const std::vector<std::string>& values) const {
-    std::string line = fmt::format("scope --pre {}ns --post {}ns", pre_ns, post_ns);
-    for (const std::string& name : values) {
-        line += " " + name;
-    }
-    if (!svg.empty()) {
-        line += " --svg " + svg;
-    }
-    return csv.empty() ? line : line + " --csv " + csv;
 }
 
 std::string ReplayedTraces::problem() const {
@@ -135,15 +147,20 @@ std::string ReplayedTraces::drawn(std::string& problem) const {
     const Record* const record = acquisition.record();
     if (!record) return "no cycle in this time\n";
     std::string text;
+    const auto write = [&](const std::string& file, const std::string& content) {
+        if (!problem.empty()) return;
+        problem = write_file(file, content);
+        if (problem.empty()) {
+            text += file + "\n";
+        }
+    };
     if (!command_.svg.empty()) {
-        problem = write_file(command_.svg, chart_svg(channels, *record, "replayed"));
-        text += command_.svg + "\n";
+        write(command_.svg, chart_svg(channels, *record, "replayed"));
     }
-    if (!command_.csv.empty() && problem.empty()) {
-        problem = write_file(command_.csv, chart_csv(channels, *record));
-        text += command_.csv + "\n";
+    if (!command_.csv.empty()) {
+        write(command_.csv, chart_csv(channels, *record));
     }
-    if (!text.empty()) return text;
+    if (!command_.svg.empty() || !command_.csv.empty()) return text;
     ScopeView view(acquisition, unicode_terminal(), false);
     const std::vector<std::string> lines =
         view.frame(picture_columns, picture_rows + channels.size());

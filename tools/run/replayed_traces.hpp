@@ -19,10 +19,12 @@ struct ScopeCommand {
     std::string svg;
     std::string csv;
 
-    /// Returns why the words are invalid, or "".
-    std::string parse(const std::string& line);
-    /// Returns the words again, with other names.
-    std::string line_for(const std::vector<std::string>& values) const;
+    /// Returns words as one text, from one process to another.
+    static std::string joined(const std::vector<std::string>& words);
+    /// `text`: from joined(). Returns why the words are invalid, or "".
+    std::string parse(const std::string& text);
+    /// Returns the words again as one text, with other names.
+    std::string text_for(const std::vector<std::string>& values) const;
 };
 
 /// Collects the values while cycles are executed. [setup] with the session's lock held
@@ -35,12 +37,11 @@ public:
     /// States which name is unknown; "" when all are known.
     std::string problem() const;
     const std::vector<std::string>& names() const { return names_; }
-    std::int64_t begin_ns() const { return moment_ns_ - command_.pre_ns; }
     std::int64_t end_ns() const { return moment_ns_ + command_.post_ns; }
     /// Reads the values at the end of the cycle that woke at `time_ns`.
     void sample(std::int64_t time_ns);
-    /// Returns the picture as text, or writes the files and returns their names. Sets `problem` when
-    /// one cannot be written.
+    /// Returns the picture as text, or writes the files and returns the names of those that are
+    /// written. Sets `problem` when one cannot be.
     std::string drawn(std::string& problem) const;
 
 private:
