@@ -285,6 +285,17 @@ class ExactReplay(Case):
         )
         self.assertEqual(1, done.returncode)
 
+    def test_a_journal_without_cycles_gives_no_recording(self):
+        netlist = self.write("a.hal", "loadrt integ names=sum\n")
+        machine = self.start("run", netlist, "--journal", "run.mcap", loaded=False)
+        wait_until(lambda: self.value("sum.in") == "0", "the instance is loaded")
+        self.finish(machine)
+        done = self.run_program("replay", "--exact", "run.mcap", "--record", "out.csv")
+        self.assertEqual(
+            (1, "hal replay: --record: no cycle was executed\n"), (done.returncode, done.stderr)
+        )
+        self.assertFalse((self.folder / "out.csv").exists())
+
     def test_no_option_replaces_the_journal_itself(self):
         self.finish(self.run_journaled(SERVO + "start\n"))
         whole = (self.folder / "run.mcap").read_bytes()
@@ -685,8 +696,27 @@ class ExactReplay(Case):
             (["--journal", "b.mcap", "--values", "wheel", "--for", "1s"], "matches 'wheel'"),
         ]:
             self.assertIn(problem, self.bad("run", self.folder / "a.hal", *words))
-        self.assertIn(
-            "need --exact", self.bad("replay", "run.mcap", self.folder / "a.hal", "--until", "3")
+        for option, value in (
+            ("--until", "3"),
+            ("--break", "a > 1"),
+            ("--show", "a"),
+            ("--shell", None),
+            ("--edit", "setp a 1"),
+            ("--netlist", "b.hal"),
+            ("--at", "3"),
+            ("--as-test", "t"),
+            ("--record", "b.csv"),
+            ("--cut", "b.mcap"),
+            ("--anyway", None),
+        ):
+            words = [option] if value is None else [option, value]
+            self.assertEqual(
+                f"hal replay: only with --exact: {option}\n",
+                self.bad("replay", "run.mcap", "a.hal", *words),
+            )
+        self.assertEqual(
+            "hal replay: only with --exact: --until, --anyway\n",
+            self.bad("replay", "run.mcap", "a.hal", "--anyway", "--until", "3"),
         )
         for words in (["--tolerance", "1"], ["--for", "1s"]):
             self.assertIn("compares all bits", self.bad("replay", "--exact", "run.mcap", *words))

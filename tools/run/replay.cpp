@@ -552,14 +552,23 @@ private:
     std::int64_t replayed_ns_ = 0;
 };
 
-/// Returns whether an option is given that works with --exact only.
-bool has_exact_options(const ReplayOptions& options) {
-    const std::string* const texts[] = {&options.until, &options.break_condition, &options.as_test,
-                                        &options.cut, &options.record};
-    const bool has_text = std::any_of(std::begin(texts), std::end(texts),
-                                      [](const std::string* text) { return !text->empty(); });
-    return has_text || options.anyway || options.shell || !options.show.empty() ||
-           !options.edits.empty() || !options.at.empty() || !options.netlist.empty();
+/// Returns the given options that work with --exact only: "--until, --show".
+std::string exact_options(const ReplayOptions& options) {
+    const std::pair<const char*, bool> all[] = {
+        {"--until", !options.until.empty()},   {"--break", !options.break_condition.empty()},
+        {"--show", !options.show.empty()},     {"--shell", options.shell},
+        {"--edit", !options.edits.empty()},    {"--netlist", !options.netlist.empty()},
+        {"--at", !options.at.empty()},         {"--as-test", !options.as_test.empty()},
+        {"--record", !options.record.empty()}, {"--cut", !options.cut.empty()},
+        {"--anyway", options.anyway},
+    };
+    std::string list;
+    for (const auto& [option, is_given] : all) {
+        if (is_given) {
+            append_item(list, option);
+        }
+    }
+    return list;
 }
 
 }  // namespace
@@ -577,10 +586,8 @@ int run_replay(const ReplayOptions& options) {
     if (options.words.size() == 1 && is_journal_test(options.words[0])) {
         return run_journal_test(options);
     }
-    if (has_exact_options(options)) {
-        return fail(options,
-                    "--until, --break, --show, --shell, --edit, --netlist, --at, --as-test, --cut, "
-                    "--record and --anyway need --exact");
+    if (const std::string given = exact_options(options); !given.empty()) {
+        return fail(options, fmt::format("only with --exact: {}", given));
     }
     if (options.words.size() < 2) return fail(options, "missing netlist: hal replay FILE NETLIST");
     const std::string file = std::filesystem::absolute(options.words.front()).string();

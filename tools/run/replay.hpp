@@ -70,8 +70,8 @@ struct ReplayOptions : NetlistOptions {
                   "with --exact: write a test of the journal up to here, whose --show values are "
                   "expected; run it with: hal replay DIR");
         set.value("--record", record, "FILE",
-                  "with --exact: write the values of each cycle but the first to this recording, "
-                  ".mcap or .csv");
+                  "with --exact: write the values of all cycles after the machine was loaded to "
+                  "this recording, .mcap or .csv");
         set.value(
             "--cut", cut, "FILE",
             "with --exact: write the rest of the journal to FILE, which begins with the state "
