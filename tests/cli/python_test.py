@@ -427,10 +427,10 @@ os._exit(0)
     def test_a_child_process_leaves_its_parents_probe_alone(self):
         self.machine()
         self.assertEqual(
-            "rejected\nrows\n",
+            "the probe belongs to the parent process; create one of its own in the child\nrows\n",
             self.python(
                 "import hal, os, sys\np = hal.probe('adder.out')\nnext(iter(p))\n"
-                "if os.fork() == 0:\n try: next(iter(p))\n except hal.error: print('rejected', flush=True)\n sys.exit(0)\n"
+                "if os.fork() == 0:\n try: next(iter(p))\n except hal.error as e: print(e, flush=True)\n sys.exit(0)\n"
                 "os.wait()\nfor _ in range(3): rows = next(iter(p))\nprint('rows', flush=True)\n"
             ),
         )
