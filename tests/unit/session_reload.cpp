@@ -99,5 +99,34 @@ TEST_F(Reload, of_functions_in_two_threads_tears_nothing) {
     EXPECT_EQ(machine.get("w.torn"), "0");
 }
 
+TEST_F(Reload, that_a_hung_thread_may_still_use_leaves_nothing_to_the_next_edit) {
+    Watch hung;
+    Watch starting;
+    machine.must("loadrt test-counter names=c\naddf c fast\nloadrt test-life names=y " +
+                 hung.argument() + "\naddf y slow");
+    machine.start();
+    ASSERT_TRUE(eventually([&] { return hung.runs > 2; }));
+    starting.hang_at_start = &hung;
+    EXPECT_FALSE(machine.edit("reload test-counter\nsetp c.step 5\nloadrt test-life names=z " +
+                              starting.argument()));
+    EXPECT_NE(machine.said.find("function 'y' (test-life) does not return [hung-thread]"),
+              std::string::npos)
+        << machine.said;
+    EXPECT_EQ(starting.started, 1);
+    EXPECT_EQ(starting.destroyed, 0) << "the edit is kept";
+    hung.hang = false;
+    ASSERT_TRUE(eventually([&] { return !machine.session.reports().threads()[1].hung; }));
+    EXPECT_TRUE(machine.session.threads().start());
+    EXPECT_EQ(machine.get("c.step"), "1");
+
+    Pin* const step = machine.session.model().find_pin("c.step");
+    machine.session.values().write({{step, hal_value{.real = 3.0}}});
+    ASSERT_TRUE(eventually([&] { return machine.get("c.step") == "3"; }));
+    EXPECT_FALSE(machine.edit("loadrt test-life names=w fail=start"));
+    EXPECT_EQ(machine.get("c.step"), "3");
+    machine.must("setp c.step 4\nunload test-life");
+    EXPECT_EQ(machine.get("c.step"), "4");
+}
+
 }  // namespace
 }  // namespace hal::test

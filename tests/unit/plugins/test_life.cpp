@@ -31,6 +31,12 @@ struct Life : hal::Component {
     void start() {
         if (failing.get() == "start") throw std::runtime_error("the test rejects the start");
         ++watch.started;
+        if (hal::test::Watch* const other = watch.hang_at_start.exchange(nullptr)) {
+            other->hang = true;
+            while (!other->hanging) {
+                std::this_thread::sleep_for(std::chrono::milliseconds(1));
+            }
+        }
     }
     void stop() noexcept { ++watch.stopped; }
     void copy(hal::Cycle) noexcept {

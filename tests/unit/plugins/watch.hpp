@@ -20,6 +20,8 @@ struct Watch {
     std::atomic<int> max_inside{0};
     std::atomic<bool> hang{false};
     std::atomic<bool> hanging{false};
+    /// the next start returns once the function of the component with this record hangs
+    std::atomic<Watch*> hang_at_start{nullptr};
     std::atomic<std::uint64_t> runs{0};
 
     std::string argument() const {
