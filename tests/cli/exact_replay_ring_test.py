@@ -127,10 +127,10 @@ class ExactReplayRing(Case):
             machine = self.run_journaled(
                 f"newthread servo 1000000\nloadrt hoard {argument}\naddf hoard.0 servo\nstart\n"
             )
-            self.wait_for_cycles(100)
+            self.wait_for_cycles(500)
             self.finish(machine)
             done = self.run_program(
-                "replay", "--exact", "run.mcap", "--until", "50", "--cut", "rest.mcap"
+                "replay", "--exact", "run.mcap", "--until", "400", "--cut", "rest.mcap"
             )
             self.assertEqual((1, cannot + problem + "\n"), (done.returncode, done.stderr))
             self.assertFalse((self.folder / "rest.mcap").exists())
