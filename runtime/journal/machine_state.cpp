@@ -351,22 +351,22 @@ bool MachineState::set_pointers(mcap::Fields& from, const Region& region, std::s
         std::uint64_t stored = 0;
         std::memcpy(&before, region.begin + at, sizeof before);
         std::memcpy(&stored, &content[at], sizeof stored);
-        std::uint64_t word = before;  // the own pointer stays
         const bool is_same = stored == (before & low_bytes) && !region.is_grown;
-        if (is_same || kind == own) {
-            // as it was after the start
-        } else if (kind == into_region) {
+        if (is_same || kind == own) {  // as it was after the start
+            std::memcpy(&content[at], &before, sizeof before);
+            continue;
+        }
+        std::uint64_t word = 0;  // `none`
+        if (kind == into_region) {
             const bool exists = target < regions_.size() && offset <= regions_[target].bytes;
             if (!exists) return fail("it is damaged");
             word = address_of(regions_[target].begin) + offset;
         } else if (kind == into_library && target < libraries.size()) {
             const std::uint64_t address = memory_.address_in(libraries[target], offset);
-            word = address == 0 ? word : address;
+            word = address == 0 ? before : address;
         } else if (kind == like) {
             if (!has_word(target, offset)) return fail("it is damaged");
             std::memcpy(&word, regions_[target].begin + offset, sizeof word);
-        } else {
-            word = 0;
         }
         std::memcpy(&content[at], &word, sizeof word);
     }

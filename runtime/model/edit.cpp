@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <iterator>
+#include <ranges>
+#include <utility>
 
 #include "model/component_replacement.hpp"
 #include "model/own.hpp"
@@ -339,14 +341,14 @@ void Edit::remove_instance(Instance& leaving) {
         drop_steps_of(leaving, *before.function);
     }
     // from the last one: the positions of the others stay
-    for (auto it = functions->own.rbegin(); it != functions->own.rend(); ++it) {
-        for (const auto& pin : it->function->pins) {
+    for (const auto& [function, position] : functions->own | std::views::reverse) {
+        const auto from = component.functions.begin() + position;
+        removed_.functions.push_back(std::move(*from));
+        component.functions.erase(from);
+        model_.function.erase(function->name);
+        for (const auto& pin : function->pins) {
             model_.leave(*pin);
         }
-        model_.function.erase(it->function->name);
-        removed_.functions.push_back(
-            std::move(component.functions[static_cast<std::size_t>(it->position)]));
-        component.functions.erase(component.functions.begin() + it->position);
     }
     removed_.instances.push_back(std::move(*at));
     component.instances.erase(at);

@@ -203,10 +203,11 @@ class CompletionScript(Case):
         self.assertIn("and2", self.complete("hal doc an"))
 
     def test_rejects_other_shells(self):
-        self.assertEqual(
-            "hal completion: unsupported shell; type: hal completion SHELL with one of bash, zsh, fish\n",
-            self.bad("completion", "tcsh"),
-        )
+        for words in (["tcsh"], ["bash", "zsh"], ["words", "bash"]):
+            self.assertEqual(
+                "hal completion: unsupported shell; type: hal completion SHELL with one of bash, zsh, fish\n",
+                self.bad("completion", *words),
+            )
 
     def test_values_of_a_running_machine(self):
         self.start("run", self.write("m.hal", SERVO))

@@ -10,6 +10,7 @@
 #include "text/numbers.hpp"
 
 namespace hal::tools {
+
 bool ValueCondition::parse(const std::string& text) {
     const std::size_t at = text.find_first_of("<>=!");
     if (at == std::string::npos || at == 0) return false;
