@@ -172,8 +172,10 @@ public:
         if (at != MAP_FAILED) {
             ::munmap(at, heap_bytes);  // an old kernel takes the address as a hint
         } else if (errno != EEXIST) {
-            return fmt::format("the addresses for the memory of components cannot be reserved: {}",
-                               std::strerror(errno));
+            return fmt::format(
+                "the addresses for the memory of components cannot be reserved: {}; "
+                "see: ulimit -v",
+                std::strerror(errno));
         }
         return "other memory has the addresses that components need";
     }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <string>
 #include <sys/mman.h>
+#include <sys/resource.h>
 
 #include "journal/component_heap.hpp"
 #include "journal/machine_state.hpp"
@@ -45,6 +46,20 @@ TEST(ComponentHeap, Is_not_made_where_other_memory_has_its_addresses) {
         EXPECT_EQ(7, *static_cast<char*>(other));
         ::munmap(other, page);
     }
+}
+
+TEST(ComponentHeap, Is_not_made_where_the_address_space_is_limited) {
+    rlimit before{};
+    ASSERT_EQ(0, ::getrlimit(RLIMIT_AS, &before));
+    rlimit small = before;
+    small.rlim_cur = rlim_t{1} << 40;
+    ASSERT_EQ(0, ::setrlimit(RLIMIT_AS, &small));
+    const std::string problem = component_heap::track();
+    ::setrlimit(RLIMIT_AS, &before);
+    EXPECT_EQ(
+        "the addresses for the memory of components cannot be reserved: Cannot allocate memory; "
+        "see: ulimit -v",
+        problem);
 }
 
 #endif
