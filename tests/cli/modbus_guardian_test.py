@@ -196,6 +196,20 @@ class Guardian(Case):
         self.assertIn("slave 1 (spindle) acknowledged its stop telegrams after", out)
         self.assertNotIn("stop the drives by other means", out)
 
+    def test_the_end_sends_the_stop_telegrams_again_behind_a_stop_that_is_over(self):
+        for guardian in ("no", "yes"):
+            with self.subTest(guardian=guardian):
+                bus = f"[bus]\nguardian = {guardian}\n"
+                self.write("spindle.modbus", CONFIGURATION.replace("[bus]\n", bus))
+                machine = self.start("run", "spindle.hal")
+                self.comes("modbus.0.spindle.online", "TRUE")
+                self.say("setp", "modbus.0.estop", "TRUE")
+                self.comes("modbus.0.spindle.stopped", "TRUE")
+                begin = len(self.drive.writes)
+                self.shell("unloadrt", "modbus")
+                self.assertIn(STOP, [frame for _, frame in self.drive.writes[begin:]])
+                self.end(machine)
+
     def test_a_drive_that_does_not_answer_is_reported(self):
         machine = self.run_spindle()
         self.drive.answers = False

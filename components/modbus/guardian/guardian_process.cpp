@@ -43,8 +43,8 @@ std::string GuardianProcess::start(const GuardianArguments& arguments, const std
 bool GuardianProcess::end() noexcept {
     if (!child_.is_running()) return true;
     resume();
-    image_.header().ending.store(1, std::memory_order_release);
     image_.stop(StopReason::unload);
+    image_.header().ending.store(1, std::memory_order_release);  // behind the stop: see Guardian
     if (has_ended_within(end_limit_ns_)) return true;
     child_.kill();
     return false;

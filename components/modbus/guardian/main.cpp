@@ -55,12 +55,11 @@ public:
             const std::int64_t now = link::monotonic_ns();
             watch(now);
             image_.header().turns.fetch_add(1, std::memory_order_relaxed);
+            // read before work(), which then follows the stop that was requested before
+            const bool is_ending = image_.header().ending.load(std::memory_order_acquire) != 0;
             const std::int64_t next = master_.work(now);
             if (master_.is_stopped()) {
-                if (parent_.is_dead() ||
-                    image_.header().ending.load(std::memory_order_acquire) != 0) {
-                    return finish(now);
-                }
+                if (parent_.is_dead() || is_ending) return finish(now);
                 if (!parent_.hangs() &&
                     image_.header().stop_held.load(std::memory_order_acquire) == 0) {
                     master_.release();

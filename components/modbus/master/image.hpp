@@ -114,6 +114,7 @@ struct ImageHeader {
     std::array<std::atomic<std::uint64_t>, slave_words> changed{};
     // written by the engine
     alignas(64) std::atomic<std::uint32_t> events_lost{0};
+    std::atomic<std::uint32_t> stops_followed{0};  ///< of `stop_count`
     std::atomic<std::uint32_t> line_open{0};
     std::atomic<std::uint32_t> broadcasts{0};  ///< broadcast stops
     /// why the guardian could not start; written before Phase::ended
@@ -192,6 +193,13 @@ public:
     void stop(StopReason reason) const noexcept {
         header_->stop_reason.store(static_cast<std::uint32_t>(reason), std::memory_order_relaxed);
         header_->stop_count.fetch_add(1, std::memory_order_release);
+    }
+    /// Returns whether the last requested stop is over. [any]
+    bool has_stopped() const noexcept {
+        return header_->stops_followed.load(std::memory_order_acquire) ==
+                   header_->stop_count.load(std::memory_order_acquire) &&
+               header_->phase.load(std::memory_order_acquire) ==
+                   static_cast<std::uint32_t>(Phase::stopped);
     }
 
 private:

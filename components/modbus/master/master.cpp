@@ -203,6 +203,7 @@ void Master::follow_requests(std::int64_t now_ns) noexcept {
     stop_seen_ = count;
     stop(static_cast<StopReason>(image_.header().stop_reason.load(std::memory_order_relaxed)),
          now_ns);
+    image_.header().stops_followed.store(count, std::memory_order_release);
 }
 
 /// Returns false while the line is lost.

@@ -272,8 +272,7 @@ private:
         image_.stop(StopReason::unload);
         const std::int64_t limit = stop_limit_ns(arguments_.plan, arguments_.bus);
         const std::int64_t begin = hal::link::monotonic_ns();
-        while (image_.header().phase.load(std::memory_order_acquire) !=
-               static_cast<std::uint32_t>(Phase::stopped)) {
+        while (!image_.has_stopped()) {
             if (hal::link::monotonic_ns() - begin > limit) {
                 reporter_->tell({Event::stop_unfinished, 0, 0, limit});
                 return;
