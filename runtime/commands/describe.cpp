@@ -160,6 +160,7 @@ void describe_threads(std::string& to, Session& session, const Patterns& pattern
         object["cycles"] = report.cycles;
         object["missed"] = report.missed;
         object["overruns"] = report.overruns;
+        object["over_budget"] = report.over_budget;
         object["page_faults"] = report.page_faults;
         object["faulted"] = report.faulted;
         object["supervised"] = report.supervised;

@@ -818,9 +818,11 @@ std::int64_t Core::account(std::int64_t woke_ns, bool ran) noexcept {
     const std::int64_t budget = budget_ns.load(std::memory_order_relaxed);
     const bool too_long = busy_ns >= max_overrun * period_ns_;
     const bool in_budget = (budget == 0 || busy_ns <= budget) && !too_long;
-    if (!in_budget) {
-        overruns.store(overruns.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-    }
+    const auto count = [](std::atomic<std::uint64_t>& counter) {
+        counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    };
+    if (now_ns - info_.start_ns > period_ns_) count(overruns);
+    if (!in_budget) count(over_budget);
     const auto event = [&](hal_fault_code code) -> FaultEvent {
         return {code,           slow_function(woke_ns),       info_.number,
                 info_.start_ns, static_cast<double>(busy_ns), nullptr,

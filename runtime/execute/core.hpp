@@ -218,7 +218,9 @@ public:
     static constexpr std::int64_t max_overrun = 10;
     std::atomic<bool> profile_every{false};
     Histogram wakeup, busy;  ///< written by the thread
-    std::atomic<std::uint64_t> overruns{0};  ///< written by the thread
+    /// Cycles that ended after the next deadline; cycles over the budget or of `max_overrun` periods.
+    /// Written by the thread.
+    std::atomic<std::uint64_t> overruns{0}, over_budget{0};
     bool stopped_by_fault() const { return stopped_.load(std::memory_order_acquire); }
 
     /// Returns the core whose functions run on the calling thread, or nullptr; for crash and

@@ -154,11 +154,23 @@ TEST(A_cycle_beyond_its_budget, is_a_fault_once_per_row) {
     machine.must("newthread t 20000000 budget=1ms\nloadrt test-faulty names=f\naddf f.run t");
     machine.start();
     machine.must("setp f.slow 3000");
-    ASSERT_TRUE(eventually([&] { return machine.session.reports().threads()[0].overruns >= 3; }));
+    ASSERT_TRUE(
+        eventually([&] { return machine.session.reports().threads()[0].over_budget >= 3; }));
     const auto faults = machine.session.reports().faults();
     ASSERT_FALSE(faults.empty());
     EXPECT_EQ(faults[0].code, "budget");
     EXPECT_NE(faults[0].sentence.find("(budget 1 ms)"), std::string::npos) << faults[0].sentence;
+}
+
+TEST(A_cycle_that_ends_after_the_next_deadline, is_counted_as_an_overrun) {
+    Machine machine(Clock::real);
+    machine.must("newthread t 20000000\nloadrt test-faulty names=f\naddf f.run t");
+    machine.start();
+    machine.must("setp f.slow 25000");
+    const Reports& reports = machine.session.reports();
+    ASSERT_TRUE(eventually([&] { return reports.threads()[0].overruns >= 3; }));
+    EXPECT_LT(reports.threads()[0].over_budget, reports.threads()[0].overruns)
+        << "the thread has no budget";
 }
 
 TEST(Missed_periods, are_counted_and_skipped_and_the_phase_stays) {

@@ -102,7 +102,7 @@ TEST(A_row_of_overruns, stays_a_fault_while_cycles_are_too_long) {
     machine.start();
     machine.must("setp f.slow 3000");
     Reports& reports = machine.session.reports();
-    ASSERT_TRUE(eventually([&] { return reports.threads()[0].overruns >= 3; }));
+    ASSERT_TRUE(eventually([&] { return reports.threads()[0].over_budget >= 3; }));
     EXPECT_EQ(reports.clear_faults().size(), 1u);
     EXPECT_GE(reports.fault_count(), 1u);
     machine.must("setp f.slow 0");

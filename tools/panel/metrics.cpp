@@ -105,7 +105,7 @@ std::string metrics_text(const Json& reply, bool up) {
     per_thread(text, threads, "thread_cycles_total", "counter", "finished cycles", "cycles");
     per_thread(text, threads, "thread_missed_cycles_total", "counter", "missed periods", "missed");
     per_thread(text, threads, "thread_overruns_total", "counter",
-               "cycles that took longer than the period", "overruns");
+               "cycles that ended after the next deadline", "overruns");
     per_thread(text, threads, "thread_page_faults_total", "counter", "page faults in cycles",
                "page_faults");
     histogram(text, histograms, "thread_wakeup_latency_seconds", "wake-up latency of the cycles",

@@ -179,8 +179,8 @@ std::string timing_report(Session& session) {
         if (r.page_faults != 0) {
             policies += fmt::format(", {} page faults", r.page_faults);
         }
-        if (r.overruns != 0) {
-            policies += fmt::format(", {} cycles over budget", r.overruns);
+        if (r.over_budget != 0) {
+            policies += fmt::format(", {} cycles over budget", r.over_budget);
         }
         if (r.hung) {
             policies +=

@@ -77,6 +77,7 @@ ThreadReport Reports::thread(const Thread& thread) const {
     report.cycles = core->monitor.cycles();
     report.missed = core->monitor.missed_by(monotonic_ns());
     report.overruns = core->overruns.load();
+    report.over_budget = core->over_budget.load();
     report.wakeup_p50_ns = core->wakeup.quantile(0.5);
     report.wakeup_p99_ns = core->wakeup.quantile(0.99);
     report.wakeup_max_ns = static_cast<double>(core->wakeup.max_ns());

@@ -21,7 +21,8 @@ struct ThreadReport {
     std::int64_t period_ns = 0;
     std::uint64_t cycles = 0;
     std::uint64_t missed = 0;
-    std::uint64_t overruns = 0;
+    std::uint64_t overruns = 0;  ///< cycles that ended after the next deadline
+    std::uint64_t over_budget = 0;  ///< cycles over the budget, or of 10 periods and more
     double wakeup_p50_ns = 0;
     double wakeup_p99_ns = 0;
     double wakeup_max_ns = 0;  ///< wake-up latency
