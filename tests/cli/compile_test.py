@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """`hal compile`: one source file becomes a plugin; errors are reported at the user's line."""
+
 import unittest
 from pathlib import Path
 
@@ -52,7 +53,9 @@ class Compile(harness.Case):
         self.assertIn("First-order lag", self.run_program("doc", "lag").stdout)
 
     def test_a_pin_of_another_type_is_one_sentence(self):
-        self.write("lag.cpp", LAG.replace("BODY", "out = 1;").replace("Out<double>  ", "Out<float>   "))
+        self.write(
+            "lag.cpp", LAG.replace("BODY", "out = 1;").replace("Out<double>  ", "Out<float>   ")
+        )
         done = self.compile("lag.cpp")
         self.assertEqual(done.returncode, 1)
         self.assertRegex(
@@ -80,9 +83,7 @@ class Compile(harness.Case):
         )
         self.assertIn("missing line in the component: using Component::Component;", done.stderr)
         self.assertTrue(
-            done.stderr.endswith(
-                "hal compile: 'lag.cpp' does not compile; it was not installed\n"
-            ),
+            done.stderr.endswith("hal compile: 'lag.cpp' does not compile; it was not installed\n"),
             done.stderr,
         )
 
@@ -132,7 +133,7 @@ class Compile(harness.Case):
                 self.assertEqual(
                     (
                         1,
-                        f"hal compile: lag: function 'lag' calls {call} in a cycle\n"
+                        f"hal compile: lag: function 'lag' calls {call} in a cycle (lag.cpp:12)\n"
                         "hal compile: note: to install it all the same, type: hal compile --no-check-rt lag.cpp\n"
                         "hal compile: 'lag.cpp' was not installed\n",
                         "",
@@ -148,7 +149,8 @@ class Compile(harness.Case):
         done = self.compile("lag.cpp")
         self.assertEqual(1, done.returncode, done.stdout)
         self.assertIn(
-            "hal compile: lag: function 'lag' does not return: it ran for ten seconds\n", done.stderr
+            "hal compile: lag: function 'lag' does not return: it ran for ten seconds\n",
+            done.stderr,
         )
 
     def test_what_may_open_a_device_is_checked_on_request_only(self):
@@ -180,7 +182,7 @@ class Compile(harness.Case):
         self.assertEqual(done.returncode, 1)
         self.assertEqual(
             done.stderr,
-            "hal compile: lag: function 'lag' calls malloc in a cycle\nhal compile: 'lag.cpp' was not installed\n",
+            "hal compile: lag: function 'lag' calls malloc in a cycle (lag.cpp:9)\nhal compile: 'lag.cpp' was not installed\n",
         )
         self.assertEqual(done.stdout, "")
 
@@ -207,10 +209,11 @@ HAL_COMPONENT(Bad, "bad", "Throws")
 
         throw = 'throw std::runtime_error("no board");'
         self.assertIn(
-            "bad: function 'bad' throws std::runtime_error in a cycle\n", said(body=throw)
+            "bad: function 'bad' throws std::runtime_error in a cycle (bad.cpp:9)\n",
+            said(body=throw),
         )
         self.assertIn(
-            "bad: function 'bad' throws int in a cycle\n",
+            "bad: function 'bad' throws int in a cycle (bad.cpp:9)\n",
             said(body="try { throw 3; } catch (int) {}"),
         )
         self.assertIn("bad: function 'bad' aborts in a cycle\n", said(body="__builtin_abort();"))

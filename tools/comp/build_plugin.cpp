@@ -77,6 +77,7 @@ std::string install(const std::string& from, const std::string& folder, const st
 std::vector<std::string> flags(Language language, bool clang, bool program) {
     std::vector<std::string> all{
         "-O2",
+        "-g1",  // lines, for the message of check_realtime()
         program ? "-fPIE" : "-fPIC",
         program ? "-pie" : "-shared",
         "-fvisibility=hidden",
@@ -231,8 +232,9 @@ private:
         headers_ = sdk_includes();
         if (headers_.empty()) {
             return fail(fmt::format(
-                "Halcyon's headers are neither in {} nor beside the program; install them: "
-                "cmake --install",
+                "Halcyon's headers are neither in {} nor beside the program; with Halcyon's Debian "
+                "packages, type: sudo apt install halcyon-dev; else install it again: cmake "
+                "--install",
                 paths::install_includes));
         }
         return temporary_.problem().empty() || fail(temporary_.problem());

@@ -50,6 +50,29 @@ std::string after(const std::string& line, std::string_view prefix) {
     return line.substr(prefix.size());
 }
 
+/// Returns " (FILE:LINE)", the innermost line of the user's file among the addresses in a plugin;
+/// empty when its file is not among them, or addr2line is missing.
+std::string place_of(const std::string& addresses, const std::string& plugin,
+                     const std::string& file) {
+    std::vector<std::string> words{"addr2line", "--inlines", "--exe", plugin};
+    for (std::string& address : split_words(addresses)) {
+        words.push_back(std::move(address));
+    }
+    std::string found;
+    if (run_program(words, found) != 0) return "";
+    std::istringstream lines(found);
+    for (std::string line; std::getline(lines, line);) {
+        const auto colon = line.rfind(':');
+        std::error_code none;
+        if (colon == line.npos || !std::filesystem::equivalent(line.substr(0, colon), file, none)) {
+            continue;
+        }
+        const std::string number = line.substr(colon + 1);
+        return fmt::format(" ({}:{})", file, number.substr(0, number.find(' ')));
+    }
+    return "";
+}
+
 /// How a guard ended that named no violation; "" when it ended in order.
 std::string end_of_guard(int status) {
     if (WIFSIGNALED(status)) {
@@ -61,16 +84,18 @@ std::string end_of_guard(int status) {
 
 }  // namespace
 
-RealtimeReport check_realtime(const Options& options, const BuiltPlugin& built, Language language) {
+RealtimeReport check_realtime(const Options& options, const BuiltPlugin& built,
+                              const PluginSource& source) {
     constexpr std::string_view rejected = "rejected: ";
     constexpr std::string_view start_fails = "start fails: ";
     constexpr std::string_view outside = "outside: ";
+    constexpr std::string_view callers = "callers:";
     RealtimeReport report;
     const TemporaryFolder temporary;
     report.unchecked = temporary.problem();
     if (!report.unchecked.empty()) return report;
     const std::string program = temporary.file("realtime");
-    report.unchecked = compile_guard(language, program);
+    report.unchecked = compile_guard(source.language, program);
     if (!report.unchecked.empty()) return report;
 
     std::vector<std::string> run{program, std::filesystem::absolute(built.path).string()};
@@ -80,19 +105,20 @@ RealtimeReport check_realtime(const Options& options, const BuiltPlugin& built, 
     std::istringstream lines(printed);
     for (std::string line; std::getline(lines, line);) {
         if (line.starts_with(rejected)) {
-            report.unchecked =
-                fmt::format("{} cannot be checked: its constructor fails: {}; load arguments go "
-                            "behind --",
-                            built.name, after(line, rejected));
+            report.unchecked = fmt::format(
+                "{} cannot be checked: its constructor fails: {}; load arguments go "
+                "behind --",
+                built.name, after(line, rejected));
         } else if (line.starts_with(start_fails)) {
             report.unchecked =
                 fmt::format("{}: start() failed, so its functions were not checked: {}", built.name,
                             after(line, start_fails));
         } else if (line.starts_with(outside)) {
-            report.violations.push_back(
-                fmt::format("{}: {}", built.name, after(line, outside)));
+            report.violations.push_back(fmt::format("{}: {}", built.name, after(line, outside)));
         } else if (line.starts_with("function '")) {
             report.violations.push_back(fmt::format("{}: {}", built.name, line));
+        } else if (line.starts_with(callers) && !report.violations.empty()) {
+            report.violations.back() += place_of(after(line, callers), built.path, source.path);
         } else if (line.ends_with("extreme values")) {
             report.summary = line;
         }

@@ -11,7 +11,8 @@
 namespace hal::tools {
 
 struct RealtimeReport {
-    /// What the component does wrong, each "NAME: function 'F' calls malloc in a cycle".
+    /// What the component does wrong, each "NAME: function 'F' calls malloc in a cycle (FILE:LINE)",
+    /// without a place where the line is unknown.
     std::vector<std::string> violations;
     /// Why it could not be checked, a sentence with the component's name; empty: it was checked.
     std::string unchecked;
@@ -24,6 +25,7 @@ struct RealtimeReport {
 /// Runs one instance a thousand cycles with random inputs and extreme parameters, in a process of
 /// its own: constructor, start(), functions, stop(), destructor. The load arguments are those of
 /// `options`.
-RealtimeReport check_realtime(const Options& options, const BuiltPlugin& built, Language language);
+RealtimeReport check_realtime(const Options& options, const BuiltPlugin& built,
+                              const PluginSource& source);
 
 }  // namespace hal::tools

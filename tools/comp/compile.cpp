@@ -131,8 +131,9 @@ void print_note(const CompileOptions& options, const std::string& note) {
 }
 
 /// --check-rt: what cannot be checked fails.
-bool passes_check(const CompileOptions& options, const BuiltPlugin& built, Language language) {
-    const RealtimeReport report = check_realtime(options, built, language);
+bool passes_check(const CompileOptions& options, const BuiltPlugin& built,
+                  const PluginSource& source) {
+    const RealtimeReport report = check_realtime(options, built, source);
     for (const std::string& violation : report.violations) {
         fail(options, violation);
     }
@@ -155,7 +156,7 @@ bool passes_default_check(const CompileOptions& options, const BuiltPlugin& buil
                                         built.name, path));
         return true;
     }
-    const RealtimeReport report = check_realtime(options, built, source.language);
+    const RealtimeReport report = check_realtime(options, built, source);
     for (const std::string& violation : report.violations) {
         fail(options, violation);
     }
@@ -216,7 +217,7 @@ int compile_file(const CompileOptions& options, const std::string& path) {
     if (!options.no_check_rt) {
         build.fit = [&](const BuiltPlugin& built) {
             print_messages(built);
-            return options.check_rt ? passes_check(options, built, source.language)
+            return options.check_rt ? passes_check(options, built, source)
                                     : passes_default_check(options, built, source, path);
         };
     }

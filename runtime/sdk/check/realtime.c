@@ -8,6 +8,7 @@
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
+#include <execinfo.h>
 #include <fcntl.h>
 #include <math.h>
 #include <poll.h>
@@ -33,10 +34,15 @@ static const int64_t period_ns = 1000000;
 
 static __thread bool in_cycle;
 static const char* forbidden; /* the first call of the function that runs */
+static void* callers[32];     /* the return addresses of that call, the innermost first */
+static int caller_count;
 
 static void check(const char* call) {
     if (in_cycle && !forbidden) {
         forbidden = call;
+        in_cycle = false; /* what the unwinder calls is not the component's */
+        caller_count = backtrace(callers, sizeof callers / sizeof *callers);
+        in_cycle = true;
     }
 }
 
@@ -360,6 +366,21 @@ static void put(const char* text) {
     }
 }
 
+/* prints the callers in the plugin as addresses for addr2line: of the call, not behind it */
+static void put_callers(void) {
+    Dl_info plugin, caller;
+    if (!dladdr(component, &plugin)) return;
+    put("callers:");
+    for (int i = 0; i < caller_count; ++i) {
+        if (!dladdr(callers[i], &caller) || caller.dli_fbase != plugin.dli_fbase) continue;
+        char text[32];
+        const ptrdiff_t offset = (char*)callers[i] - (char*)plugin.dli_fbase;
+        snprintf(text, sizeof text, " %#tx", offset - 1);
+        put(text);
+    }
+    put("\n");
+}
+
 static void ended(int number) {
     const bool cycle = in_cycle;
     in_cycle = false;
@@ -373,6 +394,7 @@ static void ended(int number) {
         put("throws ");
         put(thrown);
         put(cycle ? " in a cycle\n" : ", which nothing catches\n");
+        if (cycle) put_callers();
     } else {
         put(number == SIGABRT ? "aborts" : "crashes");
         put(cycle ? " in a cycle\n" : "\n");
@@ -413,6 +435,10 @@ static int run_function(int f) {
         printf("function '%s' throws %s in a cycle\n", running, thrown ? thrown : "an exception");
     } else if (forbidden) {
         printf("function '%s' calls %s in a cycle\n", running, forbidden);
+    }
+    if (forbidden) {
+        fflush(stdout); /* put() has no buffer */
+        put_callers();
     } else if (shortest > period_ns) {
         printf("function '%s' takes %.3g ms, longer than a period of 1 ms\n", running,
                (double)shortest * 1e-6);
