@@ -15,6 +15,7 @@
 #include <new>
 #include <string_view>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <unwind.h>
 #include <utility>
 
@@ -114,7 +115,7 @@ constexpr std::size_t min_alignment = 16;
 constexpr std::size_t large_bytes = std::size_t{1} << 16;
 
 /// Lies directly before each block.
-struct BlockHead {
+struct alignas(min_alignment) BlockHead {
     std::size_t bytes = 0;
     std::size_t size_class = 0;  ///< of the segment for cycles
 };
@@ -151,6 +152,13 @@ struct Overflow {
     std::array<char, 128> component{};
 };
 
+std::string cannot_reserve(const char* reason) {
+    rlimit limit{};
+    const bool is_limited = ::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+    return fmt::format("the addresses for the memory of components cannot be reserved: {}{}",
+                       reason, is_limited ? "; see: ulimit -v" : "");
+}
+
 template <std::size_t size>
 void copy(const char* from, std::array<char, size>& to) {
     std::strncpy(to.data(), from, size - 1);
@@ -164,6 +172,9 @@ public:
 
     /// Returns why the addresses cannot be had; "" when nothing else is mapped there from now on.
     std::string reserve() {
+        if (sizeof(void*) < sizeof heap_begin) {
+            return "a program of 32 bits has no addresses for the memory of components";
+        }
         if (!callers_.are_all()) return "the program uses more libraries than can be distinguished";
         constexpr int how = MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE;
         void* const begin = begin_of(0);
@@ -172,10 +183,7 @@ public:
         if (at != MAP_FAILED) {
             ::munmap(at, heap_bytes);  // an old kernel takes the address as a hint
         } else if (errno != EEXIST) {
-            return fmt::format(
-                "the addresses for the memory of components cannot be reserved: {}; "
-                "see: ulimit -v",
-                std::strerror(errno));
+            return cannot_reserve(std::strerror(errno));
         }
         return "other memory has the addresses that components need";
     }

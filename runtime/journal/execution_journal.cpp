@@ -266,7 +266,7 @@ void ExecutionJournal::encode(Thread& thread) {
         }
         thread.newest_ns = record.woke_ns;
         thread.newest = record.number;
-        thread.encoder.add(record, {words.data() + at, record.notes});
+        thread.encoder.add(record, std::span(words).subspan(at, record.notes));
         at += record.notes;
         ++cycles_;
         if (thread.encoder.bytes() >= batch_bytes) {

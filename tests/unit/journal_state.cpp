@@ -30,7 +30,7 @@ TEST(MachineState, Of_another_version_is_rejected) {
     EXPECT_EQ("another version of Halcyon has written it", older.problem());
 }
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && __SIZEOF_POINTER__ == 8
 
 TEST(ComponentHeap, Is_not_made_where_other_memory_has_its_addresses) {
     constexpr std::size_t page = 4096;
