@@ -57,8 +57,10 @@ using Size = std::size_t;
 
 constinit Reading<ssize_t(int, void*, Size)> next_read{"read"};
 constinit Reading<ssize_t(int, const iovec*, int)> next_readv{"readv"};
-constinit Reading<ssize_t(int, void*, Size, off64_t)> next_pread{"pread64"};
-constinit Reading<ssize_t(int, const iovec*, int, off64_t)> next_preadv{"preadv64"};
+constinit Reading<ssize_t(int, void*, Size, long)> next_pread{"pread"};
+constinit Reading<ssize_t(int, void*, Size, off64_t)> next_pread64{"pread64"};
+constinit Reading<ssize_t(int, const iovec*, int, long)> next_preadv{"preadv"};
+constinit Reading<ssize_t(int, const iovec*, int, off64_t)> next_preadv64{"preadv64"};
 constinit Reading<ssize_t(int, void*, Size, int)> next_recv{"recv"};
 constinit Reading<ssize_t(int, void*, Size, int, sockaddr*, socklen_t*)> next_recvfrom{"recvfrom"};
 constinit Reading<ssize_t(int, msghdr*, int)> next_recvmsg{"recvmsg"};
@@ -76,7 +78,8 @@ constinit Reading<int(FILE*, const char*, va_list)> next_c23_vfscanf{"__isoc23_v
 
 // With checks of the size, as in a component that was built with _FORTIFY_SOURCE.
 constinit Reading<ssize_t(int, void*, Size, Size)> next_read_chk{"__read_chk"};
-constinit Reading<ssize_t(int, void*, Size, off64_t, Size)> next_pread_chk{"__pread64_chk"};
+constinit Reading<ssize_t(int, void*, Size, long, Size)> next_pread_chk{"__pread_chk"};
+constinit Reading<ssize_t(int, void*, Size, off64_t, Size)> next_pread64_chk{"__pread64_chk"};
 constinit Reading<ssize_t(int, void*, Size, Size, int)> next_recv_chk{"__recv_chk"};
 constinit Reading<ssize_t(int, void*, Size, Size, int, sockaddr*, socklen_t*)> next_recvfrom_chk{
     "__recvfrom_chk"};
@@ -87,12 +90,12 @@ constinit Reading<char*(char*, Size, int, FILE*)> next_fgets_chk{"__fgets_chk"};
 
 void hal::report_outside_readings() noexcept {
     const auto find = [](auto&... all) { (all.find(), ...); };
-    find(next_read, next_readv, next_pread, next_preadv, next_recv, next_recvfrom, next_recvmsg,
-         next_recvmmsg, next_ioctl);
+    find(next_read, next_readv, next_pread, next_pread64, next_preadv, next_preadv64, next_recv,
+         next_recvfrom, next_recvmsg, next_recvmmsg, next_ioctl);
     find(next_fread, next_fgets, next_fgetc, next_getdelim, next_vfscanf, next_c99_vfscanf,
          next_c23_vfscanf);
-    find(next_read_chk, next_pread_chk, next_recv_chk, next_recvfrom_chk, next_fread_chk,
-         next_fgets_chk);
+    find(next_read_chk, next_pread_chk, next_pread64_chk, next_recv_chk, next_recvfrom_chk,
+         next_fread_chk, next_fgets_chk);
     reports.store(true);
 }
 
@@ -109,21 +112,21 @@ ssize_t outside_read(int file, void* to, Size bytes) { return next_read(file, to
 ssize_t outside_readv(int file, const iovec* to, int count) { return next_readv(file, to, count); }
 
 [[gnu::weak, gnu::visibility("default")]] ssize_t outside_pread(int file, void* to, Size bytes,
-                                                                off64_t at) __asm__("pread");
-ssize_t outside_pread(int file, void* to, Size bytes, off64_t at) {
+                                                                long at) __asm__("pread");
+ssize_t outside_pread(int file, void* to, Size bytes, long at) {
     return next_pread(file, to, bytes, at);
 }
 
 [[gnu::weak, gnu::visibility("default")]] ssize_t outside_pread64(int file, void* to, Size bytes,
                                                                   off64_t at) __asm__("pread64");
 ssize_t outside_pread64(int file, void* to, Size bytes, off64_t at) {
-    return next_pread(file, to, bytes, at);
+    return next_pread64(file, to, bytes, at);
 }
 
 [[gnu::weak, gnu::visibility("default")]] ssize_t outside_preadv(int file, const iovec* to,
                                                                  int count,
-                                                                 off64_t at) __asm__("preadv");
-ssize_t outside_preadv(int file, const iovec* to, int count, off64_t at) {
+                                                                 long at) __asm__("preadv");
+ssize_t outside_preadv(int file, const iovec* to, int count, long at) {
     return next_preadv(file, to, count, at);
 }
 
@@ -131,7 +134,7 @@ ssize_t outside_preadv(int file, const iovec* to, int count, off64_t at) {
                                                                    int count,
                                                                    off64_t at) __asm__("preadv64");
 ssize_t outside_preadv64(int file, const iovec* to, int count, off64_t at) {
-    return next_preadv(file, to, count, at);
+    return next_preadv64(file, to, count, at);
 }
 
 [[gnu::weak, gnu::visibility("default")]] ssize_t outside_recv(int socket, void* to, Size bytes,
@@ -280,15 +283,15 @@ ssize_t outside_read_chk(int file, void* to, Size bytes, Size limit) {
 }
 
 [[gnu::weak, gnu::visibility("default")]] ssize_t outside_pread_chk(
-    int file, void* to, Size bytes, off64_t at, Size limit) __asm__("__pread_chk");
-ssize_t outside_pread_chk(int file, void* to, Size bytes, off64_t at, Size limit) {
+    int file, void* to, Size bytes, long at, Size limit) __asm__("__pread_chk");
+ssize_t outside_pread_chk(int file, void* to, Size bytes, long at, Size limit) {
     return next_pread_chk(file, to, bytes, at, limit);
 }
 
 [[gnu::weak, gnu::visibility("default")]] ssize_t outside_pread64_chk(
     int file, void* to, Size bytes, off64_t at, Size limit) __asm__("__pread64_chk");
 ssize_t outside_pread64_chk(int file, void* to, Size bytes, off64_t at, Size limit) {
-    return next_pread_chk(file, to, bytes, at, limit);
+    return next_pread64_chk(file, to, bytes, at, limit);
 }
 
 [[gnu::weak, gnu::visibility("default")]] ssize_t outside_recv_chk(int socket, void* to, Size bytes,
