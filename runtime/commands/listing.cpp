@@ -97,10 +97,18 @@ std::string clock_text(const Session& session) {
     if (!clock) {
         return {};
     }
+    constexpr std::int64_t in_use_ns = 1'000'000'000;
+    if (!clock->idle_ns) return fmt::format("Clock not yet adjusted by {}\n", clock->leader);
     const auto shift = static_cast<double>(clock->shift_ns);
-    return fmt::format("Clock disciplined by {}: {} {} than the local clock, drift {:+.1f} ppm\n",
-                       clock->leader, format_duration(std::abs(shift)),
-                       shift < 0 ? "earlier" : "later", clock->rate * 1e6);
+    const std::string offset =
+        fmt::format("{} {} than the local clock", format_duration(std::abs(shift)),
+                    shift < 0 ? "earlier" : "later");
+    if (*clock->idle_ns >= in_use_ns) {
+        return fmt::format("Clock last adjusted by {} {} ago: {}\n", clock->leader,
+                           format_duration(static_cast<double>(*clock->idle_ns)), offset);
+    }
+    return fmt::format("Clock disciplined by {}: {}, drift {:+.1f} ppm\n", clock->leader, offset,
+                       clock->rate * 1e6);
 }
 
 const LoadedComponent* owner(const Pin& pin) {

@@ -9,6 +9,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <optional>
 
 #include "hal/abi.h"
 
@@ -41,6 +42,13 @@ public:
     /// Returns the recent rate of the grid relative to the clock, minus one: +200e-6 follows an
     /// external reference that is 200 ppm slow. 0 during the first second of adjustments. [any]
     double rate() const noexcept { return rate_.load(std::memory_order_relaxed); }
+    /// Returns when the newest adjustment was made, on the clock; nullopt: none was. [any]
+    std::optional<std::int64_t> adjusted_ns() const noexcept {
+        const Step& step = steps_[newest_.load(std::memory_order_acquire) & 1];
+        const std::int64_t grid_ns = step.after.load(std::memory_order_acquire);
+        if (grid_ns == INT64_MAX) return std::nullopt;
+        return grid_ns + step.before.load(std::memory_order_acquire);
+    }
     /// Sets the period of the fastest thread; 0: no thread. [setup]
     void bound(std::int64_t fastest_period_ns) noexcept {
         __atomic_store_n(&shared.limit_ns, fastest_period_ns / 10, __ATOMIC_RELAXED);

@@ -138,7 +138,11 @@ std::optional<ClockReport> Reports::clock() const {
         return {};
     }
     const Timeline& timeline = machine_.executor.timeline();
-    return ClockReport{leader->name, timeline.shift_ns(), timeline.rate()};
+    std::optional<std::int64_t> idle_ns;
+    if (const auto adjusted_ns = timeline.adjusted_ns()) {
+        idle_ns = std::max<std::int64_t>(0, machine_.executor.now_ns() - *adjusted_ns);
+    }
+    return ClockReport{leader->name, idle_ns, timeline.shift_ns(), timeline.rate()};
 }
 
 std::vector<std::string> Reports::missing_privileges() const {

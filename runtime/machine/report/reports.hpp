@@ -53,9 +53,11 @@ struct ThreadHistograms {
     std::vector<std::uint64_t> wakeup, busy;
 };
 
-/// The external clock reference that disciplines the threads.
+/// The external clock reference that disciplines the threads, while it is received.
 struct ClockReport {
     std::string leader;  ///< the instance that provides it
+    /// time since the newest adjustment; nullopt: there was none
+    std::optional<std::int64_t> idle_ns;
     /// offset of the threads' release times from CLOCK_MONOTONIC; positive: later
     std::int64_t shift_ns = 0;
     double rate = 0;  ///< rate offset from CLOCK_MONOTONIC; 200e-6 is 200 ppm slower
