@@ -231,6 +231,10 @@ private:
         case SyncFollower::Notice::unequal:
             begin(sync_fault_, messages_->of(BusEvent::sync_unequal));
             break;
+        case SyncFollower::Notice::unlocked:
+            begin(sync_fault_, messages_->of(BusEvent::sync_unlocked),
+                  follower_->unlocked_for(now));
+            break;
         case SyncFollower::Notice::nothing:
             if (sync_fault_.lasts() && follower_->locked()) {
                 end(sync_fault_);

@@ -32,6 +32,7 @@ enum class BusEvent : std::uint8_t {
     sync_missing,
     sync_loop,
     sync_unequal,
+    sync_unlocked,
     sync_between_cycles,
     sync_overrun,
 };
@@ -83,6 +84,9 @@ inline constexpr bus::EventRow<BusEvent> bus_event_rows[] = {
     {BusEvent::sync_unequal, bus::Effect::raises,
      "cannot follow the SYNC: its period is not a multiple of the thread's; change the thread's "
      "period, or write clock = own"},
+    {BusEvent::sync_unlocked, bus::Effect::raises,
+     "cycles not synchronised to the SYNC for {s}; compare the period of its producer with sync, "
+     "and look for jitter: at most 1000 ppm can be followed"},
     {BusEvent::sync_between_cycles, bus::Effect::raises,
      "the SYNC period is not a multiple of the thread's period; SYNCs are up to half a period "
      "early or late"},

@@ -18,6 +18,7 @@ public:
         lost,      ///< five SYNCs in a row missing: the threads run by their own clock
         in_vain,   ///< feedback loop: the SYNC follows these threads
         unequal,   ///< its period and that of the thread do not match
+        unlocked,  ///< it is received, but the cycles have not been synchronised to it for 5 s
     };
 
     SyncFollower(Component& component, const Function& shows, const config::MasterConfig& config)
@@ -42,6 +43,7 @@ public:
         beat_.lose();
         following_ = false;
         missed_ = 0;
+        unlocked_reported_ = false;
     }
 
     /// Once a cycle, after Runner::receive(). [realtime]
@@ -63,6 +65,9 @@ public:
         } else if (following_) {
             notice = miss(every, start);
         }
+        if (notice == Notice::nothing && lacks_lock(start)) {
+            notice = Notice::unlocked;
+        }
         locked_ = ours_ || beat_.locked();
         rate_ = beat_.rate() * 1e6;
         return notice;
@@ -71,6 +76,9 @@ public:
     bool locked() const noexcept { return beat_.locked(); }
     /// Returns the time since the newest SYNC in s. [realtime]
     Time silence(Time now) const noexcept { return now - came_; }
+    /// Returns how long the cycles have not been synchronised to a SYNC that is received.
+    /// [realtime]
+    Time unlocked_for(Time now) const noexcept { return now - unlocked_since_; }
 
 private:
     static constexpr unsigned max_missed = 5;
@@ -105,12 +113,25 @@ private:
         return Notice::lost;
     }
 
+    /// Returns true once when the SYNC has been received for 5 s without a lock. [realtime]
+    bool lacks_lock(Time now) noexcept {
+        constexpr Time limit = 5'000'000'000;
+        if (!following_ || beat_.locked() || beat_.in_vain()) {
+            unlocked_since_ = now;
+            unlocked_reported_ = false;
+            return false;
+        }
+        return unlocked_for(now) >= limit && !std::exchange(unlocked_reported_, true);
+    }
+
     const config::MasterConfig& config_;
     DisciplinedClock clock_;
     Discipline beat_;
     Time came_ = 0;
     std::uint64_t seen_ = 0;
+    Time unlocked_since_ = 0;  // set while there is a lock, or no SYNC
     unsigned missed_ = 0;
+    bool unlocked_reported_ = false;
     bool following_ = false;
     bool ours_ = false;
     bool unequal_ = false;
