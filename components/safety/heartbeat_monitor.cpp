@@ -100,7 +100,8 @@ struct HeartbeatMonitor : hal::Component {
 
 private:
     static std::int64_t ns(double seconds) noexcept {
-        return std::llround(std::min(seconds, 1e6) * 1e9);
+        constexpr double max = 9e9;  // s; what the integer can hold, 285 years
+        return std::llround(std::min(seconds, max) * 1e9);
     }
 
     bool sound() const noexcept {

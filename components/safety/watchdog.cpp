@@ -58,10 +58,11 @@ struct Watchdog : hal::Component {
     }
 
     void set_timeouts(hal::Cycle) noexcept {
+        constexpr double max = 9e9;  // s; what the integer can hold, 285 years
         for (std::size_t i = 0; i < timeout.size(); ++i) {
             const double seconds = timeout[i];
             watched_[i].limit_ns.store(
-                seconds > 0.0 ? std::llround(std::min(seconds, 1e6) * 1e9) : 0,
+                seconds > 0.0 ? std::llround(std::min(seconds, max) * 1e9) : 0,
                 std::memory_order_relaxed);
         }
         limits_known_.store(true, std::memory_order_release);
