@@ -123,6 +123,7 @@ public:
         const hal::bus::Turn turn = receive_turn(cycle);
         if (turn == hal::bus::Turn::leaves || turn == hal::bus::Turn::returns) {
             station_->restart();  // it listens before it sends
+            end(second_master_fault_);
             pins_.fault = is_offline(turn) || fault_.lasts();
         }
         if (is_offline(turn)) {
@@ -145,6 +146,7 @@ public:
                 others_[n].ask(*station_, n);
             }
             station_->receive(cycle.start_ns());
+            watch_second_master();
             follow(cycle.period_ns());
         }
         show();
@@ -352,8 +354,15 @@ private:
 
     /// The fault is over. [realtime]
     void recover() noexcept {
-        pins_.fault = false;
         end(fault_);
+        pins_.fault = second_master_fault_.lasts();
+    }
+    /// The fault of a second master lasts while both are received, whatever else happens. [realtime]
+    void watch_second_master() noexcept {
+        const bool are_two = station_->hears_second_master() && !withdrawn_;
+        if (are_two || !second_master_fault_.lasts()) return;
+        end(second_master_fault_);
+        pins_.fault = fault_.lasts();
     }
 
     /// Returns whether an event of a row that ends the fault does so now: `running` after a loss,
@@ -375,7 +384,8 @@ private:
         }
         if (const auto* const fault = segment_faults_->of(e, who)) {
             pins_.fault = true;
-            begin(fault_, fault->text, fault->detail(value));
+            hal::LastingFault& of = e == Event::other_master ? second_master_fault_ : fault_;
+            begin(of, fault->text, fault->detail(value));
         }
         reporter_->event(e, who, value);
     }
@@ -415,6 +425,7 @@ private:
     std::unique_ptr<Tunnel> tunnel_;  // before tap_, which uses it
     std::unique_ptr<Tap> tap_;
     hal::LastingFault fault_;
+    hal::LastingFault second_master_fault_;  // beside fault_, which later faults replace
     bool leads_ = false;
     bool period_reported_ = false;
     bool was_reset_ = false;

@@ -103,6 +103,8 @@ public:
     }
     std::size_t capacity(unsigned slot) const noexcept override;
     void count_dropped() noexcept override { rejected_.fetch_add(1, std::memory_order_relaxed); }
+    /// Returns true while the syncs of a second master are received. [realtime]
+    bool hears_second_master() const noexcept { return other_masters_.present(); }
     bool ready() const noexcept override { return ready_.load(std::memory_order_relaxed); }
     const Address& address() const noexcept override { return core_.address; }
 
