@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 # packages: ethercat
 """Ethernet over EtherCAT: an emulated slave answers ARP and ping through the TAP interface of its master."""
+
+import contextlib
 import os
 import re
 import shutil
@@ -46,6 +48,11 @@ def checksum(data):
     return ~total & 0xFFFF
 
 
+def echo_request(identifier, number, data):
+    head = struct.pack("!BBHHH", 8, 0, 0, identifier, number)
+    return struct.pack("!BBHHH", 8, 0, checksum(head + data), identifier, number) + data
+
+
 def ping(address, size, count=1, timeout=20.0):
     """Sends echo requests, each once the one before was answered; how many were. One that is lost is sent again."""
     answered, deadline = 0, time.monotonic() + timeout
@@ -53,12 +60,8 @@ def ping(address, size, count=1, timeout=20.0):
         raw.settimeout(1.0)
         while answered < count and time.monotonic() < deadline:
             data = bytes((answered + n) % 256 for n in range(size))
-            head = struct.pack("!BBHHH", 8, 0, 0, os.getpid() & 0xFFFF, answered)
-            raw.sendto(
-                struct.pack("!BBHHH", 8, 0, checksum(head + data), os.getpid() & 0xFFFF, answered)
-                + data,
-                (address, 0),
-            )
+            request = echo_request(os.getpid() & 0xFFFF, answered, data)
+            raw.sendto(request, (address, 0))
             try:
                 while True:
                     packet, sender = raw.recvfrom(65536)
@@ -66,7 +69,7 @@ def ping(address, size, count=1, timeout=20.0):
                     if (
                         sender[0] == address
                         and icmp[0] == 0
-                        and icmp[4:] == head[4:] + data
+                        and icmp[4:] == request[4:]
                         and checksum(icmp) == 0
                     ):
                         answered += 1
@@ -168,6 +171,27 @@ class Eoe(Case):
             "shell", "--name", "eoe", "-s", "setp", "ethercat-segment.0.slave-0.power", "TRUE"
         )
         self.assertEqual(2, ping("192.168.2.10", 56, 2, 60), "its address was written again")
+
+    def test_a_stopped_machine_has_no_carrier_and_drops_what_is_sent(self):
+        self.configure("192.168.2.10/24 host 192.168.2.1")
+        self.begin()
+        self.assertEqual(1, ping("192.168.2.10", 56))
+        self.run_program("shell", "--name", "eoe", "stop")
+        with socket.socket(socket.AF_INET, socket.SOCK_RAW, socket.IPPROTO_ICMP) as raw:
+            raw.settimeout(0.2)
+            for number in range(6):
+                raw.sendto(echo_request(77, number, b""), ("192.168.2.10", 0))
+            wait_until(lambda: "NO-CARRIER" in self.shown("eoe-a"), "no carrier")
+            self.run_program("shell", "--name", "eoe", "start")
+            self.assertEqual(2, ping("192.168.2.10", 56, 2, 60), "it goes on")
+            self.assertGreater(self.pin("machine.eoe-dropped"), 0)
+            late = []
+            with contextlib.suppress(TimeoutError):
+                while True:
+                    packet = raw.recv(2000)[20:]
+                    if packet[0] == 0 and packet[4:6] == struct.pack("!H", 77):
+                        late.append(packet)
+            self.assertEqual([], late, "answers to what was sent during the stop")
 
     def test_a_missing_privilege_names_what_to_type(self):
         if not shutil.which("setpriv"):

@@ -65,6 +65,29 @@ void EoeSwitch::pump() noexcept {
     }
 }
 
+void EoeSwitch::drop_stale(Port& port) noexcept {
+    for (; port.stale != 0 && !port.sending; --port.stale) {
+        port.queue.drop();
+        ++port.counters.lost;
+    }
+}
+
+void EoeSwitch::discard() noexcept {
+    pump();
+    for (const auto& port : ports_) {
+        port->stale = port->queue.size();
+        drop_stale(*port);
+    }
+}
+
+std::uint32_t EoeSwitch::lost() const noexcept {
+    std::uint32_t sum = 0;
+    for (const auto& port : ports_) {
+        sum += port->counters.lost;
+    }
+    return sum;
+}
+
 bool EoeSwitch::take(const BusSlave& slave, const MailboxMessage& message) noexcept {
     const auto header = eoe::read(message.payload);
     Port* port = port_of(slave);
@@ -139,9 +162,12 @@ Task<MailboxResult> EoeSwitch::serve(Channel& channel, BusSlave& slave) noexcept
     if (mailbox == nullptr || port == nullptr) co_return refused();
     const SlaveMailbox::Hold hold = co_await mailbox->hold(channel);
     const auto body = mailbox->body(slave);
+    port->sending = false;  // only who holds the mailbox sends
+    drop_stale(*port);
     const EthernetFrame* frame = port->queue.front();
     if (frame == nullptr) co_return succeeded();
     MailboxResult result = refused();
+    port->sending = true;
     if (body.size() >= eoe::header_bytes + 32) {
         eoe::Splitter splitter({frame->bytes.data(), frame->length}, port->frame++ & 15U,
                                body.size() + mailbox_header_bytes);
@@ -151,8 +177,13 @@ Task<MailboxResult> EoeSwitch::serve(Channel& channel, BusSlave& slave) noexcept
             if (!result) break;
         }
     }
+    port->sending = false;
     port->queue.drop();
     ++(result ? port->counters.to_slave : port->counters.lost);
+    if (port->stale != 0) {
+        --port->stale;
+        drop_stale(*port);
+    }
     co_return result;
 }
 

@@ -25,7 +25,8 @@ struct EthernetFrame {
 struct EoeCounters {
     std::uint32_t from_slave = 0;
     std::uint32_t to_slave = 0;  ///< frames
-    std::uint32_t lost = 0;  ///< frames that found a queue full
+    /// frames to the slave that found its queue full, that it did not take, or that were discarded
+    std::uint32_t lost = 0;
 };
 
 /// A slave with EoE, and the interface of the host that it is connected to.
@@ -44,6 +45,11 @@ public:
     /// Moves the frames of the interfaces to the queues of the slaves. Call once per cycle.
     /// [realtime]
     void pump() noexcept;
+    /// Discards the frames that wait for a slave, and counts them as lost: the machine was stopped,
+    /// and they are stale. A frame that is being sent is not one of them. [realtime]
+    void discard() noexcept;
+    /// Returns how many frames to slaves were lost. [realtime]
+    std::uint32_t lost() const noexcept;
     /// Returns whether a slave has EoE. [realtime]
     bool has(const BusSlave& slave) const noexcept { return port_of(slave) != nullptr; }
     /// Returns whether frames wait for a slave that can take them. [realtime]
@@ -69,6 +75,9 @@ private:
         explicit Port(std::uint16_t of, std::size_t depth) : host(of), queue(depth) {}
         std::uint16_t host;
         Queue<EthernetFrame> queue;
+        /// the first ones of the queue are to be discarded; the very first may be being sent
+        std::size_t stale = 0;
+        bool sending = false;
         eoe::Joiner joiner;
         EoeCounters counters;
         std::uint8_t frame = 0;  // number of the next one, modulo 16
@@ -81,6 +90,7 @@ private:
     };
     static constexpr unsigned the_host = 0xffff;  // as a port of a switch
     Port* port_of(const BusSlave& slave) const noexcept;
+    static void drop_stale(Port& port) noexcept;
     void forward(std::uint16_t host, unsigned from, std::span<const std::uint8_t> frame) noexcept;
     Learned& slot_of(std::uint16_t host, const std::uint8_t* address) noexcept;
     void deliver(std::uint16_t host, unsigned port, std::span<const std::uint8_t> frame) noexcept;

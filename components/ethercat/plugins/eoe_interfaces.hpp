@@ -6,8 +6,10 @@
 
 #include <poll.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -17,6 +19,7 @@
 #include "ethercat/config/config.hpp"
 #include "ethercat/master/eoe_client.hpp"
 #include "ethercat/master/master.hpp"
+#include "ethercat/wire/eoe.hpp"
 #include "hal/background.hpp"
 #include "hal/component.hpp"
 #include "hal/message_log.hpp"
@@ -68,6 +71,9 @@ public:
     /// slave. [realtime]
     void step(const master::Master& bus) noexcept {
         if (!opened_) return;
+        if (!runs_.exchange(true, std::memory_order_relaxed)) {
+            switch_.discard();
+        }
         switch_.pump();
         for (const auto& i : interfaces_) {
             bool any = false;
@@ -80,10 +86,17 @@ public:
         }
     }
 
-private:
-    static constexpr int busy_ms = 1;
+    /// No cycle follows until the next step(): the interfaces have no carrier, and what is sent to
+    /// them is discarded. [realtime] and in a crash handler
+    void interrupt() noexcept { runs_.store(false, std::memory_order_relaxed); }
+    /// Returns how many frames to slaves were dropped: a queue was full, a slave did not take them,
+    /// or the machine was stopped. [realtime]
+    std::uint32_t dropped() const noexcept {
+        return switch_.lost() + discarded_.load(std::memory_order_relaxed);
+    }
 
 private:
+    static constexpr int busy_ms = 1;
     static constexpr int idle_ms = 10;
     static constexpr std::int64_t busy_for_ns = 1'000'000'000;
     static constexpr unsigned frames_at_once = 32;
@@ -131,12 +144,14 @@ private:
     /// Moves frames between the interfaces and the queues, then waits for more.
     void turn(std::int64_t now_ns, bool may_wait) noexcept {
         if (!may_wait) return;
+        const bool runs = runs_.load(std::memory_order_relaxed);
         bool moved = false;
         bool held = false;
         for (std::size_t n = 0; n < interfaces_.size(); ++n) {
             Interface& i = *interfaces_[n];
             if (i.lost) continue;
-            if (const bool up = i.reachable.load(std::memory_order_relaxed); up != i.carrier) {
+            const bool up = runs && i.reachable.load(std::memory_order_relaxed);
+            if (up != i.carrier) {
                 i.tap.show_carrier(i.carrier = up);
             }
             auto& to = switch_.to_host(n);
@@ -146,25 +161,39 @@ private:
                 to.drop();
                 moved = true;
             }
-            auto& from = switch_.from_host(n);
-            for (unsigned k = 0; k < frames_at_once; ++k) {
-                master::EthernetFrame* place = from.place();
-                if (place == nullptr) {
-                    held = true;  // the kernel keeps the others
-                    break;
-                }
-                const std::size_t length = i.tap.read(place->bytes);
-                if (length == 0) break;
-                place->length = static_cast<std::uint16_t>(length);
-                from.commit();
-                moved = true;
-            }
+            moved |= runs ? pass_on(i, switch_.from_host(n), held) : discard(i);
         }
         if (moved) {
             busy_until_ns_ = now_ns + busy_for_ns;
         }
         log_.flush();
         wait(now_ns < busy_until_ns_ ? busy_ms : idle_ms, held);
+    }
+
+    /// Queues frames of an interface. `held` becomes true when the queue is full; the kernel keeps
+    /// the others. Returns whether there was any.
+    static bool pass_on(Interface& i, Queue<master::EthernetFrame>& to, bool& held) noexcept {
+        for (unsigned k = 0; k < frames_at_once; ++k) {
+            master::EthernetFrame* place = to.place();
+            if (place == nullptr) {
+                held = true;
+                return true;
+            }
+            const std::size_t length = i.tap.read(place->bytes);
+            if (length == 0) return k != 0;
+            place->length = static_cast<std::uint16_t>(length);
+            to.commit();
+        }
+        return true;
+    }
+    /// Reads frames of an interface while the machine is stopped: they would be stale at its start.
+    bool discard(Interface& i) noexcept {
+        std::array<std::uint8_t, eoe::max_frame> frame;
+        for (unsigned k = 0; k < frames_at_once; ++k) {
+            if (i.tap.read(frame) == 0) return k != 0;
+            discarded_.fetch_add(1, std::memory_order_relaxed);
+        }
+        return true;
     }
 
     void wait(int at_most_ms, bool held) noexcept {
@@ -190,6 +219,8 @@ private:
     hal::MessageLog log_;
     master::EoeSwitch switch_;
     bool opened_ = false;
+    std::atomic<bool> runs_{false};  // written by the cycle
+    std::atomic<std::uint32_t> discarded_{0};  // written by the thread
     // the last: it uses the others
     hal::Background background_{[this](std::int64_t now, bool may_wait) { turn(now, may_wait); }};
 };

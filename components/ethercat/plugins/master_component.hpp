@@ -64,6 +64,11 @@ public:
             }
         }
         areas_.resize(places_.size());
+        if (has_eoe()) {
+            eoe_dropped_.emplace(*this, receive_, "eoe-dropped",
+                                 "Ethernet frames to slaves that were dropped: a queue was full, "
+                                 "the slave did not take them, or the machine was stopped");
+        }
         if constexpr (Names::shared) {
             read_.emplace(*this, "read", &MasterComponent::receive,
                           "read-all of this master alone");
@@ -184,6 +189,9 @@ public:
         end_faults();
         follow(cycle);
         bus_pins_.show(master_->status(), master_->cycles_incomplete());
+        if (eoe_) {
+            *eoe_dropped_ = eoe_->dropped();
+        }
         for (std::size_t n = 0; n < slaves_.size(); ++n) {
             slaves_[n].show(master_->slave_status(n), emergencies_->of(n));
         }
@@ -225,6 +233,9 @@ public:
 
     void make_safe(hal::Cycle) noexcept {
         interrupt();
+        if (eoe_) {
+            eoe_->interrupt();
+        }
         if (master_) {
             master_->shut_down();
         }
@@ -595,6 +606,7 @@ private:
     std::unique_ptr<master::RequestServer> server_;
     std::unique_ptr<Master> master_;
     std::unique_ptr<EoeInterfaces> eoe_;
+    std::optional<hal::Out<std::uint32_t>> eoe_dropped_;  ///< with EoE only
     std::unique_ptr<master::GatewaySlaves> gateway_slaves_;
     std::unique_ptr<master::Gateway> gateway_;
     bool slaves_changed_ = false;

@@ -313,6 +313,50 @@ TEST(EthercatEoe, Switch_learns_and_joins_frames_and_IP_settings_are_sent_whole)
     EXPECT_EQ(settings[13], 0xc0);
 }
 
+TEST(EthercatEoe, Frames_that_waited_while_the_machine_was_stopped_are_discarded_and_counted) {
+    for (const unsigned steps_before : {0U, 1U, 3U}) {  // a frame is being sent, or none
+        Served f(128);
+        const std::array<EoePort, 1> with_eoe{};
+        EoeSwitch frames(f.mailboxes, with_eoe);
+        f.server.set_switch(&frames);
+        eoe::Joiner joiner;
+        Bytes received;  // the first byte behind the addresses of each frame
+        f.slave.on_request = [&](const MailboxMessage& m) {
+            if (const auto got = joiner.take(m.payload); !got.empty()) {
+                received.push_back(got[12]);
+            }
+        };
+        const auto send = [&](std::uint8_t mark) {
+            EthernetFrame frame;
+            frame.length = 500;
+            frame.bytes[6] = 2;  // another address than that of the destination
+            frame.bytes[12] = mark;
+            return frames.from_host().push(frame);
+        };
+        const auto step = [&](unsigned count) {
+            for (unsigned i = 0; i < count; ++i) {
+                frames.pump();
+                f.server.step(f.slave.now_ns);
+                f.slave.step(f.server.channel(0));
+            }
+        };
+        for (std::uint8_t mark = 1; mark <= 4; ++mark) {
+            ASSERT_TRUE(send(mark));
+        }
+        step(steps_before);
+        frames.discard();
+        ASSERT_TRUE(send(5));
+        step(2000);
+        const EoeCounters counters = frames.counters(f.slave.bus);
+        ASSERT_FALSE(received.empty());
+        EXPECT_EQ(received.back(), 5U);
+        EXPECT_LE(received.size(), 2U) << "the one that was being sent, and the fresh one";
+        EXPECT_EQ(counters.to_slave, received.size()) << steps_before;
+        EXPECT_EQ(counters.lost, 5U - received.size());
+        EXPECT_EQ(frames.lost(), counters.lost);
+    }
+}
+
 TEST(EthercatEoe, Frames_stay_at_their_interface_and_reach_the_slave_that_was_learned) {
     Mailboxes mailboxes(4);
     // two slaves at one interface, one at another
