@@ -66,6 +66,18 @@ class Sim(Case):
         )
         self.assertEqual("10\n-8\n16\n1\n", self.good("sim", "--quiet", netlist))
 
+    def test_a_folder_is_not_played(self):
+        netlist = self.write(
+            "b.hal",
+            "loadrt threads name1=servo period1=1000000\nloadrt streamer cfg=u depth=10\n"
+            "addf streamer.0 servo\nstart\nloadusr -w halstreamer .\n",
+        )
+        done = self.run_program("sim", "--quiet", netlist)
+        self.assertEqual(
+            (1, "halstreamer: cannot read '.': Is a directory"),
+            (done.returncode, done.stderr.split("\n")[0]),
+        )
+
     def test_tag_is_the_sample_number(self):
         lines = self.sim("start", "advance 3 cycles", "loadusr -w halsampler -t -n 3").splitlines()
         self.assertEqual(["0", "1", "2"], [line.split()[0] for line in lines])

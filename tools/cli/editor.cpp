@@ -57,6 +57,7 @@ bool LineReader::read(std::string& line) {
             waiting_.append(block, static_cast<std::size_t>(n));
         } else if (n == 0 || errno != EINTR) {
             ended_ = true;
+            error_ = n < 0 ? errno : 0;
         }
     }
 }

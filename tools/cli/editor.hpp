@@ -23,6 +23,8 @@ public:
     /// Returns false at the end of the input, or when `stop` became readable. A last line without
     /// end of line counts.
     bool read(std::string& line);
+    /// Returns the error number of the read that ended the input; 0: it ended in order.
+    int error() const { return error_; }
     /// Returns true when the next line is buffered: read() does not wait.
     bool waiting() const { return waiting_.find('\n', begin_) != std::string::npos; }
 
@@ -32,6 +34,7 @@ private:
     std::string waiting_;
     std::size_t begin_ = 0;
     bool ended_ = false;
+    int error_ = 0;
 };
 
 class Editor {

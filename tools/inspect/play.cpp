@@ -119,7 +119,13 @@ int follow(Stream& stream, const PlayOptions& options, int descriptor) {
             return exit_code(stop.requested());
         }
     }
-    return exit_code(feed(stream, options, std::move(records), stop) || stop.requested());
+    const bool fed = feed(stream, options, std::move(records), stop) || stop.requested();
+    if (fed && input.error() != 0) {
+        return fail(options, fmt::format("cannot read '{}': {}",
+                                         stream.file.empty() ? "<stdin>" : stream.file,
+                                         std::strerror(input.error())));
+    }
+    return exit_code(fed);
 }
 
 }  // namespace
