@@ -5,6 +5,7 @@
 import json
 import os
 import re
+import signal
 import subprocess
 import unittest
 
@@ -232,6 +233,14 @@ class Language(Case):
     def test_sim_finds_a_node_offline_whose_machine_is_unloaded(self):
         commands = ["sender: unload all", "all: advance 2s"]
         self.assertEqual("FALSE\n2000\n", self.sim(CELL, *commands, *self.state("taker", "sender")))
+
+    def test_sim_that_waits_for_a_program_can_be_interrupted(self):
+        self.write("wait.sh", "touch started\nexec sleep 60\n")
+        path = self.write("cell.hal", CELL + "loadusr -w sh wait.sh\n")
+        machine = self.start("sim", path, loaded=False)
+        wait_until((self.folder / "started").exists, "the program runs")
+        self.end(machine, signal.SIGINT)
+        self.assertEqual(1, machine.returncode)
 
     def test_advance_in_a_netlist_of_all_nodes(self):
         path = self.write("cell.hal", CELL + "advance 2s\n")

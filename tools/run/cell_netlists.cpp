@@ -225,7 +225,6 @@ int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
     StopRequest stop;
     CycleGuard guard;
     guard.begin(options.cycle_limit_ns);
-    stop.when_signalled([&guard] { guard.end_soon(); });
     SessionOptions session;
     session.name = fmt::format("sim-{}", ::getpid());
     session.virtual_clock = true;
@@ -241,6 +240,12 @@ int sim_cell(const SimOptions& options, std::vector<NodeLine> nodes) {
     ShellOptions how = shell_options(options);
     how.shared_time = options.part.empty();
     Cell cell(cell_name(options.words), std::move(nodes), session, how);
+    stop.when_signalled([&guard, &cell] {
+        for (std::size_t i = 0; i < cell.size(); ++i) {
+            cell.shell(i).cancel();
+        }
+        guard.end_soon();
+    });
     int status = cell.load(options.words, options.ini, output) && cell.start(output) ? 0 : 1;
     if (!options.part.empty()) {
         cell.isolate(cell.find(options.part));
