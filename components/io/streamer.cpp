@@ -90,8 +90,8 @@ is empty, the pins keep their values and `underruns` increases. `clock-mode` sel
 in every cycle, 1 at falling, 2 at rising, 3 at both edges of `clock`. A FIFO of `depth=N` holds N -
 1 records. The number of pins is not limited.
 
-Feed it by one program at a time: the records of two are mixed. Records that wait at `stop`, or after
-a fault that stopped the thread, are played when it runs again.
+Feed it by one program at a time: the records of two are mixed. Records that wait at `stop`, or
+after a fault that stopped the thread, are played when it runs again.
 
     loadrt streamer depth=2000 cfg=fb
     loadrt pid

@@ -14,7 +14,8 @@ const NodeReader* reader_of(const NodeField& field, std::size_t node) {
     return at == field.readers.end() ? nullptr : &*at;
 }
 
-/// Returns the name of the thread of `reader` that would subscribe to the topic; empty: it has none.
+/// Returns the name of the thread of `reader` that would subscribe to the topic; empty: it has
+/// none.
 std::string thread_of(const NodeTopic& topic, std::size_t reader, const Model& model) {
     std::vector<const Pin*> pins;
     for (const NodeField& field : topic.fields) {

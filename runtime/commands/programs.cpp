@@ -247,8 +247,8 @@ private:
     std::chrono::nanoseconds limit_, report_ = 1s;
 };
 
-/// Returns how long a command waits for a program: as its `-t` states, else the limit of the virtual
-/// clock.
+/// Returns how long a command waits for a program: as its `-t` states, else the limit of the
+/// virtual clock.
 std::int64_t limit_of(const Context& context, std::int64_t timeout_ns) {
     return timeout_ns != 0 ? timeout_ns : context.session.options().wait_limit_ns;
 }

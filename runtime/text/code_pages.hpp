@@ -420,10 +420,10 @@ inline constexpr CodePage code_pages[] = {
      "accept netlists with nodes without "
      "DDS."},
     {"no-latency",
-     "`show latency NAME` has nothing to show: no signal or pin has this name, or it does not link a "
-     "writer to a reader.\n\n"
-     "The latency of a signal is the delay from its writer to a reader. `show latency` lists all; a "
-     "name may be that of the signal, of the writer or of a reader, or begin it."},
+     "`show latency NAME` has nothing to show: no signal or pin has this name, or it does not link "
+     "a writer to a reader.\n\n"
+     "The latency of a signal is the delay from its writer to a reader. `show latency` lists all; "
+     "a name may be that of the signal, of the writer or of a reader, or begin it."},
     {"no-program",
      "loadusr could not start the program: it is not in PATH, is not executable, or the system "
      "denied it.\n\n"
@@ -617,8 +617,8 @@ inline constexpr CodePage code_pages[] = {
      "FILE` runs them together in one "
      "process."},
     {"shared-time",
-     "`advance` in a netlist for several machines, all of which `hal sim` runs together. Their time "
-     "is one: a node cannot let it pass by itself, and while the netlist is loaded, the signals "
+     "`advance` in a netlist for several machines, all of which `hal sim` runs together. Their "
+     "time is one: a node cannot let it pass by itself, and while the netlist is loaded, the signals "
      "between the nodes are not linked yet.\n\n"
      "`hal sim FILE --for 5s` lets time pass for all nodes after loading. Behind it, `-e` executes "
      "commands of one node, and lets more time pass: `-e 'desk: stop' -e 'all: advance 1s' -e "

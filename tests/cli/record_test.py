@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """hal record and hal play, halsampler and halstreamer."""
+
 import csv
 import signal
 import subprocess
@@ -233,8 +234,8 @@ class Live(Case):
             text=True,
         )
         self.addCleanup(self.end, recorder)
-        lines = (
-            lambda: (self.folder / "out.txt").read_text().splitlines()
+        lines = lambda: (
+            (self.folder / "out.txt").read_text().splitlines()
             if (self.folder / "out.txt").exists()
             else []
         )

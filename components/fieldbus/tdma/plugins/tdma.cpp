@@ -357,7 +357,8 @@ private:
         end(fault_);
         pins_.fault = second_master_fault_.lasts();
     }
-    /// The fault of a second master lasts while both are received, whatever else happens. [realtime]
+    /// The fault of a second master lasts while both are received, whatever else happens.
+    /// [realtime]
     void watch_second_master() noexcept {
         const bool are_two = station_->hears_second_master() && !withdrawn_;
         if (are_two || !second_master_fault_.lasts()) return;
