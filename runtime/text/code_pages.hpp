@@ -618,8 +618,8 @@ inline constexpr CodePage code_pages[] = {
      "process."},
     {"shared-time",
      "`advance` in a netlist for several machines, all of which `hal sim` runs together. Their "
-     "time is one: a node cannot let it pass by itself, and while the netlist is loaded, the signals "
-     "between the nodes are not linked yet.\n\n"
+     "time is one: a node cannot let it pass by itself, and while the netlist is loaded, the "
+     "signals between the nodes are not linked yet.\n\n"
      "`hal sim FILE --for 5s` lets time pass for all nodes after loading. Behind it, `-e` executes "
      "commands of one node, and lets more time pass: `-e 'desk: stop' -e 'all: advance 1s' -e "
      "'motor: getp node.desk.online'`. With `--node NAME` only this node runs, and may "
