@@ -85,7 +85,7 @@ struct FurutaControl : hal::Component {
         {.unit = "rad/s", .finite = true}};
     hal::Out<std::uint32_t> bad_inputs{*this, "bad-inputs",
                                        "cycles with a NaN or infinite angle or speed, or an angle "
-                                       "beyond 1e6 rad; the torque is 0"};
+                                       "of the pendulum beyond 1e6 rad; the torque is 0"};
 
     hal::LimitParam max_acceleration{*this,
                                      "max-acceleration",
@@ -224,8 +224,8 @@ private:
     }
 
     /// Sets the rig to that of the parameters, or to the one identified from its motion, and
-    /// `homed`. A pendulum that does not hang at 0 is not driven, because every torque would be computed for a wrong angle. A rising edge of
-    /// `enable` restarts the identification.
+    /// `homed`. A pendulum that does not hang at 0 is not driven, because every torque would be
+    /// computed for a wrong angle. A rising edge of `enable` restarts the identification.
     void update_rig(const State& s, double dt) noexcept {
         const hal::estimation::FurutaParameters given{arm_inertia, swing_inertia, coupling,
                                                       weight_moment, friction};

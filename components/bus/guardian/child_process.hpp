@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -56,9 +57,9 @@ public:
     }
     void* memory() const noexcept { return memory_; }
 
-    /// Starts the program `words[0]` with these arguments and the number of this process. Returns
-    /// the problem, or "". [setup]
-    std::string spawn(std::vector<std::string> words) {
+    /// Starts the program `arguments[0]` with these arguments and the number of this process.
+    /// Returns the problem, or "". [setup]
+    std::string spawn(std::vector<std::string> arguments) {
         Attributes attributes;
         // dup2 onto the same number would keep O_CLOEXEC, so both go through numbers above
         const link::Descriptor memory(fcntl(memory_fd_.get(), F_DUPFD_CLOEXEC, 16));
@@ -67,20 +68,20 @@ public:
         posix_spawn_file_actions_adddup2(&attributes.actions, text.get(), guardian_text_fd);
         posix_spawn_file_actions_addopen(&attributes.actions, 0, "/dev/null", O_RDONLY, 0);
         posix_spawn_file_actions_addopen(&attributes.actions, 1, "/dev/null", O_WRONLY, 0);
-        words.push_back(std::to_string(getpid()));
+        arguments.push_back(std::to_string(getpid()));
         std::vector<char*> argv;
-        for (std::string& word : words) {
-            argv.push_back(word.data());
+        for (std::string& argument : arguments) {
+            argv.push_back(argument.data());
         }
         argv.push_back(nullptr);
         const AmbientCapabilities capabilities;
-        const int error = posix_spawn(&pid_, words[0].c_str(), &attributes.actions,
+        const int error = posix_spawn(&pid_, arguments[0].c_str(), &attributes.actions,
                                       &attributes.attributes, argv.data(), environ);
         memory_fd_ = link::Descriptor();
         text_fd_ = link::Descriptor();
         if (error != 0) {
             pid_ = -1;
-            return "cannot start the guardian '" + words[0] + "': " + link::reason(error);
+            return "cannot start the guardian '" + arguments[0] + "': " + link::reason(error);
         }
         process_ = link::Descriptor(static_cast<int>(syscall(SYS_pidfd_open, pid_, 0)));
         return {};
@@ -111,8 +112,8 @@ public:
     }
 
 private:
-    /// A session of its own, so that Ctrl-C and a closed terminal miss it, and no signal mask of the
-    /// runtime.
+    /// A session of its own, so that Ctrl-C and a closed terminal miss it, and no signal mask of
+    /// the runtime.
     struct Attributes {
         Attributes() {
             posix_spawnattr_init(&attributes);

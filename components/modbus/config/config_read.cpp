@@ -83,8 +83,7 @@ const bus::KeyTable<Slave>& slave_keys() {
          "The period of values that are read, and of the drive."},
         {"lost", bus::number(&Slave::lost, 1, 100), "`3`",
          "Failed requests in a row after which the slave is offline. A request that is rejected "
-         "this "
-         "often in a row is a fault."},
+         "this often in a row is a fault."},
         {"max-registers", bus::number(&Slave::max_registers, 1, max_read_registers), "`125`",
          "The most registers in one telegram."},
         {"max-gap", bus::number(&Slave::max_gap, 0, 100), "`8`",
@@ -247,7 +246,7 @@ private:
     bool read_header(const bus::Section& section, Slave& slave) {
         const Words& w = section.words;
         const auto unit = w.size() >= 2 ? parse_natural(w[1].text) : std::nullopt;
-        if (!unit || *unit < 1 || *unit > 247 || w.size() > 3 ||
+        if (!unit || *unit < 1 || *unit > max_unit || w.size() > 3 ||
             (w.size() == 3 && !bus::is_name(w[2].text))) {
             error(Topic::line, w.size() >= 2 ? w[1].at : section.at,
                   "invalid slave section: expected an address of 1..247 and a name",
@@ -759,8 +758,8 @@ private:
                 "; write stop = holding ADDRESS VALUE, or stop = none");
     }
 
-    /// Frames of the first Huanyang dialect and of Modbus have different lengths: a slave of the one
-    /// kind must not be asked while another slave still answers in the other.
+    /// Frames of the first Huanyang dialect and of Modbus have different lengths: a slave of the
+    /// one kind must not be asked while another slave still answers in the other.
     void check_mixed_dialects() {
         for (const Slave& slave : out_.bus.slaves) {
             if (slave.is_huanyang() && out_.bus.framing == Framing::tcp) {

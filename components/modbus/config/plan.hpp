@@ -65,8 +65,8 @@ struct Load {
 /// `thinking`: how long a slave takes to answer.
 Load load_of(const Plan& plan, const Bus& bus, Framing framing, std::int64_t thinking);
 
-/// Returns the longest time from a stop until all stop telegrams are acknowledged or sent as often as
-/// the slaves declare, when no slave answers, on a serial line.
+/// Returns the longest time from a stop until all stop telegrams are acknowledged or sent as often
+/// as the slaves declare, when no slave answers, on a serial line.
 std::int64_t max_stop_ns(const Plan& plan, const Bus& bus);
 /// Returns how long to wait for that, and for what it does not contain: a line that is lost or
 /// accepts nothing, and bytes that are late. When it has passed, the master has failed.

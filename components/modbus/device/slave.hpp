@@ -29,9 +29,9 @@ public:
     DriveModel* drive() { return drive_ ? &*drive_ : nullptr; }
     /// Sets a value that the master reads, in its unit. Returns false for an unknown name.
     bool set(std::string_view name, double value);
-    /// Returns why a value cannot be set to a number: unknown, written by the master or by the model
-    /// of the drive, or out of the range of its registers; and what can be set. "" when it can.
-    /// [setup]
+    /// Returns why a value cannot be set to a number: unknown, written by the master or by the
+    /// model of the drive, or out of the range of its registers; and what can be set. "" when it
+    /// can. [setup]
     std::string problem_of(std::string_view name, double value) const;
     /// Returns a register; nullopt: there is none.
     std::optional<std::uint16_t> get(Table table, std::uint16_t address) const;

@@ -135,7 +135,7 @@ void SlaveBus::serve(const Found& found, std::int64_t now_ns) {
         case FaultKind::silence: return;
         case FaultKind::late: at += fault.late_ns; break;
         case FaultKind::corrupt: corrupt = true; break;
-        case FaultKind::wrong_unit: unit = static_cast<std::uint8_t>(unit % 247 + 1); break;
+        case FaultKind::wrong_unit: unit = static_cast<std::uint8_t>(unit % max_unit + 1); break;
         case FaultKind::half: half = true; break;
         case FaultKind::exception:
             exception.add8(found.pdu[0] | exception_flag);

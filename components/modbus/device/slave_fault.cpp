@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "modbus/wire/frame.hpp"
 #include "text/numbers.hpp"
 #include "text/quoting.hpp"
 
@@ -11,7 +12,7 @@ namespace hal::modbus {
 namespace {
 
 bool parse_unit(std::string_view text, SlaveFault& fault) {
-    return parse_whole(text, fault.unit) && fault.unit <= 247;
+    return parse_whole(text, fault.unit) && fault.unit <= max_unit;
 }
 bool parse_every(std::string_view text, SlaveFault& fault) {
     return parse_whole(text, fault.every) && fault.every > 0;

@@ -30,8 +30,7 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
      "{slave} did not acknowledge its stop telegrams[; stop it by other means]"},
     {Event::guardian_lost, bus::Effect::raises,
      "the guardian has ended; another one sends the stop telegrams, and nothing else is "
-     "exchanged[; "
-     "type: unloadrt, loadrt]"},
+     "exchanged[; type: unloadrt, loadrt]"},
     {Event::previous_stop, bus::Effect::none, "the guardian of the previous run: {report}"},
     {Event::slave_rejects, bus::Effect::raises,
      "{slave} rejects requests: their values are not read, or not written"},

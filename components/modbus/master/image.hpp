@@ -121,6 +121,7 @@ struct ImageHeader {
     std::array<char, 256> problem{};
     std::array<EventRecord, event_capacity> events{};
 };
+static_assert(ImageHeader::slave_words * 64 >= max_unit, "a bus has a slave of each address");
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free &&
               std::atomic<std::int64_t>::is_always_lock_free);
 
@@ -139,8 +140,8 @@ public:
 
     ImageHeader& header() const noexcept { return *header_; }
     SlaveImage& slave(std::size_t n) const noexcept { return slaves_[n]; }
-    /// When the last answer of a telegram arrived, in ns; 0: never. Of a read: when its oldest value
-    /// was accepted.
+    /// When the last answer of a telegram arrived, in ns; 0: never. Of a read: when its oldest
+    /// value was accepted.
     std::atomic<std::int64_t>& stamp(std::size_t telegram) const noexcept {
         return telegrams_[telegram].stamp;
     }

@@ -355,7 +355,8 @@ void Master::succeed(std::span<const std::uint8_t> data, std::int64_t now_ns) no
     end_of_job();
 }
 
-/// Keeps the share of corrupt answers of a slave: a rising one counts at once, a falling one slowly.
+/// Keeps the share of corrupt answers of a slave: a rising one counts at once, a falling one
+/// slowly.
 void Master::rate(std::uint32_t slave, bool is_corrupt) noexcept {
     SlaveState& state = slaves_[slave];
     if (is_corrupt) {
@@ -371,7 +372,8 @@ void Master::rate(std::uint32_t slave, bool is_corrupt) noexcept {
     }
 }
 
-/// Stores the values of an answer that are accepted. The others are read again at once, a few times.
+/// Stores the values of an answer that are accepted. The others are read again at once, a few
+/// times.
 void Master::store(std::span<const std::uint8_t> data, std::int64_t now_ns) noexcept {
     TelegramState& own = telegrams_[job_.telegram];
     bool has_all = true;
@@ -732,8 +734,8 @@ void Master::finish_broadcast(std::int64_t now_ns) noexcept {
     end_broadcast(now_ns);
 }
 
-/// The line did not accept a telegram to all slaves: it is sent again, but an open line that accepts
-/// nothing must not keep the addressed stop telegrams waiting.
+/// The line did not accept a telegram to all slaves: it is sent again, but an open line that
+/// accepts nothing must not keep the addressed stop telegrams waiting.
 void Master::fail_broadcast(std::int64_t now_ns) noexcept {
     free_at_ns_ = now_ns + broadcast_retry_ns;
     end_of_job();

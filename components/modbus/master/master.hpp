@@ -8,8 +8,8 @@
 //      attempts are used up. The broadcast stop comes first, and again behind them;
 //   2. the stop telegrams of a slave that did not acknowledge them, or returned while the stop
 //      lasts: nothing is written to it before. An offline slave gets them in place of 4;
-//   3. set-points that have changed, so that one waits for at most the telegram that is on the line;
-//      a read that is overdue for a whole period comes between two of them;
+//   3. set-points that have changed, so that one waits for at most the telegram that is on the
+//      line; a read that is overdue for a whole period comes between two of them;
 //   4. a request to a slave that is offline, such that all of them use at most 5 % of the line,
 //      25 % with stop telegrams while the stop lasts, and for 5 s after one was lost;
 //   5. what is due, the earliest first.

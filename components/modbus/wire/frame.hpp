@@ -18,6 +18,7 @@ enum class Framing : std::uint8_t { rtu, tcp };
 inline constexpr std::size_t max_frame = 260;
 /// All slaves execute a request to it, and none answers (serial line V1.02, clause 2.1).
 inline constexpr std::uint8_t broadcast_unit = 0;
+inline constexpr std::uint8_t max_unit = 247;  ///< the last address of a slave
 
 /// CRC-16 of Modbus, polynomial A001h, start FFFFh; of a frame with its CRC it is 0. [any]
 std::uint16_t crc16(std::span<const std::uint8_t> bytes) noexcept;

@@ -136,8 +136,7 @@ const bus::KeyTable<PdoTarget>& option_keys() {
          bus::own("a time of 0..65535ms, as in 10ms or 0.5s, or none", "0..65535ms, none",
                   &read_timeout),
          "10 of its SYNC periods, 3 of its `event-timer` or `request`, at least 20 ms; none if it "
-         "is "
-         "sent on change or event only",
+         "is sent on change or event only",
          "of a tpdo: reception timeout in the master. Its expiry is a fault, and the node is not "
          "`operational` until the next one"},
         {"request",

@@ -199,8 +199,8 @@ protected:
         begin(fault_, fault->text, fault->detail(value));
     }
 
-    /// Opens the link with the options that a station needs. Throws when it cannot be opened, or does
-    /// not fit to the table and the load arguments. [setup]
+    /// Opens the link with the options that a station needs. Throws when it cannot be opened, or
+    /// does not fit to the table and the load arguments. [setup]
     std::unique_ptr<can::Link> open_link() const {
         const std::string& address = arguments_.link.get();
         const can::Description bus = can::describe(address);

@@ -34,8 +34,8 @@ public:
     void detach() noexcept { core_.link = nullptr; }  ///< [setup]
 
     /// Starts anew after a time without cycles: the node listens first, as another one may send the
-    /// SYNC now. Drops and counts queued frames, and drops those received meanwhile; a silenced node stays silenced.
-    /// [realtime]
+    /// SYNC now. Drops and counts queued frames, and drops those received meanwhile; a silenced
+    /// node stays silenced. [realtime]
     void restart(Time now) noexcept;
     void receive(Time now) noexcept;  ///< [realtime]
     void transmit(Time now, Time period) noexcept;  ///< [realtime]
