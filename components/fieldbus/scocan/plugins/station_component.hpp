@@ -75,6 +75,7 @@ public:
     void stop() noexcept {
         if (exchange_) {
             can::withdraw_slots(*exchange_);
+            drop_outgoing();  // behind that, no link sends
         }
         exchange_.reset();
         if (station_) {
@@ -244,13 +245,17 @@ protected:
     /// Begins anew after the thread was stopped. [realtime]
     void restart() noexcept {
         station_->restart(now_);
+        drop_outgoing();
+        discipline_.lose();
+    }
+    /// Drops what waits in the links, which count it. [realtime]
+    void drop_outgoing() noexcept {
         exchange_->each([](can::SlotUser& user) {
             while (user.outgoing.front() != nullptr) {
                 user.outgoing.drop();
                 user.rejected.fetch_add(1, std::memory_order_relaxed);
             }
         });
-        discipline_.lose();
     }
 
     /// Synchronises the threads of this process: their cycles begin with slots. [realtime]
