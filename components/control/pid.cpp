@@ -430,7 +430,7 @@ a time constant, has no ultimate gain. From rest it oscillates with the fastest 
 can see, 4 of its cycles, and the gains are far too high for an output that has a limit. Nothing
 distinguishes it from an integrator alone, whose period is 4 cycles as well and whose gains are
 right. Read `ultimate-period` (`debug=1`): below 8 cycles use `identify`, which rejects such an
-oscillation, or set the gains by hand.
+oscillation and finds a slower one with its parameter `hysteresis`, or set the gains by hand.
 
     loadrt pid names=pid.x
     addf pid.x.do-pid-calcs servo
