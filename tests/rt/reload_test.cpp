@@ -32,6 +32,7 @@ const std::map<std::string, const char*> exceptions{
     {"lcec", "a network, which is started again"},
     {"mesa", "a card, which is configured again"},
     {"mesa_card", "a network, which is started again"},
+    {"frame_guardian", "a network, which is started again"},
     {"modbus", "a network, which is started again"},
     {"modbus_node", "a network, which is started again"},
     {"cia402", "the drive, which a reload stops"},
