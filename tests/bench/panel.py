@@ -163,7 +163,7 @@ def scope(browser, port, panel, build=""):
             f"scope, 16 channels at 10 kHz, {mode}: frames per second{build}",
             "",
             (after["frames"] - before["frames"]) / passed,
-            ">= 60" if mode == "roll" else "",
+            ">= 18" if mode == "roll" else "",
         )
         row(f"rows per second in the page, {mode}", "", (after["rows"] - before["rows"]) / passed)
         row(f"lost rows, {mode}", "", after["lost"] - before["lost"], "<= 0")

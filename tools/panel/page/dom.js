@@ -62,12 +62,19 @@ dark.addEventListener('change', () => {
         canvas.dispatchEvent(new Event('redraw'));
 });
 
-/// Prepares a canvas for drawing in CSS pixels at the screen's resolution; draw() is called once
-/// per frame after request(). Redraws at a change of size. `opaque`: draw() paints every pixel.
+/// From one picture of values that change by themselves to the next, in ms. Each picture costs the
+/// browser as much as its canvas is large, and the browser may run on the computer of the machine.
+export const pictureInterval = 50;
+
+/// Prepares a canvas for drawing in CSS pixels at the screen's resolution; draw() is called in the
+/// next frame after request(), and after follow() when the last picture is old enough: request() is
+/// for what the user does, follow() for what the machine does. Redraws at a change of size.
+/// `opaque`: draw() paints every pixel.
 export function surface(canvas, draw, opaque = false) {
-    let asked = false;
+    let asked = false, timer = 0, painted = -Infinity;
     const paint = () => {
         asked = false;
+        painted = performance.now();
         if (!canvas.isConnected) return;
         const ratio = devicePixelRatio || 1, width = canvas.clientWidth,
               height = canvas.clientHeight;
@@ -86,11 +93,23 @@ export function surface(canvas, draw, opaque = false) {
         if (!asked) requestAnimationFrame(paint);
         asked = true;
     };
+    const follow = () => {
+        if (asked || timer !== 0) return;
+        const wait = painted + pictureInterval - performance.now();
+        timer = setTimeout(() => {
+            timer = 0;
+            request();
+        }, Math.max(wait, 0));
+    };
+    const end = () => {
+        clearTimeout(timer);
+        watch.disconnect();
+    };
     const watch = new ResizeObserver(request);
     watch.observe(canvas);
     canvas.addEventListener('redraw', request);
     request();
-    return {request, end: () => watch.disconnect()};
+    return {request, follow, end};
 }
 
 export function announce(message) { document.getElementById('announce').textContent = message; }

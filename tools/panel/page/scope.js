@@ -2,7 +2,7 @@
 // The scope: up to 16 channels, time base, trigger, cursors, measurements. Samples come from a
 // probe, every cycle of their threads; from a machine without probes, by subscription.
 import {on, probe, readRecording, state, subscribe} from './link.js';
-import {announce, colour, dark, h, number, surface, text} from './dom.js';
+import {announce, colour, dark, h, number, pictureInterval, surface, text} from './dom.js';
 import {compareNames, similar} from './names.js';
 import {objects} from './objects.js';
 import {seconds, timeLabels, valueLabels} from './scope_axes.js';
@@ -577,7 +577,7 @@ export class View {
         if (list.length === 0) return;
         if (this.recording !== '') return this.showRecording(list, call);
         let known = 0;
-        this.stopFollowing = probe(list, {batch_ms: 15}, (event, bytes, layout) => {
+        this.stopFollowing = probe(list, {batch_ms: pictureInterval - 5}, (event, bytes, layout) => {
             if (layout.layout !== known) {
                 known = layout.layout;
                 this.store.layout(layout.groups, list, layout.columns);
@@ -654,7 +654,7 @@ export class View {
         } else
             this.takeTriggered();
         // A record that waits for the next trigger stays as it is.
-        if (this.shownAt !== before || before === null) this.surface.request();
+        if (this.shownAt !== before || before === null) this.surface.follow();
     }
 
     takeTriggered() {
