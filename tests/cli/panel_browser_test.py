@@ -386,6 +386,18 @@ net position{n} axis{n}-integ.out => axis{n}-pid.feedback
         )
         self.assertAlmostEqual(begin + 0.2 * (end - begin), at, places=6)
 
+    def test_the_scope_draws_what_moves_by_itself_twenty_times_a_second(self):
+        self.begin(view="scope?ch=sine:0.5:0&base=0.01&mode=roll")
+        self.browser.wait("window.halcyonScope?.rows > 0 && halcyonScope.frames > 0")
+        pictures = """(async () => {
+            const before = [halcyonScope.frames, performance.now()];
+            await new Promise(done => setTimeout(done, 2500));
+            return (halcyonScope.frames - before[0]) * 1000 / (performance.now() - before[1]);
+        })()"""
+        rate = self.browser.evaluate(pictures)
+        self.assertGreater(rate, 1)
+        self.assertLess(rate, 1000 / (50 - 17) + 2)  # of requestAnimationFrame(): 60
+
     def test_the_scope_scrolls_back_and_returns(self):
         self.begin(view="scope?ch=sine:0.5:0&base=0.01")
         self.browser.wait("window.halcyonScope?.rows > 1500")

@@ -65,6 +65,7 @@ dark.addEventListener('change', () => {
 /// From one picture of values that change by themselves to the next, in ms. Each picture costs the
 /// browser as much as its canvas is large, and the browser may run on the computer of the machine.
 export const pictureInterval = 50;
+const frame = 17;  // ms at most from requestAnimationFrame() to the frame
 
 /// Prepares a canvas for drawing in CSS pixels at the screen's resolution; draw() is called in the
 /// next frame after request(), and after follow() when the last picture is old enough: request() is
@@ -95,7 +96,7 @@ export function surface(canvas, draw, opaque = false) {
     };
     const follow = () => {
         if (asked || timer !== 0) return;
-        const wait = painted + pictureInterval - performance.now();
+        const wait = painted + pictureInterval - frame - performance.now();
         timer = setTimeout(() => {
             timer = 0;
             request();
