@@ -153,8 +153,9 @@ void JournalRing::work() {
     std::unique_lock own(mutex_);
     while (!ends_) {
         wake_.wait_for(own, look_every);
+        if (ends_) return;
         const std::int64_t now_ns = monotonic_ns();
-        if (now_ns - begun_ns_ >= part_ns_ && !ends_) {
+        if (now_ns - begun_ns_ >= part_ns_) {
             rotate(now_ns);
         }
         look_at_cut();
@@ -173,7 +174,7 @@ void JournalRing::rotate(std::int64_t now_ns) {
 }
 
 void JournalRing::start_cut(std::int64_t now_ns) {
-    if (cut_ != 0 || keeps_all_ || ends_ || parts_.size() < 2) return;
+    if (cut_ != 0 || keeps_all_ || parts_.size() < 2) return;
     const Part& second = parts_[1];
     if (now_ns - second.end_ns < keep_ns_ || second.last_cycle == 0) return;
     cut_ = start_idle(

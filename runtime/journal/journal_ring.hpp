@@ -52,7 +52,8 @@ public:
     void begin(ExecutionJournal& journal, Machine machine);
     /// Writes what there is to a file. Returns why not; "" when it is written. [any]
     std::string save(const std::string& to);
-    /// Ends the thread and its process. Before the journal is closed.
+    /// Ends the thread and its process. Before the machine of begin() ends, and before the journal
+    /// is closed.
     void end();
     /// Writes what there is to the file of the constructor and removes the folder, once the journal
     /// is closed. Returns why not; then the folder stays.

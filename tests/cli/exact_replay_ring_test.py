@@ -212,6 +212,15 @@ start
             self.assertGreater(seconds, 4)
         self.assertGreater(int(re.search(r"newest: cycle (\d+)", text)[1]), 6000)
 
+    def test_short_runs_end_in_order(self):
+        path = self.write("machine.hal", HEAP)
+        for _ in range(5):
+            words = ("--journal", "run.mcap", "--journal-keep", "10min", "--for", "0.3s")
+            done = self.run_program("run", path, *words)
+            self.assertEqual(0, done.returncode, done.stderr)
+            self.assertRegex(done.stderr, r"run.mcap: the last 600 s of \d+ cycles\n")
+        self.assertFalse((self.folder / "run.mcap.ring").exists())
+
     def test_a_killed_machine_leaves_its_ring(self):
         machine = self.run_journaled(HEAP, "--journal-keep", "4s")
         ring = self.folder / "run.mcap.ring"

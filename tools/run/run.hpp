@@ -64,7 +64,7 @@ public:
     virtual ExecutionSink& sink() = 0;
     /// The netlists are loaded: begins to record values. Returns an exit status.
     virtual int begin(HostedMachine& machine) = 0;
-    /// The machine is about to shut down: no more values are recorded.
+    /// The machine is about to shut down: nothing of it is read any more.
     virtual void end_values() = 0;
     /// The machine has ended: completes the file. Returns an exit status.
     virtual int end() = 0;

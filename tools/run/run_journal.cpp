@@ -149,12 +149,14 @@ public:
         return problem.empty() ? 0 : fail(options_, problem);
     }
 
-    void end_values() override { values_.reset(); }
-
-    int end() override {
+    void end_values() override {
+        values_.reset();
         if (ring_) {
             ring_->end();
         }
+    }
+
+    int end() override {
         const bool written = journal_.close();
         for (const auto& [thread, lost] : journal_.lost()) {
             write_all(2, fmt::format("{}: thread '{}': {} did not fit the buffer of the journal; "
