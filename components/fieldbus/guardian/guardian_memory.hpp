@@ -20,12 +20,13 @@ enum class StopReason : std::uint32_t {
     heartbeat,  ///< no cycle
     death,      ///< the process ended
 };
-inline constexpr const char* reason_texts[] = {"none",
-                                               "the component is unloaded",
-                                               "the thread was stopped or has a fault",
-                                               "the pin estop is TRUE",
-                                               "no cycle has run",
-                                               "the process has ended"};
+inline constexpr const char* reason_texts[] = {
+    "none",
+    "the component is unloaded",
+    "its function was stopped, or its thread has a fault",
+    "the pin estop is TRUE",
+    "no cycle has run",
+    "the process has ended"};
 /// [any]
 constexpr std::uint32_t bit_of(StopReason reason) noexcept {
     return std::uint32_t{1} << static_cast<std::uint32_t>(reason);

@@ -71,8 +71,10 @@ private:
                   now);
         }
         const std::uint64_t cycles = memory_.heartbeat.load(std::memory_order_relaxed);
-        switch (parent_.look(cycles, memory_.limit_ns.load(std::memory_order_relaxed), cycles != 0,
-                             now)) {
+        // the frames were sent when the thread was stopped
+        const bool stands = (memory_.stop_held.load() & bit_of(StopReason::fault)) != 0;
+        switch (parent_.look(cycles, memory_.limit_ns.load(std::memory_order_relaxed),
+                             cycles != 0 && !stands, now)) {
         case bus::ParentWatch::Change::none: break;
         case bus::ParentWatch::Change::died: begin(StopReason::death, now); break;
         case bus::ParentWatch::Change::hangs: begin(StopReason::heartbeat, now); break;

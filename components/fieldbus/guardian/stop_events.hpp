@@ -20,6 +20,7 @@ enum class Event : std::uint8_t {
     guardian_runs,
     guardian_killed,
     previous_stop,
+    not_sent,  ///< at the end of the component
 };
 
 inline constexpr bus::EventRow<Event> event_rows[] = {
@@ -41,6 +42,9 @@ inline constexpr bus::EventRow<Event> event_rows[] = {
     {Event::guardian_killed, bus::Effect::none,
      "the guardian did not end in time and was killed; stop the drives by other means"},
     {Event::previous_stop, bus::Effect::none, "the guardian of the previous run: {report}"},
+    {Event::not_sent, bus::Effect::none,
+     "{link} has not taken the stop frames within 2 s ({rounds} sent); stop the drives by other "
+     "means"},
 };
 static_assert(bus::in_order(event_rows));
 

@@ -76,7 +76,9 @@ struct FrameGuardian : hal::Component {
             throw std::runtime_error("'" + link_.get() +
                                      "' is a real link, and a simulation sends nothing on it; "
                                      "write link=sim:NAME, or use hal run");
-        } else if (!replays_) {
+        } else if (replays_) {
+            const hal::link::OpeningLink link;
+        } else {
             start_guardian();
         }
         shown_ = Status{Phase::watching};
@@ -120,8 +122,11 @@ struct FrameGuardian : hal::Component {
     void make_safe(hal::Cycle cycle) noexcept {
         is_interrupted_.store(true, std::memory_order_release);
         GuardianMemory& memory = this->memory();
-        memory.stop_held.fetch_or(bit_of(StopReason::fault), std::memory_order_release);
-        memory.stop(StopReason::fault);
+        constexpr std::uint32_t own = bit_of(StopReason::fault);
+        const auto held = memory.stop_held.fetch_or(own, std::memory_order_release);
+        if ((held & own) == 0) {
+            memory.stop(StopReason::fault);
+        }
         if (local_) {
             work_local(cycle.start_ns());
         }
@@ -188,7 +193,9 @@ private:
     }
 
     void start_guardian() {
-        const std::string report = hal::bus::report_file("frames-" + name_);
+        // the values of a guardian are inputs from outside
+        const hal::link::OpeningLink link;
+        const std::string report = hal::bus::report_file("frames-" + link_.get() + "-" + name_);
         previous_report_ = hal::bus::take_report(report);
         guardian_ = std::make_unique<GuardianProcess>();
         const std::string problem = guardian_->start({.program = program(),
@@ -219,8 +226,17 @@ private:
             reporter_.tell({Event::guardian_killed});
         } else if (was_alive) {
             report_outcome();
+            report_unsent();
         }
         guardian_.reset();
+    }
+
+    /// The guardian has ended by request, and nothing sends what it has not sent.
+    void report_unsent() noexcept {
+        const GuardianMemory& memory = this->memory();
+        const Outcome outcome = Status::of(memory.status.load()).outcome;
+        if (outcome != Outcome::sending && outcome != Outcome::delayed) return;
+        reporter_.tell({.event = Event::not_sent, .rounds = memory.rounds.load()});
     }
 
     /// Of the background thread: sees the end of the guardian, and reports what it does, also while
