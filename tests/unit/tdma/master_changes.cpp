@@ -162,6 +162,56 @@ TEST(Master_with_followers, does_not_yield_to_a_smaller_address) {
     EXPECT_EQ(1, m.events[Event::other_master_gone]);
 }
 
+/// Sends `count` syncs from a strange address beside those of the master: the same numbers and
+/// times, 20 us later on the wire.
+void parallel_syncs(Bed& bed, const Machine& m, int from, int count) {
+    for (int n = 1; n <= count; ++n) {
+        const std::uint32_t cycle = m.status().cycle + static_cast<std::uint32_t>(n) + 1;
+        const Time begins = m.station.cycle_start(cycle);
+        const Time scheduled = m.station.global(begins);
+        const auto f = encode(mac(from), Sync{cycle, scheduled, scheduled});
+        bed.wire.inject({f.begin(), f.end()}, from, m.port.clock().real(begins) + 20'000);
+    }
+}
+
+TEST(Station, stays_with_its_master_when_another_one_sends_syncs_of_the_same_times) {
+    Bed bed;
+    Machine& m = bed.add(5, master());
+    Machine& s = bed.add(6, slave(300'000));
+    bed.run(600 * ms);
+    ASSERT_TRUE(m.status().leading && s.station.ready());
+    int lost = 0;
+    bed.wire.fault = [&](Wire::Frame& f) {  // one of fifty syncs of the master
+        return f.from != 5 || decode(f.bytes).kind != Kind::sync || ++lost % 50 != 0;
+    };
+    parallel_syncs(bed, m, 1, 900);
+    bed.run(1000 * ms);
+    EXPECT_EQ(1, s.events[Event::other_master]);
+    EXPECT_EQ(mac(1), s.last_who[Event::other_master]);
+    EXPECT_EQ(mac(5), s.status().master);
+    EXPECT_EQ(0, s.events[Event::master_changed]);
+    EXPECT_EQ(0, s.events[Event::sync_lost]);
+    EXPECT_TRUE(s.station.hears_second_master());
+    bed.run(1500 * ms);
+    EXPECT_EQ(1, s.events[Event::other_master_gone]);
+    EXPECT_FALSE(s.station.hears_second_master());
+}
+
+TEST(Station, follows_the_second_master_when_its_own_is_lost) {
+    Bed bed;
+    Machine& m = bed.add(5, master());
+    Machine& s = bed.add(6, slave(300'000));
+    bed.run(600 * ms);
+    ASSERT_TRUE(m.status().leading && s.station.ready());
+    parallel_syncs(bed, m, 1, 900);
+    bed.run(100 * ms);
+    m.off = m.port.cut = true;
+    bed.run(100 * ms);
+    EXPECT_EQ(1, s.events[Event::sync_lost]);
+    EXPECT_EQ(mac(5), s.last_who[Event::sync_lost]);
+    EXPECT_EQ(mac(1), s.status().master);
+}
+
 TEST(Master_that_stepped_down, takes_over_when_the_other_is_lost) {
     Bed bed;
     Machine& m = bed.add(5, master());

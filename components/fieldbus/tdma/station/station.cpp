@@ -118,6 +118,7 @@ void Station::begin() noexcept {
     followers_.clear();
     pings_.clear_answers();
     other_masters_.restart();
+    parallel_master_.restart();
     slot_monitor_.restart();
     transmitter_.restart();
     calibration_.begin(core_.setup.rounds);
@@ -394,6 +395,10 @@ void Station::accept_sync(const Decoded& d, Time arrived, Time now) noexcept {
     if (finds_master(d)) return withdraw(Event::master_there, d.from);
     if (status.state == State::listening) return listen_to(d, arrived, now);
     if (!core_.fits(s)) return accept_foreign_sync(d, arrived, now);
+    if (is_beside_master(d, now)) {
+        ++status.count.foreign;
+        return;
+    }
     if (is_outdated(s)) return;
     if (is_new_sender(d.from)) {
         if (status.leading) return;
@@ -417,6 +422,29 @@ bool Station::finds_master(const Decoded& d) noexcept {
     }
     master_ = d.from;
     return master_row_ >= confirmations;
+}
+
+/// Returns true for a sync with the number and time of the master's that another station sends while
+/// the master is heard, and reports that one as a second master. The first one stays the master
+/// until its syncs are lost.
+bool Station::is_beside_master(const Decoded& d, Time now) noexcept {
+    if (core_.status.leading) return false;
+    const bool punctual = core_.is_from_master(lateness_of(d.sync));
+    if (d.from == core_.status.master) {
+        if (punctual) {
+            parallel_master_.note_master(d.sync.cycle);
+        } else {
+            parallel_master_.note_backup();
+        }
+        return false;
+    }
+    if (!punctual) return false;
+    const bool parallel = parallel_master_.note_other(d.from, d.sync.cycle);
+    const bool is_known = other_masters_.present() && other_masters_.is(d.from);
+    if (is_known || parallel_master_.confirmed()) {
+        other_masters_.confirm(d.from, followers_, now);
+    }
+    return is_known || parallel;
 }
 
 /// A new sender is accepted after its second sync; until then its sync counts as received, so that
@@ -480,6 +508,7 @@ void Station::follow(const Decoded& d, Time arrived) noexcept {
 
 void Station::change_master(const Decoded& d) noexcept {
     core_.status.master = d.from;
+    parallel_master_.restart();
     calibration_.forget();
     core_.clock.another_master();
     report(Event::master_changed, d.from);

@@ -21,6 +21,7 @@
 #include "calibration.hpp"
 #include "followers.hpp"
 #include "other_masters.hpp"
+#include "parallel_master.hpp"
 #include "pings.hpp"
 #include "slot_monitor.hpp"
 #include "transmitter.hpp"
@@ -140,6 +141,7 @@ private:
     bool is_plausible(const Sync&) const noexcept;
     bool is_outdated(const Sync&) const noexcept;
     bool finds_master(const Decoded&) noexcept;
+    bool is_beside_master(const Decoded&, Time now) noexcept;
     void listen_to(const Decoded&, Time arrived, Time now) noexcept;
     void accept_foreign_sync(const Decoded&, Time arrived, Time now) noexcept;
     bool gives_way(bool to_master, Time now) const noexcept;
@@ -172,6 +174,7 @@ private:
     std::uint32_t babble_limit_ = 32;  // frames of one station in a cycle
     Followers followers_;
     OtherMasters other_masters_{core_};
+    ParallelMaster parallel_master_;
     SlotMonitor slot_monitor_{core_};
     Pings pings_;
     Transmitter transmitter_{core_, calibration_, pings_, slot_monitor_.roster()};
