@@ -311,8 +311,9 @@ private:
         }
     }
     static Time time(double seconds) noexcept {
+        constexpr double max = 4e9;  // s, 126 years: the integer holds the sum of two
         return seconds > 0.0
-                   ? static_cast<Time>(std::min(seconds, 1e6) * static_cast<double>(one_second))
+                   ? static_cast<Time>(std::min(seconds, max) * static_cast<double>(one_second))
                    : 0;
     }
     static const Sentences& sentences() {
