@@ -635,6 +635,15 @@ void pass_time_until(const Program& by, auto&& is_done) {
     }
 }
 
+/// Makes the process the one that uses this end of the stream, or throws.
+void claim_stream(const Program& by, const std::string& name, StreamUsers::End end) {
+    const std::string why =
+        by.session.programs().stream_users().claim(name, end, by.owner, by.peer);
+    if (!why.empty()) {
+        throw RequestError{why};
+    }
+}
+
 }  // namespace
 
 void use_stream(const Program& by, const Json& body, std::string& reply) {
@@ -659,11 +668,13 @@ void use_stream(const Program& by, const Json& body, std::string& reply) {
     bool good = true;
     if (!take.is_null()) {
         const auto max_count = static_cast<std::uint64_t>(whole(take, "take", 0, 1'000'000));
+        claim_stream(by, name, StreamUsers::End::reads);
         const std::uint64_t wanted = std::min<std::uint64_t>(max_count, stream.depth / 2 + 1);
         pass_time_until(by, [&] { return waiting() >= wanted; });
         good = pop_records(stream, max_count, reply, why);
     } else if (!records.is_null()) {
         const auto rows = rows_of(records);
+        claim_stream(by, name, StreamUsers::End::feeds);
         const std::uint64_t wanted = std::min<std::uint64_t>(rows.size(), stream.depth / 2 + 1);
         pass_time_until(by, [&] { return stream.depth - waiting() >= wanted; });
         good = feed_records(stream, rows, reply, why);

@@ -224,6 +224,29 @@ class Live(Case):
         self.assertIn("nowhere.txt", self.bad("play", "0", "nowhere.txt"))
         self.assertIn("not a number", self.bad("-n", "x", name="halsampler"))
 
+    def test_a_second_one_on_a_stream_is_rejected(self):
+        first = subprocess.Popen(
+            [str(HAL), "play", "0"],
+            env=self.environment,
+            cwd=self.folder,
+            stdin=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.addCleanup(self.end, first, signal.SIGKILL)
+        first.stdin.write("1 0\n")
+        first.stdin.flush()
+        self.write("in.txt", "2 0\n")
+        rejected = f"stream 'streamer.0' is fed by process {first.pid} already"
+        wait_until(
+            lambda: rejected in self.run_program("play", "0", "in.txt").stderr,
+            "the first one feeds it",
+        )
+        self.assertIn(rejected, self.bad("play", "0", "in.txt"))
+        first.communicate(timeout=60)
+        self.assertEqual(0, first.returncode)
+        self.good("play", "0", "in.txt")
+
     def test_follows_until_interrupted(self):
         recorder = subprocess.Popen(
             [str(HAL), "record", "0", "out.txt"],

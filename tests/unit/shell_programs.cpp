@@ -258,5 +258,35 @@ TEST_F(Programs, records_go_through_a_stream_of_their_own) {
     EXPECT_EQ(ask(other, {{"stream", "stream.7"}, {"take", 1}})["ok"], false);
 }
 
+TEST_F(Programs, each_end_of_a_stream_is_one_process) {
+    ask({{"component", "p"}});
+    ask({{"stream", "stream.7"}, {"create", {{"types", "u"}, {"depth", 9}}}, {"owner", "p"}});
+    constexpr pid_t init = 1;  // a process that lives
+    auto first = std::make_unique<Connection>(machine.shell, init);
+    Connection sibling(machine.shell, init);
+    Connection second(machine.shell, ::getpid());
+    const Json feed{{"stream", "stream.7"}, {"records", {{1}}}};
+    const Json take{{"stream", "stream.7"}, {"take", 1}};
+    EXPECT_EQ(ask(*first, feed)["taken"], 1);
+    EXPECT_EQ(ask(sibling, feed)["taken"], 1) << "the same process";
+    EXPECT_EQ(ask(second, feed)["error"],
+              "stream 'stream.7' is fed by process 1 already; records of two would be mixed; end "
+              "that process first");
+    EXPECT_EQ(ask(second, {{"stream", "stream.7"}})["waiting"], 2) << "anybody may look";
+    EXPECT_EQ(ask(second, take)["records"], (Json{{1}})) << "the other end";
+    EXPECT_EQ(ask(*first, take)["error"], "stream 'stream.7' is read by process " +
+                                              std::to_string(::getpid()) +
+                                              " already; two readers would take each other's "
+                                              "records; end that process first");
+    first.reset();
+    EXPECT_EQ(ask(second, feed)["taken"], 1);
+
+    // a process that has ended, and the end of its connection is still unknown
+    Connection ghost(machine.shell, 0x7fff'fff0);
+    ask({{"stream", "stream.8"}, {"create", {{"types", "u"}, {"depth", 9}}}, {"owner", "p"}});
+    EXPECT_EQ(ask(ghost, {{"stream", "stream.8"}, {"records", {{1}}}})["taken"], 1);
+    EXPECT_EQ(ask(second, {{"stream", "stream.8"}, {"records", {{1}}}})["taken"], 1);
+}
+
 }  // namespace
 }  // namespace hal::test

@@ -82,7 +82,7 @@ bool feed(Stream& stream, const PlayOptions& options, json records, const StopRe
     while (!records.empty()) {
         const json reply = stream.client->request({{"stream", stream.name}, {"records", records}});
         if (!reply.value("ok", false)) {
-            fail(options, stream.lost());
+            fail(options, stream.problem(reply));
             return false;
         }
         const auto taken = reply.value("taken", std::ptrdiff_t{0});

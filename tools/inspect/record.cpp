@@ -141,7 +141,7 @@ int follow(Stream& stream, const RecordOptions& options, RecordFile& file) {
         const std::uint64_t wanted =
             options.count == 0 ? at_once : std::min(at_once, options.count - taken);
         const json reply = stream.client->request({{"stream", stream.name}, {"take", wanted}});
-        if (!reply.value("ok", false)) return fail(options, stream.lost());
+        if (!reply.value("ok", false)) return fail(options, stream.problem(reply));
         const std::size_t got = reply.at("records").size();
         if (!lines.write(reply, file)) return lost();
         taken += got;

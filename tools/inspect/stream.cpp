@@ -102,10 +102,11 @@ bool Stream::open(const StreamOptions& options, const char* component) {
     return !options.classic || announce(options);
 }
 
-std::string Stream::lost() const {
-    return client->connected()
-               ? fmt::format("'{}' has ended: it was unloaded, or its machine has exited", name)
-               : fmt::format("instance '{}' has ended", client->instance());
+std::string Stream::problem(const nlohmann::json& reply) const {
+    const bool exists = client->request({{"stream", name}}).value("ok", false);
+    if (!client->connected()) return fmt::format("instance '{}' has ended", client->instance());
+    if (exists) return reply.value("error", "no answer");
+    return fmt::format("'{}' has ended: it was unloaded, or its machine has exited", name);
 }
 
 bool Stream::announce(const StreamOptions& options) const {

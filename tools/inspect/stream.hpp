@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -27,8 +28,8 @@ struct Stream {
     /// Registers this process as a component, as LinuxCNC's programs do, so that `loadusr -Wn NAME`
     /// sees that it is ready.
     bool announce(const StreamOptions& options) const;
-    /// Returns the reason of a lost stream.
-    std::string lost() const;
+    /// Returns why a request for records was rejected: the stream is lost, or as the reply states.
+    std::string problem(const nlohmann::json& reply) const;
 };
 
 /// Polling interval while the FIFO is empty, or full.

@@ -390,6 +390,7 @@ void Programs::child_ended(pid_t pid, int status) {
         if (entry.pid != pid) continue;
         if (entry.running()) {
             end_child(i, status);
+    stream_users_.release(owner);
         } else if (entry.process == Process::foreign) {
             end_component(entry, status);
         }

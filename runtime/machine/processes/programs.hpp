@@ -18,6 +18,7 @@
 #include "machine/processes/child_processes.hpp"
 #include "machine/processes/program_entry.hpp"
 #include "machine/processes/program_model.hpp"
+#include "machine/processes/stream_users.hpp"
 #include "netlist/netlist.hpp"
 
 namespace hal {
@@ -73,6 +74,7 @@ public:
     bool answers(std::uint64_t owner) const;
     /// Returns the next connection's number.
     std::uint64_t new_owner() { return ++owners_; }
+    StreamUsers& stream_users() { return stream_users_; }
     ProgramStream* find_stream(std::string_view name);
     std::vector<std::string> stream_names() const;
     Entry* find(std::string_view name);
@@ -154,6 +156,7 @@ private:
     std::uint64_t owners_ = 0;
     std::uint64_t numbers_ = 0;
     std::deque<std::pair<pid_t, std::string>> refusals_;  // the newest first
+    StreamUsers stream_users_;
     static constexpr std::size_t max_refusals = 16;
     bool ending_children_ = false;  // nothing is started again
     ChildProcesses children_;
