@@ -494,6 +494,27 @@ void command_loadusr(Context& context) {
     }
 }
 
+namespace {
+
+/// Reports a name of which no program runs, unless one has ended.
+void nothing_to_wait_for(Context& context, std::size_t at) {
+    const std::string& name = context.argument(at);
+    if (context.session.model().find_component(name) != nullptr) {
+        context.diagnostics.error("not-a-program", context.span(at),
+                                  "'" + name + "' is a component in this process, not a program",
+                                  "", "waitusr waits for programs started by loadusr");
+    } else if (!context.checking() && !context.programs.was_known(name)) {
+        const auto names = context.programs.names();
+        context.diagnostics.warning(
+            "not-a-program", context.span(at),
+            "no program '" + name + "' was started or has registered: waitusr does not wait",
+            did_you_mean(name, names),
+            names.empty() ? "no program is running" : "programs: " + listed(names));
+    }
+}
+
+}  // namespace
+
 void command_waitusr(Context& context) {
     const bool limited = context.argument(0) == "-t";
     const std::int64_t limit_ns = limited ? timeout_option(context, 1) : 0;
@@ -505,23 +526,17 @@ void command_waitusr(Context& context) {
     }
     const std::size_t at = limited ? 2 : 0;
     const std::string& name = context.argument(at);
-    if (!context.programs.find(name)) {
-        const bool component = context.session.model().find_component(name) != nullptr;
-        if (component) {
-            context.diagnostics.error(
-                "not-a-program", context.span(at),
-                "'" + name + "' is a component in this process, not a program", "",
-                "waitusr waits for programs started by loadusr");
-        }
-        return;  // it has already ended
-    }
+    const auto* const named = context.programs.find(name);
+    // its component may have another name than the program
+    const auto* const awaited_entry = named ? named : context.programs.find_started_as(name);
+    if (!awaited_entry) return nothing_to_wait_for(context, at);
     Timeout timeout(limit_of(context, limit_ns));
-    const Programs::Awaited awaited(context.programs, context.programs.find(name)->pid);
+    const Programs::Awaited awaited(context.programs, awaited_entry->pid);
     // the one that has the name now; another that takes the name over meanwhile is not waited for
-    const std::uint64_t number = context.programs.find(name)->number;
+    const std::uint64_t number = awaited_entry->number;
     const auto living = [&]() -> const Programs::Entry* {
         const auto* const entry = context.programs.find_number(number);
-        if (!entry || entry->name != name) return nullptr;
+        if (!entry) return nullptr;
         return entry->gone() && entry->restarts.due_ns == 0 ? nullptr : entry;
     };
     while (const auto* const entry = living()) {

@@ -88,6 +88,8 @@ constexpr CommandRow rows[] = {
      "5 restarts within 10 s no other follows.",
      command_loadusr, load, kind::waiting},
     {"waitusr", "", "[-t TIME] PROCESS", "wait until a program has ended",
+     "PROCESS is the name of the component, or that of the program as loadusr started it. For a "
+     "program that has ended, it returns at once.\n"
      "-t TIME (10s, 500ms) limits the wait: then the command fails, and the program continues. In "
      "`hal sim`, time stands meanwhile,\n"
      "as with loadusr -w.",

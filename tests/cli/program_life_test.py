@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """The life of programs: names that are taken and released, waiting that reports and ends, machines that are killed, programs that hang."""
+
 import os
 import re
 import signal
@@ -115,8 +116,10 @@ class Names(LifeCase):
         self.machine()
         self.say("loadusr", "-Wn", "uc", *self.slow("uc", after="0.3"))
         for turn in range(2, 8):
-            self.say("net", "level", "uc.out", "adder.in1") if turn == 2 else self.say(
-                "net", "level", "uc.out"
+            (
+                self.say("net", "level", "uc.out", "adder.in1")
+                if turn == 2
+                else self.say("net", "level", "uc.out")
             )
             self.say("unload", "uc")
             self.say("loadusr", "-Wn", "uc", *self.slow("uc", "0.1", str(turn), "0.3"))
@@ -297,6 +300,31 @@ os._exit(3)
         self.assertEqual("ready", self.state("uc"))
         wait_until(lambda: self.value("adder.in1") == "4", "its link is kept")
         self.assertEqual(["uc", "sum2", "threads"], self.say("list", "comp").split())
+
+    def test_waitusr_waits_for_a_program_that_registers_another_name(self):
+        self.machine()
+        self.say("loadusr", "-Wn", "other", *self.slow("other"))
+        self.say("unload", "other")
+        self.say("waitusr", "-t", "60s", "other")
+        self.write("prog.py", SLOW)
+        self.say("loadusr", sys.executable, "prog.py", "other", "0", "1", "0")
+        wait_until(lambda: "ready" in self.state("other"), "it has registered")
+        program = Path(sys.executable).name
+        said = self.refused("waitusr", "-t", "50ms", program)
+        self.assertIn(f"'{program}' (process {self.pid('other')}, ready) did not end", said)
+        self.say("unload", "other")
+        self.say("waitusr", "-t", "60s", program)
+        self.say("waitusr", program)  # it has ended
+
+    def test_waitusr_warns_of_a_name_that_was_never_there(self):
+        self.machine()
+        done = self.shell("waitusr", "nosuch")
+        self.assertEqual(0, done.returncode)
+        self.assertIn(
+            "warning: no program 'nosuch' was started or has registered: waitusr does not wait "
+            "[not-a-program]",
+            done.stderr,
+        )
 
     def test_one_that_ends_by_the_signal_it_was_sent_leaves_nothing(self):
         self.machine()

@@ -101,6 +101,7 @@ struct ProgramEntry {
 
     std::uint64_t number = 0;  ///< of this entry, for as long as it lives
     std::string name = {};  ///< of the component; empty: it is not one
+    std::string started_as = {};  ///< the name that loadusr gave it; empty: not started by one
     pid_t pid = 0;
     Process process = Process::foreign;
     int status = 0;  ///< once the process has ended: exit status, or 128 + signal

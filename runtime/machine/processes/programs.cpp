@@ -90,11 +90,13 @@ std::uint64_t Programs::add(pid_t pid, const std::string& name, const Command& c
     Entry* const started = find(pid);
     if (!started || started->ended()) return 0;
     const std::uint64_t number = started->number;
+    note_name(name);
     // its pins and links wait for the new program
     if (Entry* const entry = reserved ? find(name) : nullptr; entry && entry->dead()) {
         entry->number = number;
         entry->pid = pid;
         entry->process = Process::running;
+        entry->started_as = name;
         entry->reserved = true;
         entry->stopping = false;
         entry->death()->restarted = true;
@@ -108,7 +110,9 @@ std::uint64_t Programs::add(pid_t pid, const std::string& name, const Command& c
     for (int i = 2; machine_.model().find_component(unique) || find(unique); ++i) {
         unique = name + "-" + std::to_string(i);
     }
+    note_name(unique);
     started->name = unique;
+    started->started_as = name;
     started->reserved = reserved;
     model_.add(unique, pid, command);
     return number;
@@ -125,6 +129,29 @@ Programs::Entry* Programs::find(pid_t pid) {
 
 Programs::Entry* Programs::find_number(std::uint64_t number) {
     return find_row(entries_, number, &Entry::number);
+}
+
+Programs::Entry* Programs::find_started_as(std::string_view name) {
+    Entry* found = nullptr;
+    for (Entry& entry : entries_) {
+        const bool lives = !entry.gone() || entry.restarts.due_ns != 0;
+        if (lives && !entry.started_as.empty() && entry.started_as == name) {
+            found = &entry;
+        }
+    }
+    return found;
+}
+
+bool Programs::was_known(std::string_view name) const {
+    return std::ranges::find(known_names_, name) != known_names_.end();
+}
+
+void Programs::note_name(const std::string& name) {
+    if (was_known(name)) return;
+    known_names_.push_front(name);
+    if (known_names_.size() > max_known_names) {
+        known_names_.pop_back();
+    }
 }
 
 bool Programs::answers(std::uint64_t owner) const {
@@ -238,6 +265,7 @@ Programs::Entry& Programs::enter(Entry* of_process, pid_t pid, const std::string
         entry = &entries_.emplace_back(Entry{.number = ++numbers_, .pid = pid});
     }
     remove(*entry);
+    note_name(name);
     entry->name = name;
     model_.add(name, pid, Command{});
     return *entry;
@@ -362,6 +390,7 @@ bool Programs::has_pins(const Entry& entry) const {
 }
 
 void Programs::withdraw(std::uint64_t owner) {
+    stream_users_.release(owner);
     for (std::size_t i = entries_.size(); i-- > 0;) {
         Entry& entry = entries_[i];
         if (entry.owner != owner) continue;
@@ -390,7 +419,6 @@ void Programs::child_ended(pid_t pid, int status) {
         if (entry.pid != pid) continue;
         if (entry.running()) {
             end_child(i, status);
-    stream_users_.release(owner);
         } else if (entry.process == Process::foreign) {
             end_component(entry, status);
         }

@@ -80,6 +80,11 @@ public:
     Entry* find(std::string_view name);
     Entry* find(pid_t pid);
     Entry* find_number(std::uint64_t number);
+    /// Returns the last program that loadusr has started under this name, if it runs or is started
+    /// again, whatever name it has registered.
+    Entry* find_started_as(std::string_view name);
+    /// Returns true when one of the last programs had this name.
+    bool was_known(std::string_view name) const;
     /// Returns the names of the components that the process has registered.
     std::vector<std::string> registered_by(pid_t pid) const;
     /// Returns why the last registration of a child was rejected, also of one that has ended since;
@@ -147,17 +152,20 @@ private:
     bool has_pins(const Entry& entry) const;
     void remove(const Entry& entry);
     void forget(Entry& entry);
+    void note_name(const std::string& name);
 
     RunningModel& machine_;
     ProgramModel model_;
+    StreamUsers stream_users_;
     std::vector<Entry> entries_;
     std::condition_variable changed_;
     std::vector<pid_t> awaited_;
     std::uint64_t owners_ = 0;
     std::uint64_t numbers_ = 0;
     std::deque<std::pair<pid_t, std::string>> refusals_;  // the newest first
-    StreamUsers stream_users_;
     static constexpr std::size_t max_refusals = 16;
+    std::deque<std::string> known_names_;  // the newest first
+    static constexpr std::size_t max_known_names = 256;
     bool ending_children_ = false;  // nothing is started again
     ChildProcesses children_;
 };
