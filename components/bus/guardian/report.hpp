@@ -3,7 +3,6 @@
 #pragma once
 
 #include <fcntl.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
 #include <unistd.h>
@@ -14,9 +13,15 @@
 #include <system_error>
 
 #include "hal/read_file.hpp"
+#include "hal/system_log.hpp"
 #include "link/system.hpp"
 
 namespace hal::bus {
+
+/// Returns what is stated of a report that was cut.
+inline std::string cut_reason() {
+    return "it could not be written whole (disk full?); the system's log may have it";
+}
 
 /// Returns the file in which a guardian of a link leaves what it did; empty: there is no folder for
 /// it. Creates the folder.
@@ -41,24 +46,37 @@ inline std::string report_file(const std::string& link) {
     return (folder / name).string();
 }
 
-/// Returns the content of the file and deletes it.
+/// Returns the content of the file and deletes it. States what is known of a report that is
+/// incomplete: its last character, a line end, is missing.
 inline std::string take_report(const std::string& file) {
+    constexpr std::size_t max_bytes = 65536;  // of a line with 247 slaves: 15000
     std::string text;
-    if (file.empty() || !read_regular_file(file, 4096, text)) return {};
+    if (file.empty() || !read_regular_file(file, max_bytes, text)) return {};
     ::unlink(file.c_str());
+    if (text.empty()) return "the process has ended; the report is lost: " + cut_reason();
+    if (text.back() != '\n') return text + " … the rest is lost: " + cut_reason();
     while (!text.empty() && text.back() == '\n') {
         text.pop_back();
     }
     return text;
 }
 
-/// Writes the file; an empty name: nothing.
-inline void keep_report(const char* file, const std::string& text) {
-    if (file[0] == '\0') return;
+/// Writes the file; an empty name: nothing. Returns false when it is incomplete or missing.
+inline bool keep_report(const char* file, const std::string& text) {
+    if (file[0] == '\0') return true;
     const link::Descriptor fd(
         ::open(file, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0600));
-    if (fd) {
-        dprintf(fd.get(), "%s\n", text.c_str());
+    return fd && write_whole(fd.get(), text + "\n");
+}
+
+/// Reports on standard error and in the file; what one of them does not accept whole goes to the
+/// system's log as well. `name`: of the instance.
+inline void report_end(const char* name, const char* file, const std::string& text) {
+    const std::string line = std::string(name) + ": guardian: " + text + "\n";
+    const bool printed = write_whole(STDERR_FILENO, line);
+    const bool kept = keep_report(file, text);
+    if (!printed || !kept) {
+        write_system_log("hal-guardian", line);
     }
 }
 

@@ -22,7 +22,7 @@ namespace hal::bus {
 /// Nothing ends the guardian before it has stopped the devices. [setup]
 inline void ignore_signals() {
     for (const int signal :
-         {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGUSR1, SIGUSR2, SIGTSTP}) {
+         {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGUSR1, SIGUSR2, SIGTSTP, SIGXFSZ}) {
         ::signal(signal, SIG_IGN);
     }
 }

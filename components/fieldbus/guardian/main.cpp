@@ -125,8 +125,7 @@ private:
         text_ += "the process has ended";
         text_ += had_hung_ ? " after its cycles had stopped; " : "; ";
         describe();
-        dprintf(STDERR_FILENO, "%s: guardian: %s\n", name_, text_.c_str());
-        bus::keep_report(report_, text_);
+        bus::report_end(name_, report_, text_);
     }
 
     void describe() {

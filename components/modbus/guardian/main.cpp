@@ -126,8 +126,7 @@ private:
         }
         std::snprintf(part, sizeof part, "; %.1f ms", static_cast<double>(now - begun_at_) * 1e-6);
         text_ += part;
-        dprintf(STDERR_FILENO, "%s: guardian: %s\n", name_, text_.c_str());
-        bus::keep_report(report_, text_);
+        bus::report_end(name_, report_, text_);
         return 0;
     }
 

@@ -21,6 +21,7 @@
 #include <unistd.h>
 
 #include "base/own_descriptors.hpp"
+#include "hal/system_log.hpp"
 #include "model/model.hpp"
 #include "text/quoting.hpp"
 
@@ -82,8 +83,11 @@ void rename_command_line() {
     std::strncpy(first, "hal-observer", static_cast<std::size_t>(length) - 1);
 }
 
+/// Standard error may be a file on a full disk, or a pipe whose reader has ended.
 void print_line(const std::string& text) {
-    [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());
+    if (!write_whole(STDERR_FILENO, text)) {
+        write_system_log("hal", text);
+    }
 }
 
 /// One thread as describe() wrote it: a line "BASE THREAD", then "END NAME" per function, END being
