@@ -931,6 +931,9 @@ std::uint32_t Core::slow_function(std::int64_t woke_ns) const noexcept {
 
 void Core::raise(FaultEvent event) noexcept {
     event.time_ns = measure_ ? unnoted_clock_ns() : info_.start_ns;
+    if (inputs_ && inputs_->replays()) {
+        event.time_ns = inputs_->record().woke_ns;
+    }
     board_.count(event, id_);
     // when full the newest is lost but counted
     limiter_.raise(event, [this](const FaultEvent& e) noexcept { faults_.push(e); });

@@ -75,7 +75,7 @@ ThreadReport Reports::thread(const Thread& thread) const {
     const Core* const core = machine_.core(&thread);
     if (!core) return report;
     report.cycles = core->monitor.cycles();
-    report.missed = core->monitor.missed_by(monotonic_ns());
+    report.missed = core->monitor.missed_by(machine_.executor.now_ns());
     report.overruns = core->overruns.load();
     report.over_budget = core->over_budget.load();
     report.wakeup_p50_ns = core->wakeup.quantile(0.5);
