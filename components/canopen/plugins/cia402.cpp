@@ -112,6 +112,11 @@ struct Cia402 : hal::Component {
     hal::Param<bool> auto_reset{*this, "auto-reset",
                                 "TRUE: a rising edge of enable also acts as one of reset"};
 
+    hal::Function read{*this, "read-all", &Cia402::read_all,
+                       "updates the feedback from the drive; after the bus receives"};
+    hal::Function write{*this, "write-all", &Cia402::write_all,
+                        "updates the drive from the commands; before the bus sends"};
+
     // Status for the user.
     hal::Out<bool> enabled{
         *this, "enabled", "the drive is in operation enabled, as commanded", {.safe = false}};
@@ -133,14 +138,16 @@ struct Cia402 : hal::Component {
     hal::Out<std::uint32_t> state{*this, "state", "state of the drive, see the table"};
     hal::Out<double> position_fb{
         *this,
+        read,
         "position-fb",
         "measured position, extended beyond the range of the drive's counter",
         {.finite = true}};
     hal::Out<double> velocity_fb{*this,
+                                 read,
                                  "velocity-fb",
                                  "measured velocity, or the derivative of the position",
                                  {.unit = "1/s", .finite = true}};
-    hal::Out<double> torque_fb{*this, "torque-fb", "measured torque", {.finite = true}};
+    hal::Out<double> torque_fb{*this, read, "torque-fb", "measured torque", {.finite = true}};
     hal::Out<double> following_error{*this,
                                      "following-error",
                                      "csp, ip: position sent to the drive - position-fb",
@@ -152,13 +159,13 @@ struct Cia402 : hal::Component {
                                        "pp: set-points queued until the drive takes them"};
     hal::Out<bool> homed{*this, "homed", "homed since the node was last lost"};
     hal::Out<bool> homing{*this, "homing", "homing in progress"};
-    hal::Out<std::int32_t> mode_fb{*this, "mode-fb", "mode displayed by the drive"};
-    hal::Out<bool> warning{*this, "warning", "statusword bit 7"};
-    hal::Out<bool> remote{*this, "remote",
+    hal::Out<std::int32_t> mode_fb{*this, read, "mode-fb", "mode displayed by the drive"};
+    hal::Out<bool> warning{*this, read, "warning", "statusword bit 7"};
+    hal::Out<bool> remote{*this, read, "remote",
                           "statusword bit 9: the drive is controlled over the bus"};
-    hal::Out<bool> voltage{*this, "voltage-enabled",
+    hal::Out<bool> voltage{*this, read, "voltage-enabled",
                            "statusword bit 4: the power stage has voltage"};
-    hal::Out<bool> limited{*this, "internal-limit", "statusword bit 11"};
+    hal::Out<bool> limited{*this, read, "internal-limit", "statusword bit 11"};
 
     // The drive's side, named as CiA 402 names the objects.
     hal::In<bool> operational{
@@ -194,11 +201,6 @@ struct Cia402 : hal::Component {
 
     ProbePins probe_1{*this, 1};
     ProbePins probe_2{*this, 2};
-
-    hal::Function read{*this, "read-all", &Cia402::read_all,
-                       "updates the feedback from the drive; after the bus receives"};
-    hal::Function write{*this, "write-all", &Cia402::write_all,
-                        "updates the drive from the commands; before the bus sends"};
 
     hal::Emergency off{
         *this, &Cia402::interrupt,
