@@ -126,6 +126,9 @@ public:
     void serve_at_rest() noexcept;
     /// Takes what the session offers, without a cycle. Returns false when there was nothing.
     bool catch_up();
+    /// Returns true when the outputs have their safe values, because functions do not run. Between
+    /// two cycles of a re-execution.
+    bool is_safe() const noexcept { return safe_; }
     /// Returns true when the thread has taken all that the session has offered.
     bool at_rest() const noexcept;
     /// What the next cycle depends on, besides the memory of the plan and of the instances.

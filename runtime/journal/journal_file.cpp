@@ -46,6 +46,21 @@ JournaledBatch batch_of(const mcap::Message& message) {
 
 }  // namespace
 
+std::optional<JournaledThread::Extent> JournaledThread::remaining() const {
+    if (!valid_) return std::nullopt;
+    Extent extent{record_.woke_ns, record_.woke_ns};
+    const bool has_further = batch_ < batches_.size();
+    CycleDecoder last = has_further ? CycleDecoder(batches_.back().records) : *decoder_;
+    CycleRecord record;
+    std::vector<std::uint64_t> notes;
+    while (last.next(record, notes)) {
+        if (record.kind == CycleRecord::cycle) {
+            extent.last_ns = record.woke_ns;
+        }
+    }
+    return extent;
+}
+
 void JournaledThread::next() {
     const bool had_one = std::exchange(valid_, false);
     if (!gap_.empty()) return;

@@ -45,6 +45,13 @@ public:
         first_sequence_ = sequence;
         is_cut_ = true;
     }
+    /// When two cycles woke, on the machine's clock.
+    struct Extent {
+        std::int64_t first_ns = 0;
+        std::int64_t last_ns = 0;
+    };
+    /// Returns the times of record() and of the last record; nothing after the last one.
+    std::optional<Extent> remaining() const;
     /// Returns the sequence of the batch that record() is of, or of the next one.
     std::uint32_t sequence() const {
         return first_sequence_ + static_cast<std::uint32_t>(batch_) - (valid_ ? 1 : 0);

@@ -406,6 +406,11 @@ ReExecution::State ReExecution::advance() {
     return state_;
 }
 
+bool ReExecution::functions_run() const {
+    return std::ranges::any_of(
+        cursors_, [](const auto& one) { return one.second.core && !one.second.core->is_safe(); });
+}
+
 JournalProgress ReExecution::progress() const {
     JournalProgress progress{.entries = entry_, .records = {}};
     for (const auto& [number, cursor] : cursors_) {

@@ -62,9 +62,13 @@ public:
     const JournaledCycle& newest() const { return newest_; }
     std::uint64_t cycles() const { return cycles_; }
     std::uint64_t edits() const { return edits_; }
+    /// Returns how many entries of the journal have been made, of JournalFile::entries().
+    std::size_t entries() const { return entry_; }
     /// Returns true once an instance has opened something outside of the process, or has created a
     /// thread: from then on the process cannot be copied.
     bool has_outside() const { return outside_; }
+    /// Returns whether the functions of a thread ran in its newest cycle.
+    bool functions_run() const;
     /// Returns how much of the journal has been executed.
     JournalProgress progress() const;
     /// Returns true when a journal may begin here: between the cycles of all threads.

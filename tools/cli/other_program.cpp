@@ -10,6 +10,7 @@
 #include <string_view>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <utility>
 
 #include "cli/capabilities.hpp"
 #include "cli/output.hpp"
@@ -91,8 +92,7 @@ int become_program(const char* name, char** argv) {
     return report_missing(name, errno);
 }
 
-int run_tool(std::vector<std::string> arguments) {
-    constexpr const char* name = "hal-tools";
+pid_t start_program(const char* name, std::vector<std::string> arguments) {
     const std::string program = path_of(name);
     if (::access(program.c_str(), X_OK) != 0) {
         build_on_demand(build_name(name));
@@ -103,10 +103,18 @@ int run_tool(std::vector<std::string> arguments) {
         argv.push_back(argument.data());
     }
     argv.push_back(nullptr);
-    const IgnoredInterrupt meanwhile;
     pid_t child = 0;
     const int error = spawn_with_default_signals(child, program, argv.data());
-    if (error != 0) return report_missing(name, error);
+    if (error == 0) return child;
+    report_missing(name, error);
+    return -1;
+}
+
+int run_tool(std::vector<std::string> arguments) {
+    constexpr const char* name = "hal-tools";
+    const IgnoredInterrupt meanwhile;
+    const pid_t child = start_program(name, std::move(arguments));
+    if (child < 0) return 1;
     int status = 0;
     while (::waitpid(child, &status, 0) < 0) {
         if (errno != EINTR) return report_missing(name, errno);

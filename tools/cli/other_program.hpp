@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <sys/types.h>
 #include <vector>
 
 namespace hal::tools {
@@ -16,5 +17,10 @@ int become_program(const char* name, char** argv);
 /// Runs `hal-tools` with these arguments, the first of which is the name of a command, and waits
 /// for its end. Returns its exit status. [setup]
 int run_tool(std::vector<std::string> arguments);
+
+/// Starts a program beside this one with these arguments, the first of which is the name of a
+/// command, and does not wait for it; builds it first where build_on_demand() does that. Returns its
+/// process, or -1 after printing why it does not run. [setup]
+pid_t start_program(const char* name, std::vector<std::string> arguments);
 
 }  // namespace hal::tools

@@ -29,10 +29,22 @@ const Verb verbs[] = {
     {"probe", RequestKind::reads, {"every", "batch_ms", "buffer_ms"}},
     {"unprobe", RequestKind::reads, {}},
     {"run", RequestKind::reads, {}},
+    {"moment", RequestKind::reads, {}},
+    {"around", RequestKind::reads, {"before_ms", "after_ms"}},
     {"set", RequestKind::writes, {}},
 };
 
-/// Of the command language a page may use what only reads, and the acknowledgement of faults.
+/// What moves a replayed machine; one that runs has no such commands.
+bool moves_in_time(const Json& words) {
+    constexpr std::string_view moves[] = {"step", "back",  "continue", "reverse",
+                                          "goto", "break", "where",    "pause"};
+    if (words == Json{"fault", "next"} || words == Json{"fault", "previous"}) return true;
+    return std::find(std::begin(moves), std::end(moves), words[0].get_ref<const std::string&>()) !=
+           std::end(moves);
+}
+
+/// Of the command language a page may use what only reads, what moves a replayed machine, and the
+/// acknowledgement of faults.
 RequestKind check_command(const Json& words) {
     if (!words.is_array() || words.empty() || words.size() > 8) return RequestKind::rejected;
     if (!std::all_of(words.begin(), words.end(),
@@ -40,6 +52,7 @@ RequestKind check_command(const Json& words) {
         return RequestKind::rejected;
     }
     if (words == Json{"fault", "clear"}) return RequestKind::writes;
+    if (moves_in_time(words)) return RequestKind::reads;
     return words[0] == "show" || words[0] == "status" ? RequestKind::reads : RequestKind::rejected;
 }
 
@@ -55,7 +68,7 @@ RequestKind check_request(Json& request, std::string& problem) {
     if (!verb) {
         problem =
             "a request has exactly one of the verbs read, subscribe, unsubscribe, list, describe, "
-            "complete, probe, unprobe, run, set";
+            "complete, probe, unprobe, run, moment, around, set";
         return RequestKind::rejected;
     }
     for (const auto& [key, value] : request.items()) {

@@ -17,6 +17,7 @@
 #include "run/journal_test.hpp"
 #include "run/journaled_program.hpp"
 #include "run/replay_note.hpp"
+#include "run/replay_panel.hpp"
 #include "run/replay_recording.hpp"
 #include "run/replay_shell.hpp"
 #include "run/replayed_machine.hpp"
@@ -243,6 +244,17 @@ std::string record_problem(const ReplayOptions& options) {
     return problem.empty() ? "" : "--record: " + problem;
 }
 
+/// Returns why the options of the panel are invalid; "" when they are valid.
+std::string panel_problem(const ReplayOptions& options) {
+    if (!options.panel) return options.name.empty() ? "" : "--name is for --panel";
+    const bool has_output = !options.show.empty() || !options.record.empty() ||
+                            !options.as_test.empty() || !options.cut.empty();
+    if (options.shell || has_output) {
+        return "--panel excludes --shell, --show, --record, --as-test and --cut; leave them out";
+    }
+    return "";
+}
+
 std::string cut_problem(const ReplayOptions& options) {
     if (!options.edits.empty() || !options.netlist.empty() || options.shell) {
         return "it is for the journal as it is: without --edit, --netlist and --shell";
@@ -280,6 +292,9 @@ int run_exact_replay(const ReplayOptions& options) {
         return fail(options, fmt::format("--break: invalid condition '{}'; {}",
                                          options.break_condition, ValueCondition::form));
     }
+    if (const std::string problem = panel_problem(options); !problem.empty()) {
+        return fail(options, problem);
+    }
     if (const std::string problem = record_problem(options); !problem.empty()) {
         return fail(options, problem);
     }
@@ -313,6 +328,10 @@ int run_exact_replay(const ReplayOptions& options) {
     const JournaledProgram program(options, file);
     if (const int status = program.check(); status != 0) return status;
     program.name_readers();
+    if (options.panel) {
+        program.name_uncopied();
+        return run_replay_panel(options, file, change);
+    }
     if (options.shell) {
         program.name_uncopied();
         return run_replay_shell(options, file, change);

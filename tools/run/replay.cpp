@@ -555,11 +555,17 @@ private:
 /// Returns the given options that work with --exact only: "--until, --show".
 std::string exact_options(const ReplayOptions& options) {
     const std::pair<const char*, bool> all[] = {
-        {"--until", !options.until.empty()},   {"--break", !options.break_condition.empty()},
-        {"--show", !options.show.empty()},     {"--shell", options.shell},
-        {"--edit", !options.edits.empty()},    {"--netlist", !options.netlist.empty()},
-        {"--at", !options.at.empty()},         {"--as-test", !options.as_test.empty()},
-        {"--record", !options.record.empty()}, {"--cut", !options.cut.empty()},
+        {"--until", !options.until.empty()},
+        {"--break", !options.break_condition.empty()},
+        {"--show", !options.show.empty()},
+        {"--shell", options.shell},
+        {"--panel", options.panel},
+        {"--edit", !options.edits.empty()},
+        {"--netlist", !options.netlist.empty()},
+        {"--at", !options.at.empty()},
+        {"--as-test", !options.as_test.empty()},
+        {"--record", !options.record.empty()},
+        {"--cut", !options.cut.empty()},
         {"--anyway", options.anyway},
     };
     std::string list;

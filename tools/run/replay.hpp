@@ -19,6 +19,8 @@ struct ReplayOptions : NetlistOptions {
     bool exact = false;
     bool anyway = false;
     bool shell = false;
+    bool panel = false;
+    std::uint16_t port = 8080;
     std::string as_test;  ///< a folder
     std::string cut;      ///< a file
     std::string record;   ///< a file
@@ -58,6 +60,13 @@ struct ReplayOptions : NetlistOptions {
         set.flag("--shell", shell,
                  "with --exact: a shell on the machine at any of its cycles; goes to --until or "
                  "--break first, type help in it");
+        set.flag("--panel", panel,
+                 "with --exact: the web panel on the machine at any of its cycles, with a time "
+                 "line; goes to --until or --break first");
+        set.value("-p,--port", port, "PORT",
+                  "with --panel: TCP port (default: 8080; 0: any free port)");
+        set.value("-N,--name", name, "NAME",
+                  "with --panel: name of the instance that other programs find (default: replay)");
         set.values("--edit", edits, "EDIT",
                    "with --exact: from --at on, execute with another value: 'setp NAME VALUE' or "
                    "'sets SIGNAL VALUE'; may be repeated");

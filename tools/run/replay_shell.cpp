@@ -1,20 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "run/replay_shell.hpp"
 
-#include <array>
-#include <cerrno>
-#include <charconv>
-#include <csignal>
-#include <cstring>
-#include <fmt/core.h>
-#include <functional>
+#include <algorithm>
 #include <iomanip>
-#include <optional>
-#include <poll.h>
 #include <sstream>
+#include <string>
 #include <string_view>
-#include <sys/socket.h>
-#include <system_error>
 #include <unistd.h>
 #include <vector>
 
@@ -22,9 +13,9 @@
 #include "cli/prompt_loop.hpp"
 #include "cli/signals.hpp"
 #include "journal/keyframes.hpp"
-#include "run/replayed_moment.hpp"
+#include "run/moment_link.hpp"
+#include "run/replay_command.hpp"
 #include "run/replayed_traces.hpp"
-#include "run/stop_rule.hpp"
 
 namespace hal::tools {
 namespace {
@@ -53,186 +44,67 @@ std::vector<std::string> split(const std::string& line) {
     return words;
 }
 
-template <std::size_t size>
-bool store(char (&to)[size], const std::string& text) {
-    if (text.size() >= size) return false;
-    std::memcpy(to, text.c_str(), text.size() + 1);
-    return true;
-}
-
-class ReplayShell final : public LineExecutor {
-public:
-    ReplayShell(Keyframes& frames, JournalFile& file, StopRequest& stop, int socket)
-        : frames_(frames), file_(file), stop_(stop), socket_(socket) {}
-
-    int execute(std::string_view line) override {
-        frames_.interrupt(false);
-        const std::string text(line);
-        const std::vector<std::string> words = split(text.substr(0, text.find('#')));
-        if (words.empty()) return 0;
-        for (const Row& row : rows) {
-            if (words[0] == row.name) return (this->*row.execute)(words);
-        }
-        Errand errand;
-        errand.kind = Errand::Kind::command;
-        return send(errand, text);
-    }
-    Completion complete(std::string_view line, std::size_t cursor) override;
-    bool collecting() const override { return false; }
-    bool over() const override { return over_ || stop_.requested(); }
-
-    int go_to(const std::string& text) { return position({"goto", text}); }
-    /// Sets the break condition and continues.
-    int run_to(const std::string& condition) {
-        const int status = set_break({"break", condition});
-        return status != 0 ? status : run({"continue"});
-    }
-
-private:
-    using Words = const std::vector<std::string>&;
-    struct Row {
-        std::string_view name;
-        int (ReplayShell::*execute)(Words);
-    };
-    static const std::array<Row, 11> rows;
-
-    int step(Words words);
-    int run(Words words);
-    int reverse(Words words);
-    int position(Words words);
-    int set_break(Words words);
-    int where(Words words);
-    int scope(Words words);
-    int help(Words words);
-    int quit(Words words);
-    std::string parse_step(Words words, std::size_t first, Errand& errand);
-    int send(Errand errand, const std::string& text = "");
-    std::optional<std::string> receive();
-
-    Keyframes& frames_;
-    JournalFile& file_;
-    StopRequest& stop_;
-    const int socket_;
-    std::string condition_;
-    bool over_ = false;
-};
-
-const std::array<ReplayShell::Row, 11> ReplayShell::rows = {{
-    {"step", &ReplayShell::step},
-    {"continue", &ReplayShell::run},
-    {"reverse", &ReplayShell::reverse},
-    {"goto", &ReplayShell::position},
-    {"break", &ReplayShell::set_break},
-    {"where", &ReplayShell::where},
-    {"scope", &ReplayShell::scope},
-    {"help", &ReplayShell::help},
-    {"quit", &ReplayShell::quit},
-    {"exit", &ReplayShell::quit},
-    {"back", &ReplayShell::step},
-}};
-
 int complain(const std::string& text) {
     write_all(STDERR_FILENO, text + "\n");
     return 1;
 }
 
-/// Returns why the words are invalid: [N] [THREAD].
-std::string ReplayShell::parse_step(Words words, std::size_t first, Errand& errand) {
-    errand.count = 1;
-    std::size_t at = first;
-    if (at < words.size()) {
-        const std::string& word = words[at];
-        const char* const end = word.data() + word.size();
-        const auto [rest, error] = std::from_chars(word.data(), end, errand.count);
-        if (error == std::errc() && rest == end) {
-            ++at;
-        } else {
-            errand.count = 1;
-        }
-        if (errand.count == 0) return "the number of cycles is 1 or more";
-    }
-    if (at < words.size()) {
-        const std::string& name = words[at++];
-        bool known = false;
-        for (const auto& [number, thread] : file_.threads()) {
-            known = known || thread.name == name;
-        }
-        if (!known || !store(errand.thread, name)) {
-            return fmt::format("the journal has no thread '{}'", name);
-        }
-    }
-    return at < words.size() ? fmt::format("unexpected '{}'", words[at]) : "";
-}
+class ReplayShell final : public LineExecutor {
+public:
+    ReplayShell(MomentLink& moment, JournalFile& file, StopRequest& stop)
+        : moment_(moment), commands_(file), stop_(stop) {}
 
-int ReplayShell::step(Words words) {
-    const bool is_back = words[0] == "back" || (words.size() > 1 && words[1] == "back");
-    const std::size_t first = is_back && words[0] == "step" ? 2 : 1;
-    Errand errand;
-    if (const std::string problem = parse_step(words, first, errand); !problem.empty()) {
-        return complain(fmt::format("step: {}; write: step [back] [N] [THREAD]", problem));
+    int execute(std::string_view line) override;
+    Completion complete(std::string_view line, std::size_t cursor) override;
+    bool collecting() const override { return false; }
+    bool over() const override { return over_ || stop_.requested(); }
+
+    int go_to(const std::string& text) { return move({"goto", text}); }
+    /// Sets the break condition and continues.
+    int run_to(const std::string& condition) {
+        const int status = move({"break", condition});
+        return status != 0 ? status : move({"continue"});
     }
-    errand.kind = is_back ? Errand::Kind::back : Errand::Kind::step;
+
+private:
+    int move(const std::vector<std::string>& words);
+    int quit();
+    int send(const Errand& errand);
+    int wait();
+
+    MomentLink& moment_;
+    ReplayCommands commands_;
+    StopRequest& stop_;
+    std::string data_;  // of the newest answer
+    bool over_ = false;
+};
+
+int ReplayShell::execute(std::string_view line) {
+    moment_.interrupt(false);
+    const std::string text(line);
+    const std::vector<std::string> words = split(text.substr(0, text.find('#')));
+    if (words.empty()) return 0;
+    if (ReplayCommands::is_known(words[0])) return move(words);
+    if (words[0] == "help") return exit_code(print(help_text));
+    if (words[0] == "quit" || words[0] == "exit") return quit();
+    Errand errand;
+    const bool is_scope = words[0] == "scope";
+    errand.kind = is_scope ? Errand::Kind::scope : Errand::Kind::command;
+    if (!store(errand.text, is_scope ? ScopeCommand::joined(words) : text))
+        return complain("the line is too long");
     return send(errand);
 }
 
-int ReplayShell::run(Words words) {
-    if (words.size() != 1) return complain("continue: it has no arguments");
+int ReplayShell::move(const std::vector<std::string>& words) {
     Errand errand;
-    errand.kind = Errand::Kind::run;
-    store(errand.condition, condition_);
+    if (const std::string problem = commands_.parse(words, errand); !problem.empty()) {
+        return complain(problem);
+    }
+    if (words[0] == "break" && commands_.condition().empty()) return 0;
     return send(errand);
 }
 
-int ReplayShell::reverse(Words words) {
-    if (words.size() != 1) return complain("reverse: it has no arguments");
-    if (condition_.empty()) {
-        return complain("reverse: no break condition; write: break NAME > VALUE");
-    }
-    Errand errand;
-    errand.kind = Errand::Kind::back;
-    errand.count = 1;
-    store(errand.condition, condition_);
-    return send(errand);
-}
-
-int ReplayShell::position(Words words) {
-    JournalPosition position;
-    if (words.size() != 2 || !position.parse(words[1])) {
-        return complain("goto: write a cycle or a time: goto 12000, goto 3.5s");
-    }
-    Errand errand;
-    errand.kind = Errand::Kind::position;
-    return send(errand, words[1]);
-}
-
-int ReplayShell::set_break(Words words) {
-    std::string text;
-    for (std::size_t i = 1; i < words.size(); ++i) {
-        text += (i == 1 ? "" : " ") + words[i];
-    }
-    ValueCondition condition;
-    Errand errand;
-    if (!text.empty() && (!condition.parse(text) || !store(errand.condition, text))) {
-        return complain(
-            fmt::format("break: invalid condition '{}'; {}", text, ValueCondition::form));
-    }
-    condition_ = text;
-    if (text.empty()) return 0;
-    errand.kind = Errand::Kind::check;
-    return send(errand);
-}
-
-int ReplayShell::where(Words) { return send({}); }
-
-int ReplayShell::scope(Words words) {
-    Errand errand;
-    errand.kind = Errand::Kind::scope;
-    return send(errand, ScopeCommand::joined(words));
-}
-
-int ReplayShell::help(Words) { return exit_code(print(help_text)); }
-
-int ReplayShell::quit(Words) {
+int ReplayShell::quit() {
     over_ = true;
     return 0;
 }
@@ -242,12 +114,10 @@ Completion ReplayShell::complete(std::string_view line, std::size_t cursor) {
     errand.kind = Errand::Kind::complete;
     errand.count = cursor;
     Completion completion;
-    if (!store(errand.text, std::string(line))) return completion;
-    if (::send(socket_, &errand, sizeof errand, MSG_NOSIGNAL) < 0) return completion;
-    std::istringstream in(receive().value_or(""));
-    std::string status;
+    if (!store(errand.text, std::string(line)) || !moment_.send(errand)) return completion;
+    wait();
+    std::istringstream in(data_);
     std::string text;
-    std::getline(in, status);
     in >> completion.begin;
     std::getline(in, text);
     while (std::getline(in, text)) {
@@ -258,63 +128,47 @@ Completion ReplayShell::complete(std::string_view line, std::size_t cursor) {
     return completion;
 }
 
-int ReplayShell::send(Errand errand, const std::string& text) {
-    if (!store(errand.text, text)) return complain("the line is too long");
-    if (::send(socket_, &errand, sizeof errand, MSG_NOSIGNAL) < 0) {
+int ReplayShell::send(const Errand& errand) {
+    if (!moment_.send(errand)) {
         over_ = true;
         return complain("the re-execution has ended");
     }
     stop_.spare(true);  // Ctrl-C is for the errand now
-    const std::optional<std::string> reply = receive();
+    const int status = wait();
     stop_.spare(false);
-    if (!reply) {
+    if (status < 0) {
         over_ = true;
-        return complain(
-            "the re-execution has ended unexpectedly: a component has crashed, or the "
-            "process was terminated");
+        return complain(ended_unexpectedly);
     }
-    return reply->starts_with("0") ? 0 : 1;
+    return status;
 }
 
-/// Returns nothing when the active process has ended.
-std::optional<std::string> ReplayShell::receive() {
-    std::vector<char> buffer(std::size_t{1} << 17);
-    for (;;) {
-        pollfd event{socket_, POLLIN, 0};
-        constexpr int check_every_ms = 100;
-        const int ready = ::poll(&event, 1, check_every_ms);
-        if (ready < 0) continue;
-        if (ready == 0) {
-            if (!frames_.alive()) return std::nullopt;
-            continue;
+/// Prints what the errand reports, and keeps its answer. Returns its status; -1 when the process has
+/// ended.
+int ReplayShell::wait() {
+    constexpr int without_limit = -1;
+    data_.clear();
+    while (const auto packet = moment_.receive(without_limit)) {
+        switch (packet->kind) {
+        case Packet::text: print(packet->text); break;
+        case Packet::data: data_ += packet->text; break;
+        case Packet::end: return packet->text == "0" ? 0 : 1;
+        case Packet::now:
+        case Packet::mark: break;
         }
-        const ssize_t bytes = ::recv(socket_, buffer.data(), buffer.size(), 0);
-        if (bytes <= 0) return std::nullopt;
-        return std::string(buffer.data(), static_cast<std::size_t>(bytes));
     }
+    return -1;
 }
 
 }  // namespace
 
 int run_replay_shell(const ReplayOptions& options, JournalFile& file, const WhatIf& change) {
-    int ends[2];
-    if (::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) {
-        return fail(options, fmt::format("cannot create a socket: {}", std::strerror(errno)));
-    }
     Keyframes frames;
-    const pid_t moment = frames.start();
-    if (moment < 0) {
-        return fail(options, fmt::format("cannot create a process: {}", std::strerror(errno)));
-    }
-    if (moment == 0) {
-        ::close(ends[0]);
-        std::signal(SIGTTOU, SIG_IGN);  // it prints while the front has the terminal
-        ReplayedMoment(options, file, frames, change, ends[1]).serve();
-    }
-    ::close(ends[1]);
+    MomentLink moment(frames);
+    if (!moment.start(options, file, change)) return 1;
     StopRequest stop;
-    stop.when_signalled([&frames] { frames.interrupt(true); });
-    ReplayShell shell(frames, file, stop, ends[0]);
+    stop.when_signalled([&moment] { moment.interrupt(true); });
+    ReplayShell shell(moment, file, stop);
     int status = 0;
     if (!options.until.empty()) {
         status = shell.go_to(options.until);
@@ -324,7 +178,6 @@ int run_replay_shell(const ReplayOptions& options, JournalFile& file, const What
     }
     const int lines = run_prompt_loop(shell, {"replay> ", "...> "}, stop.fd());
     stop.release();
-    ::close(ends[0]);
     return std::max(status, lines);
 }
 

@@ -5,20 +5,38 @@
 #include <cerrno>
 #include <cstring>
 #include <fmt/core.h>
+#include <nlohmann/json.hpp>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 #include <utility>
 
 #include "cli/output.hpp"
+#include "commands/json_text.hpp"
 #include "commands/table.hpp"
+#include "control/connection.hpp"
 #include "machine/report/crash.hpp"
+#include "run/moment_samples.hpp"
 #include "run/replay_note.hpp"
 #include "run/replayed_traces.hpp"
 #include "text/numbers.hpp"
 
 namespace hal::tools {
 namespace {
+
+/// Returns the commands of an edit on one line.
+std::string entry_text(const ExecutionEntry& entry) {
+    constexpr std::size_t max_length = 200;
+    std::string text;
+    for (const std::vector<std::string>& command : entry.commands) {
+        text += text.empty() ? "" : "; ";
+        for (std::size_t i = 0; i < command.size(); ++i) {
+            text += (i == 0 ? "" : " ") + command[i];
+        }
+        if (text.size() > max_length) return text.substr(0, max_length) + " …";
+    }
+    return text;
+}
 
 constexpr auto min_spacing = std::chrono::milliseconds(20);
 constexpr int max_share = 8;  // the copies take an eighth of the time at most
@@ -29,10 +47,16 @@ constexpr std::uint64_t look_every = 64;  // cycles: at the clock and at the fro
 ReplayedMoment::ReplayedMoment(const ReplayOptions& options, JournalFile& file, Keyframes& frames,
                                const WhatIf& change, int socket)
     : options_(options),
+      file_(file),
       frames_(frames),
       socket_(socket),
       machine_(options, file, ReplayedMachine::Compare::values, change, true),
-      spacing_(min_spacing) {}
+      spacing_(min_spacing) {
+    if (file.begin()) {  // what is before it was made in another machine
+        entries_ = file.begin()->entries;
+        has_run_ = true;
+    }
+}
 
 void ReplayedMoment::serve() {
     keep();  // where all cycles can be reached from
@@ -62,23 +86,39 @@ bool ReplayedMoment::receive(Errand& errand) {
     }
 }
 
-void ReplayedMoment::answer(int status, const std::string& text) {
-    const std::string message = fmt::format("{}\n{}", status, text);
-    while (::send(socket_, message.data(), message.size(), MSG_NOSIGNAL) < 0 && errno == EINTR) {
+void ReplayedMoment::send(Packet kind, std::string_view text) {
+    std::string packet;
+    do {
+        const std::string_view part = text.substr(0, max_packet);
+        packet.assign(1, static_cast<char>(kind)).append(part);
+        while (::send(socket_, packet.data(), packet.size(), MSG_NOSIGNAL) < 0 && errno == EINTR) {
+        }
+        text.remove_prefix(part.size());
+    } while (!text.empty());
+}
+
+void ReplayedMoment::answer(int status, std::string_view data) {
+    if (!data.empty()) {
+        send(Packet::data, data);
+    }
+    send(Packet::end, std::to_string(status));
+}
+
+void ReplayedMoment::carry_out(const Errand& errand) {
+    interrupted_ = false;
+    status_ = errand.status;
+    marks_ = errand.marks;
+    frontier_ = errand.frontier;
+    sent_ = std::chrono::steady_clock::now();
+    switch (errand.kind) {
+    case Errand::Kind::command: return answer(execute(errand.text));
+    case Errand::Kind::complete: return complete(errand);
+    case Errand::Kind::request: return request(errand);
+    default: return move(errand);
     }
 }
 
-void ReplayedMoment::carry_out(Errand errand) {
-    interrupted_ = false;
-    status_ = errand.status;
-    if (errand.kind == Errand::Kind::command) {
-        answer(execute(errand.text));
-        return;
-    }
-    if (errand.kind == Errand::Kind::complete) {
-        complete(errand);
-        return;
-    }
+void ReplayedMoment::move(Errand errand) {
     const auto lock = machine_.session().lock();
     ValueCondition condition;
     condition.parse(errand.condition);
@@ -100,6 +140,9 @@ void ReplayedMoment::carry_out(Errand errand) {
     case Errand::Kind::check: check(condition); break;
     case Errand::Kind::scope: scope(errand); break;
     case Errand::Kind::draw: draw(errand); break;
+    case Errand::Kind::run_to_fault: run_to_fault(); break;
+    case Errand::Kind::samples: samples(errand); break;
+    case Errand::Kind::sample: sample(errand); break;
     default: tell();
     }
 }
@@ -133,9 +176,11 @@ bool ReplayedMoment::next() {
             fastest_number_ = newest.number;
         }
     }
+    note_marks(goes_on);
     if (!goes_on) return false;
     if (cycles() % look_every != 0) return true;
     if (!frames_.front_lives()) end_process(0);
+    send_progress();
     if (std::chrono::steady_clock::now() - kept_ >= spacing_) {
         keep();
     }
@@ -143,14 +188,16 @@ bool ReplayedMoment::next() {
 }
 
 void ReplayedMoment::resume(const Errand& errand, std::uint64_t max_cycles) {
-    frames_.errand<Errand>() = errand;
+    Errand& next = frames_.errand<Errand>();
+    next = errand;
+    next.marks = marks_;
+    next.frontier = frontier_;
     if (machine_.execution().has_outside()) {
         machine_.execution().finish();
         machine_.session().shut_down();  // what it has opened is opened again
     }
     frames_.resume([max_cycles](const KeyframeMark& mark) { return mark.cycles <= max_cycles; });
-    print(
-        "cannot go back: no copy of this process could be made (too many processes, or not "
+    say("cannot go back: no copy of this process could be made (too many processes, or not "
         "enough memory)\n");
     answer(1);
 }
@@ -165,7 +212,7 @@ void ReplayedMoment::run(const ValueCondition& condition) {
     }
     if (resumed_) return;
     if (condition.is_unknown(machine_.session())) {
-        print(fmt::format("break: the machine has no '{}'\n", condition.name()));
+        say(fmt::format("break: the machine has no '{}'\n", condition.name()));
     }
     tell();
 }
@@ -228,10 +275,10 @@ void ReplayedMoment::search(const Errand& errand) {
     }
     if (begin == 0) {
         if (condition.is_unknown(machine_.session())) {
-            print(fmt::format("break: the machine has no '{}'\n", condition.name()));
+            say(fmt::format("break: the machine has no '{}'\n", condition.name()));
         }
-        print(condition.empty() ? "no earlier cycle of this thread\n"
-                                : "the condition begins to hold in no earlier cycle\n");
+        say(condition.empty() ? "no earlier cycle of this thread\n"
+                              : "the condition begins to hold in no earlier cycle\n");
         return seek(0);
     }
     Errand rest = errand;
@@ -261,7 +308,7 @@ void ReplayedMoment::go_to(const Errand& errand) {
 /// cycle nothing is loaded.
 void ReplayedMoment::check(const ValueCondition& condition) {
     if (cycles() != 0 && condition.is_unknown(machine_.session())) {
-        print(fmt::format("break: the machine has no '{}' in this cycle\n", condition.name()));
+        say(fmt::format("break: the machine has no '{}' in this cycle\n", condition.name()));
     }
     answer(0);
 }
@@ -281,7 +328,7 @@ void ReplayedMoment::scope(Errand errand) {
         }
     }
     if (!problem.empty()) {
-        print(fmt::format("scope: {}\n", problem));
+        say(fmt::format("scope: {}\n", problem));
         return answer(1);
     }
     errand.kind = Errand::Kind::draw;
@@ -318,12 +365,162 @@ void ReplayedMoment::draw(const Errand& errand) {
     }
     if (resumed_) return;
     std::string problem;
-    print(traces.drawn(problem));
+    say(traces.drawn(problem));
     if (!problem.empty()) {
-        print(fmt::format("scope: {}\n", problem));
+        say(fmt::format("scope: {}\n", problem));
         status_ = 1;
     }
     seek(errand.limit);
+}
+
+void ReplayedMoment::run_to_fault() {
+    const std::uint64_t before = newest_fault_;
+    while (next()) {
+        if (newest_fault_ == before) continue;
+        say(fault_text_ + "\n");
+        return tell();
+    }
+    if (!resumed_) {
+        tell();
+    }
+}
+
+/// The front has checked that the request only reads.
+void ReplayedMoment::request(const Errand& errand) {
+    std::string line;
+    std::string part(max_packet, '\0');
+    while (line.size() < errand.count) {
+        const ssize_t bytes = ::recv(socket_, part.data(), part.size(), 0);
+        if (bytes < 0 && errno == EINTR) continue;
+        if (bytes <= 0) return;
+        line.append(part, 0, static_cast<std::size_t>(bytes));
+    }
+    Connection connection(machine_.host().shell, ::getpid());
+    std::string reply;
+    if (errand.json) {
+        connection.handle(R"({"options":{"json":true}})", reply);
+        reply.clear();
+    }
+    connection.handle(line, reply, true);
+    answer(0, reply);
+}
+
+void ReplayedMoment::samples(Errand errand) {
+    const MomentSamples rows(machine_.session(), errand.text, machine_.fastest());
+    if (!rows.problem().empty()) return answer(1, rows.problem());
+    errand.kind = Errand::Kind::sample;
+    errand.limit = cycles();
+    errand.time_ns = max_time_ns_;
+    const std::int64_t begin_ns = max_time_ns_ - errand.before_ns;
+    const auto before = [begin_ns](const KeyframeMark& mark) {
+        return mark.cycles == 0 || mark.time_ns < begin_ns;
+    };
+    if (before(mark())) return sample(errand);
+    resume(errand, frames_.newest(before).value_or(0));
+}
+
+/// Executes the cycles around the moment, answers their rows, and goes back to it.
+void ReplayedMoment::sample(const Errand& errand) {
+    const std::int64_t begin_ns = errand.time_ns - errand.before_ns;
+    const std::int64_t end_ns = errand.time_ns + errand.after_ns;
+    bool goes_on = true;
+    // nothing is loaded before the first cycle
+    while ((max_time_ns_ < begin_ns || cycles() == 0) && goes_on) {
+        goes_on = next();
+    }
+    if (resumed_) return;
+    MomentSamples rows(machine_.session(), errand.text, machine_.fastest());
+    rows.add(machine_.execution().newest());
+    while (goes_on && max_time_ns_ < end_ns) {
+        goes_on = next();
+        if (goes_on) {
+            rows.add(machine_.execution().newest());
+        }
+    }
+    if (resumed_) return;
+    send(Packet::data, rows.answer(max_time_ns_));
+    seek(errand.limit);
+}
+
+// --- the time line ---
+
+void ReplayedMoment::note_marks(bool goes_on) {
+    if (!marks_) return;
+    const bool is_sent = cycles() > frontier_ || !goes_on;
+    note_entries(is_sent);
+    note_switch(is_sent);
+    note_faults(is_sent);
+    frontier_ = std::max(frontier_, cycles());
+}
+
+/// Edits before the functions were started are not marked: they load the machine.
+void ReplayedMoment::note_entries(bool is_sent) {
+    const std::size_t before = std::exchange(entries_, machine_.execution().entries());
+    for (std::size_t i = before; i < entries_; ++i) {
+        const ExecutionEntry& entry = file_.entries()[i];
+        const bool is_edit = entry.kind == ExecutionEntry::Kind::edit;
+        if (is_sent && is_edit && has_run_) {
+            send_mark("edit", entry_text(entry));
+        }
+    }
+}
+
+void ReplayedMoment::note_switch(bool is_sent) {
+    const bool runs = machine_.execution().functions_run();
+    has_run_ = has_run_ || runs;
+    const bool is_other = std::exchange(runs_, runs) != runs;
+    const bool is_begin = cycles() <= 1 && file_.begin();  // the state has it
+    if (is_sent && is_other && !is_begin) {
+        send_mark(runs ? "start" : "stop", runs ? "functions started" : "functions stopped");
+    }
+}
+
+void ReplayedMoment::note_faults(bool is_sent) {
+    const Reports& reports = machine_.session().reports();
+    const std::uint64_t count = reports.fault_count();
+    if (std::exchange(fault_count_, count) == count) return;
+    for (const FaultRecord& record : reports.faults()) {
+        if (record.number <= newest_fault_) continue;
+        newest_fault_ = record.number;
+        fault_text_ = record.sentence;
+        if (is_sent) {
+            send_mark("fault", record.sentence);
+        }
+    }
+}
+
+void ReplayedMoment::send_mark(const char* kind, const std::string& text) {
+    send(Packet::mark, json_text({{"kind", kind},
+                                  {"cycles", cycles()},
+                                  {"time_ns", machine_.execution().newest().time_ns},
+                                  {"text", text}}));
+}
+
+/// `text`: why the execution cannot go on, or "".
+void ReplayedMoment::send_position(const std::string& text, bool is_moving) {
+    const JournaledCycle& newest = machine_.execution().newest();
+    send(Packet::now,
+         json_text({{"cycles", cycles()},
+                    {"cycle", newest.number},
+                    {"thread", newest.thread},
+                    {"fastest_cycle", fastest_number_},
+                    {"time_ns", newest.time_ns},
+                    {"frontier", frontier_},
+                    {"moving", is_moving},
+                    {"ended", machine_.execution().state() != ReExecution::State::goes_on},
+                    {"running", runs_},
+                    {"copied", !machine_.execution().has_outside()},
+                    {"text", position_text()},
+                    {"state", text}}));
+}
+
+/// From time to time while an errand takes long.
+void ReplayedMoment::send_progress() {
+    constexpr auto interval = std::chrono::milliseconds(100);
+    const auto now = std::chrono::steady_clock::now();
+    if (!marks_ || now - sent_ < interval) return;
+    sent_ = now;
+    send_position("", true);
 }
 
 // --- what is printed ---
@@ -343,21 +540,26 @@ std::string ReplayedMoment::state_text() {
     }
 }
 
+std::string ReplayedMoment::position_text() const {
+    if (cycles() == 0) return "before the first cycle";
+    const JournaledCycle& newest = machine_.execution().newest();
+    return fmt::format("cycle {} of '{}' at {:.6f} s", newest.number, newest.thread,
+                       seconds(newest.time_ns));
+}
+
 /// Prints where the machine is, and answers. `found`: the name whose condition holds.
 void ReplayedMoment::tell(const std::string& found) {
-    const JournaledCycle& newest = machine_.execution().newest();
-    std::string text = "before the first cycle";
-    if (cycles() > 0) {
-        text = fmt::format("cycle {} of '{}' at {:.6f} s", newest.number, newest.thread,
-                           seconds(newest.time_ns));
-    }
+    std::string text = position_text();
     if (!found.empty()) {
         if (const auto reading = machine_.session().values().read({found}).front()) {
             text += fmt::format(": {} {}", found, format_value(reading->type, reading->value));
         }
     }
     const std::string state = state_text();
-    print(text + "\n" + state);
+    say(text + "\n" + state);
+    if (marks_) {
+        send_position(state, false);
+    }
     const bool good =
         machine_.difference().empty() && machine_.execution().state() != ReExecution::State::fails;
     answer(std::max(exit_code(good), status_));

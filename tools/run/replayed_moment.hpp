@@ -6,40 +6,15 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "journal/keyframes.hpp"
+#include "run/errand.hpp"
 #include "run/replayed_machine.hpp"
 #include "run/stop_rule.hpp"
 
 namespace hal::tools {
-
-/// What the front of a replay shell asks for. Plain memory: it passes from process to process.
-struct Errand {
-    enum class Kind : std::uint8_t {
-        run,  ///< forward until `condition` begins to hold, or to the end
-        step,  ///< forward by `count` cycles, of `thread` only unless it is empty
-        seek,  ///< to where `count` cycles have been executed
-        search,  ///< back to the `count`-th last cycle before the cycle `limit` in which
-        ///< `condition` begins to hold; without one, of `thread`
-        back,  ///< the same, before the present cycle
-        position,  ///< to `text`: a cycle or a time
-        where,  ///< print the position
-        check,  ///< report a missing name in `condition`
-        command,  ///< execute `text` in the shell
-        scope,  ///< draw the values of `text` around the present cycle
-        draw,  ///< the same around `time_ns`, and go to where `limit` cycles have been executed
-        complete,  ///< answer the candidates for `text` at byte `count`
-    };
-    Kind kind = Kind::where;
-    std::uint64_t count = 0;
-    std::uint64_t limit = 0;
-    std::int64_t time_ns = 0;
-    int status = 0;  ///< exit status so far
-    char thread[256] = "";
-    char condition[512] = "";
-    char text[2048] = "";
-};
 
 /// [setup]
 class ReplayedMoment {
@@ -54,7 +29,8 @@ public:
 
 private:
     bool receive(Errand& errand);
-    void carry_out(Errand errand);
+    void carry_out(const Errand& errand);
+    void move(Errand errand);
     void run(const ValueCondition& condition);
     void step(std::uint64_t count, const std::string& thread);
     void seek(std::uint64_t cycles, const std::string& condition = "");
@@ -64,6 +40,10 @@ private:
     void check(const ValueCondition& condition);
     void scope(Errand errand);
     void draw(const Errand& errand);
+    void run_to_fault();
+    void request(const Errand& errand);
+    void samples(Errand errand);
+    void sample(const Errand& errand);
     int execute(const std::string& line);
     bool next();
     void keep();
@@ -71,10 +51,21 @@ private:
     KeyframeMark mark() const;
     std::uint64_t cycles() const { return machine_.execution().cycles(); }
     void tell(const std::string& found = "");
+    std::string position_text() const;
     std::string state_text();
-    void answer(int status, const std::string& text = "");
+    void send(Packet kind, std::string_view text);
+    void say(const std::string& text) { send(Packet::text, text); }
+    void send_position(const std::string& text, bool is_moving);
+    void send_progress();
+    void note_marks(bool goes_on);
+    void note_entries(bool is_sent);
+    void note_switch(bool is_sent);
+    void note_faults(bool is_sent);
+    void send_mark(const char* kind, const std::string& text);
+    void answer(int status, std::string_view data = "");
 
     const ReplayOptions& options_;
+    const JournalFile& file_;
     Keyframes& frames_;
     const int socket_;
     ReplayedMachine machine_;
@@ -85,6 +76,16 @@ private:
     bool resumed_ = false;  // this process continues from a keyframe: it has another errand
     bool interrupted_ = false;
     int status_ = 0;  // of the errand, so far
+    bool marks_ = false;  // the front has a time line
+    std::uint64_t frontier_ =
+        0;  // most cycles that were executed, of which the front has the marks
+    std::size_t entries_ = 0;  // of the journal, that were looked at
+    bool runs_ = false;  // functions did in the newest cycle
+    bool has_run_ = false;  // since the begin of the machine
+    std::uint64_t fault_count_ = 0;
+    std::uint64_t newest_fault_ = 0;  // its number
+    std::string fault_text_;  // of the newest
+    std::chrono::steady_clock::time_point sent_{};  // the last progress
 };
 
 }  // namespace hal::tools
